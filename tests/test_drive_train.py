@@ -16,7 +16,8 @@ import pytest
 import lostmotion as lm
 from conftest import SCENARIOS, TRAINS
 from lostmotion.inputs.validation import shown
-from lostmotion.simulation.train_scenario import file_schema, in_long_form, train_schema
+from lostmotion.simulation.axis_form import file_schema
+from lostmotion.simulation.train_scenario import in_long_form, train_schema
 from lostmotion.simulation.train_state import start_values
 
 TRAIN: dict[str, Any] = {

@@ -1,13 +1,24 @@
 """Linear motion: slides, and the screws, racks and belts that move them, against the same drive in units of rotation."""
 
 import math
+import re
 import tomllib
 
 import numpy as np
 import pytest
 
 import lostmotion as lm
-from lostmotion.simulation.train_scenario import train_from_tables
+from lostmotion.inputs.schema import unit_in_schema
+from lostmotion.live_page.description import describe
+from lostmotion.portable import fmi2, fmi3, fmu
+from lostmotion.portable.description import numbers_of
+from lostmotion.portable.parameters import parameters_of
+from lostmotion.reports.page import render
+from lostmotion.reports.run import summary
+from lostmotion.reports.servo import servo_report
+from lostmotion.simulation.keys import set_values
+from lostmotion.simulation.scenario_files import scenario_from
+from lostmotion.simulation.train_scenario import train_from_tables, train_schema
 from lostmotion.units.conversion import to_si
 
 SCREW = """
@@ -270,3 +281,178 @@ def test_start_of_a_slide_is_given_in_units_of_translation():
     result = lm.simulate(scenario)
     assert float(result["table_position"][0]) == 0.02
     assert float(result["table_speed"][0]) == 0.005
+
+
+AXIS = """
+title = "Axis"
+[axis.motor]
+kind = "torque_source"
+rotor_inertia = "3 kg cm^2"
+rated_torque = "2.4 N m"
+torque_limit = "7 N m"
+[axis.screw]
+lead = "10 mm"
+efficiency = 0.9
+stiffness = "150 N/um"
+backlash = "2 um"
+[axis.slide]
+mass = "20 kg"
+friction_force = "30 N"
+[controller]
+sample_time = "125 us"
+encoder = { bits = 20 }
+position_encoder = { resolution = "50 nm" }
+position = { gain = "1.5 (m/min)/mm", feedforward = 1.0, speed_limit = "500 mm/s" }
+speed = { gain = 0.4, integral_time = "20 ms" }
+[controller.reference]
+kind = "position"
+speed = "300 mm/s"
+acceleration = "3 m/s^2"
+moves = [{ to = "100 mm" }]
+[simulation]
+duration = "0.6 s"
+sample_interval = "1 ms"
+"""
+
+
+def axis(**changes):
+    tables = tomllib.loads(AXIS)
+    set_values(tables, changes.items())
+    return scenario_from(tables)
+
+
+def test_short_form_of_an_axis_is_a_train():
+    """The same scenario as written out with shafts, slides and screws: the same results."""
+    short = axis()
+    assert list(short.train().shafts) == ["motor", "slide"]
+    tables = tomllib.loads(AXIS)
+    parts = tables.pop("axis")
+    tables["controllers"] = {"motor": tables.pop("controller")}
+    tables["controllers"]["motor"]["position_encoder"]["shaft"] = "slide"
+    tables |= {"shafts": {"motor": {}}, "slides": {"slide": parts["slide"]}}
+    tables |= {"motors": {"motor": {"shaft": "motor", **parts["motor"]}}}
+    tables |= {"screws": {"screw": {"input": "motor", "output": "slide", **parts["screw"]}}}
+    assert scenario_from(tables) == short
+    behind = axis(**{"axis.gearbox": {"ratio": 3.0}})
+    assert list(behind.train().shafts) == ["motor", "screw", "slide"]
+    assert behind.screws["screw"].input == "screw"
+
+
+def test_references_and_encoders_of_slides_are_in_metres():
+    controller = axis().controllers["motor"]
+    assert controller.reference.moves[0].to == 0.1
+    assert controller.reference.speed == 0.3
+    assert controller.position_encoder.resolution == 5e-8
+    assert controller.position.speed_limit == 0.5
+    assert controller.position.gain == pytest.approx(25.0, rel=1e-15)
+    result = lm.simulate(axis())
+    # The play of 2 um, and what 30 N bend of 150 N/um; the rest is the integrator's.
+    assert float(result["slide_position"][-1]) == pytest.approx(0.1, abs=5e-6)
+    assert result["motor_position_reference"].attrs["units"] == "m"
+    assert result["motor_measured_position"].attrs["units"] == "m"
+    assert result["motor_speed_reference"].attrs["units"] == "rad/s"
+
+
+def test_linear_scale_reads_its_grating_in_steps():
+    """Within half of p/2^bits, and with the period p of its error: at whole periods the error is sin(phase)."""
+    scale = lm.Encoder(grating_period=2e-5, bits=4, error=1e-7)
+    assert scale.step == 2e-5 / 16
+    result = lm.simulate(axis(**{"controller.position_encoder": {"grating_period": "20 um", "bits": 4}}))
+    step = 2e-5 / 16
+    read = result["motor_measured_position"].values / step
+    np.testing.assert_allclose(read, np.round(read), rtol=0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"controller.reference.moves": [{"to": "1 rad"}]}, "controller.reference.moves.0.to"),
+        ({"controller.position.speed_limit": "3 rad/s"}, "controller.position.speed_limit"),
+        ({"controller.encoder.resolution": "1 um", "controller.encoder.bits": 3}, "controller.encoder.resolution"),
+        ({"controller.position_encoder": {"bits": 20}}, "position_encoder.bits: counts a turn"),
+        ({"controller.encoder": {"grating_period": 2e-5}}, "encoder.grating_period: is that of a linear scale"),
+        ({"axis.belt": {"teeth": 20, "pitch": "5 mm"}}, "has screw and belt"),
+        ({"axis.screw.leed": 1.0}, "axis.screw.leed"),
+        ({"axis.slide.mass": "3 N"}, "axis.slide.mass"),
+        ({"axis.sled": {}}, "axis.sled"),
+        ({"load": {}}, "does not stand beside [axis]"),
+        ({"command": 1.0}, "both turn the motor"),
+    ],
+)
+def test_bad_input_in_the_short_form_is_refused_with_its_keys(changes, message):
+    with pytest.raises(lm.InputError) as refused:
+        axis(**changes)
+    assert message in str(refused.value)
+    assert "controllers." not in str(refused.value)
+
+
+# What measures a turn or a torque.
+ROTARY_UNITS = re.compile(r"\b(m?rad|rpm|deg|arcmin|mrad)\b|N[·*]m|°")
+SLIDES = ("slide", "deflection", "output_force")
+
+
+def rotary(lines, names=SLIDES):
+    """Lines about slides or what moves them that have a unit of rotation."""
+    return [line for line in lines if any(name in line for name in names) and ROTARY_UNITS.search(line)]
+
+
+def test_no_output_has_a_unit_of_rotation_on_a_slide(tmp_path):
+    """Of all that is written of a ball-screw axis."""
+    scenario = lm.load("ball-screw-axis").replace(**{"simulation.duration": 0.4})
+    result = lm.simulate(scenario)
+    assert rotary(f"{name} {v.attrs['units']}" for name, v in result.data_vars.items()) == []
+    lm.save(result, tmp_path / "run.csv")
+    head = next(line for line in (tmp_path / "run.csv").read_text().splitlines() if line.startswith("time"))
+    assert "slide_position [m]" in head
+    assert rotary(head.split(",")) == []
+    text = summary(result)
+    assert "slide slide:" in text
+    assert rotary(text.splitlines()) == []
+    open_loop = scenario.replace(controllers={}, command={"motor": 0.1})
+    assert rotary(str(lm.explain(open_loop, 0.1)).splitlines(), ("slide_contact", "deflection")) == []
+
+
+def test_no_unit_of_rotation_on_a_slide_in_an_fmu_or_the_live_page():
+    scenario = lm.load("ball-screw-axis").replace(**{"simulation.duration": 0.2})
+    parameters = parameters_of(scenario, numbers_of).parameters
+    turning = ("inertia", "drag_torque", "screw.viscous_friction")
+    of_slides = [f"{p.key} {p.unit}" for p in parameters if p.key.startswith(("slides", "screws"))]
+    assert [line for line in rotary(of_slides, ("",)) if not any(key in line for key in turning)] == []
+    units = {p.key: p.unit for p in parameters if p.key.startswith("controllers.motor.position_encoder")}
+    assert units.pop("controllers.motor.position_encoder.error_phase") == "rad"  # of its sine
+    assert set(units.values()) == {"m"}
+    for version in (fmi2, fmi3):
+        model = fmu._model(scenario, parameters, "0" * 32, True)
+        described = version.model_description(model).decode()
+        assert rotary(re.findall(r"<\w+[^>]*name=\"[^>]*>", described)) == []
+        assert 'unit="m/s"' in described
+    page = describe(scenario, "axis")
+    assert (
+        rotary(f"{s['key']} {s['unit']}" for s in page["sliders"] if "slides" in s["key"] or "reference" in s["key"])
+        == []
+    )
+    assert [figure["unit"] for figure in page["figures"]] == ["m", "m"]
+    assert [shaft["slide"] for shaft in page["shafts"]] == [False, True]
+
+
+def test_no_unit_of_rotation_in_the_servo_report_of_a_slide():
+    """But for the motor's own: its torque, its speed, its gains."""
+    report = lm.commission(lm.load("ball-screw-axis").replace(**{"simulation.duration": 0.4}))
+    rows = [f"{what}: {value}" for what, value in report.motion_rows()]
+    at_rest = [row for row in rows if "at the motor" in row]
+    assert rotary([row for row in rows if row not in at_rest], ("",)) == []
+    assert any("N/µm" in row for row in rows)
+    html = render(servo_report("axis", report))
+    assert "N·m/rad" not in html
+    assert "mrad" not in html or report.limit_cycle.whole.cycles
+
+
+def test_schema_of_slides_has_no_unit_of_rotation():
+    schema = train_schema()["$defs"]
+    for part in ("SlideTable", "EndStops", "ForceCurve", "StiffnessCurve", "LinearMotor", "ForceSignal"):
+        units = {key: unit_in_schema(node) for key, node in schema[part]["properties"].items()}
+        assert {k: u for k, u in units.items() if u and ROTARY_UNITS.search(u)} in (
+            {},
+            {"inclination": "rad"},
+            {"phase": "rad"},
+        ), part

@@ -11,7 +11,7 @@ export interface Description {
   shafts: ShaftView[];
   gears: GearView[];
   motors: MotorView[];
-  contacts: { label: string; variable: string }[];
+  contacts: { label: string; variable: string; slide: boolean }[];
   /** no controller turns its motors */
   open_loop: boolean;
   /** margins of the loops of the controllers, with the values of the file */
@@ -30,6 +30,8 @@ export interface ShaftView {
   angle: string | null;
   contact: string | null;
   motor: boolean;
+  /** moves along a straight line: [m], [m/s] and [N] */
+  slide: boolean;
 }
 export interface GearView {
   name: string;

@@ -3,14 +3,15 @@ import type { Run } from "./core";
 import type { Description, GearView, ShaftView } from "./description";
 import { svg } from "./dom";
 import { largest } from "./extent";
-import { angles, words } from "./kinematics";
-import { format, shown } from "./units";
+import { angles, unitsOf, words } from "./kinematics";
+import { format, shown, SLIDING, TURNING } from "./units";
 
 const [DISC, MESH, HEIGHT] = [150, 210, 210]; // widths of a shaft and of a gear, height of all
 const MIDDLE = 92;
 const TOOTH = 13; // half its width
 const REACH = 44; // of the largest twist
 const FRAME = 1 / 60;
+const SLIDE_TURN = 2 * Math.PI * 10; // a slide is drawn as a disc that turns once in 100 mm
 
 /** Shows a sample; pace: how much of a second of the drive passes in a second of the user. */
 type Mover = (k: number, pace: number) => void;
@@ -75,10 +76,11 @@ function disc(shaft: ShaftView, x: number): Part {
   const mover = (d: Description, run: Run): Mover => {
     const speeds = run.values.get(shaft.speed);
     const contact = shaft.contact === null ? undefined : run.values.get(shaft.contact);
-    const unit = shown("rad/s", speeds ? largest(speeds) : 0);
+    const unit = shown((shaft.slide ? SLIDING : TURNING).speed, speeds ? largest(speeds) : 0);
     return (k, pace) => {
-      const angle = angles(d, run, k).get(name) ?? 0;
-      const sweep = (speeds?.[k] ?? 0) * pace * FRAME * 4;
+      const turns = shaft.slide ? SLIDE_TURN : 1;
+      const angle = (angles(d, run, k).get(name) ?? 0) * turns;
+      const sweep = (speeds?.[k] ?? 0) * turns * pace * FRAME * 4;
       turning.setAttribute("transform", `rotate(${(angle * 180) / Math.PI})`);
       smear.setAttribute("d", Math.abs(sweep) > 0.6 ? arc(angle, sweep, radius - 9) : "");
       lock.style.display = contact?.[k] === 0 ? "" : "none";
@@ -111,13 +113,16 @@ function mesh(gear: GearView, number: number, x: number): Part {
   group.append(tooth, title, twist, torque);
   const mover = (d: Description, run: Run): Mover => {
     const { backlash, ratio } = d.gears[number]!;
-    title.textContent = `${words(gear.name)} ${format(ratio)}:1`;
+    const units = unitsOf(d, gear.output);
+    const linear = units === SLIDING;
+    const stage = linear ? `${format((2e3 * Math.PI) / ratio)} mm to a turn` : `${format(ratio)}:1`;
+    title.textContent = `${words(gear.name)} ${stage}`;
     const twists = gear.twist === null ? undefined : run.values.get(gear.twist);
     const torques = run.values.get(gear.output_torque);
     const gap = 0.5 * backlash;
     const scale = twists ? REACH / Math.max(largest(twists), gap, 1e-12) : 0;
-    const unit = shown("rad", twists ? largest(twists) : 0);
-    const torqueUnit = shown("N*m", torques ? largest(torques) : 0);
+    const unit = shown(units.angle, twists ? largest(twists) : 0);
+    const torqueUnit = shown(units.torque, torques ? largest(torques) : 0);
     return (k) => {
       const now = twists?.[k] ?? 0;
       const at = now * scale;
@@ -128,7 +133,9 @@ function mesh(gear: GearView, number: number, x: number): Part {
         plate.classList.toggle("pressed", side * now > gap * (1 + 1e-9) && twists !== undefined);
         spring.setAttribute("d", zigzag(pushed, side * 80));
       }
-      twist.textContent = twists ? `twist ${format(now / unit.factor, 3)} ${unit.unit}` : "rigid";
+      twist.textContent = twists
+        ? `${linear ? "deflection" : "twist"} ${format(now / unit.factor, 3)} ${unit.unit}`
+        : "rigid";
       torque.textContent = torques ? `${format(torques[k]! / torqueUnit.factor, 3)} ${torqueUnit.unit}` : "";
     };
   };

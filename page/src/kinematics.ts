@@ -1,6 +1,7 @@
 /** How the shafts of a train turn with each other. */
 import type { Run } from "./core";
 import type { Description } from "./description";
+import { SLIDING, TURNING } from "./units";
 
 /** Turns of each shaft for one of the last one, where gears with a standing housing lead from it there. */
 export function ratios(d: Description): Map<string, number> {
@@ -16,7 +17,7 @@ export function ratios(d: Description): Map<string, number> {
   return found;
 }
 
-/** The angle of each shaft at a sample [rad]; those that no gear leads to are left out. */
+/** The angle of each shaft at a sample [rad], and the position of each slide [m]; those that no gear leads to are left out. */
 export function angles(d: Description, run: Run, k: number): Map<string, number> {
   const found = new Map<string, number>();
   for (const { name, angle } of d.shafts) {
@@ -32,6 +33,11 @@ export function angles(d: Description, run: Run, k: number): Map<string, number>
       if (b === undefined && a !== undefined) found.set(g.output, a / g.ratio - twist);
     }
   return found;
+}
+
+/** Units of a shaft or a slide. */
+export function unitsOf(d: Description, shaft: string): typeof TURNING {
+  return d.shafts.find((s) => s.name === shaft)?.slide ? SLIDING : TURNING;
 }
 
 export function words(name: string): string {

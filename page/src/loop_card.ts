@@ -2,8 +2,9 @@
 import type { Run } from "./core";
 import type { Description, GearView } from "./description";
 import { h } from "./dom";
-import { words } from "./kinematics";
+import { unitsOf, words } from "./kinematics";
 import { type Line, Plot } from "./plot";
+import { SLIDING } from "./units";
 
 export class LoopCard {
   private readonly plots = new Map<string, Plot>();
@@ -15,8 +16,10 @@ export class LoopCard {
   draw(d: Description, run: Run, pinned?: Run): void {
     this.run = run;
     this.gears = d.gears;
-    for (const { name, twist, output_torque } of d.gears) {
+    for (const { name, twist, output, output_torque } of d.gears) {
       if (twist === null) continue;
+      const units = unitsOf(d, output);
+      const linear = units === SLIDING;
       const line = (of: Run, faint: boolean): Line => ({
         label: name,
         x: of.values.get(twist)!,
@@ -25,9 +28,9 @@ export class LoopCard {
         width: 1.4,
         faint,
       });
-      this.plot(name, d.gears.length > 1).draw({
-        x: { label: "twist", unit: "rad" },
-        y: { label: "output torque", unit: "N*m" },
+      this.plot(name, d.gears.length > 1, linear).draw({
+        x: { label: linear ? "deflection" : "twist", unit: units.angle },
+        y: { label: linear ? "output force" : "output torque", unit: units.torque },
         lines: [...(pinned ? [line(pinned, true)] : []), line(run, false)],
       });
     }
@@ -40,13 +43,14 @@ export class LoopCard {
     }
   }
 
-  private plot(name: string, several: boolean): Plot {
+  private plot(name: string, several: boolean, linear: boolean): Plot {
     let plot = this.plots.get(name);
     if (!plot) {
       const place = h("div", { class: "plot" });
-      const title = several ? `Torsion and hysteresis: ${words(name)}` : "Torsion and hysteresis";
+      const what = `${linear ? "Deflection" : "Torsion"} and hysteresis`;
+      const title = several ? `${what}: ${words(name)}` : what;
       this.root.append(h("figure", {}, h("figcaption", {}, h("b", {}, title)), place));
-      plot = new Plot(place, `${title}: output torque over twist`);
+      plot = new Plot(place, `${title}: ${linear ? "output force over deflection" : "output torque over twist"}`);
       this.plots.set(name, plot);
     }
     return plot;

@@ -3,11 +3,11 @@ import type { Beside } from "./beside";
 import type { Answer } from "./beside.worker";
 import type { Description } from "./description";
 import { h } from "./dom";
-import { words } from "./kinematics";
+import { unitsOf, words } from "./kinematics";
 import { type Line, Plot } from "./plot";
 import type { Point } from "./response";
 import { look, swatch } from "./time_charts";
-import { format } from "./units";
+import { format, TURNING } from "./units";
 
 const AMPLITUDES = [1, 0.3, 0.1, 0.03];
 const FREQUENCIES = Array.from({ length: 29 }, (_, k) => 0.3 * 10 ** ((2.4 * k) / 28)); // 0.3 to 75 Hz
@@ -20,6 +20,7 @@ export class ResponseCard {
   private phase?: Plot;
   private lines: Point[][] = [];
   private waiting = 0;
+  private unit = TURNING.speed;
 
   constructor(
     root: HTMLElement,
@@ -29,6 +30,7 @@ export class ResponseCard {
     if (!d.open_loop || d.motors.length === 0) return;
     const [gain, phase] = [h("div", { class: "plot" }), h("div", { class: "plot low" })];
     const entries = AMPLITUDES.map((_, k) => h("span", { class: "entry" }, swatch(k), this.entries[k]!));
+    this.unit = unitsOf(d, d.shafts.at(-1)!.name).speed;
     const title = `Frequency response: ${words(d.shafts.at(-1)!.name)} speed per command, by amplitude of the command`;
     root.append(
       h("figure", { class: "wide" }, h("figcaption", {}, h("b", {}, title), ...entries, this.state), gain, phase),
@@ -90,7 +92,7 @@ export class ResponseCard {
     const range: [number, number] = [floor, 2 * largest];
     this.gain!.draw({
       x,
-      y: { label: "gain", unit: "rad/s", logarithmic: true, range },
+      y: { label: "gain", unit: this.unit, logarithmic: true, range },
       lines: this.lines.map((points, k) => line(moving(points), k, (p) => p.gain)),
     });
     this.phase!.draw({

@@ -6,7 +6,7 @@ import type { CoreInput } from "./core_input";
 import type { Description } from "./description";
 import { h, svg } from "./dom";
 import { words } from "./kinematics";
-import { format, shown } from "./units";
+import { format, shown, SLIDING, TURNING } from "./units";
 
 const PATIENCE = 150; // ms between two questions while the instant moves
 const [WIDTH, HEIGHT, SIDE] = [300, 21, 8]; // of a bar, with room at both ends
@@ -18,6 +18,7 @@ export class StandCard {
   private run?: Run;
   private commands = new Map<string, string | null>();
   private labels = new Map<string, string>();
+  private slides = new Set<string>();
   private waiting = 0;
   private time = 0;
   private asked = -1;
@@ -36,6 +37,7 @@ export class StandCard {
     this.run = run;
     this.commands = new Map(d.motors.map((m) => [m.name, m.command]));
     this.labels = new Map(d.contacts.map((c) => [c.variable, c.label]));
+    this.slides = new Set(d.contacts.filter((c) => c.slide).map((c) => this.labels.get(c.variable)!));
     this.asked = -1;
     this.mark(this.time);
   }
@@ -72,20 +74,22 @@ export class StandCard {
     this.answer.textContent =
       stuck.length === 0 ? `Nothing stands still at ${at}.` : `Stuck at ${at}: ${stuck.map((c) => c.name).join(", ")}.`;
     this.list.replaceChildren(
-      ...named.map((c) => h("li", {}, ...bar(c), h("b", {}, c.name), `: ${contact(c)}`)),
+      ...named.map((c) =>
+        h("li", {}, ...bar(c), h("b", {}, c.name), `: ${contact(c, this.slides.has(c.name) ? SLIDING : TURNING)}`),
+      ),
       ...motors.map((m) => h("li", {}, motor(m, this.commandOf(m.name), motors.length > 1))),
     );
   }
 }
 
 /** What is true of a contact, as `lm.explain` says it. */
-export function contact(c: ContactState): string {
+export function contact(c: ContactState, { speed, torque } = TURNING): string {
   if (c.mode !== 0)
-    return `slips ${c.mode > 0 ? "forward" : "backward"} at ${withUnit("rad/s", c.speed)} and takes ${withUnit("N*m", Math.abs(c.torque))}`;
-  if (!Number.isFinite(c.forward)) return `rigid, holds ${withUnit("N*m", c.torque)}`;
+    return `slips ${c.mode > 0 ? "forward" : "backward"} at ${withUnit(speed, c.speed)} and takes ${withUnit(torque, Math.abs(c.torque))}`;
+  if (!Number.isFinite(c.forward)) return `rigid, holds ${withUnit(torque, c.torque)}`;
   return (
-    `stuck, holds ${withUnit("N*m", c.torque)} of +${withUnit("N*m", c.forward)} / −${withUnit("N*m", c.backward)}; ` +
-    `${withUnit("N*m", c.forward - c.torque)} more frees it forward, ${withUnit("N*m", c.backward + c.torque)} backward`
+    `stuck, holds ${withUnit(torque, c.torque)} of +${withUnit(torque, c.forward)} / −${withUnit(torque, c.backward)}; ` +
+    `${withUnit(torque, c.forward - c.torque)} more frees it forward, ${withUnit(torque, c.backward + c.torque)} backward`
   );
 }
 

@@ -3,9 +3,9 @@ import type { Run } from "./core";
 import type { Description } from "./description";
 import { h } from "./dom";
 import { largest } from "./extent";
-import { ratios, words } from "./kinematics";
+import { ratios, unitsOf, words } from "./kinematics";
 import { type Line, Plot } from "./plot";
-import { format, shown } from "./units";
+import { format, shown, SLIDING, TURNING } from "./units";
 
 interface Series {
   variable: string;
@@ -49,13 +49,18 @@ export function figures(d: Description, run: Run): Figure[] {
     ...d.motors.map((m) => torque(m.torque, m.name, m.shaft)),
     ...d.gears.map((g) => torque(g.output_torque, `${g.name} output`, g.output)),
   ];
-  const twists = d.gears.map((g) => ({ variable: g.twist ?? "", label: words(g.name), factor: 1 }));
+  const twists = (units: typeof TURNING): Series[] =>
+    d.gears
+      .filter((g) => unitsOf(d, g.output) === units)
+      .map((g) => ({ variable: g.twist ?? "", label: words(g.name), factor: 1 }));
+  const last = unitsOf(d, d.shafts.at(-1)!.name);
   const commands = d.motors.map((m) => ({ variable: m.command ?? "", label: words(m.name), factor: 1 }));
   const all: Figure[] = [
     ...d.figures.map((f) => ({ ...f, series: f.series.map((s) => ({ ...s, factor: 1 })) })),
-    { title: "Speed", unit: "rad/s", series: speeds },
-    { title: "Torque", unit: "N*m", series: torques },
-    { title: "Twist", unit: "rad", series: twists },
+    { title: "Speed", unit: last.speed, series: speeds },
+    { title: last === SLIDING ? "Force" : "Torque", unit: last.torque, series: torques },
+    { title: "Twist", unit: TURNING.angle, series: twists(TURNING) },
+    { title: "Deflection", unit: SLIDING.angle, series: twists(SLIDING) },
     { title: "Command", unit: "1", series: commands },
   ];
   for (const figure of all)

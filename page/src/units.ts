@@ -1,6 +1,9 @@
 /** Numbers and units as they are shown. */
 
 const WRITTEN: Record<string, string> = { "N*m": "N·m", "1": "" };
+/** Of what turns, and of what moves along a straight line. */
+export const TURNING = { angle: "rad", speed: "rad/s", torque: "N*m" };
+export const SLIDING = { angle: "m", speed: "m/s", torque: "N" };
 const PREFIXES: [number, string][] = [
   [1e3, "k"],
   [1, ""],
@@ -18,7 +21,7 @@ export interface Shown {
 export function shown(unit: string, largest: number): Shown {
   const written = WRITTEN[unit] ?? unit;
   if (written === "" || largest === 0 || !Number.isFinite(largest)) return { unit: written, factor: 1 };
-  const allowed = written.startsWith("rad") ? PREFIXES.slice(1) : PREFIXES;
+  const allowed = /^(rad|m\b)/.test(written) ? PREFIXES.slice(1) : PREFIXES;
   const [factor, prefix] = allowed.find(([f]) => largest >= f) ?? allowed.at(-1)!;
   return { unit: prefix + written, factor };
 }

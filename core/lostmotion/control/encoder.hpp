@@ -11,10 +11,11 @@
 namespace lostmotion::control {
 
 // th_hat = q floor(th/q + 1/2) + e sin(N th + psi). q is that of an incremental encoder of so many lines, 2 pi/(4
-// lines); of an absolute one of so many bits in a turn, 2 pi/2^bits; of one with sine and cosine 2 pi/(lines 2^bits).
+// lines); of a linear scale of grating period p it is p/4, or p/2^bits; of an absolute one of so many bits in a turn, 2
+// pi/2^bits; of one with sine and cosine 2 pi/(lines 2^bits).
 struct Encoder {
     int lines = 0, bits = 0;
-    double resolution = 0.0;
+    double resolution = 0.0, grating_period = 0.0;
     bool ideal = false;
     double error = 0.0;
     int error_periods = 0;
@@ -30,6 +31,9 @@ struct Encoder {
                    .meaning = "of a turn, or, with lines, of a signal period"},
                   bits, 1, 40);
         f.number({"resolution", "q", "rad", Range::positive, Given::may_be_left_out, "q itself"}, resolution);
+        f.number({"grating_period", "p", "m", Range::positive, Given::may_be_left_out,
+                  "of a linear scale on a slide; a signal period"},
+                 grating_period);
         f.flag({.key = "ideal", .meaning = "no resolution at all, for theory"}, ideal);
         f.number(
             {"error", "e", "rad", Range::not_negative, Given::has_default, "amplitude of the error within a period"},
@@ -37,7 +41,7 @@ struct Encoder {
         f.integer({.key = "error_periods",
                    .symbol = "N",
                    .given = Given::may_be_left_out,
-                   .meaning = "in a turn; left out, lines"},
+                   .meaning = "in a turn; left out, lines, or those of the grating"},
                   error_periods, 1, 1 << 24);
         f.number({"error_phase", "psi", "rad"}, error_phase);
     }

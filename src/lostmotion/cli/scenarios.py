@@ -24,6 +24,6 @@ def schema() -> None:
     """
     import json
 
-    from ..simulation.train_scenario import file_schema
+    from ..simulation.axis_form import file_schema
 
     print(json.dumps(file_schema(), indent=2))

@@ -87,6 +87,12 @@ class _Place:
     def axis(self, samples: int) -> _core.Axis:
         """The solver's controller; its sample time is so many of the shortest one."""
         c = self.controller
+        if self.train.is_slide(self.shaft):
+            for key, there in (("camera", c.camera), ("reference.target", getattr(c.reference, "target", None))):
+                if there is not None:
+                    raise InputError(
+                        f"{key}: gives an angle, and {self.shaft} is a slide; leave it out, or name a shaft"
+                    )
         out = _core.Axis()
         out.set_reference(c.reference.pieces(), c.reference.sine_list())
         out.set(
@@ -123,7 +129,12 @@ class _Place:
         encoder: Encoder | None = getattr(self.controller, key)
         if encoder is None:
             return None
-        scale = self.ratio(target, self.encoder_shaft(key), f"{key}.shaft")
+        shaft = self.encoder_shaft(key)
+        try:
+            encoder.check_shaft(slides=self.train.is_slide(shaft))
+        except InputError as problem:
+            raise InputError(f"{key}.{problem}") from None
+        scale = self.ratio(target, shaft, f"{key}.shaft")
         return {**encoder.core_fields(), "scale": scale, "delay": encoder.delay * samples}
 
     def _speed(self, loop: SpeedLoop) -> dict[str, Any]:

@@ -7,17 +7,19 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from .. import _core
+from ..errors import InputError
 from ..inputs.quantities import Whole
 from .described import EncoderFields
 
-RESOLUTION_KEYS = ("lines", "bits", "resolution")
+RESOLUTION_KEYS = ("lines", "bits", "grating_period", "resolution")
 
 
 class Encoder(EncoderFields):
     """A rotary encoder on a shaft: ``q floor(angle/q + 1/2) + error sin(periods angle + phase)``.
 
     Its resolution q is that of an incremental encoder of so many `lines`, 2 pi/(4 lines); of an absolute one of so many
-    `bits` in a turn, 2 pi/2**bits; with `lines` and `bits` of one with sine and cosine, 2 pi/(lines 2**bits).
+    `bits` in a turn, 2 pi/2**bits; with `lines` and `bits` of one with sine and cosine, 2 pi/(lines 2**bits). A linear scale on a slide
+    has a `grating_period` p: p/4, or with `bits` p/2**bits.
     """
 
     shaft: str | None = None
@@ -36,11 +38,34 @@ class Encoder(EncoderFields):
             )
         if self.resolution is not None and len(given) > 1:
             raise ValueError(f"has resolution and {given[0]}, which says the same; give one of them")
-        if self.error > 0.0 and self.error_periods is None and self.lines is None:
+        if self.grating_period is not None and self.lines is not None:
+            raise ValueError("has lines and grating_period; lines are of a turn, so leave one of them out")
+        if self.error > 0.0 and self.error_periods is None and self.lines is None and self.grating_period is None:
             raise ValueError("has an error but no error_periods; add how many of its periods a turn has")
         return self
 
+    def check_shaft(self, *, slides: bool) -> None:
+        """Refuse what a turn has on a slide, and a grating on a shaft.
+
+        Raises
+        ------
+        InputError
+        """
+        if not slides and self.grating_period is not None:
+            raise InputError(
+                "grating_period: is that of a linear scale, and this encoder is on a shaft; give lines or bits"
+            )
+        if slides:
+            keys = ("lines", "error_periods", *(() if self.grating_period is not None else ("bits",)))
+            for key in keys:
+                if getattr(self, key) is not None:
+                    raise InputError(
+                        f"{key}: counts a turn, and this encoder is on a slide; give grating_period, or resolution"
+                    )
+            if self.error > 0.0 and self.grating_period is None:
+                raise InputError("error: has no period; give grating_period in the place of resolution")
+
     @property
     def step(self) -> float:
-        """q [rad]; 0 for an ideal one."""
+        """q [rad], of a linear scale [m]; 0 for an ideal one."""
         return _core.encoder_step(self.core_fields())

@@ -85,34 +85,34 @@ def missing_torque(rig: Rig, s: Stretch, known: Mapping[str, Any], rung: int, po
     _check(scenario)
     train = scenario.train()
     ratios: dict[str, float] = {}
-    for name in scenario.shafts:
+    for name in train.shafts:
         n = turns(train, name, position.shaft)
         if n is None:
             raise InputError(f"shaft {name} does not turn with {position.shaft} by a fixed ratio")
         ratios[name] = n
     inertia, viscous, dry = 0.0, 0.0, np.zeros(len(s.time))
     other = np.zeros(len(s.time))
-    for name, shaft in scenario.shafts.items():
+    for name, shaft in train.shafts.items():
         n = ratios[name]
         inertia, viscous = inertia + n**2 * shaft.inertia, viscous + n**2 * shaft.viscous_friction
         slipping, _, speeds, torques = shaft.friction()
         dry += abs(n) * (np.interp(np.abs(n * s.speed), speeds, torques) if speeds else slipping)
-        if shaft.torque is not None:
-            other += n * _acting(rig, s, known, scenario, f"{name}_load_torque")
-    for gear in scenario.gears.values():
+        if name in scenario.loads():
+            other += n * _acting(rig, s, known, scenario, train.load_torque_of(name))
+    for gear in train.gears.values():
         n = ratios[gear.input]
         inertia, viscous = inertia + n**2 * gear.inertia, viscous + n**2 * gear.viscous_friction
     for damper in scenario.dampers.values():
         viscous += (ratios[damper.input] - ratios[damper.output]) ** 2 * damper.viscous_friction
-    for name, motor in scenario.motors.items():
+    for name, motor in train.motors.items():
         n = ratios[motor.shaft]
         inertia += n**2 * motor.rotor_inertia
         dry += abs(n) * motor.friction_torque
         other -= n * _motor_torque(rig, s, known, scenario, name, motor)
-    for t in (*scenario.gravity.values(), *scenario.angle_torques.values()):
+    for t in (*train.gravity.values(), *train.angle_torques.values()):
         n = ratios[t.shaft]
         other -= n * _over_angle(t, n * s.angle)
-    for spring in scenario.springs.values():
+    for spring in train.springs.values():
         n, spring_curve = ratios[spring.shaft], spring.stiffness.core()
         other += n * np.array([spring_curve.torque(phi - spring.rest_angle) for phi in (n * s.angle).tolist()])
     r = inertia * s.acceleration + viscous * s.speed + dry * np.sign(s.speed) + other
@@ -134,15 +134,16 @@ def _check(scenario: TrainScenario) -> None:
     for table in ("clutches", "freewheels", "brakes"):
         if names := list(getattr(scenario, table)):
             raise InputError(f"{table}.{names[0]} holds or lets go as it likes")
-    for name, gear in scenario.gears.items():
+    train = scenario.train()
+    for name, gear in train.gears.items():
         losses = gear.losses
         lossless = (isinstance(losses, ConstantEfficiency) and losses.efficiency == 1.0) or (
             isinstance(losses, MeshEfficiency) and losses.efficiencies() == (1.0, 1.0)
         )
         if not lossless or gear.transmission_error is not None:
-            raise InputError(f"gears.{name} has losses over the load or a transmission error")
+            raise InputError(f"{scenario.kind_of(name)}s.{name} has losses over the load or a transmission error")
     for table in ("shafts", "dampers"):
-        for name, element in getattr(scenario, table).items():
+        for name, element in getattr(train, table).items():
             if element.drag is not None:
                 raise InputError(f"{table}.{name} has a drag over the speed")
 
@@ -152,7 +153,7 @@ def _motor_torque(
 ) -> np.ndarray:
     """Measured, or of the command of a torque source."""
     for channel, m in rig.task.measured.items():
-        if m.variable == f"{name}_torque" and m.filter_time == 0.0:
+        if m.variable == scenario.train().motor_torque_of(name) and m.filter_time == 0.0:
             at, torque = measured_course(rig, s.log, channel, known)
             there = np.isfinite(torque)
             return np.asarray(np.interp(s.time, at[there], torque[there]))

@@ -19,8 +19,11 @@ NUMBERS = ("scale", "offset", "delay", "filter_time")
 
 
 def rate_of(variable: str) -> str:
-    """The variable that is the rate of an angle."""
-    return f"{variable.removesuffix('_angle')}_speed" if variable.endswith("_angle") else ""
+    """The variable that is the rate of an angle or a position."""
+    for suffix in ("_angle", "_position"):
+        if variable.endswith(suffix) and not variable.endswith("_measured_position"):
+            return f"{variable.removesuffix(suffix)}_speed"
+    return ""
 
 
 @dataclass(frozen=True)

@@ -38,8 +38,9 @@ def position_of(rig: Rig) -> Position:
         None does.
     """
     for name, m in rig.task.measured.items():
-        shaft = m.variable.removesuffix("_angle")
-        if m.variable.endswith("_angle") and shaft in rig.scenario.shafts and m.filter_time == 0.0:
+        train = rig.scenario.train()
+        shaft = next((s for s in train.shafts if train.angle_of(s) == m.variable), None)
+        if shaft is not None and m.filter_time == 0.0:
             return Position(name, shaft)
     raise InputError("no measured channel is the angle of a shaft without a filter")
 
@@ -94,14 +95,15 @@ def _in_windows(rig: Rig, log: Prepared, point: Point, rung: int, length: float,
         raise InputError(
             f"key fit.horizon: {length:g} s has fewer than {LEAST} samples of {log.name}; give longer ones"
         )
-    ratios = {s: turns(scenario.train(), s, position.shaft) for s in scenario.shafts}
+    train = scenario.train()
+    ratios = {s: turns(train, s, position.shaft) for s in train.shafts}
     begins: dict[int, dict[str, FormulaText]] = {}
     for k in starts[1:]:
         x, v = _cubic(time, angle, int(k), max(2, round(length / log.log.interval / 8)))
         if np.isnan(v):
             continue
-        begins[int(k)] = {f"initial.speeds.{s}": n * v for s, n in ratios.items() if n is not None}
-        begins[int(k)][f"initial.angles.{position.shaft}"] = x
+        begins[int(k)] = {scenario.initial_key("speeds", s): n * v for s, n in ratios.items() if n is not None}
+        begins[int(k)][scenario.initial_key("angles", position.shaft)] = x
     segments = []
     for segment in log.segments:
         edges = [segment.begin, *(k for k in begins if segment.begin < k < segment.end), segment.end]

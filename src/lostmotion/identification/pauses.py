@@ -41,6 +41,8 @@ class Shown:
     is_speed: bool
     ratios: Mapping[str, float]
     """turns of each shaft for one of the measured one"""
+    keys: Mapping[str, Mapping[str, str]]
+    """of `initial` for speed and angle of each shaft"""
 
 
 def split_at_pauses(rig: Rig, logs: Sequence[Prepared]) -> tuple[Rig, list[Prepared], dict[str, str]]:
@@ -119,20 +121,23 @@ def shown_by(rig: Rig, log: Prepared, known: Mapping[str, Any]) -> Shown:
     for table in ("clutches", "freewheels", "dampers"):
         if names := list(getattr(scenario, table)):
             raise InputError(f"no channel shows the state of {table}.{names[0]}")
-    for name, gear in scenario.gears.items():
+    train = scenario.train()
+    for name, gear in train.gears.items():
         if not isinstance(gear.stiffness, Rigid):
             raise InputError(f"no channel shows the twist of gears.{name}")
-    by_angle = bool(scenario.gravity or scenario.angle_torques or scenario.springs)
-    by_angle |= any(gear.transmission_error is not None for gear in scenario.gears.values())
+    by_angle = bool(train.gravity or train.angle_torques or train.springs)
+    by_angle |= any(gear.transmission_error is not None for gear in train.gears.values())
     for kind in ("angle", "speed")[: 1 if by_angle else 2]:
         for name, m in rig.task.measured.items():
-            shaft = m.variable.removesuffix(f"_{kind}")
-            if shaft == m.variable or shaft not in scenario.shafts or numbers_of(m, known)["filter_time"] > 0.0:
+            by_variable = {train.angle_of(s) if kind == "angle" else f"{s}_speed": s for s in train.shafts}
+            shaft = by_variable.get(m.variable)
+            if shaft is None or numbers_of(m, known)["filter_time"] > 0.0:
                 continue
-            ratios = {s: turns(scenario.train(), s, shaft) for s in scenario.shafts}
+            ratios = {s: turns(train, s, shaft) for s in train.shafts}
             whole = {s: n for s, n in ratios.items() if n is not None}
             if len(whole) == len(ratios):
-                return Shown(name, shaft, kind == "speed", whole)
+                keys = {s: {key: scenario.initial_key(key, s) for key in ("angles", "speeds")} for s in train.shafts}
+                return Shown(name, shaft, kind == "speed", whole, keys)
     raise InputError("no measured channel without a filter shows the angle of a shaft with which all others turn")
 
 
@@ -205,8 +210,8 @@ def _initial(
 
     speed = state(0, m.offset, OFFSETS[1]) if shown.is_speed else state(1, 0.0, OFFSETS[1])
     found: dict[str, FormulaText] = {
-        f"initial.speeds.{shaft}": f"({ratio!r})*({speed})" for shaft, ratio in shown.ratios.items()
+        shown.keys[shaft]["speeds"]: f"({ratio!r})*({speed})" for shaft, ratio in shown.ratios.items()
     }
     if not shown.is_speed:
-        found[f"initial.angles.{shown.shaft}"] = state(0, m.offset, OFFSETS[0])
+        found[shown.keys[shown.shaft]["angles"]] = state(0, m.offset, OFFSETS[0])
     return found

@@ -12,6 +12,7 @@ from .. import _core
 from ..errors import InputError
 from ..inputs.validation import did_you_mean
 from ..simulation.keys import set_values
+from ..simulation.linear_units import of_slides
 from ..simulation.scenario_files import find_scenario, load
 from ..simulation.sensitivities import channels_of
 from ..simulation.train_scenario import TrainInitial, TrainScenario, in_long_form
@@ -46,7 +47,7 @@ class Built:
         """A variable of a run, or the angle of a shaft through the gears behind it, as a sum of channels; empty: it is not there."""
         if variable in self.names:
             return {variable: 1.0}
-        return angle_terms(self.scenario, variable.removesuffix("_angle"), self.names)
+        return angle_terms(self.scenario, variable.removesuffix("_angle").removesuffix("_position"), self.names)
 
     @cached_property
     def inputs(self) -> list[str]:
@@ -56,7 +57,7 @@ class Built:
     @cached_property
     def ratios(self) -> tuple[Any, ...]:
         """Of its gears, by which angles follow from each other, and what else they do so by."""
-        return tuple((g.ratio, repr(g.transmission_error)) for g in self.scenario.gears.values())
+        return tuple((g.ratio, repr(g.transmission_error)) for g in self.scenario.train().gears.values())
 
     @cached_property
     def remembers(self) -> bool:
@@ -144,9 +145,17 @@ class Rig:
 
     def _units(self) -> dict[str, str]:
         units = {str(name): str(unit) for name, _, unit, _ in self.scenario.core().channels()}
-        kinds = {"position": "rad", "speed": "rad/s", "torque": "N*m"}
-        units |= {f"{name}_angle": "rad" for name in self.scenario.shafts if angle_terms(self.scenario, name, units)}
-        return units | {f"{name}_reference": kinds[c.reference.kind] for name, c in self.scenario.axes().items()}
+        train, kinds = self.scenario.train(), {"position": "rad", "speed": "rad/s", "torque": "N*m"}
+        units |= {
+            train.angle_of(name): train.angle_unit(name)
+            for name in train.shafts
+            if angle_terms(self.scenario, name, units)
+        }
+        for name, c in self.scenario.axes().items():
+            motor, position = self.scenario.sliding()[self.scenario.prefix(name)]
+            slides = position and c.reference.kind != "torque"
+            units[f"{name}_reference"] = of_slides(kinds[c.reference.kind], positions=slides, forces=motor)
+        return units
 
     def formulas(self, rung: int, phase: int) -> dict[str, Any]:
         """Of the values of the scenario, by dotted key."""

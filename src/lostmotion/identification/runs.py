@@ -28,7 +28,9 @@ STEP_OF_CONTROLLERS = (
     2.0**-11
 )  # with the differences of fourth order of `sensitivities`, which see the limits of controllers
 
-_SIGNALS = re.compile(r"(command|shafts\.[^.]+\.torque|controllers(\.[^.]+(\.reference)?)?)(\..*)?")
+_SIGNALS = re.compile(
+    r"(command|shafts\.[^.]+\.torque|slides\.[^.]+\.force|controllers(\.[^.]+(\.reference)?)?)(\..*)?"
+)
 Values = Mapping[str, float]
 
 
@@ -333,7 +335,11 @@ def _begun(changes: Mapping[str, Any], segment: Segment, known: Mapping[str, Any
     """With the measured state at which a segment begins, in place of that of the rig."""
     if segment.initial is None:
         return dict(changes)
-    own = {k: v for k, v in changes.items() if not k.startswith(("initial.angles", "initial.speeds"))}
+    own = {
+        k: v
+        for k, v in changes.items()
+        if not k.startswith(("initial.angles", "initial.speeds", "initial.positions", "initial.slide_speeds"))
+    }
     return {**own, **{key: number(formula, known, key) for key, formula in segment.initial.items()}}
 
 

@@ -13,15 +13,16 @@ def angle_terms(scenario: TrainScenario, shaft: str, recorded: Collection[str]) 
 
     A gear without housing and transmission error has ``input angle = ratio * (output angle + twist)``.
     """
-    own = f"{shaft}_angle"
+    train = scenario.train()
+    own = train.angle_of(shaft) if shaft in train.shafts else f"{shaft}_angle"
     if own in recorded:
         return {own: 1.0}
-    for name, gear in scenario.gears.items():
+    for name, gear in train.gears.items():
         if gear.input != shaft or gear.housing is not None or gear.transmission_error is not None:
             continue
         behind = angle_terms(scenario, gear.output, recorded)
         if not behind:
             continue
         terms = {variable: gear.ratio * factor for variable, factor in behind.items()}
-        return terms if isinstance(gear.stiffness, Rigid) else terms | {f"{name}_twist": gear.ratio}
+        return terms if isinstance(gear.stiffness, Rigid) else terms | {train.twist_of(name): gear.ratio}
     return {}

@@ -27,7 +27,7 @@ class Variants:
     def __init__(self, scenario: TrainScenario) -> None:
         self._like = scenario
         self._data = scenario.model_dump()
-        self._shafts = scenario.plain_shafts()
+        self._shafts = scenario.own_shafts() | {name: slide.shaft() for name, slide in scenario.slides.items()}
         self._checked: set[Any] = set()
 
     def __call__(self, changes: Mapping[str, Any]) -> TrainScenario:
@@ -73,6 +73,9 @@ class Variants:
             else Shaft.model_construct(None, **{key: getattr(shaft, key) for key in Shaft.model_fields})
             for name, shaft in found.shafts.items()
         }
+        shafts = found.with_drag(shafts)
+        for name, slide in found.slides.items():
+            shafts[name] = self._shafts[name] if slide is self._like.slides[name] else slide.shaft()
         tables = {table: Named(elements) for table, elements in {"shafts": shafts, **found.elements()}.items()}
         keep(found, TrainScenario.train, DriveTrain.model_construct(None, **tables))
         return found

@@ -63,7 +63,12 @@ def describe(scenario: Scenario | TrainScenario, name: str) -> dict[str, Any]:
         "figures": [
             figure
             for motor, c in scenario.axes().items()
-            for figure in axis_figures(c, motor, isinstance(scenario, TrainScenario))
+            for figure in axis_figures(
+                c,
+                motor,
+                isinstance(scenario, TrainScenario),
+                scenario.sliding().get(scenario.prefix(motor), (False, False)),
+            )
         ],
         "sliders": [s.to_page() for s in _sliders(scenario, values, closed)],
         "scenario": scenario.model_dump(exclude_none=True, mode="json"),
@@ -78,13 +83,17 @@ def _gears(scenario: Scenario | TrainScenario) -> dict[str, Any]:
     """By the table in the scenario file."""
     if isinstance(scenario, Scenario):
         return {"gearbox": scenario.gearbox}
-    return {f"gears.{name}": gear for name, gear in scenario.gears.items()}
+    return {f"{scenario.kind_of(name)}s.{name}": gear for name, gear in scenario.train().gears.items()}
 
 
 def _closed_gap(scenario: Scenario | TrainScenario) -> str | None:
     """The key of the backlash of the one gear whose torsion curve has none."""
     curves = {key: g.stiffness for key, g in _gears(scenario).items() if isinstance(g.stiffness, TorsionCurve)}
-    closed = [f"{key}.stiffness.backlash" for key, c in curves.items() if c.backlash == 0.0 == c.preload]
+    closed = [
+        f"{key}.stiffness.backlash"
+        for key, c in curves.items()
+        if c.backlash == 0.0 == c.preload and key.startswith("gear")
+    ]
     return closed[0] if len(closed) == 1 else None
 
 
@@ -95,7 +104,11 @@ def _inputs(scenario: Scenario | TrainScenario) -> list[tuple[str, Signal[Any]]]
         return [("command", scenario.command), ("load.torque", scenario.load.torque)]
     signals = scenario.signals()
     keys = {f"{name}_command": f"command.{name}" for name in scenario.commanded()}
-    keys |= {f"{name}_load_torque": f"shafts.{name}.torque" for name in scenario.shafts}
+    train = scenario.train()
+    keys |= {
+        train.load_torque_of(name): f"slides.{name}.force" if train.is_slide(name) else f"shafts.{name}.torque"
+        for name in train.shafts
+    }
     names = scenario.core().input_names()
     return [(keys[name], signals[name]) if name in keys and name in signals else ("", Signal()) for name in names]
 
@@ -119,11 +132,12 @@ def _sliders(
     views: dict[str, sliders.Place] = {}
     for k, key in enumerate(_gears(scenario)):
         views |= {f"{key}.ratio": ["gears", k, "ratio"], f"{key}.stiffness.backlash": ["gears", k, "backlash"]}
+        views |= {f"{key}.backlash": ["gears", k, "backlash"]}
     if closed is not None:
         values = [*values, (closed, 0.0)]
         usual[closed] = USUAL_BACKLASH
     for key, _ in values:
-        if key.endswith("friction_torque"):
+        if key.endswith("friction_torque") or (key.startswith("slides.") and key.endswith("friction_force")):
             usual[key] = _usual_friction(scenario, key)
     found = [*_signal_sliders(scenario), *_reference_sliders(scenario), *sliders.of_parameters(values, usual, views)]
     return [
@@ -147,9 +161,11 @@ def _signal_sliders(scenario: Scenario | TrainScenario) -> Iterator[sliders.Slid
             yield from sliders.of_signal(signal, key, group, "1", {"input": number}, 1.1, duration)
         else:
             shaft = "load" if isinstance(scenario, Scenario) else key.split(".")[1]
-            group = "Load torque" if shaft == "load" else f"Load torque on {shaft.replace('_', ' ')}"
+            slides = key.startswith("slides")
+            word, unit = ("Load force", "N") if slides else ("Load torque", "N*m")
+            group = word if shaft == "load" else f"{word} on {shaft.replace('_', ' ')}"
             most = _torque_at(scenario, shaft)
-            yield from sliders.of_signal(signal, key, group, "N*m", {"input": number}, most, duration)
+            yield from sliders.of_signal(signal, key, group, unit, {"input": number}, most, duration)
 
 
 def _reference_sliders(scenario: Scenario | TrainScenario) -> Iterator[sliders.Slider]:
@@ -157,17 +173,20 @@ def _reference_sliders(scenario: Scenario | TrainScenario) -> Iterator[sliders.S
     for number, (motor, controller) in enumerate(scenario.axes().items()):
         table = "controller" if isinstance(scenario, Scenario) else f"controllers.{motor}"
         group = f"Reference of {motor.replace('_', ' ')}" if several else "Reference"
-        yield from reference_sliders(controller, f"{table}.reference", group, number, scenario.simulation.duration)
+        sliding = scenario.sliding().get(scenario.prefix(motor), (False, False))
+        duration = scenario.simulation.duration
+        yield from reference_sliders(controller, f"{table}.reference", group, number, duration, sliding)
 
 
 def _torque_at(scenario: Scenario | TrainScenario, shaft: str) -> float:
     """What a shaft may have to carry [N·m]: the rated torque of the gear or the motor that drives it, else 1."""
     if isinstance(scenario, Scenario):
         return scenario.gearbox.rated_output_torque if shaft == "load" else scenario.motor.rated_torque or 1.0
-    for gear in scenario.gears.values():
+    train = scenario.train()
+    for gear in train.gears.values():
         if gear.output == shaft:
             return gear.rated_output_torque or gear.ratio * _torque_at(scenario, gear.input)
-    return next((m.rated_torque for m in scenario.motors.values() if m.shaft == shaft and m.rated_torque), 1.0)
+    return next((m.rated_torque for m in train.motors.values() if m.shaft == shaft and m.rated_torque), 1.0)
 
 
 def _usual_friction(scenario: Scenario | TrainScenario, key: str) -> float:
@@ -175,4 +194,4 @@ def _usual_friction(scenario: Scenario | TrainScenario, key: str) -> float:
     table, *names = key.split(".")
     if table == "motors" and isinstance(scenario, TrainScenario):
         return 0.2 * _torque_at(scenario, scenario.motors[names[0]].shaft)
-    return 0.05 * _torque_at(scenario, names[0] if table == "shafts" else table)
+    return 0.05 * _torque_at(scenario, names[0] if table in ("shafts", "slides") else table)

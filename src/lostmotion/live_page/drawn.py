@@ -20,8 +20,22 @@ def drawn_drive(scenario: Scenario) -> dict[str, Any]:
         ("load", "load_contact"),
     ]
     shafts = [
-        {"name": "motor", "speed": "motor_speed", "angle": None, "contact": "input_contact", "motor": True},
-        {"name": "load", "speed": "load_speed", "angle": "load_angle", "contact": "load_contact", "motor": False},
+        {
+            "name": "motor",
+            "speed": "motor_speed",
+            "angle": None,
+            "contact": "input_contact",
+            "motor": True,
+            "slide": False,
+        },
+        {
+            "name": "load",
+            "speed": "load_speed",
+            "angle": "load_angle",
+            "contact": "load_contact",
+            "motor": False,
+            "slide": False,
+        },
     ]
     variables = {"twist": None if rigid else "twist", "output_torque": "output_torque"}
     motor = {"name": "motor", "shaft": "motor", "torque": "motor_torque", "command": "command"}
@@ -38,7 +52,7 @@ def drawn_drive(scenario: Scenario) -> dict[str, Any]:
             }
         ],
         "motors": [motor],
-        "contacts": [{"label": label, "variable": variable} for label, variable in contacts],
+        "contacts": [{"label": label, "variable": variable, "slide": False} for label, variable in contacts],
     }
 
 
@@ -49,16 +63,18 @@ def drawn_train(scenario: TrainScenario) -> dict[str, Any]:
     def known(name: str) -> str | None:
         return name if name in names else None
 
-    with_motor = {m.shaft for m in scenario.motors.values()}
+    train = scenario.train()
+    with_motor = {m.shaft for m in train.motors.values()}
     shafts = [
         {
             "name": n,
             "speed": f"{n}_speed",
-            "angle": known(f"{n}_angle"),
+            "angle": known(train.angle_of(n)),
             "contact": known(f"{n}_contact"),
             "motor": n in with_motor,
+            "slide": train.is_slide(n),
         }
-        for n in scenario.shafts
+        for n in train.shafts
     ]
     gears = [
         {
@@ -66,22 +82,27 @@ def drawn_train(scenario: TrainScenario) -> dict[str, Any]:
             "input": g.input,
             "output": g.output,
             "fixed": g.housing is None,
-            "twist": None if isinstance(g.stiffness, Rigid) else known(f"{n}_twist"),
-            "output_torque": f"{n}_output_torque",
+            "twist": None if isinstance(g.stiffness, Rigid) else known(train.twist_of(n)),
+            "output_torque": train.output_torque_of(n),
             **_laws(g),
         }
-        for n, g in scenario.gears.items()
+        for n, g in train.gears.items()
     ]
     motors = [
-        {"name": n, "shaft": m.shaft, "torque": f"{n}_torque", "command": known(f"{n}_command")}
-        for n, m in scenario.motors.items()
+        {"name": n, "shaft": m.shaft, "torque": train.motor_torque_of(n), "command": known(f"{n}_command")}
+        for n, m in train.motors.items()
     ]
     contacts = [name for name in names if name.endswith("_contact")]
+    sliding = {f"{n}_contact" for n in train.shafts if train.is_slide(n)}
+    sliding |= {f"{train.twist_of(n)}_contact" for n, g in train.gears.items() if train.is_slide(g.output)}
     return {
         "shafts": shafts,
         "gears": gears,
         "motors": motors,
-        "contacts": [{"label": c.removesuffix("_contact").replace("_", " "), "variable": c} for c in contacts],
+        "contacts": [
+            {"label": c.removesuffix("_contact").replace("_", " "), "variable": c, "slide": c in sliding}
+            for c in contacts
+        ],
     }
 
 

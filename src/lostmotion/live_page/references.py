@@ -8,6 +8,7 @@ from typing import Any
 
 from ..control.controller import Controller
 from ..control.references import PositionReference, Reference
+from ..simulation.linear_units import of_slides
 from . import sliders
 from .sliders import Place, Range, Slider
 
@@ -38,7 +39,14 @@ def reference_view(reference: Reference[Any], duration: float) -> dict[str, Any]
     }
 
 
-def reference_sliders(controller: Controller, key: str, group: str, number: int, duration: float) -> Iterator[Slider]:
+def reference_sliders(
+    controller: Controller,
+    key: str,
+    group: str,
+    number: int,
+    duration: float,
+    sliding: tuple[bool, bool] = (False, False),
+) -> Iterator[Slider]:
     """Of its moves; without any, of its mean, its first sine and its steps.
 
     Parameters
@@ -47,11 +55,14 @@ def reference_sliders(controller: Controller, key: str, group: str, number: int,
         Table of the reference in the scenario file.
     number
         Among the controllers.
+    sliding
+        Whether the motor moves a slide, and whether the position is that of one.
     """
     reference = controller.reference
-    unit = UNITS[reference.kind]
+    positions = sliding[1] and reference.kind != "torque"
+    unit = of_slides(UNITS[reference.kind], positions=positions, forces=sliding[0])
     if isinstance(reference, PositionReference) and reference.moves:
-        yield from _of_moves(reference, key, group, number)
+        yield from _of_moves(reference, key, group, number, slides=sliding[1])
         return
     if isinstance(reference, PositionReference) and reference.target is not None:
         return
@@ -62,7 +73,7 @@ def reference_sliders(controller: Controller, key: str, group: str, number: int,
     yield from sliders.of_signal(reference, key, group, unit, {"reference": number}, most, duration)
 
 
-def _of_moves(reference: PositionReference, key: str, group: str, number: int) -> Iterator[Slider]:
+def _of_moves(reference: PositionReference, key: str, group: str, number: int, *, slides: bool) -> Iterator[Slider]:
     def slider(end: str, label: str, unit: str, value: float, reach: Range, path: Place) -> Slider:
         return Slider(f"{key}.{end}", group, label, unit, value, reach, {"reference": number, "path": ["moves", *path]})
 
@@ -70,11 +81,14 @@ def _of_moves(reference: PositionReference, key: str, group: str, number: int) -
     span = 1.5 * max(abs(p) for p in places) or math.pi
     for k, move in enumerate(reference.moves[:6]):
         label = f"move {k + 1} to" if len(reference.moves) > 1 else "move to"
-        yield slider(f"moves.{k}.to", label, "angle", move.to, Range(-span, span), ["moves", k, "to"])
+        yield slider(
+            f"moves.{k}.to", label, "m" if slides else "angle", move.to, Range(-span, span), ["moves", k, "to"]
+        )
     for name, unit in LIMITS:
         value = getattr(reference, name)
         if value is not None and any(getattr(move, name) is None for move in reference.moves):
-            yield slider(name, f"{name} limit", unit, value, sliders.around(value), [name])
+            si = of_slides(unit, positions=slides, forces=False)
+            yield slider(name, f"{name} limit", si, value, sliders.around(value), [name])
     usual = max(reference.dwell, 0.25)
     if any(move.dwell is None for move in reference.moves):
         yield slider("dwell", "dwell", "s", reference.dwell, Range(0.0, 4.0 * usual), ["dwell"])

@@ -56,6 +56,14 @@ UNITS: dict[str, list[tuple[str, float, float]]] = {
     "rad/s": [("rad/s", 1.0, 0.0)],
     "rad/s^2": [("rad/s²", 1.0, 0.0)],
     "rad/s^3": [("rad/s³", 1.0, 0.0)],
+    "kg": [("kg", 1.0, 0.0)],
+    "N": [("kN", 1e3, 5e3), ("N", 1.0, 0.0)],
+    "N/m": [("N/µm", 1e6, 0.0)],
+    "N*s/m": [("N·s/m", 1.0, 0.0)],
+    "m": [("m", 1.0, 2.0), ("mm", 1e-3, 5e-4), ("µm", 1e-6, 0.0)],
+    "m/s": [("m/s", 1.0, 5.0), ("mm/s", 1e-3, 0.0)],
+    "m/s^2": [("m/s²", 1.0, 0.0)],
+    "m/s^3": [("m/s³", 1.0, 0.0)],
     "s": [("s", 1.0, 0.3), ("ms", 1e-3, 0.0)],
     "Hz": [("Hz", 1.0, 0.0)],
     "1/s": [("1/s", 1.0, 0.0)],
@@ -102,9 +110,25 @@ LABELS: dict[str, tuple[str, str, float | str]] = {
     "speed.gain": ("speed gain", "N*m*s/rad", 10.0),
     "speed.integral_gain": ("speed integral gain", "N*m/rad", "from 0"),
     "speed.torque_limit": ("torque limit", "N*m", 10.0),
+    "slides.mass": ("mass", "kg", 10.0),
+    "slides.friction_force": ("friction force", "N", "from 0"),
+    "slides.breakaway_force": ("break-away force", "N", 4.0),
+    "slides.viscous_friction": ("viscous friction", "N*s/m", "from 0"),
+    "screws.lead": ("lead", "m", 3.0),
     "current.time_constant": ("current loop time constant", "s", 10.0),
 }
+# Of screws, racks and belts.
+LINEAR_LABELS: dict[str, tuple[str, str, float | str]] = {
+    "stiffness": ("axial stiffness", "N/m", 10.0),
+    "backlash": ("axial play (total)", "m", "from 0"),
+    "damping": ("damping", "N*s/m", "from 0"),
+    "efficiency": ("efficiency", "1", "share"),
+    "inertia": ("inertia", "kg*m^2", 10.0),
+    "drag_torque": ("drag torque", "N*m", "from 0"),
+}
+LINEAR_TABLES = ("slides", "screws", "racks", "belts")
 TABLES = (
+    *LINEAR_TABLES,
     "motor",
     "motors",
     "gearbox",
@@ -152,7 +176,10 @@ def of_parameters(
 
 
 def _label(key: str) -> tuple[str, str, float | str] | None:
-    parts = key.split(".")
+    table, *_, last = parts = key.split(".")
+    if table in LINEAR_TABLES:
+        found = LINEAR_LABELS.get(last) if table != "slides" and len(parts) == 3 else None
+        return LABELS.get(f"{table}.{last}", found)
     ends = (".".join(parts[-n:]) for n in (2, 1))
     return next((LABELS[end] for end in ends if end in LABELS), None)
 

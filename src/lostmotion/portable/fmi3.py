@@ -99,7 +99,7 @@ def _add_variables(variables: ET.Element, model: Model) -> None:
 
 
 def terminals(model: Model) -> bytes:
-    """terminalsAndIcons.xml: a terminal for each shaft that a load torque acts on, and one for all commands and references."""
+    """terminalsAndIcons.xml: a terminal for each shaft or slide that a load acts on, and one for all commands and references."""
     root = ET.Element("fmiTerminalsAndIcons", fmiVersion="3.0")
     graphics = ET.SubElement(root, "GraphicalRepresentation")
     corners = {"x1": "-100", "y1": "-100", "x2": "100", "y2": "100"}
@@ -107,8 +107,13 @@ def terminals(model: Model) -> bytes:
     ET.SubElement(graphics, "Icon", corners)
     listed = ET.SubElement(root, "Terminals")
     outputs = {v.name for v in model.outputs}
-    loads = [v.name for v in model.inputs if v.name.endswith("load_torque")]
+    loads = [v.name for v in model.inputs if v.name.endswith(("load_torque", "_load_force"))]
     for load in loads:
+        if load.endswith("_load_force"):
+            slide = load.removesuffix("_load_force")
+            members = {"force": load} | {m: f"{slide}_{m}" for m in ("speed", "position") if f"{slide}_{m}" in outputs}
+            _add_terminal(listed, f"{slide}_slide", members)
+            continue
         shaft = load.removesuffix("_load_torque") if load != "load_torque" else "load"
         members = {"torque": load} | {m: f"{shaft}_{m}" for m in ("speed", "angle") if f"{shaft}_{m}" in outputs}
         _add_terminal(listed, f"{shaft}_shaft", members)

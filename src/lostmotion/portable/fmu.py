@@ -154,6 +154,10 @@ def _key_of(scenario: Scenario | TrainScenario, name: str) -> str:
     """The key of the scenario whose signal an input replaces."""
     if isinstance(scenario, Scenario):
         return {"load_torque": "load.torque", "reference": "controller.reference"}.get(name, name)
+    if name.endswith("_load_force"):
+        slide = name.removesuffix("_load_force")
+        inclined = scenario.slides[slide].weight(1.0) != 0.0
+        return f"slides.{slide}.force" + (" and the weight" if inclined else "")
     for suffix, key in (("_load_torque", "shafts.{}.torque"), ("_reference", "controllers.{}.reference")):
         if name.endswith(suffix):
             return key.format(name.removesuffix(suffix))
@@ -191,7 +195,7 @@ def _of_signals(scenario: Scenario | TrainScenario, key: str, references: bool) 
     if isinstance(scenario, Scenario):
         given = references and parts[:2] == ["controller", "reference"]
         return given or parts[0] == "command" or parts[:2] == ["load", "torque"]
-    of_shaft = parts[0] == "shafts" and parts[2:3] == ["torque"]
+    of_shaft = (parts[0], *parts[2:3]) in (("shafts", "torque"), ("slides", "force"))
     # Of the command of a brake or a clutch: what the importer gives acts at once.
     delay = parts[0] in ("brakes", "clutches") and parts[-1] in ("engagement_delay", "release_delay")
     of_controller = parts[0] == "controllers" and parts[2] == "reference"
@@ -203,12 +207,16 @@ def _of_signals(scenario: Scenario | TrainScenario, key: str, references: bool) 
     )
 
 
-# What a reference is of: its unit and meaning, as of the core.
-_REFERENCES = {
-    "position": ("rad", "angle that the controller is to follow"),
-    "speed": ("rad/s", "speed that the controller is to follow"),
-    "torque": ("N*m", "torque of the motor that is to act"),
-}
+def _reference(scenario: Scenario | TrainScenario, prefix: str, kind: str) -> tuple[str, str]:
+    """Unit and meaning of what a controller is to follow, as of the core."""
+    motor, position = scenario.sliding().get(prefix, (False, False))
+    found = {
+        "position": ("m", "position") if position else ("rad", "angle"),
+        "speed": ("m/s" if position else "rad/s", "speed"),
+        "torque": ("N", "force of the motor") if motor else ("N*m", "torque of the motor"),
+    }
+    unit, what = found[kind]
+    return unit, f"{what} that {'is to act' if kind == 'torque' else 'the controller is to follow'}"
 
 
 def _model(
@@ -226,7 +234,10 @@ def _model(
     by_name = {v.name: Declared(v.name, v.unit, v.meaning, sizes.get(v.name, 0.0), v.name in held) for v in variables}
     windings = any(c.current.kind == "field_oriented" for c in axes.values())
     given = {f"{prefix}reference": c for prefix, c in axes.items() if references_given}
-    references = [Declared(name, *_REFERENCES[c.reference.kind], 0.0) for name, c in given.items()]
+    references = [
+        Declared(name, *_reference(scenario, name.removesuffix("reference"), c.reference.kind), 0.0)
+        for name, c in given.items()
+    ]
     return Model(
         title=scenario.title or "drive",
         guid=guid,

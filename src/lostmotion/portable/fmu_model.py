@@ -38,6 +38,7 @@ _BASE = {
     "degree_Celsius": (0, 0, 0, 0, 1, 0),
     "radian": (0, 0, 0, 0, 0, 1),
     "newton": (1, 1, -2, 0, 0, 0),
+    "pascal": (1, -1, -2, 0, 0, 0),
     "joule": (1, 2, -2, 0, 0, 0),
     "watt": (1, 2, -3, 0, 0, 0),
     "volt": (1, 2, -3, -1, 0, 0),
@@ -50,6 +51,8 @@ _NAMES = ("kg", "m", "s", "A", "K", "rad")
 _DISPLAY = {
     "rad": (("deg", 180.0 / math.pi), ("arcmin", 10800.0 / math.pi), ("mrad", 1e3)),
     "rad/s": (("rpm", 30.0 / math.pi), ("deg/s", 180.0 / math.pi)),
+    "m": (("mm", 1e3), ("µm", 1e6)),
+    "m/s": (("mm/s", 1e3),),
     "s": (("ms", 1e3),),
     "N*m": (("mN*m", 1e3),),
 }
@@ -111,7 +114,7 @@ class Model:
 
 def rate_unit(unit: str) -> str:
     """The unit of the time derivative of a quantity."""
-    return {"rad/s": "rad/s^2"}.get(unit, f"{unit}/s")
+    return {"rad/s": "rad/s^2", "m/s": "m/s^2"}.get(unit, f"{unit}/s")
 
 
 def add_units(root: ET.Element, model: Model, *, input_rates: bool) -> None:

@@ -15,7 +15,7 @@ from ..errors import InputError
 from ..inputs.quantities import Limit
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
-from ..studies.units import limit_in, unit_in
+from ..studies.units import limit_in, unit_for
 
 AnyScenario = Scenario | TrainScenario
 Numbers = Callable[[AnyScenario], np.ndarray]
@@ -82,7 +82,7 @@ def parameters_of(scenario: AnyScenario, numbers: Numbers) -> Parameters:
     found: list[Parameter] = []
     refused: dict[str, str] = {}
     for key, value in values_of(scenario.model_dump(exclude_none=True)):
-        unit = unit_in(type(scenario), key)
+        unit = unit_for(scenario, key)
         if unit is None:
             continue
         law = _law(scenario, key, value, base, numbers)

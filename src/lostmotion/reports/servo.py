@@ -11,6 +11,7 @@ import numpy as np
 
 from ..servo.commission import LoopSheet, ServoReport, decibels
 from ..servo.motion import LimitCycle, StepResponse
+from ..units.practical import charted
 from .page import Headline, Prose, Report, Table
 from .pages import table_csv, write_report
 from .panels import FAINT, Curve, Group, Mark, Panel, look
@@ -80,13 +81,14 @@ def _step_text(step: StepResponse) -> str:
     return f"{size}: {', '.join(parts)}, overshoot {100.0 * step.overshoot:.3g} %"
 
 
-def _cycle_table(cycle: LimitCycle) -> Table:
+def _cycle_table(report: ServoReport, cycle: LimitCycle) -> Table:
     """The limit cycle, and what is left of it without each possible cause."""
+    motor, load = (charted(unit, small=True) for unit in (report.motor_unit, report.load_unit))
     rows = []
     for what, rest in {"nothing": cycle.whole, **cycle.without}.items():
-        numbers = (1e3 * rest.motor_amplitude, 1e3 * rest.amplitude, rest.frequency)
+        numbers = (motor[1] * rest.motor_amplitude, load[1] * rest.amplitude, rest.frequency)
         rows.append([what, *(map(_text, numbers) if rest.cycles else ("none", "none", ""))])
-    header = ("left out", "amplitude at the motor [mrad]", "at the load [mrad]", "frequency [Hz]")
+    header = ("left out", f"amplitude at the motor [{motor[0]}]", f"at the load [{load[0]}]", "frequency [Hz]")
     return Table("Causes of the limit cycle", header, rows)
 
 
@@ -194,13 +196,15 @@ def _phase(response: np.ndarray) -> np.ndarray:
 
 def _motion_panels(report: ServoReport) -> Iterable[Panel]:
     f = report.following
-    factor, unit = (1e3, "mrad") if f.unit == "rad" else (1.0, f.unit)
-    quantity = {"rad": "position", "rad/s": "speed"}.get(f.unit, "torque")
+    unit, factor = charted(f.unit, small=True)
+    shown, of_shown = charted(f.unit)
+    named = {"rad": "position", "rad/s": "speed", "m": "position", "m/s": "speed", "N": "force"}
+    quantity = named.get(f.unit, "torque")
     both = (
-        Curve("reference", f.time, f.reference, look(1)),
-        Curve("true value", f.time, f.reference - f.error, look(0)),
+        Curve("reference", f.time, of_shown * f.reference, look(1)),
+        Curve("true value", f.time, of_shown * (f.reference - f.error), look(0)),
     )
-    yield Panel(f"{quantity} over the run", "time [s]", f"{quantity} [{f.unit}]", both)
+    yield Panel(f"{quantity} over the run", "time [s]", f"{quantity} [{shown}]", both)
     error = Curve("error", f.time, factor * f.error, look(0))
     yield Panel("following error over the run", "time [s]", f"error [{unit}]", (error,))
 
@@ -208,10 +212,22 @@ def _motion_panels(report: ServoReport) -> Iterable[Panel]:
 def _stiffness_group(report: ServoReport) -> list[Group]:
     if not report.stiffness:
         return []
-    curves = tuple(Curve(s.regime, s.frequency, s.stiffness, look(k)) for k, s in enumerate(report.stiffness))
+    slides = report.stiffness[0].slides
+    factor = 1e-6 if slides else 1.0
+    curves = tuple(Curve(s.regime, s.frequency, factor * s.stiffness, look(k)) for k, s in enumerate(report.stiffness))
     title = f"stiffness against load at {report.stiffness[0].shaft}"
-    panel = Panel(title, "frequency [Hz]", "[N·m/rad]", curves, log_x=True, log_y=True)
-    return [Group("stiffness", "Stiffness", "The load torque that turns its shaft by one radian.", (panel,), 1)]
+    panel = Panel(title, "frequency [Hz]", "[N/µm]" if slides else "[N·m/rad]", curves, log_x=True, log_y=True)
+    return [
+        Group(
+            "stiffness",
+            "Stiffness",
+            "The load force that moves its slide by one micrometre."
+            if slides
+            else "The load torque that turns its shaft by one radian.",
+            (panel,),
+            1,
+        )
+    ]
 
 
 def _loop_groups(report: ServoReport) -> tuple[Group, Group]:
@@ -259,7 +275,7 @@ def servo_report(name: str, report: ServoReport) -> Report:
             Table("Loops", HEADER, rows, blank, marked=wrong),
             Table("Regimes", ("regime", "what it is"), [list(pair) for pair in report.regimes.items()]),
             Table("Steps and motion", ("quantity", "value"), steps_and_motion),
-            *([_cycle_table(cycle)] if cycle is not None and cycle.without else []),
+            *([_cycle_table(report, cycle)] if cycle is not None and cycle.without else []),
             loops,
             *([steps] if report.steps else []),
             *_stiffness_group(report),

@@ -72,11 +72,16 @@ class Stiffness:
     frequency: np.ndarray
     """[Hz]"""
     stiffness: np.ndarray
-    """[N·m/rad]"""
+    """[N·m/rad], of a slide [N/m]"""
+    slides: bool = False
+
+    def shown(self, value: float) -> str:
+        """A stiffness with its unit."""
+        return f"{1e-6 * value:.4g} N/µm" if self.slides else f"{value:.4g} N·m/rad"
 
     @property
     def least(self) -> tuple[float, float]:
-        """Least stiffness [N·m/rad] and its frequency [Hz]."""
+        """Least stiffness [N·m/rad], of a slide [N/m], and its frequency [Hz]."""
         k = int(np.argmin(self.stiffness))
         return float(self.stiffness[k]), float(self.frequency[k])
 
@@ -98,6 +103,10 @@ class ServoReport:
     stiffness: tuple[Stiffness, ...]
     limit_cycle: LimitCycle | None
     """None without a position loop"""
+    motor_unit: str = "rad"
+    """of the motor's angle; m of a linear motor"""
+    load_unit: str = "rad"
+    """of the angle of the reference's shaft; m of a slide"""
 
     @property
     def stable(self) -> bool:
@@ -122,8 +131,7 @@ class ServoReport:
         if self.stiffness:
             weakest = min(self.stiffness, key=lambda s: s.least[0])
             least, at = weakest.least
-            unit = "N·m/rad" if f.unit == "rad" else "N/m"
-            rows.append(("stiffness", f"at least {least:.4g} {unit}, at {at:.3g} Hz ({weakest.regime})"))
+            rows.append(("stiffness", f"at least {weakest.shown(least)}, at {at:.3g} Hz ({weakest.regime})"))
         return [*rows, ("at rest", self.rest())]
 
     def _regimes(self) -> str:
@@ -165,6 +173,9 @@ class ServoReport:
             return f"{text}, as an encoder on {where} does not see {_shown(twist, self.following.unit, 3)} of static twist under load"
         return f"{text}, which the loop sees and has not yet removed; raise its gains, or allow more time"
 
+    def _place(self, position: float) -> str:
+        return f"{math.degrees(position):.5g} deg" if self.load_unit == "rad" else f"{1e3 * position:.5g} mm"
+
     def motion_rows(self) -> list[tuple[str, str]]:
         """Following, settling, stiffness and rest, as (what, value)."""
         f = self.following
@@ -174,11 +185,11 @@ class ServoReport:
         ]
         for s in self.settling:
             inside = f"{1e3 * s.time:.4g} ms" if not math.isnan(s.time) else f"not: {self._why(s)}"
-            to = f"{math.degrees(s.to):.5g} deg" if f.unit == "rad" else f"{1e3 * s.to:.5g} mm"
-            rows.append((f"settled within {_shown(self.window, f.unit)} after the move to {to}", inside))
+            within = _shown(self.window, self.load_unit)
+            rows.append((f"settled within {within} after the move to {self._place(s.to)}", inside))
         for k in self.stiffness:
             least, at = k.least
-            rows.append((f"least stiffness against load, {k.regime}", f"{least:.4g} N·m/rad at {at:.3g} Hz"))
+            rows.append((f"least stiffness against load, {k.regime}", f"{k.shown(least)} at {at:.3g} Hz"))
         return [*rows, ("at rest", self.rest())]
 
     def rest(self) -> str:
@@ -190,7 +201,8 @@ class ServoReport:
         if not whole.cycles:
             return f"{'no limit cycle' if whole.verdict == 'at rest' else whole.verdict}: {whole.described()}"
         frequency = "irregular" if math.isnan(whole.frequency) else f"{whole.frequency:.4g} Hz"
-        text = f"limit cycle: ±{_shown(whole.motor_amplitude, 'rad')} at the motor, ±{_shown(whole.amplitude, 'rad')} at the load, {frequency}"
+        motor, load = _shown(whole.motor_amplitude, self.motor_unit), _shown(whole.amplitude, self.load_unit)
+        text = f"limit cycle: ±{motor} at the motor, ±{load} at the load, {frequency}"
         return f"hunts, {text}; cause: {' and '.join(cycle.causes) or 'none of ' + ', '.join(cycle.without)}"
 
 
@@ -232,7 +244,7 @@ def commission(
     """
     axis = axis_of(scenario, motor)
     if window is not None and not window > 0.0:
-        raise InputError(f"window: {window:g} rad must be above 0")
+        raise InputError(f"window: {window:g} {axis.measured['position'][1]} must be above 0")
     points = regimes(axis)
     loops, steps = [], []
     for name in axis.loops:
@@ -258,6 +270,8 @@ def commission(
         settling=tuple(settling(axis, followed, wide)),
         stiffness=stiffness,
         limit_cycle=cycle,
+        motor_unit=axis.train.angle_unit(axis.motor_shaft),
+        load_unit=axis.train.angle_unit(axis.shaft),
     )
 
 
@@ -298,7 +312,8 @@ def _stiffness(axis: Axis, regime: Regime) -> Stiffness:
     closed = SampledLoop(axis, regime, axis.loops[-1], False)
     f = frequencies(closed)
     with np.errstate(divide="ignore"):  # a shaft that sticks is infinitely stiff
-        return Stiffness(regime.name, axis.shaft, f, 1.0 / np.abs(closed.compliance(f, axis.shaft, axis.shaft)))
+        values = 1.0 / np.abs(closed.compliance(f, axis.shaft, axis.shaft))
+    return Stiffness(regime.name, axis.shaft, f, values, axis.train.is_slide(axis.shaft))
 
 
 def decibels(factor: float) -> float:
@@ -307,4 +322,4 @@ def decibels(factor: float) -> float:
 
 
 def _shown(value: float, unit: str, digits: int = 5) -> str:
-    return f"{value:.4g} N·m" if unit == "N·m" else practical(value, unit, digits)
+    return f"{value:.4g} {unit}" if unit in ("N·m", "N") else practical(value, unit, digits)

@@ -83,7 +83,7 @@ def two_inertias(axis: Axis) -> TwoInertias:
             "rule: all gears are rigid, and this rule is for two inertias with a spring; take symmetrical_optimum"
         )
     near, far = inertias(axis, main)
-    gear = axis.scenario.gears[main]
+    gear = axis.train.gears[main]
     i = turns(axis.train, axis.motor_shaft, gear.output) or 1.0
     return TwoInertias(near, far, secant(gear) / i**2)
 

@@ -29,7 +29,8 @@ from ..inputs.schema import follow, unit_in_schema
 from ..inputs.validation import shown
 from ..simulation.keys import parse_override
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario, file_schema
+from ..simulation.axis_form import file_schema
+from ..simulation.train_scenario import TrainScenario
 from .data import frictions, inertias, lag_sum, two_inertias
 from .margins import STABLE, bandwidth_of, frequencies, margins
 from .motion import with_controller
@@ -74,6 +75,8 @@ class Tuning:
     """of the motor [N·m/A], where its data say it; of a winding per ampere of amplitude of a phase"""
     changed: Mapping[str, tuple[Any, Any]] = field(default_factory=dict)
     """old and new value [SI] of each key of the scenario that differs; None where there is none"""
+    linear_motor: bool = False
+    """whether the motor moves a slide: gains in [N·s/m] and [N/m]"""
 
     @property
     def integral_time(self) -> float:
@@ -82,7 +85,7 @@ class Tuning:
 
     def conventions(self) -> list[tuple[str, str, str]]:
         """The same gains as manufacturers of drives write them: (what, value with unit, where it is written so)."""
-        return _conventions(self.gain, self.integral_gain, self.position_gain, self.filter_time, self.torque_constant)
+        return _conventions(self.gain, self.integral_gain, self.position_gain, self.filter_time, self.torque_constant, self.linear_motor)
 
     def changes(self) -> list[tuple[str, str, str]]:
         """What tuning changed: (key of the scenario, old value, new value), with units.
@@ -142,10 +145,18 @@ class Tuning:
 
 
 def _conventions(
-    gain: float, integral_gain: float, K_v: float | None, filter_time: float, torque_constant: float | None
+    gain: float,
+    integral_gain: float,
+    K_v: float | None,
+    filter_time: float,
+    torque_constant: float | None,
+    linear_motor: bool = False,
 ) -> list[tuple[str, str, str]]:
-    rows = [("speed loop, gain", f"{gain:.5g} N·m/(rad/s)", "torque at the motor per speed of the motor")]
-    rows.append(("", f"{gain * math.pi / 30.0:.5g} N·m/rpm", "the same per revolution in a minute"))
+    if linear_motor:
+        rows = [("speed loop, gain", f"{gain:.5g} N/(m/s)", "force of the motor per speed of the motor")]
+    else:
+        rows = [("speed loop, gain", f"{gain:.5g} N·m/(rad/s)", "torque at the motor per speed of the motor")]
+        rows.append(("", f"{gain * math.pi / 30.0:.5g} N·m/rpm", "the same per revolution in a minute"))
     if torque_constant is not None:
         amps = gain / torque_constant
         rows.append(("", f"{amps:.5g} A/(rad/s)", f"with {torque_constant:.4g} N·m/A"))
@@ -154,7 +165,7 @@ def _conventions(
         time = gain / integral_gain
         rows.append(("speed loop, integral time", f"{1e3 * time:.5g} ms", "K_p/K_i, reset time T_N"))
         rows.append(("", f"{1.0 / time:.5g} 1/s", "its inverse"))
-        rows.append(("", f"{integral_gain:.5g} N·m/rad", "parallel form, K_i"))
+        rows.append(("", f"{integral_gain:.5g} {'N/m' if linear_motor else 'N·m/rad'}", "parallel form, K_i"))
     if filter_time:
         rows.append(("filter of the speed reference", f"{1e3 * filter_time:.5g} ms", "time constant"))
     if K_v is not None:
@@ -176,7 +187,9 @@ def drive_units(scenario: Scenario | TrainScenario, motor: str | None = None) ->
     filters = [f for f in speed.reference_filters if isinstance(f, LowPass)]
     time = 1.0 / (2.0 * math.pi * filters[0].frequency) if len(filters) == 1 else 0.0
     K_v = None if position is None else position.gain
-    return _aligned(_conventions(speed.gain, speed.k_i, K_v, time, _torque_constant(axis)))
+    return _aligned(_conventions(
+            speed.gain, speed.k_i, K_v, time, _torque_constant(axis), axis.train.is_slide(axis.motor_shaft)
+        ))
 
 
 @checked
@@ -492,7 +505,9 @@ def _tuning(
         changed = scenario.model_copy(update={"controller": controller})
     differences = dict(_differences(before.model_dump(), controller.model_dump(), where))
     constant = _torque_constant(axis)
-    return Tuning(rule, why, changed, gains.gain, gains.integral_gain, K_v, gains.filter_time, constant, differences)
+    slides = axis.train.is_slide(axis.motor_shaft)
+    found = (gains.gain, gains.integral_gain, K_v, gains.filter_time, constant)
+    return Tuning(rule, why, changed, *found, differences, slides)
 
 
 def _differences(old: Any, new: Any, key: str) -> Iterator[tuple[str, tuple[Any, Any]]]:

@@ -18,11 +18,12 @@ from ..inputs.toml_text import toml_text, without_empty
 from ..inputs.validation import names_like, shortened, shown
 from ..model.gearbox import Gearbox
 from ..model.linear import ScrewData
+from .axis_form import axis_from_tables, file_schema, is_axis
 from .keys import parse_override, set_values
 from .scenario import Scenario, from_tables
 from .series_files import read_series
 from .shipped import shipped_scenarios
-from .train_scenario import TrainScenario, file_schema, in_long_form, is_train, train_from_tables
+from .train_scenario import TrainScenario, in_long_form, is_train, train_from_tables
 
 MAX_BASES = 100  # files that are each the base of the one before
 MOTOR = "motor"  # its name in the long form of a drive
@@ -112,6 +113,8 @@ def scenario_from(tables: Mapping[str, Any]) -> Scenario | TrainScenario:
     InputError
         A record is unknown or lacks what a run needs; a value cannot be used.
     """
+    if is_axis(tables):
+        return axis_from_tables(tables)
     if is_train(tables):
         return train_from_tables(tables)
     controller = tables.get("controller")
@@ -217,6 +220,11 @@ def _find_records(data: dict[str, Any], directory: Path) -> None:
         if isinstance(data.get(table), str):
             data[table] = {"from": data[table]}
     naming = [(data.get(table), "from") for table in ("gearbox", "motor")]
+    if isinstance(data.get("axis"), dict):
+        for part, value in data["axis"].items():
+            if isinstance(value, str):
+                data["axis"][part] = {"from": value}
+        naming += [(element, "from") for element in data["axis"].values()]
     for table, (key, _) in RECORDS.items():
         if isinstance(data.get(table), dict):
             naming += [(element, key) for element in data[table].values()]

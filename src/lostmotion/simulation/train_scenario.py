@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Mapping, Sequence
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import Field, model_validator
@@ -28,7 +28,8 @@ from ..model.shaft import Shaft
 from ..model.signals import CommandSignal, ForceSignal, Signal, TorqueSignal
 from ..model.train import DriveTrain, Elements
 from .keys import set_values
-from .scenario import BASE, RECORD_NAME, Scenario, SimulationTable, check_on_reference, json_schema
+from .linear_units import in_si
+from .scenario import BASE, RECORD_NAME, Scenario, SimulationTable, check_on_reference
 from .train_state import angles_at_start, start_values
 from .train_variables import check_names
 
@@ -108,6 +109,11 @@ class TrainScenario(LinearElements):
     """of motors, which then have no command"""
     initial: TrainInitial = TrainInitial()
     simulation: SimulationTable
+
+    @model_validator(mode="before")
+    @classmethod
+    def _units_of_slides(cls, data: Any) -> Any:
+        return in_si(data, train_schema) if isinstance(data, Mapping) else data
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
@@ -193,6 +199,10 @@ class TrainScenario(LinearElements):
             self.prefix(name): (train.is_slide(train.motors[name].shaft), train.is_slide(self.controlled(name)))
             for name in self.axes()
         }
+
+    def initial_key(self, key: str, shaft: str) -> str:
+        """The dotted key of the state at t = 0 of a shaft or a slide, such as ``initial.positions.table`` for angles."""
+        return f"initial.{LINEAR_INITIAL[key] if shaft in self.slides else key}.{shaft}"
 
     def controlled(self, motor: str) -> str:
         """The shaft or slide that the reference of a motor's controller is for."""
@@ -300,12 +310,13 @@ class TrainScenario(LinearElements):
         """The drive train without its surroundings."""
         return DriveTrain(shafts=self.plain_shafts(), **self.elements())
 
+    def own_shafts(self) -> dict[str, Shaft]:
+        """The shafts as they are written, without the torques on them."""
+        return {name: Shaft(**{key: getattr(s, key) for key in Shaft.model_fields}) for name, s in self.shafts.items()}
+
     def plain_shafts(self) -> dict[str, Shaft]:
-        """The shafts without the torques on them."""
-        shafts = {
-            name: Shaft(**{key: getattr(s, key) for key in Shaft.model_fields}) for name, s in self.shafts.items()
-        }
-        return self.with_drag(shafts) | {name: slide.shaft() for name, slide in self.slides.items()}
+        """The shafts and slides without what acts on them."""
+        return self.with_drag(self.own_shafts()) | {name: slide.shaft() for name, slide in self.slides.items()}
 
     def elements(self) -> dict[str, Any]:
         """The tables of all else that makes the train."""
@@ -442,8 +453,18 @@ def train_from_tables(tables: Mapping[str, Any]) -> TrainScenario:
     return TrainScenario(**data)
 
 
+@cache
+def _train_schema() -> str:
+    return json.dumps(_make_train_schema())
+
+
 def train_schema() -> dict[str, Any]:
     """JSON Schema of scenario files in the long form, for editors."""
+    schema: dict[str, Any] = json.loads(_train_schema())
+    return schema
+
+
+def _make_train_schema() -> dict[str, Any]:
     schema = TrainScenario.model_json_schema()
     schema["properties"] = {key: schema["properties"][key] for key in ("title", "shafts", "slides")} | schema[
         "properties"
@@ -464,14 +485,6 @@ def train_schema() -> dict[str, Any]:
         }
         elements["additionalProperties"] = {"anyOf": [whole, from_record]}
     return schema
-
-
-def file_schema() -> dict[str, Any]:
-    """JSON Schema of scenario files, in the short or the long form."""
-    of_drive, of_train = json_schema(), json.loads(json.dumps(train_schema()).replace('"#/$defs/', '"#/$defs/train_'))
-    of_drive["properties"]["controller"]["anyOf"].append({"$ref": "#/$defs/train_ContinuousController"})
-    definitions = of_drive.pop("$defs") | {f"train_{name}": node for name, node in of_train.pop("$defs").items()}
-    return {"title": "Scenario file", "anyOf": [of_drive, of_train], "$defs": definitions}
 
 
 def in_long_form(scenario: Scenario | TrainScenario) -> TrainScenario:

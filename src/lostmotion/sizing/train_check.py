@@ -31,9 +31,10 @@ def check_train(scenario: TrainScenario) -> tuple[Finding, ...]:
     table = scenario.simulation
     interval = min(table.sample_interval, table.duration / SAMPLES)
     result = run(scenario.replace(**{"simulation.sample_interval": interval}), energy=False)
-    findings = [f for name in scenario.gears for f in _gear(scenario, name, result)]
-    findings += [f for name in scenario.motors for f in _motor(scenario, name, result)]
-    if any(isinstance(g.losses, LossMap) for g in scenario.gears.values()):
+    train = scenario.train()
+    findings = [f for name in train.gears for f in _gear(scenario, name, result)]
+    findings += [f for name in train.motors for f in _motor(scenario, name, result)]
+    if any(isinstance(g.losses, LossMap) for g in train.gears.values()):
         findings.append(loss_map(result))
     what = "in the short form, [motor], [gearbox] and [load], of a drive that can be written so"
     findings += [
@@ -47,32 +48,34 @@ def _named(name: str, findings: list[Finding]) -> list[Finding]:
 
 
 def _gear(scenario: TrainScenario, name: str, result: RunArrays) -> list[Finding]:
-    gear, where = scenario.gears[name], f"gears.{name}"
-    torque = f"{name}_output_torque"
+    train = scenario.train()
+    gear, where = train.gears[name], f"{scenario.kind_of(name)}s.{name}"
+    torque = train.output_torque_of(name)
     cycle = duty_cycle(
-        result, None, speed=f"{gear.input}_speed", motor_torque=f"{name}_input_torque", output_torque=torque
+        result, None, speed=f"{gear.input}_speed", motor_torque=train.input_torque_of(name), output_torque=torque
     )
     findings = loads(gear, float(abs(result[torque]).max()), cycle, where)
     if gear.rated_input_speed is not None or gear.limits is not None:
         findings += input_speeds(gear, cycle, where)
     findings = _named(name, findings)
-    if scenario.fixed_gears() != scenario.gears:
+    if train.fixed_gears() != train.gears:
         return findings  # what its load drives then has no verdict
     if not isinstance(gear.losses, ConstantEfficiency) and (torques := _load_torques(scenario, name, result)):
-        findings += locks(scenario.train(), name, torques)
+        findings += locks(train, name, torques)
     return findings
 
 
 def _load_torques(scenario: TrainScenario, name: str, result: RunArrays) -> list[float]:
     """The largest and the least load torque at the output of a gear, from the shafts behind it through their ratios [N·m]; its
     rated torque where there are none."""
-    gear, share = scenario.gears[name], 1.0
+    train = scenario.train()
+    gear, share = train.gears[name], 1.0
     shaft, found = gear.output, list[float]()
     while not found:
-        if scenario.shafts[shaft].torque is not None:
-            torque = result[f"{shaft}_load_torque"]
+        if shaft in scenario.loads():
+            torque = result[train.load_torque_of(shaft)]
             found = [share * t for t in sorted({float(torque.max()), float(torque.min())} - {0.0})]
-        behind = next((g for g in scenario.gears.values() if g.input == shaft), None)
+        behind = next((g for g in train.gears.values() if g.input == shaft), None)
         if behind is None:
             break
         shaft, share = behind.output, share / behind.ratio
@@ -82,8 +85,9 @@ def _load_torques(scenario: TrainScenario, name: str, result: RunArrays) -> list
 
 
 def _motor(scenario: TrainScenario, name: str, result: RunArrays) -> list[Finding]:
-    motor, where = scenario.motors[name], f"motors.{name}"
-    torque, speed = f"{name}_torque", f"{motor.shaft}_speed"
+    train = scenario.train()
+    motor, where = train.motors[name], f"{'linear_motors' if name in scenario.linear_motors else 'motors'}.{name}"
+    torque, speed = train.motor_torque_of(name), f"{motor.shaft}_speed"
     cycle = duty_cycle(result, None, speed=speed, motor_torque=torque, output_torque=torque)
     command, T, w = (result[key] for key in (f"{name}_command", torque, speed))
     command = command_of_run(motor, scenario.controllers.get(name), command, T, w)

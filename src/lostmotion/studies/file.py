@@ -9,6 +9,7 @@ from typing import Any
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.toml_files import read_toml
+from ..simulation.axis_form import is_axis, long_form
 from ..simulation.result_files import FORMATS
 from ..simulation.scenario import Scenario
 from ..simulation.scenario_files import find_base, read_tables
@@ -38,6 +39,7 @@ def load_study(path: str | Path) -> Study:
     where = find_base(base, path)
     scenario = load(where, changes)
     written = {} if where.suffix in FORMATS else read_tables(where, changes)  # a result has all values written out
+    written = long_form(written) if is_axis(written) else written
     for entry in data.get("vary", []) if isinstance(data.get("vary"), list) else []:
         find_sheets(entry, path.parent)
     try:

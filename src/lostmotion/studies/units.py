@@ -9,6 +9,7 @@ from typing import Any
 from ..inputs.quantities import Limit
 from ..inputs.schema import follow, unit_in_schema
 from ..inputs.validation import shown
+from ..simulation.linear_units import unit_of_slides
 from ..simulation.scenario import Scenario, json_schema
 from ..simulation.train_scenario import TrainScenario, train_schema
 from ..units.conversion import to_si
@@ -27,6 +28,14 @@ def unit_of_key(key: str) -> str | None:
 def unit_in(form: type[Scenario | TrainScenario], key: str) -> str | None:
     """The same, of a key of the short or of the long form."""
     return _unit(key, train_schema if form is TrainScenario else json_schema)
+
+
+def unit_for(scenario: Scenario | TrainScenario, key: str) -> str | None:
+    """SI unit of a dotted key of a scenario, where its controllers move slides in units of translation."""
+    unit = unit_in(type(scenario), key)
+    if not unit or not key.startswith("controllers.") or not isinstance(scenario, TrainScenario):
+        return unit
+    return unit_of_slides(scenario.model_dump(), key, unit)
 
 
 def limit_in(form: type[Scenario | TrainScenario], key: str) -> Limit:

@@ -42,8 +42,9 @@ def _controlled(scenario: Scenario | TrainScenario) -> Iterator[tuple[str, str]]
     """What controllers add: their signals, by how much each axis misses its reference, and how far windings may be wrong."""
     for variable in axis_variables(scenario.by_prefix(), scenario.sliding()):
         yield variable.name, variable.unit
-    for _, name in pointing_names(scenario):
-        yield name, "rad"
+    for motor, name in pointing_names(scenario):
+        sliding = scenario.sliding().get(scenario.prefix(motor), (False, False))
+        yield name, "m" if sliding[1] else "rad"
     for name, _, unit in bound_names(scenario):
         yield name, unit
 

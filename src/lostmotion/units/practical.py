@@ -25,6 +25,7 @@ PRACTICAL = {
 
 # Units of charts and summaries, where they are not SI, and those of small values such as twists and errors.
 CHARTED = {"m": ("mm", 1e3), "m/s": ("mm/s", 1e3), "m/s^2": ("mm/s²", 1e3)}
+SMALL = 1e-4  # [m], below which lengths are in µm
 CHARTED_SMALL = {"rad": ("mrad", 1e3), "m": ("µm", 1e6)}
 
 
@@ -39,5 +40,8 @@ def practical(value: Any, unit: str, digits: int = 5) -> str:
     if isinstance(value, str):
         return value
     name, factor = PRACTICAL.get(unit, (unit.replace("*", "·"), 1.0))
-    text = ", ".join(f"{factor * v:.{digits}g}" for v in (value if isinstance(value, tuple) else (value,)))
+    values = value if isinstance(value, tuple) else (value,)
+    if unit == "m" and any(values) and all(abs(v) < SMALL for v in values):
+        name, factor = CHARTED_SMALL["m"]
+    text = ", ".join(f"{factor * v:.{digits}g}" for v in values)
     return f"{text} {name}".strip()

@@ -1,0 +1,168 @@
+"""The short form of a linear axis: motor, gearbox if there is one, screw, rack or belt, and slide, in the table `axis`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from copy import deepcopy
+from typing import Any
+
+from ..errors import InputError
+from ..inputs.validation import did_you_mean, shown
+from .scenario import RECORD_NAME, json_schema
+from .train_scenario import TrainScenario, train_from_tables, train_schema
+
+DRIVES = {"screw": "screws", "rack": "racks", "belt": "belts"}
+MOTOR, SLIDE, GEARBOX = "motor", "slide", "gearbox"  # names in the long form; the drive is called after its kind
+BESIDE = ("title", "command", "controller", "initial", "simulation")
+
+
+def is_axis(tables: Mapping[str, Any]) -> bool:
+    """Whether the tables of a scenario are in the short form of a linear axis."""
+    return "axis" in tables
+
+
+def axis_from_tables(tables: Mapping[str, Any]) -> TrainScenario:
+    """The scenario of such tables: shafts `motor` and, behind a gearbox, that of the drive; slide `slide`.
+
+    Raises
+    ------
+    InputError
+        A value cannot be used.
+    """
+    try:
+        return train_from_tables(long_form(tables))
+    except InputError as error:
+        text = str(error)
+        for short, long in DRIVES.items():
+            text = text.replace(f"{long}.{short}", f"axis.{short}")
+        for long, short in (
+            (f"controllers.{MOTOR}", "controller"),
+            (f"command.{MOTOR}", "command"),
+            (f"motors.{MOTOR}", "axis.motor"),
+            (f"gears.{GEARBOX}.gearbox", "axis.gearbox.from"),
+            (f"gears.{GEARBOX}", "axis.gearbox"),
+            (f"slides.{SLIDE}", "axis.slide"),
+        ):
+            text = text.replace(long, short)
+        raise InputError(text) from None
+
+
+def long_form(tables: Mapping[str, Any]) -> dict[str, Any]:
+    """The same tables in the long form.
+
+    Raises
+    ------
+    InputError
+        A table is missing, or is none of this form.
+    """
+    for key in tables:
+        if key not in ("axis", *BESIDE):
+            meant = did_you_mean(key, ("axis", *BESIDE), f"beside [axis] there may be {', '.join(BESIDE)}")
+            raise InputError(f"key {key}: does not stand beside [axis]; {meant}")
+    axis = tables["axis"]
+    parts = (MOTOR, GEARBOX, *DRIVES, SLIDE)
+    all_parts = f"they are {', '.join(parts)}"
+    if not isinstance(axis, Mapping):
+        raise InputError(f"key axis: {shown(axis)} must be a table with {', '.join(parts)}")
+    for key, value in axis.items():
+        if key not in parts:
+            raise InputError(f"key axis.{key}: is no part of an axis; {did_you_mean(key, parts, all_parts)}")
+        if not isinstance(value, Mapping | str) or (isinstance(value, str) and key == SLIDE):
+            raise InputError(f"key axis.{key}: {shown(value)} must be a table")
+    given = [kind for kind in DRIVES if kind in axis]
+    if len(given) != 1:
+        what = (
+            f"has {' and '.join(given)}; keep one"
+            if given
+            else f"lacks what moves the slide; add one of {', '.join(DRIVES)}"
+        )
+        raise InputError(f"key axis: {what}")
+    for key in (MOTOR, SLIDE):
+        if key not in axis:
+            raise InputError(f"key axis.{key}: is missing; add it")
+    if "controller" in tables and "command" in tables:
+        raise InputError("keys command, controller: both turn the motor; leave one of them out")
+    (kind,) = given
+    table = {key: {"from": value} if isinstance(value, str) else dict(value) for key, value in axis.items()}
+    shaft = MOTOR
+    long: dict[str, Any] = {
+        "shafts": {MOTOR: {}},
+        "slides": {SLIDE: table[SLIDE]},
+        "motors": {MOTOR: {"shaft": MOTOR, **table[MOTOR]}},
+    }
+    if GEARBOX in table:
+        shaft = kind
+        long["shafts"][shaft] = {}
+        gearbox = table[GEARBOX]
+        if "from" in gearbox:
+            gearbox = {"gearbox": gearbox.pop("from"), **gearbox}
+        long["gears"] = {GEARBOX: {"input": MOTOR, "output": shaft, **gearbox}}
+    long[DRIVES[kind]] = {kind: {"input": shaft, "output": SLIDE, **table[kind]}}
+    for short, in_long in (("controller", "controllers"), ("command", "command")):
+        if short in tables:
+            long[in_long] = {MOTOR: _on_slide(tables[short]) if short == "controller" else tables[short]}
+    return {**{key: tables[key] for key in ("title", "initial", "simulation") if key in tables}, **long}
+
+
+def _on_slide(controller: Any) -> Any:
+    """The controller with its position encoder on the slide, unless it says where that is."""
+    encoder = controller.get("position_encoder") if isinstance(controller, Mapping) else None
+    if not isinstance(encoder, Mapping) or "shaft" in encoder:
+        return controller
+    return {**controller, "position_encoder": {"shaft": SLIDE, **encoder}}
+
+
+def axis_schema() -> dict[str, Any]:
+    """JSON Schema of scenario files in this form, made of that of the long form."""
+    whole = train_schema()
+    definitions = whole["$defs"]
+
+    def part(name: str, *without: str) -> dict[str, Any]:
+        own = deepcopy(definitions[name])
+        for key in without:
+            own["properties"].pop(key, None)
+        own["required"] = [key for key in own.get("required", []) if key not in without]
+        record = {"properties": {"from": RECORD_NAME}, "required": ["from"], "type": "object"}
+        return {"anyOf": [own, record, RECORD_NAME]}
+
+    properties = {
+        MOTOR: part("ShaftMotor", "shaft"),
+        GEARBOX: part("Gear", "input", "output", "housing"),
+        "screw": part("Screw", "input", "output"),
+        "rack": part("Rack", "input", "output"),
+        "belt": part("Belt", "input", "output"),
+        SLIDE: {"$ref": "#/$defs/SlideTable"},
+    }
+    long = whole["properties"]
+    axis = {
+        "type": "object",
+        "properties": properties,
+        "required": [MOTOR, SLIDE],
+        "additionalProperties": False,
+        "description": "A motor, a gearbox if there is one, one of screw, rack and belt, and the slide that it moves.",
+    }
+    beside = {key: long[key] for key in ("title", "initial", "simulation", "base")}
+    beside["command"] = long["command"]["additionalProperties"]
+    beside["controller"] = long["controllers"]["additionalProperties"]
+    return {
+        "title": "Linear axis",
+        "type": "object",
+        "properties": {"title": beside["title"], "axis": axis, **beside},
+        "additionalProperties": False,
+        "$defs": definitions,
+    }
+
+
+def file_schema() -> dict[str, Any]:
+    """JSON Schema of scenario files in all their forms."""
+
+    def of_train(schema: dict[str, Any]) -> dict[str, Any]:
+        renamed: dict[str, Any] = json.loads(json.dumps(schema).replace('"#/$defs/', '"#/$defs/train_'))
+        return renamed
+
+    of_drive, long, axis = json_schema(), of_train(train_schema()), of_train(axis_schema())
+    of_drive["properties"]["controller"]["anyOf"].append({"$ref": "#/$defs/train_ContinuousController"})
+    axis.pop("$defs")
+    definitions = of_drive.pop("$defs") | {f"train_{name}": node for name, node in long.pop("$defs").items()}
+    return {"title": "Scenario file", "anyOf": [of_drive, long, axis], "$defs": definitions}

@@ -1,0 +1,139 @@
+"""Values of controllers that are given for slides: with units of length and force where a shaft has units of angle and torque."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from ..errors import InputError
+from ..inputs.schema import follow, unit_in_schema
+from ..inputs.validation import shown
+from ..units.conversion import Unit
+
+# Keys of a controller that belong to the shaft of its reference, and to those of its encoders.
+OF_REFERENCE = (
+    ("reference",),
+    ("position", "speed_limit"),
+    ("position", "dead_zone"),
+    ("feedforward", "backlash"),
+    ("feedforward", "backlash_rate"),
+    ("inverse_model", "twist_rate"),
+)
+ENCODERS = ("encoder", "position_encoder")
+
+
+def in_si(data: Mapping[str, Any], schema: Callable[[], Mapping[str, Any]]) -> dict[str, Any]:
+    """The tables of a train with the strings of controllers of slides as numbers in SI.
+
+    Parameters
+    ----------
+    schema
+        Of the tables, which says the unit of each key for a shaft.
+
+    Raises
+    ------
+    InputError
+        A value has the unit of something else.
+    """
+    slides, controllers = data.get("slides"), data.get("controllers")
+    if not isinstance(slides, Mapping) or not slides or not isinstance(controllers, Mapping):
+        return dict(data)
+    of_slides: dict[str, Any] = {}
+    for name, controller in controllers.items():
+        if isinstance(controller, Mapping):
+            of_slides[name] = _Reader(data, name, controller, schema()).controller()
+        else:
+            of_slides[name] = controller
+    return {**data, "controllers": of_slides}
+
+
+def unit_of_slides(data: Mapping[str, Any], key: str, unit: str) -> str:
+    """The unit of a key of a controller, for the slides of the tables of a train.
+
+    Parameters
+    ----------
+    key
+        Dotted, such as ``controllers.motor.reference.moves.0.to``.
+    unit
+        That it has for shafts.
+    """
+    table, _, rest = key.partition(".")
+    name, _, path = rest.partition(".")
+    controller = (data.get("controllers") or {}).get(name)
+    if table != "controllers" or not data.get("slides") or not isinstance(controller, Mapping):
+        return unit
+    positions, forces = _Reader(data, name, controller, {}).slides_at(tuple(path.split(".")))
+    return of_slides(unit, positions=positions, forces=forces)
+
+
+class _Reader:
+    def __init__(
+        self, data: Mapping[str, Any], name: str, controller: Mapping[str, Any], schema: Mapping[str, Any]
+    ) -> None:
+        self.schema, self.table, self.name = schema, controller, name
+        slides = data["slides"]
+        self.motor_slides = name in (data.get("linear_motors") or {})
+        shaft = controller.get("shaft")
+        self.reference_slides = (next(reversed(slides)) if shaft is None else shaft) in slides
+        self.encoder_slides = {}
+        for key in ENCODERS:
+            encoder = controller.get(key)
+            own = encoder.get("shaft") if isinstance(encoder, Mapping) else None
+            self.encoder_slides[key] = self.motor_slides if own is None else own in slides
+
+    def controller(self) -> dict[str, Any]:
+        return {key: self._read(value, (key,)) for key, value in self.table.items()}
+
+    def slides_at(self, path: tuple[int | str, ...]) -> tuple[bool, bool]:
+        """Whether angles at this key are positions, and torques forces."""
+        if "phase" in str(path[-1]):
+            return False, False  # of a sine
+        if path[0] in ENCODERS:
+            return self.encoder_slides[str(path[0])], False
+        positions = any(path[: len(key)] == key for key in OF_REFERENCE)
+        if self.table.get("kind") == "continuous":
+            return self.reference_slides, self.motor_slides
+        torque = path[0] == "reference" and self.table.get("reference", {}).get("kind") == "torque"
+        return (self.reference_slides if positions and not torque else self.motor_slides), self.motor_slides
+
+    def _read(self, value: Any, path: tuple[int | str, ...]) -> Any:
+        if isinstance(value, Mapping):
+            return {key: self._read(inner, (*path, key)) for key, inner in value.items()}
+        if isinstance(value, list | tuple):
+            return [self._read(inner, (*path, k)) for k, inner in enumerate(value)]
+        if not isinstance(value, str):
+            return value
+        positions, forces = self.slides_at(path)
+        if not positions and not forces:
+            return value
+        units = set(self._units(path))
+        if len(units) != 1:
+            return value  # no quantity, or no such key: refused when the scenario is made
+        wanted = of_slides(units.pop(), positions=positions, forces=forces)
+        try:
+            return Unit(wanted).read(value) if wanted else value
+        except ValueError as error:
+            key = ".".join(("controllers", self.name, *map(str, path)))
+            raise InputError(f"key {key}: {shown(value)} {error}") from None
+
+    def _units(self, path: tuple[int | str, ...]) -> Iterator[str]:
+        """SI units that a key has for a shaft, by the kinds of the tables around it."""
+        place: list[int | str] = ["controllers", self.name]
+        node: Any = self.table
+        place += [str(node["kind"])] if "kind" in node else []
+        for key in path:
+            place.append(key)
+            node = node[key]
+            if isinstance(node, Mapping) and "kind" in node:
+                place.append(str(node["kind"]))
+        _, nodes = follow(self.schema, tuple(place))
+        for found in nodes:
+            if (unit := unit_in_schema(found)) is not None:
+                yield unit
+
+
+def of_slides(unit: str, *, positions: bool, forces: bool) -> str:
+    """The unit of a slide for one of a shaft, such as m/s for rad/s."""
+    if forces:
+        unit = unit.replace("kg*m^2", "kg").replace("N*m", "N")
+    return unit.replace("rad", "m") if positions else unit
