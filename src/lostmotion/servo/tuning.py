@@ -27,9 +27,9 @@ from ..inputs.arguments import ScenarioName, checked
 from ..inputs.quantities import Angle, Number
 from ..inputs.schema import follow, unit_in_schema
 from ..inputs.validation import shown
+from ..simulation.axis_form import file_schema
 from ..simulation.keys import parse_override
 from ..simulation.scenario import Scenario
-from ..simulation.axis_form import file_schema
 from ..simulation.train_scenario import TrainScenario
 from .data import frictions, inertias, lag_sum, two_inertias
 from .margins import STABLE, bandwidth_of, frequencies, margins
@@ -85,7 +85,9 @@ class Tuning:
 
     def conventions(self) -> list[tuple[str, str, str]]:
         """The same gains as manufacturers of drives write them: (what, value with unit, where it is written so)."""
-        return _conventions(self.gain, self.integral_gain, self.position_gain, self.filter_time, self.torque_constant, self.linear_motor)
+        return _conventions(
+            self.gain, self.integral_gain, self.position_gain, self.filter_time, self.torque_constant, self.linear_motor
+        )
 
     def changes(self) -> list[tuple[str, str, str]]:
         """What tuning changed: (key of the scenario, old value, new value), with units.
@@ -187,9 +189,9 @@ def drive_units(scenario: Scenario | TrainScenario, motor: str | None = None) ->
     filters = [f for f in speed.reference_filters if isinstance(f, LowPass)]
     time = 1.0 / (2.0 * math.pi * filters[0].frequency) if len(filters) == 1 else 0.0
     K_v = None if position is None else position.gain
-    return _aligned(_conventions(
-            speed.gain, speed.k_i, K_v, time, _torque_constant(axis), axis.train.is_slide(axis.motor_shaft)
-        ))
+    return _aligned(
+        _conventions(speed.gain, speed.k_i, K_v, time, _torque_constant(axis), axis.train.is_slide(axis.motor_shaft))
+    )
 
 
 @checked
