@@ -223,8 +223,8 @@ def following(axis: Axis) -> Following:
     encoder = encoder_shaft(axis)
     unseen = np.zeros_like(error)
     if reference.kind == "position" and encoder != axis.shaft:
-        read = data[axis.train.angle_of(encoder)].values
-        unseen = read / (turns(axis.train, encoder, axis.shaft) or 1.0) - data[name].values
+        read = data[axis.train.angle_of(encoder)]
+        unseen = read / (turns(axis.train, encoder, axis.shaft) or 1.0) - data[name]
     return Following(unit, time, wanted, error, float(np.abs(error).max()), rms, unseen, encoder)
 
 
