@@ -216,7 +216,7 @@ class LinearMotorSheet(LinearSheet, LinearMotorData):
     {'mass': 0.3, 'rated_force': 100.0}
     """
 
-    kind: Literal["iron_core", "ironless", "tubular", "voice_coil"] = "iron_core"
+    kind: Literal["ironcore", "ironless", "tubular", "voice_coil"] = "ironcore"
     resistance: Annotated[Resistance, Positive] | None = None
     """between two terminals, at 25 °C"""
     inductance: Annotated[Inductance, Positive] | None = None
