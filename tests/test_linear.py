@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
+from conftest import ROOT
 from lostmotion.inputs.schema import unit_in_schema
 from lostmotion.live_page.description import describe
 from lostmotion.portable import fmi2, fmi3, fmu
@@ -456,3 +457,17 @@ def test_schema_of_slides_has_no_unit_of_rotation():
             {"inclination": "rad"},
             {"phase": "rad"},
         ), part
+
+
+def test_the_tutorial_prints_what_the_run_prints(tmp_path):
+    page = (ROOT / "docs" / "ball-screw-axis.md").read_text()
+    (tmp_path / "my-axis.toml").write_text(re.findall(r"```toml\n(.*?)```", page, re.S)[0])
+    *shown, dots = re.findall(r"```text\n(.*?)\n```", page, re.S)[0].splitlines()
+    assert dots.strip() == "..."
+    result = lm.simulate(lm.load(tmp_path / "my-axis.toml"))
+    assert summary(result).splitlines()[: len(shown)] == shown
+    error = result["motor_position_reference"] - result["slide_position"]
+    assert f"# {1e6 * float(abs(error).max()):.1f} µm" in page
+    on_motor = {"controller.position_encoder": {"shaft": "motor", "bits": 20}}
+    beside = lm.simulate(lm.load(tmp_path / "my-axis.toml", on_motor))["slide_position"][-1]
+    assert float(beside) == pytest.approx(1e-6 + 40.0 / 100e6, abs=0.1e-6)
