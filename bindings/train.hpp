@@ -97,7 +97,7 @@ class TrainDescription : public model::TrainDescription {
     using Friction = std::tuple<double, double, std::vector<double>, std::vector<double>>;
 
     void add_shaft(const std::string& name, double inertia, double viscous_friction, const Friction& friction,
-                   const TorsionCurve* drag, bool loaded) {
+                   const TorsionCurve* drag, bool loaded, bool given_motion) {
         model::Shaft s;
         s.name = name;
         s.inertia = inertia;
@@ -106,6 +106,7 @@ class TrainDescription : public model::TrainDescription {
         s.friction = {torque, breakaway, speeds, torques};
         if (drag != nullptr) s.drag = *drag;
         s.loaded = loaded;
+        s.given_motion = given_motion;
         model::TrainDescription::add_shaft(std::move(s));
     }
     void set_domain(const std::string& shaft, const std::string& domain) {
@@ -371,7 +372,7 @@ inline void bind_train(nb::module_& m) {
     nb::class_<TrainDescription>(m, "Train", nb::is_weak_referenceable())
         .def(nb::init<>())
         .def("add_shaft", &TrainDescription::add_shaft, "name"_a, "inertia"_a, "viscous_friction"_a, "friction"_a,
-             "drag"_a.none(), "loaded"_a)
+             "drag"_a.none(), "loaded"_a, "given_motion"_a = false)
         .def("add_motor", &TrainDescription::add_motor, "name"_a, "shaft"_a, "parameters"_a, "torque_source"_a,
              "torque_limit"_a)
         .def("add_gear", &TrainDescription::add_gear, "name"_a, "input"_a, "output"_a, "parameters"_a,

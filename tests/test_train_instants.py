@@ -58,8 +58,12 @@ def test_a_train_stepped_follows_its_run(path: Path) -> None:
     # Commands and loads as straight lines over the steps, in both.
     levels = {name: np.array([_value(signals[name], h * k) for k in range(n + 1)]) for name in names}
     simulation = lm.Simulation(scenario, step=h)
+    speeds = {
+        name: np.array([_value(scenario.shafts[name].speed, h * k) for k in range(n + 1)]) for name in simulation.given
+    }
     for k in range(n):
-        simulation.advance(h, **{name: (u[k], u[k + 1]) for name, u in levels.items()})
+        motion = {name: {"speed": w[k + 1]} for name, w in speeds.items()}
+        simulation.advance(h, motion=motion, **{name: (u[k], u[k + 1]) for name, u in levels.items()})
     changes: dict[str, Any] = {"simulation.duration": h * n, "simulation.sample_interval": h}
     for name, u in levels.items():
         element, load = name.removesuffix("_load_torque"), name.endswith("_load_torque")
@@ -68,6 +72,9 @@ def test_a_train_stepped_follows_its_run(path: Path) -> None:
         if name.endswith("_reference"):
             controller = f"controllers.{name.removesuffix('_reference')}.reference"
             changes[controller] = changes.pop(key) | {"kind": scenario.controllers["servo"].reference.kind}
+    for name, w in speeds.items():  # with the last line going on, since a run has the right limits of accelerations
+        points = {"times": [h * k for k in range(n + 2)], "values": [*w.tolist(), 2.0 * w[-1] - w[-2]]}
+        changes[f"shafts.{name}.speed"] = {"samples": points}
     run = lm.simulate(scenario.replace(**changes))
     assert set(simulation.read()) == {str(name) for name in run}
     for name in run:
@@ -92,9 +99,10 @@ def test_an_angle_that_no_gear_hands_on_is_no_variable_of_stepping_either() -> N
 
 
 def _value(signal: Any, t: float) -> float:
-    """Of a signal at an instant: mean, sine, steps and nothing else."""
+    """Of a signal at an instant: mean, sine, steps, ramps and nothing else."""
     sine = signal.amplitude * math.sin(2.0 * math.pi * signal.frequency * t + signal.phase) if signal.amplitude else 0.0
-    return float(signal.mean + sine + sum(s.height for s in signal.steps if s.time <= t))
+    ramps = sum(r.rise * min(1.0, max(0.0, (t - r.begin) / r.duration)) for r in signal.ramps)
+    return float(signal.mean + sine + sum(s.height for s in signal.steps if s.time <= t) + ramps)
 
 
 @pytest.mark.parametrize("path", [p for p in SCENARIOS if p not in CONTROLLED], ids=lambda p: p.stem)

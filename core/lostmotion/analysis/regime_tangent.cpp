@@ -11,6 +11,7 @@ std::optional<model::Row> channel_form(const model::Assembly& a, const model::Re
         case TrainChannel::output_torque: return r.output_torque[k];
         case TrainChannel::input_torque: return r.input_torque[k];
         case TrainChannel::contact_torque: return r.contact_torque[k];
+        case TrainChannel::drive_torque: return r.drive_torque[k];
         case TrainChannel::output: return a.controller_command(c.index, r.key);
         case TrainChannel::error: return a.controller_error(c.index);
         default: return std::nullopt;

@@ -63,9 +63,7 @@ class ResetTangent {
  private:
     void add_now(const VariedForm& f, const double* w, const double* derivative, double factor, const double* to,
                  double* sum) const;
-    static model::Ties tie(const model::Assembly& a, const std::int8_t* modes) {
-        return model::tie(a.places().contacts, static_cast<int>(a.train().shafts.size()), modes);
-    }
+    static model::Ties tie(const model::Assembly& a, const std::int8_t* modes) { return a.places().ties(modes); }
 
     const VariedTrain& trains_;
     const FormTangent& form_;

@@ -34,6 +34,7 @@ struct Guard {
         input_limit,  // an input crosses a limit
         turning,      // the torque that drives a contact at its limit turns back
         outside,      // the extended data of a law end
+        set_off,      // a contact at rest whose speed is given begins to move
     };
     Row form{};
     Kind kind = outside;
@@ -48,7 +49,7 @@ struct Guard {
     // Edge of a law or limit of an input, with a neighbour beyond.
     bool is_edge() const { return kind == edge || kind == input_limit; }
     // Says whether a contact goes on in its mode.
-    bool is_of_contact() const { return kind == speed || kind == capacity || kind == turning; }
+    bool is_of_contact() const { return kind == speed || kind == capacity || kind == turning || kind == set_off; }
 };
 
 // Speeds that the contacts at rest tie together: each a sum over those that stay free, w_s = sum_k share[s][k] w_k.
@@ -65,7 +66,8 @@ struct Ties {
             use(k, share[s][k]);
         }
     }
-    std::array<bool, max_contacts> redundant{};  // stuck, but its speed is kept at zero by those before it
+    // Stuck, but its speed is kept at zero by those before it, or given and zero.
+    std::array<bool, max_contacts> redundant{};
 };
 
 // What takes a torque that rest leaves open along with the limit of a contact: where the inputs have a part in it, it
@@ -112,6 +114,7 @@ struct Regime {
     std::vector<Row> input_torque;     // T_1 of each gear [N m]; while its input shaft is stuck without dry losses
     std::vector<Row> gear_hysteresis;  // H of each gear [N m]
     std::vector<Row> contact_torque;   // what each contact takes [N m]
+    std::vector<Row> drive_torque;     // of each given motion: what it turns its shaft with [N m]
     std::array<bool, max_contacts> at_rest{};  // contacts whose speeds this regime keeps at zero
     Ties ties;
     std::vector<Driver<Row>> drivers;

@@ -17,9 +17,10 @@ namespace lostmotion::model {
 struct ShaftPlace {
     int speed = nowhere, angle = nowhere;  // states; the angle only if something depends on it
     int contact = nowhere, load = nowhere;
-    int friction_piece = nowhere;                  // branch
-    double inertia = 0.0, viscous_friction = 0.0;  // with the rotors and gears on it
-    double motor_friction = 0.0;                   // [N m], of the bearings of the motors on it
+    int given_speed = nowhere, given_acceleration = nowhere;  // inputs, where the motion is given
+    int friction_piece = nowhere;                             // branch
+    double inertia = 0.0, viscous_friction = 0.0;             // with the rotors and gears on it
+    double motor_friction = 0.0;                              // [N m], of the bearings of the motors on it
 };
 
 // The shaft that an element acts on, in forms.

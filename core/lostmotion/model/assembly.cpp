@@ -5,13 +5,16 @@ namespace lostmotion::model {
 Regime Assembly::build(const Key& key) const {
     Regime r;
     r.key = key;
-    r.ties = tie(places().contacts, static_cast<int>(train().shafts.size()), key.modes.data());
-    for (int c = 0; c < layout().contacts; ++c) r.at_rest[c] = kept_at_rest(places().contacts[c], r.ties);
+    r.ties = places().ties(key.modes.data());
+    for (int c = 0; c < layout().contacts; ++c)
+        r.at_rest[c] = r.ties.redundant[c] || kept_at_rest(places().contacts[c], r.ties);
 
     std::vector<Row> motion(train().shafts.size());
     equations_.compose(key, r, motion);
+    for (const int s : places().driven) r.drive_torque.push_back(equations_.drive_torque(s, motion[s]));
     std::vector<Row*> forms;
-    for (std::vector<Row>* rows : {&r.output_torque, &r.input_torque, &r.gear_hysteresis, &r.contact_torque})
+    for (std::vector<Row>* rows :
+         {&r.output_torque, &r.input_torque, &r.gear_hysteresis, &r.contact_torque, &r.drive_torque})
         for (Row& f : *rows) forms.push_back(&f);
     r.solvable = Statics(places(), key, r.ties, motion).solve(forms);
     equations_.set_rates(key, motion, r);

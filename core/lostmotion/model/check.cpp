@@ -142,7 +142,8 @@ std::string TrainCheck::inertias() const {
     for (int s = 0; s < shafts; ++s) {
         if (!(places.shafts[s].inertia >= 0.0))
             return shaft(s) + " has a negative inertia; give it none or a positive one";
-        if (places.shafts[s].inertia > 0.0) held.push_back({ContactPlace::shaft, s, s});
+        if (places.shafts[s].inertia > 0.0 || train_.shafts[s].given_motion)
+            held.push_back({ContactPlace::shaft, s, s});
     }
     for (const ContactPlace& c : places.contacts)
         if (c.bilateral) held.push_back(c);
@@ -171,6 +172,20 @@ std::string TrainCheck::rigid_loops() const {
                                   : "another ratio: nothing could turn") +
                "; give it a stiffness or leave it out";
     }
+    return given_motions(rigid);
+}
+
+std::string TrainCheck::given_motions(const std::vector<ContactPlace>& rigid) const {
+    Given given;
+    for (std::size_t s = 0; s < train_.shafts.size(); ++s)
+        if (train_.shafts[s].given_motion) given.shafts |= 1u << s;
+    const std::vector<std::int8_t> stuck(rigid.size(), 0);
+    const Ties ties = tie(rigid, static_cast<int>(train_.shafts.size()), stuck.data(), nullptr, given);
+    for (std::size_t k = 0; k < rigid.size(); ++k)
+        if (const auto gear = static_cast<std::size_t>(rigid[k].element); ties.redundant[k])
+            return named("gear", train_.gears[gear].name, gear) +
+                   " is rigid and joins shafts whose motions are both given; give it a stiffness, or leave one of the "
+                   "speeds out";
     return {};
 }
 
@@ -187,6 +202,8 @@ std::string TrainCheck::turned() const {
         act_on(c->output);
     }
     for (const ShaftMotor& m : train_.motors) act_on(m.shaft);
+    for (std::size_t s = 0; s < acted_on.size(); ++s)
+        if (train_.shafts[s].given_motion) act_on(static_cast<int>(s));
     for (const auto& e : shaft_elements(train_))
         if (e->drives()) act_on(e->shaft);
     for (std::size_t s = 0; s < acted_on.size(); ++s)

@@ -40,6 +40,9 @@ class TrainCheck {
     // Rigid gears alone: a loop either locks the train or leaves its torques undetermined.
     std::string rigid_loops() const;
 
+    // A rigid gear between shafts whose motions are both given.
+    std::string given_motions(const std::vector<ContactPlace>& rigid) const;
+
     // Does a motor, gear, coupling, spring or load torque act on each shaft? A part without motor and load moves
     // freely.
     std::string turned() const;

@@ -153,7 +153,7 @@ class ComponentLaws<model::TrainSystem<D>> {
     const std::vector<model::GearPlace>& gears() const { return assembly_.places().gears; }
     template <class Modes>
     model::Ties ties(const Modes& modes) const {
-        return model::tie(contacts(), static_cast<int>(assembly_.train().shafts.size()), modes.data());
+        return assembly_.places().ties(modes.data());
     }
     void set_torque(int memory, double magnitude) {
         neutral_[D::states + memory] = false;

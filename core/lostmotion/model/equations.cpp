@@ -20,7 +20,8 @@ void Equations::compose(const Key& key, Regime& r, std::vector<Row>& motion) con
     for (std::size_t s = 0; s < train_.shafts.size(); ++s) motion[s] = net_torque(static_cast<int>(s), key, r);
     r.locked.clear();
     for (std::size_t c = places_.contacts.size(); c-- > 0;)
-        if (r.ties.redundant[c]) r.locked.push_back(locked_torque(static_cast<int>(c), key, r));
+        if (r.ties.redundant[c] && places_.contacts[c].locked != nowhere)
+            r.locked.push_back(locked_torque(static_cast<int>(c), key, r));
     // From here on the torque at the input includes the losses.
     for (std::size_t g = 0; g < gears; ++g) r.input_torque[g] += loss[g];
 }
@@ -167,7 +168,7 @@ LockedTorque<Row> Equations::locked_torque(int contact, const Key& key, const Re
     const int on = places_.shafts[c.b].contact;
     const bool lossy = std::any_of(train_.gears.begin(), train_.gears.end(),
                                    [&](const Gear& g) { return g.input == c.b && g.has_dry_losses(); });
-    if (on != nowhere && mode(key, on) == 0 && !lossy) add_held_shaft(c.b, key, r, locked);
+    if (on != nowhere && mode(key, on) == 0 && !r.ties.redundant[on] && !lossy) add_held_shaft(c.b, key, r, locked);
     return locked;
 }
 

@@ -25,6 +25,11 @@ class Equations {
 
     // Torques, and the net torque of each shaft, in terms of the reactions of the stuck contacts as well.
     void compose(const Key& key, Regime& r, std::vector<Row>& motion) const;
+    // What the given motion of a shaft turns it with, beside all that else acts on it: J w' less that.
+    Row drive_torque(int shaft, const Row& others) const {
+        const ShaftPlace& p = places_.shafts[shaft];
+        return terms_.input(p.given_acceleration, p.inertia) - others;
+    }
     // Rates of the states, from accelerations without reactions.
     void set_rates(const Key& key, const std::vector<Row>& acceleration, Regime& r) const;
 
@@ -38,9 +43,12 @@ class Equations {
     void add_held_shaft(int shaft, const Key& key, const Regime& r, LockedTorque<Row>& locked) const;
 
     int mode(const Key& key, int contact) const { return key.modes[contact]; }
-    // What a stuck contact takes: found from its rest, or, where the motion does not determine it, as it was.
+    // What a stuck contact takes: found from its rest, or, where the motion does not determine it, as it was. The
+    // friction of a shaft whose given speed is zero takes nothing.
     Row held(int contact, const Regime& r) const {
-        return r.ties.redundant[contact] ? terms_.memory(places_.contacts[contact].locked) : terms_.reaction(contact);
+        if (!r.ties.redundant[contact]) return terms_.reaction(contact);
+        const int locked = places_.contacts[contact].locked;
+        return locked == nowhere ? Row{} : terms_.memory(locked);
     }
 
     const ElementForms& forms_;

@@ -31,11 +31,19 @@ void RegimeGuards::add_all() {
 void RegimeGuards::add_speed_guards() {
     for (int c = 0; c < layout_.contacts; ++c) {
         const int mode = regime_.key.modes[c];
+        if (mode == 0 && regime_.ties.redundant[c]) add_given_speed(c);
         if (mode == 0 || held_in_motion(c)) continue;
         // (16) sets the hysteresis anew whenever the twist rate reaches zero, whether it then changes sign or not.
         add(static_cast<double>(mode) * forms_.contact_speed(c), Guard::speed, c, nowhere, 0).by_grazing =
             places_.contacts[c].kind == ContactPlace::gear;
     }
+}
+
+// A contact whose speed is given, at rest while that is zero.
+void RegimeGuards::add_given_speed(int contact) {
+    if (kept_at_rest(places_.contacts[contact], regime_.ties)) return;
+    for (const int s : {+1, -1})
+        add(-static_cast<double>(s) * forms_.contact_speed(contact), Guard::set_off, contact, nowhere, s);
 }
 
 void RegimeGuards::add_gear_capacities() {
@@ -70,6 +78,7 @@ void RegimeGuards::add_shaft_guards(int shaft) {
         each_gear([&](int g) { add_loss_edges(g); });
         return;
     }
+    if (regime_.ties.redundant[p.contact]) return;
     for (const int s : {+1, -1}) {
         Row F = forms_.held_friction(shaft, regime_.key);
         each_gear([&](int g) { add_loss_cells(g, s, F); });
@@ -143,7 +152,7 @@ void RegimeGuards::add_driver(int contact) {
     Regime stuck;
     stuck.key = regime_.key;
     stuck.key.modes[contact] = 0;
-    stuck.ties = tie(places_.contacts, static_cast<int>(train_.shafts.size()), stuck.key.modes.data());
+    stuck.ties = places_.ties(stuck.key.modes.data());
     std::vector<Row> motion(train_.shafts.size());
     equations_.compose(stuck.key, stuck, motion);
     Row& overcome = stuck.contact_torque[contact];

@@ -25,6 +25,7 @@ class RegimeGuards {
  private:
     bool held_in_motion(int contact) const;
     void add_speed_guards();
+    void add_given_speed(int contact);
     void add_gear_capacities();
     void add_coupling_capacities();
     void add_shaft_guards(int shaft);

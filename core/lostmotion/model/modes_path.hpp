@@ -25,6 +25,8 @@ bool SwitchedTrain<Sizes>::conditions(Cache& cache, Now now, const Key& modes, c
         const auto& guard = r.guards[g];
         if (guard.kind == Guard::capacity)
             out[guard.contact][guard.neighbour + 1] = evaluate(n_, guard.form, now);
+        else if (guard.kind == Guard::set_off)
+            out[guard.contact][guard.neighbour + 1] = along.rate(guard.form, 1);
         else if (guard.kind == Guard::speed && event.at_rest[guard.contact] && !r.at_rest[guard.contact])
             out[guard.contact][1] = along.rate(guard.form, 1);
     }

@@ -21,8 +21,12 @@ template <class X, class AtRest>
 void SwitchedTrain<Sizes>::stop(X& x, AtRest& at_rest) const {
     std::array<std::int8_t, max_contacts> modes{};
     for (int c = 0; c < contacts(); ++c) modes[c] = at_rest[c] ? 0 : 1;
-    const Ties ties = tie(places().contacts, static_cast<int>(train().shafts.size()), modes.data());
+    Ties ties = places().ties(modes.data(), nullptr, true);
     for (int c = 0; c < contacts(); ++c) at_rest[c] = kept_at_rest(places().contacts[c], ties);
+    if (!places().driven.empty()) {  // whose speeds stay what they are, to the last bit
+        for (int c = 0; c < contacts(); ++c) modes[c] = at_rest[c] ? 0 : 1;
+        ties = places().ties(modes.data());
+    }
     for (std::size_t s = 0; s < train().shafts.size(); ++s) {
         double& w = x[places().shafts[s].speed];
         if (!ties.at_rest[s] && !ties.follows(static_cast<int>(s))) continue;
@@ -32,12 +36,39 @@ void SwitchedTrain<Sizes>::stop(X& x, AtRest& at_rest) const {
 }
 
 template <class Sizes>
+template <class Now>
+bool SwitchedTrain<Sizes>::follow_given(Now& now, const Key& key, Rest& rests) const {
+    if (places().driven.empty()) return false;
+    unsigned given = 0;
+    for (const int s : places().driven) {
+        given |= 1u << s;
+        now.x[places().shafts[s].speed] = now.input[0][places().shafts[s].given_speed];
+    }
+    const Ties ties = places().ties(key.modes.data());
+    bool some = false;
+    for (int c = 0; c < contacts(); ++c) {
+        if (key.modes[c] == 0) continue;
+        std::array<double, max_shafts> per;
+        const unsigned moves = tied_speed(places().contacts[c], ties, per);
+        if (moves == 0 || (moves & ~given) != 0) continue;
+        double speed = 0.0;
+        for (const int s : places().driven)
+            if (moves >> s & 1) speed += per[s] * now.x[places().shafts[s].speed];
+        rests[c] = speed == 0.0;
+        some = some || rests[c];
+    }
+    return some;
+}
+
+template <class Sizes>
 template <class Cache, class Now>
 Found SwitchedTrain<Sizes>::start(Cache& cache, Now& now, Key& key) const {
     constexpr double few_roundings = 8.0 * std::numeric_limits<double>::epsilon();
     key = Key{};
     Event event;
-    bool snap = false;
+    Rest given_rest{};
+    follow_given(now, key, given_rest);
+    bool snap = !places().driven.empty();
     for (int c = 0; c < contacts(); ++c) {
         const ContactPlace& p = places().contacts[c];
         double speed = 0.0, size = 0.0;
@@ -78,7 +109,10 @@ Found SwitchedTrain<Sizes>::start(Cache& cache, Now& now, Key& key) const {
 template <class Sizes>
 template <class Cache, class Now, class G, class Input>
 Found SwitchedTrain<Sizes>::next(Cache& cache, Now& now, const G* fired, Key& key, const Input& input) const {
-    if (fired != nullptr ? goes_on(cache, now, *fired, key) : stays(cache, now, key, input)) return Found::yes;
+    Rest given_rest{};
+    const bool comes_to_rest = fired == nullptr && follow_given(now, key, given_rest);
+    if (fired != nullptr ? goes_on(cache, now, *fired, key) : !comes_to_rest && stays(cache, now, key, input))
+        return Found::yes;
     Now past = now;
     past.input[0] = input;
     const auto& old = cache.regime(key);
@@ -98,7 +132,7 @@ Found SwitchedTrain<Sizes>::next(Cache& cache, Now& now, const G* fired, Key& ke
     }
     Rest before{};
     std::copy_n(old.at_rest.begin(), contacts(), before.begin());
-    event.at_rest = before;
+    for (int c = 0; c < contacts(); ++c) event.at_rest[c] = before[c] || given_rest[c];
     if (fired != nullptr && fired->kind == Guard::speed) event.at_rest[fired->contact] = true;
     stop(now.x, event.at_rest);
     past.x = now.x;
@@ -188,7 +222,7 @@ template <class Sizes>
 bool SwitchedTrain<Sizes>::at_its_limit(const Key& key) const {
     if (!some_redundant_) return false;
     const std::vector<ContactPlace>& all = places().contacts;
-    const Ties ties = tie(all, static_cast<int>(train().shafts.size()), key.modes.data());
+    const Ties ties = places().ties(key.modes.data());
     std::array<int, max_shafts> direction{};  // of each free shaft
     std::array<double, max_shafts> speed;
     for (std::size_t k = 0; k < all.size(); ++k) {

@@ -90,6 +90,11 @@ std::vector<std::string> input_names(const Assembly& a) {
     };
     for (std::size_t k = 0; k < t.motors.size(); ++k) set(p.motors[k].command, command_of(t, k));
     for (std::size_t k = 0; k < t.shafts.size(); ++k) set(p.shafts[k].load, load_torque_of(t, k));
+    for (const int s : p.driven) {
+        const auto k = static_cast<std::size_t>(s);
+        set(p.shafts[k].given_speed, t.shafts[k].name + "_given_speed");
+        set(p.shafts[k].given_acceleration, t.shafts[k].name + "_given_acceleration");
+    }
     for (const auto& e : p.acting) set(e->command, e->name + "_command");
     for (const auto& c : p.couplings) set(c->command, c->name + "_command");
     for (std::size_t k = 0; k < t.controllers.size(); ++k) {

@@ -21,6 +21,7 @@ Places::Places(const Train& train, bool with_remainders)
     for (std::size_t s = 0; s < shafts.size(); ++s) {
         shafts[s].inertia = train.shafts[s].inertia;
         shafts[s].viscous_friction = train.shafts[s].viscous_friction;
+        if (train.shafts[s].given_motion) driven.push_back(static_cast<int>(s));
     }
     for (const ShaftMotor& m : train.motors) {
         shafts[m.shaft].inertia += m.law.rotor_inertia;
@@ -121,6 +122,10 @@ void Places::place_inputs(const Train& train) {
         if (m.controller == nowhere) m.command = layout.inputs++;
     for (std::size_t s = 0; s < shafts.size(); ++s)
         if (train.shafts[s].loaded) shafts[s].load = layout.inputs++;
+    for (const int s : driven) {
+        shafts[s].given_speed = layout.inputs++;
+        shafts[s].given_acceleration = layout.inputs++;
+    }
     for (const auto& e : acting)
         if (e->has_command()) e->command = layout.inputs++;
     for (const auto& c : couplings)
@@ -137,9 +142,9 @@ void Places::place_memory_and_branches(const Train& train) {
         if (train.gears[k].law.has_hysteresis()) gears[k].hysteresis = layout.memory++;
     // What is redundant while some contacts are stuck is so while all are.
     const std::vector<std::int8_t> all_stuck(contacts.size(), 0);
-    const Ties ties = tie(contacts, static_cast<int>(shafts.size()), all_stuck.data());
+    const Ties stuck = ties(all_stuck.data());
     for (std::size_t c = 0; c < contacts.size(); ++c)
-        if (ties.redundant[c]) contacts[c].locked = layout.memory++;
+        if (stuck.redundant[c] && contacts[c].kind != ContactPlace::shaft) contacts[c].locked = layout.memory++;
 
     int& next = layout.branches;
     for (std::size_t m = 0; m < motors.size(); ++m)

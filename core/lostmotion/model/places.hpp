@@ -50,9 +50,16 @@ struct Places {
     CouplingElements couplings;
     std::vector<ContactPlace> contacts;
     std::vector<int> last_shaft;  // of each part of the train, whose angle is kept
+    std::vector<int> driven;      // shafts whose motion is given
 
     // with_remainders: what piecewise-linear laws leave of smooth ones enters as further inputs.
     explicit Places(const Train& train, bool with_remainders = false);
+
+    Ties ties(const std::int8_t* modes, const double* inertia = nullptr, bool given_speeds_follow = false) const {
+        unsigned given = 0;
+        for (const int s : driven) given |= 1u << s;
+        return tie(contacts, static_cast<int>(shafts.size()), modes, inertia, {given, given_speeds_follow});
+    }
 
     template <class Now>
     ShaftInstant instant_of(const ShaftElement& e, const Now& now) const {

@@ -15,6 +15,9 @@ void each_flow(const Assembly& a, Use&& use) {
     for (std::size_t m = 0; m < train.motors.size(); ++m)
         use(PowerFlow::source, train.motors[m].name, "motor",
             [&](const Regime& r) -> Flow { return {{r.motor_torque[m], speed(train.motors[m].shaft)}}; });
+    for (std::size_t k = 0; k < places.driven.size(); ++k)
+        use(PowerFlow::source, train.shafts[places.driven[k]].name, "given motion",
+            [&](const Regime& r) -> Flow { return {{r.drive_torque[k], speed(places.driven[k])}}; });
     for (const auto& e : places.acting)
         if (e->source() != nullptr)
             use(PowerFlow::source, e->name, e->source(),

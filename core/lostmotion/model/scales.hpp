@@ -63,6 +63,7 @@ void balanced_scale(const Assembly& a, State& s, int first_angle) {
     const Places& p = a.places();
     double largest = 0.0;
     for (const ShaftPlace& shaft : p.shafts) largest = std::fmax(largest, shaft.inertia);
+    if (!(largest > 0.0)) largest = 1.0;  // where all motion is given
     // A shaft without inertia follows others.
     const auto inertia = [&](int shaft) { return p.shafts[shaft].inertia > 0.0 ? p.shafts[shaft].inertia : largest; };
     const int first = train.motors.empty() ? 0 : train.motors[0].shaft;

@@ -76,7 +76,7 @@ std::array<int, max_shafts> parts(const std::vector<ContactPlace>& contacts, con
 }
 
 Statics::Statics(const Places& places, const Key& key, const Ties& ties, std::vector<Row>& motion)
-    : contacts_(places.contacts), layout_(places.layout), key_(key), ties_(ties), motion_(motion) {
+    : places_(places), contacts_(places.contacts), layout_(places.layout), key_(key), ties_(ties), motion_(motion) {
     for (const ShaftPlace& s : places.shafts) inertia_.push_back(s.inertia);
 }
 
@@ -94,7 +94,14 @@ bool Statics::has_light_shafts() const {
     for (std::size_t first = 0; first < inertia_.size(); ++first) {
         if (speed[first] != 0.0) continue;
         speed[first] = 1.0;
-        double least = inertia_[first], most = inertia_[first];
+        double least = std::numeric_limits<double>::infinity(), most = 0.0;
+        const auto count = [&](std::size_t s) {
+            if (is_given(s)) return;
+            const double J = inertia_[s] * speed[s] * speed[s];
+            least = std::fmin(least, J);
+            most = std::fmax(most, J);
+        };
+        count(first);
         for (bool more = true; more;) {
             more = false;
             for (std::size_t k = 0; k < contacts_.size(); ++k) {
@@ -104,14 +111,12 @@ bool Statics::has_light_shafts() const {
                 contacts_[k].each_shaft([&](int s, double per) {
                     if (slip == 0.0 || speed[s] != 0.0 || per == 0.0) return;
                     speed[s] = slip / std::fabs(per);
-                    const double J = inertia_[s] * speed[s] * speed[s];
-                    least = std::fmin(least, J);
-                    most = std::fmax(most, J);
+                    count(static_cast<std::size_t>(s));
                     more = true;
                 });
             }
         }
-        if (most > much_lighter * least) return true;
+        if (most > much_lighter * least || least == 0.0) return true;
     }
     return false;
 }
@@ -119,7 +124,8 @@ bool Statics::has_light_shafts() const {
 bool Statics::solve(const std::vector<Row*>& forms) {
     const std::vector<int> of = stuck();
     if (has_light_shafts()) return solve_balances(of, forms);
-    for (std::size_t s = 0; s < motion_.size(); ++s) motion_[s] = motion_[s] / inertia_[s];
+    for (std::size_t s = 0; s < motion_.size(); ++s)
+        motion_[s] = is_given(s) ? acceleration_of(s) : motion_[s] / inertia_[s];
     return solve_reactions(of, forms);
 }
 
@@ -155,7 +161,7 @@ bool Statics::moves_freely(const std::vector<int>& of, const std::vector<Row>& r
 
 bool Statics::solve_balances(const std::vector<int>& of, const std::vector<Row*>& forms) {
     const int shafts = static_cast<int>(motion_.size());
-    const Ties heavy = tie(contacts_, shafts, key_.modes.data(), inertia_.data());
+    const Ties heavy = places_.ties(key_.modes.data(), inertia_.data());
     std::vector<int> unknowns;
     for (const int c : of) unknowns.push_back(unknown(c));
     for (int s = 0; s < shafts; ++s)
@@ -163,8 +169,11 @@ bool Statics::solve_balances(const std::vector<int>& of, const std::vector<Row*>
     if (unknowns.size() != motion_.size()) return false;
     std::vector<Balance> rows(motion_.size());
     for (int s = 0; s < shafts; ++s) {
+        const bool given = is_given(static_cast<std::size_t>(s));
+        if (given) motion_[s] = acceleration_of(static_cast<std::size_t>(s));
+        const double J = given ? 1.0 : inertia_[s];
         std::transform(motion_[s].c.begin(), motion_[s].c.end(), rows[s].c.begin(), std::negate<>());
-        heavy.each_share(s, [&](int k, double share) { rows[s].c[max_columns + k] = inertia_[s] * share; });
+        heavy.each_share(s, [&](int k, double share) { rows[s].c[max_columns + k] = J * share; });
     }
     const bool free = balances_move_freely(of, heavy);
     const auto take = [](auto& f, double factor, const Balance& row) { subtract(f, factor, row, false); };
@@ -189,15 +198,17 @@ bool Statics::balances_move_freely(const std::vector<int>& of, const Ties& heavy
         Matrix with(in.size()), without(in.size());
         for (std::size_t row = 0; row < in.size(); ++row) {
             const int s = in[row];
+            const bool given = is_given(static_cast<std::size_t>(s));
             for (const int k : in)
                 if (heavy.free[k] >> k & 1)
-                    with[row].push_back((heavy.free[s] >> k & 1) != 0 ? inertia_[s] * heavy.share[s][k] : 0.0);
+                    with[row].push_back((heavy.free[s] >> k & 1) != 0 ? (given ? 1.0 : inertia_[s]) * heavy.share[s][k]
+                                                                      : 0.0);
             without[row] = with[row];
             for (const int c : of) {
                 if (part[contacts_[c].a] != static_cast<int>(p)) continue;
                 with[row].push_back(-motion_[s].c[unknown(c)]);
                 double per_speed = 0.0;
-                contacts_[c].each_shaft([&](int at, double per) { per_speed += at == s ? per : 0.0; });
+                contacts_[c].each_shaft([&](int at, double per) { per_speed += at == s && !given ? per : 0.0; });
                 without[row].push_back(per_speed);
             }
         }

@@ -18,7 +18,8 @@ std::array<int, max_shafts> parts(const std::vector<ContactPlace>& contacts, con
 // inertia: the balances J S a = F + B lambda of all shafts, S being their speeds by those that stay free, the heaviest.
 class Statics {
  public:
-    // motion: of each shaft, the net torque; it becomes the acceleration.
+    // motion: of each shaft, the net torque; it becomes the acceleration. That of a shaft whose motion is given is an
+    // input: J is infinite there.
     Statics(const Places& places, const Key& key, const Ties& ties, std::vector<Row>& motion);
 
     // Eliminates the reactions from the motion and the forms. False if they have no unique solution.
@@ -35,8 +36,13 @@ class Statics {
     // of det [J S, -B] over det [J S, C^T].
     bool moves_freely(const std::vector<int>& of, const std::vector<Row>& rows) const;
     bool balances_move_freely(const std::vector<int>& of, const Ties& heavy) const;
+    bool is_given(std::size_t shaft) const { return places_.shafts[shaft].given_acceleration != nowhere; }
+    Row acceleration_of(std::size_t shaft) const {
+        return Row::unit(layout_.first_input + places_.shafts[shaft].given_acceleration);
+    }
     int unknown(int contact) const { return layout_.terms + contact; }
 
+    const Places& places_;
     const std::vector<ContactPlace>& contacts_;
     const Layout& layout_;
     const Key& key_;

@@ -118,7 +118,7 @@ class SwitchedTrain {
         // The margins of a contact that has just come to a stop are zero by chance only.
         template <class G>
         bool by_value_alone(const G& g) const {
-            return by_value ||
+            return (by_value && g.kind != Guard::set_off) ||
                    (with_guard && kind == Guard::speed && g.kind == Guard::capacity && g.contact == contact);
         }
         // The solver has seen this regime to its end.
@@ -228,6 +228,10 @@ class SwitchedTrain {
     }
     template <class Now>
     void locate(const Now& now, Key& trial) const;
+    // Where the motion of shafts is given, sets their speeds to what they are now. True if contacts that slip and whose
+    // speeds follow from that alone have none: those are marked.
+    template <class Now>
+    bool follow_given(Now& now, const Key& key, Rest& rests) const;
     template <class Now>
     void locate_losses(const Now& now, const std::array<double, max_contacts>& T_2, Key& trial) const;
     template <class R, class Now>

@@ -38,11 +38,14 @@ static int lightest(unsigned moves, const std::array<double, max_shafts>& speed,
     return found;
 }
 
-bool stop_contact(const ContactPlace& c, int shafts, Ties& t, const double* inertia) {
+bool stop_contact(const ContactPlace& c, int shafts, Ties& t, const double* inertia, Given given) {
     std::array<double, max_shafts> speed;
     const unsigned moves = tied_speed(c, t, speed);
-    if (moves == 0) return false;
-    const int last = inertia != nullptr ? lightest(moves, speed, shafts, t, inertia) : std::bit_width(moves) - 1;
+    unsigned may_follow = moves & ~given.shafts;
+    if (may_follow == 0 && given.follow) may_follow = moves;
+    if (may_follow == 0) return false;
+    const int last =
+        inertia != nullptr ? lightest(may_follow, speed, shafts, t, inertia) : std::bit_width(may_follow) - 1;
     for (int s = 0; s < shafts; ++s) {
         if ((t.free[s] >> last & 1) == 0) continue;
         t.free[s] ^= static_cast<std::uint16_t>(1u << last);
@@ -59,16 +62,21 @@ bool stop_contact(const ContactPlace& c, int shafts, Ties& t, const double* iner
     return true;
 }
 
-Ties tie(const std::vector<ContactPlace>& contacts, int shafts, const std::int8_t* modes, const double* inertia) {
+Ties tie(const std::vector<ContactPlace>& contacts, int shafts, const std::int8_t* modes, const double* inertia,
+         Given given) {
     Ties t;
     for (int s = 0; s < shafts; ++s) {
         t.free[s] = static_cast<std::uint16_t>(1u << s);
         t.share[s][s] = 1.0;
     }
-    for (const bool frame : {true, false})
+    enum { rigid, frame, other };
+    const auto turn = [&](const ContactPlace& c) {
+        return c.bilateral && given.shafts != 0 ? rigid : c.b == nowhere ? frame : other;
+    };
+    for (const auto now : {rigid, frame, other})
         for (std::size_t k = 0; k < contacts.size(); ++k)
-            if (modes[k] == 0 && (contacts[k].b == nowhere) == frame)
-                t.redundant[k] = !stop_contact(contacts[k], shafts, t, inertia);
+            if (modes[k] == 0 && turn(contacts[k]) == now)
+                t.redundant[k] = !stop_contact(contacts[k], shafts, t, inertia, given);
     for (int s = 0; s < shafts; ++s) t.at_rest[s] = t.free[s] == 0;
     return t;
 }

@@ -20,6 +20,9 @@ struct Shaft {
     double viscous_friction = 0.0;  // [N m s/rad]
     DryFriction friction;
     bool loaded = false;  // has an input: the load torque M_Z [N m] that acts against it
+    // Its motion is given: it has two inputs, its speed [rad/s] and the rate of that [rad/s^2], and no equation of
+    // motion.
+    bool given_motion = false;
     // Torque [N m] against the motion over speed [rad/s]: odd, piecewise linear; present if it has a slope.
     TorsionCurve drag{{}, {0.0}};
 

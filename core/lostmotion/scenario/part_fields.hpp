@@ -162,6 +162,7 @@ void describe(F& f, Shaft& s) {
     f.part("friction", [&] { describe(f, s.friction); });
     f.part("drag", [&] { describe(f, s.drag); });
     f.flag("loaded", s.loaded);
+    f.flag("given_motion", s.given_motion);
 }
 
 template <class F>

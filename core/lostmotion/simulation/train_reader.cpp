@@ -54,6 +54,12 @@ std::vector<TrainChannel> short_channels(const model::Assembly& a) {
     };
 }
 
+bool is_given(const model::Places& p, int input) {
+    return std::any_of(p.shafts.begin(), p.shafts.end(), [input](const model::ShaftPlace& s) {
+        return input == s.given_speed || input == s.given_acceleration;
+    });
+}
+
 }  // namespace
 
 std::vector<TrainChannel> train_channels(const model::Assembly& a) {
@@ -65,6 +71,7 @@ std::vector<TrainChannel> train_channels(const model::Assembly& a) {
     const auto inputs = model::input_names(a);
     for (std::size_t k = 0; k < inputs.size(); ++k) {
         if (k >= first_reference(a)) break;
+        if (is_given(p, static_cast<int>(k))) continue;  // the speed is a state
         const auto loaded = std::ranges::find(p.shafts, static_cast<int>(k), &model::ShaftPlace::load);
         if (loaded == p.shafts.end()) {
             out.push_back({C::input, static_cast<int>(k), inputs[k], "", "command"});
@@ -79,6 +86,14 @@ std::vector<TrainChannel> train_channels(const model::Assembly& a) {
         out.push_back({C::motor_torque, static_cast<int>(k), model::motor_torque_of(t, k),
                        model::torque_unit(t, t.motors[k].shaft),
                        std::string(model::torque_word(t, t.motors[k].shaft)) + " of the motor"});
+    for (std::size_t k = 0; k < p.driven.size(); ++k) {
+        const model::ShaftPlace& shaft = p.shafts[static_cast<std::size_t>(p.driven[k])];
+        const std::string& name = t.shafts[static_cast<std::size_t>(p.driven[k])].name;
+        out.push_back({C::drive_torque, static_cast<int>(k), name + "_drive_torque", model::torque_unit(t, p.driven[k]),
+                       "torque that the given motion takes, in its direction"});
+        out.push_back({C::input, shaft.given_acceleration, name + "_acceleration",
+                       model::is_slide(t, p.driven[k]) ? "m/s^2" : "rad/s^2", "given acceleration"});
+    }
     for (std::size_t k = 0; k < t.shafts.size(); ++k)
         out.push_back({C::state, p.shafts[k].speed, t.shafts[k].name + "_speed",
                        model::speed_unit(t, static_cast<int>(k)),

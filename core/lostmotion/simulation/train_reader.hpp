@@ -21,6 +21,7 @@ struct TrainChannel {
         output_torque,
         input_torque,
         contact_torque,
+        drive_torque,
         loss_coefficient,
         contact_mode,
         shaft_sign,  // of the speed: what shows how a contact slips that the train does not have
@@ -28,7 +29,7 @@ struct TrainChannel {
         output,
         error
     } kind;
-    int index;  // of the input, state, motor, gear, contact, shaft or controller
+    int index;  // of the input, state, motor, gear, contact, given motion, shaft or controller
     std::string name, unit, meaning, symbol = {};
 };
 
@@ -89,6 +90,7 @@ class TrainReader {
                 return;
             case TrainChannel::output: form(row(model_.assembly.controller_command(c.index, regime_.key))); return;
             case TrainChannel::error: form(row(model_.assembly.controller_error(c.index))); return;
+            case TrainChannel::drive_torque: form(row(regime_.rows.drive_torque[index])); return;
             case TrainChannel::contact_torque: form(regime_.contact_torque[index]); return;
             case TrainChannel::shaft_sign: each([&](int k) { return signs(speed(c.index, at, k)); }); return;
             case TrainChannel::twist_sign: each([&](int k) { return signs(twist_rate(index, at, k)); }); return;

@@ -37,7 +37,8 @@ std::vector<SwitchingCause> switching_causes(bool short_form) {
     else
         for (const SwitchingCause& c : {SwitchingCause{model::Guard::edge, "piece or cell of a law"},
                                         SwitchingCause{model::Guard::input_limit, "limit of a command"},
-                                        SwitchingCause{model::Guard::turning, "driving torque turned"}})
+                                        SwitchingCause{model::Guard::turning, "driving torque turned"},
+                                        SwitchingCause{model::Guard::set_off, "given motion began"}})
             all.push_back(c);
     return all;
 }

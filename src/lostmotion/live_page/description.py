@@ -12,7 +12,7 @@ from ..model.signals import Signal
 from ..model.torsion import TorsionCurve
 from ..portable.description import described
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario
+from ..simulation.train_scenario import TrainScenario, need_free_motion
 from ..units.practical import ARCMIN
 from ..version import __version__
 from . import sliders
@@ -36,6 +36,7 @@ def describe(scenario: Scenario | TrainScenario, name: str) -> dict[str, Any]:
     InputError
         A controller has a law of your own, which only Python can call.
     """
+    need_free_motion(scenario, "live page")
     numbers, values = described(scenario)
     closed = _closed_gap(scenario)
     core = {

@@ -15,7 +15,7 @@ from pydantic import Field, model_validator
 
 from .. import _core
 from ..inputs.part import Part
-from ..inputs.quantities import Angle, Force, Frequency, NotNegative, Number, Positive, Time, Torque, Whole
+from ..inputs.quantities import Angle, Force, Frequency, NotNegative, Number, Positive, Speed, Time, Torque, Whole
 from ..reproducible import sin, total
 from ..units.scalars import is_number, scalar
 from .wind import AnyWind
@@ -287,6 +287,41 @@ class CommandSignal(Signal[Number]):
 
 class ForceSignal(Signal[Force]):
     """A force [N] over time: the sum of all that is given."""
+
+
+class SpeedSignal(Signal[Speed]):
+    """A speed [rad/s] over time: the sum of all that is given, without jumps."""
+
+    @model_validator(mode="after")
+    def _is_continuous(self) -> Self:
+        lines = self.breakpoint_list()
+        for (begin, value, slope), (end, after, _) in itertools.pairwise(lines):
+            before = value + slope * (end - begin)
+            if not math.isclose(before, after, rel_tol=1e-9, abs_tol=1e-9 * max(abs(v) for _, v, _ in lines)):
+                raise ValueError(
+                    f"jumps at {end:g} s from {before:.6g} to {after:.6g} rad/s, which takes an infinite acceleration; give ramps"
+                )
+        return self
+
+    def at_start(self) -> float:
+        """Its value at t = 0."""
+        return total((a * sin(phase) for a, _, phase in self.sine_list()), self.breakpoint_list()[0][1])
+
+    def acceleration(self) -> AccelerationSignal:
+        """Its time derivative [rad/s²]."""
+        return AccelerationSignal(speed=self)
+
+
+class AccelerationSignal(Signal[Number]):
+    """The time derivative [rad/s²] of a speed."""
+
+    speed: SpeedSignal
+
+    def sine_list(self) -> list[tuple[float, float, float]]:
+        return [(2.0 * math.pi * f * a, f, phase + 0.5 * math.pi) for a, f, phase in self.speed.sine_list()]
+
+    def breakpoint_list(self) -> list[Breakpoint]:
+        return [(time, slope, 0.0) for time, _, slope in self.speed.breakpoint_list()]
 
 
 class TorqueSignal(Signal[Torque]):

@@ -157,7 +157,7 @@ class DriveTrain(TrainElements):
         self.check(self.shafts)
         return self
 
-    def check(self, loaded: Collection[str], tables: TrainElements | None = None) -> None:
+    def check(self, loaded: Collection[str], tables: TrainElements | None = None, given: Collection[str] = ()) -> None:
         """Refuse a train that cannot move, or whose motion is not determined.
 
         Parameters
@@ -166,13 +166,15 @@ class DriveTrain(TrainElements):
             Names of the shafts that a load torque acts on.
         tables
             What the elements were written as, for messages; left out, this train.
+        given
+            Names of the shafts whose motion is given.
 
         Raises
         ------
         InputError
             With the key of the element, what is wrong with it, and the remedy.
         """
-        problem = self.core(loaded).check()
+        problem = self.core(loaded, given=given).check()
         if not problem:
             return
         found = re.fullmatch(f"({'|'.join(TABLES)}) '([^']*)' (.*)", problem)
@@ -182,15 +184,18 @@ class DriveTrain(TrainElements):
         table = next((t for t in TABLES[kind] if name in getattr(tables or self, t, ())), TABLES[kind][0])
         raise InputError(f"key {table}.{name}: {text}")
 
-    def core(self, loaded: Collection[str], driven: Mapping[str, MotorLaw | None] = {}) -> _core.Train:
+    def core(
+        self, loaded: Collection[str], driven: Mapping[str, MotorLaw | None] = {}, given: Collection[str] = ()
+    ) -> _core.Train:
         """The solver's train, where a load torque acts on some of the shafts, and current loops change the law of some motors.
 
+        The motion of the shafts named in `given` is an input.
         Controllers keep to the torque_limit of the motors that such loops drive.
         """
         train = _core.Train()
         for name, s in self.shafts.items():
             drag = None if s.drag is None else s.drag.core()
-            train.add_shaft(name, s.inertia, s.viscous_friction, s.friction(), drag, name in loaded)
+            train.add_shaft(name, s.inertia, s.viscous_friction, s.friction(), drag, name in loaded, name in given)
             if s.domain != "rotation":
                 train.set_domain(name, s.domain)
         for name, m in self.motors.items():

@@ -158,7 +158,12 @@ def _key_of(scenario: Scenario | TrainScenario, name: str) -> str:
         slide = name.removesuffix("_load_force")
         inclined = scenario.slides[slide].weight(1.0) != 0.0
         return f"slides.{slide}.force" + (" and the weight" if inclined else "")
-    for suffix, key in (("_load_torque", "shafts.{}.torque"), ("_reference", "controllers.{}.reference")):
+    for suffix, key in (
+        ("_load_torque", "shafts.{}.torque"),
+        ("_given_speed", "shafts.{}.speed"),
+        ("_given_acceleration", "shafts.{}.speed"),
+        ("_reference", "controllers.{}.reference"),
+    ):
         if name.endswith(suffix):
             return key.format(name.removesuffix(suffix))
     return f"command.{name.removesuffix('_command')}"
@@ -195,7 +200,7 @@ def _of_signals(scenario: Scenario | TrainScenario, key: str, references: bool) 
     if isinstance(scenario, Scenario):
         given = references and parts[:2] == ["controller", "reference"]
         return given or parts[0] == "command" or parts[:2] == ["load", "torque"]
-    of_shaft = (parts[0], *parts[2:3]) in (("shafts", "torque"), ("slides", "force"))
+    of_shaft = (parts[0], *parts[2:3]) in (("shafts", "torque"), ("shafts", "speed"), ("slides", "force"))
     # Of the command of a brake or a clutch: what the importer gives acts at once.
     delay = parts[0] in ("brakes", "clutches") and parts[-1] in ("engagement_delay", "release_delay")
     of_controller = parts[0] == "controllers" and parts[2] == "reference"
@@ -232,6 +237,8 @@ def _model(
     # From tick to tick, or from one switching to the next. Where there is no contact, its variable follows a sign.
     held = controlled | shown | set(core.contact_names())
     by_name = {v.name: Declared(v.name, v.unit, v.meaning, sizes.get(v.name, 0.0), v.name in held) for v in variables}
+    for shaft in scenario.given() if isinstance(scenario, TrainScenario) else ():
+        by_name |= {v.name: v for v in _given_motion(shaft)}
     windings = any(c.current.kind == "field_oriented" for c in axes.values())
     given = {f"{prefix}reference": c for prefix, c in axes.items() if references_given}
     references = [
@@ -261,6 +268,14 @@ def _model(
         parameters=list(parameters),
         references_given=references_given,
         note=scenario.note(),
+    )
+
+
+def _given_motion(shaft: str) -> tuple[Declared, Declared]:
+    """The inputs that give the motion of a shaft."""
+    return (
+        Declared(f"{shaft}_given_speed", "rad/s", "speed that the shaft has at the begin of a step", 0.0),
+        Declared(f"{shaft}_given_acceleration", "rad/s^2", "acceleration that the shaft has", 0.0),
     )
 
 

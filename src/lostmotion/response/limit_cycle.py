@@ -11,7 +11,7 @@ import numpy as np
 from .. import _core
 from ..errors import InputError
 from ..simulation.core_runs import core_case, core_run
-from ..simulation.train_scenario import TrainScenario
+from ..simulation.train_scenario import TrainScenario, need_free_motion
 from .shooting import PERIODICITY, SAMPLES_PER_PERIOD, reason_of
 from .standstill import FOREVER, NOTHING_MOVES, Outlook, Verdict, Watch, frequency_of
 
@@ -75,6 +75,7 @@ class Loop:
         InputError
             One of them does not.
         """
+        need_free_motion(scenario, "limit cycle")
         core, inputs, start, capacities = core_case(scenario)
         signals, constants, settled = scenario.signals(), [], 0.0
         for name in core.input_names():

@@ -22,7 +22,7 @@ from ..simulation.core_runs import core_case
 from ..simulation.scenario import Initial, Scenario, capacities_of, drive_of, state_of
 from ..simulation.stepping import Simulation
 from ..simulation.train_parts import NO_CONTACT
-from ..simulation.train_scenario import TrainInitial, TrainScenario, loaded_train, need_open_loop
+from ..simulation.train_scenario import TrainInitial, TrainScenario, loaded_train, need_free_motion, need_open_loop
 from ..simulation.train_state import start_values
 from ..simulation.train_variables import angle_through, angles_through_gears, train_variables
 from ..simulation.variables import CONTACTS, STATES, VARIABLES
@@ -241,6 +241,7 @@ def _ramp(value: float, rate: float) -> _core.Signal:
 
 
 def _model_now(simulation: Simulation) -> LinearModel:
+    need_free_motion(simulation._scenario, "linearize")
     with simulation._turn:
         rows = simulation._idle().linearize()
     return _model(simulation._train, simulation._core_train, *rows)
@@ -252,6 +253,7 @@ def _model_of_run(what: Any, time: float) -> LinearModel:
     if not 0.0 <= time <= what.simulation.duration:
         raise InputError(f"time {time} s must lie between 0 and the duration, {what.simulation.duration} s")
     need_open_loop(what, "linearize at a time")
+    need_free_motion(what, "linearize")
     case = core_case(what)
     return _model(what.train(), case[0], *_core.linearize_at(*case, time))
 
@@ -262,6 +264,7 @@ def _model_of_train(
     inputs: Mapping[str, float],
     rates: Mapping[str, float],
 ) -> LinearModel:
+    need_free_motion(what, "linearize")
     train, loaded = loaded_train(what)
     core = what.core(sampled=False) if isinstance(what, TrainScenario) else train.core(loaded)
     if not isinstance(state, TrainInitial | None):

@@ -17,7 +17,7 @@ from ..model.drive import Drive
 from ..model.signals import CommandSignal, Signal, TorqueSignal
 from ..simulation.results import add_angles, add_efficiency
 from ..simulation.scenario import Initial, Scenario, mean_inputs
-from ..simulation.train_scenario import TrainInitial, TrainScenario, need_open_loop
+from ..simulation.train_scenario import TrainInitial, TrainScenario, need_free_motion, need_open_loop
 from ..simulation.train_variables import axis_variables, train_variables
 from ..simulation.variables import CHANNELS, STATES, VARIABLES, Variable
 
@@ -189,6 +189,7 @@ def _start_of_drive(initial: Initial) -> dict[str, float]:
 
 
 def _plant_of_train(scenario: TrainScenario) -> Plant:
+    need_free_motion(scenario, "response")
     train = scenario.train()
     core = scenario.core(sampled=False)
     signals = scenario.signals()

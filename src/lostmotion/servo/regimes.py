@@ -19,7 +19,7 @@ from ..model.signals import ForceSignal, TorqueSignal
 from ..model.torsion import Rigid
 from ..response.linear import LinearModel, train_model
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainInitial, TrainScenario, in_long_form
+from ..simulation.train_scenario import TrainInitial, TrainScenario, in_long_form, need_free_motion
 from ..simulation.train_state import start_values
 from ..units.practical import charted
 from .winding import OrientedWinding
@@ -115,6 +115,7 @@ def axis_of(scenario: Scenario | TrainScenario, motor: str | None = None) -> Axi
     InputError
         There is no controller, there are several, or its loops are a function (law = true).
     """
+    need_free_motion(scenario, "servo")
     names = list(scenario.axes())
     if not names:
         raise InputError(

@@ -21,7 +21,7 @@ from .core_runs import core_case
 from .keys import list_index
 from .results import add_derived
 from .scenario import Scenario
-from .train_scenario import TrainScenario
+from .train_scenario import TrainScenario, need_free_motion
 from .train_variables import named_signals
 from .variables import CONTACTS
 
@@ -230,6 +230,7 @@ def run_sensitivities(scenario: AnyScenario, keys: Sequence[str]) -> Sensitiviti
     SolverError
         The motion has no continuation.
     """
+    need_free_motion(scenario, "sensitivities")
     keys = list(keys)
     if not keys or len(set(keys)) < len(keys):
         raise InputError(f"sensitivities: {shown(keys)}; give keys of the scenario, such as load.inertia, each once")

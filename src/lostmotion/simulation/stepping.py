@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -24,9 +25,10 @@ from ..model.couplings import FULL_COMMAND
 from ..model.drive import Drive
 from ..model.synchronous_motor import PhaseValues
 from ..model.train import DriveTrain
+from .given_motion import course_to, motion_given
 from .scenario import Initial, Scenario, capacities_of, drive_of, state_of
 from .step_bound import StepBound
-from .train_scenario import TrainInitial, TrainScenario, loaded_train
+from .train_scenario import TrainInitial, TrainScenario, given_train
 from .train_state import start_values
 from .train_variables import (
     ALL_SIGNALS,
@@ -39,6 +41,8 @@ from .train_variables import (
 )
 from .variables import VARIABLES, Variable
 from .windings import bounded, coarser, oriented
+
+INPUTS_OF_STATE = 4  # where the core's state of a simulation has the last values of its inputs
 
 MIN_INTERVAL, MAX_INTERVAL = 1e-12, 1e12
 """Of a step [s]: below, it is lost in the rounding of the time; above, in that of a motion's phase."""
@@ -78,6 +82,8 @@ class Simulation:
         State at t = 0; default that of the scenario, or rest.
     loaded
         Names of the shafts of a train that a load torque may act on; default those of the scenario, of a train alone all.
+    given
+        Names of the shafts of a train whose motion `advance` is given; default those of the scenario that have a speed.
     law
         As of `simulate`.
     error_bound
@@ -110,10 +116,18 @@ class Simulation:
         step: Time = 1e-3,
         initial: Initial | TrainInitial | None = None,
         loaded: Sequence[str] | None = None,
+        given: Sequence[str] | None = None,
         law: Any = None,
         error_bound: bool = False,
     ) -> None:
-        self._made = {"drive": drive, "step": step, "loaded": loaded, "law": law, "error_bound": error_bound}
+        self._made = {
+            "drive": drive,
+            "step": step,
+            "loaded": loaded,
+            "given": given,
+            "law": law,
+            "error_bound": error_bound,
+        }
         self._turn = threading.RLock()  # other threads wait
         self._stepping = False
         if not MIN_INTERVAL <= step <= MAX_INTERVAL:
@@ -125,14 +139,12 @@ class Simulation:
         self._control = self._exchanging(scenario.control(laws)) if scenario is not None else OPEN_LOOP
         self._bound: StepBound | None = None
         self._signals: dict[str, int] = {}  # of the controllers
-        self._drive, self._train, core, self._loaded, self._initial = _parts(drive, loaded)
+        self._drive, self._train, core, self._loaded, self._given, self._initial = _parts(drive, loaded, given)
         self._core_train = core
         self._short = core.short_form
         names = core.input_names()
         self._core = _core.Simulation(core, step, self._control, self._acting_always(names))
-        self._input_places = {name: k for k, name in enumerate(names) if name not in self._controlled()}
-        self._inputs = len(names)
-        self._required = [name for name in self._input_places if not name.endswith("load_torque")]
+        self._place_inputs(names)
         channels = core.channels()
         self._channel = {name: k for k, (name, *_) in enumerate(channels)}
         self._input_units = {name: unit.removeprefix("1") for name, _, unit, _ in channels}
@@ -155,8 +167,20 @@ class Simulation:
                 raise InputError(
                     "error_bound: needs a law that may be called again; give lm.Law(function, repeatable=True)"
                 )
-            self._bound = StepBound(_Coarser(drive, step=step, loaded=loaded, law=law), of_windings)
+            self._bound = StepBound(_Coarser(drive, step=step, loaded=loaded, given=given, law=law), of_windings)
         self.reset(initial)
+
+    def _place_inputs(self, names: Sequence[str]) -> None:
+        """Where the core has what `advance` is given."""
+        self._inputs = len(names)
+        self._motions = {  # speed and acceleration of each shaft
+            name: (names.index(f"{name}_given_speed"), names.index(f"{name}_given_acceleration"))
+            for name in self._given
+        }
+        motions = {k for places in self._motions.values() for k in places}
+        controlled = self._controlled()
+        self._input_places = {name: k for k, name in enumerate(names) if name not in controlled and k not in motions}
+        self._required = [name for name in self._input_places if not name.endswith("load_torque")]
 
     def _add_signals(self, scenario: Scenario | TrainScenario | None) -> None:
         """What the controllers show, and in the place of the straight line that drives the mechanics the torque of a winding."""
@@ -233,10 +257,20 @@ class Simulation:
             self._core.reset(scenario.start(start), scenario.capacities(start))
         else:
             self._core.reset(start_values(self._train, start), dict(start.hysteresis_capacities))
+        self._begin_motions(start)
         self._initial = start
         if self._bound is not None:
             self._bound.coarse.reset(start)
             self._bound.forget()
+
+    def _begin_motions(self, start: Initial | TrainInitial) -> None:
+        """Where a motion is given, the speed that its shaft begins with is what has been given."""
+        if not self._motions or not isinstance(start, TrainInitial):
+            return
+        state: list[Any] = list(self._core.get_state())
+        for name, (speed, _) in self._motions.items():
+            state[INPUTS_OF_STATE][speed] = start.speeds.get(name, 0.0)
+        self._core.set_state(*state)
 
     @property
     def error_bound(self) -> dict[str, float]:
@@ -263,6 +297,11 @@ class Simulation:
         return self._loaded
 
     @property
+    def given(self) -> tuple[str, ...]:
+        """Names of the shafts of a train whose motion `advance` is given."""
+        return self._given
+
+    @property
     def inputs(self) -> tuple[str, ...]:
         """Names of what is given to `advance`."""
         return tuple(self._input_places)
@@ -280,7 +319,15 @@ class Simulation:
         """[s]"""
         return self._core.time()
 
-    def advance(self, interval: float | str, command: Ramp = _GIVE, load_torque: Ramp = 0.0, **inputs: Ramp) -> None:
+    def advance(
+        self,
+        interval: float | str,
+        command: Ramp = _GIVE,
+        load_torque: Ramp = 0.0,
+        *,
+        motion: Any = None,
+        **inputs: Ramp,
+    ) -> None:
         """Advance by an interval [s].
 
         Parameters
@@ -290,6 +337,11 @@ class Simulation:
         command, load_torque
             Of a drive E_C [-] and M_Z [N·m]: one value, held over the interval, or a pair of values, between which it runs in a
             straight line.
+        motion
+            By the name of each shaft whose motion is given a dictionary: its ``speed`` [rad/s] at the end of the interval, and if wanted its ``angle``
+            [rad] and ``acceleration`` [rad/s²] there. On the way from the present values the acceleration is constant; with more
+            than a speed it runs in up to three straight lines, so that the end is met. The torque that this takes is the
+            variable ``<shaft>_drive_torque``.
         inputs
             Of a train the same by the names in `inputs`, among them the references of continuous controllers, such as ``servo_command=0.2`` and ``table_load_torque=(0.0, 5.0)``. All
             commands are to be given; a load torque that is left out is 0.
@@ -316,7 +368,47 @@ class Simulation:
                 raise InputError(f"{name} {shown(value)} is a share, and 1 is the full torque; give at most that")
         if missing := [name for name in self._required if name not in inputs]:
             raise InputError(f"{', '.join(sorted(missing))}: missing; all commands and references are to be given")
-        self._step(interval, begin, end)
+        if motion or self._motions:
+            self._step_with_motions(interval, begin, end, motion or {})
+        else:
+            self._step(interval, begin, end)
+
+    def _step_with_motions(self, interval: Any, begin: list[float], end: list[float], motion: Any) -> None:
+        """In parts, in each of which all accelerations are straight lines."""
+        h = argument("interval", interval, "s")
+        if not MIN_INTERVAL <= h <= MAX_INTERVAL:
+            raise self._no_interval(h)
+        for name in motion:
+            if name not in self._motions:
+                meant = did_you_mean(name, self._motions, f"those are {', '.join(self._motions) or 'none'}")
+                raise InputError(f"motion.{shown(name)}: is no shaft whose motion is given; {meant}")
+        if missing := [name for name in self._motions if name not in motion]:
+            raise InputError(
+                f"motion.{missing[0]}: is missing; give at least its speed at the end of the interval [rad/s]"
+            )
+        wanted = {name: motion_given(name, values) for name, values in motion.items()}
+        with self._turn:
+            before = self.state
+            values = self._idle().read()
+            courses = {}
+            for name, given in wanted.items():
+                angle = self._value(f"{name}_angle", values) if "angle" in given else 0.0
+                speed, acceleration = (self._value(f"{name}_{what}", values) for what in ("speed", "acceleration"))
+                courses[name] = course_to(given, angle, speed, acceleration, h)
+            times = sorted({t for course in courses.values() for t in course.times})
+            try:
+                for t0, t1 in itertools.pairwise(times):
+                    rows = []
+                    for t in (t0, t1):
+                        row = [a + (b - a) * (t / h) for a, b in zip(begin, end, strict=True)]
+                        for name, course in courses.items():
+                            speed, acceleration = self._motions[name]
+                            row[speed], row[acceleration] = course.speed_at(t), course.acceleration_at(t)
+                        rows.append(row)
+                    self._step(t1 - t0, *rows)
+            except (InputError, _core.SolverError):
+                self.state = before
+                raise
 
     def _of_drive(self, command: Ramp, load_torque: Ramp, others: dict[str, Ramp]) -> dict[str, Ramp]:
         """The inputs of a drive by name."""
@@ -479,18 +571,21 @@ class Simulation:
 
 
 def _parts(
-    what: Drive | Scenario | DriveTrain | TrainScenario, loaded: Sequence[str] | None
-) -> tuple[Drive | DriveTrain, DriveTrain, _core.Train, tuple[str, ...], Initial | TrainInitial]:
-    """What is simulated, the same as a train, the solver's train, the shafts that a load torque may act on, and the start."""
+    what: Drive | Scenario | DriveTrain | TrainScenario, loaded: Sequence[str] | None, given: Sequence[str] | None
+) -> tuple[Drive | DriveTrain, DriveTrain, _core.Train, tuple[str, ...], tuple[str, ...], Initial | TrainInitial]:
+    """What is simulated, the same as a train, the solver's train, the shafts that a load torque may act on, those whose motion is
+    given, and the start."""
     if isinstance(what, DriveTrain | TrainScenario):
-        train, shafts = loaded_train(what, loaded)
+        train, shafts, moved = given_train(what, loaded, given)
         if isinstance(what, DriveTrain):
-            return train, train, train.core(shafts), tuple(shafts), TrainInitial()
-        return train, train, what.core(loaded=shafts), tuple(shafts), what.begin()
+            return train, train, train.core(shafts, given=moved), tuple(shafts), tuple(moved), TrainInitial()
+        return train, train, what.core(loaded=shafts, given=moved), tuple(shafts), tuple(moved), what.begin()
     if loaded is not None:
         raise InputError("loaded: is for trains; a drive has one load torque, on its load")
+    if given is not None:
+        raise InputError("given: is for trains; give drive.train() for a drive whose motor or load has a given motion")
     start = what.begin() if isinstance(what, Scenario) else Initial()
-    return drive_of(what), what.train(), what.core(), (), start
+    return drive_of(what), what.train(), what.core(), (), (), start
 
 
 def _remade(kind: Any, made: Mapping[str, Any], sines: Any, initial: Any, state: SimulationState) -> Any:

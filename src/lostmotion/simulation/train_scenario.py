@@ -25,7 +25,8 @@ from ..model.linear import Slide
 from ..model.linear_train import LinearElements
 from ..model.parameters import MotorLaw
 from ..model.shaft import Shaft
-from ..model.signals import CommandSignal, ForceSignal, Signal, TorqueSignal
+from ..model.signals import CommandSignal, ForceSignal, Signal, SpeedSignal, TorqueSignal
+from ..model.torsion import Rigid
 from ..model.train import DriveTrain, Elements
 from .keys import set_values
 from .linear_units import in_si
@@ -35,10 +36,13 @@ from .train_variables import check_names
 
 
 class ShaftTable(Shaft):
-    """A shaft and the load torque on it."""
+    """A shaft, the load torque on it, and its motion where that is given."""
 
     torque: TorqueSignal | None = None
     """M_Z, against its motion; left out, none can act on it"""
+    speed: SpeedSignal | None = None
+    """speed that it has whatever acts on it; the torque that this takes is the variable ``NAME_drive_torque``; left out, it moves
+    as the torques let it"""
 
 
 class SlideTable(Slide):
@@ -119,7 +123,8 @@ class TrainScenario(LinearElements):
     def _consistent(self) -> Self:
         self._check_shafts()
         train = self.train()
-        train.check(self.loaded(), self)
+        train.check(self.loaded(), self, self.given())
+        self._check_given()
         self._check_controllers()
         check_on_reference(self.initial, self.axes(), ("angles", "speeds", "positions", "slide_speeds"))
         core = self.core()
@@ -166,6 +171,14 @@ class TrainScenario(LinearElements):
                         raise InputError(
                             f"key initial.{given}.{name}: {shown(name)} {what}; give initial.{other}.{name}"
                         )
+
+    def _check_given(self) -> None:
+        for name in self.given():
+            if name in self.initial.speeds:
+                raise InputError(
+                    f"keys shafts.{name}.speed, initial.speeds.{name}: both say how fast the shaft turns at t = 0; leave the "
+                    "initial speed out"
+                )
 
     def _check_controllers(self) -> None:
         motors = self.train().motors
@@ -235,7 +248,13 @@ class TrainScenario(LinearElements):
     def _control(self) -> Bound:
         return core_control(self.train(), self.axes())
 
-    def core(self, *, sampled: bool = True, loaded: Collection[str] | None = None) -> _core.Train:
+    def core(
+        self,
+        *,
+        sampled: bool = True,
+        loaded: Collection[str] | None = None,
+        given: Collection[str] | None = None,
+    ) -> _core.Train:
         """The solver's train with its continuous controllers, its motors as the current loops make them.
 
         Parameters
@@ -244,18 +263,29 @@ class TrainScenario(LinearElements):
             Also those of sampled controllers.
         loaded
             Names of the shafts that a load torque acts on, if others than those of the scenario.
+        given
+            Names of the shafts whose motion is given, if others than those of the scenario.
         """
-        return self._own_core() if sampled and loaded is None else self._core_with(sampled=sampled, loaded=loaded)
+        if sampled and loaded is None and given is None:
+            return self._own_core()
+        return self._core_with(sampled=sampled, loaded=loaded, given=given)
 
     @kept_while_used
     def _own_core(self) -> _core.Train:
         return self._core_with()
 
-    def _core_with(self, *, sampled: bool = True, loaded: Collection[str] | None = None) -> _core.Train:
+    def _core_with(
+        self,
+        *,
+        sampled: bool = True,
+        loaded: Collection[str] | None = None,
+        given: Collection[str] | None = None,
+    ) -> _core.Train:
         continuous = self.continuous()
         laws = motor_laws(self.controllers if sampled else continuous)
         shafts = self.loaded() if loaded is None else loaded
-        return _core_train(self.train(), tuple(shafts), tuple(laws.items()), tuple(continuous.items()))
+        moved = self.given() if given is None else given
+        return _core_train(self.train(), tuple(shafts), tuple(moved), tuple(laws.items()), tuple(continuous.items()))
 
     def start(self, initial: TrainInitial | None = None) -> dict[str, float]:
         """State at t = 0 by the names of its variables; what is left out is 0.
@@ -288,10 +318,12 @@ class TrainScenario(LinearElements):
     @kept
     def begin(self) -> TrainInitial:
         """State at t = 0, with what the references say of it."""
+        speeds = self._given_speeds()
         if not self.initial.on_reference:
-            return self.initial
+            if not speeds:
+                return self.initial
+            return self.initial.model_copy(update={"speeds": Named(self.initial.speeds | speeds)})
         angles: dict[str, float] = {}
-        speeds: dict[str, float] = {}
         train = self.train()
         for controller in self.axes().values():
             if controller.reference.kind == "position":
@@ -304,6 +336,22 @@ class TrainScenario(LinearElements):
             found[key] = Named({name: v for name, v in values.items() if not train.is_slide(name)})
             found[LINEAR_INITIAL[key]] = Named({name: v for name, v in values.items() if train.is_slide(name)})
         return self.initial.model_copy(update=found)
+
+    def _given_speeds(self) -> dict[str, float]:
+        """Speeds at t = 0 [rad/s] of the shafts whose motion is given, and of those that rigid gears tie to them."""
+        rigid = [
+            (g.input, g.output, g.ratio) for g in self.train().fixed_gears().values() if isinstance(g.stiffness, Rigid)
+        ]
+        speeds = {name: shaft.speed.at_start() for name, shaft in self.shafts.items() if shaft.speed is not None}
+        waiting = list(speeds)
+        while waiting:
+            shaft = waiting.pop()
+            for one, other, ratio in rigid:
+                found = {one: (other, 1.0 / ratio), other: (one, ratio)}.get(shaft)
+                if found is not None and found[0] not in speeds:
+                    speeds[found[0]] = speeds[shaft] * found[1]
+                    waiting.append(found[0])
+        return speeds
 
     @kept
     def train(self) -> DriveTrain:
@@ -336,13 +384,21 @@ class TrainScenario(LinearElements):
                 found[name] = force.model_copy(update={"mean": force.mean + weight}) if weight != 0.0 else force
         return found
 
+    def given(self) -> list[str]:
+        """Names of the shafts whose motion is given."""
+        return [name for name, shaft in self.shafts.items() if shaft.speed is not None]
+
     def signals(self) -> dict[str, Signal[Any]]:
         """All that acts on the train, after delays of brakes and clutches, by the name of its result variable."""
         controllers = self.continuous()
         commands = {f"{name}_command": self._acting(name) for name in self.commanded() if name not in controllers}
         torques = {self.train().load_torque_of(name): load for name, load in self.loads().items()}
         references = {name: s for motor, c in controllers.items() for name, s in c.signals(motor).items()}
-        return {**commands, **torques, **references}
+        motions: dict[str, Signal[Any]] = {}
+        for name, s in self.shafts.items():
+            if s.speed is not None:
+                motions |= {f"{name}_given_speed": s.speed, f"{name}_given_acceleration": s.speed.acceleration()}
+        return {**commands, **torques, **motions, **references}
 
     def _acting(self, name: str) -> CommandSignal:
         """The command of a motor, brake or clutch after its delays."""
@@ -380,10 +436,11 @@ class TrainScenario(LinearElements):
 def _core_train(
     train: DriveTrain,
     loaded: tuple[str, ...],
+    given: tuple[str, ...],
     laws: tuple[tuple[str, MotorLaw | None], ...],
     continuous: tuple[tuple[str, ContinuousController], ...],
 ) -> _core.Train:
-    core = train.core(loaded, dict(laws))
+    core = train.core(loaded, dict(laws), given)
     for name, controller in continuous:
         try:
             controller.add_to(core, train, name)
@@ -392,13 +449,22 @@ def _core_train(
     return core
 
 
-def loaded_train(what: DriveTrain | TrainScenario, loaded: Sequence[str] | None = None) -> tuple[DriveTrain, list[str]]:
-    """A train, and the names of the shafts that a load torque may act on.
+def loaded_train(what: DriveTrain | TrainScenario) -> tuple[DriveTrain, list[str]]:
+    """A train, and the names of the shafts that a load torque may act on: those of the scenario, of a train alone all."""
+    return given_train(what, None, None)[:2]
+
+
+def given_train(
+    what: DriveTrain | TrainScenario, loaded: Sequence[str] | None, given: Sequence[str] | None
+) -> tuple[DriveTrain, list[str], list[str]]:
+    """A train, the names of the shafts that a load torque may act on, and of those whose motion is given.
 
     Parameters
     ----------
     loaded
         These; left out, those of the scenario, of a train alone all.
+    given
+        These; left out, those of the scenario, of a train alone none.
 
     Raises
     ------
@@ -406,17 +472,19 @@ def loaded_train(what: DriveTrain | TrainScenario, loaded: Sequence[str] | None 
         One of them is no shaft, or names of variables coincide.
     """
     train = what if isinstance(what, DriveTrain) else what.train()
-    if loaded is None:
-        shafts = list(train.shafts) if isinstance(what, DriveTrain) else what.loaded()
-    else:
-        shafts = list(loaded)
-        for name in shafts:
+    shafts = list(train.shafts) if isinstance(what, DriveTrain) else what.loaded()
+    moved = [] if isinstance(what, DriveTrain) else what.given()
+    for key, names in (("loaded", loaded), ("given", given)):
+        for name in names or ():
             if name not in train.shafts:
                 meant = did_you_mean(name, train.shafts, f"the shafts are {', '.join(train.shafts)}")
-                raise InputError(f"loaded: {shown(name)} is no shaft of this train; {meant}")
-        train.check(shafts)
-    check_names(train, train.core(shafts))
-    return train, shafts
+                raise InputError(f"{key}: {shown(name)} is no shaft of this train; {meant}")
+    shafts = shafts if loaded is None else list(loaded)
+    moved = moved if given is None else list(given)
+    if loaded is not None or given is not None:
+        train.check(shafts, given=moved)
+    check_names(train, train.core(shafts, given=moved))
+    return train, shafts, moved
 
 
 def need_open_loop(scenario: Scenario | TrainScenario, function: str) -> None:
@@ -432,6 +500,20 @@ def need_open_loop(scenario: Scenario | TrainScenario, function: str) -> None:
         raise InputError(
             f"{function}: the scenario has {has}, and this takes a drive whose commands are given; for the drive without, give "
             f"scenario.replace({table}={none}), or in a file [command] over its base"
+        )
+
+
+def need_free_motion(scenario: object, function: str) -> None:
+    """Refuses a train in which the motion of a shaft is given, for what torques alone are to move.
+
+    Raises
+    ------
+    InputError
+    """
+    if isinstance(scenario, TrainScenario) and (given := scenario.given()):
+        raise InputError(
+            f"{function}: key shafts.{given[0]}.speed gives the motion of a shaft, and this takes a train that torques alone "
+            "move; leave the speed out"
         )
 
 
