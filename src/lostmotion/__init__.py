@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from .identification.design import Candidate as Candidate
     from .identification.design import design_experiment as design_experiment
     from .identification.errors_of_logs import LogError as LogError
+    from .identification.first_task import first_task as first_task
     from .identification.identifiability import Undetermined as Undetermined
     from .identification.identify import IdentificationResult as IdentificationResult
     from .identification.identify import identify as identify
@@ -220,6 +221,7 @@ _HOMES = {
     "identification.campaign": ("write_campaign",),
     "identification.design": ("Candidate", "design_experiment"),
     "identification.errors_of_logs": ("LogError",),
+    "identification.first_task": ("first_task",),
     "identification.identifiability": ("Undetermined",),
     "identification.identify": ("IdentificationResult", "identify"),
     "identification.intervals": ("Interval",),

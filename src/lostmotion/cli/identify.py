@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -19,10 +20,27 @@ NOTES = 10  # lines of them in the terminal
 
 
 def identify(
-    file: Annotated[Path, typer.Argument(metavar="IDENTIFY.toml", help="Identification file: logs, rig, parameters.")],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Directory, made if missing.")] = Path(
-        "identified"
-    ),
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="IDENTIFY.toml|new", help="Identification file: logs, rig, parameters; `new`: a first one for logs."
+        ),
+    ],
+    directory: Annotated[
+        Path | None, typer.Argument(metavar="[DIR]", help="With `new`: the directory that holds the logs.")
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="PATH",
+            help="Directory, made if missing (identified); with `new` the file (DIR/identify.toml).",
+        ),
+    ] = None,
+    rig: Annotated[
+        str | None, typer.Option("--rig", metavar="RIG.toml", help="With `new`: scenario whose variables are taken.")
+    ] = None,
     profiles: Annotated[
         bool, typer.Option("--profiles", help="Also intervals by the profile of the likelihood (takes longer).")
     ] = False,
@@ -33,12 +51,23 @@ def identify(
     Writes identified.toml (the rig with the values that were found, a scenario), identified.html (one page), errors.csv (of each
     log), parameters.csv and, with the key record, gearbox.toml (a data sheet). What was dropped of logs is listed.
 
+    `new` looks at the logs in DIR and writes a first identification file: channels, units, sample times, and what is in doubt about
+    them. A file that exists is never overwritten.
+
     \b
+    lostmotion identify new servo/logs --rig servo.toml
     lostmotion identify servo/identify.toml -o servo
     """
+    if str(file) == "new":
+        _new(directory, rig, output)
+        return
+    for option, value in (("DIR", directory), ("--rig", rig)):
+        if value is not None:
+            raise typer.BadParameter(f"{option} goes with `identify new`")
     from ..reports.pictures import endings
 
     pictures = endings(figures)
+    output = output or Path("identified")
     try_directory(output)
     from ..identification.identify import identify as run
 
@@ -54,6 +83,29 @@ def identify(
         page = write_identification(output, file.stem, result, pictures)
     _print_summary(result)
     print(f"The page is at {page}")
+
+
+def _new(directory: Path | None, rig: str | None, output: Path | None) -> None:
+    """Write a first identification file."""
+    if directory is None:
+        raise typer.BadParameter("`new` needs the directory of the logs, such as `lostmotion identify new logs`")
+    from ..errors import InputError
+    from ..identification.first_task import first_task
+
+    path = output or directory / "identify.toml"
+    if os.path.lexists(path):
+        raise InputError(f"{path}: exists; name another file with -o")
+    with busy("Reading logs") as tell:
+        text = first_task(directory, home=path.parent, rig=rig or "", progress=tell)
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise InputError(f"{path}: exists; name another file with -o") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}") from None
+    doubts = text.count("# Doubt: ")
+    print(f"First identification file written to {path}; it has {doubts} lines that begin with Doubt:")
 
 
 def _print_summary(result: IdentificationResult) -> None:

@@ -1,0 +1,396 @@
+"""A first identification file from a directory of logs: channels, units, sample times, and what is in doubt about them."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, visible
+from ..inputs.arguments import checked
+from ..inputs.validation import listed
+from ..simulation.scenario_files import find_scenario, load
+from ..simulation.train_scenario import TrainScenario, in_long_form
+from .logs import Log
+from .prepare import channel_unit
+from .readers import ENDINGS, read_log
+from .screening import screened
+
+MOST_LOGS = 2000
+MOST_LINES = 40  # of doubts of one kind
+COMMANDS = ("goal", "command", "cmd", "reference", "ref", "setpoint", "target", "desired", "demand", "set")
+QUANTITIES = {
+    "rad": ("position", "pos", "angle", "theta", "encoder", "deg"),
+    "rad/s": ("speed", "velocity", "vel", "omega", "rpm"),
+    "N*m": ("torque", "moment"),
+    "A": ("current",),
+    "V": ("voltage", "volts", "volt"),
+}
+SAME = {"m": "rad", "m/s": "rad/s", "N": "N*m"}  # of linear axes
+PLACEHOLDER = "RIG.toml"
+SOUGHT = ("inertia", "rotor_inertia", "viscous_friction", "friction_torque")  # keys of shafts and motors
+
+
+@dataclass
+class _Seen:
+    """A channel in all logs that have it."""
+
+    name: str
+    units: list[str] = field(default_factory=list)
+    """as files say, each once"""
+    logs: int = 0
+    low: float = math.inf
+    high: float = -math.inf
+    noise: list[float] = field(default_factory=list)
+    """standard deviation of what differs between neighbours, of each log"""
+
+    @property
+    def words(self) -> list[str]:
+        """Of its name."""
+        return "".join(c.lower() if c.isalnum() else " " for c in self.name).split()
+
+    @property
+    def is_command(self) -> bool:
+        """Whether its name says that it is what is wanted."""
+        return any(word in COMMANDS for word in self.words)
+
+    @property
+    def quantity(self) -> str:
+        """SI unit by the unit in the files, else by its name; empty if neither tells."""
+        try:
+            unit = channel_unit("", self.units[0], "", "")[1] if self.units and self.units[0] else ""
+        except InputError:
+            unit = ""
+        unit = SAME.get(unit, unit)
+        if unit in QUANTITIES:
+            return unit
+        return next((unit for unit, names in QUANTITIES.items() if any(word in names for word in self.words)), "")
+
+
+@checked
+def first_task(
+    directory: str | Path, *, home: str | Path = "", rig: str | Path = "", progress: Callable[[str], None] | None = None
+) -> str:
+    """Propose an identification file for the logs in a directory and in those below it.
+
+    Parameters
+    ----------
+    directory
+        Where the logs are.
+    home
+        Where the file will be, to which its names are relative; left out, the directory of the logs.
+    rig
+        Scenario of the rig, by which inputs, measured variables and parameters get their names; left out, these names are to be
+        written by hand.
+    progress
+        Is called with the name of each log that is read.
+
+    Returns
+    -------
+    str
+        Text of the file (TOML). What is in doubt stands in comments that begin with ``Doubt:``.
+
+    Raises
+    ------
+    InputError
+        There are no logs, or none can be read.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> import lostmotion as lm
+    >>> with TemporaryDirectory() as folder:
+    ...     rows = [f"{0.01 * k},{k % 7}" for k in range(20)]
+    ...     _ = Path(folder, "log.csv").write_text("\\n".join(["time [s],angle [deg]", *rows]))
+    ...     text = lm.first_task(folder)
+    >>> print(*[line for line in text.splitlines() if "ample time" in line])
+    # Sample time: 10 ms; logs last 0.19 s.
+    """
+    directory = Path(directory)
+    paths = _files(directory)
+    logs: list[tuple[Path, Log]] = []
+    refused: list[str] = []
+    for path in paths:
+        if progress is not None:
+            progress(path.name)
+        try:
+            logs.append((path, read_log(path)))
+        except InputError as problem:
+            refused.append(str(problem).replace(f"{directory}{os.sep}", ""))
+    if not logs:
+        raise InputError(f"{directory}: none of its {len(paths)} logs can be read; the first: {refused[0]}")
+    seen = _channels([log for _, log in logs])
+    scenario = in_long_form(load(find_scenario(str(rig), Path.cwd()))) if str(rig) else None
+    measured, inputs = _roles(seen)
+    doubts = [f"{text}; it is left out" for text in refused]
+    doubts += _doubts(logs, seen, measured, inputs)
+    home = Path(home) if str(home) else directory
+    scenario_name = Path(os.path.relpath(rig, home)).as_posix() if str(rig) and Path(rig).is_file() else str(rig)
+    return "\n".join(
+        [
+            "# First identification file, written by `lostmotion identify new`. Check the lines with Doubt:, then run",
+            "#   lostmotion identify identify.toml -o identified",
+            f"title = {_text(directory.resolve().name)}",
+            *_rig_lines(scenario_name),
+            "",
+            *_log_lines(home, [path for path, _ in logs], [log for _, log in logs]),
+            *_channel_lines(seen, len(logs)),
+            *_some(doubts),
+            "",
+            *_input_lines(inputs, scenario),
+            *_measured_lines(measured, scenario),
+            *_parameter_lines(scenario),
+            "",
+        ]
+    )
+
+
+def _files(directory: Path) -> list[Path]:
+    if not directory.is_dir():
+        raise InputError(f"{directory}: is no directory; name the one that holds the logs")
+    found = []
+    for folder, inner, names in os.walk(directory):
+        inner[:] = sorted(name for name in inner if not name.startswith("."))
+        found += [Path(folder, name) for name in sorted(names) if Path(name).suffix.lower() in ENDINGS]
+        if len(found) > MOST_LOGS:
+            raise InputError(f"{directory}: has more than {MOST_LOGS} logs; name a directory with some of them")
+    if not found:
+        raise InputError(f"{directory}: has no log; logs end in {', '.join(ENDINGS)}")
+    return found
+
+
+def _channels(logs: Sequence[Log]) -> list[_Seen]:
+    found: dict[str, _Seen] = {}
+    for log in logs:
+        for name, channel in log.channels.items():
+            own = found.setdefault(name, _Seen(name))
+            own.logs += 1
+            if channel.unit not in own.units:
+                own.units.append(channel.unit)
+            x = channel.values[np.isfinite(channel.values)]
+            if len(x):
+                own.low, own.high = min(own.low, float(x.min())), max(own.high, float(x.max()))
+            if len(x) > 3:
+                own.noise.append(float(np.std(np.diff(x, 2))) / math.sqrt(6.0))  # of white noise
+    return list(found.values())
+
+
+def _roles(seen: Sequence[_Seen]) -> tuple[list[_Seen], list[_Seen]]:
+    """(channels to compare, channels that act) by their quantities and names; without any sign the first is compared."""
+    motion = [c for c in seen if c.quantity in ("rad", "rad/s") and not c.is_command]
+    commands = [c for c in seen if c.is_command]
+    drives = [c for c in seen if c.quantity in ("N*m", "A", "V") and not c.is_command]
+    measured = (
+        [c for c in motion if c.quantity == "rad"]
+        or motion
+        or [c for c in seen if c not in commands][:1]
+        or list(seen[:1])
+    )
+    return measured, [c for c in commands or drives if c not in measured]
+
+
+def _doubts(
+    logs: Sequence[tuple[Path, Log]], seen: Sequence[_Seen], measured: Sequence[_Seen], inputs: Sequence[_Seen]
+) -> list[str]:
+    """What is wrong with logs, or different between them."""
+    notes: dict[str, list[str]] = {}
+    for path, log in logs:
+        own = [c.name for c in measured if c.name in log.channels]
+        acting = [c.name for c in inputs if c.name in log.channels]
+        try:
+            found: Iterable[str] = screened(log, own, acting).notes
+        except InputError as problem:
+            found = [str(problem).removeprefix(f"{log.name}: ")]
+        for note in found:
+            notes.setdefault(note, []).append(path.name)
+    doubts = [f"{names[0]}{f' and {len(names) - 1} more' if len(names) > 1 else ''}: {n}" for n, names in notes.items()]
+    for c in seen:
+        if len(c.units) > 1:
+            doubts.append(f"channel {c.name} has the units {listed(repr(unit) for unit in c.units)} in different logs")
+        if c.logs < len(logs) and c in (*measured, *inputs):
+            doubts.append(f"channel {c.name} is in {c.logs} of {len(logs)} logs; the others cannot be used")
+    steps = np.array([log.interval for _, log in logs if len(log.time) > 1])
+    if len(steps) and steps.max() > 1.05 * steps.min():
+        doubts.append(f"sample times differ between logs: {1e3 * steps.min():.4g} to {1e3 * steps.max():.4g} ms")
+    return doubts
+
+
+# --- lines of the file ---
+
+
+def _text(value: str) -> str:
+    """A string of TOML."""
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _comment(text: str) -> str:
+    return f"# {visible(' '.join(text.split()))}"
+
+
+def _some(doubts: list[str]) -> list[str]:
+    lines = [_comment(f"Doubt: {text}") for text in doubts[:MOST_LINES]]
+    more = len(doubts) - MOST_LINES
+    return [*lines, *([f"# and {more} more"] if more > 0 else [])]
+
+
+def _rig_lines(rig: str) -> list[str]:
+    if rig:
+        return [f"scenario = {_text(rig)}"]
+    return [
+        f"scenario = {_text(PLACEHOLDER)}",
+        "# Doubt: name the rig in place of RIG.toml, and its variables below in place of SHAFT and MOTOR; or delete this file, and",
+        "# `lostmotion identify new DIR --rig RIG.toml` writes these names.",
+    ]
+
+
+def _log_lines(home: Path, paths: Sequence[Path], logs: Sequence[Log]) -> list[str]:
+    patterns = dict.fromkeys(
+        (Path(os.path.relpath(path.parent, home)) / f"*{path.suffix}").as_posix() for path in paths
+    )
+    steps, lengths = (
+        [log.interval for log in logs if len(log.time) > 1],
+        [log.duration for log in logs if len(log.time)],
+    )
+    lines = ["[logs]", f"files = [{', '.join(map(_text, patterns))}]"]
+    if any("decimal commas" in note for log in logs for note in log.notes):
+        lines.append('decimal = ","')
+    lines.append(f"# Sample time: {_range(1e3 * np.array(steps))} ms; logs last {_range(np.array(lengths))} s.")
+    values: dict[str, dict[Any, int]] = {}
+    for log in logs:
+        for key, value in log.header.items():
+            if isinstance(value, int | float | str):
+                counts = values.setdefault(key, {})
+                counts[value] = counts.get(value, 0) + 1
+    for key, counts in values.items():
+        shown = listed(f"{v:g}" if isinstance(v, float) else str(v) for v in counts)
+        lines.append(_comment(f"Header: {key} is {shown} (in {sum(counts.values())} of {len(logs)} logs)"))
+    divides = [key for key, counts in values.items() if len(counts) > 1 and key.isidentifier()]
+    key, value = (divides[0], next(iter(values[divides[0]]))) if divides else ("file", paths[-1].name)
+    own = f"{value:g}" if isinstance(value, float) else repr(value)
+    return [*lines, f"# held_out = {_text(f'{key} == {own}')}  # logs that are kept from the fit, to test it"]
+
+
+def _range(values: np.ndarray) -> str:
+    low, high = (f"{x:.4g}" for x in (values.min(), values.max())) if len(values) else ("?", "?")
+    return low if low == high else f"{low} to {high}"
+
+
+def _channel_lines(seen: Sequence[_Seen], count: int) -> list[str]:
+    lines = ["", f"# Channels, in {count} log{'' if count == 1 else 's'}:"]
+    for c in seen:
+        unit = c.units[0] or "no unit"
+        some = f", in {c.logs} of them" if c.logs < count else ""
+        lines.append(_comment(f"  {c.name} [{unit}]: {c.low:.4g} to {c.high:.4g}{some}"))
+    return lines
+
+
+def _keyed(names: Iterable[str]) -> list[str]:
+    """Names as keys of TOML that differ."""
+    found: list[str] = []
+    for name in names:
+        key = "".join(c if c.isalnum() and c.isascii() else "_" for c in name).strip("_") or "channel"
+        found.append(key if key not in found else f"{key}_{len(found) + 1}")
+    return found
+
+
+def _about_unit(c: _Seen) -> list[str]:
+    if c.units[0]:
+        return []
+    return [
+        f'# Doubt: its files name no unit, so that it is read in SI{f" ({c.quantity})" if c.quantity else ""}; else: unit = "..."'
+    ]
+
+
+def _input_lines(inputs: Sequence[_Seen], scenario: TrainScenario | None) -> list[str]:
+    if not inputs:
+        return [
+            '# Doubt: no channel is known to act on the rig; if one does, add [inputs.NAME] with channel = "..."',
+            "",
+        ]
+    kinds = {"rad": "_reference", "rad/s": "_reference", "N*m": "_command", "A": "_command", "V": "_command"}
+    free = _signals(scenario)
+    lines: list[str] = []
+    for k, c in enumerate(inputs):
+        wanted = kinds.get(c.quantity, "_command")
+        fits = (
+            [name for name in free if name.endswith(wanted)]
+            or [name for name in free if name.endswith("_command")]
+            or free
+        )
+        if scenario is not None and not fits:
+            lines += [_comment(f"Doubt: nothing is left on the rig that channel {c.name} could act on"), ""]
+            continue
+        name = fits[0] if fits else f"MOTOR{k + 1 if k else ''}{wanted}"
+        lines += [f"[inputs.{name}]", f"channel = {_text(c.name)}", *_about_unit(c)]
+        if len(fits) > 1:
+            lines.append(_comment(f"Doubt: it may act as {listed(fits[1:])} just as well"))
+        lines.append("")
+        free = [other for other in free if other != name]
+    return lines
+
+
+def _signals(scenario: TrainScenario | None) -> list[str]:
+    if scenario is None:
+        return []
+    return [*scenario.signals(), *(f"{name}_reference" for name in scenario.axes())]
+
+
+def _measured_lines(measured: Sequence[_Seen], scenario: TrainScenario | None) -> list[str]:
+    shafts = list(scenario.shafts) if scenario is not None else []
+    lines: list[str] = []
+    for c, key in zip(measured, _keyed(c.name for c in measured), strict=True):
+        kind = "speed" if c.quantity == "rad/s" else "angle"
+        named = [shaft for shaft in shafts if shaft.lower() in c.words]
+        shaft = (named or shafts[-1:] or ["SHAFT"])[0]
+        lines += [f"[measured.{key}]", f"channel = {_text(c.name)}", f'variable = "{shaft}_{kind}"', *_about_unit(c)]
+        if c.quantity not in ("rad", "rad/s"):
+            lines.append("# Doubt: neither its name nor its unit says that it is an angle or a speed")
+        if len(shafts) > 1 and not named:
+            lines.append(_comment(f"Doubt: it may be that of another shaft: {listed(shafts[:-1])}"))
+        if len(measured) > 1:
+            noise = float(np.median(c.noise)) if c.noise else 0.0
+            factor = _factor(c)
+            deviation = factor * (noise or 1e-3 * (c.high - c.low) or 1.0)
+            lines += [
+                f"deviation = {deviation:.3g}",
+                "# Doubt: standard deviation of its errors in SI, by neighbouring samples",
+            ]
+        lines.append("")
+    return lines
+
+
+def _factor(c: _Seen) -> float:
+    try:
+        return channel_unit("", c.units[0], "", "")[0]
+    except InputError:
+        return 1.0
+
+
+def _parameter_lines(scenario: TrainScenario | None) -> list[str]:
+    found: dict[str, float] = {}
+    for table, parts in (("shafts", scenario.shafts), ("motors", scenario.motors)) if scenario is not None else ():
+        for name, part in parts.items():
+            for key in SOUGHT:
+                value = getattr(part, key, None)
+                if isinstance(value, float) and value > 0.0:
+                    found[f"{table}.{name}.{key}"] = value
+    if not found:
+        found = {"shafts.SHAFT.friction_torque": 1.0} if scenario is None else {}
+    names = _keyed("_".join(key.split(".")[1:]) for key in found)
+    if not found:
+        return ["# Doubt: the rig states no inertia and no friction; name what is sought", "[set]", "", "[parameters]"]
+    lines = ["# What is sought, from the values of the rig.", "[set]"]
+    lines += [f"{_text(key)} = {_text(name)}" for key, name in zip(found, names, strict=True)]
+    lines += ["", "[parameters]"]
+    for name, value in zip(names, found.values(), strict=True):
+        lines.append(
+            f"{name} = {{ start = {value!r}, min = {value / 100.0!r}, max = {value * 100.0!r}, logarithmic = true }}"
+        )
+    return lines

@@ -1,0 +1,117 @@
+"""A first identification file: it names what is there and what is in doubt, and is read by the command once the rig is named."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import lostmotion as lm
+from identification_logs import AXIS
+from lostmotion.cli import app
+
+TIME = np.arange(0.0, 2.0, 0.01)
+FORCE, MASS, VISCOUS = 400.0, 80.0, 150.0  # N, kg, N*s/m
+
+
+def speed(time: np.ndarray) -> np.ndarray:
+    """Of m v' + b v = F from rest."""
+    return np.asarray(FORCE / VISCOUS * (1.0 - np.exp(-VISCOUS / MASS * time)))
+
+
+@pytest.fixture
+def logs(tmp_path: Path) -> Path:
+    """Two logs of an axis under a constant force, without dry friction."""
+    for name, share in (("a.csv", 1.0), ("b.csv", 0.5)):
+        rows = "\n".join(
+            f"{t!r},{share * FORCE!r},{share * v!r}" for t, v in zip(TIME.tolist(), speed(TIME).tolist(), strict=True)
+        )
+        (tmp_path / name).write_text(f"# share: {share}\ntime [s],force [N],carriage speed [rad/s]\n{rows}\n")
+    (tmp_path / "rig.toml").write_text(AXIS.replace("friction_torque = 20.0\n", ""))
+    return tmp_path
+
+
+def invoke(*words: str) -> tuple[int, str]:
+    done = CliRunner().invoke(app, list(words))
+    return done.exit_code, done.output + (str(done.exception) if done.exception else "")
+
+
+def test_the_command_reads_the_file_with_a_rig_and_finds_the_truth(logs: Path) -> None:
+    code, said = invoke("identify", "new", str(logs), "--rig", str(logs / "rig.toml"))
+    assert code == 0, said
+    assert f"written to {logs / 'identify.toml'}" in said
+    result = lm.identify(logs / "identify.toml")
+    assert result.values["drive_rotor_inertia"] == pytest.approx(MASS, rel=1e-3)
+    assert result.values["carriage_viscous_friction"] == pytest.approx(VISCOUS, rel=1e-3)
+
+
+def test_without_a_rig_the_file_is_whole_but_for_the_rig(logs: Path) -> None:
+    assert invoke("identify", "new", str(logs))[0] == 0
+    task, _ = lm.load_identification(logs / "identify.toml")
+    assert task.logs.files == ("*.csv",)
+    assert {m.channel for m in task.measured.values()} == {"carriage speed"}
+    assert {i.channel for i in task.inputs.values()} == {"force"}
+    with pytest.raises(lm.InputError, match=r"RIG\.toml"):
+        lm.identify(logs / "identify.toml")
+    text = (logs / "identify.toml").read_text()
+    text = text.replace("RIG.toml", "rig.toml").replace("MOTOR_", "drive_").replace("SHAFT", "carriage")
+    text = text.replace("friction_torque", "viscous_friction").replace("max = 100.0", "max = 1000.0")
+    (logs / "identify.toml").write_text(text)
+    assert lm.identify(logs / "identify.toml").values  # the mass of the rig is not that of the logs
+
+
+def test_no_file_is_overwritten(logs: Path) -> None:
+    (logs / "identify.toml").write_text("mine")
+    (logs / "link.toml").symlink_to(logs / "nowhere")
+    for more in ([], ["-o", str(logs / "a.csv")], ["-o", str(logs / "link.toml")]):
+        code, said = invoke("identify", "new", str(logs), *more)
+        assert code == 1 and "exists; name another file with -o" in said
+    assert (logs / "identify.toml").read_text() == "mine" and not (logs / "nowhere").exists()
+
+
+def test_what_is_in_doubt_is_said(logs: Path) -> None:
+    rows = "\n".join(f"{0.02 * k:.2f};{0.5 * k}".replace(".", ",") for k in range(100))
+    inner = logs / "more"
+    inner.mkdir()
+    (inner / "c.txt").write_text(f"time;carriage speed\n{rows}\n")
+    (inner / 'd"\n.csv').write_text("time,x\n0,fast\n")
+    text = lm.first_task(logs)
+    data = tomllib.loads(text)
+    assert data["logs"] == {"files": ["*.csv", "more/*.txt"], "decimal": ","}
+    assert data["measured"] == {"carriage_speed": {"channel": "carriage speed", "variable": "SHAFT_speed"}}
+    for line in (
+        "# Sample time: 10 to 20 ms; logs last 1.98 to 1.99 s.",
+        "# Header: share is 1, 0.5 (in 2 of 3 logs)",
+        "is no number; it is left out",
+        "# Doubt: c.txt: its commas are read as decimal commas",
+        "# Doubt: channel carriage speed has the units 'rad/s', '' in different logs",
+        "# Doubt: channel force is in 2 of 3 logs; the others cannot be used",
+        "# Doubt: sample times differ between logs: 10 to 20 ms",
+        "force [N]: 200 to 400, in 2 of them",
+    ):
+        assert line in text, text
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (["new"], 2, "needs the directory of the logs"),
+        (["new", "nowhere"], 1, "nowhere: is no directory"),
+        (["new", "empty"], 1, "empty: has no log; logs end in .json, .csv"),
+        (["new", "bad"], 1, "none of its 1 logs can be read"),
+        (["x.toml", "empty"], 2, "DIR goes with `identify new`"),
+        (["x.toml", "--rig", "rig.toml"], 2, "--rig goes with `identify new`"),
+    ],
+)
+def test_wrong_calls_end_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], code: int, said: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "bad").mkdir()
+    (tmp_path / "bad" / "log.csv").write_text("nothing")
+    found, text = invoke("identify", *words)
+    assert found == code and said in text.replace("\n", " "), text
