@@ -132,6 +132,9 @@ if TYPE_CHECKING:
     from .response.linear import rigid_constants as rigid_constants
     from .response.shooting import periodic_motion as periodic_motion
     from .response.shooting import periodic_motions as periodic_motions
+    from .response.spectrum import Spectrum as Spectrum
+    from .response.spectrum import SpectrumLine as SpectrumLine
+    from .response.spectrum import spectrum as spectrum
     from .servo.commission import LoopSheet as LoopSheet
     from .servo.commission import ServoReport as ServoReport
     from .servo.commission import Stiffness as Stiffness
@@ -267,6 +270,7 @@ _HOMES = {
     "response.harmonic": ("frequency_response", "to_control"),
     "response.linear": ("LinearModel", "RigidConstants", "linearize", "rigid_constants"),
     "response.shooting": ("periodic_motion", "periodic_motions"),
+    "response.spectrum": ("Spectrum", "SpectrumLine", "spectrum"),
     "simulation.explanation": ("ContactState", "Explanation", "MotorState", "explain"),
     "simulation.result_files": ("open_result", "save"),
     "simulation.results": ("RunArrays", "energy_of", "scenario_of"),

@@ -23,6 +23,19 @@ def run(
     plot: Annotated[
         Path | None, typer.Option("--plot", metavar="FILE", help="Figure of the run: .png, .svg or .pdf.")
     ] = None,
+    figure: Annotated[
+        str | None,
+        typer.Option(
+            "--figure", metavar="NAME", help="What --plot shows: motion, losses, contacts or energy; all of it."
+        ),
+    ] = None,
+    spectrum: Annotated[
+        bool,
+        typer.Option(
+            "--spectrum",
+            help="Periodic error at constant speed, by the order of each shaft's revolution, and the part that causes it.",
+        ),
+    ] = False,
     report: Annotated[
         Path | None,
         typer.Option("--report", metavar="FILE", help="Page of the run with all charts and its data: .html."),
@@ -54,6 +67,7 @@ def run(
     \b
     lostmotion run drive.toml
     lostmotion run paper-2dof-nl-small --plot small.png
+    lostmotion run paper-2dof-nl-small --plot energy.png --figure energy
     lostmotion run position-axis --report axis.html
     lostmotion run drive.toml --set command.amplitude=0.1 -o result.csv --plot result.png
     lostmotion run result.csv --explain 0.25
@@ -63,6 +77,7 @@ def run(
     from ..simulation.train_scenario import need_open_loop
 
     _try_files(output, plot, report)
+    _check_figure(figure, plot)
     loaded = load(scenario, overrides or ())
     if explain is not None and not 0.0 <= explain <= loaded.simulation.duration:
         raise InputError(
@@ -86,6 +101,12 @@ def run(
         from ..simulation.explanation import explain as explain_instant
 
         print(explain_instant(loaded, explain))
+    if spectrum:
+        from ..response.spectrum import spectrum as error_spectrum
+
+        with busy("Spectrum"):
+            found = error_spectrum(loaded)
+        print(found)
     if output is not None:
         from ..simulation.result_files import save
 
@@ -97,7 +118,7 @@ def run(
             from ..atomic_writer import write_whole
             from ..reports.plots import overview
 
-            write_whole(plot, overview(result.dataset()).savefig)
+            write_whole(plot, overview(result.dataset(), figure).savefig)
         print(f"Figure written to {plot}")
     if report is not None:
         with busy("Writing"):
@@ -123,6 +144,18 @@ def _try_files(output: Path | None, plot: Path | None, report: Path | None) -> N
         try_file(plot)
     if report is not None:
         try_page(report)
+
+
+def _check_figure(figure: str | None, plot: Path | None) -> None:
+    from ..errors import InputError
+
+    if figure is not None and plot is None:
+        raise InputError(f"--figure {figure}: says what --plot shows; add --plot FILE")
+    if figure is not None:
+        from ..reports.run_charts import FIGURES
+
+        if figure not in FIGURES:
+            raise InputError(f"--figure {figure}: is not known; take one of {', '.join(FIGURES)}")
 
 
 def _check_solver(solver: str, tolerance: float | None) -> None:

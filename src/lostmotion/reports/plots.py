@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from . import other_plots as others
 from .panels import Chart, Curve, Ground, Group, Panel
-from .run_charts import run_charts
+from .run_charts import figure_charts, run_charts
 from .thinning import thinned
 
 if TYPE_CHECKING:
@@ -150,20 +150,27 @@ def _range_within(curves: Iterable[Curve], x_range: tuple[float, float]) -> tupl
     return low - margin, high + margin
 
 
-def overview(result: xarray.Dataset) -> Figure:
+def overview(result: xarray.Dataset, figure: str | None = None) -> Figure:
     """A run at a glance: controlled axes with their following errors, commands, speeds, torques, twists, contacts as bars.
+
+    Parameters
+    ----------
+    figure
+        A part of it alone: motion, losses, contacts or energy.
 
     Raises
     ------
     InputError
         The dataset lacks what is shown.
     """
-    charts = run_charts(result)
+    charts = run_charts(result) if figure is None else figure_charts(result, figure)
+    columns = min(2, len(charts))
     note = result.attrs.get("warning", "") or result.attrs.get("note", "")
-    figure = draw(charts, 2, (10.0, 2.7 * -(-len(charts) // 2)), note=note)
+    rows = -(-len(charts) // columns)
+    drawn = draw(charts, columns, (10.0, 2.7 * rows if figure is None else max(4.5, 2.7 * rows)), note=note)
     if result.attrs.get("title"):
-        figure.suptitle(result.attrs["title"])
-    return figure
+        drawn.suptitle(result.attrs["title"])
+    return drawn
 
 
 @in_our_looks

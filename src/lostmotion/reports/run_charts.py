@@ -9,15 +9,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
+from ..inputs.validation import shown
 from ..live_page.drawn import axis_figures
 from ..model.losses import LossMap
 from ..model.train import DriveTrain
-from ..simulation.results import is_train_result, scenario_of
+from ..simulation.results import energy_of, is_train_result, scenario_of
 from ..simulation.scenario import Scenario
 from ..simulation.train_parts import parts_of
 from ..simulation.train_scenario import TrainScenario
 from ..units.practical import charted
-from .panels import FAINT, Chart, Contacts, Curve, Ground, Panel, look
+from .panels import FAINT, Chart, Contacts, Curve, Flows, Ground, Panel, look
 
 if TYPE_CHECKING:
     import xarray
@@ -37,6 +38,7 @@ OVERVIEW = (
     "input_contact",
     "twist_contact",
 )
+FIGURES = ("motion", "losses", "contacts", "energy")
 CONTACTS = {"input_contact": "input shaft", "twist_contact": "gearbox twist", "load_contact": "load"}
 
 
@@ -56,6 +58,34 @@ def run_charts(result: xarray.Dataset) -> list[Chart]:
     if lacking:
         raise InputError(f"this dataset lacks {', '.join(lacking)}, which the figure of a run shows")
     return [*_axes(result), *_drive(result)]
+
+
+def figure_charts(result: xarray.Dataset, figure: str) -> list[Chart]:
+    """Charts of a run on one subject.
+
+    Parameters
+    ----------
+    figure
+        ``"motion"``: references, errors, commands, speeds, torques, twists; ``"losses"``: torque over twist, and the way through the loss
+        maps; ``"contacts"``: what is stuck when; ``"energy"``: where it comes from and where it goes.
+
+    Raises
+    ------
+    InputError
+        The figure is unknown, or the drive has nothing that it shows.
+    """
+    if figure not in FIGURES:
+        raise InputError(f"figure: {shown(figure)} is not known; take one of {', '.join(FIGURES)}")
+    charts: list[Chart]
+    if figure == "energy":
+        charts = [Flows("Energy of the whole run", energy_of(result))]
+    elif figure == "losses":
+        charts = list(gear_charts(result))
+    else:
+        charts = [c for c in run_charts(result) if isinstance(c, Contacts) is (figure == "contacts")]
+    if not charts:
+        raise InputError(f"figure: the drive has nothing that {figure} shows; take another one of {', '.join(FIGURES)}")
+    return charts
 
 
 def _axes(result: xarray.Dataset) -> Iterator[Panel]:
