@@ -395,7 +395,10 @@ def _sources(long: TrainScenario, train: DriveTrain, over: str) -> Iterator[tupl
             if key == "position_encoder":
                 default = getattr(controller, "shaft", None) or list(train.shafts)[-1]
             shaft = encoder.shaft or default
-            yield f"encoder error: {key} of {name} on {shaft}", of(shaft, encoder.error_periods or encoder.lines), False
+            per_turn = encoder.error_periods or encoder.lines
+            if per_turn is None:  # of a linear scale, whose coordinate is a length
+                per_turn = 2.0 * math.pi / encoder.grating_period
+            yield f"encoder error: {key} of {name} on {shaft}", of(shaft, per_turn), False
 
 
 def _order(law: Any) -> tuple[float, bool]:
