@@ -71,3 +71,11 @@ def test_the_ledger_of_a_locked_worm_keeps_changes_far_below_what_it_stores(rati
         assert energy[name] == pytest.approx(per_square * ratio**2, rel=1e-9), name
     assert run.attrs["energy_residual"] < 1e-9
     assert "warning" not in run.attrs
+
+
+@pytest.mark.parametrize("ratio", [1e-7, 1e-8])
+def test_a_motion_faster_than_the_clock_is_no_accumulation(ratio: float) -> None:
+    """The damper of the coupling slows the rotor at c/(i^2 J) = 2.5e16 1/s and more: 1e-17 s is 0 beside 0.1 s."""
+    with pytest.raises(lm.SolverError, match="or what numbers resolve") as refusal:
+        lm.simulate(lm.load(NAMED["worm-lowering"], {"gears.coupling.ratio": ratio}))
+    assert "accumulate" not in str(refusal.value)

@@ -196,8 +196,28 @@ inline void compare_with_steps(RandomTrains& random, int shafts, double duration
                     s.own);
 }
 
+// Do two runs switch at the same instants? The adaptive solver turns a speed that dies out through zero by its error,
+// at an instant that depends on the tolerance.
+inline bool same_instants(const Recorded& p, const Recorded& q) {
+    return std::equal(p.report.switchings.begin(), p.report.switchings.end(), q.report.switchings.begin(),
+                      q.report.switchings.end(),
+                      [](const auto& a, const auto& b) { return std::fabs(a.time - b.time) < 1e-6; });
+}
+
+// Where two runs part, does a speed graze zero in one of them? An undamped shaft under a torque that rises in a
+// straight line comes back to zero once a period: whether its hysteresis is set anew there is decided by rounding.
+inline bool part_at_grazing(const Recorded& p, const Recorded& q) {
+    const auto &a = p.report.switchings, &b = q.report.switchings;
+    std::size_t k = 0;
+    while (k < std::min(a.size(), b.size()) && std::fabs(a[k].time - b[k].time) < 1e-6) ++k;
+    const auto grazes = [k](const auto& all) {
+        return k < all.size() && !all[k].input_jump && all[k].kind == Guard::speed && all[k].before == all[k].after;
+    };
+    return grazes(a) || grazes(b);
+}
+
 // Exact against adaptive solver. Two tolerances of the adaptive one tell how well it knows the motion: a run counts if
-// it agrees with itself. Where it has taken the same steps with both, a third tells.
+// it agrees with itself. Where it does not, or has taken the same steps with both, smaller ones tell.
 struct SolverTally {
     int compared = 0, undecided = 0, jammed = 0, wrong = 0;
     double worst = 0.0;
@@ -220,13 +240,15 @@ inline void compare_solvers(const RandomRun& r, const Control& control, double d
         const Recorded coarse = run(1e-8);
         own = fine.done() && coarse.done() ? difference(coarse, fine) : 1.0;
     }
-    if (own < 1e-5 && gap > std::max(1e-6, 2.0 * own)) {
-        const Recorded finest = run(1e-12);
-        own = finest.done() ? difference(fine, finest) : 1.0;
+    if (own > 1e-5 || gap > std::max(1e-6, 2.0 * own)) {
+        const Recorded finer = run(1e-12), finest = run(1e-13);
+        own = finer.done() && finest.done() ? difference(finer, finest) : 1.0;
         gap = finest.done() ? difference(exact, finest) : 1.0;
+        if (gap > 1e-6 && (!same_instants(finer, finest) || part_at_grazing(exact, finest))) own = 1.0;
     }
-    if (own > 1e-5) {
+    if (own > 1e-5 && gap > 1e-6) {
         ++tally.undecided;
+        if (tell != nullptr) std::printf("  %s: the adaptive run does not settle\n", tell);
         return;
     }
     const bool agree = gap <= std::max(1e-6, 2.0 * own);

@@ -153,6 +153,14 @@ struct LinearRatesOf {
         return (*this)(derivative, Column{}, u);
     }
 
+    // The fastest rate [1/s] of one state, or of two that act on each other, whatever their units.
+    double fastest() const {
+        double square = 0.0;
+        for (int j = 0; j < D::coupled; ++j)
+            for (int k = 0; k <= j; ++k) square = std::fmax(square, std::fabs(rate(j, k) * rate(k, j)));
+        return std::sqrt(square);
+    }
+
     // Sums of the magnitudes of the terms of both, from magnitudes of what they depend on.
     State magnitude(const State& x, const Memory& m, const Inputs& u) const {
         State out = higher_magnitude(x, u);

@@ -5,7 +5,8 @@
 
 namespace lostmotion::model {
 
-// In these modes, whether they are consistent or not.
+// In these modes, whether they are consistent or not. What is zero to rounding is zero: the margin of a contact at its
+// limit does not fail by its last bit.
 template <class Sizes>
 template <class Cache, class Now>
 bool SwitchedTrain<Sizes>::conditions(Cache& cache, Now now, const Key& modes, const Event& event,
@@ -21,14 +22,17 @@ bool SwitchedTrain<Sizes>::conditions(Cache& cache, Now now, const Key& modes, c
     const auto& r = regime_of(e);
     for (auto& c : out) c.fill(std::numeric_limits<double>::infinity());
     auto along = flow(e, now);
+    const auto clear = [](double value, double size) { return std::fabs(value) > rounding * size ? value : 0.0; };
     for (std::size_t g = 0; g < guard_count(r) && r.solvable; ++g) {
         const auto& guard = r.guards[g];
         if (guard.kind == Guard::capacity)
-            out[guard.contact][guard.neighbour + 1] = evaluate(n_, guard.form, now);
+            out[guard.contact][guard.neighbour + 1] =
+                clear(evaluate(n_, guard.form, now), magnitude(n_, guard.form, now));
         else if (guard.kind == Guard::set_off)
-            out[guard.contact][guard.neighbour + 1] = along.rate(guard.form, 1);
+            out[guard.contact][guard.neighbour + 1] =
+                clear(along.rate(guard.form, 1), along.rate_magnitude(guard.form, 1));
         else if (guard.kind == Guard::speed && event.at_rest[guard.contact] && !r.at_rest[guard.contact])
-            out[guard.contact][1] = along.rate(guard.form, 1);
+            out[guard.contact][1] = clear(along.rate(guard.form, 1), along.rate_magnitude(guard.form, 1));
     }
     return r.solvable;
 }

@@ -346,7 +346,7 @@ Status ExactSolver<System>::change_regime(const Guard* fired, Observer& observer
     else
         course_.forget();
     ++switchings_;
-    return accumulation_.add(time_, unit_) ? Status::zeno : Status::done;
+    return accumulation_.add(time_, unit_, linear_rates());
 }
 
 }  // namespace lostmotion

@@ -5,6 +5,7 @@
 
 #include "../kernel/flow.hpp"
 #include "../kernel/inputs.hpp"
+#include "../kernel/rates.hpp"
 #include "observer.hpp"
 #include "status.hpp"
 
@@ -130,15 +131,19 @@ Status follow_change(const System& system, Cache& cache, const InputsOf<D>& left
     return Status::done;
 }
 
-// Counts switchings that crowd: true if more than a hundred lie within a few thousand roundings of the time.
+// Counts switchings that crowd: more than a hundred within a few thousand roundings of the time accumulate. Where the
+// rates of the regime are faster than that time, the numbers do not resolve the instants of its motion.
 class Accumulation {
  public:
-    bool add(double time, double unit) {
-        if (count_ == 0 || time - since_ > span * std::fmax(std::fabs(time), unit)) {
+    template <class D>
+    Status add(double time, double unit, const LinearRatesOf<D>& rates) {
+        const double resolved = span * std::fmax(std::fabs(time), unit);
+        if (count_ == 0 || time - since_ > resolved) {
             count_ = 0;
             since_ = time;
         }
-        return ++count_ > max_count;
+        if (++count_ <= max_count) return Status::done;
+        return resolved * rates.fastest() > 1.0 ? Status::outside : Status::zeno;
     }
 
  private:
