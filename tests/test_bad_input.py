@@ -100,7 +100,7 @@ BROKEN = [
     ("zero ratio", "ratio = 90", "ratio = 0", ["gearbox.ratio", "greater than 0"]),
     ("negative ratio", "ratio = 90", "ratio = -90", ["gearbox.ratio", "greater than 0"]),
     ("negative friction", "friction_torque = 0.016", "friction_torque = -0.016", ["motor.friction_torque"]),
-    ("zero time constant", '"0.1286 ms"', '"0 ms"', ["electrical_time_constant", "greater than 0"]),
+    ("negative time constant", '"0.1286 ms"', '"-1 ms"', ["electrical_time_constant", "at least 0"]),
     ("voltage constant below one", "3.1169", "0.9", ["armature_voltage_constant", "greater than 1"]),
     ("hysteresis above one", "efficiency = 0.93", "efficiency = 1.93", ["gearbox.hysteresis.efficiency"]),
     ("NaN", "ratio = 90", "ratio = nan", ["gearbox.ratio", "finite"]),

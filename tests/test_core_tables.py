@@ -19,7 +19,9 @@ from lostmotion.units.conversion import Unit
 
 # What the core has no use for as it stands in a file: ratings, texts, the two voltages of which it takes the ratio, and what
 # makes a synchronous motor a DC motor.
-NOT_OF_THE_CORE = {"motor.rated_voltage", "motor.voltage_limit", "motor.dc_voltage"}
+# The line of a motor becomes its rated point.
+LINE = {"motor.stall_torque", "motor.no_load_speed", "motor.stall_current", "motor.no_load_current"}
+NOT_OF_THE_CORE = {"motor.rated_voltage", "motor.voltage_limit", "motor.dc_voltage"} | LINE
 OF_THE_CORE_ALONE = {"motor.command_limit"}
 
 

@@ -30,6 +30,10 @@ OTHER = {
     "motor.electrical_time_constant": "5 ms",
     "motor.armature_voltage_constant": 10,
     "motor.voltage_limit": "12 V",
+    "motor.stall_torque": "4 Nm",
+    "motor.no_load_speed": "5000 rpm",
+    "motor.stall_current": "30 A",
+    "motor.no_load_current": "1 A",
     "motor.limits.continuous_torque": "0.1 Nm",
     "motor.limits.max_speed": "100 rpm",
     "motor.limits.resistance": "1 ohm",
@@ -75,6 +79,7 @@ OTHER = {
     "load.torque": "3 Nm",
 }
 REFUSED = {
+    **{f"motor.{key}": "give both" for key in ("stall_torque", "no_load_speed", "stall_current", "no_load_current")},
     "motor.limits.thermal_resistance": "say the same",  # as both of its parts
     "motor.winding": "resistance_phase",
     "motor.dc_voltage": "winding",

@@ -35,7 +35,7 @@ def native(path: Path) -> dict[str, np.ndarray]:
     Python solves parts of a train that nothing joins one after the other, the C interface as one train: so it is here, too.
     """
     with patch("lostmotion.simulation.core_runs.parts_of", lambda scenario: [scenario]):
-        result = lm.simulate(loaded(path))
+        result = lm.simulate(loaded(path), energy=True)
     out = {f"{SAMPLES} {name}": result[name].values for name in result}
     out |= {f"{ENERGIES} {name}": np.array([v]) for name, v in lm.energy_of(result).items()}
     out |= {f"{END_STATE} {name}": np.array([v]) for name, v in json.loads(result.attrs["end_state"]).items()}

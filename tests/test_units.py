@@ -231,7 +231,7 @@ REFUSED = [
     ("motor.rated_torque", "3300 rpm", "something else"),
     ("motor.rated_speed", "3300", 'no unit; write it as a bare number for rad/s, or "3300 rad/s"'),
     ("simulation.duration", "3 a", "not known"),
-    ("simulation.duration", "3 Pa", "not known"),
+    ("simulation.duration", "3 Gy", "not known"),
     ("command.amplitude", "5 dB", "not known"),
     ("load.inertia", "155 degC", "something else"),
     ("motor.limits.max_winding_temperature", "155 K/W", "a temperature"),

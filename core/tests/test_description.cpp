@@ -144,7 +144,7 @@ TEST_SUITE("description") {
         int unnoticed = 0, refused = 0, accepted = 0, run = 0;
         for (int n = 0; n < 6000; ++n) {
             std::vector<double> numbers = originals[n % originals.size()];
-            for (auto left = 1 + bits() % 3; left > 0; --left) {
+            for (auto left = 1 + bits() % 3; left > 0 && !numbers.empty(); --left) {
                 const std::size_t at = bits() % numbers.size();
                 switch (bits() % 6) {
                     case 0: numbers.erase(numbers.begin() + static_cast<std::ptrdiff_t>(at)); break;

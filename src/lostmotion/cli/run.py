@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from .arguments import Overrides, SourceArgument, number
 from .targets import try_file, try_page
 from .terminal import busy, simulating
+
+if TYPE_CHECKING:
+    from ..simulation.results import RunArrays
+    from ..simulation.scenario import Scenario
+    from ..simulation.train_scenario import TrainScenario
 
 PICTURES = (".png", ".svg", ".pdf")
 
@@ -102,11 +107,7 @@ def run(
 
         print(explain_instant(loaded, explain))
     if spectrum:
-        from ..response.spectrum import spectrum as error_spectrum
-
-        with busy("Spectrum"):
-            found = error_spectrum(loaded)
-        print(found)
+        _print_spectrum(loaded)
     if output is not None:
         from ..simulation.result_files import save
 
@@ -114,12 +115,7 @@ def run(
             save(result.dataset(), output)
         print(f"Result written to {output}")
     if plot is not None:
-        with busy("Drawing"):
-            from ..atomic_writer import write_whole
-            from ..reports.plots import overview
-
-            write_whole(plot, overview(result.dataset(), figure).savefig)
-        print(f"Figure written to {plot}")
+        _draw(plot, result, figure)
     if report is not None:
         with busy("Writing"):
             from ..reports.page import write_page
@@ -127,6 +123,23 @@ def run(
 
             write_page(report, run_report(Path(scenario).stem, result.dataset()))
         print(f"The page is at {report}")
+
+
+def _draw(plot: Path, result: RunArrays, figure: str | None) -> None:
+    from ..atomic_writer import write_whole
+    from ..reports.plots import overview
+
+    with busy("Drawing"):
+        write_whole(plot, overview(result.dataset(), figure).savefig)
+    print(f"Figure written to {plot}")
+
+
+def _print_spectrum(scenario: Scenario | TrainScenario) -> None:
+    from ..response.spectrum import spectrum
+
+    with busy("Spectrum"):
+        found = spectrum(scenario)
+    print(found)
 
 
 def _try_files(output: Path | None, plot: Path | None, report: Path | None) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import visible
-from ..simulation.results import RunArrays, energy_of, is_train_result
+from ..simulation.results import RunArrays, energy_of, is_train_result, whole
 from ..simulation.switchings import ATTRIBUTE as SWITCHINGS
 from ..simulation.switchings import names_in, unpacked
 from ..simulation.train_scenario import TrainScenario
@@ -153,6 +153,7 @@ def run_report(name: str, result: xarray.Dataset) -> Report:
     from .panels import Flows, Group
     from .run_charts import gear_charts, run_charts
 
+    result = whole(result)
     charts = run_charts(result)
     _, *lines = (line.strip() for line in summary(result).splitlines())
     told = [line for line in lines if line.startswith(("warning:", "note:"))]

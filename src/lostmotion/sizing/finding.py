@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Self
 
+from ..errors import InputError
+from ..inputs.validation import shown
 from .duty_cycle import DutyCycle
 
 Verdict = Literal["ok", "warning", "unknown"]
@@ -68,6 +71,13 @@ class Findings(tuple[Finding, ...]):
     """
 
     __slots__ = ()
+
+    def __new__(cls, findings: Iterable[Finding] = ()) -> Self:
+        kept = tuple(findings) if isinstance(findings, Iterable) else (findings,)
+        for finding in kept:
+            if not isinstance(finding, Finding):
+                raise InputError(f"findings: {shown(finding)} is no Finding; give those of a check")
+        return super().__new__(cls, kept)
 
 
 def within(
