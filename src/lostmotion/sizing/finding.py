@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Literal, Self
 
@@ -73,7 +73,7 @@ class Findings(tuple[Finding, ...]):
     __slots__ = ()
 
     def __new__(cls, findings: Iterable[Finding] = ()) -> Self:
-        kept = tuple(findings) if isinstance(findings, Iterable) else (findings,)
+        kept = tuple(findings) if isinstance(findings, list | tuple | Iterator) else (findings,)
         for finding in kept:
             if not isinstance(finding, Finding):
                 raise InputError(f"findings: {shown(finding)} is no Finding; give those of a check")
