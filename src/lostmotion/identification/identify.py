@@ -297,38 +297,56 @@ def identify_logs(
 ) -> IdentificationResult:
     """As `identify`, of logs that have been prepared."""
     rig, logs, left_out = split_at_pauses(rig, logs)
-    odd: list[OddLog] = []
+    spoiled: list[OddLog] = []
     while True:
-        result, more = _identified(rig, logs, threads, profiles, notify)
-        spoiled = [o for o in more if o.left_out]
-        if not spoiled:
+        found = _climbed(rig, logs, threads, notify)
+        if not (more := [o for o in found.odd if o.left_out]):
             break
-        odd += spoiled
-        logs = [log for log in logs if log.name not in {o.log for o in spoiled}]
-    result.left_out = left_out | {o.log: o.text for o in odd}
-    result.odd = [*odd, *more]
+        spoiled += more
+        logs = [log for log in logs if log.name not in {o.log for o in more}]
+    result = _answer(found, profiles)
+    result.left_out = left_out | {o.log: o.text for o in spoiled}
+    result.odd = [*spoiled, *found.odd]
     result.conditions = left_out_errors(
         result.rig or rig, Engine(result.rig or rig, threads), result.logs, result.fit, result.chosen, notify
     )
     return result
 
 
-def _identified(
-    rig: Rig, logs: list[Prepared], threads: int | None, profiles: bool, notify: Notify
-) -> tuple[IdentificationResult, list[OddLog]]:
-    """(answer from all of the logs, logs that disagree with the others)."""
+@dataclass(frozen=True)
+class _Climbed:
+    """The models that were fitted to some logs, and the logs that disagree with the others."""
+
+    engine: Engine
+    logs: list[Prepared]
+    start: Regression
+    ways: list[str]
+    rungs: list[RungResult]
+    best: int
+    odd: list[OddLog]
+
+
+def _climbed(rig: Rig, logs: list[Prepared], threads: int | None, notify: Notify) -> _Climbed:
+    """All models fitted to logs; the intervals wait until no log is left out any more."""
     rig, logs, point, start, ways = _begun(rig, logs, threads, notify)
-    task, engine = rig.task, Engine(rig, threads)
+    engine = Engine(rig, threads)
     rungs = climb(rig, engine, logs, point, notify)
     best = chosen(rungs)
     odd = odd_logs(rig, engine, logs, point, rungs[best].fit, best)
+    return _Climbed(engine, logs, start, ways, rungs, best, odd)
+
+
+def _answer(found_by: _Climbed, profiles: bool) -> IdentificationResult:
+    """What the fitted models say, with intervals."""
+    engine, logs, rungs, best = found_by.engine, found_by.logs, found_by.rungs, found_by.best
+    rig, task = engine.rig, engine.rig.task
     fit, free = rungs[best].fit, free_on(task, best)
     train = [log for log in logs if not log.held_out]
     problem: Problem = problem_of(rig, engine, train, best)
     misfit = misfits(problem, engine.residuals(train, fit.point, best))
     intervals, found = _intervals(problem, fit, misfit, rungs[best].minima, profiles)
     first = logs[0]
-    result = IdentificationResult(
+    return IdentificationResult(
         task,
         rungs,
         best,
@@ -340,13 +358,12 @@ def _identified(
         found,
         engine.by_differences,
         {log.name: engine.touching[log.name] for log in train if log.name in engine.touching},
-        start,
+        found_by.start,
         rig,
         logs,
-        inputs=ways,
+        inputs=found_by.ways,
         misfits=[m for m in misfit if m.large or m.structured],
     )
-    return result, odd
 
 
 def _begun(
