@@ -212,6 +212,22 @@ def sheet_parts(
     return parts
 
 
+def rig_parts(
+    comparisons: Sequence[Comparison],
+    sheet: Record | None,
+    notes: Iterable[str],
+    measured: Sequence[tuple[str, str]],
+    how: Sequence[str],
+    own: Sequence[tuple[str, str, str]] = (),
+) -> tuple[Table | Group | Prose, ...]:
+    """The tables below the charts: comparison, notes, further measurements, the data sheet, and how it was measured."""
+    parts = comparison_table(comparisons)
+    told = [sheet.note] if sheet is not None and sheet.note else []
+    if notes := [*told, *notes]:
+        parts.append(Prose("", notes, noted=True))
+    return (*parts, *sheet_parts(sheet, measured, own), Prose("How it was measured", how))
+
+
 def compared_rows(comparisons: Sequence[Comparison]) -> str:
     """The comparison as a CSV file."""
     header = ["quantity", "unit", "catalogue", "rig", "relative difference", "remark"]
@@ -221,18 +237,14 @@ def compared_rows(comparisons: Sequence[Comparison]) -> str:
 def rig_report(name: str, report: RigReport, sheet: GearboxSheet | None = None, notes: Iterable[str] = ()) -> Report:
     """The page of a gearbox on the rig."""
     kind = f"{sheet.manufacturer} {sheet.kind.replace('_', ' ')} gearbox, " if sheet is not None else ""
-    told = [sheet.note] if sheet is not None and sheet.note else []
-    parts = comparison_table(report.comparisons)
-    if notes := [*told, *notes]:
-        parts.append(Prose("", notes, noted=True))
-    parts += sheet_parts(sheet, summary_rows(report), rows_of_part(report.gearbox))
+    own = rows_of_part(report.gearbox)
     caption = "Measured on the simulated gearbox; points: the catalogue."
     return Report(
         title=sheet.title if sheet is not None and sheet.title else name,
         lead=f"{kind}`{name}`, on the virtual test rig.",
         verdict=_verdict(report),
         main=Group("rig", "Measurements", caption, tuple(panels(report, sheet))),
-        parts=(*parts, Prose("How it was measured", MEASURED)),
+        parts=rig_parts(report.comparisons, sheet, notes, summary_rows(report), MEASURED, own),
     )
 
 

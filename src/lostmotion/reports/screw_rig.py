@@ -11,10 +11,10 @@ from ..data_sheets.linear_sheets import ScrewSheet
 from ..test_rig.rig import LOST_MOTION_LOAD
 from ..test_rig.screw_measurement import RATED, ScrewReport
 from ..units.practical import RPM
-from .page import Headline, Prose, Report
+from .page import Headline, Report
 from .pages import table_csv, write_report
 from .panels import DOTS, Curve, Group, Panel, step
-from .rig import compared_rows, comparison_table, largest_difference, sheet_parts
+from .rig import compared_rows, largest_difference, rig_parts
 
 MEASURED = (
     "Deflection: the input is locked and the force on the slide goes through slow ramps. Efficiency: a flywheel keeps the screw at its speed against the force; it "
@@ -99,11 +99,6 @@ def _verdict(report: ScrewReport) -> Headline:
 
 def screw_report(name: str, report: ScrewReport, sheet: ScrewSheet | None = None, notes: Iterable[str] = ()) -> Report:
     """The page of a screw on the rig."""
-    parts = [*comparison_table(report.comparisons)]
-    told = [sheet.note] if sheet is not None and sheet.note else []
-    if notes := [*told, *notes]:
-        parts.append(Prose("", notes, noted=True))
-    parts += sheet_parts(sheet, summary_rows(report))
     caption = "Measured on the simulated screw; points: the catalogue."
     kind = f"{sheet.manufacturer} {sheet.kind.replace('_', ' ')}, " if sheet is not None else ""
     return Report(
@@ -111,7 +106,7 @@ def screw_report(name: str, report: ScrewReport, sheet: ScrewSheet | None = None
         lead=f"{kind}`{name}`, on the virtual test rig at {report.load:.4g} N.",
         verdict=_verdict(report),
         main=Group("rig", "Measurements", caption, tuple(panels(report, sheet))),
-        parts=(*parts, Prose("How it was measured", MEASURED)),
+        parts=rig_parts(report.comparisons, sheet, notes, summary_rows(report), MEASURED),
     )
 
 
