@@ -7,7 +7,7 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from ..errors import InputError
-from ..inputs.quantities import NotNegative, Number, ViscousFriction
+from ..inputs.quantities import NotNegative, ViscousFriction
 from .angle_torques import TransmissionError
 from .gearbox import Gearbox, Transmission
 from .losses import ConstantEfficiency, LossMap, MeshEfficiency, WormMesh, efficiency_map
@@ -17,8 +17,6 @@ from .torsion import LinearStiffness, Rigid, TorsionCurve
 class Gear(Transmission):
     """A stage between two shafts: a gearbox, a belt, a worm, or, with the ratio 1, a coupling."""
 
-    ratio: Number
-    """i_C, input speed / output speed; below 0, the output turns against the input"""
     input: str
     """shaft"""
     output: str

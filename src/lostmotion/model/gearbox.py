@@ -38,7 +38,7 @@ class Transmission(Part):
     """What gearboxes and gears of a drive train have in common: ratio, inertia, compliance."""
 
     ratio: Number
-    """i_C, input speed / output speed"""
+    """i_C, input speed / output speed; below 0, the output turns against the input"""
     inertia: Annotated[Inertia, NotNegative] = 0.0
     """J_R, on the input shaft"""
     viscous_friction: Annotated[ViscousFriction, NotNegative] = 0.0
