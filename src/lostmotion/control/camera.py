@@ -1,7 +1,5 @@
 """A camera on the axis, and the filter that makes angle, rate and acceleration of a target from its frames."""
 
-from __future__ import annotations
-
 from typing import Annotated, Self
 
 from pydantic import model_validator

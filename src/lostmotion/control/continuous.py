@@ -1,7 +1,5 @@
 """Continuous controllers: PID and state space, as states and regimes of the train."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """The controller of a motor: reference, encoders, loops and their sample times."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal, Self
 

@@ -4,8 +4,6 @@ What a part adds to them in `loops.py` and its neighbours is what the core does 
 The names for type checkers are in `described.pyi`, which ``make stub`` writes.
 """
 
-from __future__ import annotations
-
 from typing import Annotated, Any, ClassVar
 
 from pydantic import Field, create_model

@@ -1,7 +1,5 @@
 """Encoders: what a controller reads of an angle."""
 
-from __future__ import annotations
-
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator

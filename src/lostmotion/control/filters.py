@@ -1,7 +1,5 @@
 """Filters of references and torques, as discrete-time systems."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Any, Literal, Self
 

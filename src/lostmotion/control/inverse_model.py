@@ -1,7 +1,5 @@
 """Feedforward by the model of the drive, with losses over load and speed that may adapt, and the load that follows from it."""
 
-from __future__ import annotations
-
 from typing import Any, Self
 
 from pydantic import model_validator

@@ -1,7 +1,5 @@
 """The loops of a servo cascade: position, speed, current, and what is fed forward."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator

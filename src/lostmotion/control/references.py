@@ -1,7 +1,5 @@
 """References that a controller follows: position, speed or torque over time, with exact derivatives for feedforward."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from functools import lru_cache

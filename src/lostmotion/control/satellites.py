@@ -1,7 +1,5 @@
 """Satellites as targets, from two-line elements by SGP4."""
 
-from __future__ import annotations
-
 import math
 from datetime import UTC, datetime
 from typing import Annotated, Literal, Self

@@ -4,8 +4,6 @@ Coordinates are those of the station: x to the right of the bearing 0, y along i
 right; elevation E = atan2(z, sqrt(x^2 + y^2)). All derivatives are those of the path itself, by truncated Taylor series.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Any, Literal, Self
 

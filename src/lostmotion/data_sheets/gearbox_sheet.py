@@ -1,7 +1,5 @@
 """The data sheet of a gearbox, as manufacturers print it, and the parts that follow from it."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Annotated, Any, Literal, Self
 

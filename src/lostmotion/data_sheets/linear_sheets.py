@@ -1,7 +1,5 @@
 """Data sheets of ball screws, racks, toothed belts and linear motors."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self
 

@@ -1,7 +1,5 @@
 """What a data sheet says of the losses of a gearbox."""
 
-from __future__ import annotations
-
 from typing import Annotated, Self
 
 from pydantic import model_validator

@@ -1,7 +1,5 @@
 """The data sheet of a motor, and the motor that follows from it."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator

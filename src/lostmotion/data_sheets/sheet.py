@@ -1,7 +1,5 @@
 """What every record of a data sheet has: sources of its data, and gaps."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 

@@ -1,7 +1,5 @@
 """What is identified: parameters with start values, bounds, scales and priors."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Any, Self
 

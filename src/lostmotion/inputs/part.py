@@ -1,7 +1,5 @@
 """The base of all parts, tables and records that are given: immutable, and refused in one line."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -21,7 +19,7 @@ from .validation import describe, shown
 class Part(BaseModel):
     """Immutable; unknown keys, NaN and infinity are refused, with an `InputError` that says what would be right."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
     # Neither a field nor a private attribute: pydantic copies, compares and pickles both, and what is kept belongs to one object.
     __slots__ = ("_made",)

@@ -1,7 +1,5 @@
 """What depends on the angle of a shaft: gravity, cogging, ripple, and the transmission error of a gear."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from typing import Annotated, Any, Literal, Self

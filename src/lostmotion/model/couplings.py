@@ -1,7 +1,5 @@
 """What holds a shaft or joins two at the same speed: brakes, clutches, freewheels."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import model_validator

@@ -1,7 +1,5 @@
 """Dampers between two shafts: viscous and fluid couplings, eddy-current couplings, torsional vibration dampers."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator

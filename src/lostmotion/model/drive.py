@@ -1,7 +1,5 @@
 """A drive: a motor, a gearbox and a load, as frozen objects in SI units; a scenario file spells them word for word."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Self
 

@@ -1,7 +1,5 @@
 """A gear of a drive train: a stage between two shafts."""
 
-from __future__ import annotations
-
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator

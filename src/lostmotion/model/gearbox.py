@@ -1,7 +1,5 @@
 """Gearboxes: parameters and ratings."""
 
-from __future__ import annotations
-
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator

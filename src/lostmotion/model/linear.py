@@ -4,8 +4,6 @@ The equations are those of shafts and gears. A slide is a shaft whose inertia is
 whose torques are forces [N]; a screw of lead p is a gear of ratio 2 pi/p between a shaft and a slide.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Literal, Self
 

@@ -1,7 +1,5 @@
 """The tables of slides and of what moves them, and the drive train that they make."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

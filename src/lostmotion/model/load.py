@@ -1,7 +1,5 @@
 """The driven body."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from ..inputs.part import Part

@@ -1,7 +1,5 @@
 """The losses of a gearbox."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from typing import Annotated, Literal, Self

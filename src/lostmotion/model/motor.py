@@ -1,7 +1,5 @@
 """Motors: parameters and ratings."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Literal, Self
 

@@ -1,7 +1,5 @@
 """A shaft of a drive train: inertia, friction and drag."""
 
-from __future__ import annotations
-
 import itertools
 from typing import Annotated, Literal, Self
 

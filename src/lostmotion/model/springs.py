@@ -1,7 +1,5 @@
 """Springs between a shaft and the frame: counterbalances, flexure pivots, cables that are wound up, end stops."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any
 
 from pydantic import Field

@@ -15,8 +15,6 @@ the DC motor of (2) where command 1 is the voltage u_R and 1 of m_D the torque M
     tau_a = L_q/R,    k_N = 1.5 p psi u_R/(R M_R),    omega_DR = (u_R - R M_R/(1.5 p psi))/(p psi).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

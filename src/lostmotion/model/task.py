@@ -1,7 +1,5 @@
 """What is asked of a drive: the duty cycle and the requirements that the drive check compares with."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from ..inputs.part import Part

@@ -1,7 +1,5 @@
 """The torsion of a gearbox: stiffness, backlash and hysteresis."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from typing import Annotated, Literal, Self

@@ -1,7 +1,5 @@
 """Wind on a load: a torque with the spectrum of the gusts, seeded, so that it is the same each time."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Literal, Self
 

@@ -1,7 +1,5 @@
 """What an axis has to do, and the scenario of one motor and gearbox that does it: tuned by rule, its cycle repeated."""
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 from typing import Annotated, Any, Self

@@ -1,7 +1,5 @@
 """What a study selects by: the table `[select]` of its file."""
 
-from __future__ import annotations
-
 from typing import Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator

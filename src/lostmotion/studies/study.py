@@ -1,7 +1,5 @@
 """A study: a base scenario, what is varied and how, and what is kept of each run."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """One parameter that a study varies: its key, its values or their distribution, and what they do to a scenario."""
 
-from __future__ import annotations
-
 import difflib
 import re
 from collections.abc import Iterator, Mapping
