@@ -1,10 +1,19 @@
 #include "reference.hpp"
 
+#include <algorithm>
+
 namespace lostmotion::control {
 
 auto Reference::at(double t) const -> ReferencePoint {
     if (t < 0.0) return {at(0.0).value};
     std::size_t low = 0, high = pieces.size();
+    // Where pieces are equally long, as those of targets are, two guesses find it.
+    if (const double span = pieces.back().time; high > 8 && t < span) {
+        const std::size_t guess = std::min(std::size_t(t / span * double(high - 1)), high - 2);
+        const std::size_t from = guess > 0 ? guess - 1 : 0, to = std::min(guess + 2, high - 1);
+        if (pieces[from].time <= t) low = from;
+        if (pieces[to].time > t) high = to;
+    }
     while (high - low > 1) {
         const std::size_t middle = (low + high) / 2;
         (pieces[middle].time <= t ? low : high) = middle;

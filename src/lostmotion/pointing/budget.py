@@ -140,24 +140,27 @@ def pointing_budget(
     loaded = in_long_form(scenario)
     given = None if after is None else argument("after", after, "s")
     _check(loaded, given or 0.0)
+    as_it_is = _run(loaded)
     start, line = (
-        _end_of_transient(loaded) if given is None else (given, f"errors count from {given:.4g} s on, as given")
+        _end_of_transient(loaded, as_it_is)
+        if given is None
+        else (given, f"errors count from {given:.4g} s on, as given")
     )
     angles = _view(loaded, view or {})
     cases = _cases(loaded, robustness=robustness)
     changed: dict[Case, TrainScenario] = {}
-    known: dict[TrainScenario, Found] = {}
+    known = {loaded: _numbers(as_it_is, start)}
     with thread_pool(os.cpu_count()) as pool:
-        for one, errors_of in pool.map(lambda s: (s, _run(s, start)), _different(loaded, cases, changed)):
-            known[one] = errors_of
+        others = (one for one in _different(loaded, cases, changed) if one != loaded)
+        for one, numbers in pool.map(lambda s: (s, _numbers(_run(s), start)), others):
+            known[one] = numbers
             if progress is not None:
                 progress()
     if progress is not None:
-        for _ in range(len(cases) - len(known)):
+        for _ in range(len(cases) - len(known) + 1):
             progress()
-    found = {case: known[one] for case, one in changed.items()}
-    time, errors, measured, whole = found["whole", ""]
-    of = {case: numbers for case, (*_, numbers) in found.items()}
+    of = {case: known[one] for case, one in changed.items()}
+    (time, errors, measured), whole = as_it_is, of["whole", ""]
 
     def group(kind: str) -> dict[Any, Errors]:
         return {name: value for (own, name), value in of.items() if own == kind}
@@ -185,11 +188,10 @@ def pointing_budget(
     )
 
 
-def _end_of_transient(scenario: TrainScenario) -> tuple[float, str]:
+def _end_of_transient(scenario: TrainScenario, as_it_is: Found) -> tuple[float, str]:
     """From when on errors do not depend on how the axes start [s], and the line that says so."""
-    (time, first, *_), (_, second, *_) = (
-        _run(s, 0.0) for s in (scenario, without(scenario, [_other_start(scenario)]) or scenario)
-    )
+    time, first, _ = as_it_is
+    second = _run(without(scenario, [_other_start(scenario)]) or scenario)[1]
     half = len(time) // 2
     end = 0.0
     for motor, error in first.items():
@@ -282,7 +284,8 @@ def _view(scenario: TrainScenario, view: Mapping[str, float | str]) -> dict[str,
     return angles
 
 
-Found = tuple[np.ndarray, dict[str, np.ndarray], dict[str, np.ndarray], Errors]
+Found = tuple[np.ndarray, dict[str, np.ndarray], dict[str, np.ndarray]]
+"""instants, errors of the true and of the measured direction by axis"""
 
 
 def _different(
@@ -299,22 +302,27 @@ def _different(
             yield one
 
 
-def _run(scenario: TrainScenario, after: float) -> Found:
-    """Instants, errors of the true and of the measured direction by axis, and what is made of them."""
+def _run(scenario: TrainScenario) -> Found:
     result = run(scenario, energy=False)
-    time = result.time
-    counted = time >= after
-    found, measured, numbers = {}, {}, {}
+    found, measured = {}, {}
     true = pointing_errors(scenario, result)
     for motor, name in pointing_names(scenario):
         found[motor] = error = true[name]
         controller = scenario.axes()[motor]
-        target = controller.reference.at(time)[0]
+        target = controller.reference.at(result.time)[0]
         # The load is at the reference less its error.
         truth, said = (
             (target - error, "measured_position") if controller.camera is None else (target, "position_reference")
         )
         measured[motor] = truth - result[f"{motor}_{said}"]
+    return result.time, found, measured
+
+
+def _numbers(found: Found, after: float) -> Errors:
+    time, errors, measured = found
+    counted = time >= after
+    numbers = {}
+    for motor, error in errors.items():
         e = error[counted]
         numbers[motor] = PointingError(
             rms=float(np.sqrt(np.mean(e**2))),
@@ -323,7 +331,7 @@ def _run(scenario: TrainScenario, after: float) -> Found:
             probable=PROBABLE * float(e.std()),
             measured_rms=float(np.sqrt(np.mean(measured[motor][counted] ** 2))),
         )
-    return time, found, measured, numbers
+    return numbers
 
 
 def _in_view(counted: np.ndarray, errors: Mapping[str, np.ndarray], angles: Mapping[str, float]) -> View:
