@@ -33,7 +33,7 @@ def section(report: Report, programs: dict[str, list[list[str]]]) -> None:
         ("Python to dataset, a law compiled by numba", lambda: lm.simulate(law, energy=False, law=compiled_law())),
         (
             "Python to dataset, a law in Python",
-            lambda: lm.simulate(law, energy=False, law=lm.Law(python_law, states=1)),
+            lambda: lm.simulate(law, energy=False, law=lm.control.Law(python_law, states=1)),
         ),
     ]
     report.table(("", "time [ms]"), [(name, f"{best(5, work):.2f}") for name, work in rows])
@@ -120,7 +120,7 @@ def python_law(_time: float, measured: Any, reference: Any, state: Any) -> float
 _kept: list[Any] = []
 
 
-def compiled_law() -> lm.Law:
+def compiled_law() -> lm.control.Law:
     """The same, compiled."""
     if not _kept:
         import numba
@@ -137,4 +137,4 @@ def compiled_law() -> lm.Law:
             return 0 if math.isfinite(torque) else 1
 
         _kept.append(law)
-    return lm.Law(_kept[0], states=1)
+    return lm.control.Law(_kept[0], states=1)

@@ -14,7 +14,7 @@ from report import Report
 
 import lostmotion as lm
 from lostmotion.live_page.page import write_page
-from lostmotion.portable.description import kernel_of
+from lostmotion.portable.descriptions import kernel_of
 
 ROOT = Path(__file__).parent.parent
 CHROMIUM = Path("/usr/bin/chromium")
@@ -67,7 +67,7 @@ def section(report: Report) -> None:
             scenario = lm.load(name)
             page, numbers = Path(directory, f"{name}.html"), Path(directory, f"{name}.bin")
             write_page(page, scenario)
-            numbers.write_bytes(lm.description(scenario, parameters=False).astype("<f8").tobytes())
+            numbers.write_bytes(lm.portable.description(scenario, parameters=False).astype("<f8").tobytes())
             core = ROOT / "build" / "page-core" / kernel_of(scenario) / "core.wasm"
             pairs = [(native(library, numbers), portable(core, numbers)) for _ in range(ROUNDS)]
             here, there = (min(times) for times in zip(*pairs, strict=True))

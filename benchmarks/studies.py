@@ -27,18 +27,18 @@ COMMAND = [{"key": "command.amplitude", "uniform": [0.1, 1.0]}]
 DRIVE = [{"key": "load.inertia", "uniform": [1.0, 3.0]}, {"key": "motor.friction_torque", "uniform": [0.01, 0.02]}]
 
 
-def spent(study: lm.Study, clock: Callable[[], float] = time.perf_counter, **how: object) -> float:
+def spent(study: lm.studies.Study, clock: Callable[[], float] = time.perf_counter, **how: object) -> float:
     """Time of the whole study [s]."""
     with tempfile.TemporaryDirectory() as directory:
         return 1e-3 * best(1, lambda: lm.study(study, Path(directory) / "s", **how), clock)  # type: ignore[arg-type]
 
 
-def make(scenario: lm.Scenario, vary: list[dict[str, object]], runs: int) -> lm.Study:
+def make(scenario: lm.Scenario, vary: list[dict[str, object]], runs: int) -> lm.studies.Study:
     base = scenario.replace(**{"simulation.duration": 1.0})
-    return lm.Study(scenario=base, design="random", runs=runs, vary=vary, keep=KEEP)  # type: ignore[arg-type]
+    return lm.studies.Study(scenario=base, design="random", runs=runs, vary=vary, keep=KEEP)  # type: ignore[arg-type]
 
 
-def core_alone(study: lm.Study, threads: int) -> float:
+def core_alone(study: lm.studies.Study, threads: int) -> float:
     """Processor time of the calls into the core alone [s]."""
     fields = [_core.batch_fields().index(v.key) for v in study.vary]
     channels = ("load_speed", "twist")
@@ -96,7 +96,7 @@ def section(report: Report, scenario: lm.Scenario) -> None:
     report.add("", resume(make(scenario, COMMAND, 1_000_000)))
 
 
-def resume(study: lm.Study) -> str:
+def resume(study: lm.studies.Study) -> str:
     """All parts of the study but the last are there; the time to find that out and to make the last."""
     parts = study.total // CHUNK
     with tempfile.TemporaryDirectory() as directory:

@@ -37,7 +37,7 @@ def hunting_map() -> tuple[str, float]:
         "controllers.servo.position.integral_gain": np.linspace(4, 64, 40),
         "shafts.table.breakaway_torque": np.linspace(5, 12, 40),
     }
-    seconds, _ = timed(lambda: lm.hunting_map(lm.load("hunting-with-static-friction"), over))
+    seconds, _ = timed(lambda: lm.servo.hunting_map(lm.load("hunting-with-static-friction"), over))
     return "hunting map of 40 x 40 limit cycles", seconds
 
 

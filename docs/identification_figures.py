@@ -17,7 +17,7 @@ IDENTIFIED: dict[str, Any] = {"color": "#d9730d", "linestyle": "--", "linewidth"
 EXAMPLE = Path(__file__).resolve().parent.parent / "examples" / "cycloidal"
 
 
-def loops(name: str, result: lm.IdentificationResult) -> list[Panel]:
+def loops(name: str, result: lm.identification.IdentificationResult) -> list[Panel]:
     """Torque against position of the log that was held out, in a small and in a large ramp."""
     assert result.rig is not None
     (log,) = [log for log in result.logs if log.held_out]

@@ -40,7 +40,7 @@ def maps(out: Path, scenario: lm.TrainScenario) -> None:
         "controllers.servo.position.integral_gain": np.linspace(4.0, 64.0, 40),
         "shafts.table.breakaway_torque": np.linspace(5.0, 12.0, 40),
     }
-    found = lm.hunting_map(scenario, grid)
+    found = lm.servo.hunting_map(scenario, grid)
     found.lm.plot().savefig(out / "hunting-map.png", dpi=100, metadata={"Software": None})
 
 

@@ -38,14 +38,14 @@ def write(out: Path) -> None:
     """The page's figures into a directory."""
     write_weakening(out)
     result = lm.simulate(scenario())
-    current = lm.motor_current(result)
-    steady = lm.temperatures(result, repeated=True)
+    current = lm.sizing.motor_current(result)
+    steady = lm.sizing.temperatures(result, repeated=True)
     time = result["time"].values
     curves = (
         Curve("phase, amplitude", time, current["current"].values, LIGHT),
         Curve("rms", time, current["current_rms"].values, DARK),
     )
-    motor = lm.scenario_of(result).motor
+    motor = lm.simulation.scenario_of(result).motor
     bodies = TwoBodies.of(motor, 25.0)
     long = np.concatenate([n * CYCLE + time[:-1] for n in range(360)])  # from cold, cycle by cycle
     torque = np.tile(result["motor_torque"].values[:-1], 360)
@@ -81,7 +81,7 @@ def write_weakening(out: Path) -> None:
         Curve("across the magnets, $i_q$", time, result["m_quadrature_current"].values, LIGHT),
         Curve("along the magnets, $i_d$", time, result["m_direct_current"].values, DARK),
     )
-    of_motor = lm.motor_current(result)
+    of_motor = lm.sizing.motor_current(result)
     limit = of_motor.attrs["voltage_limit"]
     voltage = (
         Curve("motor", time, of_motor["voltage"].values, DARK),

@@ -112,12 +112,12 @@ def lowering(
     swing = math.sqrt(stiffness / mass)
     speed = LOAD / stiffness * swing * RATIO
     duration = 1500.0 / swing
-    losses = lm.MeshEfficiency(drive_efficiency=0.4, backdrive_efficiency=eta_b)
+    losses = lm.model.MeshEfficiency(drive_efficiency=0.4, backdrive_efficiency=eta_b)
     gear = lm.Gear(
         input="worm",
         output="drum",
         ratio=RATIO,
-        stiffness=lm.LinearStiffness(stiffness=stiffness),
+        stiffness=lm.model.LinearStiffness(stiffness=stiffness),
         mesh_damping=damping,
         losses=losses,
     )
@@ -147,7 +147,7 @@ def map_points() -> list[tuple[float, float, bool, bool]]:
             swing = math.sqrt(STIFFNESS / mass)
             values = {"damping": 2.0 * DAMPING * math.sqrt(STIFFNESS * mass), "viscous": OIL * WORM * swing}
             scenario = lowering(eta_b, mass, **values)
-            said = lm.self_locking(scenario.train(), "gear", LOAD).lowering == "chatters"
+            said = lm.sizing.self_locking(scenario.train(), "gear", LOAD).lowering == "chatters"
             points.append((float(eta_b), float(ratio), said, chatters(scenario)))
     return points
 
@@ -239,7 +239,7 @@ def boundary(eta_b: float) -> float:
             "viscous": OIL * WORM * math.sqrt(STIFFNESS / mass),
         }
         train = lowering(eta_b, mass, **values).train()
-        if lm.self_locking(train, "gear", LOAD).lowering == "chatters":
+        if lm.sizing.self_locking(train, "gear", LOAD).lowering == "chatters":
             high = ratio
         else:
             low = ratio
@@ -256,7 +256,7 @@ def worm_table() -> str:
         if record.kind != "worm":
             continue
         gearbox = lm.Gearbox(**worm_values(record))
-        at = lm.overrunning(gearbox)
+        at = lm.sizing.overrunning(gearbox)
         verdict = (
             "locks, and stops its load" if at.stops else "holds, but does not stop its load" if at.holds else "overruns"
         )

@@ -123,7 +123,7 @@ def found(torque: float, losses: tuple[float, float], sudden: bool) -> tuple[flo
     key, duration = "ramps.0.rise", 100 * PERIOD
     if sudden:
         signal, key, duration = {"steps": [{"height": 0.1, "time": 0.05}]}, "steps.0.height", 20 * PERIOD
-    study = lm.Study(
+    study = lm.studies.Study(
         scenario=ring(
             losses,
             friction,

@@ -6,7 +6,7 @@ import lostmotion as lm
 
 ARCMIN = math.pi / 10800
 
-sheet = lm.GearboxSheet(
+sheet = lm.data_sheets.GearboxSheet(
     name="my-gearbox",
     kind="planetary",
     ratio=10,
@@ -22,12 +22,12 @@ sheet = lm.GearboxSheet(
         "no_load_torque": [{"input_speed": "3100 rpm", "torque": 0.64}],  # at the input [N·m]
     },
 )
-built = lm.build_loss_map(sheet)
+built = lm.data_sheets.build_loss_map(sheet)
 print(*built.notes)  # these two data contradict each other, as they often do
 
 gearbox = lm.gearbox("wittenstein-tp010-mf-10")  # the same from the catalogue
 assert gearbox.losses == built.losses
-rig = lm.TestRig(gearbox)
+rig = lm.test_rig.TestRig(gearbox)
 print(f"lost motion        {rig.lost_motion() / ARCMIN:.2f} arcmin")
 print(f"efficiency at 10 % {rig.efficiency(3100 * math.pi / 30, 0.1):.2f}")
 

@@ -48,7 +48,7 @@ def run(law) -> tuple[float, float]:
     """Peak error [rad] and the time that the run took [s]."""
     scenario = axis()
     begin = time.perf_counter()
-    result = lm.simulate(scenario, law=lm.Law(law, states=1), energy=False)
+    result = lm.simulate(scenario, law=lm.control.Law(law, states=1), energy=False)
     took = time.perf_counter() - begin
     return float(abs(result["position_reference"] - result["load_angle"]).max()), took
 

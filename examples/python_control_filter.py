@@ -28,7 +28,7 @@ def margins(scenario: lm.TrainScenario) -> tuple[float, float]:
 
 
 if __name__ == "__main__":
-    designed = lm.as_filter(notch(AXIS.controllers["servo"].sample_time))
+    designed = lm.control.as_filter(notch(AXIS.controllers["servo"].sample_time))
     for name, scenario in (
         ("without a filter", axis()),
         ("filter of python-control", axis(designed)),

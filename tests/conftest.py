@@ -79,7 +79,7 @@ def run_in_build(build: str, *arguments: str) -> subprocess.CompletedProcess[str
     )
 
 
-def rows_by_any_threads_and_executor(study: lm.Study, directory: Path) -> pa.Table:
+def rows_by_any_threads_and_executor(study: lm.studies.Study, directory: Path) -> pa.Table:
     """The table of a study, having found that one thread, three and processes give the same; in folder `1` of the directory."""
     one = pq.ParquetDataset(lm.study(study, directory / "1", threads=1)).read()
     three = pq.ParquetDataset(lm.study(study, directory / "3", threads=3)).read()

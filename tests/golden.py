@@ -74,7 +74,7 @@ def compute() -> Groups:
 
 def of_run(scenario: lm.Scenario | lm.TrainScenario) -> Groups:
     result = lm.simulate(scenario)
-    derived = {v.name for v in lm.VARIABLES if v.derived}
+    derived = {v.name for v in lm.simulation.VARIABLES if v.derived}
     switchings = lm.switchings_of(result)
     groups: Groups = {
         "samples": {str(name): result[name].values for name in result if name not in derived},
@@ -84,7 +84,7 @@ def of_run(scenario: lm.Scenario | lm.TrainScenario) -> Groups:
     }
     gears = scenario.gears.values() if isinstance(scenario, lm.TrainScenario) else (scenario.gearbox,)
     for gear in gears:
-        if isinstance(gear.losses, lm.LossMap):  # not of the core; where it differs, all else does
+        if isinstance(gear.losses, lm.model.LossMap):  # not of the core; where it differs, all else does
             groups["input"] = {"loss_map": np.ravel(gear.losses.values)}
     return groups
 
@@ -110,7 +110,7 @@ def of_steps(scenario: lm.Scenario) -> Values:
             simulation.advance(1e-3, command=level if k else (before, level), load_torque=20.0 * level)
             readings.append(simulation.read())
         before = level
-    return {v.name: np.array([r[v.name] for r in readings]) for v in lm.VARIABLES if not v.derived}
+    return {v.name: np.array([r[v.name] for r in readings]) for v in lm.simulation.VARIABLES if not v.derived}
 
 
 def of_response(scenario: lm.Scenario) -> Values:
@@ -123,7 +123,7 @@ def of_response(scenario: lm.Scenario) -> Values:
 
 
 def of_study(scenario: lm.Scenario) -> Values:
-    study = lm.Study(
+    study = lm.studies.Study(
         scenario=scenario,
         vary=[
             {"key": "load.inertia", "values": [1.5, 2.0, 2.5]},

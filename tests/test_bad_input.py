@@ -211,11 +211,17 @@ PARTS = [
     (lambda: lm.Load.model_validate({"inertia": -1}), "key inertia: -1.0 must be greater than 0"),
     (lambda: lm.Load(inertia=1).model_copy(update={"inertia": "1,2 kg*m^2"}), "has a decimal comma"),
     (lambda: lm.Load(inertia=1).model_copy(update={"inertja": 2}), "key inertja: is not known; did you mean inertia?"),
-    (lambda: lm.TorsionCurve(slopes=[1, 2]), "the torsion curve has 2 slopes and 0 breaks"),
-    (lambda: lm.TorsionCurve(slopes=5), "key slopes: 5 must be a list"),
+    (lambda: lm.model.TorsionCurve(slopes=[1, 2]), "the torsion curve has 2 slopes and 0 breaks"),
+    (lambda: lm.model.TorsionCurve(slopes=5), "key slopes: 5 must be a list"),
     (lambda: lm.CommandSignal(amplitude=3), "the command signal lacks frequency"),
-    (lambda: lm.GearboxSheet(name="x", kind="magic", ratio=3), 'key kind: "magic" must be one of "strain_wave"'),
-    (lambda: lm.GearboxSheet(name="My Gear", kind="other", ratio=3), "lower-case letters, digits, dots and dashes"),
+    (
+        lambda: lm.data_sheets.GearboxSheet(name="x", kind="magic", ratio=3),
+        'key kind: "magic" must be one of "strain_wave"',
+    ),
+    (
+        lambda: lm.data_sheets.GearboxSheet(name="My Gear", kind="other", ratio=3),
+        "lower-case letters, digits, dots and dashes",
+    ),
     (lambda: lm.gearbox("paper-gearbox", added_backlash="1,5 arcmin"), 'write "1.5 arcmin"'),
     (lambda: lm.motor("paper-motor", voltage_limit="24 A"), 'key voltage_limit: "24 A" has the unit of something else'),
 ]
@@ -267,9 +273,12 @@ FUNCTIONS = [
     (lambda s: lm.Simulation(s.drive()).advance(-1.0, 0.0), "must lie between"),
     (lambda s: lm.frequency_response(s.drive(), [-1.0], [0.1]), "frequencies must be positive"),
     (lambda s: lm.periodic_motion(s.drive(), command=0.1), "needs at least one sine"),
-    (lambda s: lm.build_loss_map(lm.GearboxSheet(name="x", kind="other", ratio=3)), "lacks rated_output_torque"),
     (
-        lambda s: lm.TestRig(
+        lambda s: lm.data_sheets.build_loss_map(lm.data_sheets.GearboxSheet(name="x", kind="other", ratio=3)),
+        "lacks rated_output_torque",
+    ),
+    (
+        lambda s: lm.test_rig.TestRig(
             s.replace(**{"gearbox.stiffness": {"kind": "rigid"}, "gearbox.hysteresis": None}).gearbox
         ).loop(1.0),
         "rigid",
@@ -407,7 +416,13 @@ def test_files_that_cannot_be_named_are_refused_by_their_names(tmp_path: Path, m
         "zero\0.toml",
     ):
         start = name[:20].replace("\0", r"\x00")
-        for call in (lm.load, lm.load_study, lm.load_task, lm.load_identification, lm.gearbox):
+        for call in (
+            lm.load,
+            lm.studies.load_study,
+            lm.studies.load_task,
+            lm.identification.load_identification,
+            lm.gearbox,
+        ):
             message = refused(lambda call=call, name=name: call(name))
             assert start in message, message
     for base in ("n" * 5000 + ".toml", "a.toml", r"zero\u0000.toml"):

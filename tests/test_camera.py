@@ -104,7 +104,7 @@ def test_the_tracking_index_gives_the_gains_of_the_kalman_filter(index: float) -
     F, G = np.array([[1.0, 1.0], [0.0, 1.0]]), np.array([[0.5], [1.0]])
     P = solve_discrete_are(F.T, np.array([[1.0], [0.0]]), index**2 * G @ G.T, np.eye(1))
     K = P[:, 0] / (P[0, 0] + 1.0)
-    assert lm.Tracker(tracking_index=index).gains()[:2] == pytest.approx(K, rel=1e-9)
+    assert lm.control.Tracker(tracking_index=index).gains()[:2] == pytest.approx(K, rel=1e-9)
 
 
 def test_the_noise_is_white_and_normal() -> None:

@@ -90,9 +90,9 @@ def test_a_table_that_says_its_kind_takes_the_place_of_the_whole_one(tmp_path: P
     path = scenario_with(tmp_path, f'[gearbox]\nfrom = "{own_sheet(tmp_path)}"')
     plain = lm.load(path).gearbox
     curve = lm.load(path, ['gearbox.stiffness={kind = "curve", slopes = [2e4]}']).gearbox
-    assert curve.stiffness == lm.TorsionCurve(slopes=(2e4,))  # without the record's backlash
+    assert curve.stiffness == lm.model.TorsionCurve(slopes=(2e4,))  # without the record's backlash
     linear = lm.load(path, ['gearbox.stiffness={kind = "linear", stiffness = "6 Nm/arcmin"}']).gearbox
-    assert linear.stiffness == lm.LinearStiffness(stiffness="6 Nm/arcmin")
+    assert linear.stiffness == lm.model.LinearStiffness(stiffness="6 Nm/arcmin")
     assert curve.hysteresis == linear.hysteresis == plain.hysteresis
     assert lm.load(path, ['gearbox.stiffness={kind = "rigid"}']).gearbox.hysteresis is None
 
@@ -193,12 +193,12 @@ def test_the_rig_gives_no_figure_where_there_is_no_cause():
     plain = lm.gearbox("paper-gearbox").model_copy(update={"hysteresis": None})
     assert plain.stiffness.backlash == 0.0
     slack = plain.model_copy(update={"stiffness": plain.stiffness.model_copy(update={"backlash": 1e-3})})
-    rows = {name: dict(summary_rows(lm.measure(g))) for name, g in (("plain", plain), ("slack", slack))}
+    rows = {name: dict(summary_rows(lm.test_rig.measure(g))) for name, g in (("plain", plain), ("slack", slack))}
     width, energy = "width of the loop at zero torque, rated torque in both directions", "energy lost in that loop"
     assert rows["plain"][width] == "none: neither hysteresis nor backlash is given"
     assert rows["slack"][width].startswith(f"{np.degrees(1e-3) * 60.0:.4g}"[:4])  # the backlash, in arcmin
     assert rows["plain"][energy] == rows["slack"][energy] == "none: no hysteresis is given"
-    assert dict(summary_rows(lm.measure(lm.gearbox("paper-gearbox"))))[energy].endswith(" J")
+    assert dict(summary_rows(lm.test_rig.measure(lm.gearbox("paper-gearbox"))))[energy].endswith(" J")
 
 
 def test_a_reversed_range_is_told_as_such():

@@ -196,7 +196,7 @@ def test_a_law_of_ones_own_has_a_response() -> None:
         state[0] = measured[1]
         return gain * float(reference[0] - measured[1])
 
-    response = lm.frequency_response(scenario, [50.0, 500.0], 0.4, law=lm.Law(law, states=1))
+    response = lm.frequency_response(scenario, [50.0, 500.0], 0.4, law=lm.control.Law(law, states=1))
     z = np.exp(2j * np.pi * response["frequency"].to_numpy() * T)
     # J (w+ - w)/T = gain (r - m)/z, m = (w + w-)/2 the difference of the angles over a tick, under a torque that changes at ticks
     w = (gain * T / J / z) / (z - 1.0 + gain * T / J / z * 0.5 * (1.0 + 1.0 / z))

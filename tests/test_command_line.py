@@ -57,7 +57,7 @@ def test_a_file_comes_before_a_shipped_name_and_may_build_on_one(tmp_path: Path,
     Path("study.toml").write_text(
         'base = "step-to-standstill"\ndesign = "list"\n[[vary]]\nkey = "load.inertia"\nvalues = [1]\n[keep]\na = "peak(twist)"\n'
     )
-    assert lm.load_study("study.toml").scenario == lm.load("step-to-standstill")
+    assert lm.studies.load_study("study.toml").scenario == lm.load("step-to-standstill")
 
 
 def test_an_unknown_name_is_told_with_the_nearest(tmp_path: Path) -> None:
@@ -124,7 +124,7 @@ def test_the_catalogue_says_what_is_a_gearbox_a_motor_complete_or_not() -> None:
     for record in lm.catalogue():
         assert of[record.name][:2] == [table_of(record), record.kind]
         assert ("yes" in of[record.name]) is (not record.missing())
-    gearboxes = [r for r in lm.catalogue() if isinstance(r, lm.GearboxSheet)]
+    gearboxes = [r for r in lm.catalogue() if isinstance(r, lm.data_sheets.GearboxSheet)]
     complete = [r for r in gearboxes if not r.missing()]
     assert 0 < len(complete) < len(gearboxes)
     assert f"{len(gearboxes)} gearboxes, {len(complete)} of them complete" in lines[-2]
@@ -144,7 +144,7 @@ def test_the_template_of_a_motor_sheet_can_be_used_as_it_is(tmp_path: Path, kind
     assert lostmotion("run", "drive.toml", cwd=tmp_path).returncode == 0
     text = (tmp_path / "my-motor.toml").read_text()
     assert f'kind = "{expected}"' in text
-    for figure in lm.MotorSheet.model_fields:
+    for figure in lm.data_sheets.MotorSheet.model_fields:
         assert figure in ("note", "sources", "gaps") or f"{figure} = " in text
 
 
@@ -494,7 +494,7 @@ def test_the_rig_reports_its_progress_to_the_end() -> None:
 
     steps: list[None] = []
     gearbox = lm.load(SMALL).gearbox
-    lm.measure(gearbox, progress=lambda: steps.append(None))
+    lm.test_rig.measure(gearbox, progress=lambda: steps.append(None))
     assert len(steps) == WORK
 
 

@@ -324,7 +324,7 @@ def test_limit_cycle_with_static_friction_is_that_of_the_closed_form() -> None:
         e, t = hunting(excess)
         at_stop = expm(M * t) @ np.array([e, 0.0, -excess / J])
         stick = (0.3 - J * at_stop[2] + 0.3 + excess) / (PID["integral_gain"] * e)
-        cycle = lm.limit_cycle(inertia(0.3, 0.3 + excess, 100.0))
+        cycle = lm.servo.limit_cycle(inertia(0.3, 0.3 + excess, 100.0))
         assert cycle.exact
         assert cycle.stable
         assert cycle.period == pytest.approx(2.0 * (t + stick), rel=1e-13)
@@ -340,7 +340,7 @@ def test_limit_cycle_with_static_friction_is_that_of_the_closed_form() -> None:
 
 
 def test_without_static_friction_there_is_none_and_why() -> None:
-    cycle = lm.limit_cycle(inertia(0.3, 0.3, 100.0))
+    cycle = lm.servo.limit_cycle(inertia(0.3, 0.3, 100.0))
     assert not cycle.cycles
     assert repr(cycle).startswith("no limit cycle: it comes to rest")
 
@@ -402,7 +402,7 @@ def test_limit_cycle_of_a_play_is_that_of_the_closed_form_and_the_published_one(
     assert (round(X, 3), round(2.0 * np.pi / period, 3)) == (amplitude, frequency)
     errors = []
     for small in (1e-4, 1e-5):
-        cycle = lm.limit_cycle(play_loop(gain, small), causes=small == 1e-5)
+        cycle = lm.servo.limit_cycle(play_loop(gain, small), causes=small == 1e-5)
         assert cycle.stable
         errors.append([cycle.amplitudes["motor_angle"] / X - 1.0, cycle.period / period - 1.0])
     assert cycle.causes == ("backlash",)
@@ -413,7 +413,7 @@ def test_limit_cycle_of_a_play_is_that_of_the_closed_form_and_the_published_one(
 
 
 def test_a_play_with_a_small_gain_has_none() -> None:
-    cycle = lm.limit_cycle(play_loop(2.0, 1e-4))
+    cycle = lm.servo.limit_cycle(play_loop(2.0, 1e-4))
     assert not cycle.cycles
 
 
@@ -441,13 +441,13 @@ def test_systems_of_scipy_and_python_control_act_as_the_pid_that_they_equal() ->
         )
     )
     for system in (scipy.signal.lti(top, bottom), control.tf(top, bottom), control.ss(control.tf(top, bottom))):
-        run = lm.simulate(two_masses(reference=reference, position=None, state_space=lm.as_state_space(system)))
+        run = lm.simulate(two_masses(reference=reference, position=None, state_space=lm.control.as_state_space(system)))
         x = wanted["load_angle"].values
         np.testing.assert_allclose(run["load_angle"].values, x, rtol=0.0, atol=1e-11 * np.abs(x).max())
     with pytest.raises(lm.InputError, match="has a sample time of"):
-        lm.as_state_space(scipy.signal.dlti(top, bottom, dt=0.1))
+        lm.control.as_state_space(scipy.signal.dlti(top, bottom, dt=0.1))
     with pytest.raises(lm.InputError, match="as many poles as zeros"):
-        lm.as_state_space(scipy.signal.lti([1.0, 2.0, 3.0], [1.0, 1.0]))
+        lm.control.as_state_space(scipy.signal.lti([1.0, 2.0, 3.0], [1.0, 1.0]))
 
 
 REFUSED = [
@@ -481,14 +481,16 @@ def test_a_derivative_of_a_reference_with_steps_needs_a_filter() -> None:
 
 def test_a_map_has_the_limit_cycles_of_its_points() -> None:
     grid = {"shafts.axis.breakaway_torque": [0.3, 0.4, 0.5], "controllers.servo.position.integral_gain": [1.5, 2.0]}
-    found = lm.hunting_map(inertia(0.3, 0.4, 100.0), grid, threads=2)
+    found = lm.servo.hunting_map(inertia(0.3, 0.4, 100.0), grid, threads=2)
     assert found["amplitude"].dims == ("shafts_axis_breakaway_torque", "controllers_servo_position_integral_gain")
     assert found["amplitude"][0, 0] == 0.0
     assert np.isnan(found["frequency"][0, 0])
     assert "rest" in str(found["reason"][0, 0].values)
     for row, excess in ((1, 0.1), (2, 0.2)):
         assert float(found["amplitude"][row, 0]) == pytest.approx(hunting(excess)[0], rel=1e-9)
-        alone = lm.limit_cycle(inertia(0.3, 0.3 + excess, 100.0, position=PID | {"integral_gain": 2.0}), causes=False)
+        alone = lm.servo.limit_cycle(
+            inertia(0.3, 0.3 + excess, 100.0, position=PID | {"integral_gain": 2.0}), causes=False
+        )
         assert float(found["frequency"][row, 1]) == alone.frequency
 
 
@@ -496,7 +498,9 @@ def test_the_period_is_the_shortest_one() -> None:
     # At the middle gain Newton's method is first led to four periods.
     hunting = lm.load("hunting-with-static-friction", {"shafts.table.breakaway_torque": 11.0})
     key = "controllers.servo.position.integral_gain"
-    found = [lm.limit_cycle(hunting.replace(**{key: k}), causes=False).frequency for k in (7.5, 8.615384615384617, 9.5)]
+    found = [
+        lm.servo.limit_cycle(hunting.replace(**{key: k}), causes=False).frequency for k in (7.5, 8.615384615384617, 9.5)
+    ]
     assert np.diff(found).min() > 0.0
     assert found[1] == pytest.approx(0.157284, rel=1e-5)
 

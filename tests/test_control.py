@@ -154,7 +154,7 @@ def test_a_law_of_your_own_that_is_the_loop_moves_the_drive_as_the_loop_does() -
         state[0] += T * 20.0 / 0.4 * (torque - state[0])
         return torque / 2.0  # type: ignore[no-any-return]
 
-    own = lm.simulate(scenario(**tables, controllers={"m": common | {"law": True}}), law=lm.Law(law, states=1))
+    own = lm.simulate(scenario(**tables, controllers={"m": common | {"law": True}}), law=lm.control.Law(law, states=1))
     for name in ("motor_speed", "load_speed"):
         assert own[name].to_numpy() == pytest.approx(loop[name].to_numpy(), abs=1e-9 * float(np.abs(loop[name]).max()))
 

@@ -209,7 +209,7 @@ class Rig:
 def test_the_rig_with_backlash_and_static_friction_is_that_of_scipy() -> None:
     result = lm.simulate(rig(), energy=False)
     body, pending, before, estimate, integral = Rig(), 0.0, 0.0, 0.0, 0.0
-    wanted = lm.SpeedReference(**WANTED).at(RIG_T * np.arange(RIG_TICKS + 1))[0].tolist()
+    wanted = lm.control.SpeedReference(**WANTED).at(RIG_T * np.arange(RIG_TICKS + 1))[0].tolist()
     smoothing = -math.expm1(-RIG_T / 5e-4)
     states = []
     for k in range(RIG_TICKS + 1):

@@ -108,7 +108,7 @@ def test_a_controlled_run_is_written_and_read_back(axis: lm.Scenario, tmp_path: 
         back = lm.open_result(tmp_path / name)
         same(result, back)
         assert back["torque_reference"].attrs["units"] == result["torque_reference"].attrs["units"] == "N*m"
-        assert lm.scenario_of(back) == axis
+        assert lm.simulation.scenario_of(back) == axis
         assert lm.load(tmp_path / name) == axis
 
 
@@ -162,7 +162,7 @@ def test_a_law_that_is_the_loop_gives_its_bits(law: Any) -> None:
     own = lm.simulate(loop(law=True), law=law)
     for name in ("motor_speed", "motor_angle", "m_torque", "m_measured_speed"):
         assert (own[name].to_numpy() == built_in[name].to_numpy()).all(), name
-    assert (lm.simulate(loop(law=True), law={"m": lm.Law(law)})["motor_speed"] == own["motor_speed"]).all()
+    assert (lm.simulate(loop(law=True), law={"m": lm.control.Law(law)})["motor_speed"] == own["motor_speed"]).all()
 
 
 def test_a_law_keeps_its_state_and_gets_its_data() -> None:
@@ -170,8 +170,8 @@ def test_a_law_keeps_its_state_and_gets_its_data() -> None:
         state[0] += 250e-6 * (reference[0] - measured[1])
         return 0.01 * state[0]
 
-    a = lm.simulate(loop(law=True), law=lm.Law(integrating, states=1))
-    b = lm.simulate(loop(law=True), law=lm.Law(integrating, states=1))  # begins at 0 anew
+    a = lm.simulate(loop(law=True), law=lm.control.Law(integrating, states=1))
+    b = lm.simulate(loop(law=True), law=lm.control.Law(integrating, states=1))  # begins at 0 anew
     assert (a["motor_speed"] == b["motor_speed"]).all()
     assert float(a["m_torque"][-1]) > 0.0
 
@@ -205,8 +205,8 @@ def test_laws_where_there_is_no_use_for_them_and_the_other_way_round_are_refused
         (lambda: lm.simulate(loop(law=True), law=3.0), ["law", "function"]),
         (lambda: lm.simulate(loop(law=True), law={"n": python_law}), ["law", "m"]),
         (lambda: lm.simulate(loop(speed={"gain": K}), law=python_law), ["law"]),
-        (lambda: lm.simulate(loop(law=True), law=lm.Law(python_law, states=-1)), ["states"]),
-        (lambda: lm.simulate(loop(law=True), law=lm.Law(python_law, data=np.zeros(2))), ["data"]),
+        (lambda: lm.simulate(loop(law=True), law=lm.control.Law(python_law, states=-1)), ["states"]),
+        (lambda: lm.simulate(loop(law=True), law=lm.control.Law(python_law, data=np.zeros(2))), ["data"]),
     ):
         with pytest.raises(lm.InputError) as caught:
             make()
@@ -273,7 +273,7 @@ def test_the_check_holds_the_load_with_the_controller_off(axis: lm.Scenario) -> 
 
 def test_a_study_of_a_controlled_drive_runs_its_controller(axis: lm.Scenario, tmp_path: Path) -> None:
     scenario = axis.replace(**{"simulation.duration": 0.5})
-    study = lm.Study(
+    study = lm.studies.Study(
         scenario=scenario,
         vary=[{"key": "gearbox.ratio", "values": [80.0, 90.0]}, {"key": "load.inertia", "values": [1.5, 2.0]}],
         keep={"peak": "peak(load_speed)"},

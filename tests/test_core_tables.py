@@ -67,12 +67,12 @@ def test_a_drive_of_the_core_refuses_a_parameter_that_it_does_not_know() -> None
 def test_the_states_are_variables_and_what_a_run_can_start_from() -> None:
     names = _core.states()
     assert names == [n for n in lm.Initial.model_fields if n not in ("hysteresis_capacity", "on_reference")]
-    assert set(names) <= {v.name for v in lm.VARIABLES}
+    assert set(names) <= {v.name for v in lm.simulation.VARIABLES}
 
 
 def test_a_constant_efficiency_varies_in_the_core_as_in_single_runs(tmp_path: Path) -> None:
     base = lm.load(ROOT / "scenarios" / "paper-2dof-l-large.toml", ["simulation.duration=0.2"])
-    study = lm.Study(
+    study = lm.studies.Study(
         scenario=base,
         vary=[{"key": "gearbox.losses.efficiency", "values": [0.6, 0.7]}],
         keep={"end": "final(load_angle)"},

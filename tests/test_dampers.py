@@ -124,7 +124,7 @@ def test_a_damper_joins_its_shafts_to_one_part() -> None:
 
 def test_a_damper_has_the_bits_of_python_in_a_description_and_its_value_can_be_changed(library: c.CDLL) -> None:  # noqa: F811
     scenario = pair(FLUID | {"viscous_friction": D}, initial=SPINNING, command={"m": {"mean": 0.2}})
-    there = Scenario(library, lm.description(scenario))
+    there = Scenario(library, lm.portable.description(scenario))
     for value in (D, 2.0 * D):
         assert there.set("dampers.d.viscous_friction", value) == OK
         here = lm.simulate(scenario.replace(**{"dampers.d.viscous_friction": value}))

@@ -12,7 +12,7 @@ import pytest
 
 import lostmotion as lm
 from lostmotion.inputs.quantities import NotNegative
-from lostmotion.portable.description import numbers_of
+from lostmotion.portable.descriptions import numbers_of
 from lostmotion.portable.parameters import Effect, Parameter, Parameters, parameters_of, predicted
 from test_c_interface import INPUTS, INTERRUPTED, INVALID, OK, STATES, VARIABLES, Signal, doubles, library  # noqa: F401
 from test_c_interface import Simulation as Stepped
@@ -66,7 +66,7 @@ class Scenario:
 
 @pytest.mark.parametrize("name", ["paper-2dof-nl-small", "position-axis", "field-weakening", "joint-under-gravity"])
 def test_a_run_has_the_bits_of_python(library: c.CDLL, name: str) -> None:  # noqa: F811
-    there = Scenario(library, lm.description(lm.load(name), parameters=False)).run()
+    there = Scenario(library, lm.portable.description(lm.load(name), parameters=False)).run()
     here = lm.simulate(lm.load(name))
     assert set(there) == set(here)
     for variable in there:
@@ -75,7 +75,7 @@ def test_a_run_has_the_bits_of_python(library: c.CDLL, name: str) -> None:  # no
 
 @pytest.fixture
 def axis(library: c.CDLL) -> Scenario:  # noqa: F811
-    return Scenario(library, lm.description(lm.load("position-axis"), parameters=False))
+    return Scenario(library, lm.portable.description(lm.load("position-axis"), parameters=False))
 
 
 def loads() -> Iterator[tuple[float, float]]:
@@ -134,7 +134,7 @@ def explained(scenario: Scenario, time: float) -> dict[int, dict[str, list[float
 def test_an_explanation_is_that_of_python(library: c.CDLL, name: str) -> None:  # noqa: F811
     scenario, time = lm.load(name), 0.3
     told, wanted = (
-        explained(Scenario(library, lm.description(scenario, parameters=False)), time),
+        explained(Scenario(library, lm.portable.description(scenario, parameters=False)), time),
         lm.explain(scenario, time),
     )
     contacts = {
@@ -185,7 +185,7 @@ def test_signals_references_and_times_are_replaced(library: c.CDLL, axis: Scenar
 
 def test_a_result_tells_how_far_it_came(library: c.CDLL) -> None:  # noqa: F811
     scenario = lm.load("paper-2dof-nl-large")
-    there, wanted = Scenario(library, lm.description(scenario, parameters=False)), lm.simulate(scenario)
+    there, wanted = Scenario(library, lm.portable.description(scenario, parameters=False)), lm.simulate(scenario)
     library.lm_scenario_title.restype = c.c_char_p
     for name in ("time", "left_data_at"):
         getattr(library, f"lm_result_{name}").restype = c.c_double
@@ -203,7 +203,7 @@ def test_a_result_tells_how_far_it_came(library: c.CDLL) -> None:  # noqa: F811
 def test_a_simulation_goes_on_with_another_inertia(library: c.CDLL) -> None:  # noqa: F811
     """A free load: the torque of the gear gives it half the acceleration at twice the inertia."""
     scenario = lm.load("paper-2dof-nl-small", {"load.friction_torque": 0.0, "load.viscous_friction": 0.0})
-    there = Scenario(library, lm.description(scenario))
+    there = Scenario(library, lm.portable.description(scenario))
     simulation = there.simulation(1e-3)
     place = simulation.names(INPUTS).index("command")
     inputs = [0.3 if k == place else 0.0 for k in range(len(simulation.names(INPUTS)))]
@@ -233,7 +233,7 @@ def found() -> Parameters:
 
 def test_a_parameter_that_is_set_gives_the_run_of_the_changed_scenario(library: c.CDLL) -> None:  # noqa: F811
     scenario = lm.load("paper-2dof-nl-small").replace(**{"simulation.duration": 0.5})
-    there = Scenario(library, lm.description(scenario))
+    there = Scenario(library, lm.portable.description(scenario))
     assert set(SMALL) <= set(there.keys())
     for key, value in zip(SMALL, (2.7, 80.0, 0.013, 0.06, 0.9), strict=True):
         assert there.set(key, value) == OK, there.error()
@@ -248,7 +248,7 @@ def test_a_parameter_that_is_set_gives_the_run_of_the_changed_scenario(library: 
 @pytest.mark.parametrize("name", ["paper-2dof-nl-small", "belt-before-gearbox"])
 def test_a_parameter_keeps_to_the_range_of_scenario_files(library: c.CDLL, name: str) -> None:  # noqa: F811
     scenario = lm.load(name)
-    there = Scenario(library, lm.description(scenario))
+    there = Scenario(library, lm.portable.description(scenario))
     seen = 0
     for p in parameters_of(scenario, numbers_of).parameters:
         limits = ((p.limit.gt, -1.0), (p.limit.gt, 0.0), (p.limit.ge, -1.0), (p.limit.le, 44.0))
@@ -305,7 +305,7 @@ def test_numbers_that_are_no_description_are_refused(
     change: Any,
     said: str,
 ) -> None:
-    scenario = Scenario(library, change(lm.description(lm.load("paper-2dof-nl-small"), parameters=False)))
+    scenario = Scenario(library, change(lm.portable.description(lm.load("paper-2dof-nl-small"), parameters=False)))
     assert not scenario.handle
     assert said in scenario.refused
 
@@ -314,7 +314,7 @@ def test_a_law_of_ones_own_cannot_be_described() -> None:
     axis = lm.load("speed-axis")
     own = {"law": True, "sample_time": 1e-3, "reference": {"kind": "torque"}, "encoder": {"ideal": True}}
     with pytest.raises(lm.InputError, match="controller of motor: has a law of your own"):
-        lm.description(axis.replace(controller=own))
+        lm.portable.description(axis.replace(controller=own))
 
 
 def test_what_is_zero_in_a_sum_can_be_changed() -> None:
@@ -327,7 +327,7 @@ def test_what_is_zero_in_a_sum_can_be_changed() -> None:
 def test_rates_and_guards_serve_an_integrator_of_the_caller_s_own(library: c.CDLL) -> None:  # noqa: F811
     """Runge-Kutta's steps of 5 us through a stretch without an event: an error of some (rate * step)^4 = 1e-10."""
     scenario = lm.load("paper-2dof-nl-small", ["initial.motor_speed=30", "initial.load_speed=0.3"])
-    described = Scenario(library, lm.description(scenario, parameters=False))
+    described = Scenario(library, lm.portable.description(scenario, parameters=False))
     exact, placed = described.simulation(1e-3), described.simulation(1e-3)
     n, guards = len(placed.names(STATES)), int(library.lm_guard_count(placed.handle))
     library.lm_next_event.restype = c.c_double
@@ -358,11 +358,11 @@ def test_rates_and_guards_serve_an_integrator_of_the_caller_s_own(library: c.CDL
 
 
 def test_given_references_are_inputs(library: c.CDLL) -> None:  # noqa: F811
-    described = Scenario(library, lm.description(lm.load("position-axis"), parameters=False))
+    described = Scenario(library, lm.portable.description(lm.load("position-axis"), parameters=False))
     assert library.lm_scenario_give_references(described.handle, 1) == OK
     assert described.simulation(1e-3).names(INPUTS) == ["load_torque", "reference"]
     delayed = lm.load("position-axis", ["controller.position.reference_delay='1 ms'"])
-    described = Scenario(library, lm.description(delayed, parameters=False))
+    described = Scenario(library, lm.portable.description(delayed, parameters=False))
     assert library.lm_scenario_give_references(described.handle, 1) == 100
     assert "has to know the past of its reference" in described.error()
 
@@ -370,7 +370,7 @@ def test_given_references_are_inputs(library: c.CDLL) -> None:  # noqa: F811
 @pytest.mark.parametrize("name", ["paper-2dof-nl-small", "two-motors-one-ring"])
 def test_a_function_of_the_caller_ends_a_run_and_a_step(library: c.CDLL, name: str) -> None:  # noqa: F811
     scenario = lm.load(name, {"simulation.duration": 1e7, "simulation.sample_interval": 1e4})
-    there = Scenario(library, lm.description(scenario))
+    there = Scenario(library, lm.portable.description(scenario))
     begin = time.perf_counter()
     asked = c.CFUNCTYPE(c.c_int, c.c_void_p)(lambda _: time.perf_counter() > begin + 0.3)
     library.lm_scenario_set_interrupt(there.handle, asked, None)

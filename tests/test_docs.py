@@ -195,23 +195,28 @@ def test_generated_pages_name_every_key_and_variable(generate: Any) -> None:
         "simulation",
     ):
         assert f"[{table}" in reference
-    for key in (*lm.Motor.model_fields, *lm.Gearbox.model_fields, *lm.Load.model_fields, *lm.LossMap.model_fields):
+    for key in (
+        *lm.Motor.model_fields,
+        *lm.Gearbox.model_fields,
+        *lm.Load.model_fields,
+        *lm.model.LossMap.model_fields,
+    ):
         assert f"| `{key}` |" in reference
     of_trains = generate.train_reference()
     parts = (
         lm.Shaft,
         lm.ShaftMotor,
         lm.Gear,
-        lm.WormMesh,
-        lm.MeshEfficiency,
+        lm.model.WormMesh,
+        lm.model.MeshEfficiency,
         lm.Brake,
         lm.Clutch,
         lm.Freewheel,
-        lm.Gravity,
+        lm.model.Gravity,
     )
     for key in (*lm.TrainScenario.model_fields, *(key for part in parts for key in part.model_fields)):
         assert f"| `{key}` |" in of_trains
-    for variable in lm.VARIABLES:
+    for variable in lm.simulation.VARIABLES:
         assert f"| `{variable.name}` |" in generate.variables()
 
 

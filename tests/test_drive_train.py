@@ -284,7 +284,7 @@ def test_the_schema_of_files_holds_all_forms() -> None:
 
 def test_a_worm_follows_from_its_drawing() -> None:
     # m = 2 mm, one thread, d = 22.4 mm: tan g = 0.0892857; mu = 0.1: tan r = 0.1
-    worm = lm.WormMesh(module="2 mm", starts=1, diameter="22.4 mm", friction_coefficient=0.1)
+    worm = lm.model.WormMesh(module="2 mm", starts=1, diameter="22.4 mm", friction_coefficient=0.1)
     tan_g, tan_r = 2.0 / 22.4, 0.1
     forward = tan_g * (1.0 - tan_g * tan_r) / (tan_g + tan_r)
     backward = (tan_g - tan_r) / (1.0 + tan_g * tan_r) / tan_g
@@ -293,7 +293,7 @@ def test_a_worm_follows_from_its_drawing() -> None:
 
 
 def test_gravity_is_a_sine_to_the_stated_error() -> None:
-    arm = lm.Gravity(shaft="s", mass="2 kg", radius="300 mm", angle=0.3, error=0.01)
+    arm = lm.model.Gravity(shaft="s", mass="2 kg", radius="300 mm", angle=0.3, error=0.01)
     torque = arm.core()
     for phi in np.linspace(-7.0, 7.0, 1000):
         assert abs(torque(float(phi)) + 2.0 * 9.80665 * 0.3 * math.sin(phi + 0.3)) <= 0.01 * (1.0 + 1e-9)
@@ -355,11 +355,11 @@ def test_what_takes_a_drive_alone_says_so() -> None:
     with pytest.raises(
         lm.InputError, match=r"drive: .* is a drive train, and this is defined for one motor, one gearbox"
     ):
-        lm.rigid_constants(train())
+        lm.response.rigid_constants(train())
     with pytest.raises(
         lm.InputError, match=r"gearbox: .* the test rig measures one gear; give one, such as scenario.gears"
     ):
-        lm.TestRig(train())
+        lm.test_rig.TestRig(train())
 
 
 # --- runs ---
@@ -426,7 +426,7 @@ def test_a_saved_result_of_a_train_is_read_back_and_run_again(tmp_path: Path, en
     back = lm.open_result(path)
     assert back.identical(result)
     assert lm.switchings_of(back).identical(lm.switchings_of(result))
-    assert lm.scenario_of(back) == train()
+    assert lm.simulation.scenario_of(back) == train()
     assert lm.simulate(lm.load(path), energy=True).identical(result)
     halved = lm.load(path, ["gears.belt.ratio=1"])
     assert halved.gears["belt"].ratio == 1.0

@@ -28,7 +28,9 @@ def test_the_compiled_law_moves_the_axis_as_the_same_in_python() -> None:
     pytest.importorskip("numba", reason="pip install --group examples")
     numba_law = example("numba_law")
     scenario = numba_law.axis().replace(**{"simulation.duration": 0.4})
-    one, two = (lm.simulate(scenario, law=lm.Law(law, states=1)) for law in (numba_law.compiled, numba_law.in_python))
+    one, two = (
+        lm.simulate(scenario, law=lm.control.Law(law, states=1)) for law in (numba_law.compiled, numba_law.in_python)
+    )
     for name in ("motor_speed", "load_angle"):  # the compiler may contract products and sums
         assert np.abs(one[name] - two[name]).max() < 1e-9 * np.abs(one[name]).max()
     assert float(one["load_angle"][-1]) > 0.1
@@ -37,7 +39,7 @@ def test_the_compiled_law_moves_the_axis_as_the_same_in_python() -> None:
 def test_the_filter_of_python_control_is_the_notch_of_the_scenario() -> None:
     pytest.importorskip("control")
     module = example("python_control_filter")
-    own = module.axis(lm.as_filter(module.notch(250e-6))).replace(**{"simulation.duration": 0.3})
+    own = module.axis(lm.control.as_filter(module.notch(250e-6))).replace(**{"simulation.duration": 0.3})
     shipped = module.AXIS.replace(**{"simulation.duration": 0.3})
     plain = module.axis().replace(**{"simulation.duration": 0.3})
     one, two, without = (lm.simulate(s, energy=False)["servo_torque"] for s in (own, shipped, plain))

@@ -463,7 +463,7 @@ def test_a_law_must_give_both_voltages() -> None:
     assert len(read[0]) == 5
     assert [m[3] for m in read] == pytest.approx(result["direct_current"].to_numpy()[: len(read)], abs=1e-12)
     assert "error_bound" not in result.attrs
-    again = lm.simulate(one, law=lm.Law(lambda *_: (1.0, 2.0), repeatable=True))
+    again = lm.simulate(one, law=lm.control.Law(lambda *_: (1.0, 2.0), repeatable=True))
     assert np.array_equal(again["direct_current"], result["direct_current"])
     assert 0.0 < json.loads(again.attrs["error_bound"])["direct_current"] < 1e-3
 
@@ -472,14 +472,14 @@ def test_the_bound_is_in_the_summary_and_the_heat_is_that_of_both_currents() -> 
     result = lm.simulate(scenario(changed(ROUND, **SALIENT, reference=7.0), 80))
     assert "error of the field-oriented control at most: direct current" in summary(result)
     both = np.hypot(result["direct_current"], result["quadrature_current"]).to_numpy()
-    assert lm.motor_current(result)["current"].to_numpy() == pytest.approx(both)
+    assert lm.sizing.motor_current(result)["current"].to_numpy() == pytest.approx(both)
     voltage = np.hypot(result["direct_voltage"], result["quadrature_voltage"]).to_numpy()
-    assert lm.motor_current(result)["voltage"].to_numpy() == pytest.approx(voltage)
+    assert lm.sizing.motor_current(result)["voltage"].to_numpy() == pytest.approx(voltage)
 
 
 def test_the_bound_of_each_run_is_a_column_of_a_study(tmp_path: Path) -> None:
     one = scenario(changed(ROUND, J_M=1e-3, reference=3.0), 30)
-    study = lm.Study(
+    study = lm.studies.Study(
         scenario=one,
         vary=[{"key": "controller.reference.mean", "values": [1.0, 3.0]}],
         keep={"torque": "final(motor_torque_error_bound)", "speed": "peak(motor_speed_error_bound)"},

@@ -43,7 +43,7 @@ class Rates:
         ]
 
 
-def expected(model: Rates, linear: lm.LinearModel) -> list[np.ndarray]:
+def expected(model: Rates, linear: lm.response.LinearModel) -> list[np.ndarray]:
     """The same of a linear model, in the order of the FMU."""
     x = [linear.states.index(n) for n in model.states]
     u = [linear.inputs.index(n) for n in model.inputs]

@@ -98,7 +98,7 @@ def test_the_data_sheet_of_a_rigid_gear_makes_a_gearbox_and_is_measured(
     sheet.write_text(found.record_text())
     gearbox, c = lm.gearbox(str(sheet)), found.values["load_friction"]
     assert gearbox.stiffness.kind == "rigid" and "nothing of its stiffness" in gearbox.note
-    rig = lm.TestRig(gearbox)
+    rig = lm.test_rig.TestRig(gearbox)
     assert rig.efficiency(0.5, 1.0) == pytest.approx(1.0 / (1.0 + c), rel=1e-9)
     assert rig.efficiency(0.5, -1.0) == pytest.approx(1.0 - c, rel=1e-9)
     run = CliRunner().invoke(app, ["rig", str(sheet), "-o", str(tmp_path / "rig")])
@@ -435,7 +435,7 @@ def test_the_page_shows_what_a_gear_loses_in_both_directions() -> None:
 
 
 def test_the_example_reads(tmp_path: Path) -> None:
-    task, directory = lm.load_identification(ROOT / "examples" / "servo_logs" / "identify.toml")
+    task, directory = lm.identification.load_identification(ROOT / "examples" / "servo_logs" / "identify.toml")
     assert directory == SERVO and len(task.rungs()) == 4
     # Every rung makes a rig with its start values.
     rig = Rig(task, SERVO)
@@ -450,11 +450,11 @@ def test_an_experiment_with_the_motor_off_tells_friction_from_back_emf(found: Id
     still = replace(
         still, name="stands", channels={**still.channels, "goal_position": Channel(np.zeros(len(still.time)))}
     )
-    ranked = lm.design_experiment(found, [still, swing])
+    ranked = lm.identification.design_experiment(found, [still, swing])
     assert [c.name for c in ranked] == ["002.json", "stands"]
     assert ranked[0].widths["viscous_friction"] < ranked[1].widths["viscous_friction"] <= 1.0
     with pytest.raises(lm.InputError, match="is empty"):
-        lm.design_experiment(found, [])
+        lm.identification.design_experiment(found, [])
 
 
 def test_intervals_of_random_servos_hold_the_truth() -> None:

@@ -49,7 +49,7 @@ def test_the_gearbox_is_found_again(campaign: Path, gearbox: lm.Gearbox) -> None
 def test_a_gearbox_with_backlash_is_found_again(tmp_path: Path) -> None:
     """Run after run with impacts; a search that begins with all logs ends with a quarter of the stiffness."""
     planetary = gearbox_from_record("bonfiglioli-tq060-2-25", ())[0]
-    result = lm.identify(lm.write_campaign(tmp_path, planetary))
+    result = lm.identify(lm.identification.write_campaign(tmp_path, planetary))
     truth = parameters(planetary)[0]
     assert truth["backlash"] > 1e-3
     for name, value in truth.items():
@@ -59,8 +59,8 @@ def test_a_gearbox_with_backlash_is_found_again(tmp_path: Path) -> None:
 def test_hysteresis_is_chosen_by_the_loop_held_out_and_found_within_its_interval(
     gearbox: lm.Gearbox, tmp_path: Path
 ) -> None:
-    lossy = gearbox.model_copy(update={"hysteresis": lm.Hysteresis(efficiency=0.9)})
-    result = lm.identify(lm.write_campaign(tmp_path, lossy))
+    lossy = gearbox.model_copy(update={"hysteresis": lm.model.Hysteresis(efficiency=0.9)})
+    result = lm.identify(lm.identification.write_campaign(tmp_path, lossy))
     without, with_it = result.rungs
     assert [e.log for e in result.errors if e.held_out] == ["locked-ramp-half.csv"] * 3
     assert result.chosen == 1 and with_it.held_out < 0.8 * without.held_out
@@ -109,13 +109,17 @@ def test_the_rig_is_locked_driven_and_driven_back(gearbox: lm.Gearbox) -> None:
 @pytest.mark.parametrize(
     ("stiffness", "losses", "names"),
     [
-        (lm.LinearStiffness(stiffness=1e4), lm.ConstantEfficiency(efficiency=0.9), ["stiffness", "efficiency"]),
         (
-            lm.TorsionCurve(slopes=(1e4,), backlash=1e-3),
-            lm.ConstantEfficiency(efficiency=0.9),
+            lm.model.LinearStiffness(stiffness=1e4),
+            lm.model.ConstantEfficiency(efficiency=0.9),
+            ["stiffness", "efficiency"],
+        ),
+        (
+            lm.model.TorsionCurve(slopes=(1e4,), backlash=1e-3),
+            lm.model.ConstantEfficiency(efficiency=0.9),
             ["stiffness_1", "backlash", "efficiency"],
         ),
-        (lm.Rigid(), lm.ConstantEfficiency(efficiency=0.9), ["efficiency"]),
+        (lm.model.Rigid(), lm.model.ConstantEfficiency(efficiency=0.9), ["efficiency"]),
     ],
 )
 def test_every_law_of_a_gearbox_has_its_parameters(
@@ -129,5 +133,5 @@ def test_every_law_of_a_gearbox_has_its_parameters(
 def test_a_gearbox_without_inertia_is_refused(gearbox: lm.Gearbox, tmp_path: Path) -> None:
     massless = lm.Gearbox(**{**gearbox.model_dump(), "inertia": 0.0})
     with pytest.raises(lm.InputError, match="has no inertia"):
-        lm.write_campaign(tmp_path / "campaign", massless)
+        lm.identification.write_campaign(tmp_path / "campaign", massless)
     assert not (tmp_path / "campaign").exists()

@@ -36,7 +36,7 @@ def folders(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def run(directory: Path, fit: dict[str, Any] | None = None, **logs: Any) -> lm.IdentificationResult:
+def run(directory: Path, fit: dict[str, Any] | None = None, **logs: Any) -> lm.identification.IdentificationResult:
     more = {"logs": {"files": ["*/*.csv"], **logs}, "fit": {"regression": False, "loss": "linear"} | (fit or {})}
     return identify_task(spring_task(directory, **more), directory)
 

@@ -34,13 +34,13 @@ def procedure() -> ModuleType:
 
 
 @pytest.fixture(scope="module")
-def baseline() -> lm.IdentificationResult:
+def baseline() -> lm.identification.IdentificationResult:
     """Of the shipped file and logs."""
     return lm.identify(EXAMPLE / "baseline.toml")
 
 
 @pytest.fixture(scope="module")
-def split() -> lm.IdentificationResult:
+def split() -> lm.identification.IdentificationResult:
     """Of the shipped file and logs of the split pin wheel."""
     return lm.identify(EXAMPLE / "split-pinwheel.toml")
 
@@ -58,7 +58,7 @@ def test_the_extract_has_what_the_author_measured(procedure: ModuleType) -> None
         assert found[1] == pytest.approx(compliance, rel=0.01)
 
 
-def test_the_drive_moves_as_at_the_angle_that_was_held_out(baseline: lm.IdentificationResult) -> None:
+def test_the_drive_moves_as_at_the_angle_that_was_held_out(baseline: lm.identification.IdentificationResult) -> None:
     _, rmse = baseline.error(held_out=True)
     assert np.degrees(rmse) < 0.30
     assert baseline.chosen == 2
@@ -67,7 +67,7 @@ def test_the_drive_moves_as_at_the_angle_that_was_held_out(baseline: lm.Identifi
 
 
 def test_play_compliance_and_friction_are_those_of_the_thesis(
-    baseline: lm.IdentificationResult, procedure: ModuleType
+    baseline: lm.identification.IdentificationResult, procedure: ModuleType
 ) -> None:
     play, compliance = procedure.play_and_compliance(procedure.tests_of(baseline, simulated=True))
     friction = procedure.coulomb_friction(baseline.scenario)
@@ -75,7 +75,7 @@ def test_play_compliance_and_friction_are_those_of_the_thesis(
 
 
 def test_play_and_compliance_of_the_split_pin_wheel_are_those_of_the_thesis(
-    split: lm.IdentificationResult, procedure: ModuleType
+    split: lm.identification.IdentificationResult, procedure: ModuleType
 ) -> None:
     assert split.chosen == 1
     found = procedure.play_and_compliance(procedure.tests_of(split, simulated=True))
@@ -83,7 +83,7 @@ def test_play_and_compliance_of_the_split_pin_wheel_are_those_of_the_thesis(
 
 
 def test_the_split_pin_wheel_comes_as_near_to_the_held_out_log_as_the_other_logs_do(
-    split: lm.IdentificationResult, procedure: ModuleType
+    split: lm.identification.IdentificationResult, procedure: ModuleType
 ) -> None:
     """In the large ramps: the identified drive against the mean of the ramps at the two other angles."""
     measured, simulated = (procedure.tests_of(split, simulated=s) for s in (False, True))
@@ -100,7 +100,9 @@ def test_the_split_pin_wheel_comes_as_near_to_the_held_out_log_as_the_other_logs
     assert np.degrees(rmse) < 0.32
 
 
-def test_only_the_sum_of_two_frictions_shows_while_the_output_is_locked(baseline: lm.IdentificationResult) -> None:
+def test_only_the_sum_of_two_frictions_shows_while_the_output_is_locked(
+    baseline: lm.identification.IdentificationResult,
+) -> None:
     widths = {name: i.high - i.low for name, i in baseline.intervals.items()}
     assert widths["friction"] > baseline.values["friction"]
     assert any("friction" in u.text and "disc_friction" in u.text for u in baseline.undetermined)
@@ -108,7 +110,7 @@ def test_only_the_sum_of_two_frictions_shows_while_the_output_is_locked(baseline
     assert baseline.values["friction"] + baseline.values["disc_friction"] == pytest.approx(BASELINE[2], rel=0.1)
 
 
-def test_values_are_shown_in_their_units(baseline: lm.IdentificationResult) -> None:
+def test_values_are_shown_in_their_units(baseline: lm.identification.IdentificationResult) -> None:
     (line,) = [line for line in baseline.lines() if line.startswith("  half_play")]
     assert line.endswith("deg")
     assert float(line.split()[2]) == pytest.approx(np.degrees(baseline.values["half_play"]), rel=1e-4)

@@ -50,7 +50,7 @@ def test_the_command_reads_the_file_with_a_rig_and_finds_the_truth(logs: Path) -
 
 def test_without_a_rig_the_file_is_whole_but_for_the_rig(logs: Path) -> None:
     assert invoke("identify", "new", str(logs))[0] == 0
-    task, _ = lm.load_identification(logs / "identify.toml")
+    task, _ = lm.identification.load_identification(logs / "identify.toml")
     assert task.logs.files == ("*.csv",)
     assert {m.channel for m in task.measured.values()} == {"carriage speed"}
     assert {i.channel for i in task.inputs.values()} == {"force"}
@@ -78,7 +78,7 @@ def test_what_is_in_doubt_is_said(logs: Path) -> None:
     inner.mkdir()
     (inner / "c.txt").write_text(f"time;carriage speed\n{rows}\n")
     (inner / 'd"\n.csv').write_text("time,x\n0,fast\n")
-    text = lm.first_task(logs)
+    text = lm.identification.first_task(logs)
     data = tomllib.loads(text)
     assert data["logs"] == {"files": ["*.csv", "more/*.txt"], "decimal": ","}
     assert data["measured"] == {"carriage_speed": {"channel": "carriage speed", "variable": "SHAFT_speed"}}

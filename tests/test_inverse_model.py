@@ -213,7 +213,7 @@ def test_a_gap_needs_a_rate_and_a_train_one_gear() -> None:
     motor = next(iter(train.motors))
     shaft = list(train.shafts)[-1]
     with pytest.raises(lm.InputError, match="takes one gear"):
-        lm.InverseModel().solver_fields(train.train(), motor, shaft, on_motor=True)
+        lm.control.InverseModel().solver_fields(train.train(), motor, shaft, on_motor=True)
 
 
 def test_both_feedforwards_are_refused() -> None:

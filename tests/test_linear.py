@@ -12,7 +12,7 @@ from conftest import ROOT
 from lostmotion.inputs.schema import unit_in_schema
 from lostmotion.live_page.description import describe
 from lostmotion.portable import fmi2, fmi3, fmu
-from lostmotion.portable.description import numbers_of
+from lostmotion.portable.descriptions import numbers_of
 from lostmotion.portable.parameters import parameters_of
 from lostmotion.reports.page import render
 from lostmotion.reports.run import summary
@@ -170,12 +170,15 @@ def test_weight_of_an_inclined_slide_is_a_load():
 @pytest.mark.parametrize(
     ("drive", "travel"),
     [
-        (lm.Screw(input="a", output="b", lead="10 mm"), 0.01),
-        (lm.Screw(input="a", output="b", pitch="5 mm", starts=4), 0.02),
-        (lm.Rack(input="a", output="b", module="2 mm", teeth=20), math.pi * 0.04),
-        (lm.Rack(input="a", output="b", module="2 mm", teeth=20, helix_angle="19.5283 deg"), math.pi * 0.04 / 0.94247),
-        (lm.Belt(input="a", output="b", teeth=20, pitch="5 mm"), 0.1),
-        (lm.Belt(input="a", output="b", pulley_diameter="31.83098862 mm"), 0.1),
+        (lm.model.Screw(input="a", output="b", lead="10 mm"), 0.01),
+        (lm.model.Screw(input="a", output="b", pitch="5 mm", starts=4), 0.02),
+        (lm.model.Rack(input="a", output="b", module="2 mm", teeth=20), math.pi * 0.04),
+        (
+            lm.model.Rack(input="a", output="b", module="2 mm", teeth=20, helix_angle="19.5283 deg"),
+            math.pi * 0.04 / 0.94247,
+        ),
+        (lm.model.Belt(input="a", output="b", teeth=20, pitch="5 mm"), 0.1),
+        (lm.model.Belt(input="a", output="b", pulley_diameter="31.83098862 mm"), 0.1),
     ],
 )
 def test_travel_to_one_turn(drive, travel):
@@ -186,16 +189,16 @@ def test_travel_to_one_turn(drive, travel):
 
 def test_efficiency_of_a_screw_follows_from_its_lead_angle_and_friction():
     """tan(g)/tan(g + r) and tan(g - r)/tan(g) of the friction angle r, as textbooks have it."""
-    part = lm.Screw(input="a", output="b", lead="10 mm", mean_diameter="25 mm", friction_coefficient=0.1)
+    part = lm.model.Screw(input="a", output="b", lead="10 mm", mean_diameter="25 mm", friction_coefficient=0.1)
     g, r = math.atan(10.0 / (25.0 * math.pi)), math.atan(0.1)
     assert part.efficiencies() == pytest.approx(
         (math.tan(g) / math.tan(g + r), math.tan(g - r) / math.tan(g)), rel=1e-14
     )
-    assert lm.Screw(input="a", output="b", lead="10 mm", efficiency=0.8).efficiencies() == (0.8, 2.0 - 1.0 / 0.8)
+    assert lm.model.Screw(input="a", output="b", lead="10 mm", efficiency=0.8).efficiencies() == (0.8, 2.0 - 1.0 / 0.8)
 
 
 def test_stiffness_of_screw_nut_and_bearings_in_series():
-    part = lm.Screw(
+    part = lm.model.Screw(
         input="a",
         output="b",
         lead="10 mm",
@@ -210,7 +213,7 @@ def test_stiffness_of_screw_nut_and_bearings_in_series():
 
 
 def test_inertia_of_a_screw_follows_from_its_size():
-    part = lm.Screw(input="a", output="b", lead="10 mm", diameter="25 mm", length="1 m")
+    part = lm.model.Screw(input="a", output="b", lead="10 mm", diameter="25 mm", length="1 m")
     mass = 7850.0 * math.pi / 4.0 * 0.025**2
     assert part.gear("a", "b").inertia == pytest.approx(mass * 0.025**2 / 8.0, rel=1e-14)
 
@@ -240,7 +243,7 @@ def test_end_stops_hold_the_slide_within_its_travel():
 
 def test_cogging_of_a_linear_motor_has_its_pole_pitch():
     """A slide that is moved slowly against much viscous friction meets F_c sin(2 pi x/tau)."""
-    motor = lm.LinearMotor(slide="ram", rated_force="200 N", cogging_force="8 N", pole_pitch="24 mm")
+    motor = lm.model.LinearMotor(slide="ram", rated_force="200 N", cogging_force="8 N", pole_pitch="24 mm")
     curve = motor.cogging().core()
     for x in np.linspace(-0.05, 0.05, 101):
         assert curve(x) == pytest.approx(8.0 * math.sin(2.0 * math.pi * x / 0.024), abs=8e-3)
@@ -356,7 +359,7 @@ def test_references_and_encoders_of_slides_are_in_metres():
 
 def test_linear_scale_reads_its_grating_in_steps():
     """Within half of p/2^bits, and with the period p of its error: at whole periods the error is sin(phase)."""
-    scale = lm.Encoder(grating_period=2e-5, bits=4, error=1e-7)
+    scale = lm.control.Encoder(grating_period=2e-5, bits=4, error=1e-7)
     assert scale.step == 2e-5 / 16
     result = lm.simulate(axis(**{"controller.position_encoder": {"grating_period": "20 um", "bits": 4}}))
     step = 2e-5 / 16

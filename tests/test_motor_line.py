@@ -198,7 +198,7 @@ def test_a_falling_drag_curve_holds_its_last_torque() -> None:
 
 def test_a_curve_that_falls_at_its_end_names_the_remedy() -> None:
     with pytest.raises(InputError, match='give beyond = "hold", which keeps the last torque'):
-        lm.DragCurve(speeds=(0.0, 1.0, 2.0), torques=(0.0, 2.0, 1.0))
+        lm.model.DragCurve(speeds=(0.0, 1.0, 2.0), torques=(0.0, 2.0, 1.0))
 
 
 def test_an_eddy_current_brake_slows_down_as_its_law_says() -> None:
@@ -217,7 +217,9 @@ def test_an_eddy_current_brake_slows_down_as_its_law_says() -> None:
 
 @pytest.mark.parametrize("error", [0.5, 0.05])
 def test_the_straight_lines_of_an_eddy_current_brake_keep_to_their_error(error: float) -> None:
-    drag = lm.EddyCurrentDrag(kind="eddy_current", peak_torque=50.0, critical_speed=10.0, max_speed=300.0, error=error)
+    drag = lm.model.EddyCurrentDrag(
+        kind="eddy_current", peak_torque=50.0, critical_speed=10.0, max_speed=300.0, error=error
+    )
     w = np.linspace(0.0, 300.0, 20001)
     core = drag.core()
     curve = np.array([core.torque(x) for x in w.tolist()])

@@ -49,7 +49,7 @@ def run(command, duration: float = 60.0, interval: float = 0.05, **limits) -> lm
 def test_a_step_of_loss_into_two_bodies() -> None:
     """x(t) = A^-1 (e^(A t) - 1) b, with constant resistance; the slow and the fast mode, and what the case is told."""
     result = lm.simulate(run(0.5))
-    found = lm.temperatures(result, constant_resistance=True)
+    found = lm.sizing.temperatures(result, constant_resistance=True)
     b = np.array([LOSS * 0.25 / C_W, 0.0])
     inverse = np.linalg.inv(NETWORK)
     expected = np.array([40.0 + inverse @ (expm(NETWORK * t) - np.eye(2)) @ b for t in result["time"].values])
@@ -65,7 +65,7 @@ def test_a_step_of_loss_into_two_bodies() -> None:
 def test_the_temperature_follows_the_full_equations_within_the_stated_error(interval: float) -> None:
     """A sine of torque and copper that gets warm, integrated by another solver over the same straight lines."""
     result = lm.simulate(run({"amplitude": 0.6, "frequency": 0.5}, duration=20.0, interval=interval))
-    found = lm.temperatures(result, winding="50 degC")
+    found = lm.sizing.temperatures(result, winding="50 degC")
     t, torque = result["time"].values, result["motor_torque"].values
 
     def rates(now: float, x: np.ndarray) -> np.ndarray:
@@ -98,16 +98,16 @@ def test_steps_of_all_lengths_are_exact(pause: float) -> None:
 
 def test_a_cycle_repeated_for_ever_ends_as_it_began_and_as_many_cycles_do() -> None:
     result = lm.simulate(run({"amplitude": 0.5, "frequency": 0.1}, duration=20.0))
-    found = lm.temperatures(result, repeated=True)
+    found = lm.sizing.temperatures(result, repeated=True)
     for name in ("winding_temperature", "case_temperature"):
         assert float(found[name][-1]) == pytest.approx(float(found[name][0]), abs=1e-9)
     ends = (40.0, 40.0)
     for _ in range(500):  # 10,000 s, 26 of the slowest time constant
-        one = lm.temperatures(result, winding=ends[0], case=ends[1])
+        one = lm.sizing.temperatures(result, winding=ends[0], case=ends[1])
         ends = float(one["winding_temperature"][-1]), float(one["case_temperature"][-1])
     assert ends[0] == pytest.approx(float(found["winding_temperature"][0]), abs=1e-6)
     # A constant torque heats by R_th P/(1 - alpha R_th P) at 25 °C, with the heat of 40 °C here.
-    steady = lm.temperatures(lm.simulate(run(0.3, interval=1.0)), repeated=True)
+    steady = lm.sizing.temperatures(lm.simulate(run(0.3, interval=1.0)), repeated=True)
     cold = (R_WC + R_CA) * LOSS * 0.09
     assert float(steady["winding_temperature"][0]) == pytest.approx(
         40 + cold * (1 + COPPER * 15) / (1 - COPPER * cold), abs=1e-9
@@ -116,7 +116,7 @@ def test_a_cycle_repeated_for_ever_ends_as_it_began_and_as_many_cycles_do() -> N
 
 def test_rms_torque_is_that_of_straight_lines_between_samples() -> None:
     result = lm.simulate(run({"ramps": [{"rise": 0.9, "duration": 60.0}]}, interval=30.0))
-    assert float(lm.temperatures(result)["rms_torque"]) == pytest.approx(0.9 / math.sqrt(3.0), rel=1e-12)
+    assert float(lm.sizing.temperatures(result)["rms_torque"]) == pytest.approx(0.9 / math.sqrt(3.0), rel=1e-12)
 
 
 def test_the_drive_check_takes_the_peak_of_the_repeated_cycle() -> None:
@@ -126,7 +126,7 @@ def test_the_drive_check_takes_the_peak_of_the_repeated_cycle() -> None:
     mean_only = scenario.replace(**parts, **{"motor.limits.thermal_resistance": 3.2})
     uses = [next(f.use for f in check_drive(s) if f.rule == "winding_temperature") for s in (scenario, mean_only)]
     result = lm.simulate(scenario, sample_interval=0.025)
-    peak = float(lm.temperatures(result, repeated=True)["winding_temperature"].max())
+    peak = float(lm.sizing.temperatures(result, repeated=True)["winding_temperature"].max())
     assert uses[0] == pytest.approx((peak - 40.0) / 115.0, rel=1e-3)  # the check samples as finely
     assert uses[0] > 1.05 * uses[1]
 
@@ -136,20 +136,20 @@ def test_current_and_voltage_of_a_synchronous_motor() -> None:
     motor = lm.Motor(**motor_table("siemens-1ft7044-ak7", {"dc_voltage": "600 V", "friction_torque": 0.0}))
     scenario = run(0.9, duration=0.5, interval=1e-3)
     result = lm.simulate(lm.Scenario(**{**scenario.model_dump(), "motor": motor, "command": 1.3}))
-    found = lm.motor_current(result)
+    found = lm.sizing.motor_current(result)
     torque, speed = result["motor_torque"].values, result["motor_speed"].values
     assert found["current_rms"].values == pytest.approx(abs(torque) / 0.88, rel=1e-12)
     assert found["current"].values == pytest.approx(torque / 0.88 * math.sqrt(2.0), rel=1e-12)
     u_q, u_d = 600.0 / math.sqrt(3.0), 3.0 * speed * 4.2e-3 * found["current"].values
     assert found["voltage"].values == pytest.approx(np.hypot(u_q, u_d), rel=1e-12)
     assert found.attrs["voltage_limit"] == u_q
-    check = {f.rule: f for f in check_drive(lm.scenario_of(result))}
+    check = {f.rule: f for f in check_drive(lm.simulation.scenario_of(result))}
     assert check["current"].use == pytest.approx(float(found["current_rms"].max()) / 30.0, rel=0.02)  # finer samples
     assert check["voltage"].verdict == "warning"
     heat = motor.copper_loss()[0] * torque**2
     assert heat == pytest.approx(3.0 * 0.61 * found["current_rms"].values ** 2, rel=1e-12)
     source = lm.simulate(scenario)
-    assert lm.motor_current(source)["current"].values == pytest.approx(source["motor_torque"].values / 0.06)
+    assert lm.sizing.motor_current(source)["current"].values == pytest.approx(source["motor_torque"].values / 0.06)
 
 
 @pytest.mark.parametrize("tau", [0.0, 2e-3])
@@ -162,7 +162,7 @@ def test_voltage_under_a_current_loop_is_what_torque_and_speed_need(tau: float) 
     result = lm.simulate(
         lm.Scenario(**{**scenario.model_dump(), "command": 0.0, "motor": motor, "controller": controller})
     )
-    found, phase = lm.motor_current(result), motor.winding.phase_values()
+    found, phase = lm.sizing.motor_current(result), motor.winding.phase_values()
     decay = np.exp(-result["time"].values / tau) if tau else np.zeros(result.sizes["time"])
     i, speed = 4.0 / phase.torque_constant * (1.0 - decay), result["motor_speed"].values
     rise = 4.0 / phase.torque_constant * decay / tau if tau else 0.0
@@ -171,7 +171,7 @@ def test_voltage_under_a_current_loop_is_what_torque_and_speed_need(tau: float) 
     assert speed[-1] > 10.0
     assert found["current"].values == pytest.approx(i, rel=1e-9)
     assert found["voltage"].values == pytest.approx(np.hypot(u_q, u_d), rel=1e-9)
-    use = next(f.use for f in check_drive(lm.scenario_of(result)) if f.rule == "voltage")
+    use = next(f.use for f in check_drive(lm.simulation.scenario_of(result)) if f.rule == "voltage")
     assert use == pytest.approx(float(found["voltage"].max()) / found.attrs["voltage_limit"], rel=1e-3)
 
 
@@ -202,15 +202,15 @@ def test_synchronous_records_follow_from_their_sheets() -> None:
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda r: lm.temperatures(lm.simulate(run(0.1, thermal_time_constant_motor=None))), r"lacks motor\.limits\.thermal_time_constant_motor; data"),
-        (lambda r: lm.temperatures(lm.simulate(run(0.1, resistance=None))), r"lacks motor\.limits\.resistance, motor\.limits\.torque_constant"),
-        (lambda r: lm.temperatures(r, "m1"), "motor 'm1': this drive has one motor"),
-        (lambda r: lm.temperatures(r, ambient="3 V"), "ambient"),
-        (lambda r: lm.temperatures(r, repeated=True, winding=30.0), "has no beginning; leave winding and case out"),
-        (lambda r: lm.temperatures(lm.simulate(run(3.0, duration=2.0)), repeated=True), "no end to its heat"),
-        (lambda r: lm.temperatures(r.drop_vars("motor_torque")), "the result lacks motor_torque"),
-        (lambda r: lm.temperatures(r.drop_attrs()), "carries no scenario"),
-        (lambda r: lm.motor_current(lm.simulate(run(0.1, torque_constant=None))), r"lacks motor\.limits\.torque_constant; give it, or a winding"),
+        (lambda r: lm.sizing.temperatures(lm.simulate(run(0.1, thermal_time_constant_motor=None))), r"lacks motor\.limits\.thermal_time_constant_motor; data"),
+        (lambda r: lm.sizing.temperatures(lm.simulate(run(0.1, resistance=None))), r"lacks motor\.limits\.resistance, motor\.limits\.torque_constant"),
+        (lambda r: lm.sizing.temperatures(r, "m1"), "motor 'm1': this drive has one motor"),
+        (lambda r: lm.sizing.temperatures(r, ambient="3 V"), "ambient"),
+        (lambda r: lm.sizing.temperatures(r, repeated=True, winding=30.0), "has no beginning; leave winding and case out"),
+        (lambda r: lm.sizing.temperatures(lm.simulate(run(3.0, duration=2.0)), repeated=True), "no end to its heat"),
+        (lambda r: lm.sizing.temperatures(r.drop_vars("motor_torque")), "the result lacks motor_torque"),
+        (lambda r: lm.sizing.temperatures(r.drop_attrs()), "carries no scenario"),
+        (lambda r: lm.sizing.motor_current(lm.simulate(run(0.1, torque_constant=None))), r"lacks motor\.limits\.torque_constant; give it, or a winding"),
         (lambda r: run(0.1, thermal_resistance=3.2), "has thermal_resistance and both of its parts"),
     ],
 )  # fmt: skip
@@ -229,11 +229,11 @@ def test_a_motor_of_a_train_is_chosen_by_name() -> None:
         simulation={"duration": 60.0, "sample_interval": 0.05},
     )
     result = lm.simulate(scenario)
-    of_one = lm.temperatures(result, "one", ambient=40.0)
-    expected = lm.temperatures(lm.simulate(single))
+    of_one = lm.sizing.temperatures(result, "one", ambient=40.0)
+    expected = lm.sizing.temperatures(lm.simulate(single))
     assert of_one["winding_temperature"].values == pytest.approx(expected["winding_temperature"].values, rel=1e-12)
-    assert float(lm.motor_current(result, "two")["current"][0]) == pytest.approx(0.1 / 0.06)
+    assert float(lm.sizing.motor_current(result, "two")["current"][0]) == pytest.approx(0.1 / 0.06)
     with pytest.raises(lm.InputError, match="motor is missing; the motors are one, two"):
-        lm.temperatures(result)
+        lm.sizing.temperatures(result)
     with pytest.raises(lm.InputError, match="motor 'onw': the motors are one, two"):
-        lm.motor_current(result, "onw")
+        lm.sizing.motor_current(result, "onw")

@@ -105,7 +105,7 @@ def what_is_seen(scenario: lm.Scenario) -> tuple[object, ...]:
     result = lm.simulate(scenario)
     motion = [result[name].values.tobytes() for name in result.data_vars]
     try:
-        heat = lm.temperatures(result)["case_temperature"].values.tobytes()
+        heat = lm.sizing.temperatures(result)["case_temperature"].values.tobytes()
     except lm.InputError as lacking:  # such as the resistance of a torque source
         heat = str(lacking).encode()
     return (*motion, heat, result.attrs.get("note"), *map(str, lm.check_drive(scenario)))

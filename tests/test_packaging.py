@@ -119,7 +119,7 @@ def test_a_missing_library_ends_in_one_line_that_says_what_to_install(
 @pytest.mark.parametrize(
     ("what", "library"),
     [
-        ("lm.bandwidth(s, 1.0)", "scipy"),
+        ("lm.response.bandwidth(s, 1.0)", "scipy"),
         ("lm.linearize(s, lm.Initial(motor_speed=1.0)).antiresonances()", "scipy"),
         ("lm.linearize(s, lm.Initial(motor_speed=1.0)).to_scipy()", "scipy"),
         ("lm.linearize(s, lm.Initial(motor_speed=1.0)).to_control()", "control"),

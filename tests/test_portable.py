@@ -13,7 +13,7 @@ import pytest
 
 import lostmotion as lm
 from conftest import ALL_SCENARIOS
-from lostmotion.portable.description import description, kernel_of
+from lostmotion.portable.descriptions import description, kernel_of
 from portable import END_STATE, ENERGIES, SAMPLES, PortableCore, bits, compiled
 
 

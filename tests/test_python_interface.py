@@ -17,6 +17,7 @@ import lostmotion as lm
 from conftest import ROOT, SCENARIOS
 from lostmotion.inputs.part import Part
 from lostmotion.reports import thinning
+from public_names import FLAT, NAMESPACES, PATHS, public
 
 SMALL = lm.load("paper-2dof-nl-small")
 
@@ -27,19 +28,19 @@ SMALL = lm.load("paper-2dof-nl-small")
 def test_every_function_that_needs_a_drive_takes_a_scenario() -> None:
     drive, rigid = SMALL.drive(), lm.load("paper-1dof-l-large")
     for takes in (
-        lambda d: lm.bandwidth(d, 1.0),
+        lambda d: lm.response.bandwidth(d, 1.0),
         lambda d: lm.frequency_response(d, [1.0], 1.0)["response"].values,
-        lambda d: lm.characteristics(lm.frequency_response(d, [1.0, 9.0], 1.0), d)["bandwidth"].values,
+        lambda d: lm.response.characteristics(lm.frequency_response(d, [1.0, 9.0], 1.0), d)["bandwidth"].values,
         lambda d: lm.Simulation(d)["command"],
     ):
         assert np.array_equal(takes(drive), takes(SMALL), equal_nan=True)
-    assert lm.rigid_constants(rigid) == lm.rigid_constants(rigid.drive())
+    assert lm.response.rigid_constants(rigid) == lm.response.rigid_constants(rigid.drive())
     assert lm.linearize(SMALL, lm.Initial(motor_speed=1.0)).contacts == (
         lm.linearize(drive, lm.Initial(motor_speed=1.0)).contacts
     )
     one, other = lm.periodic_motion(SMALL), lm.periodic_motion(drive, SMALL.command)
     assert np.array_equal(one["load_speed"], other["load_speed"])
-    (only,) = lm.periodic_motions(SMALL, starts=[lm.Initial()])
+    (only,) = lm.response.periodic_motions(SMALL, starts=[lm.Initial()])
     assert np.array_equal(only["load_speed"], one["load_speed"])
 
 
@@ -57,7 +58,7 @@ def test_what_is_no_drive_is_refused_in_plain_words() -> None:
     with pytest.raises(
         lm.InputError, match=r'drive: "drive.toml" must be a Drive, or a Scenario, such as load\(path\) returns'
     ):
-        lm.bandwidth("drive.toml", 1.0)
+        lm.response.bandwidth("drive.toml", 1.0)
 
 
 # --- pickling, showing ---
@@ -149,7 +150,7 @@ def test_a_result_draws_the_figures_of_the_command_line() -> None:
     with pytest.raises(ValueError, match="lacks twist, which the figure of a run shows"):
         result.drop_vars("twist").lm.plot()
     with pytest.raises(ValueError, match="no figure of it"):
-        lm.TestRig(SMALL.gearbox).efficiency_map([100.0], [0.5]).lm.plot()
+        lm.test_rig.TestRig(SMALL.gearbox).efficiency_map([100.0], [0.5]).lm.plot()
 
 
 def test_a_figure_shows_itself_in_a_notebook_and_leaves_the_user_s_settings_alone() -> None:
@@ -215,7 +216,7 @@ def test_reading_a_variable_costs_no_more_than_a_step() -> None:
 
 
 def test_variables_read_step_by_step_are_those_of_a_run() -> None:
-    names = tuple(v.name for v in lm.VARIABLES)
+    names = tuple(v.name for v in lm.simulation.VARIABLES)
     constant = {
         "command": -0.3,
         "load.torque": 20.0,
@@ -382,15 +383,57 @@ def test_what_functions_return_is_exported() -> None:
         for module in (ROOT / "src" / "lostmotion").rglob("*.py")
         for name in re.findall(r"^class (\w+)", module.read_text(), re.M)
     }
-    page = (ROOT / "docs" / "api.md").read_text()
-    without_members = set(re.findall(r"lostmotion\.(\w+)\n   :no-members:", page))
-    for name in set(lm.__all__) - without_members:
-        missing = (returned_by(getattr(lm, name)) & own) - set(lm.__all__)
+    without_members = set(re.findall(r"lostmotion\.(?:\w+\.)?(\w+)\n   :no-members:", PAGES))
+    for name in set(PATHS) - without_members:
+        missing = (returned_by(public(name)) & own) - set(PATHS)
         assert not missing, f"{name} gives {missing}"
 
 
+PAGES = "".join(p.read_text() for p in [ROOT / "docs" / "api.md", *(ROOT / "docs" / "api").glob("*.md")])
+
+
 def test_every_exported_name_is_documented() -> None:
-    page = (ROOT / "docs" / "api.md").read_text()
-    listed = set(re.findall(r":: lostmotion\.(\w+)$", page, re.M))
-    assert listed == set(lm.__all__) - {"__version__"}
+    listed = set(re.findall(r":: lostmotion\.([\w.]+)$", PAGES, re.M))
+    assert listed == set(PATHS.values()) - {"__version__"}
     assert re.fullmatch(r"\d+\.\d+\.\d+.*", lm.__version__)
+
+
+# --- namespaces ---
+
+
+def test_each_namespace_has_a_page_in_the_documentation() -> None:
+    assert {p.stem for p in (ROOT / "docs" / "api").glob("*.md")} == set(NAMESPACES)
+
+
+def test_each_name_has_one_place() -> None:
+    listed = FLAT + [name for space in NAMESPACES for name in getattr(lm, space).__all__]
+    assert sorted(set(listed)) == sorted(listed)
+    assert len(FLAT) <= 55  # what fits on a page
+
+
+@pytest.mark.parametrize("space", NAMESPACES)
+def test_no_module_hides_a_public_name_of_its_namespace(space) -> None:
+    modules = {p.stem for p in (ROOT / "src" / "lostmotion" / space).glob("*.py")}
+    assert modules & set(getattr(lm, space).__all__) == set()
+
+
+@pytest.mark.parametrize("name", [n for n in PATHS if n not in FLAT])
+def test_names_that_moved_into_a_namespace_forward_with_a_warning(name) -> None:
+    place = re.escape(f"lostmotion.{name} is now lostmotion.{PATHS[name]}")
+    with pytest.warns(DeprecationWarning, match=place) as caught:
+        old = getattr(lm, name)
+    assert old is public(name)
+    assert caught[0].filename == __file__
+
+
+def test_an_unknown_name_is_no_attribute() -> None:
+    assert not hasattr(lm, "Gearboxx")
+    assert not hasattr(lm.servo, "Gearboxx")
+    assert not hasattr(lm, "__wrapped__")
+
+
+def test_names_of_namespaces_can_be_imported() -> None:
+    from lostmotion.servo import Margins
+    from lostmotion.sizing import overrunning
+
+    assert (Margins, overrunning) == (lm.servo.Margins, lm.sizing.overrunning)

@@ -199,13 +199,13 @@ def test_jumps_between_pieces_are_those_of_rounded_instants() -> None:
             assert np.all(jump <= 16.0 * EPS * scale[:3] + 4.0 * EPS * end * scale[1:])
 
 
-KINDS: dict[str, tuple[lm.PositionReference | lm.SpeedReference | lm.TorqueReference, Callable[[np.ndarray], list[np.ndarray]]]] = {
+KINDS: dict[str, tuple[lm.PositionReference | lm.control.SpeedReference | lm.control.TorqueReference, Callable[[np.ndarray], list[np.ndarray]]]] = {
     "constant": (
-        lm.TorqueReference.model_validate("3 N*m"),
+        lm.control.TorqueReference.model_validate("3 N*m"),
         lambda t: [0 * t + 3.0, 0 * t, 0 * t, 0 * t],
     ),
     "step": (
-        lm.SpeedReference(mean=1.0, steps=[{"height": "60 rpm", "time": 0.5}]),
+        lm.control.SpeedReference(mean=1.0, steps=[{"height": "60 rpm", "time": 0.5}]),
         lambda t: [1.0 + 2 * np.pi * (t >= 0.5), 0 * t, 0 * t, 0 * t],
     ),
     "ramp": (
@@ -224,7 +224,7 @@ KINDS: dict[str, tuple[lm.PositionReference | lm.SpeedReference | lm.TorqueRefer
         ],
     ),
     "linear series": (
-        lm.SpeedReference(samples={"times": [0.25, 0.5, 1.0], "values": [1, 3, 0]}),
+        lm.control.SpeedReference(samples={"times": [0.25, 0.5, 1.0], "values": [1, 3, 0]}),
         lambda t: [
             np.interp(t, [0.25, 0.5, 1.0], [1, 3, 0]),
             np.select([t < 0.25, t < 0.5, t < 1.0], [0.0, 8.0, -6.0], 0.0),
@@ -464,7 +464,9 @@ def test_any_limits_and_moves_are_refused_in_one_plain_line_or_end_where_they_sh
 @example(times=[0.0, 1.0, 4e14], values=[0.0, 0.0, 0.0], interpolation="cubic")
 def test_any_series_is_refused_in_one_plain_line_or_passes_through_its_points(times, values, interpolation) -> None:
     try:
-        reference = lm.TorqueReference(samples={"times": times, "values": values, "interpolation": interpolation})
+        reference = lm.control.TorqueReference(
+            samples={"times": times, "values": values, "interpolation": interpolation}
+        )
     except lm.InputError as error:
         assert "\n" not in str(error)
         assert not re.search(r"Input should|https?:|pydantic|NoneType|dtype|array|dydx", str(error))

@@ -43,11 +43,11 @@ def report(*charts: object, table: Table | None = None) -> Report:
 
 
 @pytest.fixture(scope="module")
-def axis() -> lm.ServoReport:
+def axis() -> lm.servo.ServoReport:
     return lm.commission(lm.load("speed-axis"))
 
 
-def test_the_numbers_of_a_page_are_those_of_the_result(axis: lm.ServoReport) -> None:
+def test_the_numbers_of_a_page_are_those_of_the_result(axis: lm.servo.ServoReport) -> None:
     found = {chart["title"]: chart for chart in charts(render(servo_report("speed-axis", axis)))}
     (error,) = found["following error over the run"]["lines"]
     assert np.array_equal(error["x"], axis.following.time)
@@ -65,7 +65,7 @@ def test_the_numbers_of_a_page_are_those_of_the_result(axis: lm.ServoReport) -> 
         assert margin["to"] == pytest.approx(-180.0, abs=2.0)  # the curve is linear between its frequencies there
 
 
-def test_a_notebook_shows_the_page_of_the_command(axis: lm.ServoReport) -> None:
+def test_a_notebook_shows_the_page_of_the_command(axis: lm.servo.ServoReport) -> None:
     shown = axis._repr_html_()  # type: ignore[attr-defined]
     assert shown.startswith("<iframe srcdoc=")
     assert "Stable in " in shown and "Worst margins" in shown
@@ -142,7 +142,7 @@ def test_a_static_figure_has_its_points_where_the_axes_say() -> None:
     assert ">100<" in svg
 
 
-def test_figures_are_drawn_where_they_are_asked_for(axis: lm.ServoReport, tmp_path: Path) -> None:
+def test_figures_are_drawn_where_they_are_asked_for(axis: lm.servo.ServoReport, tmp_path: Path) -> None:
     write_servo(tmp_path, "speed-axis", axis, endings("png, svg"))
     made = {p.name for p in tmp_path.iterdir()} - {"report.js"}
     assert made == {"servo.html", "margins.csv"} | {

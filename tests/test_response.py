@@ -39,8 +39,8 @@ def oscillator(*, stiffness=4.0, inertia=0.01, friction=0.0, damping=0.0, backla
             ratio=1.0,
             rated_input_speed=100.0,
             rated_output_torque=10.0,
-            stiffness=lm.TorsionCurve(slopes=(stiffness,), backlash=backlash),
-            losses=lm.ConstantEfficiency(efficiency=1.0),
+            stiffness=lm.model.TorsionCurve(slopes=(stiffness,), backlash=backlash),
+            losses=lm.model.ConstantEfficiency(efficiency=1.0),
         ),
         load=lm.Load(inertia=inertia, viscous_friction=damping, friction_torque=friction),
     )
@@ -81,8 +81,8 @@ def test_two_mass_resonance_and_antiresonance():
             ratio=1.0,
             rated_input_speed=100.0,
             rated_output_torque=1.0,
-            stiffness=lm.LinearStiffness(stiffness=700.0),
-            losses=lm.ConstantEfficiency(efficiency=1.0),
+            stiffness=lm.model.LinearStiffness(stiffness=700.0),
+            losses=lm.model.ConstantEfficiency(efficiency=1.0),
         ),
         load=lm.Load(inertia=0.005),
     )
@@ -231,7 +231,7 @@ def test_stuck_all_period_is_a_solution_with_no_response():
     assert np.all(response["reason"].values == "")
     assert np.all(load_response(response, 0.01) == 0.0)
     # That is the dead zone: friction holds whatever the command of 0.01 gives.
-    assert lm.characteristics(response, NONLINEAR).attrs["dead_zone_forward"] > 0.01
+    assert lm.response.characteristics(response, NONLINEAR).attrs["dead_zone_forward"] > 0.01
 
 
 def test_a_load_that_advances_each_period_is_periodic_all_the_same():
@@ -248,7 +248,7 @@ def test_coexisting_motions_and_subharmonics_of_a_load_in_backlash():
     drive = oscillator(stiffness=k, inertia=J, damping=2 * 0.02 * math.sqrt(k * J), backlash=2e-3)
     torque = lm.TorqueSignal(amplitude=1e-3 * k, frequency=20.0)
     starts = [lm.Initial(), lm.Initial(twist=5e-3), lm.Initial(twist=5e-3, load_speed=0.3)]
-    found = lm.periodic_motions(drive, load_torque=torque, starts=starts, multiples=(1, 3))
+    found = lm.response.periodic_motions(drive, load_torque=torque, starts=starts, multiples=(1, 3))
     tall = [m for m in found if float(np.ptp(m["twist"].values)) > 2e-3]
     assert {round(m.attrs["period"] * 20.0) for m in tall} == {3}
     assert all(m.attrs["stable"] and m.attrs["residual"] < PERIODICITY for m in tall)
@@ -291,7 +291,7 @@ def stops(share: float) -> tuple[int, lm.Drive, "object"]:
     """Number of stretches in which a free mass under P sin(wt) is at rest, with friction F = share P."""
     drive = oscillator(stiffness=1e-9, friction=share)
     drive = drive.model_copy(
-        update={"gearbox": drive.gearbox.model_copy(update={"stiffness": lm.TorsionCurve(slopes=(1e-9,))})}
+        update={"gearbox": drive.gearbox.model_copy(update={"stiffness": lm.model.TorsionCurve(slopes=(1e-9,))})}
     )
     motion = lm.periodic_motion(drive, load_torque=lm.TorqueSignal(amplitude=1.0, frequency=1.0))
     stuck = motion["load_contact"].values == 0
@@ -339,7 +339,7 @@ def test_response_depends_on_amplitude_as_in_the_paper():
     response = lm.frequency_response(NONLINEAR, np.geomspace(0.1, 20.0, 20), [0.025, 1.0275])
     gain = np.abs(response["response"].sel(output="load_speed").values)
     assert gain[0, 0] < 0.5 * gain[1, 0]
-    band = lm.characteristics(response, NONLINEAR)
+    band = lm.response.characteristics(response, NONLINEAR)
     assert float(band["bandwidth"].sel(amplitude=1.0275)) == pytest.approx(2.45, rel=0.15)
     # Mean power: what the motor gives goes into gear, dampers and friction; the gear loses some of it.
     assert np.all(response["gear_loss"].values > 0.0)
@@ -374,24 +374,24 @@ def test_frequencies_are_added_where_the_curve_bends():
 
 def test_bandwidth_is_where_the_gain_has_fallen_by_three_decibels():
     linear = frictionless("2-DOF-L")
-    found = lm.bandwidth(linear, 0.5)
+    found = lm.response.bandwidth(linear, 0.5)
     gain = np.abs(lm.linearize(linear).response(np.array([0.1, found])))
     assert gain[1] / gain[0] == pytest.approx(math.sqrt(0.5), rel=1e-7)
     # Of the drive with friction it depends on the amplitude, and agrees with the curve it is read from otherwise.
     near = np.geomspace(0.1, 20.0, 60)
     for amplitude in (0.1, 1.0):
-        curve = lm.characteristics(lm.frequency_response(NONLINEAR, near, amplitude), NONLINEAR)
-        assert lm.bandwidth(NONLINEAR, amplitude) == pytest.approx(float(curve["bandwidth"][0]), rel=2e-3)
-    assert math.isnan(lm.bandwidth(linear, 0.5, highest=1.0))
+        curve = lm.response.characteristics(lm.frequency_response(NONLINEAR, near, amplitude), NONLINEAR)
+        assert lm.response.bandwidth(NONLINEAR, amplitude) == pytest.approx(float(curve["bandwidth"][0]), rel=2e-3)
+    assert math.isnan(lm.response.bandwidth(linear, 0.5, highest=1.0))
     with pytest.raises(RuntimeError, match="does not move"):
-        lm.bandwidth(NONLINEAR, 1e-3)
+        lm.response.bandwidth(NONLINEAR, 1e-3)
     with pytest.raises(ValueError, match="must be positive"):
-        lm.bandwidth(linear, 0.0)
+        lm.response.bandwidth(linear, 0.0)
 
 
 def test_control_gets_the_response_as_data():
     response = lm.frequency_response(NONLINEAR, [0.5, 1.0, 5.0], [0.025, 1.0275])
-    data = lm.to_control(response, 1.0275)
+    data = lm.response.to_control(response, 1.0275)
     assert np.allclose(
         data.frequency_response(2 * np.pi * np.array([1.0])).frdata.ravel(), load_response(response, 1.0275)[1]
     )

@@ -41,7 +41,7 @@ def test_a_result_file_reads_back_unchanged(result: xr.Dataset, tmp_path: Path, 
 @pytest.mark.parametrize("ending", [".nc", ".csv", ".parquet"])
 def test_a_result_file_alone_can_be_run_again(result: xr.Dataset, tmp_path: Path, ending: str) -> None:
     lm.save(result, tmp_path / f"r{ending}")
-    again = lm.simulate(lm.scenario_of(lm.open_result(tmp_path / f"r{ending}")), energy=True)
+    again = lm.simulate(lm.simulation.scenario_of(lm.open_result(tmp_path / f"r{ending}")), energy=True)
     xr.testing.assert_identical(again, result)
 
 

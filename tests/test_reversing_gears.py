@@ -110,6 +110,6 @@ def test_ratio_zero_and_a_reversing_inverse_model_are_refused() -> None:
     with pytest.raises(InputError, match="has the ratio 0; give input speed / output speed"):
         lm.Gear(input="a", output="b", ratio=0.0)
     with pytest.raises(InputError, match="reverses; what loads drive has a verdict for ratios above 0"):
-        lm.self_locking(axis(-6.0, "two efficiencies", "spring", 0).train(), "g", 5.0)
+        lm.sizing.self_locking(axis(-6.0, "two efficiencies", "spring", 0).train(), "g", 5.0)
     with pytest.raises(InputError, match="ratio: -50"):
         lm.load("paper-2dof-nl-small").replace(**{"gearbox.ratio": -50.0})

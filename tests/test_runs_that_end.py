@@ -169,7 +169,7 @@ def a_study_row_by_row(directory: Path) -> None:
 
 def a_hunting_map(_: Path) -> None:
     inertias = [0.5 + 1e-3 * k for k in range(10_000)]
-    lm.hunting_map(lm.load(NAMED["hunting-with-backlash"]), {"load.inertia": inertias}, threads=2)
+    lm.servo.hunting_map(lm.load(NAMED["hunting-with-backlash"]), {"load.inertia": inertias}, threads=2)
 
 
 def a_pointing_budget(_: Path) -> None:

@@ -68,14 +68,14 @@ def test_parts_are_immutable_and_hashable(small: Path) -> None:
 
 
 def test_backlash_and_preload_reshape_the_curve() -> None:
-    curve = lm.TorsionCurve(slopes=(2650.0, 21200.0, 26500.0), breaks=(0.6e-3, 3e-3))
-    gap = lm.TorsionCurve(**(curve.model_dump() | {"backlash": 2e-3}))
+    curve = lm.model.TorsionCurve(slopes=(2650.0, 21200.0, 26500.0), breaks=(0.6e-3, 3e-3))
+    gap = lm.model.TorsionCurve(**(curve.model_dump() | {"backlash": 2e-3}))
     for d in (0.0, 0.5e-3, 1e-3):
         assert gap.torque(d) == 0.0
     for d in (0.1e-3, 2e-3, 5e-3):
         assert gap.torque(d + 1e-3) == pytest.approx(curve.torque(d))
     for preload in (0.5, 1.59, 10.0, 52.47, 80.0):
-        tight = lm.TorsionCurve(**(curve.model_dump() | {"preload": preload}))
+        tight = lm.model.TorsionCurve(**(curve.model_dump() | {"preload": preload}))
         at = next(d for d in np.linspace(0, 6e-3, 600001) if curve.torque(float(d)) >= preload - 1e-9)
         for d in (0.1e-3, 1e-3, 4e-3):
             assert tight.torque(d) == pytest.approx(curve.torque(at + d) - curve.torque(at), abs=2e-4)
@@ -90,8 +90,8 @@ def value(signal: lm.CommandSignal, times: np.ndarray) -> np.ndarray:
             ratio=1,
             rated_input_speed=1,
             rated_output_torque=1,
-            stiffness=lm.Rigid(),
-            losses=lm.ConstantEfficiency(efficiency=1),
+            stiffness=lm.model.Rigid(),
+            losses=lm.model.ConstantEfficiency(efficiency=1),
         ),
         load=lm.Load(inertia=1.0),
     )

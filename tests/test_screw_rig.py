@@ -26,8 +26,8 @@ class Steps:
         self.count += 1
 
 
-def screw(**values) -> lm.Screw:
-    return lm.Screw(**({"input": "m", "output": "t", "lead": LEAD} | values))
+def screw(**values) -> lm.model.Screw:
+    return lm.model.Screw(**({"input": "m", "output": "t", "lead": LEAD} | values))
 
 
 def test_stiffness_drag_and_efficiency_come_back() -> None:
@@ -60,7 +60,7 @@ def test_nut_bearing_and_screw_are_in_series() -> None:
 
 
 def test_each_segment_of_a_stiffness_curve_is_measured() -> None:
-    report = lm.measure_screw(screw(stiffness_curve={"slopes": [1.2e8, 2e8], "breaks": [2e-6]}))
+    report = lm.test_rig.measure_screw(screw(stiffness_curve={"slopes": [1.2e8, 2e8], "breaks": [2e-6]}))
     assert report.stiffness == pytest.approx((1.2e8, 2e8), rel=1e-8)
 
 
@@ -75,7 +75,7 @@ def test_hysteresis_opens_the_loop_and_a_pitch_error_is_seen_over_a_turn() -> No
 
 def test_a_self_locking_screw_is_not_driven_back_and_a_rigid_one_has_no_deflection() -> None:
     assert ScrewRig(screw(stiffness=1e8, efficiency=0.3), load=1000.0).backdriving_force() is None
-    rigid = lm.measure_screw(screw(efficiency=0.9, drag_torque=0.1, viscous_friction=1e-3))
+    rigid = lm.test_rig.measure_screw(screw(efficiency=0.9, drag_torque=0.1, viscous_friction=1e-3))
     assert rigid.first_loading is None and rigid.loops == () and rigid.stiffness == () and rigid.lost_motion == 0.0
     # The flywheel loses 2e-6 of its speed.
     assert rigid.drag_at(100.0) == pytest.approx(0.1 + 1e-3 * 100.0, rel=1e-5)
@@ -96,7 +96,7 @@ def test_the_rig_returns_the_data_of_the_records() -> None:
     ):
         sheet = next(r for r in catalogue() if r.name == name)
         steps = Steps()
-        report = lm.measure_screw(screw_from_record(name), sheet, progress=steps)
+        report = lm.test_rig.measure_screw(screw_from_record(name), sheet, progress=steps)
         assert 0 < steps.count <= WORK
         assert report.load == rig_load(sheet) == pytest.approx(0.1 * sheet.dynamic_capacity)
         assert len(report.comparisons) >= 2

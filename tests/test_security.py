@@ -294,7 +294,7 @@ def peak():
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 lm.load("paper-2dof-nl-small")
 before = peak()
-for read, path in zip((read_log, read_log, lm.open_result, lm.load, lm.load_study), sys.argv[1:]):
+for read, path in zip((read_log, read_log, lm.open_result, lm.load, lm.studies.load_study), sys.argv[1:]):
     try:
         read(path)
     except lm.InputError as error:

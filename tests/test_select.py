@@ -301,7 +301,7 @@ def test_refused_pairs_say_why(result: Any):
 
 
 def test_a_record_that_lacks_data_is_refused_in_words():
-    lacking = next(r.name for r in lm.catalogue() if isinstance(r, lm.GearboxSheet) and r.missing())
+    lacking = next(r.name for r in lm.catalogue() if isinstance(r, lm.data_sheets.GearboxSheet) and r.missing())
     vary = [{"key": "gearbox", "values": ["schaeffler-rt1-h-20-100", lacking]}, TABLES["vary"][1]]
     found = lm.select(task_of(changed(vary=vary)))
     rows = found.isel(pair=found["gearbox"].values == lacking)
@@ -390,7 +390,7 @@ def test_bad_tasks_are_refused_in_one_line(change: dict[str, Any], says: str):
 def test_a_file_is_named(tmp_path: Path):
     (tmp_path / "task.toml").write_text('[task]\ncycle = "1 m"\n[load]\n[controller]\n')
     with pytest.raises(lm.InputError, match=r"task.toml: .*cycle"):
-        lm.load_task(tmp_path / "task.toml")
+        lm.studies.load_task(tmp_path / "task.toml")
 
 
 # --- command ---

@@ -48,7 +48,7 @@ def scenario(tables: dict[str, Any], **more: Any) -> lm.TrainScenario:
 
 
 def verdict(load: float = LOAD, speed: float | None = None, **values: Any) -> SelfLocking:
-    return lm.self_locking(scenario(worm_tables(load=load, **values)).train(), "gear", load, speed)
+    return lm.sizing.self_locking(scenario(worm_tables(load=load, **values)).train(), "gear", load, speed)
 
 
 # --- closed forms ---
@@ -91,7 +91,7 @@ def test_with_a_coupling_the_worm_alone_counts_in_a_fast_instability():
     tables["motors"]["motor"] |= {"shaft": "rotor", "rotor_inertia": rotor}
     link = {"input": "rotor", "output": "worm", "ratio": 1.0, "stiffness": {"kind": "linear", "stiffness": coupling}}
     tables["gears"]["coupling"] = link
-    found = lm.self_locking(scenario(tables).train(), "gear", LOAD)
+    found = lm.sizing.self_locking(scenario(tables).train(), "gear", LOAD)
     # (p + k/J_2) (J_1 (k_1 + J_M p) + J_M k_1) + k eta_b/i^2 (k_1 + J_M p) = 0
     p = np.polynomial.Polynomial
     together = p([coupling * (worm + rotor), worm * rotor])
@@ -107,7 +107,7 @@ def test_with_a_coupling_the_worm_alone_counts_in_a_fast_instability():
 def test_the_rate_is_that_of_the_classic_drive_with_a_dc_motor_and_a_loss_map(share: float, lowering: str):
     """Against `linearize`, whose core shares no equation with that of trains."""
     values = ((0.1, 0.08, 0.1), (0.75, 0.7, 0.66), (2.3, 2.2, 2.1))  # steeper at high load: the slope is not eta_b
-    losses = lm.LossMap(
+    losses = lm.model.LossMap(
         speeds=(0.0, 0.5, 1.2),
         loads=(0.0, 0.5, 1.5),
         values=tuple(tuple(share * m for m in row) for row in values),
@@ -117,7 +117,7 @@ def test_the_rate_is_that_of_the_classic_drive_with_a_dc_motor_and_a_loss_map(sh
         ratio=60.0,
         rated_input_speed=150.0,
         rated_output_torque=70.0,
-        stiffness=lm.LinearStiffness(stiffness=2e4),
+        stiffness=lm.model.LinearStiffness(stiffness=2e4),
         losses=losses,
     )
     motor = lm.Motor(
@@ -129,7 +129,7 @@ def test_the_rate_is_that_of_the_classic_drive_with_a_dc_motor_and_a_loss_map(sh
     )
     drive = lm.Drive(motor=motor, gearbox=gearbox, load=lm.Load(inertia=5.0))
     M, w = 60.0, 100.0
-    found = lm.self_locking(drive.train(), "gearbox", M, w)
+    found = lm.sizing.self_locking(drive.train(), "gearbox", M, w)
     at = lm.Initial(motor_speed=-w, load_speed=-w / 60.0, twist=M / 2e4)
     rates = np.linalg.eigvals(lm.linearize(drive, at, load_torque=M).A).real
     assert found.lowering == lowering
@@ -209,7 +209,7 @@ def test_the_verdict_is_what_the_solver_does():
         swing = math.sqrt(values["stiffness"] / values["mass"])
         speed = values["load"] / values["stiffness"] * swing * values["ratio"] * float(rng.uniform(0.2, 3.0))
         train = scenario(worm_tables(eta_b, **values)).train()
-        found = lm.self_locking(train, "gear", values["load"], speed)
+        found = lm.sizing.self_locking(train, "gear", values["load"], speed)
         # Within a run of 2000/swing a disturbance of 2 % grows tenfold or dies out if its rate is 2.3/2000 of the swing.
         _, rate, _ = train.core(()).steady_regime([-speed, -speed / values["ratio"]], [values["load"]])
         rates = np.linalg.eigvals(rate).real
@@ -257,7 +257,7 @@ def hoist(share: float) -> tuple[lm.TrainScenario, float]:
     belt = {"input": "motor", "output": "worm", "ratio": 2.0, "stiffness": {"kind": "linear", "stiffness": 5.0}}
     losses = {"kind": "mesh_efficiency", "drive_efficiency": 0.9, "backdrive_efficiency": 0.85}
     tables["gears"]["belt"] = belt | {"losses": losses, "mesh_damping": 5e-3}
-    least = lm.self_locking(scenario(tables).train(), "gear", LOAD).least_torque
+    least = lm.sizing.self_locking(scenario(tables).train(), "gear", LOAD).least_torque
     wound = {"gear": LOAD / STIFFNESS}
     ramp = {"ramps": [{"rise": -share * least, "duration": 1.0}]}
     return scenario(tables, command={"motor": ramp}, initial={"twists": wound}), least
@@ -289,7 +289,7 @@ def catalogue_worm(name: str) -> lm.Gearbox:
 @pytest.mark.parametrize("name", WORMS)
 def test_a_worm_gear_of_the_catalogue_does_what_is_said(name: str):
     gearbox = catalogue_worm(name)
-    found = lm.overrunning(gearbox)
+    found = lm.sizing.overrunning(gearbox)
     load = 70.0
     motor = lm.Motor(kind="torque_source", rotor_inertia=1e-5)
     drive = lm.Drive(motor=motor, gearbox=gearbox, load=lm.Load(inertia=0.01, viscous_friction=5.0))
@@ -313,13 +313,15 @@ def test_a_worm_gear_of_the_catalogue_does_what_is_said(name: str):
 def test_a_gear_of_a_train_is_measured_on_the_rig_as_its_losses_say():
     gear = lm.load("worm-lowering").gears["worm_gear"]
     with pytest.raises(lm.InputError, match="lacks rated_input_speed and rated_output_torque, by which the test rig"):
-        lm.TestRig(gear)
+        lm.test_rig.TestRig(gear)
     rated = gear.model_copy(update={"rated_input_speed": 150.0, "rated_output_torque": 20.0})
-    rig = lm.TestRig(rated)
+    rig = lm.test_rig.TestRig(rated)
     eta_f, _ = gear.losses.efficiencies()
     assert rig.efficiency(100.0, 0.7) == pytest.approx(eta_f, rel=1e-9)
     assert rig.backdriving_torque() is None
-    assert lm.overrunning(rig.gearbox).backward_efficiency == pytest.approx(gear.losses.efficiencies()[1], rel=1e-12)
+    assert lm.sizing.overrunning(rig.gearbox).backward_efficiency == pytest.approx(
+        gear.losses.efficiencies()[1], rel=1e-12
+    )
 
 
 def test_the_drive_check_takes_a_train_and_says_how_it_lowers():
@@ -359,11 +361,11 @@ def test_of_a_train_the_gear_that_locks_is_named_and_no_other():
 def test_a_gear_that_is_not_there_is_refused():
     train = lm.load("worm-lowering").train()
     with pytest.raises(lm.InputError, match=r"worm_gaer is no gear of this train; did you mean worm_gear\?"):
-        lm.self_locking(train, "worm_gaer", 20.0)
+        lm.sizing.self_locking(train, "worm_gaer", 20.0)
     with pytest.raises(lm.InputError, match=r"key gears\.worm_gear: load_torque is missing, and the gear has no rated"):
-        lm.self_locking(train, "worm_gear")
+        lm.sizing.self_locking(train, "worm_gear")
     with pytest.raises(lm.InputError, match="0 N·m drives nothing"):
-        lm.self_locking(train, "worm_gear", 0.0)
+        lm.sizing.self_locking(train, "worm_gear", 0.0)
 
 
 # --- at rest, and at the start ---
@@ -419,7 +421,7 @@ PAGE = (ROOT / "docs" / "self-locking.md").read_text()
 def test_the_page_shows_what_is_printed():
     shown = re.search(r"```text\n(.*?)\n```", PAGE, re.S)
     assert shown is not None
-    assert str(lm.self_locking(lm.load("worm-lowering").train(), "worm_gear", 20.0)) == shown.group(1)
+    assert str(lm.sizing.self_locking(lm.load("worm-lowering").train(), "worm_gear", 20.0)) == shown.group(1)
 
 
 def test_the_table_of_the_page_has_every_worm_gear_and_what_is_said_below_it():

@@ -116,7 +116,7 @@ def test_every_variable_can_be_read_while_stepping(small: Path) -> None:
     for _ in range(30):
         sim.advance(0.01, command=0.1)
     run = lm.simulate(scenario, command=0.1, duration=0.3, sample_interval=0.01)
-    for variable in lm.VARIABLES:
+    for variable in lm.simulation.VARIABLES:
         assert sim[variable.name] == pytest.approx(float(run[variable.name][-1]), rel=1e-9)
     with pytest.raises(lm.InputError, match="load_sped"):
         sim["load_sped"]

@@ -75,5 +75,5 @@ def test_the_recipe_gives_the_rows_of_this_machine(tmp_path: Path) -> None:
             subprocess.run([str(tmp_path / "scancel"), job], check=True)
     assert done.returncode == 0, done.stderr
     assert jobs.exists()
-    study = lm.load_study(tmp_path / "tolerance.toml")
+    study = lm.studies.load_study(tmp_path / "tolerance.toml")
     assert read_table(tmp_path / "rows").equals(read_table(lm.study(study, tmp_path / "here")))

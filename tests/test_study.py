@@ -141,8 +141,8 @@ def test_bandwidth_and_tracking_error_of_each_run(tmp_path: Path):
     rows = rows_of(lm.study(study, tmp_path / "s"))
     for run in (0, 1):
         scenario = scenario_of_run(study, run)
-        assert rows["own"][run] == lm.bandwidth(scenario.drive(), scenario.command.amplitude)
-        assert rows["small"][run] == lm.bandwidth(scenario.drive(), 0.1)
+        assert rows["own"][run] == lm.response.bandwidth(scenario.drive(), scenario.command.amplitude)
+        assert rows["small"][run] == lm.response.bandwidth(scenario.drive(), 0.1)
         result = lm.simulate(scenario)
         # Without load the speed of a DC motor is u / k_E, here by its rated point: w_R M_stall / (M_stall - M_R).
         ideal = result["command"] * scenario.motor.rated_speed * 3.1169 / 2.1169 / scenario.gearbox.ratio
@@ -319,7 +319,7 @@ def test_killed_and_started_again_it_goes_on_where_it_was(long_study: Path, tmp_
     for name, stamp in kept.items():
         assert (directory / name).stat().st_mtime_ns == stamp  # nothing twice
     assert not list(directory.glob(".part*"))
-    whole = lm.study(lm.load_study(long_study), tmp_path / "whole")
+    whole = lm.study(lm.studies.load_study(long_study), tmp_path / "whole")
     assert read_table(directory).equals(read_table(whole))
     assert read_table(directory)["run"].to_pylist() == list(range(6000))
 
@@ -603,7 +603,7 @@ def test_the_command_line_computes_on_the_workers_of_a_scheduler(tmp_path: Path)
         words = ["study", str(example), "-o", str(tmp_path / "s"), "--scheduler", cluster.address]
         done = CliRunner().invoke(app, words)
     assert done.exit_code == 0, done.output
-    assert read_table(tmp_path / "s").equals(read_table(lm.study(lm.load_study(example), tmp_path / "t")))
+    assert read_table(tmp_path / "s").equals(read_table(lm.study(lm.studies.load_study(example), tmp_path / "t")))
 
 
 def test_progress_rises_to_the_total_and_starts_from_what_is_there(tmp_path: Path):
@@ -628,8 +628,8 @@ def test_sobol_indices_of_a_closed_form(tmp_path: Path):
             ratio=1.0,
             rated_input_speed=100.0,
             rated_output_torque=1.0,
-            stiffness=lm.LinearStiffness(stiffness=1e4),
-            losses=lm.ConstantEfficiency(efficiency=1.0),
+            stiffness=lm.model.LinearStiffness(stiffness=1e4),
+            losses=lm.model.ConstantEfficiency(efficiency=1.0),
         ),
         load={"inertia": 0.01},
         simulation={"duration": 0.1, "sample_interval": 0.05},
@@ -730,7 +730,7 @@ def test_a_bad_study_ends_in_one_clear_line(tmp_path: Path, old: str, new: str, 
     assert old in GOOD
     path.write_text(GOOD.replace(old, new).replace("{base}", str(ROOT / "scenarios" / "paper-2dof-nl-large.toml")))
     with pytest.raises(InputError, match=match) as caught:
-        lm.load_study(path)
+        lm.studies.load_study(path)
     assert "\n" not in str(caught.value)
 
 
@@ -739,7 +739,7 @@ def test_a_saved_result_can_be_the_base_of_a_study(tmp_path: Path):
     lm.save(lm.simulate(lm.load("step-to-standstill")), tmp_path / "result.csv")
     for name, base in (("own", "result.csv"), ("other", "step-to-standstill")):
         (tmp_path / f"{name}.toml").write_text(GOOD.replace("{base}", base))
-    first, second = (lm.load_study(tmp_path / f"{name}.toml") for name in ("own", "other"))
+    first, second = (lm.studies.load_study(tmp_path / f"{name}.toml") for name in ("own", "other"))
     assert first.scenario == second.scenario
     tables = [read_table(lm.study(study, tmp_path / name)) for name, study in (("a", first), ("b", second))]
     assert tables[0].to_pydict() == tables[1].to_pydict()
@@ -753,7 +753,7 @@ def test_a_saved_result_is_refused_where_a_file_of_text_is_wanted(tmp_path: Path
     ):
         lm.load(tmp_path / "s.toml")
     with pytest.raises(InputError, match=r"result.csv: has the ending of a saved result; a study is a TOML file"):
-        lm.load_study(tmp_path / "result.csv")
+        lm.studies.load_study(tmp_path / "result.csv")
 
 
 def test_quantiles_are_those_of_the_statistics_library():

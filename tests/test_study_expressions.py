@@ -293,11 +293,13 @@ def test_a_study_file_with_such_an_expression_is_refused_as_a_whole(tmp_path: Pa
     path = tmp_path / "s.toml"
     path.write_text(study + 'good = "peak(load_speed)"\nbad = "load_speed.to_netcdf(\'f\')"\n')
     with pytest.raises(lm.InputError, match=r"s\.toml: .*keep\.bad: .*must not use \.to_netcdf; the methods are mean"):
-        lm.load_study(path)
+        lm.studies.load_study(path)
     assert os.listdir() == ["s.toml"]
     scenario = paper_scenario("2-DOF-NL", "large")
     with pytest.raises(ValueError, match="must not use"):
-        lm.Study(scenario=scenario, vary=[{"key": "load.inertia", "values": [1]}], keep={"bad": "load_speed.values"})
+        lm.studies.Study(
+            scenario=scenario, vary=[{"key": "load.inertia", "values": [1]}], keep={"bad": "load_speed.values"}
+        )
 
 
 NAMES = (*(v.name for v in VARIABLES), *FUNCTIONS, *OF_THE_RUN, *METHODS, "to_netcdf", "values", "__class__", "open")

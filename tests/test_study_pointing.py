@@ -39,7 +39,7 @@ def test_rows_are_those_of_single_runs_for_any_number_of_workers(
     make: Any, prefix: str, error: str, tmp_path: Path
 ) -> None:
     signal = error.replace("pointing_error", "target_direction")
-    study = lm.Study(
+    study = lm.studies.Study(
         scenario=make(),
         vary=[
             {"key": f"{prefix}reference.target.speed", "values": [60.0, 120.0]},

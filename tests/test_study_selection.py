@@ -25,13 +25,13 @@ EXAMPLE = ROOT / "examples" / "select-gearbox.toml"
 
 
 @pytest.fixture(scope="module")
-def selection(tmp_path_factory: pytest.TempPathFactory) -> tuple[lm.Study, Path]:
+def selection(tmp_path_factory: pytest.TempPathFactory) -> tuple[lm.studies.Study, Path]:
     directory = tmp_path_factory.mktemp("selection") / "rows"
-    study = lm.load_study(EXAMPLE)
+    study = lm.studies.load_study(EXAMPLE)
     return study, lm.study(study, directory)
 
 
-def test_what_fits_is_what_a_check_of_each_drive_by_itself_finds(selection: tuple[lm.Study, Path]):
+def test_what_fits_is_what_a_check_of_each_drive_by_itself_finds(selection: tuple[lm.studies.Study, Path]):
     study, directory = selection
     ranked = candidates(read_table(directory), study)
     assert sorted(c.run for c in ranked) == list(range(study.total))
@@ -63,14 +63,14 @@ def test_a_slow_study_shows_progress_within_a_chunk(tmp_path: Path):
         EXAMPLE.read_text().replace('base = "..', f'base = "{ROOT}').replace("ratio = [40, 130]", "ratio = [40, 100]")
     )
     (tmp_path / "s.toml").write_text(text)
-    study = lm.load_study(tmp_path / "s.toml")
+    study = lm.studies.load_study(tmp_path / "s.toml")
     seen: list[int] = []
     lm.study(study, tmp_path / "rows", progress=seen.append)
     assert 20 < study.total < 40
     assert seen == [0, 20, study.total]
 
 
-def test_the_command_line_shows_the_selection(selection: tuple[lm.Study, Path]):
+def test_the_command_line_shows_the_selection(selection: tuple[lm.studies.Study, Path]):
     _, directory = selection
     done = CliRunner().invoke(app, ["study", "show", str(directory), "--best", "energy:largest"])
     assert done.exit_code == 0, done.output
@@ -95,7 +95,7 @@ def test_the_command_line_shows_the_selection(selection: tuple[lm.Study, Path]):
     assert shown["Pareto front"] == {r["gearbox"] for r in rows if r["Pareto front"] == "yes"}
     assert all(r["why"] for r in rows if r["fits"] == "no")
     assert not any(r["why"] for r in rows if r["fits"] == "yes")
-    assert {r["gearbox"] for r in rows} == set(lm.load_study(EXAMPLE).vary[0].names)
+    assert {r["gearbox"] for r in rows} == set(lm.studies.load_study(EXAMPLE).vary[0].names)
 
 
 def made(*rows: tuple[str, str, float, float]) -> list[Candidate]:
@@ -159,7 +159,7 @@ def test_directions_and_limits_of_a_selection(tmp_path: Path):
         'limits = { stuck_share = { max = "40 percent" }, "load.inertia" = { min = "1.7 kg*m^2", max = 2.4 } }\n'
     )
     (tmp_path / "s.toml").write_text(text)
-    study = lm.load_study(tmp_path / "s.toml")
+    study = lm.studies.load_study(tmp_path / "s.toml")
     table = read_table(lm.study(study, tmp_path / "rows"))
     rows = table.to_pylist()
     assert "violated" not in table.column_names
@@ -193,7 +193,7 @@ def test_a_bad_selection_ends_in_one_clear_line(tmp_path: Path, select: str, mat
     path = tmp_path / "s.toml"
     path.write_text(text[: text.index("[select]")] + "[select]\n" + select)
     with pytest.raises(lm.InputError, match=match) as caught:
-        lm.load_study(path)
+        lm.studies.load_study(path)
     assert "\n" not in str(caught.value)
 
 
@@ -201,10 +201,10 @@ def test_a_name_of_the_drive_check_s_columns_is_taken(tmp_path: Path):
     text = EXAMPLE.read_text().replace('base = "..', f'base = "{ROOT}').replace("travel", "why")
     (tmp_path / "s.toml").write_text(text)
     with pytest.raises(lm.InputError, match="keeps 'why', a name that is taken"):
-        lm.load_study(tmp_path / "s.toml")
+        lm.studies.load_study(tmp_path / "s.toml")
 
 
-def test_best_takes_a_direction(selection: tuple[lm.Study, Path]):
+def test_best_takes_a_direction(selection: tuple[lm.studies.Study, Path]):
     study, directory = selection
     energies = [e for e in read_table(directory)["energy"].to_pylist() if math.isfinite(e)]
     for text, title, first in (
@@ -222,7 +222,7 @@ def test_best_takes_a_direction(selection: tuple[lm.Study, Path]):
         best_lines(directory, "gearbox")
 
 
-def test_the_names_of_the_pareto_front_stand_within_the_axes(selection: tuple[lm.Study, Path]):
+def test_the_names_of_the_pareto_front_stand_within_the_axes(selection: tuple[lm.studies.Study, Path]):
     study, directory = selection
     table = read_table(directory)
     ranked = candidates(table, study)

@@ -43,13 +43,13 @@ KEEP = {
 }
 
 
-def make(**changes) -> lm.Study:
-    return lm.Study(
+def make(**changes) -> lm.studies.Study:
+    return lm.studies.Study(
         **({"scenario": BELT, "design": "sobol", "runs": 48, "seed": 5, "vary": VARY, "keep": KEEP} | changes)
     )
 
 
-def rows_of(study: lm.Study, directory: Path, **how) -> dict[str, list]:
+def rows_of(study: lm.studies.Study, directory: Path, **how) -> dict[str, list]:
     return read_table(lm.study(study, directory, **how)).to_pydict()
 
 
@@ -134,7 +134,7 @@ def test_entries_of_lists_and_coupled_keys_vary(tmp_path: Path):
         {"key": "command.first_motor.steps.1.height", "values": [0.2, 0.4]},
         {"keys": [f"gears.{n}_gear.stiffness.backlash" for n in ("first", "second")], "values": ["2 arcmin", 0]},
     ]
-    study = lm.Study(scenario=RING.replace(**steps), vary=vary, keep={"x": "final(ring_angle)"})
+    study = lm.studies.Study(scenario=RING.replace(**steps), vary=vary, keep={"x": "final(ring_angle)"})
     rows = rows_of(study, tmp_path / "s")
     assert len(set(rows["x"])) == 4
     last = scenario_of_run(study, 3)
@@ -154,10 +154,10 @@ peak = "peak(strain_wave_twist)"
 """
 
 
-def read(tmp_path: Path, text: str) -> lm.Study:
+def read(tmp_path: Path, text: str) -> lm.studies.Study:
     path = tmp_path / "s.toml"
     path.write_text(STUDY.format(text=text))
-    return lm.load_study(path)
+    return lm.studies.load_study(path)
 
 
 def test_a_gearbox_and_a_motor_of_the_catalogue_vary_at_their_place(tmp_path: Path):
@@ -266,7 +266,7 @@ def test_a_motor_named_as_a_key_of_the_short_form_is_not_mistaken():
     with pytest.raises(
         lm.InputError, match=r"varies command\.frequency, which is a key of the short form, too; rename"
     ):
-        lm.Study(
+        lm.studies.Study(
             scenario=data, vary=[{"key": "command.frequency", "values": [1.0]}], keep={"x": "peak(frequency_torque)"}
         )
 
@@ -367,7 +367,7 @@ def smallest_bias(tmp_path: Path, torque: float, losses: tuple[float, float], wa
         "simulation.sample_interval": 4e-3,
     }
     signal = {"ramps": [{"rise": 0.1, "duration": ramp, "begin": 0.1}]}
-    study = lm.Study(
+    study = lm.studies.Study(
         scenario=ring(friction, losses, **steady, **{f"command.{name}_motor": signal for name in NAMES}),
         design="list",
         vary=[

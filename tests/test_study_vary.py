@@ -27,8 +27,8 @@ def write(tmp_path: Path, text: str, base: Path = JOINT) -> Path:
     return path
 
 
-def rows_of(path: Path, tmp_path: Path) -> tuple[lm.Study, dict]:
-    study = lm.load_study(path)
+def rows_of(path: Path, tmp_path: Path) -> tuple[lm.studies.Study, dict]:
+    study = lm.studies.load_study(path)
     return study, read_table(lm.study(study, tmp_path / "rows")).to_pydict()
 
 
@@ -38,7 +38,7 @@ def test_a_row_of_a_gearbox_equals_the_single_run_with_it(tmp_path: Path, key: s
     assert rows[key] == list(GEARBOXES)
     short = {"simulation.duration": 0.2, "simulation.sample_interval": 0.002}
     for run, name in enumerate(GEARBOXES):
-        part = lm.gearbox(name).model_copy(update={"hysteresis": lm.Hysteresis(efficiency=0.95)})  # beside `from`
+        part = lm.gearbox(name).model_copy(update={"hysteresis": lm.model.Hysteresis(efficiency=0.95)})  # beside `from`
         single = lm.load(JOINT, short).model_copy(update={"gearbox": part})
         assert scenario_of_run(study, run).gearbox.model_copy(update={"note": ""}) == part.model_copy(
             update={"note": ""}
@@ -132,7 +132,7 @@ def test_a_constant_load_torque_varies_in_its_own_unit(tmp_path: Path):
     assert [scenario_of_run(study, run).load.torque.mean for run in range(2)] == [3.0, 5.0]
     assert study.vary[0].unit == "N*m"
     with pytest.raises(lm.InputError, match='"3,5 N\\*m" has a decimal comma'):
-        lm.load_study(write(tmp_path, '[[vary]]\nkey = "load.torque"\nvalues = ["3,5 N*m"]', OVERRUNNING))
+        lm.studies.load_study(write(tmp_path, '[[vary]]\nkey = "load.torque"\nvalues = ["3,5 N*m"]', OVERRUNNING))
 
 
 def test_runs_that_fail_are_counted_on_the_command_line(tmp_path: Path):
@@ -174,7 +174,7 @@ def test_runs_that_fail_are_counted_on_the_command_line(tmp_path: Path):
 )
 def test_what_is_wrong_with_a_parameter_is_said_in_the_words_of_the_file(tmp_path: Path, text: str, sentence: str):
     with pytest.raises(lm.InputError) as caught:
-        lm.load_study(write(tmp_path, f"[[vary]]\n{text}"))
+        lm.studies.load_study(write(tmp_path, f"[[vary]]\n{text}"))
     assert sentence in str(caught.value)
     assert not re.search("True|'", str(caught.value))
 
@@ -183,7 +183,7 @@ def test_the_catalogue_is_filtered_by_figures(tmp_path: Path):
     filters = (
         '{ kind = "strain_wave", ratio = [90, 110], rated_output_torque = ["20 N*m", "60 N*m"], maker = "Schae*" }'
     )
-    study = lm.load_study(write(tmp_path, f'[[vary]]\nkey = "gearbox"\ncatalogue = {filters}'))
+    study = lm.studies.load_study(write(tmp_path, f'[[vary]]\nkey = "gearbox"\ncatalogue = {filters}'))
     fitting = {
         r.name
         for r in lm.catalogue()
@@ -196,7 +196,7 @@ def test_the_catalogue_is_filtered_by_figures(tmp_path: Path):
     }
     assert set(study.vary[0].values) == fitting
     assert len(fitting) > 1
-    everything = lm.load_study(write(tmp_path, '[[vary]]\nkey = "gearbox"\ncatalogue = {}'))
+    everything = lm.studies.load_study(write(tmp_path, '[[vary]]\nkey = "gearbox"\ncatalogue = {}'))
     assert everything.total == sum(isinstance(r, GearboxSheet) for r in lm.catalogue())
 
 
@@ -211,7 +211,9 @@ def test_a_record_with_gaps_is_a_row_that_says_what_it_lacks(tmp_path: Path):
 def test_a_sheet_of_one_s_own_stands_beside_the_study(tmp_path: Path):
     sheet = (ROOT / "src" / "lostmotion" / "data_sheets" / "gearbox-template.toml").read_text()
     (tmp_path / "own.toml").write_text(sheet)
-    study = lm.load_study(write(tmp_path, f'[[vary]]\nkey = "gearbox"\nvalues = ["own.toml", "{GEARBOXES[0]}"]'))
+    study = lm.studies.load_study(
+        write(tmp_path, f'[[vary]]\nkey = "gearbox"\nvalues = ["own.toml", "{GEARBOXES[0]}"]')
+    )
     assert study.vary[0].names == (str(tmp_path / "own.toml"), GEARBOXES[0])
     assert scenario_of_run(study, 0).gearbox.ratio == 100.0
 
@@ -286,7 +288,7 @@ values = [1.0, 1.2]
 def test_what_cannot_vary_ends_in_one_clear_line(tmp_path: Path, text: str, match: str):
     path = write(tmp_path, f"[[vary]]\n{text}", OVERRUNNING)
     with pytest.raises(lm.InputError, match=match) as caught:
-        lm.load_study(path)
+        lm.studies.load_study(path)
     assert "\n" not in str(caught.value)
     assert str(caught.value).startswith(str(path))
 
@@ -294,7 +296,7 @@ def test_what_cannot_vary_ends_in_one_clear_line(tmp_path: Path, text: str, matc
 def test_a_record_varied_twice_is_refused(tmp_path: Path):
     one, other = (f'[[vary]]\nkey = "{k}"\nvalues = ["{GEARBOXES[0]}"]\n' for k in ("gearbox", "gearbox.from"))
     with pytest.raises(lm.InputError, match="which are the same"):
-        lm.load_study(write(tmp_path, one + other))
+        lm.studies.load_study(write(tmp_path, one + other))
 
 
 def test_lists_of_lists_are_scaled_too(tmp_path: Path):
@@ -306,7 +308,7 @@ def test_lists_of_lists_are_scaled_too(tmp_path: Path):
 
 
 def test_a_study_made_in_python_varies_records_as_well(tmp_path: Path):
-    study = lm.Study(
+    study = lm.studies.Study(
         scenario=lm.load(OVERRUNNING, {"simulation.duration": 0.1}),
         vary=[{"key": "gearbox", "values": GEARBOXES}],
         keep={"peak": "peak(twist)"},

@@ -241,7 +241,7 @@ def test_a_train_a_linear_model_and_an_explanation_take_it() -> None:
     speeds = [lm.simulate(s)[v].values for s, v in ((train, "a_speed"), (start, "motor_speed"))]
     assert speeds[0] == pytest.approx(speeds[1], rel=1e-12, abs=1e-12)
     assert np.array_equal(*(lm.linearize(s, lm.Initial()).A for s in (scenario, of_dc)))
-    assert lm.rigid_constants(scenario).bandwidth == lm.rigid_constants(of_dc).bandwidth
+    assert lm.response.rigid_constants(scenario).bandwidth == lm.response.rigid_constants(of_dc).bandwidth
     assert lm.explain(scenario, 0.01).command_limit == 1.0
     assert lm.explain(train, 0.01).motors[0].command_limit == 1.0
     again = lm.Scenario.from_json(scenario.to_json())
@@ -274,7 +274,7 @@ def test_its_voltage_is_changed_by_dc_voltage_and_by_nothing_else(tmp_path) -> N
 def test_a_study_varies_it_as_single_runs_do(tmp_path, key, values) -> None:
     """The numbers of the core follow from these keys, so none is written into it by itself."""
     base = axis(motor(), 0.4)
-    study = lm.Study(scenario=base, vary=[{"key": key, "values": values}], keep={"end": "final(motor_speed)"})
+    study = lm.studies.Study(scenario=base, vary=[{"key": key, "values": values}], keep={"end": "final(motor_speed)"})
     ends = read_table(lm.study(study, tmp_path / "s")).to_pydict()["end"]
     single = [float(lm.simulate(base.replace(**{key: v}))["motor_speed"][-1]) for v in values]
     assert ends == single

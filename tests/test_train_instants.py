@@ -36,7 +36,7 @@ def chain(inertias: list[float], stiffnesses: list[float], damping: float = 0.0)
                 input=names[k],
                 output=names[k + 1],
                 ratio=1.0,
-                stiffness=lm.LinearStiffness(stiffness=c),
+                stiffness=lm.model.LinearStiffness(stiffness=c),
                 mesh_damping=damping,
             )
             for k, c in enumerate(stiffnesses)
@@ -232,7 +232,7 @@ def test_an_arm_under_gravity_is_the_pendulum_of_the_textbook() -> None:
     arm = lm.DriveTrain(
         shafts={"arm": lm.Shaft(inertia=J - ROTOR, viscous_friction=0.4)},
         motors={"m": lm.ShaftMotor(shaft="arm", kind="torque_source", rotor_inertia=ROTOR)},
-        gravity={"g": lm.Gravity(shaft="arm", mass=1.0, radius=weight / 9.80665, error=1e-6)},
+        gravity={"g": lm.model.Gravity(shaft="arm", mass=1.0, radius=weight / 9.80665, error=1e-6)},
     )
     for angle in (0.0, 1.0, math.pi):
         model = lm.linearize(arm, lm.TrainInitial(angles={"arm": angle}))

@@ -77,7 +77,7 @@ def test_a_drive_in_the_long_form_has_the_same_motion_and_response_to_the_last_b
         assert np.array_equal(of_drive["harmonics"].sel(output=short), of_train["harmonics"].sel(output=long))
     for key in ("motor_power", "load_power", "gear_loss", "efficiency", "angle_advance", "residual"):
         assert np.array_equal(of_drive[key], of_train[key], equal_nan=True)
-    assert lm.bandwidth(drive, 1.0) == lm.bandwidth(train, 1.0)
+    assert lm.response.bandwidth(drive, 1.0) == lm.response.bandwidth(train, 1.0)
 
 
 def test_a_chain_of_four_masses_follows_its_transfer_function_over_four_decades() -> None:
@@ -206,7 +206,10 @@ REFUSED = [
         "source is missing, and there is not one motor alone; name an input: ",
     ),
     (lambda t: lm.frequency_response(t, [1.0], [0.1], source="command"), 'source "command" is not known; it must be '),
-    (lambda t: lm.bandwidth(t, 0.1, source="left_command", output="load_speed"), 'output "load_speed" is not known'),
+    (
+        lambda t: lm.response.bandwidth(t, 0.1, source="left_command", output="load_speed"),
+        'output "load_speed" is not known',
+    ),
     (
         lambda t: lm.frequency_response(t, [1.0], [0.1], source="left_command", mean_command=0.1),
         "mean_command: is for drives",
@@ -232,7 +235,7 @@ def test_a_start_of_the_other_kind_is_refused() -> None:
 
 def test_different_starts_lead_to_one_motion_of_a_train_once() -> None:
     starts = [lm.TrainInitial(), lm.TrainInitial(speeds={"motor": 3.0})]
-    assert len(lm.periodic_motions(lm.TrainScenario(**TWO_STAGES), starts=starts)) == 1
+    assert len(lm.response.periodic_motions(lm.TrainScenario(**TWO_STAGES), starts=starts)) == 1
 
 
 def test_the_command_draws_the_response_of_a_train(tmp_path: Path) -> None:

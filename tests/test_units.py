@@ -381,12 +381,12 @@ def test_every_unit_of_the_schema_can_be_written():
     found = (
         units(scenario)
         | units(train)
-        | units(lm.GearboxSheet.model_json_schema())
-        | units(lm.MotorSheet.model_json_schema())
-        | units(lm.ScrewSheet.model_json_schema())
-        | units(lm.RackSheet.model_json_schema())
-        | units(lm.BeltSheet.model_json_schema())
-        | units(lm.LinearMotorSheet.model_json_schema())
+        | units(lm.data_sheets.GearboxSheet.model_json_schema())
+        | units(lm.data_sheets.MotorSheet.model_json_schema())
+        | units(lm.data_sheets.ScrewSheet.model_json_schema())
+        | units(lm.data_sheets.RackSheet.model_json_schema())
+        | units(lm.data_sheets.BeltSheet.model_json_schema())
+        | units(lm.data_sheets.LinearMotorSheet.model_json_schema())
         | units(lm.PositionReference.model_json_schema())
     )
     assert {"rad/s^2", "rad/s^3"} <= found
@@ -411,7 +411,7 @@ def doors(text: str, tmp_path: Path) -> dict[str, str]:
         "scenario": lambda: lm.load(tmp_path / "s.toml"),
         "override": lambda: lm.load(base, [f"load.inertia={text}"]),
         "mapping": lambda: lm.load(base, {"load.inertia": text}),
-        "study": lambda: lm.load_study(tmp_path / "study.toml"),
+        "study": lambda: lm.studies.load_study(tmp_path / "study.toml"),
         "sheet": lambda: parse_sheets({"gearbox": [entry]}, "x.toml"),
         "record": lambda: gearbox_from_record("paper-gearbox", [f"inertia={text}"]),
         "constructor": lambda: lm.Load(inertia=text),
@@ -450,11 +450,11 @@ def test_scenarios_studies_sheets_overrides_and_constructors_read_alike(tmp_path
     )
     gearbox = lm.load(base).gearbox
     (sheet,) = parse_sheets({"gearbox": [{"name": "x", "kind": "other", "ratio": 10, "rated_input_speed": text}]}, "")
-    assert isinstance(sheet, lm.GearboxSheet)
+    assert isinstance(sheet, lm.data_sheets.GearboxSheet)
     for found in (
         lm.load(tmp_path / "s.toml").gearbox.rated_input_speed,
         lm.load(base, [f"{key}={text}"]).gearbox.rated_input_speed,
-        lm.load_study(tmp_path / "study.toml").vary[0].values[0],
+        lm.studies.load_study(tmp_path / "study.toml").vary[0].values[0],
         sheet.rated_input_speed,
         gearbox_from_record("paper-gearbox", [f"rated_input_speed={text}"])[0].rated_input_speed,
         lm.Gearbox(**(gearbox.model_dump() | {"rated_input_speed": text})).rated_input_speed,

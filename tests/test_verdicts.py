@@ -161,7 +161,7 @@ def test_hunting_slower_than_the_first_watch_is_found_with_its_cause() -> None:
     assert 1.0 / cycle.whole.frequency == pytest.approx(period, rel=0.01)
     assert 2.0 * cycle.whole.motor_amplitude == pytest.approx(np.ptp(angle[late]), rel=0.02)
     assert "dry friction" in cycle.causes
-    assert lm.limit_cycle(scenario, causes=False).verdict == "hunts"
+    assert lm.servo.limit_cycle(scenario, causes=False).verdict == "hunts"
 
 
 def test_the_time_of_the_break_away_follows_from_the_stuck_state() -> None:
@@ -289,7 +289,7 @@ def test_hunting_through_the_gap_is_found_and_rest_without_it() -> None:
     scenario = rotary_table(position_encoder={"shaft": "load", "bits": 20})
     r = lm.simulate(scenario, duration=60.0, energy=False)
     late = r.time.values > 30.0
-    found = lm.limit_cycle(scenario, causes=False)
+    found = lm.servo.limit_cycle(scenario, causes=False)
     assert found.verdict == "hunts"
     assert 2.0 * found.amplitudes["load_angle"] == pytest.approx(np.ptp(r.load_angle.values[late]), rel=0.1)
     assert np.ptp(r.twist.values[late]) > math.radians(3.0 / 60.0)  # the motor crosses the whole gap

@@ -21,6 +21,7 @@ from conftest import for_all
 from lostmotion.identification.parameters import FreeParameter
 from lostmotion.inputs.part import Part
 from lostmotion.studies.select import Selection
+from public_names import PATHS, public
 
 WRONG: list[Any] = [
     5,
@@ -58,9 +59,11 @@ HEAT = lm.simulate(HEATED)
 RESPONSE = lm.frequency_response(SCENARIO, [1.0, 2.0, 4.0], [0.5, 1.0], threads=1)
 LINEAR = lm.linearize(SCENARIO, lm.Initial())
 SHEET = next(r for r in lm.catalogue() if r.name == "schaeffler-rt1-h-20-100")
-RIG = lm.TestRig(SCENARIO.gearbox)
-SCREW = lm.Screw(input="motor", output="table", lead="10 mm", stiffness="200 N/um", efficiency=0.9)
-STUDY = lm.Study(scenario=SCENARIO, vary=[{"key": "load.inertia", "values": [1.0]}], keep={"top": "peak(load_speed)"})
+RIG = lm.test_rig.TestRig(SCENARIO.gearbox)
+SCREW = lm.model.Screw(input="motor", output="table", lead="10 mm", stiffness="200 N/um", efficiency=0.9)
+STUDY = lm.studies.Study(
+    scenario=SCENARIO, vary=[{"key": "load.inertia", "values": [1.0]}], keep={"top": "peak(load_speed)"}
+)
 
 
 def dangle(*_: object, **__: object) -> None:
@@ -69,12 +72,12 @@ def dangle(*_: object, **__: object) -> None:
 
 # A call of each function that does something, and takes a short time.
 CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
-    "bandwidth": (lm.bandwidth, {"drive": SCENARIO, "amplitude": 1.0, "output": "load_speed", "source": "command", "mean_command": 0.0, "mean_load_torque": 0.0, "lowest": 1.0, "highest": 2.0}),
-    "build_loss_map": (lm.build_loss_map, {"sheet": SHEET, "temperature": None, "loss_factor": 1.0}),
+    "bandwidth": (lm.response.bandwidth, {"drive": SCENARIO, "amplitude": 1.0, "output": "load_speed", "source": "command", "mean_command": 0.0, "mean_load_torque": 0.0, "lowest": 1.0, "highest": 2.0}),
+    "build_loss_map": (lm.data_sheets.build_loss_map, {"sheet": SHEET, "temperature": None, "loss_factor": 1.0}),
     "catalogue": (lm.catalogue, {}),
-    "characteristics": (lm.characteristics, {"response": RESPONSE, "drive": SCENARIO, "output": "load_speed"}),
+    "characteristics": (lm.response.characteristics, {"response": RESPONSE, "drive": SCENARIO, "output": "load_speed"}),
     "check_drive": (lm.check_drive, {"scenario": SCENARIO}),
-    "description": (lm.description, {"scenario": SCENARIO, "parameters": False}),
+    "description": (lm.portable.description, {"scenario": SCENARIO, "parameters": False}),
     "export_fmu": (lm.export_fmu, {"scenario": SCENARIO, "path": "drive.fmu", "fmi": 2, "controllers": True, "references": False, "libraries": None}),
     "energy_of": (lm.energy_of, {"dataset": RESULT}),
     "explain": (lm.explain, {"what": SCENARIO, "time": 0.01}),
@@ -83,48 +86,48 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "linearize": (lm.linearize, {"drive": SCENARIO, "state": lm.Initial(), "command": 0.0, "load_torque": 0.0, "command_rate": 0.0, "load_torque_rate": 0.0, "time": None, "inputs": None, "input_rates": None}),
     "linearize of a train": (lm.linearize, {"drive": TRAIN, "state": lm.TrainInitial(), "inputs": {}, "input_rates": {}}),
     "live": (lm.live, {"scenario": SCENARIO, "height": 400}),
-    "LivePage": (lm.LivePage, {"scenario": SCENARIO, "height": 400}),
+    "LivePage": (lm.live_page.LivePage, {"scenario": SCENARIO, "height": 400}),
     "load": (lm.load, {"source": "paper-2dof-nl-small", "overrides": {}}),
-    "load_study": (lm.load_study, {"path": "none.toml"}),
-    "measure": (lm.measure, {"gearbox": None, "sheet": None, "notes": (), "progress": dangle}),
+    "load_study": (lm.studies.load_study, {"path": "none.toml"}),
+    "measure": (lm.test_rig.measure, {"gearbox": None, "sheet": None, "notes": (), "progress": dangle}),
     "motor": (lm.motor, {"name": "paper-motor", "voltage_limit": None}),
-    "motor_current": (lm.motor_current, {"result": HEAT, "motor": None}),
-    "overrunning": (lm.overrunning, {"gear": SCENARIO.gearbox, "load_torque": 10.0, "input_speed": 100.0}),
-    "self_locking": (lm.self_locking, {"train": SCENARIO.drive().train(), "gear": "gearbox", "load_torque": 10.0, "input_speed": 100.0}),
+    "motor_current": (lm.sizing.motor_current, {"result": HEAT, "motor": None}),
+    "overrunning": (lm.sizing.overrunning, {"gear": SCENARIO.gearbox, "load_torque": 10.0, "input_speed": 100.0}),
+    "self_locking": (lm.sizing.self_locking, {"train": SCENARIO.drive().train(), "gear": "gearbox", "load_torque": 10.0, "input_speed": 100.0}),
     "open_result": (lm.open_result, {"path": "none.csv"}),
     "periodic_motion": (lm.periodic_motion, {"drive": SCENARIO, "command": None, "load_torque": 0.0, "multiple": 1, "start": lm.Initial(), "max_periods": 5}),
-    "periodic_motions": (lm.periodic_motions, {"drive": SCENARIO, "command": None, "load_torque": 0.0, "starts": [lm.Initial()], "multiples": [1]}),
-    "rigid_constants": (lm.rigid_constants, {"drive": lm.load("paper-1dof-l-small"), "motor_time_constant": None, "time_constant": None}),
+    "periodic_motions": (lm.response.periodic_motions, {"drive": SCENARIO, "command": None, "load_torque": 0.0, "starts": [lm.Initial()], "multiples": [1]}),
+    "rigid_constants": (lm.response.rigid_constants, {"drive": lm.load("paper-1dof-l-small"), "motor_time_constant": None, "time_constant": None}),
     "save": (lm.save, {"dataset": RESULT, "path": "out.csv"}),
-    "scenario_of": (lm.scenario_of, {"dataset": RESULT}),
+    "scenario_of": (lm.simulation.scenario_of, {"dataset": RESULT}),
     "shipped_scenarios": (lm.shipped_scenarios, {}),
     "simulate": (lm.simulate, {"scenario_or_drive": SCENARIO, "command": 0.0, "load_torque": 0.0, "duration": 0.01, "sample_interval": 0.001, "initial": None, "solver": "exact", "relative_tolerance": None, "energy": True, "law": None, "sensitivities": None, "output": "dataset"}),
     "study": (lm.study, {"what": STUDY, "directory": "study", "threads": 1, "executor": None, "repair": False, "progress": None}),
     "switchings_of": (lm.switchings_of, {"result": RESULT}),
-    "as_filter": (lm.as_filter, {"system": scipy.signal.dlti([1.0], [1.0, -0.5], dt=1e-3)}),
-    "as_state_space": (lm.as_state_space, {"system": scipy.signal.lti([1.0], [1.0, 1.0])}),
-    "limit_cycle": (lm.limit_cycle, {"scenario": HUNTING, "motor": None, "causes": False}),
-    "hunting_map": (lm.hunting_map, {"scenario": HUNTING, "grid": {"shafts.table.inertia": [0.8]}, "variable": None, "threads": 1, "progress": dangle}),
+    "as_filter": (lm.control.as_filter, {"system": scipy.signal.dlti([1.0], [1.0, -0.5], dt=1e-3)}),
+    "as_state_space": (lm.control.as_state_space, {"system": scipy.signal.lti([1.0], [1.0, 1.0])}),
+    "limit_cycle": (lm.servo.limit_cycle, {"scenario": HUNTING, "motor": None, "causes": False}),
+    "hunting_map": (lm.servo.hunting_map, {"scenario": HUNTING, "grid": {"shafts.table.inertia": [0.8]}, "variable": None, "threads": 1, "progress": dangle}),
     "pointing_budget": (lm.pointing_budget, {"scenario": TRACKING, "after": 0.0, "view": None, "robustness": False, "progress": dangle}),
-    "first_task": (lm.first_task, {"directory": "none", "home": "", "rig": "", "progress": dangle}),
+    "first_task": (lm.identification.first_task, {"directory": "none", "home": "", "rig": "", "progress": dangle}),
     "spectrum": (lm.spectrum, {"scenario": SCENARIO, "against": "motor", "motor": None, "start": None, "max_order": 4.0}),
-    "Findings": (lm.Findings, {"findings": ()}),
+    "Findings": (lm.sizing.Findings, {"findings": ()}),
     "identify": (lm.identify, {"source": "none.toml", "threads": 1, "profiles": False, "progress": dangle}),
-    "load_identification": (lm.load_identification, {"path": "none.toml"}),
-    "read_log": (lm.read_log, {"path": "none.csv", "time": "", "decimal": ""}),
-    "write_campaign": (lm.write_campaign, {"directory": "none", "gearbox": SCENARIO.gearbox, "title": "", "ripple": None, "seed": 1, "progress": dangle}),
-    "design_experiment": (lm.design_experiment, {"result": 5, "plans": [], "deviation": None}),
+    "load_identification": (lm.identification.load_identification, {"path": "none.toml"}),
+    "read_log": (lm.identification.read_log, {"path": "none.csv", "time": "", "decimal": ""}),
+    "write_campaign": (lm.identification.write_campaign, {"directory": "none", "gearbox": SCENARIO.gearbox, "title": "", "ripple": None, "seed": 1, "progress": dangle}),
+    "design_experiment": (lm.identification.design_experiment, {"result": 5, "plans": [], "deviation": None}),
     "commission": (lm.commission, {"scenario": SCENARIO, "motor": None, "window": None, "progress": dangle}),
     "tune": (lm.tune, {"scenario": SCENARIO, "rule": "identical_damping", "damping": 0.7, "phase_margin": 1.0, "goal": "bandwidth", "sensitivity_peak": 1.7, "feedforward": False, "motor": None}),
     "select": (lm.select, {"task": "task.toml", "directory": None, "threads": 1, "executor": None, "progress": None}),
-    "load_task": (lm.load_task, {"path": "task.toml"}),
-    "temperatures": (lm.temperatures, {"result": HEAT, "motor": None, "ambient": 25.0, "winding": 25.0, "case": 25.0, "repeated": False, "constant_resistance": False}),
-    "to_control": (lm.to_control, {"response": RESPONSE, "amplitude": 1.0, "output": "load_speed"}),
+    "load_task": (lm.studies.load_task, {"path": "task.toml"}),
+    "temperatures": (lm.sizing.temperatures, {"result": HEAT, "motor": None, "ambient": 25.0, "winding": 25.0, "case": 25.0, "repeated": False, "constant_resistance": False}),
+    "to_control": (lm.response.to_control, {"response": RESPONSE, "amplitude": 1.0, "output": "load_speed"}),
     "Simulation": (lm.Simulation, {"drive": SCENARIO, "step": 1e-3, "initial": None, "loaded": None, "given": None, "law": None, "error_bound": False}),
     "Simulation of a train": (lm.Simulation, {"drive": TRAIN, "step": 1e-3, "initial": None, "loaded": ["worm"]}),
-    "measure_screw": (lm.measure_screw, {"screw": SCREW, "sheet": None, "load": 1000.0, "progress": dangle}),
-    "TestRig": (lm.TestRig, {"gearbox": SCENARIO.gearbox}),
-    "ResultAccessor": (lm.ResultAccessor, {"dataset": RESULT}),
+    "measure_screw": (lm.test_rig.measure_screw, {"screw": SCREW, "sheet": None, "load": 1000.0, "progress": dangle}),
+    "TestRig": (lm.test_rig.TestRig, {"gearbox": SCENARIO.gearbox}),
+    "ResultAccessor": (lm.reports.ResultAccessor, {"dataset": RESULT}),
     "InputError": (lm.InputError, {"text": "x"}),
     "Simulation.reset": (lambda **a: lm.Simulation(SCENARIO).reset(**a), {"initial": lm.Initial()}),
     "Simulation.advance": (lambda **a: lm.Simulation(SCENARIO).advance(**a), {"interval": 1e-3, "command": 0.0, "load_torque": 0.0}),
@@ -176,7 +179,7 @@ SLOW = {
 
 
 def names() -> list[str]:
-    return [name for name in lm.__all__ if callable(getattr(lm, name))]
+    return [name for name in PATHS if callable(public(name))]
 
 
 def refused_plainly(call: Callable[[], Any], where: str) -> None:
@@ -206,15 +209,15 @@ def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @for_all(names())
 def test_an_exported_name_refuses_wrong_objects_by_place(name: str) -> None:
-    exported = getattr(lm, name)
+    exported = public(name)
     for wrong in WRONG:
         refused_plainly(lambda wrong=wrong: exported(wrong), f"{name}({wrong!r:.30})")
         refused_plainly(lambda wrong=wrong: exported(wrong, wrong), f"{name}(two of {wrong!r:.30})")
 
 
-@for_all(n for n in names() if inspect.isclass(getattr(lm, n)) and issubclass(getattr(lm, n), Part))
+@for_all(n for n in names() if inspect.isclass(public(n)) and issubclass(public(n), Part))
 def test_a_part_refuses_wrong_objects_under_each_key(name: str) -> None:
-    part = getattr(lm, name)
+    part = public(name)
     for key in part.model_fields:
         for wrong in WRONG:
             refused_plainly(lambda key=key, wrong=wrong: part(**{key: wrong}), f"{name}({key}={wrong!r:.30})")
@@ -266,10 +269,10 @@ def test_a_number_of_any_library_is_the_same_number_everywhere() -> None:
     curve = np.array([[0.1, 0.2], [0.3, 0.4]])
     losses = {"kind": "map", "mirrored": np.True_, "speeds": np.array([0.0, 1.0]), "loads": (0, np.float64(1.0))}
     listed = {"kind": "map", "mirrored": True, "speeds": [0.0, 1.0], "loads": [0.0, 1.0], "values": curve.tolist()}
-    assert lm.LossMap(**losses, values=curve) == lm.LossMap(**listed)
-    assert lm.LossMap(**losses, values=xr.DataArray(curve)) == lm.LossMap(**listed)
+    assert lm.model.LossMap(**losses, values=curve) == lm.model.LossMap(**listed)
+    assert lm.model.LossMap(**losses, values=xr.DataArray(curve)) == lm.model.LossMap(**listed)
     assert lm.CommandSignal.model_validate(np.array(0.3)) == lm.CommandSignal(mean=0.3)
-    assert lm.Encoder(lines=np.array(2048)) == lm.Encoder(lines=2048)
+    assert lm.control.Encoder(lines=np.array(2048)) == lm.control.Encoder(lines=2048)
     for made in SCALARS_OF_FLOATS:
         number = made(0.25)
         assert lm.Load(inertia=number).inertia == 0.25
@@ -279,7 +282,7 @@ def test_a_number_of_any_library_is_the_same_number_everywhere() -> None:
         assert lm.gearbox("paper-gearbox", added_backlash=number) == lm.gearbox("paper-gearbox", added_backlash=0.25)
         assert lm.motor("paper-motor", voltage_limit=number).voltage_limit == 0.25
         vary = [{"key": "load.inertia", "values": [number]}, {"key": "load.torque", "uniform": (0, number)}]
-        study = lm.Study(
+        study = lm.studies.Study(
             scenario=SCENARIO, vary=vary, keep={"top": "peak(load_speed)"}, design="sobol", runs=np.int64(2)
         )
         assert (study.vary[0].values, study.vary[1].uniform, study.runs) == ((0.25,), (0.0, 0.25), 2)
@@ -322,7 +325,7 @@ def test_what_is_nearly_a_number_is_refused_with_the_reason(value: Any, sentence
 
 def test_every_function_and_argument_is_tried() -> None:
     for name in names():
-        exported = getattr(lm, name)
+        exported = public(name)
         own = inspect.isclass(exported) and (
             is_dataclass(exported) or issubclass(exported, Part | ImportError | RuntimeError)
         )
@@ -333,7 +336,7 @@ def test_every_function_and_argument_is_tried() -> None:
 
 
 SENTENCES = [
-    (lambda: lm.TestRig(5), 'gearbox: 5 must be a Gearbox, such as gearbox("schaeffler-rt1-h-20-100") returns'),
+    (lambda: lm.test_rig.TestRig(5), 'gearbox: 5 must be a Gearbox, such as gearbox("schaeffler-rt1-h-20-100") returns'),
     (lambda: lm.open_result(5), "path: 5 must be text, or the name of a file or directory"),
     (lambda: lm.save(5, "x.csv"), "dataset: 5 must be a dataset, such as simulate returns"),
     (lambda: lm.save(xr.Dataset(), "x.csv"), "this dataset is no result over time"),
@@ -355,7 +358,7 @@ def test_what_is_wanted_is_said(call: Callable[[], Any], sentence: str) -> None:
 
 
 def test_numbers_may_be_text_with_a_unit_on_the_rig_too() -> None:
-    rig = lm.TestRig(SCENARIO.gearbox)
+    rig = lm.test_rig.TestRig(SCENARIO.gearbox)
     same = rig.efficiency_map(["3000 rpm"], ["50 %"])
     assert float(same["input_speed"][0]) == pytest.approx(100.0 * np.pi)
     assert same.identical(rig.efficiency_map([3000.0 * np.pi / 30.0], [0.5])) or np.allclose(
@@ -380,7 +383,7 @@ MISSPELT: list[tuple[Callable[[], Any], str]] = [
     (lambda: SCENARIO.motor.at_voltage(volts=24), "Motor.at_voltage() has no argument volts; its arguments are voltage"),
     (lambda: RIG.backlash(torqe=1.0), "TestRig.backlash() has no argument torqe; did you mean torque?"),
     (lambda: lm.Load(inertja=1.0), "key inertja: is not known; did you mean inertia?"),
-    (lambda: lm.Law(dangle, sates=1), "Law() has no argument sates; did you mean states?"),
+    (lambda: lm.control.Law(dangle, sates=1), "Law() has no argument sates; did you mean states?"),
 ]  # fmt: skip
 
 

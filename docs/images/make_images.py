@@ -45,7 +45,7 @@ def tutorial() -> None:
     rig.savefig(HERE / "rig.png", dpi=80, metadata={"Software": None})
 
 
-def selection(study: lm.Study, name: str) -> None:
+def selection(study: lm.studies.Study, name: str) -> None:
     with tempfile.TemporaryDirectory() as directory:
         table = read_table(lm.study(study, Path(directory) / "selection"))
     ranked = candidates(table, study)
@@ -65,5 +65,5 @@ if __name__ == "__main__":
     tracking()
     tutorial()
     examples = HERE.parents[1] / "examples"
-    selection(lm.load_study(examples / "select-gearbox.toml"), "selection.png")
-    selection(lm.load_task(examples / "select-axis.toml"), "select-axis.png")
+    selection(lm.studies.load_study(examples / "select-gearbox.toml"), "selection.png")
+    selection(lm.studies.load_task(examples / "select-axis.toml"), "select-axis.png")

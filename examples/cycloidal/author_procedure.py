@@ -88,7 +88,7 @@ def coulomb_friction(scenario: lm.TrainScenario) -> float:
     return float(torque[forward].mean() - torque[back].mean()) / 2
 
 
-def tests_of(result: lm.IdentificationResult, *, simulated: bool) -> list[np.ndarray]:
+def tests_of(result: lm.identification.IdentificationResult, *, simulated: bool) -> list[np.ndarray]:
     """The logs of an identification, with the position that was measured, or that of the identified drive under the same torque."""
     tests = []
     for log in result.logs:

@@ -64,7 +64,7 @@ def explanations(scenario: lm.Scenario | lm.TrainScenario, name: str) -> list[di
         else:
             told = lm.explain(scenario, time)
         contacts = [(c.name, c.mode, c.speed, c.torque, c.capacity_forward, c.capacity_backward) for c in told.contacts]
-        if isinstance(told, lm.Explanation):
+        if isinstance(told, lm.simulation.Explanation):
             motors = [("motor", told.command_forward, told.command_backward)]
         else:
             motors = [(m.name, m.command_forward, m.command_backward) for m in told.motors]

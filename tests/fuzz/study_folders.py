@@ -35,7 +35,7 @@ peak_load_speed = "peak(load_speed)"
 """
     folder = Path(mkdtemp(prefix="fuzz-study-"))
     (folder / "study.toml").write_text(text)
-    lm.study(lm.load_study(folder / "study.toml"), folder / "study", threads=1)
+    lm.study(lm.studies.load_study(folder / "study.toml"), folder / "study", threads=1)
     return folder / "study", read_table(folder / "study")
 
 

@@ -1,1 +1,5 @@
 """Identification: from measured logs to the values of a drive, their intervals, and what the logs cannot tell."""
+
+from ..namespace import namespace
+
+__getattr__, __dir__ = namespace(__name__)

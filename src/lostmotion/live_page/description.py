@@ -10,7 +10,7 @@ import numpy as np
 
 from ..model.signals import Signal
 from ..model.torsion import TorsionCurve
-from ..portable.description import described
+from ..portable.descriptions import described
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario, need_free_motion
 from ..units.practical import ARCMIN

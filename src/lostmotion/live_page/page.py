@@ -11,7 +11,7 @@ from pathlib import Path
 from ..atomic_writer import write_bytes
 from ..errors import InputError
 from ..portable.checkout import made_here
-from ..portable.description import kernel_of
+from ..portable.descriptions import kernel_of
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
 from .description import describe

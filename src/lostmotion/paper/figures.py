@@ -11,7 +11,7 @@ import numpy as np
 from ..model.losses import LossMap
 from ..reports.pages import panels_csv, plain, table_csv
 from ..reports.panels import COMMAND_STYLE, STYLES, Chart, Curve, Drawing, Ground, Panel, scientific, step
-from ..response.bandwidth import THREE_DECIBELS
+from ..response.crossovers import THREE_DECIBELS
 from ..response.linear import rigid_constants
 from .drive import AMPLITUDES, MODELS, paper_scenario
 from .facts import Facts

@@ -27,7 +27,7 @@ from ..simulation.train_scenario import TrainScenario
 from ..simulation.train_variables import axis_variables
 from . import fmi2, fmi3
 from .checkout import made_here
-from .description import kernel_of, numbers_of, written
+from .descriptions import kernel_of, numbers_of, written
 from .fmu_model import Declared, Model, page
 from .parameters import Parameter, parameters_of
 

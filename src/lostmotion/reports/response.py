@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..atomic_writer import write_bytes
-from ..response.bandwidth import characteristics
+from ..response.crossovers import characteristics
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
 from .page import Headline, Prose, Report, Table

@@ -165,7 +165,7 @@ class Simulation:
                 )
             if not all(one.repeatable for one in laws.values()):
                 raise InputError(
-                    "error_bound: needs a law that may be called again; give lm.Law(function, repeatable=True)"
+                    "error_bound: needs a law that may be called again; give lm.control.Law(function, repeatable=True)"
                 )
             self._bound = StepBound(_Coarser(drive, step=step, loaded=loaded, given=given, law=law), of_windings)
         self.reset(initial)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..response.bandwidth import bandwidth
+from ..response.crossovers import bandwidth
 from ..simulation.results import add_efficiency
 from ..simulation.scenario import Scenario
 from ..simulation.variables import CHANNEL_NAMES

@@ -1,1 +1,5 @@
 """The virtual test rig."""
+
+from ..namespace import namespace
+
+__getattr__, __dir__ = namespace(__name__)

@@ -98,8 +98,8 @@ def measure_screw(
     Examples
     --------
     >>> import lostmotion as lm
-    >>> screw = lm.Screw(input="m", output="t", lead="10 mm", stiffness="200 N/um", backlash="5 um", efficiency=0.9)
-    >>> report = lm.measure_screw(screw)
+    >>> screw = lm.model.Screw(input="m", output="t", lead="10 mm", stiffness="200 N/um", backlash="5 um", efficiency=0.9)
+    >>> report = lm.test_rig.measure_screw(screw)
     >>> [round(k / 1e6, 3) for k in report.stiffness], round(1e6 * report.lost_motion, 3)
     ([200.0], 5.3)
     """

@@ -49,7 +49,7 @@ class ScrewRig:
     Examples
     --------
     >>> import lostmotion as lm
-    >>> screw = lm.Screw(input="motor", output="table", lead="10 mm", stiffness="200 N/um", efficiency=0.9, drag_torque=0.1)
+    >>> screw = lm.model.Screw(input="motor", output="table", lead="10 mm", stiffness="200 N/um", efficiency=0.9, drag_torque=0.1)
     >>> rig = ScrewRig(screw, load=1000.0)
     >>> round(rig.stiffness()[0] / 1e6), round(rig.drag_torque(100.0), 6), round(rig.efficiency(1.0), 6)
     (200, 0.1, 0.9)

@@ -109,7 +109,7 @@ def first_task(
     >>> with TemporaryDirectory() as folder:
     ...     rows = [f"{0.01 * k},{k % 7}" for k in range(20)]
     ...     _ = Path(folder, "log.csv").write_text("\\n".join(["time [s],angle [deg]", *rows]))
-    ...     text = lm.first_task(folder)
+    ...     text = lm.identification.first_task(folder)
     >>> print(*[line for line in text.splitlines() if "ample time" in line])
     # Sample time: 10 ms; logs last 0.19 s.
     """

@@ -1,0 +1,9 @@
+from .gearbox_sheet import GearboxSheet as GearboxSheet
+from .linear_sheets import BeltSheet as BeltSheet
+from .linear_sheets import LinearMotorSheet as LinearMotorSheet
+from .linear_sheets import RackSheet as RackSheet
+from .linear_sheets import ScrewSheet as ScrewSheet
+from .loss_map_builder import BuiltMap as BuiltMap
+from .loss_map_builder import build_loss_map as build_loss_map
+from .motor_sheet import MotorSheet as MotorSheet
+from .sheet import Source as Source

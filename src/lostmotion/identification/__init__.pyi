@@ -1,0 +1,14 @@
+from .campaign import write_campaign as write_campaign
+from .design import Candidate as Candidate
+from .design import design_experiment as design_experiment
+from .errors_of_logs import LogError as LogError
+from .identifiability import Undetermined as Undetermined
+from .identify import IdentificationResult as IdentificationResult
+from .intervals import Interval as Interval
+from .ladder import RungResult as RungResult
+from .logs import Channel as Channel
+from .logs import Log as Log
+from .new_task import first_task as first_task
+from .readers import read_log as read_log
+from .task import Identification as Identification
+from .task import load_identification as load_identification

@@ -1,0 +1,100 @@
+"""Public names of a package, imported when they are first used, so that `import lostmotion` stays quick.
+
+The file `__init__.pyi` of a package states its public names, one import a line. Type checkers read it, and so does this module.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import re
+import sys
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+_TOP = "lostmotion"
+_LINE = re.compile(r"from (\.[\w.]*) import (\w+) as \2\n")
+
+# Modules whose functions return datasets: importing one of their names registers the accessor `result.lm`.
+_WITH_DATASETS = (
+    "response.crossovers",
+    "response.harmonic",
+    "response.shooting",
+    "servo.hunting",
+    "simulation.result_files",
+    "simulation.results",
+    "simulation.run",
+    "simulation.switchings",
+    "test_rig.measurement",
+    "test_rig.rig",
+)
+# Modules whose results notebooks show as the page that the command writes.
+_WITH_PAGES = (
+    "identification.identify",
+    "pointing.budget",
+    "servo.commission",
+    "sizing.drive_check",
+    "test_rig.measurement",
+)
+
+
+def homes_of(package: str) -> dict[str, str]:
+    """Public names of a package, each with the absolute name of the module that defines it."""
+    stub = Path(str(sys.modules[package].__file__)).with_suffix(".pyi").read_text(encoding="utf-8")
+    return {name: importlib.util.resolve_name(home, package) for home, name in _LINE.findall(stub)}
+
+
+def namespace(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """`__getattr__` and `__dir__` of a package whose public names are those of its stub."""
+    homes: dict[str, str] = {}
+
+    def known() -> dict[str, str]:
+        if not homes:
+            homes.update(homes_of(package))
+        return homes
+
+    def get(name: str) -> Any:
+        if name == "__all__":
+            return [*known()]
+        if name not in known():
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        value = _public(known()[name], name)
+        setattr(sys.modules[package], name, value)
+        return value
+
+    def names() -> list[str]:
+        return [*known()]
+
+    return get, names
+
+
+def _public(home: str, name: str) -> Any:
+    if home == _TOP:  # a namespace
+        return importlib.import_module(f"{_TOP}.{name}")
+    module = importlib.import_module(home)
+    inner = home.removeprefix(f"{_TOP}.")
+    if inner in _WITH_DATASETS:
+        importlib.import_module(f"{_TOP}.reports.accessor")
+    if inner in _WITH_PAGES:
+        importlib.import_module(f"{_TOP}.reports.notebook").attach(module)
+    return getattr(module, name)
+
+
+def moved(name: str) -> Any:
+    """The value of a name that used to be flat in `lostmotion`, from its namespace, with a warning.
+
+    Raises AttributeError where no namespace has the name.
+    """
+    spaces = [space for space, home in homes_of(_TOP).items() if home == _TOP]
+    for space in spaces:
+        module = importlib.import_module(f"{_TOP}.{space}")
+        if name in homes_of(module.__name__):
+            warnings.warn(
+                f"{_TOP}.{name} is now {_TOP}.{space}.{name}; the old name will go in the next release",
+                DeprecationWarning,
+                stacklevel=3,
+            )
+            return getattr(module, name)
+    raise AttributeError(f"module {_TOP!r} has no attribute {name!r}")

@@ -1,0 +1,1 @@
+from .descriptions import description as description

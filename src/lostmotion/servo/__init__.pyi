@@ -1,0 +1,15 @@
+from .commission import LoopSheet as LoopSheet
+from .commission import ServoReport as ServoReport
+from .commission import Stiffness as Stiffness
+from .hunting import Hunting as Hunting
+from .hunting import hunting_map as hunting_map
+from .hunting import limit_cycle as limit_cycle
+from .margins import Bandwidth as Bandwidth
+from .margins import Instability as Instability
+from .margins import Margins as Margins
+from .motion import AtRest as AtRest
+from .motion import Following as Following
+from .motion import LimitCycle as LimitCycle
+from .motion import Settling as Settling
+from .motion import StepResponse as StepResponse
+from .tuning import Tuning as Tuning

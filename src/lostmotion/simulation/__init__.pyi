@@ -1,0 +1,10 @@
+from .explanation import ContactState as ContactState
+from .explanation import Explanation as Explanation
+from .explanation import MotorState as MotorState
+from .results import RunArrays as RunArrays
+from .results import scenario_of as scenario_of
+from .stepping import SimulationState as SimulationState
+from .train_scenario import ShaftTable as ShaftTable
+from .train_scenario import SlideTable as SlideTable
+from .variables import VARIABLES as VARIABLES
+from .variables import Variable as Variable
