@@ -1,5 +1,7 @@
 """Identification files: logs, the rig as a scenario, what is sought, what is compared."""
 
+from __future__ import annotations
+
 import itertools
 from collections.abc import Mapping
 from pathlib import Path

@@ -62,7 +62,11 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
     that to the function. ``Any`` is not checked. A wrong number of arguments or an unknown name is an `ArgumentError`.
     """
     signature = inspect.signature(function)
-    wanted = {p.name: str(p.annotation) for p in signature.parameters.values() if p.annotation is not p.empty}
+    wanted = {p.name: p.annotation for p in signature.parameters.values() if p.annotation is not p.empty}
+    if evaluated := [name for name, annotation in wanted.items() if not isinstance(annotation, str)]:
+        raise TypeError(
+            f"{function.__module__}: {evaluated[0]} is checked by the name of its annotation; import annotations from __future__"
+        )
     wanted = {name: annotation for name, annotation in wanted.items() if annotation != "Any"}
     known = function.__globals__
 

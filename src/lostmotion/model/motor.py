@@ -1,5 +1,7 @@
 """Motors: parameters and ratings."""
 
+from __future__ import annotations
+
 import math
 from typing import Annotated, Literal, Self
 
