@@ -122,18 +122,21 @@ class TrainDescription : public model::TrainDescription {
     }
     void add_gear(const std::string& name, const std::string& input, const std::string& output, const Named& parameters,
                   const TorsionCurve* curve, const LossMap* map,
-                  const std::optional<std::pair<double, double>>& efficiencies, double mesh_damping,
+                  const std::optional<std::pair<double, double>>& efficiencies, bool damping_limited,
                   const model::PeriodicCurve* transmission_error) {
-        Gearbox law = with_parameters(parameters).gears[0].law;
+        model::Gear gear = with_parameters(parameters).gears[0];
         if (curve != nullptr) {
-            law.compliance = Gearbox::torsion_curve;
-            law.curve = *curve;
+            gear.law.compliance = Gearbox::torsion_curve;
+            gear.law.curve = *curve;
         }
         if (map != nullptr) {
-            law.losses = Gearbox::loss_map;
-            law.map = *map;
+            gear.law.losses = Gearbox::loss_map;
+            gear.law.map = *map;
         }
-        model::TrainDescription::add_gear(name, input, output, law, efficiencies, mesh_damping, transmission_error);
+        if (efficiencies) gear.efficiencies.emplace(efficiencies->first, efficiencies->second);
+        gear.damping_limited = damping_limited;
+        if (transmission_error != nullptr) gear.transmission_error = *transmission_error;
+        model::TrainDescription::add_gear(name, input, output, std::move(gear));
     }
 
     void add(const std::string& table, const std::string& name, const std::string& shaft, const nb::dict& fields) {
@@ -376,7 +379,7 @@ inline void bind_train(nb::module_& m) {
         .def("add_motor", &TrainDescription::add_motor, "name"_a, "shaft"_a, "parameters"_a, "torque_source"_a,
              "torque_limit"_a)
         .def("add_gear", &TrainDescription::add_gear, "name"_a, "input"_a, "output"_a, "parameters"_a,
-             "torsion_curve"_a.none(), "loss_map"_a.none(), "efficiencies"_a.none(), "mesh_damping"_a,
+             "torsion_curve"_a.none(), "loss_map"_a.none(), "efficiencies"_a.none(), "damping_limited"_a,
              "transmission_error"_a.none())
         .def("set_domain", &TrainDescription::set_domain, "shaft"_a, "domain"_a)
         .def("set_housing", &TrainDescription::set_housing, "gear"_a, "shaft"_a)

@@ -18,7 +18,7 @@ static void stop_if(int failed, const char* why) {
 
 int main(void) {
     const lm_parameter motor[] = {{"motor.rotor_inertia", 1e-4}, {"motor.rated_torque", 1.0}};
-    const lm_parameter gear[] = {{"gearbox.ratio", 50.0}};
+    const lm_parameter gear[] = {{"gearbox.ratio", 50.0}, {"gearbox.mesh_damping", 20.0}};
     const double stiffness[] = {1e4}, efficiencies[] = {0.44, -0.2};
     const lm_curve mesh = {NULL, stiffness, 0};
     double *state, *variables, *inputs;
@@ -30,7 +30,7 @@ int main(void) {
     lm_add_shaft(train, "worm", 0.0, 1e-3, 0.0, 0.0, NULL, 0);
     lm_add_shaft(train, "drum", 0.5, 0.0, 0.0, 0.0, NULL, 1);
     lm_add_motor(train, "motor", "worm", motor, 2, 1, INFINITY);
-    lm_add_gear(train, "gear", "worm", "drum", gear, 1, &mesh, NULL, efficiencies, 20.0, NULL);
+    lm_add_gear(train, "gear", "worm", "drum", gear, 2, &mesh, NULL, efficiencies, NULL);
     s = lm_simulation_new(train, 1e-3);
     stop_if(s == NULL, lm_train_error(train));
     lm_train_free(train);

@@ -94,7 +94,7 @@ class Train:
                 curve = c.byref(Curve(doubles(breaks), doubles(slopes), len(breaks)))
             both = doubles(g.losses.efficiencies()) if hasattr(g.losses, "efficiencies") else None
             parameters = self.parameters(g, "gearbox")
-            self.add("lm_add_gear", name, g.input, g.output, *parameters, curve, None, both, g.mesh_damping, None)
+            self.add("lm_add_gear", name, g.input, g.output, *parameters, curve, None, both, None)
         for name, b in train.brakes.items():
             self.add("lm_add_brake", name, b.shaft, b.torque, b.breakaway_torque or 0.0)
         for name, k in train.clutches.items():

@@ -455,8 +455,10 @@ def test_lossy_gear_with_bearing_friction() -> None:
     close(speeds(scenario, "a", "b"), np.array([expected, expected / 2.0]).T)
 
 
-def test_elastic_backlash() -> None:
-    """Backlash with ElastoBacklash2: the flanks push as spring and damper, and part where these would pull."""
+@pytest.mark.parametrize("limited", [False, True])
+def test_elastic_backlash(limited: bool) -> None:
+    """Backlash with ElastoBacklash2: the flanks push as spring and damper, and part where these would pull. With ElastoBacklash
+    (limited) the torque of the damper is at most that of the spring as well."""
     J, c, d, half = 5.0, 2e4, 50.0, math.pi / 8.0
     scenario = lm.TrainScenario(
         shafts={"inertia": {"inertia": J, "torque": 0.0}, "wall": {"inertia": 1.0}},
@@ -467,6 +469,7 @@ def test_elastic_backlash() -> None:
                 "ratio": 1.0,
                 "stiffness": {"kind": "curve", "backlash": 2.0 * half, "slopes": [c]},
                 "mesh_damping": d,
+                "damping_limited": limited,
             }
         },
         brakes={"ground": {"shaft": "wall", "torque": 1e6}},
@@ -477,30 +480,48 @@ def test_elastic_backlash() -> None:
     result = lm.simulate(scenario)
     times = result["time"].values
     expected = np.zeros((2, len(times)))
-    t, y, touching, events = 0.0, [0.5 * math.pi, 0.0], True, 0
+    t, y, events = 0.0, [0.5 * math.pi, 0.0], 0
+    law = "both"  # of the flank on this side: gap, both, or the doubled spring while the damping is limited
     while t < 1.0:
         side = 1.0 if y[0] > 0.0 else -1.0
 
-        def force(y: Sequence[float], side: float = side) -> float:
-            return side * (c * (y[0] - side * half) + d * y[1])
+        def spring(y: Sequence[float], side: float = side) -> float:
+            return c * (side * y[0] - half)
 
-        def leaves(t: float, y: Sequence[float], force: Any = force) -> float:
-            return float(force(y))
+        def torque(y: Sequence[float], side: float = side, law: str = law) -> float:
+            if law == "gap":
+                return 0.0
+            return 2.0 * spring(y) if law == "doubled" else spring(y) + d * side * y[1]
 
-        leaves.terminal, leaves.direction = True, -1  # type: ignore[attr-defined]
-        rates = (
-            (lambda t, y, force=force, side=side: [y[1], -side * force(y) / J])
-            if touching
-            else (lambda t, y: [y[1], 0.0])
-        )
-        if not touching:  # to the other flank: the one that was left lies behind
-            crossing = (half + side * y[0]) / abs(y[1])
-            part = solve_ivp(rates, (t, min(1.0, t + crossing)), y, "DOP853", dense_output=True, **TIGHT)
-        else:
-            part = solve_ivp(rates, (t, 1.0), y, "DOP853", dense_output=True, events=[leaves], **TIGHT)
+        def rates(t: float, y: Sequence[float], side: float = side, torque: Any = torque) -> list[float]:
+            return [y[1], -side * torque(y) / J]
+
+        def pressed(t: float, y: Sequence[float], side: float = side) -> float:
+            return spring(y) + d * side * y[1]
+
+        def spare(
+            t: float, y: Sequence[float], side: float = side, way: float = 1.0 if law == "both" else -1.0
+        ) -> float:
+            return way * (spring(y) - d * side * y[1])
+
+        pressed.terminal, pressed.direction = True, -1  # type: ignore[attr-defined]
+        spare.terminal, spare.direction = limited, -1  # type: ignore[attr-defined]
+        end = 1.0
+        if law == "gap":  # to the other flank: the one that was left lies behind
+            end = min(1.0, t + (half + side * y[0]) / abs(y[1]))
+        guards = {"gap": [], "both": [pressed, spare] if limited else [pressed], "doubled": [spare]}[law]
+        part = solve_ivp(rates, (t, end), y, "DOP853", dense_output=True, events=guards, **TIGHT)
         inside = (times >= t) & (times <= part.t[-1])
         expected[:, inside] = part.sol(times[inside])
-        t, y, touching, events = float(part.t[-1]), list(part.y[:, -1]), not touching, events + 1
-    assert events >= 8
+        t, y, events = float(part.t[-1]), list(part.y[:, -1]), events + 1
+        if law == "gap":
+            law = "doubled" if limited else "both"
+        else:
+            law = "gap" if law == "both" and len(part.t_events[0]) else "doubled" if law == "both" else "both"
+    assert events >= (12 if limited else 8)
     close(result["mesh_twist"].values, expected[0])
     close(result["inertia_speed"].values, expected[1])
+    if limited:
+        torques = result["mesh_output_torque"].values
+        springs = c * (np.abs(expected[0]) - half).clip(0.0)
+        assert np.all(np.abs(torques) <= 2.0 * springs + 1e-5)

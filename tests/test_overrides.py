@@ -69,6 +69,8 @@ OTHER = {
     "gearbox.limits.momentary_output_torque": "3 Nm",
     "gearbox.limits.average_input_speed": "100 rpm",
     "gearbox.limits.max_input_speed": "100 rpm",
+    "gearbox.mesh_damping": "20 N*m*s/rad",
+    "gearbox.damping_limited": True,
     "gearbox.note": "worn",
     "gearbox.temperature": "60 degC",
     "gearbox.added_backlash": "1 arcmin",
@@ -89,6 +91,7 @@ REFUSED = {
     "gearbox.losses.loads": "rows of values",
     "gearbox.losses.values": "rows of values",
     "gearbox.losses.mirrored": "must begin at 0",
+    "gearbox.damping_limited": "needs mesh_damping",
 }
 
 

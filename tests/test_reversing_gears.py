@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -106,10 +107,76 @@ def test_linear_models_of_a_reversing_gear_have_the_same_poles() -> None:
     assert np.allclose(*poles, rtol=1e-12, atol=1e-12)
 
 
-def test_ratio_zero_and_a_reversing_inverse_model_are_refused() -> None:
-    with pytest.raises(InputError, match="has the ratio 0; give input speed / output speed"):
-        lm.Gear(input="a", output="b", ratio=0.0)
-    with pytest.raises(InputError, match="reverses; what loads drive has a verdict for ratios above 0"):
-        lm.sizing.self_locking(axis(-6.0, "two efficiencies", "spring", 0).train(), "g", 5.0)
-    with pytest.raises(InputError, match="ratio: -50"):
-        lm.load("paper-2dof-nl-small").replace(**{"gearbox.ratio": -50.0})
+MIRRORED = ("load_speed", "load_angle", "load_contact", "twist", "output_torque", "twist_contact")
+
+
+@pytest.mark.parametrize("name", ["paper-2dof-nl-small", "paper-2dof-nl-large", "paper-2dof-l-large"])
+def test_a_drive_whose_gearbox_reverses_moves_its_load_mirrored(name: str) -> None:
+    straight = lm.load(name)
+    reverse = straight.replace(**{"gearbox.ratio": -straight.gearbox.ratio})
+    a, b = lm.simulate(straight), lm.simulate(reverse)
+    for variable in a.data_vars:
+        sign = -1.0 if variable in MIRRORED else 1.0
+        assert np.array_equal(sign * b[variable].values + 0.0, a[variable].values + 0.0, equal_nan=True), variable
+    one, other = (lm.Simulation(s) for s in (straight, reverse))
+    for simulation in (one, other):
+        simulation.advance(0.2, command=0.9, load_torque=0.0)
+    assert one["efficiency"] == other["efficiency"] != 0.0
+    assert lm.test_rig.TestRig(reverse.gearbox).gearbox == straight.gearbox
+
+
+@pytest.mark.parametrize("gear", ["two efficiencies", "self-locking", "map"])
+@pytest.mark.parametrize("between", [2.0, -2.0])
+def test_what_a_load_does_to_a_reversing_gear_is_what_it_does_to_another(gear: str, between: float) -> None:
+    """A stage of 2:1 before it, which may reverse too."""
+    found = []
+    for ratio, belt in ((6.0, 2.0), (-6.0, between)):
+        tables = axis(ratio, gear, "spring", 3).model_dump(exclude_none=True)
+        tables["gears"]["g"].pop("hysteresis")
+        tables["shafts"]["rotor"] = {"inertia": 0.0, "friction_torque": 0.02}
+        tables["shafts"]["motor"]["inertia"] = 2e-3
+        tables["motors"]["m"]["shaft"] = "rotor"
+        losses = {"kind": "mesh_efficiency", "drive_efficiency": 0.9, "backdrive_efficiency": 0.8}
+        tables["gears"]["belt"] = {"input": "rotor", "output": "motor", "ratio": belt, "losses": losses}
+        tables["gears"]["belt"]["stiffness"] = {"kind": "linear", "stiffness": 50.0}
+        found.append(lm.sizing.self_locking(lm.TrainScenario(**tables).train(), "g", 5.0))
+    one, other = found
+    # Eigenvalues have roundings of the largest of them, some 100 1/s.
+    assert (one.rate, one.undamped_rate) == pytest.approx((other.rate, other.undamped_rate), abs=1e-11)
+    assert replace(one, rate=0.0, undamped_rate=0.0) == replace(other, rate=0.0, undamped_rate=0.0)
+    assert one.least_torque != 0.0
+
+
+@pytest.mark.parametrize("encoder", ["motor", "load"])
+def test_an_inverse_model_drives_a_reversing_gearbox(encoder: str) -> None:
+    """The reference mirrored, the same torques to the last bit: with the losses of the map, their adaptation and the load observer."""
+    straight = lm.load("position-axis-load-encoder")
+    controller = straight.controller.model_dump(exclude_none=True)
+    controller["inverse_model"] = {
+        "twist_rate": 0.5, "min_speed": 1.0, "loss_adaptation": {"rate": 100.0},
+        "load_observer": {"input_time": 2e-3, "load_time": 2e-2},
+    }  # fmt: skip
+    controller["encoder"] = {"ideal": True}
+    controller["position_encoder"] = {"ideal": True, "shaft": "load"}
+    if encoder == "motor":
+        del controller["position_encoder"]
+    results = []
+    for way in (1.0, -1.0):
+        controller["reference"] = {"kind": "position", "amplitude": way * 0.2, "frequency": 0.5}
+        changes = {"gearbox.ratio": way * straight.gearbox.ratio, "simulation.duration": 3.0}
+        changes["load.torque"] = {"mean": way * 5.0, "amplitude": way * 2.0, "frequency": 0.8}
+        results.append(lm.simulate(straight.replace(controller=controller, **changes)))
+    a, b = results
+    assert float(abs(a["load_angle"]).max()) > 0.1
+    for name, sign in (("motor_torque", 1.0), ("load_angle", -1.0), ("observed_load_torque", -1.0)):
+        assert np.array_equal(sign * b[name].values + 0.0, a[name].values + 0.0), name
+    assert np.array_equal(a["model_loss_factor"].values, b["model_loss_factor"].values)
+
+
+def test_ratio_zero_is_refused() -> None:
+    for make in (
+        lambda: lm.Gear(input="a", output="b", ratio=0.0),
+        lambda: lm.load("paper-2dof-nl-small").replace(**{"gearbox.ratio": 0.0}),
+    ):
+        with pytest.raises(InputError, match="is no ratio; give input speed"):
+            make()

@@ -81,6 +81,7 @@ ELEMENTS = {
     "friction over speed": two_shafts(gears={"g": SOFT}, shafts={"b": {"inertia": 2e-3, "torque": 0.0, **STRIBECK}}),
     "drag": two_shafts(gears={"g": STIFF}, shafts={"b": {"inertia": 2e-3, "torque": 0.0, "drag": FAN}}),
     "damped play": two_shafts(gears={"g": SOFT | {"stiffness": GAP, "mesh_damping": 0.2}}),
+    "limited damping": two_shafts(gears={"g": SOFT | {"stiffness": GAP, "mesh_damping": 0.2, "damping_limited": True}}),
     "torque limit": two_shafts(
         gears={"g": STIFF},
         motors={"m": {"shaft": "a", "kind": "torque_source", "rotor_inertia": 1e-4, "torque_limit": 0.5}},

@@ -28,7 +28,7 @@ extern "C" {
 #endif
 
 /* Rises with every change that a caller has to know of. */
-#define LM_INTERFACE_VERSION 4
+#define LM_INTERFACE_VERSION 5
 LM_API int lm_interface_version(void);
 
 enum {
@@ -199,7 +199,10 @@ LM_API int lm_add_motor(lm_train* train, const char* name, const char* shaft, co
  */
 LM_API int lm_add_gear(lm_train* train, const char* name, const char* input, const char* output,
                        const lm_parameter* parameters, size_t n, const lm_curve* stiffness, const lm_loss_map* losses,
-                       const double* efficiencies, double mesh_damping, const lm_periodic_curve* transmission_error);
+                       const double* efficiencies, const lm_periodic_curve* transmission_error);
+/* Limits the torque of the mesh damping of a gear with backlash to that of its spring, so that no torque jumps where
+ * flanks meet. LM_INVALID: there is none of that name. */
+LM_API int lm_limit_mesh_damping(lm_train* train, const char* gear);
 /* Makes a slide of a shaft: its inertia is a mass [kg], its angle a position [m], torques on it are forces [N], and
  * results have the names "<name>_position" and "<name>_load_force". The ratio of a screw of lead p that drives it is 2
  * pi/p. LM_INVALID: there is none of that name. */

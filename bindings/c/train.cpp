@@ -146,13 +146,13 @@ int lm_add_motor(lm_train* train, const char* name, const char* shaft, const lm_
 
 int lm_add_gear(lm_train* train, const char* name, const char* input, const char* output,
                 const lm_parameter* parameters, size_t n, const lm_curve* stiffness, const lm_loss_map* losses,
-                const double* efficiencies, double mesh_damping, const lm_periodic_curve* transmission_error) {
+                const double* efficiencies, const lm_periodic_curve* transmission_error) {
     return train->attempt([&] {
         const std::string what = "gear '" + text(name) + "'";
         std::string wrong = name_error(*train, name);
         lm::model::Train drive = lm::model::drive_train();
-        lm::Gearbox& law = drive.gears[0].law;
-        lm::model::PeriodicCurve error;
+        lm::model::Gear& gear = drive.gears[0];
+        lm::Gearbox& law = gear.law;
         if (wrong.empty()) wrong = read(parameters, n, what, drive);
         if (wrong.empty() && stiffness != nullptr) {
             law.compliance = lm::Gearbox::torsion_curve;
@@ -163,13 +163,22 @@ int lm_add_gear(lm_train* train, const char* name, const char* input, const char
             wrong = read(*losses, what + ": losses", law.map);
         }
         if (wrong.empty() && transmission_error != nullptr)
-            wrong = read(*transmission_error, what + ": transmission error", error);
+            wrong = read(*transmission_error, what + ": transmission error", gear.transmission_error);
         if (!wrong.empty()) return wrong;
-        std::optional<std::pair<double, double>> both;
-        if (efficiencies != nullptr) both.emplace(efficiencies[0], efficiencies[1]);
-        train->description.add_gear(name, text(input), text(output), law, both, mesh_damping,
-                                    transmission_error == nullptr ? nullptr : &error);
+        if (efficiencies != nullptr) gear.efficiencies.emplace(efficiencies[0], efficiencies[1]);
+        train->description.add_gear(name, text(input), text(output), gear);
         return wrong;
+    });
+}
+
+int lm_limit_mesh_damping(lm_train* train, const char* gear) {
+    return train->attempt([&] {
+        for (lm::model::Gear& g : train->description.train.gears)
+            if (g.name == text(gear)) {
+                g.damping_limited = true;
+                return std::string{};
+            }
+        return "there is no gear '" + text(gear) + "'";
     });
 }
 

@@ -198,7 +198,10 @@ class RandomTrains {
         if (g.rigid()) return g;
         if (coin(0.25)) {
             g.mesh_damping = spread(0.1, 2.0);
-            if (g.has_backlash()) g.law.hysteresis_efficiency = 1.0;
+            if (g.has_backlash()) {
+                g.law.hysteresis_efficiency = 1.0;
+                g.damping_limited = coin(0.5);
+            }
         }
         if (coin(0.15)) {
             g.law.hysteresis_efficiency = 1.0;

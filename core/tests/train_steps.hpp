@@ -97,7 +97,8 @@ class TrainSteps {
         What what;
         int element;
     };
-    // flanks: of each gear, whether damping acts (1), they have parted (-1) or neither (0).
+    // flanks: of each gear, whether damping acts (1), has the torque of the spring (2), they have parted (-1) or
+    // neither (0).
     struct Modes {
         std::vector<int> contact, overrun, flanks;
     };
@@ -201,7 +202,9 @@ class TrainSteps {
             if (modes_.flanks[at(g)] == 0 || !has_gap(g)) continue;
             const double rate = value(twist_rate(g), speed);
             const double P = gear(g).law.curve.torque(twist[at(g)]);
-            if (P * (P + gear(g).mesh_damping * rate) < 0.0) modes_.flanks[at(g)] = -1;
+            const double damping = gear(g).mesh_damping * rate;
+            if (P * (P + damping) < 0.0) modes_.flanks[at(g)] = -1;
+            if (gear(g).damping_limited && P * (damping - P) > 0.0) modes_.flanks[at(g)] = 2;
         }
     }
     // T_2 at the end of the step.
@@ -218,7 +221,11 @@ class TrainSteps {
         const double way = value(rate, speed) >= 0.0 ? small : -small;
         f.one = P;
         f.add(rate, h_ * (e.law.curve.torque(twist[at(g)] + way) - P) / way);
-        if (m.flanks[at(g)] > 0) f.add(rate, e.mesh_damping);
+        if (m.flanks[at(g)] == 1) f.add(rate, e.mesh_damping);
+        if (m.flanks[at(g)] == 2) {
+            f.one += f.one;
+            f.add(rate, h_ * (e.law.curve.torque(twist[at(g)] + way) - P) / way);
+        }
         if (contact >= 0) f.add(torque_of(contact), 1.0);
         return f;
     }

@@ -105,6 +105,7 @@ def gear(random: Random) -> dict[str, Any]:
                 made["hysteresis"] = {"efficiency": random.uniform(0.5, 1.0)}
     if "stiffness" in made and random.random() < 0.4:
         made["mesh_damping"] = spread(random, 1e-2, 1e2)
+        made["damping_limited"] = random.random() < 0.3
     match random.randrange(3):
         case 0:
             forward, backward = random.uniform(0.5, 1.0), random.uniform(-0.3, 0.95)

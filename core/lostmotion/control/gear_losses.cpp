@@ -15,15 +15,15 @@ double GearLosses::output_torque(double T_1, double s, double w, double factor) 
 }
 
 auto GearLosses::at(double T_2, double s, double w) const -> Loss {
-    const double load = s * T_2;
+    const double i = std::fabs(ratio), load = s * std::copysign(1.0, ratio) * T_2;
     if (kind == constant_efficiency) {
         const double slope = load > 0.0 ? 1.0 / efficiency - 1.0 : efficiency - 1.0;
-        return {load * slope / ratio, slope};
+        return {load * slope / i, slope};
     }
     if (kind == none) return {};
     const double mu = load / rated_torque, v = std::fabs(w) / rated_speed;
     const Plane p = map.plane(map.triangle(mu, v));
-    return {(p.at_zero + p.per_speed * v + p.per_load * mu) * rated_torque / ratio, p.per_load};
+    return {(p.at_zero + p.per_speed * v + p.per_load * mu) * rated_torque / i, p.per_load};
 }
 
 }  // namespace lostmotion::control

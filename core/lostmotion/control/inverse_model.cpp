@@ -20,7 +20,7 @@ auto InverseModel::twist(double speed, double acceleration, double observed_load
 }
 
 auto InverseModel::torque(double speed, double acceleration, double observed_load, const double* slot) const -> Known {
-    const double i = losses.ratio, s = sign_of(speed);
+    const double i = losses.ratio, s = sign_of(i * speed);
     const double rate = through_gear ? slot[first_ + 3] : 0.0;
     const double w = i * (speed + rate), T_2 = output_torque(speed, acceleration, observed_load);
     const double Y = s * losses(T_2, s, w), kappa = slot[first_], T_10 = slot[first_ + 1];

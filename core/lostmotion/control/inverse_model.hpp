@@ -1,8 +1,8 @@
 // Feedforward by the drive's own model, with losses that depend on load and speed, and their adaptation: what the
 // reference needs of the motor through one gear.
 //
-//   T_2* = J_Z phi*'' + b_Z phi*' + M_Z,  d* = P^-1(T_2*),  w* = i (phi*' + d*'),  s = sgn phi*'
-//   M_ff = J_MR w*' + b_MR w* + T_2*/i + s T_10 + kappa Y,  Y = s M_2B(T_2*)/i
+//   T_2* = J_Z phi*'' + b_Z phi*' + M_Z,  d* = P^-1(T_2*),  w* = i (phi*' + d*'),  s = sgn(i phi*')
+//   M_ff = J_MR w*' + b_MR w* + T_2*/i + s T_10 + kappa Y,  Y = s M_2B(T_2*)/|i|
 //
 // kappa and T_10 follow the error of the speed (Slotine and Li 1987): kappa' = g_1 e Y, T_10' = g_2 e s.
 #pragma once

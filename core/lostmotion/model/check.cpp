@@ -97,6 +97,8 @@ std::string TrainCheck::elements() const {
             return name + " has a drive efficiency of " + std::to_string(g.efficiencies->driving()) +
                    "; it must be > 0: no torque would turn it";
         if (g.mesh_damping > 0.0 && g.rigid()) return name + " is rigid and has mesh damping; give it a stiffness";
+        if (g.damping_limited && !g.parts_flanks())
+            return name + " limits its mesh damping, which it does not have, or has no backlash; give it both";
         if (g.parts_flanks() && g.law.has_hysteresis())
             return name + " has backlash with both mesh damping and hysteresis; take one of them";
         if (g.transmission_error.present() && (g.rigid() || g.law.has_hysteresis()))

@@ -45,7 +45,7 @@ void Equations::compose_motors(const Key& key, Regime& r) const {
     }
 }
 
-// T_2 = P(d) + H, with damping while the flanks touch; T_1 without the losses that act on the contact of the input
+// T_2 = P(d) + H, with damping while the flanks touch, of a limited one at most another P; T_1 without the losses that act on the contact of the input
 // shaft, which are `loss`: M_2B sign(w)/i with M_2B of one cell of the loss law (12).
 void Equations::compose_gear(int gear, const Key& key, Regime& r, std::vector<Row>& loss) const {
     const Gear& g = train_.gears[gear];
@@ -65,9 +65,11 @@ void Equations::compose_gear(int gear, const Key& key, Regime& r, std::vector<Ro
     Row& T_2 = r.output_torque[gear];
     T_2 = P + H;
     if (p.contact != nowhere) r.contact_torque[p.contact] = H;
-    const bool parted = p.parted != nowhere && key.branch[p.parted] != 0;
-    if (parted)
+    const int flanks = p.flanks == nowhere ? int{Gear::touching} : key.branch[p.flanks];
+    if (flanks == Gear::parted)
         T_2 = Row{};
+    else if (flanks == Gear::limited)
+        T_2 = 2.0 * P;
     else if (g.mesh_damping > 0.0 && !(g.has_backlash() && key.branch[p.piece] == 0) && !forms_.twist_rests(gear, r))
         T_2 += g.mesh_damping * forms_.twist_rate(gear, key);
 

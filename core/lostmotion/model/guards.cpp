@@ -218,11 +218,21 @@ void RegimeGuards::add_twist_pieces(int gear) {
     if (piece > -curve.outermost_piece())
         add(terms_.state(p.twist) - terms_.one(curve.lower(piece)), Guard::edge, p.contact, p.piece, piece - 1).behind =
             slip > 0;
-    if (p.parted == nowhere || piece == 0) return;
-    const bool parted = regime_.key.branch[p.parted] != 0;
-    const Row pressed = terms_.state(p.twist, curve.slope(piece)) + terms_.one(curve.offset(piece)) +
-                        g.mesh_damping * forms_.twist_rate(gear, regime_.key);
-    add(((piece > 0) != parted ? 1.0 : -1.0) * pressed, Guard::edge, p.contact, p.parted, parted ? 0 : 1);
+    if (p.flanks == nowhere || piece == 0) return;
+    const double way = piece > 0 ? 1.0 : -1.0;
+    const Row P = terms_.state(p.twist, curve.slope(piece)) + terms_.one(curve.offset(piece)),
+              damping = g.mesh_damping * forms_.twist_rate(gear, regime_.key), pressed = way * (P + damping),
+              spare = way * (P - damping);
+    const auto change = [&](const Row& form, Gear::Flanks to) {
+        add(form, Guard::edge, p.contact, p.flanks, to);
+    };
+    switch (regime_.key.branch[p.flanks]) {
+        case Gear::parted: return change(-1.0 * pressed, Gear::touching);
+        case Gear::limited: return change(-1.0 * spare, Gear::touching);
+        default:
+            change(pressed, Gear::parted);
+            if (g.damping_limited) change(spare, Gear::limited);
+    }
 }
 
 void RegimeGuards::add_speed_pieces(int shaft) {

@@ -48,13 +48,13 @@ void SwitchedTrain<Sizes>::locate(const Now& now, Key& trial) const {
         const double d = now.x[p.twist];
         const int piece = gear.law.curve.locate(d);
         set(p.piece, piece);
-        if (p.parted == nowhere) continue;
+        if (p.flanks == nowhere) continue;
         const double w_in = now.x[places().shafts[gear.input].speed], w_out = now.x[places().shafts[gear.output].speed];
         double rate = assembly_.per_input(static_cast<int>(g), trial) * w_in - w_out;
         if (gear.housing != nowhere)
             rate += assembly_.per_housing(static_cast<int>(g), trial) * now.x[places().shafts[gear.housing].speed];
-        const double pressed = gear.law.curve.torque(d) + gear.mesh_damping * rate;
-        set(p.parted, piece != 0 && piece * pressed < 0.0 ? 1 : 0);
+        set(p.flanks, piece == 0 ? Gear::touching
+                                 : gear.flanks(piece, gear.law.curve.torque(d), gear.mesh_damping * rate));
     }
     for (std::size_t k = 0; k < train().controllers.size(); ++k) {
         const int branch = places().controllers[k].branch;

@@ -148,7 +148,7 @@ std::vector<std::string> branch_names(const Assembly& a) {
                                                                      : ": piece of the torsion curve"));
         set(p.gears[k].cell, name + ": cell of the losses");
         set(p.gears[k].cell_back, name + ": cell of the losses backward");
-        set(p.gears[k].parted, name + ": flanks parted");
+        set(p.gears[k].flanks, name + ": flanks parted, or their damping at its limit");
         set(p.gears[k].error_piece, name + ": piece of the transmission error");
         set(p.gears[k].error_corner, name + ": rest on a corner of the transmission error");
     }

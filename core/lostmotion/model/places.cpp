@@ -158,7 +158,7 @@ void Places::place_memory_and_branches(const Train& train) {
             gears[k].cell = next++;
             gears[k].cell_back = next++;
         }
-        if (g.parts_flanks()) gears[k].parted = next++;
+        if (g.parts_flanks()) gears[k].flanks = next++;
         if (g.transmission_error.present()) {
             gears[k].error_piece = next++;
             if (shafts[g.input].contact != nowhere && g.housing == nowhere) gears[k].error_corner = next++;

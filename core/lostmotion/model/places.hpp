@@ -29,7 +29,7 @@ struct MotorPlace {
 struct GearPlace {
     int twist = nowhere, contact = nowhere;
     int hysteresis = nowhere;                                                                           // memory
-    int piece = nowhere, cell = nowhere, cell_back = nowhere, parted = nowhere, error_piece = nowhere;  // branches
+    int piece = nowhere, cell = nowhere, cell_back = nowhere, flanks = nowhere, error_piece = nowhere;  // branches
     int error_corner = nowhere;  // branch: +1, -1: the input shaft rests on the upper, the lower end of that piece
     int error_turn = nowhere;    // memory
 };

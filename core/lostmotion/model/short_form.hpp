@@ -41,6 +41,7 @@ template <double Shaft::* member>
 double& of_load(Train& t) {
     return t.shafts[1].*member;
 }
+inline double& mesh_damping(Train& t) { return t.gears[0].mesh_damping; }
 inline double& friction_of_load(Train& t) { return t.shafts[1].friction.torque; }
 
 inline constexpr std::array parameters{
@@ -56,6 +57,7 @@ inline constexpr std::array parameters{
     Parameter{"gearbox.viscous_friction", "N*m*s/rad", of_gearbox<&Gearbox::viscous_friction>},
     Parameter{"gearbox.rated_input_speed", "rad/s", of_gearbox<&Gearbox::rated_input_speed>},
     Parameter{"gearbox.rated_output_torque", "N*m", of_gearbox<&Gearbox::rated_output_torque>},
+    Parameter{"gearbox.mesh_damping", "N*m*s/rad", mesh_damping},
     Parameter{"gearbox.hysteresis.efficiency", "", of_gearbox<&Gearbox::hysteresis_efficiency>},
     Parameter{"gearbox.losses.efficiency", "", of_gearbox<&Gearbox::efficiency>},
     Parameter{"load.inertia", "kg*m^2", of_load<&Shaft::inertia>},

@@ -3,17 +3,11 @@
 namespace lostmotion::model {
 
 void TrainDescription::add_gear(const std::string& name, const std::string& input, const std::string& output,
-                                const Gearbox& law, const std::optional<std::pair<double, double>>& efficiencies,
-                                double mesh_damping, const PeriodicCurve* transmission_error) {
-    Gear g;
-    g.name = name;
-    g.input = place_of(input);
-    g.output = place_of(output);
-    g.law = law;
-    if (efficiencies) g.efficiencies.emplace(efficiencies->first, efficiencies->second);
-    g.mesh_damping = mesh_damping;
-    if (transmission_error != nullptr) g.transmission_error = *transmission_error;
-    train.gears.push_back(std::move(g));
+                                Gear gear) {
+    gear.name = name;
+    gear.input = place_of(input);
+    gear.output = place_of(output);
+    train.gears.push_back(std::move(gear));
 }
 
 void TrainDescription::set_housing(const std::string& gear, const std::string& shaft) {

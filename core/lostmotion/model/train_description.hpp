@@ -19,10 +19,7 @@ class TrainDescription {
     void add_motor(const std::string& name, const std::string& shaft, const Motor& law, double torque_limit) {
         train.motors.push_back({name, place_of(shaft), law, torque_limit});
     }
-    // efficiencies: driving and overrunning, in place of the losses of the law.
-    void add_gear(const std::string& name, const std::string& input, const std::string& output, const Gearbox& law,
-                  const std::optional<std::pair<double, double>>& efficiencies, double mesh_damping,
-                  const PeriodicCurve* transmission_error);
+    void add_gear(const std::string& name, const std::string& input, const std::string& output, Gear gear);
     // Puts the housing of a gear, by default on the frame, on a shaft.
     void set_housing(const std::string& gear, const std::string& shaft);
     // What acts on one shaft.

@@ -27,12 +27,20 @@ struct Gear {
     std::optional<MeshEfficiency> efficiencies;  // of both directions of power flow, in place of the law's losses
     // Mesh damping [N m s/rad, at the output]: acts while the flanks touch. They part when P + c d' would pull.
     double mesh_damping = 0.0;
+    // The torque of the damping is at most that of the spring, |c d'| <= |P|, so that none jumps where flanks meet.
+    bool damping_limited = false;
     PeriodicCurve transmission_error;  // e [rad, at the output] over the angle of the input shaft
 
     bool rigid() const { return law.compliance == Gearbox::rigid; }
     bool has_dry_losses() const { return efficiencies || law.losses == Gearbox::loss_map; }
     bool has_backlash() const { return !rigid() && law.curve.slope(0) == 0.0; }
     bool parts_flanks() const { return mesh_damping > 0.0 && has_backlash(); }
+    enum Flanks { touching, parted, limited };
+    // Of flanks on one side of the gap (way: +1 or -1), from P and c d'.
+    Flanks flanks(double way, double P, double damping) const {
+        if (way * (P + damping) < 0.0) return parted;
+        return damping_limited && way * (damping - P) > 0.0 ? limited : touching;
+    }
     // i < 0: the output turns against the input. Losses see the torque in the direction in which the input turns it.
     double sense() const { return law.ratio < 0.0 ? -1.0 : 1.0; }
     double reduction() const { return std::fabs(law.ratio); }

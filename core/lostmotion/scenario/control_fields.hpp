@@ -43,7 +43,9 @@ void describe(F& f, Sensor& s) {
 template <class F>
 void describe(F& f, GearLosses& l) {
     f.choice("kind", l.kind, {"none", "constant_efficiency", "loss_map"});
-    f.number("ratio", l.ratio, Range::positive);
+    f.number("ratio", l.ratio);
+    if constexpr (F::reads)
+        if (f.well() && l.ratio == 0.0) f.wrong("ratio", "must not be 0");
     if (l.kind == GearLosses::loss_map) f.curve("map", l.map);
     f.number("rated_torque", l.rated_torque, Range::positive);
     f.number("rated_speed", l.rated_speed, Range::positive);

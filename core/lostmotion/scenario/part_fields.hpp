@@ -187,6 +187,7 @@ void describe(F& f, Gear& g) {
         e = MeshEfficiency(driving, overrunning);
     });
     f.number("mesh_damping", g.mesh_damping, Range::not_negative);
+    f.flag("damping_limited", g.damping_limited);
     bool present = g.transmission_error.present();
     f.flag("transmission_error", present);
     if (present) f.part("transmission_error", [&] { describe(f, g.transmission_error); });

@@ -23,14 +23,14 @@ class FrictionAdaptationLaw(FrictionAdaptationLawFields):
 class LoadObserver(LoadObserverFields):
     """The load torque from the motor's torque and speed, through the losses of the gear; it joins the feedforward.
 
-    ``T_1 = LP[M - J w' - b w - T_10 sgn w]``, ``T_2 + sgn(w) kappa M_2B(T_2) = i T_1``, ``M_Z = LP[T_2 - J_Z phi'' - b_Z phi']``
+    ``T_1 = LP[M - J w' - b w - T_10 sgn w]``, ``T_2/i + sgn(w) kappa M_2B(T_2)/|i| = T_1``, ``M_Z = LP[T_2 - J_Z phi'' - b_Z phi']``
     """
 
 
 class InverseModel(InverseModelFields):
     """Torque of the motor and twist of the gear that the reference needs, by the data of the drive itself.
 
-    ``T_2* = J_Z a + b_Z w + M_Z``, ``M = J_MR i a + b_MR i w + T_2*/i + sgn(w) (T_10 + kappa M_2B(T_2*)/i)`` for the speed w
+    ``T_2* = J_Z a + b_Z w + M_Z``, ``M = J_MR i a + b_MR i w + T_2*/i + sgn(i w) (T_10 + kappa M_2B(T_2*)/|i|)`` for the speed w
     and the acceleration a of the reference. With the encoder on the motor its position runs ahead by the twist under T_2*.
     What is left out here is that of the drive.
     """
@@ -103,10 +103,6 @@ class InverseModel(InverseModelFields):
             raise InputError(
                 f"inverse_model: takes one gear from the shaft {motor_shaft} to {shaft} and no other at either; "
                 "take feedforward for other trains"
-            )
-        if between[0].ratio < 0.0:
-            raise InputError(
-                "inverse_model: takes no gear that reverses; give the ratio above 0 and turn the signs of the load, or take feedforward"
             )
         return between[0]
 

@@ -114,7 +114,9 @@ def rig_scenario(gearbox: Gearbox, title: str = "", ripple: TorqueHarmonic | Non
 
 
 def mesh_damping(gearbox: Gearbox) -> float:
-    """Of the gear on the rig [N·m·s/rad], by a damping ratio of 5 % on the first stiffness; 0 of a rigid one."""
+    """Of the gear on the rig [N·m·s/rad]: its own, or by a damping ratio of 5 % on the first stiffness; 0 of a rigid one."""
+    if gearbox.mesh_damping > 0.0:
+        return gearbox.mesh_damping
     slopes = [k for k in gearbox.stiffness.pieces()[1] if k > 0.0] if gearbox.stiffness.kind != "rigid" else []
     if not slopes:
         return 0.0
@@ -283,6 +285,7 @@ def write_campaign(
     if ripple is not None and ripple.shaft not in ("motor", "output"):
         raise InputError(f'ripple: shaft is "{ripple.shaft}"; the shafts of the rig are "motor" and "output"')
     directory = Path(directory)
+    gearbox = gearbox.forward()
     scenario = rig_scenario(gearbox, title, ripple)
     tables = identification(gearbox, title, ripple)
     (directory / "logs").mkdir(parents=True, exist_ok=True)

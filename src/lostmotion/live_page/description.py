@@ -186,7 +186,7 @@ def _torque_at(scenario: Scenario | TrainScenario, shaft: str) -> float:
     train = scenario.train()
     for gear in train.gears.values():
         if gear.output == shaft:
-            return gear.rated_output_torque or gear.ratio * _torque_at(scenario, gear.input)
+            return gear.rated_output_torque or abs(gear.ratio) * _torque_at(scenario, gear.input)
     return next((m.rated_torque for m in train.motors.values() if m.shaft == shaft and m.rated_torque), 1.0)
 
 

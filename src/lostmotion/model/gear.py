@@ -5,7 +5,6 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from ..errors import InputError
-from ..inputs.quantities import NotNegative, ViscousFriction
 from .angle_torques import TransmissionError
 from .gearbox import Gearbox, Transmission
 from .losses import ConstantEfficiency, LossMap, MeshEfficiency, WormMesh, efficiency_map
@@ -28,8 +27,6 @@ class Gear(Transmission):
         ConstantEfficiency(efficiency=1.0)
     )
     """left out, none"""
-    mesh_damping: Annotated[ViscousFriction, NotNegative] = 0.0
-    """at the output, while the flanks touch; they part when it would pull"""
     transmission_error: TransmissionError | None = None
     """e over the angle of the input shaft, at the output: twist = input angle/ratio - output angle - e"""
 
@@ -40,8 +37,6 @@ class Gear(Transmission):
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
-        if self.ratio == 0.0:
-            raise ValueError("has the ratio 0; give input speed / output speed, below 0 for a gear that reverses")
         if isinstance(self.losses, LossMap):
             for key in ("rated_input_speed", "rated_output_torque"):
                 if getattr(self, key) is None:
@@ -49,7 +44,7 @@ class Gear(Transmission):
         return self
 
     def gearbox(self) -> Gearbox:
-        """The same gear alone, as the test rig takes it: without mesh damping and transmission error, its losses as a map. One that
+        """The same gear alone, as the test rig takes it: without transmission error, its losses as a map. One that
         reverses is taken as one that does not: its values are the same.
 
         Raises
@@ -65,10 +60,7 @@ class Gear(Transmission):
         losses = self.losses
         if isinstance(losses, MeshEfficiency | WormMesh):
             losses = efficiency_map(*losses.efficiencies())
-        return Gearbox(
-            **{name: getattr(self, name) for name in Gearbox.model_fields}
-            | {"losses": losses, "ratio": abs(self.ratio)}
-        )
+        return Gearbox(**{name: getattr(self, name) for name in Gearbox.model_fields} | {"losses": losses}).forward()
 
     @classmethod
     def of(cls, gearbox: Gearbox, *, input: str, output: str) -> Self:

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from ..inputs.part import Part
 from ..inputs.quantities import (
@@ -47,22 +47,41 @@ class Transmission(Part):
     """T_2R"""
     stiffness: Annotated[TorsionCurve | LinearStiffness | Rigid, Field(discriminator="kind")]
     hysteresis: Hysteresis | None = None
+    mesh_damping: Annotated[ViscousFriction, NotNegative] = 0.0
+    """at the output, while the flanks touch; they part when it would pull"""
+    damping_limited: bool = False
+    """whether the torque of the mesh damping is at most that of the spring, so that no torque jumps where flanks meet; needs
+    backlash"""
     limits: GearboxLimits | None = None
     note: str = ""
     """what a reader of the results must know, such as that a loss table is a stand-in"""
 
+    @field_validator("ratio")
+    @classmethod
+    def _is_not_zero(cls, ratio: float) -> float:
+        if ratio == 0.0:
+            raise ValueError("is no ratio; give input speed / output speed, below 0 for a gear that reverses")
+        return ratio
+
     @model_validator(mode="after")
-    def _hysteresis_needs_compliance(self) -> Self:
-        if self.hysteresis is not None and self.hysteresis.efficiency < 1.0 and isinstance(self.stiffness, Rigid):
+    def _compliance_fits(self) -> Self:
+        hysteresis = self.hysteresis is not None and self.hysteresis.efficiency < 1.0
+        rigid = isinstance(self.stiffness, Rigid)
+        backlash = not isinstance(self.stiffness, Rigid) and self.stiffness.pieces()[1][0] == 0.0
+        if hysteresis and rigid:
             raise ValueError("has hysteresis but is rigid; leave hysteresis out or give it a stiffness")
+        if self.mesh_damping > 0.0 and rigid:
+            raise ValueError("has mesh damping but is rigid; leave mesh_damping out or give it a stiffness")
+        if self.mesh_damping > 0.0 and backlash and hysteresis:
+            raise ValueError("has backlash with both mesh damping and hysteresis; leave one of the two out")
+        if self.damping_limited and not (self.mesh_damping > 0.0 and backlash):
+            raise ValueError("has damping_limited, which needs mesh_damping and a stiffness with backlash; give both")
         return self
 
 
 class Gearbox(Transmission):
     """A compliance and a loss law, each chosen freely."""
 
-    ratio: Annotated[Number, Positive]
-    """i_C, input speed / output speed"""
     rated_input_speed: Annotated[Speed, Positive]
     """n_1R"""
     rated_output_torque: Annotated[Torque, Positive]
@@ -73,3 +92,7 @@ class Gearbox(Transmission):
         laws = f"stiffness {self.stiffness.kind}, losses {self.losses.kind}"
         rated = f"{self.rated_output_torque:.4g} N·m at {practical(self.rated_input_speed, 'rad/s', 4)}"
         return f"Gearbox({self.ratio:g}:1, {rated}, {laws})"
+
+    def forward(self) -> Self:
+        """The same with a ratio above 0, as the test rig takes it: a gearbox that reverses has the same values."""
+        return self if self.ratio > 0.0 else self.model_copy(update={"ratio": -self.ratio})

@@ -177,7 +177,7 @@ def _overrunning(
         backward_efficiency=1.0 - back / M,
         static_efficiency=1.0 - static / M,
         slope=1.0 + slope,
-        input_torque=(static - M) / gear.ratio,
+        input_torque=(static - M) / abs(gear.ratio),
     )
 
 
@@ -201,7 +201,7 @@ def self_locking(
     Raises
     ------
     InputError
-        The train has no such gear, or one whose housing turns or that reverses; no torque is given, and the gear has no rated one.
+        The train has no such gear, or one whose housing turns; no torque is given, and the gear has no rated one.
     """
     if gear not in train.gears:
         known = list(train.gears)
@@ -210,10 +210,6 @@ def self_locking(
     if turning := [name for name, g in train.gears.items() if g.housing is not None]:
         raise InputError(
             f"the housing of gear {turning[0]} turns; what its load drives has no verdict here, only a run"
-        )
-    if reversing := [name for name, g in train.gears.items() if g.ratio < 0.0]:
-        raise InputError(
-            f"gear {reversing[0]} reverses; what loads drive has a verdict for ratios above 0: turn the signs of what is behind it"
         )
     core = train.core(())
     part = train.gears[gear]
@@ -311,12 +307,13 @@ def _torques(train: DriveTrain, gear: str, path: list[str], at: Overrunning) -> 
     """T_2 of each gear in the steady motion [N·m], to find the pieces of their laws: that of the load in the gear, what the
     motor gives on the way up to it, the load on the way down; 0 elsewhere."""
     torques = dict.fromkeys(train.gears, 0.0)
-    torques[gear] = at.load_torque
-    torque = at.backward_efficiency * at.load_torque / train.gears[gear].ratio
+    load = math.copysign(at.load_torque, train.gears[gear].ratio)  # the input turns backward
+    torques[gear] = load
+    torque = at.backward_efficiency * load / train.gears[gear].ratio
     for name in path:
         torques[name] = torque
         torque /= train.gears[name].ratio
-    shaft, torque = train.gears[gear].output, at.load_torque
+    shaft, torque = train.gears[gear].output, load
     while below := [n for n, g in train.gears.items() if g.input == shaft and torques[n] == 0.0]:
         name = below[0]
         torque *= train.gears[name].ratio
@@ -350,7 +347,7 @@ def _least_torque(
     torque = at.input_torque + holding[shaft]
     for name in path:
         stage = train.gears[name]
-        torque = (torque + core.mesh_loss(places.index(name), torque, 0.0)[0]) / stage.ratio
+        torque = (torque + core.mesh_loss(places.index(name), torque, 0.0)[0]) / abs(stage.ratio)
         shaft = stage.input
         torque += holding[shaft]
     return torque, next((name for name, m in train.motors.items() if m.shaft == shaft), "")

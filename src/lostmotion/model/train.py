@@ -223,7 +223,7 @@ def add_gear(train: _core.Train, name: str, gear: Gear) -> None:
         torsion_curve=None if isinstance(stiffness, Rigid) else stiffness.core(),
         loss_map=losses.core() if isinstance(losses, LossMap) else None,
         efficiencies=losses.efficiencies() if isinstance(losses, MeshEfficiency | WormMesh) else None,
-        mesh_damping=gear.mesh_damping,
+        damping_limited=gear.damping_limited,
         transmission_error=None if error is None else error.core(),
     )
     if gear.housing is not None:

@@ -179,7 +179,7 @@ def _plant_of(what: Drive | Scenario | TrainScenario) -> Plant:
         derive=lambda data, _: add_efficiency(data, g.ratio),
         output="load_speed",
         angle="load_angle",
-        floors={"motor_speed": speed, "load_speed": speed / g.ratio, "output_torque": torque, "twist": 0.0},
+        floors={"motor_speed": speed, "load_speed": speed / abs(g.ratio), "output_torque": torque, "twist": 0.0},
         attributes={"gear_ratio": g.ratio},
     )
 

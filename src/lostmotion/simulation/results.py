@@ -253,10 +253,11 @@ def add_angles(train: DriveTrain, data: dict[str, Any], time: Any) -> None:
 def gear_efficiency(data: dict[str, Any], ratio: Any) -> Any:
     """Useful torque / torque fed in [-], by the direction of the load; NaN where the input shaft is at rest.
 
-    Driving (T_2 has the sign of w_M) it is T_2/(i T_1), overrunning i T_1/T_2; 0 where both sides feed the losses.
+    Driving (T_2 has the sign of w_M i) it is T_2/(i T_1), overrunning i T_1/T_2; 0 where both sides feed the losses.
     """
-    driving = data["output_torque"] * np.sign(data["motor_speed"])
-    fed_in = ratio * data["input_torque"] * np.sign(data["motor_speed"])
+    way = np.sign(data["motor_speed"])
+    driving = data["output_torque"] * way * np.copysign(1.0, ratio)
+    fed_in = np.abs(ratio) * data["input_torque"] * way
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         eta = np.where(driving >= 0.0, driving / fed_in, np.where(fed_in < 0.0, fed_in / driving, 0.0))
     return np.where(data["motor_speed"] == 0.0, np.nan, eta)

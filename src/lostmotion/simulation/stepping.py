@@ -521,8 +521,9 @@ class Simulation:
         speed = values[self._channel["motor_speed"]]
         if speed == 0.0:
             return math.nan
-        driving = math.copysign(1.0, speed) * values[self._channel["output_torque"]]
-        fed_in = math.copysign(1.0, speed) * values[self._channel["input_torque"]] * self._train.gears["gearbox"].ratio
+        ratio, way = self._train.gears["gearbox"].ratio, math.copysign(1.0, speed)
+        driving = math.copysign(way, way * ratio) * values[self._channel["output_torque"]]
+        fed_in = way * values[self._channel["input_torque"]] * abs(ratio)
         if driving >= 0.0:
             return driving / fed_in if fed_in != 0.0 else math.nan if driving == 0.0 else math.inf
         return fed_in / driving if fed_in < 0.0 else 0.0

@@ -58,7 +58,7 @@ def holding(scenario: Scenario, load_torque: float, speed: float) -> Holding:
     if scenario.controller is not None:
         scenario = scenario.replace(controller=None)
     g = scenario.gearbox
-    begin = (speed or SLOW * g.rated_input_speed / g.ratio) * (-1.0 if load_torque > 0.0 else 1.0)
+    begin = (speed or SLOW * g.rated_input_speed / abs(g.ratio)) * (-1.0 if load_torque > 0.0 else 1.0)
     raised = TorqueSignal(ramps=(Ramp(rise=load_torque, duration=RAMP),))
     moving = Initial(motor_speed=begin * g.ratio, load_speed=begin)
     from_rest = _lasting_speed(scenario, raised, Initial())

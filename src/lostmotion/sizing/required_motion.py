@@ -94,9 +94,9 @@ class InputDemand:
 
 
 def input_demand(motion: RequiredMotion, g: Gearbox) -> InputDemand:
-    """That of a gearbox, its losses as the solver takes them: T_1 = (T_2 + s m_2B T_2R)/i, s the direction of the motion."""
+    """That of a gearbox, its losses as the solver takes them: T_1 = (T_2 + s m_2B T_2R)/i, s the direction of the load."""
     speed, acceleration = g.ratio * motion.speed, g.ratio * motion.acceleration
-    s = np.sign(speed)
+    s = np.sign(motion.speed)
     if isinstance(g.losses, ConstantEfficiency):
         through = motion.torque / (g.ratio * g.losses.efficiency)
     else:

@@ -67,7 +67,7 @@ class TestRig:
     def __init__(self, gearbox: Gearbox | Gear) -> None:
         if isinstance(gearbox, Gear):
             gearbox = gearbox.gearbox()
-        self.gearbox = gearbox
+        self.gearbox = gearbox = gearbox.forward()
         self.rigid = isinstance(gearbox.stiffness, Rigid)
         """without a twist"""
         self.breaks: tuple[float, ...] = ()
