@@ -1,5 +1,8 @@
 """Sphinx configuration."""
 
+import re
+from pathlib import Path
+
 from docutils import nodes
 from latex2mathml.converter import convert
 from sphinx.application import Sphinx
@@ -8,18 +11,37 @@ from sphinx.writers.html5 import HTML5Translator
 project = "lostmotion"
 author = "the lostmotion developers"
 copyright = "2026, the lostmotion developers"
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+# As text: importing the package would not be needed for it.
+release = re.findall(r'"(.*)"', (Path(__file__).parents[1] / "src" / "lostmotion" / "version.py").read_text())[0]
+version = release
+extensions = [
+    "myst_nb",  # pages in Markdown, and notebooks, which are executed
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",
+    "sphinx_copybutton",
+    "sphinx_design",
+]
 myst_enable_extensions = ["dollarmath", "colon_fence"]
+nb_execution_mode = "force"
+nb_execution_raise_on_error = True
+nb_execution_timeout = 300
+copybutton_prompt_text = r">>> |\.\.\. |\$ "
+copybutton_prompt_is_regexp = True
+copybutton_selector = "div:not(.output) > div.highlight:not(.highlight-text *) pre"
 myst_heading_anchors = 3
 html_theme = "furo"
-html_title = "lostmotion"
+html_title = f"lostmotion {release}"
+html_static_path = ["_static"]
+html_css_files = ["pages.css"]
 exclude_patterns = ["_build"]
 html_extra_path = ["_generated/extra"]
+html_show_sourcelink = True
 autodoc_typehints = "description"
 autodoc_member_order = "bysource"
 autodoc_mock_imports: list[str] = []
 napoleon_numpy_docstring = True
-suppress_warnings = ["myst.header"]
+suppress_warnings = ["myst.header", "mystnb.unknown_mime_type"]
 smartquotes = False  # commands are shown as they are typed
 html_math_renderer = "mathml"
 

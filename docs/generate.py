@@ -120,6 +120,8 @@ def scenario_reference() -> str:
     lines = [
         "# Scenario files",
         "",
+        "This page is for those who write scenarios. It lists every key of the short form, with unit, range and default.",
+        "",
         'A scenario is a TOML file. Numbers are SI and radians; strings carry a unit, such as `"3300 rpm"`, `"0.6 mrad"` or',
         '`"23 N*m/arcmin"` ([all units](#numbers-and-units)). An unknown key, a missing one, a wrong unit or a value out of range ends',
         "in one line that names all of them.",
@@ -138,6 +140,8 @@ def train_reference() -> str:
     schema = train_schema()
     lines = [
         "# Scenario files of drive trains",
+        "",
+        "This page is for those who write drive trains. It lists every key of the long form, with unit, range and default.",
         "",
         "The long form of a [scenario](scenario.md): instead of `[motor]`, `[gearbox]` and `[load]` there are shafts, slides and what joins, turns,",
         "holds and loads them, each with a NAME of its own: letters, digits and `_`. Result variables are called after the names.",
@@ -207,7 +211,11 @@ def units() -> list[str]:
 
 
 def variables() -> str:
-    lines = ["# Result variables", "", "Over the coordinate `time` [s].", ""]
+    lines = ["# Result variables", ""]
+    lines += [
+        "This page is for those who evaluate results. It lists the variables of a result, over the coordinate `time` [s].",
+        "",
+    ]
     lines += ["| variable | symbol | unit | meaning |", "|---|---|---|---|"]
     lines += [f"| `{v.name}` | {v.symbol} | {v.unit.replace('*', '·')} | {v.meaning} |" for v in VARIABLES]
     lines += [
@@ -232,6 +240,8 @@ def commands() -> str:
     """The reference of the command line, from the commands themselves."""
     lines = [
         "# Command line",
+        "",
+        "This page is for users of the command line. It lists every command with its arguments and options.",
         "",
         "Every command takes `-h` or `--help`. The exit code is 0 only if all went well; errors are one line on the standard error.",
         "`lostmotion --install-completion` installs the completion of commands, options, scenarios and gearboxes for your shell.",
@@ -269,38 +279,87 @@ def _command_section(name: str, command: Any) -> list[str]:
     return [*lines, ""]
 
 
+# The shipped scenarios by topic: a heading of the gallery, and the beginnings of the names below it.
+TOPICS = {
+    "The drive of the paper": ("paper-",),
+    "Backlash, friction and losses": (
+        "backlash-",
+        "catalogue-",
+        "lossy-",
+        "overrunning-",
+        "step-to-",
+        "voltage-",
+        "worm-",
+    ),
+    "Servo axes": ("position-axis", "speed-axis", "joint-", "field-weakening"),
+    "Linear axes": ("ball-screw-", "rack-", "vertical-"),
+    "Limit cycles": ("hunting-",),
+    "Tracking and pointing": ("tracking-", "direction-finder"),
+    "Drive trains": ("belt-", "two-motors-", "given-motion"),
+}
+
+
+def topic_of(name: str) -> str:
+    """Heading of the gallery for a scenario."""
+    found = [topic for topic, beginnings in TOPICS.items() if name.startswith(beginnings)]
+    if len(found) != 1:
+        raise ValueError(
+            f"scenario {name}: {len(found)} topics of the gallery have it; add it to TOPICS of docs/generate.py"
+        )
+    return found[0]
+
+
 def gallery(out: Path) -> str:
-    """A page with a figure of every shipped scenario; the figures go into the directory `gallery` of `out`."""
-    pictures = out / "gallery"
-    pictures.mkdir(exist_ok=True)
+    """The page with a thumbnail of each shipped scenario, by topic; pages and figures go into the directory `gallery` of `out`."""
+    pages = out / "gallery"
+    pages.mkdir(exist_ok=True)
     lines = [
         "# Gallery of scenarios",
         "",
-        "These scenarios come with the package. Each can be run by its name, changed with `--set`, and named as the `base` of",
-        "a file of your own. Those called paper-... are the runs of [the paper](../citing.md#the-paper).",
+        "This page is for those who look for a scenario to start from. It shows each scenario that is shipped, by topic.",
+        "",
+        "Run a scenario by its name, change it with `--set`, or name it as the `base` of your own file.",
+        "Those called paper-... are the runs of [the paper](../citing.md#the-paper).",
         "",
     ]
-    for name, path in lm.shipped_scenarios().items():
+    scenarios = lm.shipped_scenarios()
+    for name, path in scenarios.items():
         scenario = lm.load(name)
-        lm.simulate(scenario).lm.plot().savefig(pictures / f"{name}.png", dpi=80, metadata={"Software": None})
-        lines += [
-            f"## {name}",
-            "",
-            f"**{scenario.title}.** {introduction(path)}",
-            "",
-            f"![{scenario.title}](gallery/{name}.png)",
-            "",
-        ]
-        lines += ["```sh", f"lostmotion run {name} --plot {name}.png", "```", ""]
-        lines += [
-            "<details><summary>The file</summary>",
-            "",
-            "```toml",
-            path.read_text(encoding="utf-8").strip(),
-            "```",
-        ]
-        lines += ["", "</details>", ""]
+        lm.simulate(scenario).lm.plot().savefig(pages / f"{name}.png", dpi=80, metadata={"Software": None})
+        (pages / f"{name}.md").write_text("\n".join(scenario_page(name, scenario.title, path)), encoding="utf-8")
+    for topic in TOPICS:
+        names = [name for name in scenarios if topic_of(name) == topic]
+        if not names:
+            continue
+        lines += [f"## {topic}", "", "::::{grid} 2 3 3 4", ":class-container: gallery", ":gutter: 2", ""]
+        for name in names:
+            lines += [f":::{{grid-item-card}} {name}", f":link: gallery/{name}", ":link-type: doc"]
+            lines += [f":img-top: gallery/{name}.png", f":img-alt: {lm.load(name).title}", ":::", ""]
+        lines += ["::::", ""]
+    lines += ["```{toctree}", ":hidden:", "", *(f"gallery/{name}" for name in scenarios), "```", ""]
     return "\n".join(lines)
+
+
+def scenario_page(name: str, title: str, path: Path) -> list[str]:
+    """The page of one shipped scenario: what it shows, its command, its figure and its file."""
+    return [
+        f"# {name}",
+        "",
+        f"**{title}.** {introduction(path)}",
+        "",
+        "```sh",
+        f"lostmotion run {name} --plot {name}.png",
+        "```",
+        "",
+        f"![{title}]({name}.png)",
+        "",
+        "## The file",
+        "",
+        "```toml",
+        path.read_text(encoding="utf-8").strip(),
+        "```",
+        "",
+    ]
 
 
 def introduction(path: Path) -> str:

@@ -85,7 +85,7 @@ def commands_in(page: str) -> list[str]:
 
 
 def test_the_first_commands_run(tmp_path: Path) -> None:
-    pages = ["README.md", "docs/index.md"]
+    pages = ["README.md", "docs/get-started.md"]
     commands = commands_in(pages[0])
     assert len(commands) == 4
     assert commands_in(pages[1]) == commands[:3]
@@ -109,7 +109,7 @@ def test_the_command_of_the_page_on_the_drive_check_runs(tmp_path: Path) -> None
 
 def test_every_extra_is_explained_on_the_home_page() -> None:
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
-    page = (ROOT / "docs" / "index.md").read_text()
+    page = (ROOT / "docs" / "get-started.md").read_text()
     assert set(re.findall(r"^\| `(\w+)` \|", page, re.M)) == set(extras) - {"all"}
 
 
