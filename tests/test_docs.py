@@ -164,11 +164,35 @@ def test_figures_of_pages_leave_the_gallery_alone_and_are_written_once(
     monkeypatch.setattr(lm, "shipped_scenarios", lambda: shipped)
     page = generate.gallery(tmp_path)
     generate.collect([writer("one")], tmp_path)
-    (picture,) = re.findall(r"!\[.*\]\((.*)\)", page)
+    (picture,) = re.findall(r":img-top: (.*)", page)
     assert (tmp_path / picture).read_bytes().startswith(b"\x89PNG")
     assert (tmp_path / "worm-lowering.png").read_text() == "one"
     with pytest.raises(FileExistsError, match=r"worm-lowering\.png: written by one and by other"):
         generate.collect([writer("one"), writer("other")], tmp_path)
+
+
+def test_every_shipped_scenario_has_a_topic_in_the_gallery(generate: Any) -> None:
+    assert {generate.topic_of(name) for name in lm.shipped_scenarios()} == set(generate.TOPICS)
+
+
+# A page of the site that opens with a picture, a command or a condition leaves the reader to guess whether it is for him.
+@pytest.mark.parametrize("page", sorted((ROOT / "docs").glob("*.md")), ids=lambda p: p.stem)
+def test_every_page_opens_with_its_readers_and_its_purpose(page: Path) -> None:
+    if page.name == "contributing.md":  # includes CONTRIBUTING.md
+        return
+    opening = " ".join(page.read_text().split("\n\n")[1].split())
+    assert re.match(r"This (page|site|tutorial) ", opening), opening
+    assert " for " in opening or opening.startswith("This page lists"), opening
+
+
+def test_every_page_is_in_one_part_of_the_site() -> None:
+    home = (ROOT / "docs" / "index.md").read_text()
+    parts = re.findall(r":caption: ([^\n]*)\n\n(.*?)```", home, re.S)
+    assert [caption for caption, _ in parts] == ["Get started", "Tutorials", "How-to", "Explanation", "Reference"]
+    listed = [page for _, pages in parts for page in pages.split()]
+    listed += re.findall(r"^(contributing|verification)$", (ROOT / "docs" / "developers.md").read_text(), re.M)
+    assert len(listed) == len(set(listed))
+    assert {p.stem for p in (ROOT / "docs").glob("*.md")} - {"index"} <= set(listed)
 
 
 def test_generated_pages_name_every_key_and_variable(generate: Any) -> None:
