@@ -329,6 +329,7 @@ def test_help_names_every_command() -> None:
         "servo",
         "track",
         "identify",
+        "monitor",
         "study",
         "schema",
     ):

@@ -113,6 +113,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "spectrum": (lm.spectrum, {"scenario": SCENARIO, "against": "motor", "motor": None, "start": None, "max_order": 4.0}),
     "Findings": (lm.sizing.Findings, {"findings": ()}),
     "identify": (lm.identify, {"source": "none.toml", "threads": 1, "profiles": False, "progress": dangle}),
+    "monitor": (lm.monitor, {"source": "none.toml", "logs": [], "progress": dangle}),
     "load_identification": (lm.identification.load_identification, {"path": "none.toml"}),
     "read_log": (lm.identification.read_log, {"path": "none.csv", "time": "", "decimal": ""}),
     "write_campaign": (lm.identification.write_campaign, {"directory": "none", "gearbox": SCENARIO.gearbox, "title": "", "ripple": None, "seed": 1, "progress": dangle}),
@@ -165,6 +166,7 @@ SLOW = {
     "measure_screw",
     "commission",
     "identify",
+    "monitor",
     "first_task",  # of files that are not there
     "spectrum",  # of a motion that makes no whole turn
     "load_identification",

@@ -17,6 +17,7 @@ from . import (
     fmu,
     identify,
     live,
+    monitor,
     reproduce,
     response,
     rig,
@@ -143,6 +144,7 @@ for command in (
     select.select,
     track.track,
     identify.identify,
+    monitor.monitor,
 ):
     app.command()(command)
 drive_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Check a drive against its task.")

@@ -1,4 +1,5 @@
 from .campaign import write_campaign as write_campaign
+from .changes import Change as Change
 from .design import Candidate as Candidate
 from .design import design_experiment as design_experiment
 from .errors_of_logs import LogError as LogError
@@ -8,6 +9,9 @@ from .intervals import Interval as Interval
 from .ladder import RungResult as RungResult
 from .logs import Channel as Channel
 from .logs import Log as Log
+from .monitor import LogEstimate as LogEstimate
+from .monitor import MonitorResult as MonitorResult
+from .monitor import Watched as Watched
 from .new_task import first_task as first_task
 from .readers import read_log as read_log
 from .task import Identification as Identification

@@ -181,9 +181,9 @@ def _other_minima(
     def starts() -> Iterator[Point]:
         for k, name in enumerate(names):
             if k == 0:
-                yield _grown(problem, first)
+                yield grown(problem, first)
             for value in _promising(problem, best, name):
-                yield _grown(problem, replace(best.point, values=best.point.values | {name: value}))
+                yield grown(problem, replace(best.point, values=best.point.values | {name: value}))
 
     for start in starts():
         fit = _one(rig, engine, train, rung, start, rig.rungs()[rung].name, notify)
@@ -196,7 +196,7 @@ def _other_minima(
     return best, [fit.point for fit in others if _cost(problem, fit, best) - best.cost < CHI_SQUARE * scale]
 
 
-def _grown(problem: Problem, start: Point) -> Point:
+def grown(problem: Problem, start: Point) -> Point:
     """Where fits to the first parts of the logs lead, each longer than the one before: there are few impacts in the first."""
     for share in PARTS:
         logs = [log.part(0, max(LEAST, round(share * len(log.time)))) for log in problem.logs]

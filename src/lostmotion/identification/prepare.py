@@ -283,7 +283,7 @@ def first_values_named(task: Identification) -> set[str]:
 
 def _named(task: Identification) -> frozenset[str]:
     """What the formulas of a task name."""
-    return names_within(task.model_dump(include={"set", "phases", "ladder", "logs", "measured", "inputs"}))
+    return names_within(task.model_dump(include={"set", "phases", "ladder", "logs", "measured", "inputs", "monitor"}))
 
 
 def _facts_of(channel: str) -> tuple[str, str]:

@@ -18,6 +18,7 @@ from ..inputs.toml_files import read_toml
 from ..inputs.validation import did_you_mean
 from ..model.train import Elements
 from .formulas import CONSTANTS, FUNCTIONS, Formula
+from .monitor_task import Monitoring
 from .parameters import FreeParameter, in_unit
 
 FormulaText = str | float
@@ -169,6 +170,8 @@ class Identification(Part):
     fit: FitOptions = FitOptions()
     record: str = ""
     """``gear.NAME`` of the rig, of which a data sheet is written"""
+    monitor: Monitoring = Monitoring()
+    """what `lostmotion monitor` compares over the life of a drive"""
 
     @model_validator(mode="before")
     @classmethod
@@ -214,6 +217,7 @@ class Identification(Part):
                         raise ValueError(
                             f"has ladder[{k}].multi_start.{name} with {value:g} outside of {p.min:g} to {p.max:g}; leave it out"
                         )
+        self._refuse_unknown_watches(known)
         for name in (*self.parameters, *self.nuisance):
             if name in CONSTANTS or name in FUNCTIONS:
                 raise ValueError(f"has a parameter {name}, which formulas know as something else; give it another name")
@@ -228,6 +232,24 @@ class Identification(Part):
             )
         return self
 
+    def _refuse_unknown_watches(self, known: list[str]) -> None:
+        models = [rung.name for rung in self.ladder]
+        if self.monitor.model and self.monitor.model not in models:
+            meant = did_you_mean(self.monitor.model, models, f"the models are {', '.join(models) or 'none'}")
+            raise ValueError(f"has monitor.model = {self.monitor.model!r}, which is no model of the ladder; {meant}")
+        for key in ("watch", "constant"):
+            for name in getattr(self.monitor, key):
+                if name not in known:
+                    meant = did_you_mean(name, known, f"the parameters are {', '.join(known)}")
+                    raise ValueError(f"has monitor.{key} with {name!r}, which is no free parameter; {meant}")
+        for name, watch in self.monitor.watch.items():
+            low, high = (
+                in_unit(getattr(watch, end), self.parameters[name].unit, f"monitor.watch.{name}.{end}")
+                for end in ("min", "max")
+            )
+            if low is not None and high is not None and not low < high:
+                raise ValueError(f"has monitor.watch.{name} with min = {low:g}, which is not below max = {high:g}")
+
     def _formulas(self) -> list[tuple[str, list[FormulaText]]]:
         found = [
             (f"{table}.{name}.{key}", [getattr(entry, key)])
@@ -238,6 +260,9 @@ class Identification(Part):
         ]
         found += [(f"phases[{k}].when", [phase.when]) for k, phase in enumerate(self.phases)]
         found.append(("logs.weight", [self.logs.weight]))
+        found.append(("monitor.conditions", list(self.monitor.conditions)))
+        if self.monitor.order:
+            found.append(("monitor.order", [self.monitor.order]))
         if self.fit.first is not None:
             found.append(("fit.first", [self.fit.first]))
         return found + ([("logs.held_out", [self.logs.held_out])] if self.logs.held_out is not None else [])

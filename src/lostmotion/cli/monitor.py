@@ -1,0 +1,56 @@
+"""`lostmotion monitor`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .arguments import FiguresOption
+from .targets import try_directory, writing
+from .terminal import busy
+
+
+def monitor(
+    file: Annotated[
+        Path, typer.Argument(metavar="TASK.toml", help="Identification file; its table [monitor] says what is watched.")
+    ],
+    logs: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="[LOGS]...", help="Log files or directories; left out, those of the file."),
+    ] = None,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Directory, made if missing.")] = Path(
+        "monitored"
+    ),
+    figures: FiguresOption = None,
+) -> None:
+    """Follow backlash, friction, stiffness and losses of a drive over its life, from ordinary operation logs.
+
+    Writes monitor.html (one page), values.csv (each log) and watched.csv (trends, changes, limits). Exit code 1 if a value has
+    changed or is beyond its limit.
+
+    \b
+    lostmotion monitor joint.toml logs/2026-*.csv -o joint-7
+    """
+    from ..reports.pictures import endings
+
+    pictures = endings(figures)
+    try_directory(output)
+    from ..identification.monitor import monitor as run
+
+    with busy("Monitoring") as tell:
+        result = run(file, logs or (), progress=lambda log, k, count: tell(f"log {k} of {count}, {log}"))
+    print(result.task.title or "Monitor")
+    print(result)
+    unused = {e.log: e.why for e in result.logs if e.why} | result.left_out
+    if unused:
+        first = next(iter(unused))
+        print(f"  {len(unused)} logs are not used, listed on the page; {first}: {unused[first]}")
+    with writing(output), busy("Writing"):
+        from ..reports.monitor import write_monitor
+
+        page = write_monitor(output, file.stem, result, pictures)
+    print(f"The page is at {page}")
+    if result.alarms:
+        raise typer.Exit(1)

@@ -1,0 +1,171 @@
+"""The page of a monitor: trends with intervals, the evidence of changes, and what each log could tell."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..identification.monitor import RESIDUAL, MonitorResult, Watched
+from ..identification.parameters import in_unit
+from ..units.conversion import si_factor
+from .page import Headline, Prose, Report, Table
+from .pages import table_csv, write_report
+from .panels import FAINT, PALETTE, Curve, Group, Mark, Panel
+
+VALUES: dict[str, Any] = {"color": PALETTE["first"], "linestyle": "none", "marker": "o", "markersize": 3.0}
+ENDS: dict[str, Any] = {"color": PALETTE["first"], "linestyle": "-", "linewidth": 0.7, "alpha": 0.6}
+LIMIT: dict[str, Any] = {"color": PALETTE["second"], "linestyle": "--", "linewidth": 1.5}
+EVIDENCE: dict[str, Any] = {"color": PALETTE["first"], "linestyle": "-", "linewidth": 1.6}
+LEAST = 1e-4  # evidence, below which it is not drawn
+LOGS = ("log", "place", "residual", "tells", "why it is not used")
+WATCHED = ("value", "baseline", "now", "from", "to", "unit", "change", "limit")
+
+
+def write_monitor(directory: Path, name: str, result: MonitorResult, pictures: Sequence[str] = ()) -> Path:
+    """``monitor.html`` and tables (CSV) in a directory, made if missing; on request pictures.
+
+    Returns
+    -------
+    Path
+        Of the page.
+    """
+    tables = {
+        "values.csv": table_csv(
+            ["log", "place", "residual", "parameter", "value", "low", "high", "told"], _values(result)
+        ),
+        "watched.csv": table_csv(WATCHED, [_row(result, w) for w in result.watched.values()]),
+    }
+    return write_report(directory, "monitor.html", monitor_report(name, result), tables, pictures)
+
+
+def monitor_report(name: str, result: MonitorResult) -> Report:
+    """The page of a monitor."""
+    watched = list(result.watched.values())
+    marked = frozenset(k for k, w in enumerate(watched) if w.alarm)
+    rows = [
+        [e.log, f"{e.at:g}", f"{e.residual:.3g}", ", ".join(sorted(e.told)) or "nothing", e.why] for e in result.logs
+    ]
+    unused = frozenset(k for k, e in enumerate(result.logs) if e.why)
+    left_out = [list(pair) for pair in result.left_out.items()]
+    return Report(
+        title=result.task.title or name,
+        lead=f"{result.lines()[0]}.",
+        verdict=_verdict(result),
+        main=Group("trends", "Trends", TRENDS, tuple(_trend(result, w) for w in watched)),
+        parts=(
+            Table("Watched values", WATCHED, [_row(result, w) for w in watched], "", marked),
+            Prose("Findings", [w.text for w in watched], listed=True),
+            Group(
+                "evidence",
+                "Evidence of a change",
+                EVIDENCES,
+                tuple(_evidence(result, w) for w in watched if w.change is not None),
+            ),
+            Table("What each log tells", LOGS, rows, TELLS, unused),
+            *([Table("Logs that are left out", ("log", "reason"), left_out)] if left_out else []),
+        ),
+    )
+
+
+TRENDS = "Estimate of each log with its 95 % interval. Dashed: limits. The marked log is the one at which a change most likely began."
+EVIDENCES = (
+    "Bayes factor of a change, averaged over its beginning, its size and its shape. An alarm is evidence above the line with two logs "
+    "in a row; the line is the reciprocal of the permitted probability of a false alarm."
+)
+TELLS = (
+    "A log tells a value if its own interval is narrower than half of the value; others take no part in its trend. "
+    "Residuals are in those of the baseline."
+)
+
+
+def _verdict(result: MonitorResult) -> Headline:
+    """Alarms, what is not decided, or that nothing has changed."""
+    alarms = result.alarms
+    undecided = [w for w in result.watched.values() if not w.decided and not w.alarm]
+    if alarms:
+        more = f" {len(alarms) - 2} more below." if len(alarms) > 2 else ""
+        return Headline("bad", tuple(f"{w.text}.{more if k == 1 else ''}" for k, w in enumerate(alarms[:2])))
+    if undecided:
+        return Headline("open", tuple(f"{w.text}." for w in undecided[:3]))
+    return Headline("good", ("No watched value has changed, and none is beyond its limits.",))
+
+
+def _row(result: MonitorResult, w: Watched) -> list[str]:
+    """A watched value as text."""
+    p = result.task.parameters.get(w.name)
+
+    def shown(value: float) -> str:
+        return f"{value:.4g}" if p is None else p.shown(value)
+
+    if w.level is None or w.change is None:
+        return [w.name, "", "", "", "", w.unit, "not decided", "not decided"]
+    change = "none" if w.begins is None else f"since {result.logs[w.begins].log}"
+    limit = {True: "beyond", False: "within", None: "not decided"}[w.beyond]
+    if p is None or w.name not in result.task.monitor.watch or not _limits(result, w):
+        limit = "none given"
+    return [w.name, shown(w.before), shown(w.now), shown(w.level.low), shown(w.level.high), w.unit, change, limit]
+
+
+def _values(result: MonitorResult) -> list[list[str]]:
+    """Estimates of all logs, SI."""
+    return [
+        [
+            e.log,
+            f"{e.at:g}",
+            f"{e.residual:.6g}",
+            name,
+            f"{value:.9g}",
+            f"{e.intervals[name].low:.9g}",
+            f"{e.intervals[name].high:.9g}",
+            "yes" if name in e.told else "no",
+        ]
+        for e in result.logs
+        for name, value in e.values.items()
+    ]
+
+
+def _limits(result: MonitorResult, w: Watched) -> list[float]:
+    """Limits of a watched value in its unit."""
+    watch = result.task.monitor.watch.get(w.name)
+    found = [] if watch is None else [in_unit(x, w.unit, w.name) for x in (watch.min, watch.max)]
+    return [x / si_factor(w.unit) for x in found if x is not None]
+
+
+def _trend(result: MonitorResult, w: Watched) -> Panel:
+    place = result.task.monitor.order or "log"
+    logs = [result.logs[k] for k in w.logs]
+    at = np.array([e.at for e in logs])
+    if w.name == RESIDUAL:
+        y = np.array([e.residual for e in logs])
+        curves = [Curve("residual", at, y, VALUES)]
+        label = "residual [baseline = 1]"
+    else:
+        unit = si_factor(w.unit)
+        y = np.array([e.values[w.name] for e in logs]) / unit
+        low, high = (np.array([getattr(e.intervals[w.name], end) for e in logs]) / unit for end in ("low", "high"))
+        curves = [
+            Curve("value", at, y, VALUES),
+            Curve("low", at, low, ENDS, "_"),
+            Curve("high", at, high, ENDS, "95 %"),
+        ]
+        label = f"{w.name} [{w.unit or '-'}]"
+    ends = np.array([at.min(), at.max()]) if len(at) else np.zeros(0)
+    curves += [Curve(f"limit {x:g}", ends, np.full(len(ends), x), LIMIT) for x in _limits(result, w)]
+    marks: tuple[Mark, ...] = ()
+    if w.begins is not None:
+        k = w.logs.index(w.begins)
+        marks = (Mark(float(at[k]), float(y[k]), result.logs[w.begins].log, VALUES),)
+    return Panel(w.name, place, label, tuple(curves), marks=marks)
+
+
+def _evidence(result: MonitorResult, w: Watched) -> Panel:
+    assert w.change is not None
+    at = np.array([result.logs[k].at for k in w.logs])
+    curves = (
+        Curve("evidence", at, np.maximum(w.change.evidence, LEAST), EVIDENCE),
+        Curve("alarm", at[[0, -1]], np.full(2, w.change.limit), FAINT),
+    )
+    return Panel(w.name, result.task.monitor.order or "log", "evidence [-]", curves, log_y=True)
