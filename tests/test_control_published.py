@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 import lostmotion as lm
 
-# --- EMPS: Janot, Gautier, Brunot (2019), one linear axis; 1 m is 1 rad here ---
+# --- EMPS: Janot, Gautier, Brunot (2019), one linear axis ---
 
 EMPS = {
     "M": 95.1089,
@@ -28,8 +28,8 @@ def emps(resolution: float) -> lm.TrainScenario:
     p = EMPS
     encoder: dict[str, Any] = {"resolution": resolution} if resolution else {"ideal": True}
     return lm.TrainScenario(
-        shafts={"axis": {"inertia": p["M"], "viscous_friction": p["F_v"], "friction_torque": p["F_c"], "torque": p["offset"]}},
-        motors={"m": {"shaft": "axis", "kind": "torque_source", "rotor_inertia": 0.0, "rated_torque": 1.0}},
+        slides={"axis": {"mass": p["M"], "viscous_friction": p["F_v"], "friction_force": p["F_c"], "force": p["offset"]}},
+        linear_motors={"m": {"slide": "axis", "rated_force": 1.0}},
         controllers={"m": {
             "sample_time": 1e-3, "reference": MOVES, "encoder": encoder,
             "position": {"gain": p["k_p"], "reference_delay": 1e-3},
@@ -82,7 +82,7 @@ def test_the_emps_axis_in_closed_loop_is_that_of_its_closed_form() -> None:
         pending = u[-1]
     assert body.stops >= 2
     assert max(map(abs, u)) > 3.0  # the axis works
-    assert np.abs(result["axis_angle"].to_numpy() - q).max() < 1e-9 * 0.2
+    assert np.abs(result["axis_position"].to_numpy() - q).max() < 1e-9 * 0.2
     assert np.abs(result["axis_speed"].to_numpy() - v).max() < 1e-9 * 0.15
     assert np.abs(result["m_torque_reference"].to_numpy() - p["g_tau"] * np.array(u)).max() < 1e-9 * VOLTS * p["g_tau"]
     energy = lm.energy_of(result)
