@@ -275,7 +275,7 @@ def test_windows_are_refused_where_they_cannot_be(tmp_path: Path) -> None:
     data = rig.task.model_dump()
     data["measured"]["angle"]["filter_time"] = 0.01
     rig = Rig(Identification(**data), tmp_path)
-    with pytest.raises(lm.InputError, match="no measured channel is the angle of a shaft"):
+    with pytest.raises(lm.InputError, match="no measured channel is the angle or the speed of a shaft"):
         windows(rig, logs, start_point(rig.task, logs), 0, 1.0)
     data["measured"] = {"speed": {"channel": "angle", "variable": "arm_speed"}}
     rig = Rig(Identification(**data), tmp_path)
@@ -304,3 +304,83 @@ def test_values_of_multi_start_have_units_as_start_values_have(tmp_path: Path) -
         with pytest.raises(lm.InputError, match=text) as refused:
             Identification(**data)
         assert "\n" not in str(refused.value)
+
+
+SPINDLE = """
+[shafts.spindle]
+viscous_friction = 0.01
+friction_torque = 0.05
+[motors.drive]
+shaft = "spindle"
+kind = "torque_source"
+rated_torque = 1.0
+rotor_inertia = 2e-3
+[simulation]
+duration = "1 s"
+sample_interval = "1 ms"
+"""
+SPEED_NOISE = 0.05  # rad/s
+
+
+def spindle_task(directory: Path, factor: float, **more: Any) -> Identification:
+    """A spindle of which torque and speed are recorded, no angle."""
+    (directory / "spindle.toml").write_text(SPINDLE)
+    data: dict[str, Any] = {
+        "scenario": "spindle.toml",
+        "logs": {"files": ["*.csv"]},
+        "inputs": {"drive_command": {"channel": "torque", "interpolation": "hold"}},
+        "measured": {"speed": {"channel": "speed", "variable": "spindle_speed", "deviation": SPEED_NOISE}},
+        "set": {
+            "motors.drive.rotor_inertia": "inertia",
+            "shafts.spindle.viscous_friction": "viscous",
+            "shafts.spindle.friction_torque": "coulomb",
+        },
+        "parameters": {
+            "inertia": {"start": factor * 2e-3, "min": 1e-5, "max": 1.0},
+            "viscous": {"start": factor * 0.01, "max": 1.0},
+            "coulomb": {"start": factor * 0.05, "max": 5.0},
+        },
+    }
+    return Identification(**data | more)
+
+
+def spindle_log(rig: Rig) -> Prepared:
+    """Steps of the torque, all forward: J w' + b w = T - T_C, solved step by step."""
+    time = 1e-3 * np.arange(2000)
+    torque = np.repeat([0.4, 0.9, 0.15, 0.6], 500)
+    speed, w = np.zeros(len(time)), 0.0
+    for k in range(len(time)):
+        speed[k] = w
+        end = (torque[k] - 0.05) / 0.01
+        w = end + (w - end) * np.exp(-0.01 / 2e-3 * 1e-3)
+    speed += SPEED_NOISE * np.random.default_rng(4).normal(size=len(time))
+    log = Log("0.csv", time, {"torque": Channel(torque), "speed": Channel(speed)})
+    return prepared(rig.task, log, rig.units)
+
+
+@pytest.mark.parametrize("factor", [20.0, 0.05])
+def test_logs_with_a_speed_alone_get_start_values(tmp_path: Path, factor: float) -> None:
+    rig = Rig(spindle_task(tmp_path, factor), tmp_path)
+    log = spindle_log(rig)
+    start = start_point(rig.task, [log])
+    point, report = regressed(rig, Engine(rig, threads=1), [log], start, rig.task.parameters)
+    assert set(report.found) == {"inertia", "viscous", "coulomb"}
+    assert point.values["inertia"] == pytest.approx(2e-3, rel=0.1)
+    assert point.values["viscous"] == pytest.approx(0.01, rel=0.1)
+    assert point.values["coulomb"] == pytest.approx(0.05, abs=0.02)  # 2 % of the largest torque
+
+
+def test_logs_with_a_speed_alone_are_fitted_in_windows(tmp_path: Path) -> None:
+    rig = Rig(spindle_task(tmp_path, 1.0), tmp_path)
+    log = spindle_log(rig)
+    (cut,) = windows(rig, [log], start_point(rig.task, [log]), 0, 0.08)  # no window begins near a step of the torque
+    assert len(cut.segments) == 25
+    (r,) = Engine(rig, threads=1).residuals([cut], start_point(rig.task, [log]), 0)
+    # A window begins at the value of a cubic, whose own error is below that of a sample; over a window it falls by exp(-b t/J).
+    assert SPEED_NOISE < np.std(r) < 1.2 * SPEED_NOISE
+    growing = Rig(spindle_task(tmp_path, 3.0, fit={"regression": False, "horizon": [0.08]}), tmp_path)
+    result = identify_logs(growing, [log], threads=1)
+    for name, value in {"inertia": 2e-3, "viscous": 0.01, "coulomb": 0.05}.items():
+        i = result.intervals[name]
+        assert result.values[name] == pytest.approx(value, abs=4.0 * (i.high - i.low) / (2.0 * 1.96)), name
+    assert result.error()[1] == pytest.approx(SPEED_NOISE, rel=0.06)

@@ -23,7 +23,7 @@ from ..model.losses import ConstantEfficiency, MeshEfficiency
 from ..model.motor import ShaftMotor
 from ..simulation.train_scenario import TrainScenario
 from .acting import DELAY, course_of_input, numbers_of_input
-from .motion import Position, measured_course
+from .motion import Shown, measured_course
 from .prepare import Prepared
 from .rig import Rig
 
@@ -44,7 +44,7 @@ class Stretch:
     """samples of each piece in which the shaft turns in one direction: blocks x samples"""
 
 
-def stretches(rig: Rig, log: Prepared, known: Mapping[str, Any], position: Position, width: int) -> list[Stretch]:
+def stretches(rig: Rig, log: Prepared, known: Mapping[str, Any], shown: Shown, width: int) -> list[Stretch]:
     """All of a log that is long enough.
 
     Parameters
@@ -52,7 +52,7 @@ def stretches(rig: Rig, log: Prepared, known: Mapping[str, Any], position: Posit
     width
         Samples of the filter, cubics by least squares (Savitzky and Golay 1964), and of a block; odd.
     """
-    at, x = measured_course(rig, log, position.channel, known)
+    at, x = measured_course(rig, log, shown.channel, known)
     h, found = log.log.interval, []
     for segment in log.segments:
         of = slice(segment.begin, segment.end)
@@ -66,6 +66,8 @@ def stretches(rig: Rig, log: Prepared, known: Mapping[str, Any], position: Posit
                 continue
             even = np.interp(t, own[piece], values[piece])
             q, w, a = (savgol_filter(even, width, 3, deriv=d, delta=h)[width // 2 : -(width // 2)] for d in (0, 1, 2))
+            if shown.is_speed:  # no torque depends on the angle then
+                q, w, a = np.zeros(len(q)), q, w
             blocks = np.arange(len(q) // width * width).reshape(-1, width)
             blocks = blocks[np.all(w[blocks] > 0.0, axis=1) | np.all(w[blocks] < 0.0, axis=1)]
             if len(blocks):
@@ -73,7 +75,7 @@ def stretches(rig: Rig, log: Prepared, known: Mapping[str, Any], position: Posit
     return found
 
 
-def missing_torque(rig: Rig, s: Stretch, known: Mapping[str, Any], rung: int, position: Position) -> np.ndarray:
+def missing_torque(rig: Rig, s: Stretch, known: Mapping[str, Any], rung: int, shown: Shown) -> np.ndarray:
     """r of each block [N·m].
 
     Raises
@@ -86,9 +88,9 @@ def missing_torque(rig: Rig, s: Stretch, known: Mapping[str, Any], rung: int, po
     train = scenario.train()
     ratios: dict[str, float] = {}
     for name in train.shafts:
-        n = turns(train, name, position.shaft)
+        n = turns(train, name, shown.shaft)
         if n is None:
-            raise InputError(f"shaft {name} does not turn with {position.shaft} by a fixed ratio")
+            raise InputError(f"shaft {name} does not turn with {shown.shaft} by a fixed ratio")
         ratios[name] = n
     inertia, viscous, dry = 0.0, 0.0, np.zeros(len(s.time))
     other = np.zeros(len(s.time))

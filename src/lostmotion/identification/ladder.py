@@ -24,7 +24,9 @@ from .prepare import Prepared
 from .rig import Rig
 from .task import Identification
 
-ROUGH = re.compile(r"(^|\.)(backlash|breaks|breakaway_torque)(\.|$)")  # keys on which a motion does not depend smoothly
+ROUGH = re.compile(
+    r"(^|\.)(backlash|breaks|breakaway_torque|stribeck_speed|friction_curve)(\.|$)"
+)  # keys on which a motion does not depend smoothly
 SCAN = 9  # values of such a parameter at which the cost is computed
 SPAN = 8.0  # from an eighth of the value found to eight times it
 PARTS = (1 / 16, 1 / 8, 1 / 4, 1 / 2)  # of the logs, to which a fit is made before that to the whole
@@ -154,7 +156,7 @@ def climb(rig: Rig, engine: Engine, logs: Sequence[Prepared], start: Point, noti
 
 
 def is_rough(rig: Rig, name: str, rung: int) -> bool:
-    """Whether the motion does not depend smoothly on a parameter: it enters a gap or a break of a law."""
+    """Whether the motion does not depend smoothly on a parameter: it enters a gap, a break of a law or sticking."""
     phases = range(-1, len(rig.task.phases))
     return any(ROUGH.search(key) for phase in phases for key in rig.leaves_of(name, rung, phase))
 

@@ -1,4 +1,4 @@
-"""The measured motion of a rig: which shaft a log shows, its angle, and its derivatives by local cubics."""
+"""The measured motion of a rig: which shaft a log shows, its angle or speed, and the derivatives by local cubics."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from ..control.axis import turns
 from ..errors import InputError
+from ..model.train import DriveTrain
 from .engine import Point
 from .formulas import names_in
 from .measuring import numbers_of
@@ -22,27 +23,42 @@ LEAST = 5  # samples of a cubic
 
 
 @dataclass(frozen=True)
-class Position:
-    """A measured channel that shows the angle of a shaft."""
+class Shown:
+    """A measured channel that shows the motion of a shaft."""
 
     channel: str
     shaft: str
+    is_speed: bool
+    """whether it shows the speed; else the angle"""
 
 
-def position_of(rig: Rig) -> Position:
-    """The first measured channel that shows an angle.
+def shown_motion(rig: Rig) -> Shown:
+    """The first measured channel that shows an angle, or if none does and no torque depends on the angle, a speed.
 
     Raises
     ------
     InputError
         None does.
     """
-    for name, m in rig.task.measured.items():
-        train = rig.scenario.train()
-        shaft = next((s for s in train.shafts if train.angle_of(s) == m.variable), None)
-        if shaft is not None and m.filter_time == 0.0:
-            return Position(name, shaft)
-    raise InputError("no measured channel is the angle of a shaft without a filter")
+    train = rig.scenario.train()
+    plain = {name: m.variable for name, m in rig.task.measured.items() if m.filter_time == 0.0}
+    by_variable = {train.angle_of(s): s for s in train.shafts}
+    for name, variable in plain.items():
+        if variable in by_variable:
+            return Shown(name, by_variable[variable], is_speed=False)
+    by_speed = {f"{s}_speed": s for s in train.shafts}
+    for name, variable in plain.items():
+        if variable in by_speed and not depends_on_angle(train):
+            return Shown(name, by_speed[variable], is_speed=True)
+    if any(variable in by_speed for variable in plain.values()):
+        raise InputError("no measured channel shows the angle of a shaft without a filter, on which torques depend")
+    raise InputError("no measured channel is the angle or the speed of a shaft without a filter")
+
+
+def depends_on_angle(train: DriveTrain) -> bool:
+    """Whether a torque of a train depends on an angle."""
+    by_angle = bool(train.gravity or train.angle_torques or train.springs)
+    return by_angle or any(gear.transmission_error is not None for gear in train.gears.values())
 
 
 def measured_course(rig: Rig, log: Prepared, channel: str, known: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
@@ -58,7 +74,7 @@ def names_of_channel(rig: Rig, channel: str) -> frozenset[str]:
 
 
 def windows(rig: Rig, logs: Sequence[Prepared], point: Point, rung: int, length: float) -> list[Prepared]:
-    """Logs in windows, each run of which begins at the angle and the speed that were measured there.
+    """Logs in windows, each run of which begins at the angle and the speed that were measured there, or at the speed alone.
 
     Parameters
     ----------
@@ -68,27 +84,27 @@ def windows(rig: Rig, logs: Sequence[Prepared], point: Point, rung: int, length:
     Raises
     ------
     InputError
-        The state of the rig is not that of a measured angle, or a window has too few samples.
+        No channel shows the state of the rig, or a window has too few samples.
     """
     try:
-        position = position_of(rig)
+        shown = shown_motion(rig)
     except InputError as problem:
         raise InputError(
-            f"key fit.horizon: {problem}, and windows begin at a measured angle; leave fit.horizon out"
+            f"key fit.horizon: {problem}, and windows begin at a measured state; leave fit.horizon out"
         ) from None
-    return [_in_windows(rig, log, point, rung, length, position) for log in logs]
+    return [_in_windows(rig, log, point, rung, length, shown) for log in logs]
 
 
-def _in_windows(rig: Rig, log: Prepared, point: Point, rung: int, length: float, position: Position) -> Prepared:
+def _in_windows(rig: Rig, log: Prepared, point: Point, rung: int, length: float, shown: Shown) -> Prepared:
     known = {**log.facts, **point.of(log)}
     built = rig.built(rig.changes(known, rung, log.segments[0].phase))
     scenario = built.scenario
     if scenario.axes() or built.remembers or scenario.clutches or scenario.freewheels or scenario.dampers:
         raise InputError(
-            "key fit.horizon: the rig has a controller with states of its own, a clutch or a damper, whose state no angle shows; "
+            "key fit.horizon: the rig has a controller with states of its own, a clutch or a damper, whose state no channel shows; "
             "leave fit.horizon out"
         )
-    time, angle = measured_course(rig, log, position.channel, known)
+    time, course = measured_course(rig, log, shown.channel, known)
     starts = np.unique(np.searchsorted(log.time, np.arange(0.0, log.time[-1], length)))
     starts = starts[len(log.time) - starts >= LEAST]
     if length < LEAST * log.log.interval:
@@ -96,14 +112,16 @@ def _in_windows(rig: Rig, log: Prepared, point: Point, rung: int, length: float,
             f"key fit.horizon: {length:g} s has fewer than {LEAST} samples of {log.name}; give longer ones"
         )
     train = scenario.train()
-    ratios = {s: turns(train, s, position.shaft) for s in train.shafts}
+    ratios = {s: turns(train, s, shown.shaft) for s in train.shafts}
     begins: dict[int, dict[str, FormulaText]] = {}
     for k in starts[1:]:
-        x, v = _cubic(time, angle, int(k), max(2, round(length / log.log.interval / 8)))
-        if np.isnan(v):
+        x, slope = _cubic(time, course, int(k), max(2, round(length / log.log.interval / 8)))
+        if np.isnan(slope):
             continue
+        v = x if shown.is_speed else slope
         begins[int(k)] = {scenario.initial_key("speeds", s): n * v for s, n in ratios.items() if n is not None}
-        begins[int(k)][scenario.initial_key("angles", position.shaft)] = x
+        if not shown.is_speed:
+            begins[int(k)][scenario.initial_key("angles", shown.shaft)] = x
     segments = []
     for segment in log.segments:
         edges = [segment.begin, *(k for k in begins if segment.begin < k < segment.end), segment.end]

@@ -19,6 +19,7 @@ from ..model.torsion import Rigid
 from .formulas import number
 from .ladder import start_point
 from .measuring import numbers_of
+from .motion import depends_on_angle
 from .parameters import FreeParameter
 from .prepare import Prepared, Segment, first_values_named
 from .rig import Rig
@@ -33,7 +34,7 @@ OFFSETS = ("restart_angle", "restart_speed")  # of the state behind a pause, in 
 
 
 @dataclass(frozen=True)
-class Shown:
+class Restart:
     """A measured channel that shows the state of a rig that moves as one shaft."""
 
     channel: str
@@ -106,7 +107,7 @@ def _late(task: Identification, log: Prepared) -> int:
     return max((int(np.argmax(v)) for v, n in zip(log.valid, log.measured, strict=True) if n in wanted), default=0)
 
 
-def shown_by(rig: Rig, log: Prepared, known: Mapping[str, Any]) -> Shown:
+def shown_by(rig: Rig, log: Prepared, known: Mapping[str, Any]) -> Restart:
     """The channel that shows the state.
 
     Raises
@@ -125,9 +126,7 @@ def shown_by(rig: Rig, log: Prepared, known: Mapping[str, Any]) -> Shown:
     for name, gear in train.gears.items():
         if not isinstance(gear.stiffness, Rigid):
             raise InputError(f"no channel shows the twist of gears.{name}")
-    by_angle = bool(train.gravity or train.angle_torques or train.springs)
-    by_angle |= any(gear.transmission_error is not None for gear in train.gears.values())
-    for kind in ("angle", "speed")[: 1 if by_angle else 2]:
+    for kind in ("angle", "speed")[: 1 if depends_on_angle(train) else 2]:
         for name, m in rig.task.measured.items():
             by_variable = {train.angle_of(s) if kind == "angle" else f"{s}_speed": s for s in train.shafts}
             shaft = by_variable.get(m.variable)
@@ -137,7 +136,7 @@ def shown_by(rig: Rig, log: Prepared, known: Mapping[str, Any]) -> Shown:
             whole = {s: n for s, n in ratios.items() if n is not None}
             if len(whole) == len(ratios):
                 keys = {s: {key: scenario.initial_key(key, s) for key in ("angles", "speeds")} for s in train.shafts}
-                return Shown(name, shaft, kind == "speed", whole, keys)
+                return Restart(name, shaft, kind == "speed", whole, keys)
     raise InputError("no measured channel without a filter shows the angle of a shaft with which all others turn")
 
 
@@ -163,7 +162,7 @@ def _part(log: Prepared, begin: int, end: int) -> Prepared | None:
     return part if np.all(part.valid.sum(axis=1) >= LEAST) else None
 
 
-def _restarted(rig: Rig, part: Prepared, shown: Shown, known: Mapping[str, Any]) -> Prepared | None:
+def _restarted(rig: Rig, part: Prepared, shown: Restart, known: Mapping[str, Any]) -> Prepared | None:
     """A part that begins at the measured state, as soon as the inputs that act are those recorded behind the pause."""
     inputs = rig.task.inputs.items()
     dead = max((number(i.delay, known, f"inputs.{name}.delay") for name, i in inputs), default=0.0)
@@ -199,7 +198,7 @@ def _taylor(time: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _initial(
-    task: Identification, shown: Shown, delay: float, value: np.ndarray, error: np.ndarray
+    task: Identification, shown: Restart, delay: float, value: np.ndarray, error: np.ndarray
 ) -> dict[str, FormulaText]:
     """Formulas of the state by dotted key: that of the cubic, through the scale, the offset and the delay of the channel."""
     m = task.measured[shown.channel]

@@ -15,7 +15,7 @@ from ..errors import InputError
 from .engine import Engine, Point
 from .formulas import names_in
 from .inverse_dynamics import Stretch, missing_torque, stretches
-from .motion import Position, names_of_channel, position_of, windows
+from .motion import Shown, names_of_channel, shown_motion, windows
 from .parameters import FreeParameter
 from .prepare import Prepared
 from .rig import Rig
@@ -66,13 +66,13 @@ def regressed(
         On the lowest rung.
     """
     try:
-        position = position_of(rig)
+        shown = shown_motion(rig)
         judged = _windows_or_logs(rig, logs, point)
         best, report, error = point, Regression(), _error(rig, engine, judged, point)
         refusal, solved = "", False
         for width in WIDTHS:
             try:
-                values, kept = _solved(rig, logs, point, free, position, width)
+                values, kept = _solved(rig, logs, point, free, shown, width)
             except InputError as problem:
                 refusal = refusal or str(problem)  # that of the narrowest filter, which has the most samples
                 continue
@@ -112,7 +112,7 @@ def _solved(
     logs: Sequence[Prepared],
     point: Point,
     free: Mapping[str, FreeParameter],
-    position: Position,
+    shown: Shown,
     width: int,
 ) -> tuple[dict[str, float], dict[str, str]]:
     """(values found, why others are not) with one filter.
@@ -122,7 +122,7 @@ def _solved(
     InputError
         There is no regression.
     """
-    balance = _Balance(rig, logs, point, position, width)
+    balance = _Balance(rig, logs, point, shown, width)
     delays = frozenset().union(*(names_in(i.delay) for i in rig.task.inputs.values()))
     kept: dict[str, str] = {}
     steps: dict[str, float] = {}
@@ -130,7 +130,7 @@ def _solved(
     for name, p in free.items():
         if p.deviation is not None:
             kept[name] = "of a prior"
-        elif name in delays or name in names_of_channel(rig, position.channel):
+        elif name in delays or name in names_of_channel(rig, shown.channel):
             kept[name] = "of the measurement or of a delay"
         else:
             h = _step(p, point.values[name])
@@ -171,15 +171,15 @@ def _step(p: FreeParameter, value: float) -> float:
 class _Balance:
     """The missing torques of all blocks of some logs, at the start and beside it."""
 
-    def __init__(self, rig: Rig, logs: Sequence[Prepared], point: Point, position: Position, width: int) -> None:
-        self._rig, self._point, self._position = rig, point, position
+    def __init__(self, rig: Rig, logs: Sequence[Prepared], point: Point, shown: Shown, width: int) -> None:
+        self._rig, self._point, self._shown = rig, point, shown
         self._stretches: list[Stretch] = []
         rows, refused = [], ""
         for log in logs:
             known = {**log.facts, **point.of(log)}
-            for s in stretches(rig, log, known, position, width):
+            for s in stretches(rig, log, known, shown, width):
                 try:
-                    rows.append(missing_torque(rig, s, known, 0, position))
+                    rows.append(missing_torque(rig, s, known, 0, shown))
                     self._stretches.append(s)
                 except InputError as problem:
                     refused = str(problem)
@@ -193,7 +193,7 @@ class _Balance:
         for s in self._stretches:
             known = {**s.log.facts, **self._point.of(s.log)}
             known |= {name: known[name] + d for name, d in offsets.items()}
-            rows.append(missing_torque(self._rig, s, known, 0, self._position))
+            rows.append(missing_torque(self._rig, s, known, 0, self._shown))
         return np.asarray(np.concatenate(rows) - self.there)
 
     def column(
