@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -9,6 +10,7 @@ import lostmotion as lm
 from conftest import ROOT
 from lostmotion.cli import app
 from lostmotion.data_sheets import records
+from lostmotion.data_sheets.components import motor_table
 from lostmotion.data_sheets.loss_map_builder import build_loss_map
 from lostmotion.data_sheets.records import KINDS, catalogue, find, parse_sheets
 from lostmotion.errors import InputError
@@ -27,8 +29,8 @@ def test_names_are_unique_and_enough_records_can_run():
     names = [r.name for r in catalogue()]
     assert len(set(names)) == len(names)
     assert {r.kind for r in COMPLETE} >= {"strain_wave", "planetary"}
-    assert len(COMPLETE) >= 8
-    assert len([r for r in MOTORS if not r.missing()]) >= 4
+    assert len(COMPLETE) >= 400
+    assert len([r for r in MOTORS if not r.missing()]) >= 150
     assert {r.kind for r in GEARBOXES} >= {"strain_wave", "planetary", "worm"}
 
 
@@ -127,9 +129,47 @@ def test_files_that_are_no_sheets(tmp_path: Path):
         find("schaeffler-rt1-h-20-10", "gearbox")
 
 
-def test_a_sheet_without_efficiency_is_refused_with_the_place_to_read_it():
-    with pytest.raises(ValueError, match=r"lacks an efficiency.*Harmonic Drive, CSF-2UH"):
-        build_loss_map(find("harmonic-drive-csf-17-100-2uh", "gearbox"))
+def test_a_sheet_without_efficiency_of_a_kind_without_estimate_is_refused_with_the_place_to_read_it():
+    gap = {"datum": "losses.efficiency", "where": "the catalogue, page 7"}
+    with pytest.raises(ValueError, match=r"lacks an efficiency.*the catalogue, page 7"):
+        build_loss_map(sheet(kind="cycloidal", losses={}, gaps=[gap]))
+
+
+def test_losses_that_are_not_printed_are_those_of_the_kind_and_say_so():
+    record = find("harmonic-drive-csf-17-100-2uh", "gearbox")
+    assert record.losses.empty and record.level() == "estimated losses"
+    gearbox = lm.gearbox(record.name)
+    # At rated load and speed an efficiency eta loses 1/eta - 1 of what the load takes: 0.75, within 0.6 to 0.85.
+    losses, speed = gearbox.losses, gearbox.losses.speeds.index(1.0)
+    lost = losses.values[losses.loads.index(1.0)][speed]
+    assert lost == pytest.approx(1.0 / 0.75 - 1.0)
+    assert [lost * factor for factor in gearbox.loss_range] == pytest.approx([1.0 / 0.85 - 1.0, 1.0 / 0.6 - 1.0])
+    assert "estimated as 75%" in gearbox.note and "60% to 85%" in gearbox.note
+    with pytest.raises(InputError, match="only those of a map are estimated"):
+        gearbox.model_copy(update={"losses": {"kind": "constant_efficiency", "efficiency": 0.9}})
+
+
+def test_a_motor_without_winding_runs_as_a_torque_source_within_its_printed_torques():
+    record = find("yaskawa-sgm7j-01a", "motor")
+    assert record.level() == "torque source"
+    motor = lm.motor(record.name)
+    assert (motor.kind, motor.friction_torque, motor.limits.peak_torque) == ("torque_source", 0.0, 1.11)
+    assert "voltage and current are not judged" in motor.note and "friction of yaskawa-sgm7j-01a" in motor.note
+    siemens = lm.Motor(**motor_table("siemens-1ft7044-ak7", {"dc_voltage": "600 V", "friction_torque": 0.1}))
+    assert siemens.kind == "synchronous" and "taken as 0" not in siemens.note
+    with pytest.raises(InputError, match=r"lacks dc_voltage.*give motor.dc_voltage beside `from`"):
+        motor_table("siemens-1ft7044-ak7", {"kind": "synchronous"})
+
+
+def test_data_are_read_as_they_are_printed():
+    printed = sheet(name="My-Gearbox", stiffness="6 Nm/arcmin", losses={}, efficiency=0.96)
+    assert printed.name == "my-gearbox"
+    assert printed.stiffness.slopes == pytest.approx((6.0 * 60.0 * 180.0 / np.pi,))
+    (point,) = printed.losses.efficiency
+    assert (point.efficiency, point.load, point.input_speed) == (0.96, 1.0, printed.rated_input_speed)
+    with pytest.raises(InputError, match="say the same; give one"):
+        sheet(efficiency=0.9, losses={"efficiency": 0.8})
+    assert find("Schaeffler-RT1-H-20-100", "gearbox") == find("schaeffler-rt1-h-20-100", "gearbox")
 
 
 def test_a_loop_wider_than_the_torque_is_refused():

@@ -241,6 +241,27 @@ def test_the_page_on_the_drive_check_names_every_rule():
         assert f"`{rule}`" in page
 
 
+def test_the_peak_torque_of_the_motor_is_judged_where_it_is_known():
+    assert "motor_peak_torque" not in by_rule(move())
+    largest = float(abs(lm.simulate(move())["motor_torque"]).max())
+    for limit, verdict in ((1.01 * largest, "ok"), (0.98 * largest, "warning")):
+        assert by_rule(move(**{"motor.limits.peak_torque": limit}))["motor_peak_torque"].verdict == verdict
+
+
+def test_verdicts_that_depend_on_estimated_losses_are_not_decided():
+    losses = {"kind": "map", "speeds": [0, 1], "loads": [0, 1], "values": [[0, 0], [0.3, 0.3]], "mirrored": True}
+    most = losses | {"values": [[0, 0], [0.39, 0.39]]}
+    torque, largest = (
+        float(abs(lm.simulate(move(**{"gearbox.losses": some}))["output_torque"]).max()) for some in (losses, most)
+    )
+    assert largest > 1.01 * torque  # the same torque of the motor brakes the load harder the more the gearbox loses
+    for limit, verdict in ((1.1 * largest, "ok"), (0.5 * (torque + largest), "unknown")):
+        changes = {"gearbox.loss_range": [0.5, 1.3], "gearbox.limits.peak_output_torque": limit}
+        found = by_rule(move(**{"gearbox.losses": losses, **changes}))["estimated_losses"]
+        assert found.verdict == verdict
+        assert ("output torque, largest (ok to warning)" in found.value) is (verdict == "unknown")
+
+
 def test_leaving_the_data_of_the_loss_map_is_found():
     path = ROOT / "scenarios" / "paper-2dof-nl-large.toml"
     assert by_rule(lm.load(path))["loss_map"].verdict == "ok"
@@ -259,7 +280,7 @@ def test_a_worm_gear_that_locks_lowers_smoothly_or_chatters():
 
 
 def test_every_rule_is_tried_and_names_its_source():
-    assert set(OTHERWISE) | {"loss_map", "self_locking"} == set(RULES)
+    assert set(OTHERWISE) | {"loss_map", "self_locking", "motor_peak_torque", "estimated_losses"} == set(RULES)
     for finding in check_drive(move()):
         assert finding.source
         assert f"[{finding.source}]" in str(finding)

@@ -170,7 +170,7 @@ def test_own_sheets_from_templates_can_be_used_as_they_are(tmp_path: Path) -> No
         lm.load(axis(tmp_path, table, f'from = "own.toml"\n{beside}'))
         for datum in KINDS[kind].__annotations__:
             assert datum.isupper() or f"{datum} = " in template(kind), (kind, datum)
-        assert "Complete: it can be simulated." in record_text(str(tmp_path / "own.toml"))
+        assert "It can be simulated: all data." in record_text(str(tmp_path / "own.toml"))
 
 
 @pytest.mark.parametrize(

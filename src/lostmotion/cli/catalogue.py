@@ -34,7 +34,7 @@ def catalogue(
 ) -> None:
     """List the components, show one with its sources and gaps, or start your own data sheet.
 
-    The list says of each record what it is, and what it lacks for a simulation.
+    Without an option: how many records of each kind there are. The list says of each record how it runs, or what it lacks.
 
     \b
     lostmotion catalogue --kind strain_wave --ratio 50..120 --torque 20..100
@@ -43,7 +43,7 @@ def catalogue(
     lostmotion catalogue --kind screw --lead "5 mm..10 mm" --force 10000..20000
     lostmotion catalogue new --kind screw -o my-screw.toml
     """
-    from ..reports.listing import list_records, record_text, template
+    from ..reports.listing import list_records, record_text, summary, template
 
     if name == "new":
         text = template(kind)
@@ -59,5 +59,7 @@ def catalogue(
         print(f"Template written to {output}; fill in what your data sheet says and delete the rest")
     elif name is not None:
         print(record_text(name))
+    elif not complete and (kind, ratio, torque, force, lead) == (None,) * 5:
+        print(summary())
     else:
         print(list_records(kind, ratio, torque, complete, force, lead))

@@ -80,6 +80,8 @@ def gearbox_table(
         table["stiffness"] = torsion.model_dump()
     if built is not None:
         table["losses"] = built.losses.model_dump()
+        if (estimate := sheet.loss_estimate()) is not None:
+            table["loss_range"] = estimate.factors()
     if notes := [*filter(None, [sheet.note]), *(built.notes if built else ())]:
         table["note"] = " ".join(notes)
     _change(table, changes)
@@ -208,13 +210,13 @@ def motor(name: RecordName, *, voltage_limit: float | None = None) -> Motor:
         raise InputError(f"motor {name}: {error}") from None
 
 
-# Keys of `[motor]` that may close a gap of the record, and the name of that gap.
+# Keys of `[motor]` that may close a gap of a record, and the keys of a sheet that say the same.
 CLOSES = {
-    "rotor_inertia": "rotor_inertia",
-    "friction_torque": "friction_torque or no_load_current",
-    "electrical_time_constant": "inductance",
-    "dc_voltage": "dc_voltage",
-    "rated_torque": "rated_torque",
+    "rotor_inertia": ("rotor_inertia",),
+    "friction_torque": ("friction_torque", "no_load_current"),
+    "electrical_time_constant": ("electrical_time_constant", "inductance"),
+    "dc_voltage": ("dc_voltage",),
+    "rated_torque": ("rated_torque", "rated_current"),
 }
 
 
@@ -231,8 +233,10 @@ def motor_table(reference: str, changes: Mapping[str, Any], where: str = "motor"
 
     record = find(reference, "motor")
     assert isinstance(record, MotorSheet)
-    missing = record.missing()
-    gaps = {key: changes[key] for key, gap in CLOSES.items() if key in changes and missing.keys() & {key, gap}}
+    lacked = [key for key, same in CLOSES.items() if all(getattr(record, name) is None for name in same)]
+    gaps = {key: changes[key] for key in lacked if key in changes}
+    if record.kind != "synchronous":
+        gaps.pop("dc_voltage", None)  # there it stands beside the kind "synchronous"
     winding = changes.get("winding")
     if record.kind == "brushless" and isinstance(winding, Mapping) and "pole_pairs" in winding:
         gaps["pole_pairs"] = winding["pole_pairs"]
@@ -240,7 +244,8 @@ def motor_table(reference: str, changes: Mapping[str, Any], where: str = "motor"
         sheet = MotorSheet(**_given(record) | gaps) if gaps else record
         table = (sheet.synchronous() if changes.get("kind") == "synchronous" else sheet.motor()).model_dump()
     except ValueError as error:
-        keys = [f"{where}.{key}" for key, gap in CLOSES.items() if missing.keys() & {key, gap} and key not in changes]
+        needed = {*record.missing(), *(["dc_voltage"] if changes.get("kind") == "synchronous" else [])}
+        keys = [f"{where}.{key}" for key in lacked if key in needed and key not in changes]
         remedy = f"; give {' and '.join(keys)} beside `from`" if keys else ""
         raise InputError(f"{where} from {shown(reference)}: {error}{remedy}") from None
     if changes.get("kind") == "torque_source":

@@ -1,5 +1,6 @@
 """What a data sheet says of the losses of a gearbox."""
 
+from dataclasses import dataclass
 from typing import Annotated, Self
 
 from pydantic import model_validator
@@ -63,6 +64,24 @@ class Lubricant(Part):
         slope = (w(self.viscosity_100) - w(self.viscosity_40)) / (t100 - t40)
         exponent = w(self.viscosity_40) + slope * (log10(temperature + 273.15) - t40)
         return (power(10.0, power(10.0, exponent)) - 0.7) * 1e-6
+
+
+@dataclass(frozen=True)
+class LossEstimate:
+    """The efficiency of gearboxes of a kind at rated load and speed, where a sheet says nothing of losses."""
+
+    efficiency: float
+    lowest: float
+    highest: float
+    source: str
+
+    def factors(self) -> tuple[float, float]:
+        """What the losses of the best and of the worst of the kind are of those of the estimate."""
+
+        def lost(efficiency: float) -> float:
+            return 1.0 / efficiency - 1.0
+
+        return lost(self.highest) / lost(self.efficiency), lost(self.lowest) / lost(self.efficiency)
 
 
 class LossData(Part):

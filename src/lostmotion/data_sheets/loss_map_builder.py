@@ -11,7 +11,7 @@ torque, 3 starting torque, 4 standstill under load. docs/catalogue-data.md expla
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ..errors import InputError
@@ -74,15 +74,16 @@ def build_loss_map(
                 f"{sheet.name}: has a whole loss table, which holds for {losses.temperature:g} °C; leave temperature out"
             )
         speeds, loads, values = losses.table.whole()
-        scaled = [[loss_factor * x for x in row] for row in values]
-        table = LossMap(speeds=tuple(speeds), loads=tuple(loads), values=tuple(map(tuple, scaled)))
+        whole = LossMap(speeds=tuple(speeds), loads=tuple(loads), values=tuple(map(tuple, values)))
+        table = whole.scaled(loss_factor)
         return BuiltMap(table, tuple(tuple("given table" for _ in speeds) for _ in loads))
-    if losses.empty:
+    if losses.empty and sheet.loss_estimate() is None:
         raise InputError(
             f"{sheet.name}: lacks an efficiency, without which no loss map can be made; see "
             f"{sheet.where('losses.efficiency')}"
         )
-    return _Builder(sheet, temperature).build(loss_factor)
+    built = _Builder(sheet.with_losses(), temperature).build(loss_factor)
+    return replace(built, notes=(*sheet.assumptions(), *built.notes))
 
 
 @dataclass

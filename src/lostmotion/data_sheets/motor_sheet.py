@@ -27,6 +27,8 @@ from ..model.motor import SAID_BY_WINDING, Motor, MotorLimits
 from ..model.synchronous_motor import Winding
 from .sheet import Record
 
+# At which level the data of a record let it run, from all to little.
+SYNCHRONOUS, DC_EQUIVALENT, TORQUE_SOURCE = "synchronous motor", "DC-equivalent motor", "torque source"
 # What of a brushless motor with block commutation the winding of a synchronous one says in its own ways.
 BLOCK_KEYS = ("rated_voltage", "torque_constant", "resistance", "inductance", "pole_pairs")
 
@@ -41,6 +43,8 @@ class MotorSheet(Record):
     rated_torque: Annotated[Torque, Positive] | None = None
     """at the shaft, continuous; with armature_voltage_constant that of the field"""
     rated_speed: Annotated[Speed, Positive] | None = None
+    peak_torque: Annotated[Torque, Positive] | None = None
+    """at the shaft, for seconds, as in acceleration"""
     rated_current: Annotated[Current, Positive] | None = None
     no_load_speed: Annotated[Speed, Positive] | None = None
     no_load_current: Annotated[Current, Positive] | None = None
@@ -83,24 +87,35 @@ class MotorSheet(Record):
 
     def missing(self) -> dict[str, str]:
         """What a run needs and the record lacks."""
-        if self.kind == "synchronous":
-            need = {
-                "rotor_inertia": self.rotor_inertia,
-                "winding": self.winding,
-                "rated_torque": self.rated_torque,
-                "dc_voltage": self.dc_voltage,
-                "friction_torque": self.friction_torque is not None,
-            }
-        else:
-            constants = self.torque_constant and self.resistance
-            need = {
-                "rotor_inertia": self.rotor_inertia,
-                "torque_constant, resistance": self.armature_voltage_constant or constants,
-                "rated_torque or rated_current": self.rated_torque or self.rated_current,
-                "inductance": self.electrical_time_constant or self.inductance,
-                "friction_torque or no_load_current": self.friction_torque is not None or self.no_load_current,
-            }
+        need = {
+            "rotor_inertia": self.rotor_inertia,
+            "rated_torque": self.rated_torque or (self.rated_current and self.torque_constant),
+        }
         return {key: f"see {self.where(key)}" for key, value in need.items() if not value}
+
+    def level(self) -> str | None:
+        """How it runs with the data that it has: ``"synchronous motor"``, ``"DC-equivalent motor"``, ``"torque source"``, or None."""
+        if self.missing():
+            return None
+        if self.kind == "synchronous":
+            return SYNCHRONOUS if self.winding is not None and self.dc_voltage is not None else TORQUE_SOURCE
+        constants = self.torque_constant is not None and self.resistance is not None
+        return DC_EQUIVALENT if constants or self.armature_voltage_constant is not None else TORQUE_SOURCE
+
+    def assumptions(self) -> tuple[str, ...]:
+        """What a run of it takes for granted beyond its data, one sentence each."""
+        level, out = self.level(), []
+        if level == TORQUE_SOURCE:
+            lacks = "its dc voltage is not given" if self.winding is not None else "its winding is not given"
+            out.append(f"{self.name} runs as a torque source, since {lacks}: voltage and current are not judged.")
+        if self.friction_torque is None and (self.no_load_current is None or self.torque_constant is None):
+            out.append(f"The friction of {self.name} is not given and taken as 0.")
+        if level == DC_EQUIVALENT and self.electrical_time_constant is None and self.inductance is None:
+            out.append(f"The inductance of {self.name} is not given and taken as 0.")
+        return tuple(out)
+
+    def _note(self) -> str:
+        return " ".join(filter(None, [self.note, *self.assumptions()]))
 
     def motor(self) -> Motor:
         """Parameters of eq. (2), or of the synchronous motor.
@@ -109,8 +124,11 @@ class MotorSheet(Record):
         often not consistent with each other, and `no_load_speed_of_model` says by how much.
         """
         self._need_all()
-        if self.kind == "synchronous":
-            return self._synchronous(self.winding, self.dc_voltage, self.rated_torque, self.friction_torque)
+        level = self.level()
+        if level == SYNCHRONOUS:
+            return self._synchronous(self.winding, self.dc_voltage, self.rated_torque, self._friction())
+        if level == TORQUE_SOURCE:
+            return self._torque_source()
         k_t, R = self.torque_constant, self.resistance
         M_DR, k_N, speed = self._field_torque(), self.armature_voltage_constant, self.rated_speed
         assert self.rated_voltage is not None
@@ -123,9 +141,7 @@ class MotorSheet(Record):
                 speed = (self.rated_voltage - R * M_DR / k_t) / k_t
         tau = self.electrical_time_constant
         if tau is None:
-            assert self.inductance is not None
-            assert R is not None
-            tau = self.inductance / R
+            tau = 0.0 if self.inductance is None or R is None else self.inductance / R
         return Motor(
             rotor_inertia=self.rotor_inertia,  # type: ignore[arg-type]  # not missing
             friction_torque=self._friction(),
@@ -135,6 +151,19 @@ class MotorSheet(Record):
             electrical_time_constant=tau,
             armature_voltage_constant=k_N,
             limits=self._limits(M_DR, resistance=R, torque_constant=k_t),
+            note=self._note(),
+        )
+
+    def _torque_source(self) -> Motor:
+        torque = self._field_torque()
+        return Motor(
+            kind="torque_source",
+            rotor_inertia=self.rotor_inertia,  # type: ignore[arg-type]  # not missing
+            friction_torque=self._friction(),
+            rated_torque=torque,
+            winding=self.winding,
+            limits=self._limits(torque),
+            note=self._note(),
         )
 
     def synchronous(self) -> Motor:
@@ -150,9 +179,12 @@ class MotorSheet(Record):
         """
         if self.kind == "dc_brushed":
             raise InputError(f"{self.name}: has brushes, and cannot be of kind synchronous")
-        if self.kind == "synchronous":
-            return self.motor()
         self._need_all()
+        if self.kind == "synchronous":
+            for key in ("winding", "dc_voltage"):
+                if getattr(self, key) is None:
+                    raise InputError(f"{self.name}: lacks {key}; see {self.where(key)}")
+            return self.motor()
         for key in ("pole_pairs", "torque_constant", "resistance", "inductance"):
             if getattr(self, key) is None:
                 raise InputError(f"{self.name}: lacks {key}, which a synchronous motor needs; see {self.where(key)}")
@@ -173,8 +205,8 @@ class MotorSheet(Record):
         """T_10 [N·m]."""
         if self.friction_torque is not None:
             return self.friction_torque
-        assert self.torque_constant is not None
-        assert self.no_load_current is not None
+        if self.torque_constant is None or self.no_load_current is None:
+            return 0.0
         return self.torque_constant * self.no_load_current
 
     def _field_torque(self) -> float:
@@ -196,6 +228,7 @@ class MotorSheet(Record):
             winding=winding,
             dc_voltage=dc_voltage,
             limits=self._limits(torque),
+            note=self._note(),
         )
 
     def _limits(self, torque: float | None, **constants: float | None) -> MotorLimits:

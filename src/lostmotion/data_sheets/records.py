@@ -73,7 +73,8 @@ def _entries_of(file: str) -> tuple[Entry, ...]:
 
 @cache
 def _named(name: str) -> Sheet | None:
-    """The shipped record of a name. Only files whose text has the name are parsed, and no other record is made."""
+    """The shipped record of a name, in any case. Only files whose text has the name are parsed, and no other record is made."""
+    name = name.lower()
     near = (entry for file, text in _texts().items() if f'"{name}"' in text for entry in _entries_of(file))
     return next((_made(*entry) for entry in near if entry[1].get("name") == name), None)
 

@@ -6,9 +6,12 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from ..inputs.part import Part
+from ..inputs.quantities import Length, Mass, Number, Positive, Time
 from ..model.synchronous_motor import Winding
 from .loss_data import LossData
 
+# Fields of a record that are no data.
+WORDS = ("name", "manufacturer", "title", "note", "sources", "gaps")
 # Sheets written before may have these words.
 FORMER_WORDS = {"maker": "manufacturer", "figures": "data", "figure": "datum"}
 
@@ -21,6 +24,11 @@ def current_word(word: Any) -> Any:
 def in_current_words(table: Mapping[str, Any]) -> dict[str, Any]:
     """A table with its keys as they are called now; a key that is given in both words stays, and is refused as unknown."""
     return {key if current_word(key) in table else current_word(key): value for key, value in table.items()}
+
+
+def in_lower_case(name: Any) -> Any:
+    """A name as records are found by it."""
+    return name.lower() if isinstance(name, str) else name
 
 
 class Remark(Part):
@@ -53,27 +61,46 @@ class Gap(Remark):
 class Record(Part):
     """What data sheets of all kinds have."""
 
-    name: str = Field(pattern=r"^[a-z0-9][a-z0-9.-]*$")
-    """lower-case letters, digits, dots and dashes"""
+    name: Annotated[str, BeforeValidator(in_lower_case)] = Field(pattern=r"^[a-z0-9][a-z0-9.-]*$")
+    """letters, digits, dots and dashes; capitals are read as small letters"""
     manufacturer: str = ""
     title: str = ""
     """as the manufacturer calls it"""
     note: str = ""
     """what a reader of results must know"""
+    total_mass: Annotated[Mass, Positive] | None = None
+    """of the whole component, for the choice"""
+    overall_length: Annotated[Length, Positive] | None = None
+    """along the axis, for the space that it takes"""
+    price: Annotated[Number, Positive] | None = None
+    """in one currency for all sheets that are compared"""
+    lead_time: Annotated[Time, Positive] | None = None
+    """from order to delivery"""
     sources: tuple[Source, ...] = ()
     gaps: tuple[Gap, ...] = ()
 
     def given(self) -> list[str]:
         """Dotted keys of all data that are given."""
-        plain = {*Record.model_fields, "kind"}
         out = []
-        for name in self.model_fields_set - plain:
+        for name in self.model_fields_set - {*WORDS, "kind"}:
             value = getattr(self, name)
             if isinstance(value, LossData | Winding):
                 out += [f"{name}.{k}" for k in sorted(value.model_fields_set)]
             else:
                 out.append(name)
         return sorted(out)
+
+    def missing(self) -> dict[str, str]:
+        """What a run needs and the record lacks, with where to read it."""
+        raise NotImplementedError
+
+    def level(self) -> str | None:
+        """How it runs with the data that it has; None if it does not."""
+        return None if self.missing() else "all data"
+
+    def assumptions(self) -> tuple[str, ...]:
+        """What a run of it takes for granted beyond its data, one sentence each."""
+        return ()
 
     def source_of(self, datum: str) -> Source | None:
         """The source that covers a datum."""

@@ -53,6 +53,9 @@ class Transmission(Part):
     """whether the torque of the mesh damping is at most that of the spring, so that no torque jumps where flanks meet; needs
     backlash"""
     limits: GearboxLimits | None = None
+    loss_range: tuple[Annotated[Number, Positive], Annotated[Number, Positive]] | None = None
+    """of losses that are estimated: between which multiples of them those of such gearboxes lie. No run depends on it; the drive check says
+    which of its verdicts hold at both ends"""
     note: str = ""
     """what a reader of the results must know, such as that a loss table is a stand-in"""
 
@@ -62,6 +65,24 @@ class Transmission(Part):
         if ratio == 0.0:
             raise ValueError("is no ratio; give input speed / output speed, below 0 for a gear that reverses")
         return ratio
+
+    @model_validator(mode="after")
+    def _range_is_of_a_map(self) -> Self:
+        if self.loss_range is None:
+            return self
+        losses = getattr(self, "losses")  # noqa: B009
+        if not isinstance(losses, LossMap):
+            raise ValueError(
+                f"has a loss_range beside losses of kind {losses.kind!r}; only those of a map are estimated"
+            )
+        if self.loss_range[0] > self.loss_range[1]:
+            raise ValueError(f"has a loss_range that falls, from {self.loss_range[0]:g} to {self.loss_range[1]:g}")
+        return self
+
+    def with_losses(self, factor: float) -> Self:
+        """With losses that are known: `factor` times those of the map."""
+        losses = getattr(self, "losses")  # noqa: B009
+        return self.model_copy(update={"losses": losses.scaled(factor), "loss_range": None})
 
     @model_validator(mode="after")
     def _compliance_fits(self) -> Self:

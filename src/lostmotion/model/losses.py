@@ -80,6 +80,11 @@ class LossMap(Part):
             values = list(reversed(values[1:])) + values
         return list(self.speeds), loads, values
 
+    def scaled(self, factor: float) -> Self:
+        """All losses multiplied by `factor`."""
+        values = tuple(tuple(factor * x for x in row) for row in self.values)
+        return self.model_copy(update={"values": values})
+
     def core(self) -> _core.LossMap:
         speeds, loads, values = self.whole()
         return _core.LossMap(speeds, loads, [x for row in values for x in row])

@@ -35,6 +35,8 @@ class MotorLimits(Part):
     """What a motor can stand. No run depends on it; the drive check compares with it."""
 
     continuous_torque: Annotated[Torque, Positive] | None = None
+    peak_torque: Annotated[Torque, Positive] | None = None
+    """for seconds, as in acceleration"""
     max_speed: Annotated[Speed, Positive] | None = None
     resistance: Annotated[Resistance, Positive] | None = None
     """of the winding, at 25 °C"""
@@ -128,6 +130,8 @@ class Motor(Part):
     dc_voltage: Annotated[Voltage, Positive] | None = None
     """of the amplifier that feeds a synchronous motor"""
     limits: MotorLimits | None = None
+    note: str = ""
+    """what a reader of the results must know, such as that the friction is not printed"""
 
     @model_validator(mode="after")
     def _complete(self) -> Self:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
 from typing import get_args
@@ -86,8 +87,38 @@ def list_records(
     ]
     if not found:
         return "No record fits."
-    head = f"{'name':<34} {'type':<12} {'kind':<12} {'ratio, lead':>11} {'rated':>10} {'rpm':>6}  complete"
+    head = f"{'name':<34} {'type':<12} {'kind':<12} {'ratio, lead':>11} {'rated':>10} {'rpm':>6}  runs as"
     return "\n".join([head, *map(_line, found), _counts(found), "`lostmotion catalogue NAME` shows one."])
+
+
+def summary() -> str:
+    """How many records of each kind there are, how they run, and between which ratings."""
+    rows = []
+    of_kind: dict[tuple[str, str], list[Sheet]] = {}
+    for record in catalogue():
+        of_kind.setdefault((table_of(record), record.kind), []).append(record)
+    for (table, kind), records in of_kind.items():
+        levels = {level: sum(r.level() == level for r in records) for r in records if (level := r.level()) is not None}
+        runs = ", ".join(f"{number} {level}" for level, number in levels.items()) or "none"
+        spans = [
+            _span(records, data_of, unit, factor)
+            for data_of, unit, factor in (
+                (_ratio, "", 1.0),
+                (_lead, " mm", 1e3),
+                (_rated_torque, " N·m", 1.0),
+                (_rated_force, " N", 1.0),
+            )
+        ]
+        rows.append(f"{table:<13} {kind:<12} {len(records):>7}  {'; '.join(filter(None, spans)):<40} {runs}")
+    head = f"{'type':<13} {'kind':<12} {'records':>7}  {'ratio or lead; rated':<40} run as"
+    return "\n".join(
+        [head, *rows, _counts(list(catalogue())), "`lostmotion catalogue --kind KIND` lists those of a kind."]
+    )
+
+
+def _span(records: list[Sheet], data_of: Callable[[Sheet], float | None], unit: str, factor: float) -> str:
+    found = [factor * x for r in records if (x := data_of(r))]
+    return f"{min(found):.4g} to {max(found):.4g}{unit}" if found else ""
 
 
 def _ratio(record: Sheet) -> float | None:
@@ -126,7 +157,7 @@ def _line(record: Sheet) -> str:
     turns = isinstance(record, GearboxSheet | MotorSheet)
     rpm = f"{RPM * speed:.0f}" if speed else "?" if turns else ""
     missing = ", ".join(record.missing())
-    state = "yes" if not missing else f"no, lacks {missing}"
+    state = record.level() or f"lacks {missing}"
     return f"{record.name:<34} {table_of(record):<12} {record.kind:<12} {first:>11} {rated:>10} {rpm:>6}  {state}"
 
 
@@ -138,7 +169,7 @@ def _counts(records: list[Sheet]) -> str:
             whole = sum(not r.missing() for r in of_it)
             one = table.replace("_", " ")
             many = "gearboxes" if table == "gearbox" else f"{one}s"
-            parts.append(f"{len(of_it)} {many if len(of_it) > 1 else one}, {whole} of them complete")
+            parts.append(f"{len(of_it)} {many if len(of_it) > 1 else one}, {whole} of them run")
     return f"{len(records)} record{'s' if len(records) > 1 else ''}: {'; '.join(parts)}."
 
 
@@ -173,9 +204,10 @@ def record_text(name: str) -> str:
     missing = record.missing()
     lines += [
         "",
-        "Complete: it can be simulated."
+        f"It can be simulated: {record.level()}."
         if not missing
         else f"Not complete: a simulation also needs {', '.join(missing)}.",
+        *record.assumptions(),
     ]
     if isinstance(record, LinearSheet) and (choices := record.open_choices(record.values())):
         beside = " and ".join(f"{key} ({text})" for key, text in choices.items())

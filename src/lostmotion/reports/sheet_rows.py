@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..data_sheets.gearbox_sheet import StiffnessData
-from ..data_sheets.sheet import Record
+from ..data_sheets.sheet import WORDS, Record
 from ..inputs.part import Part
 from ..inputs.schema import unit_in_schema
 from ..model.gearbox import Gearbox
@@ -23,12 +23,7 @@ def rows_of(record: Record) -> list[tuple[str, str, str]]:
 
     for name in type(record).model_fields:
         value = getattr(record, name)
-        if (
-            name in Record.model_fields
-            or name == "kind"
-            or value in (None, False)
-            or name not in record.model_fields_set
-        ):
+        if name in WORDS or name == "kind" or value in (None, False) or name not in record.model_fields_set:
             continue
         label = name.replace("_", " ")
         if isinstance(value, StiffnessData):

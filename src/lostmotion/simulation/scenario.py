@@ -169,8 +169,8 @@ class Scenario(Part):
         return {}
 
     def note(self) -> str:
-        """What the sheet of the gearbox says beside its numbers."""
-        return self.gearbox.note
+        """What the sheets of gearbox and motor say beside their numbers."""
+        return " ".join(filter(None, [self.gearbox.note, self.motor.note]))
 
     def continuous(self) -> dict[str, ContinuousController]:
         """The continuous controllers: a drive in the short form has none."""

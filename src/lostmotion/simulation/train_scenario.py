@@ -226,8 +226,9 @@ class TrainScenario(LinearElements):
         return self.train().commanded()
 
     def note(self) -> str:
-        """What the sheets of the gears say beside their numbers."""
+        """What the sheets of gears and motors say beside their numbers."""
         notes = {name: part.note for name, part in self.train().gears.items()}
+        notes |= {name: part.note for name, part in self.motors.items()}
         notes |= {name: part.note for name, part in self.linear_motors.items()}
         return " ".join(f"{name}: {note}" for name, note in notes.items() if note)
 

@@ -16,7 +16,7 @@ from .duty_cycle import MIN_REST, STANDSTILL, DutyCycle, duty_cycle
 from .finding import Finding, Findings
 from .gearbox_check import input_speeds, loads, locks, loss_map, lost_motion
 from .motion_check import dead_zone, holdings, inertia, load_torques, resonance, resonances
-from .motor_check import command_of_run, current, heat, largest_speed, voltage
+from .motor_check import command_of_run, current, heat, largest_speed, peak_torque, voltage
 from .motor_run import oriented_amplitudes
 from .train_check import check_train
 
@@ -41,8 +41,13 @@ def check_drive(scenario: Scenario | TrainScenario) -> Findings:
     SolverError
         As `simulate`.
     """
+    findings = _findings(scenario)
+    return Findings([*findings, *_over_estimates(scenario, findings)])
+
+
+def _findings(scenario: Scenario | TrainScenario) -> list[Finding]:
     if isinstance(scenario, TrainScenario):
-        return Findings(check_train(scenario))
+        return list(check_train(scenario))
     result = _finely_sampled(scenario)
     cycle = duty_cycle(result, scenario.task.cycle)
     g, m, task = scenario.gearbox, scenario.motor, scenario.task
@@ -53,6 +58,7 @@ def check_drive(scenario: Scenario | TrainScenario) -> Findings:
         *loads(g, float(abs(result["output_torque"]).max()), cycle),
         *input_speeds(g, cycle),
         largest_speed(m, float(abs(speed).max())),
+        *peak_torque(m, torque),
         *heat(m, cycle, task.ambient_temperature),
         voltage(m, command, torque, speed, oriented=None if oriented is None else oriented[1]),
         current(m, torque),
@@ -65,7 +71,41 @@ def check_drive(scenario: Scenario | TrainScenario) -> Findings:
     ]
     if g.losses.kind == "map":
         findings.append(loss_map(result))
-    return Findings(_with_sinking(f, result, cycle) if f.rule in MEANS else f for f in findings)
+    return [_with_sinking(f, result, cycle) if f.rule in MEANS else f for f in findings]
+
+
+def _over_estimates(scenario: Scenario | TrainScenario, findings: list[Finding]) -> list[Finding]:
+    """Which of the verdicts hold wherever estimated losses lie in their range; nothing where none are estimated."""
+    ends = [_known_losses(scenario, end) for end in (0, 1)]
+    if scenario in ends:
+        return []
+    others = [{(f.rule, f.what): f for f in _findings(one)} for one in ends]
+    turned = []
+    for finding in findings:
+        least, most = (at_end.get((finding.rule, finding.what)) for at_end in others)
+        if least is None or most is None or {least.verdict, most.verdict} != {finding.verdict}:
+            said = ("not judged" if f is None else f.verdict for f in (least, most))
+            turned.append(f"{finding.what} ({' to '.join(said)})")
+    if turned:
+        value = f"not decided by them: {'; '.join(turned)}"
+        remark = "from the least to the largest losses of its kind; a measured or printed efficiency decides"
+        return [Finding("estimated_losses", "estimated losses", value, "unknown", remark)]
+    return [
+        Finding(
+            "estimated_losses", "estimated losses", "all verdicts hold from the least to the largest of the kind", "ok"
+        )
+    ]
+
+
+def _known_losses(scenario: Scenario | TrainScenario, end: int) -> Scenario | TrainScenario:
+    """With the losses at one end of the range of each estimate."""
+    parts = {"": scenario.gearbox} if isinstance(scenario, Scenario) else scenario.gears
+    known = {name: p.with_losses(p.loss_range[end]) for name, p in parts.items() if p.loss_range is not None}
+    if not known:
+        return scenario
+    return scenario.model_copy(
+        update={"gearbox": known[""]} if isinstance(scenario, Scenario) else {"gears": {**parts, **known}}
+    )
 
 
 def _with_sinking(finding: Finding, result: RunArrays, cycle: DutyCycle) -> Finding:

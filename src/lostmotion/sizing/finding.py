@@ -29,6 +29,8 @@ RULES = {
     "lost_motion": "virtual test rig; the limit is that of the task",
     "holding": "runs with command 0, from rest and from motion",
     "self_locking": "linear regime of the steady motion under the load: docs/self-locking.md",
+    "motor_peak_torque": "the motor's data sheet",
+    "estimated_losses": "the same check with the least and the largest losses of gearboxes of the kind",
     "loss_map": "the run, and the data of gearbox.losses",
 }
 

@@ -31,6 +31,18 @@ def largest_speed(m: Motor, speed: float, where: str = "motor") -> Finding:
     )
 
 
+def peak_torque(m: Motor, torque: np.ndarray, where: str = "motor") -> list[Finding]:
+    """The largest of the run [N·m]; nothing where no limit is known, as that of the current then judges."""
+    limit = m.limits.peak_torque if m.limits else None
+    if limit is None:
+        return []
+    key = f"{where}.limits.peak_torque"
+    largest = float(abs(torque).max())
+    return [
+        within("motor_peak_torque", "motor torque, largest", largest, limit, "N·m", "peak torque of the motor", key=key)
+    ]
+
+
 def heat(
     m: Motor, cycle: DutyCycle, ambient: float, where: str = "motor", *, rise: float | None = None
 ) -> list[Finding]:

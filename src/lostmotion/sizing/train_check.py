@@ -12,7 +12,7 @@ from ..simulation.train_scenario import TrainScenario
 from .duty_cycle import duty_cycle
 from .finding import Finding
 from .gearbox_check import input_speeds, loads, locks, loss_map
-from .motor_check import command_of_run, current, heat, largest_speed, voltage
+from .motor_check import command_of_run, current, heat, largest_speed, peak_torque, voltage
 from .motor_run import oriented_amplitudes
 
 SAMPLES = 20_000  # the fewest of a run
@@ -94,6 +94,7 @@ def _motor(scenario: TrainScenario, name: str, result: RunArrays) -> list[Findin
     oriented = oriented_amplitudes(result, where)
     findings = [
         largest_speed(motor, float(abs(w).max()), where),
+        *peak_torque(motor, T, where),
         *heat(motor, cycle, Task().ambient_temperature, where),
         voltage(motor, command, T, w, where, oriented=None if oriented is None else oriented[1]),
         current(motor, T, where),

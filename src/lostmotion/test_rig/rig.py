@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     import xarray
 
 FLYWHEEL = 1e9  # [kg m2] on the input: keeps its speed, or stays at rest, whatever the gearbox does
+LARGE_TORQUE = 100.0  # at the input [N·m]
 RIG_FREQUENCY = 20.0  # [Hz] of the load on the stiffest segment of the curve, damped critically
 SETTLING = 4.0  # [s] until a steady state is read
 RAMP = 400.0  # [s] of a slow ramp
@@ -100,7 +101,9 @@ class TestRig:
         return run(as_scenario(drive, **surroundings), energy=False)
 
     def _flywheel(self) -> Drive:
-        motor = Motor(kind="torque_source", rotor_inertia=FLYWHEEL)
+        # So large that its speed does not sink notably under the torque of a large gear of low ratio either.
+        share = max(1.0, self.gearbox.rated_output_torque / self.gearbox.ratio / LARGE_TORQUE)
+        motor = Motor(kind="torque_source", rotor_inertia=share * FLYWHEEL)
         return Drive(motor=motor, gearbox=self.gearbox, load=self.load)
 
     # --- (a), (e): steady state ---
