@@ -63,12 +63,13 @@ def panels(report: ScrewReport, sheet: ScrewSheet | None) -> list[Panel]:
 def summary_rows(report: ScrewReport) -> list[tuple[str, str]]:
     """What the rig says of itself, beside the comparison."""
     back = report.backdriving_force
+    bare = "" if report.screw.drag_torque > 0.0 else ", as no drag is given"
     rows = [
         (
             f"lost motion at ±{100 * LOST_MOTION_LOAD:.0f} % of {report.load:.4g} N",
             f"{1e6 * report.lost_motion:.4g} µm",
         ),
-        ("drag torque at 1000 rpm without a load", f"{report.drag_at(RATED):.4g} N·m"),
+        ("drag torque at 1000 rpm without a load", f"{report.drag_at(RATED):.4g} N·m{bare}"),
     ]
     if report.stiffness:
         rows.append(("axial stiffness", ", ".join(f"{1e-6 * k:.4g}" for k in report.stiffness) + " N/µm"))
@@ -78,7 +79,7 @@ def summary_rows(report: ScrewReport) -> list[tuple[str, str]]:
         (f"starting torque on the screw against {report.load:.4g} N", f"{report.starting_torque:.4g} N·m"),
         (
             "back-driving force with a free input",
-            f"{back:.4g} N" if back is not None else "none up to three times the load: self-locking",
+            f"{back:.4g} N{bare}" if back is not None else "none up to three times the load: self-locking",
         ),
     ]
     if report.screw.pitch_error is not None:
