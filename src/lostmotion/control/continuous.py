@@ -343,19 +343,31 @@ def _rate(signal: Signal[Any]) -> CommandSignal:
 
 
 def as_state_space(system: Any) -> StateSpace:
-    """A continuous-time system of scipy (`lti`) or python-control, of the error, as the state space of a controller.
+    """Convert a continuous-time system of scipy or python-control to the state space of a controller.
 
     Parameters
     ----------
-    system
-        Transfer function, poles and zeros, or state space, with one output and one input, the error [rad] or [rad/s] of the
-        controller, or with two inputs, the reference and the measured value. It gives the torque [N·m], or the relative
+    system : scipy.signal.lti or control.LTI
+        Transfer function, poles and zeros, or state space, with one output. Its input is the error [rad] or [rad/s] of the
+        controller; with two inputs they are the reference and the measured value. Its output is the torque [N·m] or the relative
         voltage.
+
+    Returns
+    -------
+    StateSpace
+        The state space, for `ContinuousController`.
 
     Raises
     ------
     InputError
-        It is of discrete time, has another number of inputs or outputs, or has more zeros than poles.
+        The system is of discrete time, has another number of inputs or outputs, or has more zeros than poles.
+
+    Examples
+    --------
+    >>> from scipy.signal import lti
+    >>> import lostmotion as lm
+    >>> lm.control.as_state_space(lti([2.0, 1.0], [0.1, 1.0])).A
+    ((-10.0,),)
     """
     need("scipy", "This conversion", "control")
     if isinstance(dt := getattr(system, "dt", None), float | int) and dt > 0.0:

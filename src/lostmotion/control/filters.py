@@ -119,17 +119,29 @@ def prewarped(
 
 
 def as_filter(system: Any) -> TransferFunction:
-    """A discrete-time system of scipy (`dlti`) or python-control, with one input and one output, as a filter.
+    """Convert a discrete-time system of scipy or python-control to a filter.
 
     Parameters
     ----------
-    system
-        Transfer function, poles and zeros, or state space, with its sample time `dt` [s].
+    system : scipy.signal.dlti or control.LTI
+        Transfer function, poles and zeros, or state space, with one input, one output and the sample time `dt` [s].
+
+    Returns
+    -------
+    TransferFunction
+        The filter, with numerator and denominator in powers of z.
 
     Raises
     ------
     InputError
-        It is of continuous time, has several inputs or outputs, or is too large.
+        The system is of continuous time, has several inputs or outputs, or is too large.
+
+    Examples
+    --------
+    >>> from scipy.signal import dlti
+    >>> import lostmotion as lm
+    >>> lm.control.as_filter(dlti([0.5], [1.0, -0.5], dt=1e-3)).denominator
+    (1.0, -0.5)
     """
     dt = getattr(system, "dt", None)
     if not isinstance(dt, float | int) or isinstance(dt, bool) or not dt > 0.0:

@@ -162,23 +162,35 @@ def _wear(table: dict[str, Any], changes: Mapping[str, Any], conditions: Conditi
 def gearbox(
     name: RecordName, *, temperature: float | None = None, added_backlash: float = 0.0, loss_factor: float = 1.0
 ) -> Gearbox:
-    """The gearbox of a record.
+    """Return the gearbox of a record.
 
     Parameters
     ----------
-    name
-        Of a record in the catalogue, or a file (``.toml``) with one record.
-    temperature
-        Of the lubricant [°C]; left out, that of the data.
-    added_backlash
+    name : str
+        Name of a record in the catalogue, or a file (``.toml``) with one record.
+    temperature : float, optional
+        Temperature of the lubricant [°C]. Default: the temperature of the data.
+    added_backlash : float
         Wear: added to the printed backlash [rad].
-    loss_factor
-        Wear: multiplies all losses.
+    loss_factor : float
+        Wear: factor of all losses.
+
+    Returns
+    -------
+    Gearbox
+        The gearbox with stiffness, backlash, hysteresis and loss map.
 
     Raises
     ------
     InputError
-        There is no such record, or it lacks what a run needs.
+        There is no such record, or it lacks data that a run requires.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> gearbox = lm.gearbox("wittenstein-tp010-mf-10")
+    >>> gearbox.ratio, round(gearbox.rated_output_torque, 1)
+    (10.0, 81.0)
     """
     changes: dict[str, Any] = {"added_backlash": added_backlash, "loss_factor": loss_factor}
     if temperature is not None:
@@ -189,19 +201,30 @@ def gearbox(
 
 @checked
 def motor(name: RecordName, *, voltage_limit: float | None = None) -> Motor:
-    """The motor of a record.
+    """Return the motor of a record.
 
     Parameters
     ----------
-    name
-        Of a record in the catalogue, or a file (``.toml``) with one record.
-    voltage_limit
+    name : str
+        Name of a record in the catalogue, or a file (``.toml``) with one record.
+    voltage_limit : float, optional
         Largest voltage of the amplifier [V].
+
+    Returns
+    -------
+    Motor
+        The motor with its speed-torque line and limits.
 
     Raises
     ------
     InputError
-        There is no such record, or it lacks what a run needs.
+        There is no such record, or it lacks data that a run requires.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> lm.motor("maxon-ec-i-52-606793").kind
+    'dc'
     """
     table = motor_table(name, {} if voltage_limit is None else {"voltage_limit": voltage_limit})
     try:

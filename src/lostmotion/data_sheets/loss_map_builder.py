@@ -47,20 +47,34 @@ class BuiltMap:
 def build_loss_map(
     sheet: GearboxSheet, *, temperature: Temperature | None = None, loss_factor: Number = 1.0
 ) -> BuiltMap:
-    """The loss map of a data sheet.
+    """Build the loss map of a data sheet.
 
     Parameters
     ----------
-    temperature
-        Of the lubricant [°C]; that of the data if left out. It changes the part that is lost without load, by the
-        given curves where the sheet has them at several temperatures, else by the viscosity of its lubricant.
-    loss_factor
-        All losses are multiplied by it, for wear.
+    sheet : GearboxSheet
+        The data sheet.
+    temperature : float, optional
+        Temperature of the lubricant [°C]. Default: that of the data. It changes the loss without load, by the given curves if the
+        sheet has them at several temperatures, else by the viscosity of its lubricant.
+    loss_factor : float
+        Factor of all losses, for wear.
+
+    Returns
+    -------
+    BuiltMap
+        The loss map with notes on its data.
 
     Raises
     ------
     InputError
-        The data do not suffice, or contradict each other beyond repair; the message names both.
+        The data do not suffice, or contradict each other beyond repair. The message names both.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> sheet = next(s for s in lm.catalogue() if s.name == "wittenstein-tp010-mf-10")
+    >>> len(lm.data_sheets.build_loss_map(sheet).notes)
+    1
     """
     if loss_factor <= 0.0:
         raise InputError(f"loss_factor {loss_factor} must be greater than 0")

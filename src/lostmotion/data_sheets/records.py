@@ -36,7 +36,20 @@ COMMON = ("kind", "manufacturer", "note")
 
 
 def catalogue() -> tuple[Sheet, ...]:
-    """All records that are shipped: gearboxes, motors, screws, racks, belts, linear motors."""
+    """Return all records that are shipped: gearboxes, motors, screws, racks, belts and linear motors.
+
+    Returns
+    -------
+    tuple of Sheet
+        The data sheets. ``lm.gearbox(sheet.name)`` and ``lm.motor(sheet.name)`` make parts of them.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> names = [sheet.name for sheet in lm.catalogue()]
+    >>> "schaeffler-rt1-h-20-100" in names
+    True
+    """
     return _shipped()
 
 

@@ -254,33 +254,44 @@ def write_campaign(
     seed: Count = 1,
     progress: Callable[[str], None] | None = None,
 ) -> Path:
-    """Write logs of the virtual rig with noise and steps of its sensors, the rig, and the identification file.
+    """Write logs of the virtual rig with noise and sensor resolution, the rig, and the identification file.
 
     Parameters
     ----------
-    directory
-        Gets ``identify.toml``, ``rig.toml`` and ``logs/*.csv``; made if missing.
-    gearbox
-        Whose values the logs are of.
-    title
-        Of the files.
-    ripple
-        A torque on the shaft ``motor`` or ``output`` of the rig over its angle, which data sheets do not give; with it there is a
-        slow run under a constant torque, and its amplitude and phase are to be found, too.
-    seed
-        Of the noise.
-    progress
-        Is called with the name of each log that is written.
+    directory : str or Path
+        Directory for ``identify.toml``, ``rig.toml`` and ``logs/*.csv``; made if missing.
+    gearbox : Gearbox
+        The gearbox on the rig.
+    title : str
+        Title of the files.
+    ripple : TorqueHarmonic, optional
+        A torque over the angle of the shaft ``motor`` or ``output`` of the rig, which data sheets do not give. It adds a slow run
+        under a constant torque. Amplitude and phase of the ripple become parameters, too.
+    seed : int
+        Seed of the noise.
+    progress : callable, optional
+        Called with the name of each log that is written.
 
     Returns
     -------
     Path
-        Of the identification file.
+        The identification file.
 
     Raises
     ------
     InputError
         The gearbox has no inertia, or the ripple is on another shaft.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> import lostmotion as lm
+    >>> gearbox = lm.gearbox("schaeffler-rt1-h-20-100")
+    >>> with TemporaryDirectory() as folder:
+    ...     task = lm.identification.write_campaign(folder, gearbox)
+    ...     print(task.name, sorted(path.name for path in Path(folder, "logs").iterdir())[:2])
+    identify.toml ['back-driving.csv', 'braked-slow.csv']
     """
     if ripple is not None and ripple.shaft not in ("motor", "output"):
         raise InputError(f'ripple: shaft is "{ripple.shaft}"; the shafts of the rig are "motor" and "output"')

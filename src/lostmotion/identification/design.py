@@ -36,26 +36,39 @@ class Candidate:
 def design_experiment(
     result: IdentificationResult, plans: Sequence[Log], *, deviation: Mapping[str, float] | None = None
 ) -> list[Candidate]:
-    """Rank experiments by what they would tell of the parameters, beside the logs that there are.
+    """Rank experiments by their information about the parameters, in addition to the existing logs.
 
     Parameters
     ----------
-    result
-        Of an identification.
-    plans
-        Candidate experiments: time, header and inputs of each, as in a log; measured channels need not be there.
-    deviation
-        Standard deviations of the measured channels by name, SI; left out, those of the residuals of the fit.
+    result : IdentificationResult
+        Result of `identify`.
+    plans : sequence of Log
+        Candidate experiments: time, header and inputs of each, as in a log. Measured channels may be missing.
+    deviation : mapping of str to float, optional
+        Standard deviations of the measured channels by name, SI. Default: those of the residuals of the fit.
 
     Returns
     -------
-    list
-        The most informative first.
+    list of Candidate
+        The candidates, the most informative first.
 
     Raises
     ------
     InputError
-        There is no plan, or one of them lacks a channel.
+        There is no plan, or a plan lacks a channel.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> import lostmotion as lm
+    >>> gearbox = lm.gearbox("schaeffler-rt1-h-20-100")
+    >>> with TemporaryDirectory() as folder:
+    ...     result = lm.identify(lm.identification.write_campaign(folder, gearbox))
+    ...     plans = [lm.identification.read_log(path) for path in sorted(Path(folder, "logs").iterdir())[:2]]
+    >>> ranked = lm.identification.design_experiment(result, plans)
+    >>> ranked[0].gain >= ranked[1].gain
+    True
     """
     if not plans:
         raise InputError("plans: is empty; give at least one experiment, as a log with its time, header and inputs")

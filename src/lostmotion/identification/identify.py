@@ -255,19 +255,35 @@ def identify(
 
     Parameters
     ----------
-    source
+    source : str or Path
         The identification file (TOML).
-    threads
-        Runs at the same time; left out, as many as there are processors.
-    profiles
-        Also intervals by the profile of the likelihood, which takes as long as the fit again for each parameter.
-    progress
-        Is called with the name of the rung, the iteration and the cost.
+    threads : int, optional
+        Number of runs at the same time. Default: the number of processors.
+    profiles : bool
+        Whether to compute intervals by the profile of the likelihood, too. They take as long as the fit for each parameter.
+    progress : callable, optional
+        Called with the name of the model, the iteration and the cost.
+
+    Returns
+    -------
+    IdentificationResult
+        Values with intervals, errors of each log, the models that were tried, and the unidentifiable parameters.
 
     Raises
     ------
     InputError
-        The file, a log or the rig cannot be used; the message names file, key, value and remedy.
+        The file, a log or the rig cannot be used. The message names file, key, value and remedy.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> import lostmotion as lm
+    >>> gearbox = lm.gearbox("schaeffler-rt1-h-20-100")
+    >>> with TemporaryDirectory() as folder:
+    ...     result = lm.identify(lm.identification.write_campaign(folder, gearbox))
+    >>> len(result.logs), len(result.intervals) > 0
+    (6, True)
     """
     task, directory = load_identification(source)
     try:

@@ -43,19 +43,38 @@ def read_log(path: str | Path, *, time: str = "", decimal: str = "") -> Log:
 
     Parameters
     ----------
-    time
-        Name of the channel of the time, where it is not found by itself; of an MCAP file or a bag the topic,
-        or ``TOPIC.header.stamp``.
-    decimal
-        What separates decimals in text, ``"."`` or ``","``. If empty, a comma is taken only where the text has no other reading, and the
-        log carries a note on it.
+    path : str or Path
+        File of the log.
+    time : str
+        Name of the channel of the time, if it is not found automatically. For an MCAP file or a bag: the topic, or
+        ``TOPIC.header.stamp``.
+    decimal : str
+        Decimal separator in text, ``"."`` or ``","``. If empty, a comma is taken only if the text has no other reading, and the log
+        has a note on it.
+
+    Returns
+    -------
+    Log
+        Channels with units, header and notes.
 
     Raises
     ------
     InputError
-        With one line that names the file and the remedy; also of a log that needs more memory than the limit.
+        The file cannot be read, or needs more memory than the limit. The message names the file and the remedy.
     MissingLibraryError
         The library of the format is not installed.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> import lostmotion as lm
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder, "log.csv")
+    ...     _ = path.write_text("time [s],angle [deg]\\n0.0,0\\n0.1,1\\n0.2,3\\n")
+    ...     log = lm.identification.read_log(path)
+    >>> [channel for channel in log.channels]
+    ['angle']
     """
     path = Path(path)
     if decimal not in ("", ".", ","):

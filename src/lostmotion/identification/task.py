@@ -287,12 +287,31 @@ def _in_unit_of(parameters: Mapping[str, Any], name: str, tried: Any, rung: int)
 
 @checked
 def load_identification(path: str | Path) -> tuple[Identification, Path]:
-    """Read an identification file; with it comes the directory that its names are relative to.
+    """Read an identification file.
+
+    Parameters
+    ----------
+    path : str or Path
+        The identification file (TOML).
+
+    Returns
+    -------
+    task : Identification
+        The content of the file.
+    directory : Path
+        The directory to which its names are relative.
 
     Raises
     ------
     InputError
-        With one line that names the file, the key, the value and the remedy.
+        The file cannot be used. The message names the file, the key, the value and the remedy.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> task, directory = lm.identification.load_identification("examples/cycloidal/baseline.toml")
+    >>> sorted(task.parameters)
+    ['disc_friction', 'disc_stiffness', 'friction', 'half_play', 'load_friction', 'play_stiffness', 'stiffness']
     """
     path = Path(path)
     data = read_toml(path, "an identification")

@@ -122,23 +122,30 @@ def _widget(page: str, height: int) -> Any:
 
 @checked
 def live(scenario: Scenario | TrainScenario, *, height: Count = 900) -> LivePage:
-    """The drive in the browser, solved there by the same core: sliders, and a drawing that moves.
+    """Show a drive in the notebook as a page that simulates it in the browser.
 
     Parameters
     ----------
-    scenario
-        In the short or the long form, with or without controllers.
-    height
-        Of the page in the notebook, in pixels.
+    scenario : Scenario or TrainScenario
+        The drive and its inputs, with or without controllers.
+    height : int
+        Height of the page in the notebook, in pixels.
 
     Returns
     -------
     LivePage
-        A notebook shows it where it is the last line of a cell; `save` writes it as one HTML file.
+        The page. A notebook shows it if it is the last line of a cell. `LivePage.save` writes it as one HTML file.
 
     Raises
     ------
     InputError
-        A controller has a law of your own, which only Python can call; in a checkout, the page has not been built.
+        A controller has your own law, which only Python can call. In a checkout: the page has not been built.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> page = lm.live(lm.load("paper-2dof-nl-small"), height=600)
+    >>> type(page).__name__
+    'LivePage'
     """
     return LivePage(scenario, height)

@@ -135,19 +135,32 @@ class SelfLocking:
 def overrunning(
     gear: Gear | Gearbox, load_torque: Torque | None = None, input_speed: Speed | None = None
 ) -> Overrunning:
-    """Efficiencies of a gear while its load drives it.
+    """Return the efficiencies of a gear while its load drives it.
 
     Parameters
     ----------
-    load_torque
-        At the output [N·m]; left out, the rated one.
-    input_speed
-        [rad/s]; left out, the rated one. Only a loss map depends on it.
+    gear : Gear or Gearbox
+        The gear.
+    load_torque : float, optional
+        Torque at the output [N·m]. Default: the rated one.
+    input_speed : float, optional
+        Speed of the input [rad/s]. Default: the rated one. Only a loss map depends on it.
+
+    Returns
+    -------
+    Overrunning
+        The efficiencies, and whether the gear is self-locking.
 
     Raises
     ------
     InputError
         Neither a torque nor a rated one is given.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> print(lm.sizing.overrunning(lm.gearbox("wittenstein-tp010-mf-10")))
+    not self-locking: the load drives it (backward efficiency 0.884 at rest, 0.89 in motion)
     """
     part = gear if isinstance(gear, Gear) else Gear.of(gear, input="input", output="output")
     core = _core.Train()
@@ -185,23 +198,39 @@ def _overrunning(
 def self_locking(
     train: DriveTrain, gear: str, load_torque: Torque | None = None, input_speed: Speed | None = None
 ) -> SelfLocking:
-    """The verdict on a gear of a train, for a load that drives it through its output shaft.
+    """Decide whether a gear of a train holds a load that drives it through its output shaft.
 
-    The linear regime of the whole train in a steady motion downward decides: its friction slips, clutches and freewheels are closed,
-    brakes open. Torques over angle and transmission errors, which change within a turn, are left out.
+    The verdict follows from the linear regime of the whole train in a steady motion downward: its friction slips, clutches and
+    freewheels are closed, brakes open. Torques over angle and transmission errors, which change within a turn, are left out.
 
     Parameters
     ----------
-    load_torque
-        M on the output shaft of the gear [N·m]; left out, its rated torque.
-    input_speed
-        Of the motion, at the gear's input [rad/s]; left out, its rated speed, or where it has none, 1 rad/s. It counts where losses,
-        friction or drag depend on the speed.
+    train : DriveTrain
+        The train.
+    gear : str
+        Name of the gear.
+    load_torque : float, optional
+        Torque M on the output shaft of the gear [N·m]. Default: its rated torque.
+    input_speed : float, optional
+        Speed of the motion at the gear's input [rad/s]. Default: its rated speed, or 1 rad/s. It counts if losses, friction or drag
+        depend on the speed.
+
+    Returns
+    -------
+    SelfLocking
+        Whether the gear holds and stops its load, the least torque that lowers it, and whether that is smooth.
 
     Raises
     ------
     InputError
         The train has no such gear, or one whose housing turns; no torque is given, and the gear has no rated one.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> verdict = lm.sizing.self_locking(lm.load("worm-lowering").train(), "worm_gear", load_torque=20.0)
+    >>> str(verdict).split(" (")[0]
+    'worm_gear: self-locking: holds its load at rest and stops it in motion'
     """
     if gear not in train.gears:
         known = list(train.gears)

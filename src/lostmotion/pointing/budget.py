@@ -109,33 +109,46 @@ def pointing_budget(
     robustness: bool = True,
     progress: Callable[[], None] | None = None,
 ) -> PointingBudget:
-    """How far axes miss the direction that they are to follow, and what each cause contributes.
+    """Compute the pointing error of axes and the contribution of each cause.
 
-    All motions are simulated, several at a time: the scenario as it is; with each of backlash, the zone of low stiffness, hysteresis, dry friction,
-    losses of the gears, encoder steps, delay, wind, and latency, noise and pixels of cameras taken away; with each of them alone; with one after another taken away;
-    with other controllers, temperatures, wear and target speeds. A controller with an inverse
-    model knows the drive as it is in each run, but for temperature. A cause that the scenario does not have is left out.
+    All motions are simulated, several at a time: the scenario as it is; without each cause; with each cause alone; with one cause
+    after another removed; with other controllers, temperatures, wear and target speeds. Causes are backlash, the zone of low
+    stiffness, hysteresis, dry friction, gear losses, encoder steps, delay, wind, and latency, noise and pixels of cameras. A
+    controller with an inverse model knows the drive of each run, except its temperature.
 
     Parameters
     ----------
-    scenario
+    scenario : Scenario or TrainScenario
         One axis or several (`[controllers.MOTOR]`), each with a reference of the position.
-    after
-        Time [s] from which errors count; left out, from the end of the start-up transient: the same run is made from another start,
-        on the reference or, where the scenario begins on it, at rest there, and errors count after twice the time in which both come
-        together to a tenth of the rms error, or as far as they do in the second half.
-    view
-        Whole angle of view [rad] of each axis, by the name of its motor; left out, those of the cameras.
-    robustness
-        Also runs at other temperatures, target speeds, with wear, and with losses in the controller that are wrong.
-    progress
+    after : float or str, optional
+        Time [s] from which errors count. Default: the end of the start-up transient. To find it, the same run is made from another
+        start: on the reference or, if the scenario begins on it, at rest there. Errors count after twice the time in which both
+        agree to a tenth of the rms error, or as far as they do in the second half.
+    view : mapping of str to float or str, optional
+        Full angle of view [rad] of each axis, by the name of its motor. Default: that of the cameras.
+    robustness : bool
+        Whether to run other temperatures, target speeds, wear, and wrong losses in the controller, too.
+    progress : callable, optional
         Called after each run.
+
+    Returns
+    -------
+    PointingBudget
+        Errors of each axis [rad], contributions of the causes, and robustness.
 
     Raises
     ------
     InputError
-        An axis has no controller with a reference of the position, or `view` names none.
+        An axis has no controller with a reference of the position, or `view` names no axis.
     SolverError
+        A run has no continuation.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> budget = lm.pointing_budget(lm.load("tracking-loss-map"), robustness=False)
+    >>> {axis: f"{1e3 * error.rms:.2g} mrad" for axis, error in budget.whole.items()}
+    {'motor': '0.0019 mrad'}
     """
     loaded = in_long_form(scenario)
     given = None if after is None else argument("after", after, "s")

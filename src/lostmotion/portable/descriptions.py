@@ -23,25 +23,31 @@ def kernel_of(scenario: Scenario | TrainScenario) -> str:
 
 @checked
 def description(scenario: Scenario | TrainScenario, *, parameters: bool = True) -> np.ndarray:
-    """A scenario as the numbers that `lm_scenario_read` of the C interface takes.
+    """Return a scenario as the numbers that `lm_scenario_read` of the C interface takes.
 
     Parameters
     ----------
-    scenario
-        With its signals, controllers and references, its state at t = 0, duration and sample interval.
-    parameters
-        Whether the numbers also say how they follow from the values of the scenario, so that these can be changed without
-        Python. To find that out the scenario is made anew some hundred times, which takes seconds.
+    scenario : Scenario or TrainScenario
+        The scenario with its signals, controllers and references, its state at t = 0, duration and sample interval.
+    parameters : bool
+        Whether the numbers also state how they follow from the values of the scenario, so that these can be changed without
+        Python. For this the scenario is made anew some hundred times, which takes seconds.
 
     Returns
     -------
     numpy.ndarray
-        Float64.
+        Float64 numbers, shape (n,).
 
     Raises
     ------
     InputError
-        A controller has a law of your own, which only Python can call.
+        A controller has your own law, which only Python can call.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> lm.portable.description(lm.load("paper-1dof-l-small"), parameters=False).dtype
+    dtype('float64')
     """
     return described(scenario)[0] if parameters else written(scenario, ())
 

@@ -67,38 +67,47 @@ def export_fmu(
     references: bool = False,
     libraries: str | Path | None = None,
 ) -> dict[str, str]:
-    """Write a scenario as an FMU for Co-Simulation and Model Exchange, which no compiler is needed for.
+    """Write a scenario as an FMU for Co-Simulation and Model Exchange. No compiler is needed.
 
-    Its inputs are the commands, load torques and references of continuous controllers; sampled controllers are inside. Its
-    outputs are the result variables, its parameters the values of the scenario by their keys. With field-oriented control inside,
-    or where the scenario itself has no run, it is for Co-Simulation alone.
+    The inputs of the FMU are commands, load torques and references of continuous controllers; sampled controllers are inside. Its
+    outputs are the result variables, and its parameters are the values of the scenario by their keys. The FMU is for Co-Simulation
+    alone with field-oriented control, or if the scenario itself has no run.
 
     Parameters
     ----------
-    scenario
-        Each input follows its signal in the scenario until the importer sets that input.
-    path
-        Of the file, with the extension ``.fmu``.
-    fmi
-        Version of the standard: 2 is 2.0, 3 is 3.0.
-    controllers
-        False: without them, so that the commands of their motors are inputs.
-    references
-        True: the references of sampled controllers are inputs, too, named ``reference`` or ``<motor>_reference``; False: the
-        importer cannot replace them.
-    libraries
-        Directory with the libraries of the platforms, as ``make fmu`` builds them; default those of this installation.
+    scenario : Scenario or TrainScenario
+        The drive. Each input follows its signal in the scenario until the importer sets that input.
+    path : str or Path
+        File to write, with the extension ``.fmu``.
+    fmi : int
+        Version of the standard: 2 for FMI 2.0, 3 for FMI 3.0.
+    controllers : bool
+        Whether to include the controllers. Without them the commands of their motors are inputs.
+    references : bool
+        Whether the references of sampled controllers are inputs, too, named ``reference`` or ``<motor>_reference``.
+    libraries : str or Path, optional
+        Directory with the libraries of the platforms, as ``make fmu`` builds them. Default: those of this installation.
 
     Returns
     -------
-    dict
+    dict of str to str
         For each input of the FMU, the key of the scenario whose signal it replaces once it is set.
 
     Raises
     ------
     InputError
-        The scenario cannot be used without Python, a controller has to know the past of its reference, there is no library, or
-        the file cannot be written.
+        The scenario cannot be used without Python, a controller requires the past of its reference, there is no library, or the file
+        cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> import lostmotion as lm
+    >>> with TemporaryDirectory() as folder:
+    ...     inputs = lm.export_fmu(lm.load("paper-2dof-nl-small"), Path(folder, "drive.fmu"))
+    >>> inputs
+    {'command': 'command', 'load_torque': 'load.torque'}
     """
     path = Path(path)
     if path.suffix != ".fmu":

@@ -28,24 +28,37 @@ THREE_DECIBELS = math.sqrt(2.0)  # the bandwidth ends where the gain has fallen 
 def characteristics(
     response: xarray.Dataset, drive: Drive | Scenario | TrainScenario, output: str | None = None
 ) -> xarray.Dataset:
-    """Bandwidth and phase crossover as functions of amplitude, with the dead zone of the drive.
+    """Return bandwidth and phase crossover over amplitude, with the dead zone of the drive.
 
     Parameters
     ----------
-    response
-        From `frequency_response`.
-    drive
+    response : xarray.Dataset
+        Result of `frequency_response`.
+    drive : Drive, Scenario or TrainScenario
         The drive, or its scenario.
-    output
-        The result variable that is looked at; left out, the load's speed, of a train that of its last shaft.
+    output : str, optional
+        The result variable. Default: the load's speed, in a train that of its last shaft.
 
     Returns
     -------
     xarray.Dataset
-        Over ``amplitude``: ``bandwidth`` [Hz], where the gain first falls 3 dB below that at the lowest frequency;
-        ``phase_crossover`` [Hz], where the phase first falls through -180 degrees; NaN where that lies outside the
-        frequencies. Of a drive without a controller, the attributes ``dead_zone_forward``, ``dead_zone_backward``: constant commands beyond
-        which the load moves from rest.
+        Over ``amplitude``: ``bandwidth`` [Hz], at which the gain first falls 3 dB below that at the lowest frequency;
+        ``phase_crossover`` [Hz], at which the phase first falls through -180 degrees. They are NaN outside the frequencies. A drive
+        without a controller has the attributes ``dead_zone_forward`` and ``dead_zone_backward``: constant commands beyond which the
+        load moves from rest.
+
+    Raises
+    ------
+    InputError
+        The dataset is no frequency response, or has no such output.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> drive = lm.load("paper-2dof-nl-small")
+    >>> response = lm.frequency_response(drive, [1.0, 4.0, 16.0], 0.5)
+    >>> bool(lm.response.characteristics(response, drive)["bandwidth"].item() > 1.0)
+    True
     """
     import xarray as xr
 
@@ -94,32 +107,43 @@ def bandwidth(
     lowest: Frequency = 0.1,
     highest: Frequency = 1000.0,
 ) -> float:
-    """Frequency [Hz] at which the gain from the command first falls 3 dB below that at the lowest frequency.
+    """Return the frequency at which the gain from the command first falls 3 dB below that at the lowest frequency.
 
-    Gains come from periodic motions, as in `frequency_response`. They are computed half an octave apart, and the fall is
-    then located between two of them.
+    Gains come from periodic motions, as in `frequency_response`. They are computed half an octave apart, and the fall is then
+    located between two of them.
 
     Parameters
     ----------
-    drive
-        A drive, or a scenario, of which the drive or train and the constant parts of its inputs are taken.
-    amplitude
-        Of the command, E_CA [-], or of another input.
-    output
-        The result variable that is looked at; left out, the load's speed, of a train that of its last shaft.
-    source
-        The input, as of `frequency_response`; left out, the command of the only motor.
-    mean_command, mean_load_torque
-        Constant parts of E_C [-] and M_Z [N·m] of a drive; left out, those of the scenario, or 0.
-    lowest, highest
-        [Hz]. Where the gain has not fallen at the highest, the bandwidth is NaN.
+    drive : Drive, Scenario or TrainScenario
+        A drive, or a scenario. A scenario provides the drive or train and the constant parts of its inputs.
+    amplitude : float
+        Amplitude of the command, E_CA [-], or of another input.
+    output : str, optional
+        The result variable. Default: the load's speed, in a train that of its last shaft.
+    source : str, optional
+        The input, as in `frequency_response`. Default: the command of the only motor.
+    mean_command, mean_load_torque : float, optional
+        Constant parts of E_C [-] and M_Z [N·m] of a drive. Default: those of the scenario, or 0.
+    lowest, highest : float
+        Range of frequencies [Hz].
+
+    Returns
+    -------
+    float
+        Bandwidth [Hz]; NaN if the gain has not fallen at the highest frequency.
 
     Raises
     ------
     InputError
-        The amplitude is not positive, the output is not known, or the frequencies do not rise.
+        The amplitude is not positive, the output is unknown, or the frequencies do not rise.
     RuntimeError
         No periodic motion was found, or the output does not move at the lowest frequency.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> round(lm.response.bandwidth(lm.load("paper-1dof-l-large"), 1.0, lowest=1.0, highest=50.0), 2)
+    2.85
     """
     need("scipy", "The bandwidth", "control")
     from scipy.optimize import brentq

@@ -43,60 +43,68 @@ def frequency_response(
     law: Any = None,
     progress: Callable[[], None] | None = None,
 ) -> xarray.Dataset:
-    """Response by harmonic linearisation (describing functions): harmonics of all outputs over one sinusoidal input.
+    """Compute the response to a sine over frequency and amplitude, by harmonic linearisation (describing functions).
 
-    Each point is a periodic motion, found by shooting. Points are independent of each other; the result is the same
-    for any number of threads.
+    Each point is a periodic motion, found by shooting. Points are independent of each other; the result is the same for any number
+    of threads.
 
-    Of a scenario with controllers the sine is that of a reference or a load torque. Its periods have to fit the sample times: where
-    ten of them do not, the nearest frequency is taken that does. Encoders with steps may keep the motion from repeating; then the
-    harmonics are means over many periods, and ``spread`` says how far they vary. Variables of controllers are taken
-    at their samples, those of the drive between two ticks, at least 256 times a period.
+    In a scenario with controllers the sine is that of a reference or a load torque. Its period must fit the sample times: if ten
+    periods do not, the nearest frequency that fits is taken. Encoders with steps may keep the motion from repeating. Then the
+    harmonics are means over many periods, and ``spread`` states how far they vary. Variables of controllers are taken at their
+    samples, those of the drive between two sample instants, at least 256 times a period.
 
     Parameters
     ----------
-    drive
-        A drive, or a scenario, of which drive or train, controllers and the constant parts of the inputs are taken.
-    frequencies
-        [Hz].
-    amplitudes
-        Of the input: E_CA [-], [N·m] for a load torque; of a reference in its unit, rad, rad/s or N·m.
-    source
-        The input that is a sine, ``"command"``, with a controller ``"reference"``, or ``"load_torque"``, of a train
-        ``"<motor>_command"``, ``"<motor>_reference"``, ``"<shaft>_load_torque"`` ...; the others are constant. Left out, command or
+    drive : Drive, Scenario or TrainScenario
+        A drive, or a scenario. A scenario provides the drive or train, the controllers and the constant parts of the inputs.
+    frequencies : float or sequence of float
+        Frequencies [Hz].
+    amplitudes : float or sequence of float
+        Amplitudes of the input: E_CA [-], load torque [N·m], or a reference in its unit (rad, rad/s, N·m).
+    source : str, optional
+        The input that is a sine: ``"command"``, with a controller ``"reference"``, or ``"load_torque"``; in a train
+        ``"<motor>_command"``, ``"<motor>_reference"``, ``"<shaft>_load_torque"`` and so on. The others are constant. Default: command or
         reference of the only motor.
-    mean_command, mean_load_torque
-        Constant parts of E_C [-] and M_Z [N·m] of a drive; left out, those of the scenario, or 0.
-    harmonics
-        How many to keep.
-    refine
-        Adds frequencies where a curve bends: until, at each one, gain and phase of the load's speed (of a train, that of its last shaft) lie within this many
-        decibels (and ten times as many degrees) of the straight line through its neighbours, or the grid is sixteen
-        times as fine.
-    threads
-        All cores, if left out; with a law of your own always one, since it may keep something of its own.
-    law
-        The law of a controller with ``law = true``, as of `simulate`.
-    progress
+    mean_command, mean_load_torque : float, optional
+        Constant parts of E_C [-] and M_Z [N·m] of a drive. Default: those of the scenario, or 0.
+    harmonics : int
+        Number of harmonics to keep.
+    refine : float, optional
+        Adds frequencies at bends of a curve. The result has gain and phase of the load speed (in a train: of its last shaft)
+        within this many decibels, and ten times as many degrees, of the straight line through the neighbours. At most the grid
+        becomes sixteen times as fine.
+    threads : int, optional
+        Number of threads. Default: all cores; one with your own law, since it may keep a state.
+    max_periods : int
+        Largest number of periods that a point may take.
+    law : callable, optional
+        The law of a controller with ``law = true``, as in `simulate`.
+    progress : callable, optional
         Called after each point.
 
     Returns
     -------
     xarray.Dataset
-        Over ``amplitude`` and ``frequency`` [Hz], with ``output`` and ``harmonic``: complex ``response`` (first harmonic
-        of each output / that of the input), ``harmonics`` (complex amplitudes, 0 the mean), ``distortion`` (rms of all
-        above the first / of the first), ``efficiency`` (mean power out of the last gears / mean power of the motors), ``motor_power``,
-        ``load_power``, ``gear_loss`` [W], ``angle_advance`` [rad] of the load, or last shaft, a period, ``residual`` of periodicity, ``periods``,
-        ``newton_steps``, ``multiplier`` (largest Floquet multiplier), ``stable``, ``reason`` (empty where a motion was
-        found; elsewhere why not, and the values are NaN). With controllers, ``output`` is if not said otherwise what the outermost
-        loop measures, ``newton_steps`` are extrapolations, ``multiplier`` is NaN, since the map has no derivative; there are
-        ``spread`` (of the first harmonic of ``output`` from period to period / its mean; 0 where the motion repeats) and
-        ``asked_frequency`` [Hz].
+        Over ``amplitude`` and ``frequency`` [Hz], with ``output`` and ``harmonic``: complex ``response`` (first harmonic of each output
+        divided by that of the input), ``harmonics`` (complex amplitudes, 0 is the mean), ``distortion`` (rms of all above the first,
+        divided by the first), ``efficiency`` (mean power out of the last gears divided by mean power of the motors), ``motor_power``,
+        ``load_power``, ``gear_loss`` [W], ``angle_advance`` [rad] of the load or last shaft in a period, ``residual`` of periodicity,
+        ``periods``, ``newton_steps``, ``multiplier`` (largest Floquet multiplier), ``stable``, and ``reason`` (empty if a motion was
+        found; otherwise the values are NaN). With controllers, ``output`` is by default the measured value of the outermost loop,
+        ``newton_steps`` are extrapolations, and ``multiplier`` is NaN, since the map has no derivative. ``spread`` is the variation of
+        the first harmonic of ``output`` divided by its mean, 0 if the motion repeats; ``asked_frequency`` [Hz] is the requested one.
 
     Raises
     ------
     InputError
         An argument cannot be used.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> response = lm.frequency_response(lm.load("paper-2dof-nl-small"), [2.0, 8.0], 0.5)
+    >>> abs(response["response"].sel(output="load_speed", amplitude=0.5)).values.round(2)
+    array([3.13, 1.31])
     """
     plant = plant_or_loop(drive)
     source = plant.known_source(source)
@@ -320,7 +328,21 @@ def of_output(response: xarray.Dataset, output: str | None = None) -> xarray.Dat
 
 @checked
 def to_control(response: xarray.Dataset, amplitude: Number, output: str | None = None) -> control.FrequencyResponseData:
-    """One curve of a response for python-control, as data over frequency.
+    """Return one curve of a frequency response for python-control.
+
+    Parameters
+    ----------
+    response : xarray.Dataset
+        Result of `frequency_response`.
+    amplitude : float
+        One of its amplitudes.
+    output : str, optional
+        The result variable. Default: the load's speed, in a train that of its last shaft.
+
+    Returns
+    -------
+    control.FrequencyResponseData
+        The curve over the angular frequency [rad/s].
 
     Raises
     ------
@@ -328,6 +350,13 @@ def to_control(response: xarray.Dataset, amplitude: Number, output: str | None =
         python-control is not installed.
     InputError
         The dataset is no frequency response, or has no such amplitude or output.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> response = lm.frequency_response(lm.load("paper-2dof-nl-small"), [2.0, 8.0], 0.5)
+    >>> lm.response.to_control(response, 0.5).omega.round(3)
+    array([12.566, 50.265])
     """
     curves = of_output(response, output)
     known = response["amplitude"].values.tolist()

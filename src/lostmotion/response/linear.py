@@ -164,33 +164,45 @@ def linearize(
     inputs: Mapping[str, float] | None = None,
     input_rates: Mapping[str, float] | None = None,
 ) -> LinearModel:
-    """The linear model of the regime that a state is in, sticking included.
+    """Return the linear model of the regime that a state is in, stuck contacts included.
 
-    Nothing is approximated: a regime is linear. Which one it is, is decided by the state and by where the inputs lead
-    next, as in a run. Only the input torque of a gear whose input shaft sticks is that without losses, since a share of what a contact
-    holds is not linear.
+    A regime is linear, and the model is exact. State and inputs decide the regime, as in a run. One quantity is approximated: the
+    input torque of a gear whose input shaft is stuck is that without losses, since a share of a stuck torque is not linear.
 
     Parameters
     ----------
-    drive
-        A drive or a train, of a scenario too; or a simulation, which is linearised as it stands.
-    state
+    drive : Drive, Scenario, DriveTrain, TrainScenario or Simulation
+        A drive or a train, a scenario with one, or a simulation in its present state.
+    state : Initial or TrainInitial, optional
         The operating point in SI, such as ``Initial(motor_speed=100.0, load_speed=1.1, twist=2e-3)``, ``Initial()`` for rest, or
-        the end of a run, ``Initial(**json.loads(result.attrs["end_state"]))``; of a train a `TrainInitial`. May be left out only for a
-        drive that has one regime, which is the same everywhere.
-    time
-        [s]: takes the place of a state, of a scenario, which is run until then with its own inputs.
-    command, load_torque
-        Inputs of a drive [-], [N·m] at this instant, and their rates [1/s], [N·m/s].
-    inputs, input_rates
-        The same of a train, by name, such as ``{"servo_command": 0.2, "table_load_torque": 5.0}``; what is left out is 0.
+        the end of a run, ``Initial(**json.loads(result.attrs["end_state"]))``. A drive with a single regime needs none.
+    time : float, optional
+        Instant [s] in place of a state: the scenario is run until then with its own inputs.
+    command, load_torque : float
+        Inputs of a drive [-], [N·m] at this instant.
+    command_rate, load_torque_rate : float
+        Their rates [1/s], [N·m/s].
+    inputs, input_rates : mapping of str to float, optional
+        The same for a train, by name, such as ``{"servo_command": 0.2, "table_load_torque": 5.0}``. Others are 0.
+
+    Returns
+    -------
+    LinearModel
+        Matrices ``A``, ``B``, ``C`` and ``D`` with names and units, the operating point, and the modes of the contacts.
 
     Raises
     ------
     InputError
-        The state is missing, and the drive has several regimes; or what is given does not go together.
+        The state is missing and the drive has several regimes, or the arguments contradict each other.
     SolverError
         The state has no continuation.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> model = lm.linearize(lm.load("paper-2dof-nl-small"), lm.Initial(motor_speed=100.0, load_speed=1.1))
+    >>> model.contacts
+    {'input_contact': 1, 'twist_contact': 1, 'load_contact': 2}
     """
     rates = {
         "command_rate": argument("command_rate", command_rate, "1/s"),
@@ -430,12 +442,30 @@ class RigidConstants:
 def rigid_constants(
     drive: Drive | Scenario, *, motor_time_constant: Time | None = None, time_constant: Time | None = None
 ) -> RigidConstants:
-    """Constants of (8) to (11); two of them may be given instead of computed.
+    """Return the constants of (8) to (11) of a rigid drive.
+
+    Parameters
+    ----------
+    drive : Drive or Scenario
+        A drive with a DC motor and a constant efficiency.
+    motor_time_constant, time_constant : float, optional
+        Time constants [s] that replace computed ones.
+
+    Returns
+    -------
+    RigidConstants
+        Gain, damping and time constants.
 
     Raises
     ------
     InputError
         The drive has a torque source, or no constant efficiency.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> f"{lm.response.rigid_constants(lm.load('paper-1dof-l-large')).bandwidth:.3f} Hz"
+    '2.451 Hz'
     """
     drive = drive_of(drive)
     for name, value in (("motor_time_constant", motor_time_constant), ("time_constant", time_constant)):

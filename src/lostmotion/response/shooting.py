@@ -110,37 +110,45 @@ def periodic_motion(
     start: Initial | TrainInitial | None = None,
     max_periods: Count = MAX_PERIODS,
 ) -> xarray.Dataset:
-    """A periodic motion under periodic inputs, by shooting.
+    """Find a periodic motion under periodic inputs, by shooting.
 
-    Newton's method on the map over one period, with its exact Jacobian; it is entered after a few periods from `start`,
-    and where it does not converge, the transient is followed further. The load angle is neutral: it may advance from
-    period to period. An angle that torques depend on may advance by whole periods of these.
+    Newton's method solves for a fixed point of the map over one period, with its exact Jacobian. It starts after a few periods from
+    `start`; if it does not converge, the transient is followed further. The load angle is neutral: it may advance from period to
+    period. An angle on which torques depend may advance by whole periods of these.
 
     Parameters
     ----------
-    drive
-        A drive, a scenario, or a scenario of a drive train.
-    command, load_torque
-        E_C [-] and M_Z [N·m] of a drive: constants, or signals of mean and sines with a common period; left out, those
-        of the scenario, or 0. What acts on a train stands in its scenario.
-    multiple
-        The motion may repeat after this many periods of the inputs (sub-harmonics).
-    start
-        From where, a `TrainInitial` for a train; the initial state of the scenario, or rest, if left out. Coexisting motions
-        are reached from different ones.
+    drive : Drive, Scenario or TrainScenario
+        The drive or the scenario.
+    command, load_torque : CommandSignal, TorqueSignal or float, optional
+        E_C [-] and M_Z [N·m] of a drive: constants, or signals of mean and sines with a common period. Default: those of the
+        scenario, or 0. The inputs of a train are those of its scenario.
+    multiple : int
+        Number of periods of the inputs after which the motion repeats (sub-harmonics).
+    start : Initial or TrainInitial, optional
+        Initial state. Default: that of the scenario, or rest. Coexisting motions are reached from different ones.
+    max_periods : int
+        Largest number of periods to follow.
 
     Returns
     -------
     xarray.Dataset
-        The result variables over one period, and the ``jacobian`` of the map over it. Attributes: ``residual`` (largest change of a state over the period / its
-        largest magnitude), ``angle_advance`` of the load, of a train the last shaft [rad], ``multipliers_real`` and ``multipliers_imag`` (Floquet),
-        ``stable``, ``smooth`` (the multipliers are exact: no switching grazes), ``periods`` followed, ``newton_steps``,
-        ``start_<component>``, ``period`` [s], of a drive ``gear_ratio``.
+        The result variables over one period, and the ``jacobian`` of the map. Attributes: ``residual`` (largest change of a state over
+        the period divided by its largest magnitude), ``angle_advance`` of the load or last shaft [rad], ``multipliers_real`` and
+        ``multipliers_imag`` (Floquet), ``stable``, ``smooth`` (true if the multipliers are exact: no switching grazes), ``periods``
+        followed, ``newton_steps``, ``start_<component>``, ``period`` [s], and ``gear_ratio`` of a drive.
 
     Raises
     ------
     RuntimeError
-        None was found; the message says why.
+        No periodic motion was found. The message states the reason.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> motion = lm.periodic_motion(lm.load("paper-2dof-nl-small"))
+    >>> motion.attrs["stable"], round(motion.attrs["period"], 6)
+    (1, 1.0)
     """
     plant = plant_of(drive)
     signals = _replaced(plant.signals, {"command": command, "load_torque": load_torque})
@@ -228,10 +236,35 @@ def periodic_motions(
     starts: Iterable[Any],
     multiples: Iterable[Count] = (1,),
 ) -> list[xarray.Dataset]:
-    """The different periodic motions that several starts lead to, each once.
+    """Find the different periodic motions that several starts lead to, each once.
 
-    Motions that differ by a whole period of the inputs only, or by the load angle, count as one. The starts are as of
-    `periodic_motion`.
+    Motions that differ by a whole period of the inputs only, or by the load angle, count as one.
+
+    Parameters
+    ----------
+    drive, command, load_torque
+        As in `periodic_motion`.
+    starts : iterable of Initial or TrainInitial
+        Initial states.
+    multiples : iterable of int
+        Numbers of periods of the inputs after which a motion may repeat.
+
+    Returns
+    -------
+    list of xarray.Dataset
+        The motions, as `periodic_motion` returns them.
+
+    Raises
+    ------
+    InputError
+        An argument cannot be used.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> starts = [lm.Initial(), lm.Initial(twist=1e-4)]
+    >>> len(lm.response.periodic_motions(lm.load("paper-2dof-nl-small"), starts=starts))
+    1
     """
     floors = plant_of(drive).floors
     found: list[xarray.Dataset] = []

@@ -214,26 +214,31 @@ def commission(
     window: Angle | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> ServoReport:
-    """Look at an axis as one does at its commissioning.
+    """Compute margins, steps, following error, settling, stiffness and limit cycles of an axis.
 
-    Margins, bandwidths and stiffness are those of the exact linear sampled loop in each regime of the plant (piece of the
-    torsion curve, twist or load stuck): plant by the matrix exponential over a base tick, sample times and delays as they
-    are, a loop with several sample times as the time-invariant system over that of its outermost loop. Field-oriented control is
-    linear about the steady motion of the regime: its speed, and the torque that keeps it. A loop is cut where its
-    measured value enters its controller, the loops within it closed, those around it open. Limits, quantisation and dead zones
-    do not count there; they do in the runs: steps, following, settling and rest are exact simulations of the scenario.
+    Margins, bandwidths and stiffness are those of the exact linear sampled loop in each regime of the plant (segment of the torsion
+    curve, twist or load stuck). The plant is propagated by the matrix exponential over a base period, with sample times and delays
+    as they are. A loop with several sample times is a time-invariant system over that of its outermost loop. Field-oriented control
+    is linear about the steady motion of the regime. A loop is cut at the measured value of its controller; the loops within it are
+    closed, those around it open. Limits, quantisation and dead zones count in the runs only: steps, following, settling and rest are
+    exact simulations of the scenario.
 
     Parameters
     ----------
-    scenario
-        With a controller.
-    motor
-        Whose controller; may be left out where there is one.
-    window
-        Within which the position has settled [rad]; left out, four encoder steps at the reference's shaft, at least a
-        thousandth of the reference's range.
-    progress
+    scenario : Scenario or TrainScenario
+        A scenario with a controller.
+    motor : str, optional
+        Name of the motor whose controller is examined. Default: the only one.
+    window : float, optional
+        Window of the settled position [rad]. Default: four encoder steps at the reference's shaft, at least a thousandth of the
+        reference's range.
+    progress : callable
         Called `work(scenario)` times.
+
+    Returns
+    -------
+    ServoReport
+        The report. `ServoReport.summary` returns the verdict; notebooks show the page.
 
     Raises
     ------
@@ -241,6 +246,13 @@ def commission(
         There is no controller, its sample times do not nest, or the window is not above 0.
     SolverError
         A run has no continuation.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> report = lm.commission(lm.load("speed-axis"))
+    >>> report.summary()[0]
+    ('verdict', 'stable in all 4 regimes (first stiffness, last stiffness, twist stuck, load stuck)')
     """
     axis = axis_of(scenario, motor)
     if window is not None and not window > 0.0:

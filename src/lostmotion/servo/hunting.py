@@ -77,26 +77,37 @@ class Hunting:
 
 @checked
 def limit_cycle(scenario: Scenario | TrainScenario, *, motor: str | None = None, causes: bool = True) -> Hunting:
-    """The limit cycle that a loop falls into by itself, from the initial state of its scenario.
+    """Find the limit cycle that a loop reaches from the initial state of its scenario.
 
-    With continuous controllers, or without any, a run leads to its neighbourhood, and Newton's method finds state and period
-    to rounding, with the exact Jacobian of the map over a period. Sampled controllers have no such map, since a quantised
-    angle has no derivative: of them a long run after a small step is watched, as in `commission`.
+    With continuous controllers, or without any, a run leads to its neighbourhood. Newton's method then finds state and period to
+    rounding, with the exact Jacobian of the map over a period. Sampled controllers have no such map, since a quantised angle has no
+    derivative: a long run after a small step is evaluated, as in `commission`.
 
     Parameters
     ----------
-    scenario
-        Its inputs must come to rest; its duration is that of the shortest run, and longer ones follow where it does not
-        suffice.
-    motor
-        Whose sampled controller is looked at; may be left out where there is one.
-    causes
-        Whether to find out what causes it, by leaving out one possible cause after the other.
+    scenario : Scenario or TrainScenario
+        Its inputs must come to rest. Its duration is that of the shortest run; longer ones follow if it does not suffice.
+    motor : str, optional
+        Name of the motor whose sampled controller is examined. Default: the only one.
+    causes : bool
+        Whether to find the causes, by leaving out one possible cause after the other.
+
+    Returns
+    -------
+    Hunting
+        The verdict, and the limit cycle if there is one.
 
     Raises
     ------
     InputError
         An input never comes to rest, or there are both sampled and continuous controllers.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> hunting = lm.servo.limit_cycle(lm.load("hunting-with-static-friction"), causes=False)
+    >>> hunting.verdict, round(hunting.period, 3)
+    ('hunts', 2.841)
     """
     train = in_long_form(scenario)
     if train.axes():
@@ -199,32 +210,39 @@ def hunting_map(
     threads: Count | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> xarray.Dataset:
-    """Amplitude and frequency of the limit cycle over one or two keys of a scenario.
+    """Compute amplitude and frequency of the limit cycle over one or two keys of a scenario.
 
     Parameters
     ----------
-    scenario
-        As of `limit_cycle`.
-    grid
+    scenario : Scenario or TrainScenario
+        As in `limit_cycle`.
+    grid : mapping of str to array_like
         One or two dotted keys with their values, such as ``{"controllers.servo.position.gain": np.linspace(1, 10, 40),
         "gears.belt.stiffness.backlash": np.linspace(0, 1e-2, 40)}``.
-    variable
-        Whose amplitude is wanted; left out, the angle of the last shaft.
-    threads
-        Left out, one for each processor.
-    progress
-        Called with the number of points done.
+    variable : str, optional
+        Variable of the amplitude. Default: the angle of the last shaft.
+    threads : int, optional
+        Number of threads. Default: the number of processors.
+    progress : callable, optional
+        Called with the number of finished points.
 
     Returns
     -------
     xarray.Dataset
-        Over the values of the keys: ``amplitude`` (SI; 0 at rest, NaN where not decided), ``frequency`` [Hz] (NaN without a limit
-        cycle), ``stable``, ``verdict`` as of `Hunting`, and ``reason`` why there is no limit cycle.
+        Over the values of the keys: ``amplitude`` (SI; 0 at rest, NaN if not decided), ``frequency`` [Hz] (NaN without a limit
+        cycle), ``stable``, ``verdict`` as in `Hunting`, and ``reason`` why there is no limit cycle.
 
     Raises
     ------
     InputError
         A key is unknown, or a value cannot be used.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> grid = {"controllers.servo.position.integral_gain": [16.0, 32.0]}
+    >>> lm.servo.hunting_map(lm.load("hunting-with-static-friction"), grid)["verdict"].values.tolist()
+    ['hunts', 'hunts']
     """
     import xarray as xr
 

@@ -206,38 +206,49 @@ def tune(
     feedforward: bool = False,
     motor: str | None = None,
 ) -> Tuning:
-    """Gains of the speed and the position loop of an axis.
+    """Compute gains of the speed and the position loop of an axis.
 
     Parameters
     ----------
-    scenario
-        With a controller whose loops, sample times, filters and encoders are those that are to be tuned; its gains do not count.
-    rule
-        ``"suited"``, that by which `select` tunes: identical damping where the inertias and the sampling permit it, else the
-        symmetrical optimum; ``"symmetrical_optimum"`` of the total inertia and the sum of the lags; of two inertias and the spring
-        between them ``"identical_damping"``, ``"identical_radius"`` or ``"identical_real_part"`` of their poles; ``"margins"``, the greatest gain
-        that keeps a phase margin and a gain margin of 2 in all regimes of the exact sampled loop; ``"search"``, an optimum of the
-        exact sampled response. suited sets K_v to half of the reciprocal of the speed loop's equivalent time, each other but search
-        to a quarter of the speed loop's bandwidth, the lowest of all regimes.
-    damping
-        zeta of the poles, for identical_damping and identical_real_part.
-    phase_margin
-        [rad], for margins.
-    goal
+    scenario : Scenario or TrainScenario
+        A scenario with a controller. Its loops, sample times, filters and encoders count; its gains do not.
+    rule : str
+        ``"identical_damping"``, ``"identical_radius"`` or ``"identical_real_part"``: poles of two inertias and the spring between them.
+        ``"symmetrical_optimum"``: total inertia and sum of the lags. ``"suited"``: identical damping if inertias and sampling permit
+        it, else the symmetrical optimum, as in `select`. ``"margins"``: the largest gain that keeps a phase margin and a gain margin
+        of 2 in all regimes of the exact sampled loop. ``"search"``: an optimum of the exact sampled response. The rule suited sets
+        K_v to half of the reciprocal of the speed loop's equivalent time. The others, except search, set K_v to a quarter of the
+        speed loop's lowest bandwidth.
+    damping : float
+        Damping ratio of the poles, for identical_damping and identical_real_part.
+    phase_margin : float
+        Phase margin [rad], for margins.
+    goal : str
         For search: ``"bandwidth"`` of the outermost loop, the lowest of all regimes, or ``"stiffness"``, the least over frequency of
         the load torque that turns the motor by 1 rad.
-    sensitivity_peak
-        For search: of the speed loop in each regime, not to be exceeded; that of the position loop the same.
-    feedforward
-        Whether to feed forward what the scenario says of the drive too: the speed of the reference, and torques for the inertia, the viscous
-        and the dry friction of all that turns.
-    motor
-        Whose controller; may be left out where there is one.
+    sensitivity_peak : float
+        For search: largest sensitivity peak of the speed loop and of the position loop in each regime.
+    feedforward : bool
+        Whether to feed forward the speed of the reference, and the torques of inertia, viscous and dry friction of the scenario.
+    motor : str, optional
+        Name of the motor whose controller is tuned. Default: the only one.
+
+    Returns
+    -------
+    Tuning
+        The gains, and the scenario with these gains.
 
     Raises
     ------
     InputError
-        The rule is unknown, or cannot be kept by any gains.
+        The rule is unknown, or no gains satisfy it.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> tuned = lm.tune(lm.load("speed-axis"), rule="suited")
+    >>> f"{tuned.scenario.controller.speed.gain:.4g} N·m/(rad/s)"
+    '0.01991 N·m/(rad/s)'
     """
     if rule not in RULES:
         raise InputError(f"rule: {shown(rule)} is not known; take one of {', '.join(RULES)}")

@@ -157,14 +157,14 @@ class Explanation:
 
 @checked
 def explain(what: Scenario | Simulation | TrainScenario, time: Time | None = None) -> Explanation:
-    """The state of the contacts of a drive or a train at one instant.
+    """Report the state of the contacts of a drive or a train at one instant.
 
     Parameters
     ----------
-    what
-        A scenario, which is run to `time`, or a simulation, which is explained as it stands.
-    time
-        [s], for a scenario.
+    what : Scenario, TrainScenario or Simulation
+        A scenario, which is run to `time`, or a simulation in its present state.
+    time : float, optional
+        Instant [s], for a scenario.
 
     Returns
     -------
@@ -175,6 +175,13 @@ def explain(what: Scenario | Simulation | TrainScenario, time: Time | None = Non
     ------
     InputError
         The time is missing, or outside the scenario's duration.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> explanation = lm.explain(lm.load("paper-2dof-nl-small"), time=0.1)
+    >>> [contact.name for contact in explanation.contacts]
+    ['input shaft', 'twist of the gear']
     """
     if isinstance(what, Simulation):
         if time is not None:

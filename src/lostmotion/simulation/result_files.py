@@ -57,12 +57,33 @@ def _need_library(path: Path) -> None:
 
 @checked
 def save(dataset: xarray.Dataset, path: str | Path) -> None:
-    """Write a result with its energy ledger as ``.nc``, ``.csv`` or ``.parquet``; `open_result` reads each back unchanged.
+    """Write a result with its energy ledger. `open_result` reads it back unchanged.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A result of `simulate`.
+    path : str or Path
+        File with the ending ``.nc``, ``.csv`` or ``.parquet``.
+
+    Returns
+    -------
+    None
 
     Raises
     ------
     InputError
-        No result, unknown ending, or the file cannot be written; nothing half-written remains.
+        The dataset is no result, the ending is unknown, or the file cannot be written. Nothing half-written remains.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> import lostmotion as lm
+    >>> with TemporaryDirectory() as folder:
+    ...     lm.save(lm.simulate(lm.load("step-to-standstill")), Path(folder, "run.nc"))
+    ...     print([path.name for path in Path(folder).iterdir()])
+    ['run.nc']
     """
     if "time" not in dataset.coords or not any(v.name in dataset for v in recorded_variables(dataset.attrs)):
         raise InputError("this dataset is no result over time; give one of simulate, periodic_motion or open_result")
@@ -75,10 +96,32 @@ def save(dataset: xarray.Dataset, path: str | Path) -> None:
 def open_result(path: str | Path) -> xarray.Dataset:
     """Read a result that `save` wrote.
 
+    Parameters
+    ----------
+    path : str or Path
+        File with the ending ``.nc``, ``.csv`` or ``.parquet``.
+
+    Returns
+    -------
+    xarray.Dataset
+        The result, with the same values and attributes as before `save`.
+
     Raises
     ------
     InputError
         The file is not such a result, or needs more memory than the limit.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> import lostmotion as lm
+    >>> result = lm.simulate(lm.load("step-to-standstill"))
+    >>> with TemporaryDirectory() as folder:
+    ...     lm.save(result, Path(folder, "run.csv"))
+    ...     same = lm.open_result(Path(folder, "run.csv"))
+    >>> bool((same["load_speed"] == result["load_speed"]).all())
+    True
     """
     path = Path(path)
     readers = {".nc": _read_netcdf, ".csv": _read_csv, ".parquet": _read_parquet}

@@ -265,12 +265,29 @@ def gear_efficiency(data: dict[str, Any], ratio: Any) -> Any:
 
 @checked
 def scenario_of(dataset: xarray.Dataset) -> Scenario | TrainScenario:
-    """The scenario that a result came from: of a drive a `Scenario`, of a drive train a `TrainScenario`.
+    """Return the scenario that a result came from.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Result of `simulate` or `open_result`.
+
+    Returns
+    -------
+    Scenario or TrainScenario
+        The scenario; it can be run again.
 
     Raises
     ------
     InputError
-        The dataset carries none.
+        The dataset contains no scenario.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> result = lm.simulate(lm.load("step-to-standstill"))
+    >>> lm.simulation.scenario_of(result) == lm.load("step-to-standstill")
+    True
     """
     if "scenario" not in dataset.attrs:
         raise InputError(
@@ -282,27 +299,33 @@ def scenario_of(dataset: xarray.Dataset) -> Scenario | TrainScenario:
 
 @checked
 def energy_of(dataset: xarray.Dataset | RunArrays) -> dict[str, float]:
-    """Energy ledger of a run [J].
+    """Return the energy ledger of a run.
 
-    A result that carries none, since it was simulated without ``energy=True``, is simulated a second time for it.
+    A result that was simulated without ``energy=True`` has no ledger; it is simulated a second time.
 
     Parameters
     ----------
-    dataset
-        From `simulate` or `open_result`.
+    dataset : xarray.Dataset or RunArrays
+        Result of `simulate` or `open_result`.
 
     Returns
     -------
-    dict
-        `source` is what the motor gave to the shaft; `input_damper`, `motor_friction`, `gear_losses`, `hysteresis`,
-        `load_damper` and `load_friction` is what became heat; `load_work` what went into the disturbance torque;
-        `kinetic_change` and `elastic_change` what is stored; `residual` what the balance fails by, `turned_over` the sum
-        of the magnitudes of all flows.
+    dict of str to float
+        Energies [J]. `source` is the work of the motor on the shaft. `input_damper`, `motor_friction`, `gear_losses`, `hysteresis`,
+        `load_damper` and `load_friction` became heat. `load_work` is the work against the load torque. `kinetic_change` and
+        `elastic_change` are stored. `residual` is the error of the balance, and `turned_over` the sum of the magnitudes of all flows.
 
     Raises
     ------
     InputError
         The result has no energy ledger.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> ledger = lm.energy_of(lm.simulate(lm.load("paper-2dof-nl-small"), energy=True))
+    >>> f"{ledger['gear_losses']:.4g} J"
+    '0.02143 J'
     """
     attributes = attributes_with_energy(dataset)
     if "energy" not in attributes:

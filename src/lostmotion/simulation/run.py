@@ -87,51 +87,58 @@ def simulate(
     sensitivities: Sequence[str] | None = None,
     output: OutputName = "dataset",
 ) -> xarray.Dataset | RunArrays:
-    """Simulate a drive, or a drive train.
+    """Simulate a drive or a drive train.
 
     Parameters
     ----------
-    scenario_or_drive
-        A scenario, whose values the other arguments replace, or a drive alone. What acts on a drive train stands in its
-        scenario alone (`TrainScenario.replace` changes it), so that of it duration and sample_interval can be given here.
-    command
-        E_C [-]; default 0 for a drive alone.
-    load_torque
-        M_Z [N·m]; default 0 for a drive alone.
-    duration, sample_interval
-        [s]; needed for a drive alone. They say at which instants the result is wanted and do not affect the motion.
-    initial
-        State at t = 0; default rest.
-    solver
-        ``"exact"``, or ``"dormand-prince"`` for the adaptive second opinion, which keeps no energy ledger.
-    relative_tolerance
-        Of the adaptive solver, 1e-15 to 1e-3; default 1e-8. The exact solver has none.
-    energy
-        Whether to compute the energy ledger with the motion, which takes about as long again. Left out, `energy_of`, `save` and
-        reports compute it when they need it, by a second run; under a law, which only its caller knows, it is computed at once.
-    law
-        The law of a controller with ``law = true``, a function or a `Law`; of several, by the names of their motors.
-    sensitivities
-        Keys of the scenario, such as ``load.inertia``: the derivative of each variable with respect to their values, exact
-        through switchings, as ``NAME_sensitivity`` over ``parameter`` and ``time``. NaN from an instant on at which it does
-        not exist; the attributes say when and why.
-    output
+    scenario_or_drive : Scenario, TrainScenario or Drive
+        A scenario, whose values the other arguments replace, or a drive alone. The inputs of a drive train are those of its
+        scenario (`TrainScenario.replace` changes them); only duration and sample_interval can be given here.
+    command : CommandSignal or float, optional
+        E_C [-]. Default: that of the scenario; 0 for a drive alone.
+    load_torque : TorqueSignal or float, optional
+        M_Z [N·m]. Default: that of the scenario; 0 for a drive alone.
+    duration, sample_interval : float, optional
+        Times [s], required for a drive alone. They set the instants of the result and do not affect the motion.
+    initial : Initial, optional
+        State at t = 0. Default: rest.
+    solver : str
+        ``"exact"``, or ``"dormand-prince"`` for the adaptive solver, which computes no energy ledger.
+    relative_tolerance : float, optional
+        Tolerance of the adaptive solver, 1e-15 to 1e-3. Default: 1e-8. The exact solver has none.
+    energy : bool, optional
+        Whether to compute the energy ledger with the motion, which takes about as long again. By default `energy_of`, `save` and
+        reports compute it by a second run when they need it; with a law it is computed at once.
+    law : callable or Law, optional
+        The law of a controller with ``law = true``. For several, a mapping by the names of their motors.
+    sensitivities : sequence of str, optional
+        Keys of the scenario, such as ``load.inertia``. Adds the derivative of each variable with respect to their values, exact
+        through switchings, as ``NAME_sensitivity`` over ``parameter`` and ``time``. It is NaN from an instant at which it does not
+        exist; the attributes state the instant and the reason.
+    output : str
         ``"dataset"``, or ``"arrays"`` for plain arrays by name, which take a fraction of the time to make.
 
     Returns
     -------
     xarray.Dataset or RunArrays
-        The variables of `lostmotion.VARIABLES`, or those of the elements of the train, over the coordinate ``time`` [s], the switching instants, and in the
-        attributes the end state, the scenario and, if it was computed, the energy ledger.
+        The variables of `lostmotion.simulation.VARIABLES`, or those of the elements of the train, over ``time`` [s]. The attributes
+        contain the end state, the scenario and, if it was computed, the energy ledger.
 
     Raises
     ------
     InputError
         The scenario cannot be used.
     SolverError
-        The motion has no continuation (jamming, accumulating switchings); the message names time and contact.
+        The motion has no continuation (jamming, accumulating switchings). The message names time and contact.
     KeyboardInterrupt
         Ctrl-C ends the run at once.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> result = lm.simulate(lm.load("paper-2dof-nl-small"), duration="1 s")
+    >>> f"{result['load_speed'].sel(time=0.3).item():.4g} {result['load_speed'].units}"
+    '0.02915 rad/s'
     """
     changes: dict[str, Any] = {"command": command, "load_torque": load_torque, "initial": initial}
     times: dict[str, Any] = {"duration": duration, "sample_interval": sample_interval}

@@ -18,24 +18,33 @@ from .train_scenario import TrainScenario
 
 @checked
 def load(source: ScenarioName | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> Scenario | TrainScenario:
-    """The scenario of a file, of a shipped example, or of a saved result.
-
-    In the short form (tables `[motor] [gearbox] [load]`) it is a `Scenario`, in the long form (`[shafts.NAME]` ...) a
-    `TrainScenario`.
+    """Return the scenario of a file, of a shipped example, or of a saved result.
 
     Parameters
     ----------
-    source
-        A scenario file (``.toml``), whose key `base` may name another scenario that it changes; the name of a scenario
-        that comes with the package, such as ``"paper-2dof-nl-small"``; or a result (``.nc``, ``.csv``, ``.parquet``),
-        whose scenario is taken so that it can be run again.
-    overrides
-        ``{"command.amplitude": 0.1}`` or ``["command.amplitude=0.1"]``, as by ``--set``.
+    source : str or Path
+        A scenario file (``.toml``), whose key `base` may name another scenario that it changes; the name of a shipped scenario, such
+        as ``"paper-2dof-nl-small"``; or a result (``.nc``, ``.csv``, ``.parquet``), whose scenario can be run again.
+    overrides : mapping or iterable of str
+        Changed values, ``{"command.amplitude": 0.1}`` or ``["command.amplitude=0.1"]``, as with ``--set``.
+
+    Returns
+    -------
+    Scenario or TrainScenario
+        A `Scenario` for the short form (tables `[motor] [gearbox] [load]`), a `TrainScenario` for the long form
+        (`[shafts.NAME]` and so on).
 
     Raises
     ------
     InputError
-        With one line that names the file, the key, the value and the remedy.
+        A file, a key or a value cannot be used. The message names file, key, value and remedy.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> scenario = lm.load("paper-2dof-nl-small", {"load.inertia": "3 kg*m^2"})
+    >>> scenario.load.inertia
+    3.0
     """
     path = Path(source)
     if path.suffix not in FORMATS:

@@ -61,24 +61,31 @@ def packed_again(columns: Mapping[str, Any], attributes: Mapping[str, Any]) -> s
 
 @checked
 def switchings_of(result: xarray.Dataset) -> xarray.Dataset:
-    """The switchings of a run, one entry each along the dimension ``switching``.
+    """Return the switchings of a run, one entry each along the dimension ``switching``.
 
     Parameters
     ----------
-    result
-        From `simulate` or `open_result`.
+    result : xarray.Dataset
+        Result of `simulate` or `open_result`.
 
     Returns
     -------
     xarray.Dataset
-        ``instant`` [s]; ``cause``, what ended the regime (its attributes name the flags); for each contact its mode before and
-        after (``input_contact_before``, ...; 2: there is none); of a drive, not of a train, ``output_torque_before`` and
-        ``output_torque_after`` [N·m], the left and right limit. Of a long run the first 100,000; ``switching_count`` of the result counts all.
+        ``instant`` [s]; ``cause`` of the end of the regime (its attributes name the flags); for each contact its mode before and
+        after (``input_contact_before`` and so on; 2: there is none); for a drive ``output_torque_before`` and ``output_torque_after``
+        [N·m], the left and right limit. A long run has the first 100,000; ``switching_count`` of the result counts all.
 
     Raises
     ------
     InputError
         The dataset is no result of `simulate`.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> switchings = lm.switchings_of(lm.simulate(lm.load("step-to-standstill")))
+    >>> switchings.sizes["switching"]
+    85
     """
     import xarray as xr
 

@@ -28,18 +28,35 @@ MEANS = ("average_output_torque", "average_input_speed", "motor_torque", "windin
 
 @checked
 def check_drive(scenario: Scenario | TrainScenario) -> Findings:
-    """Checks a drive, or a drive train, against its scenario.
+    """Check a drive or a drive train against its limits and its task.
 
-    The scenario is run; loads, speeds, voltage, current and heat are those of that run, over the duty cycle that `task.cycle`
-    says, or with the motion repeated without a pause. Limits come from `gearbox.limits`, `motor.limits` (which records of the
-    catalogue bring along) and `task`. What has no limit is reported as unknown, and so is what is not judged of a train.
+    The scenario is run. Loads, speeds, voltage, current and heat are those of that run, over the duty cycle of `task.cycle`, or with
+    the motion repeated without a pause. Limits are `gearbox.limits` and `motor.limits` (records of the catalogue include theirs) and
+    those of `task`. Rules without a limit are reported as unknown, and so are those that are not judged in a train.
+
+    Parameters
+    ----------
+    scenario : Scenario or TrainScenario
+        The drive and its motion.
+
+    Returns
+    -------
+    Findings
+        One finding for each rule, with its verdict, its source and the share of the limit.
 
     Raises
     ------
     InputError
         `task.cycle` does not fit the run.
     SolverError
-        As `simulate`.
+        The motion has no continuation.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> findings = lm.check_drive(lm.load("catalogue-robot-joint"))
+    >>> findings[0].rule, findings[0].verdict
+    ('average_output_torque', 'ok')
     """
     findings = _findings(scenario)
     return Findings([*findings, *_over_estimates(scenario, findings)])

@@ -26,28 +26,35 @@ if TYPE_CHECKING:
 
 @checked
 def motor_current(result: xarray.Dataset, motor: str | None = None) -> xarray.Dataset:
-    """Current and voltage of the motor of a run.
+    """Return current and voltage of the motor of a run.
 
     Parameters
     ----------
-    result
-        Of `simulate`, or read from a file.
-    motor
+    result : xarray.Dataset
+        Result of `simulate` or `open_result`.
+    motor : str, optional
         Name of one of several motors of a drive train.
 
     Returns
     -------
     xarray.Dataset
-        Over ``time`` [s], of a motor with a winding: `current` [A], i_q, the amplitude of a phase with the sign of the torque;
-        `current_rms` [A]; `voltage` [V], the amplitude of a phase with that of the decoupling, which may exceed `voltage_limit`
-        since only u_q ends there. Under a current loop of kind ideal or first_order it is the voltage that torque and speed need, of
-        first_order with that of the inductance, which jumps without bounds in an ideal one. Under field-oriented control the amplitudes of both axes together, as they were in the run.
-        Of any other motor `current` alone, torque / torque constant.
+        Over ``time`` [s]. A motor with a winding has `current` [A], i_q, the amplitude of a phase with the sign of the torque;
+        `current_rms` [A]; and `voltage` [V], the amplitude of a phase with the decoupling, which may exceed `voltage_limit` since
+        only u_q is limited. Under a current loop of kind ideal or first_order it is the voltage that torque and speed require.
+        With first_order it includes that of the inductance, which has no bound in an ideal loop. Under field-oriented control the
+        amplitudes are those of both axes together, as in the run. Any other motor has `current` alone, torque / torque constant.
 
     Raises
     ------
     InputError
         The motor has neither a winding nor `limits.torque_constant`, or `motor` names none.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> result = lm.simulate(lm.load("field-weakening"))
+    >>> sorted(lm.sizing.motor_current(result).data_vars)
+    ['current', 'current_rms', 'voltage']
     """
     m, where, (command, torque, speed) = _motor_of(result, motor)
     oriented = oriented_amplitudes(result, where)
@@ -122,37 +129,44 @@ def temperatures(
     repeated: bool = False,
     constant_resistance: bool = False,
 ) -> xarray.Dataset:
-    """Temperatures of winding and case in a run, from the copper loss.
+    """Compute the temperatures of winding and case in a run, from the copper loss.
 
     The motor needs the thermal resistances from winding to case and from case to ambient and both thermal time constants
     (`limits`), and `winding`, or `limits.resistance` and `limits.torque_constant`. Losses in iron and friction are left out.
 
     Parameters
     ----------
-    result
-        Of `simulate`, or read from a file.
-    motor
+    result : xarray.Dataset
+        Result of `simulate` or `open_result`.
+    motor : str, optional
         Name of one of several motors of a drive train.
-    ambient
-        [°C]; left out, that of the task, or 25 °C.
-    winding, case
-        Temperatures [°C] at the beginning; left out, the ambient one.
-    repeated
-        The run is a cycle that has been repeated until the temperatures repeat too: in closed form.
-    constant_resistance
-        The resistance stays that of its reference temperature; else it rises by 0.393 % per kelvin, as that of copper.
+    ambient : float, optional
+        Ambient temperature [°C]. Default: that of the task, or 25 °C.
+    winding, case : float, optional
+        Temperatures [°C] at the beginning. Default: the ambient one.
+    repeated : bool
+        Whether the run is a cycle that has been repeated until the temperatures repeat too, in closed form.
+    constant_resistance : bool
+        Whether the resistance stays that of its reference temperature. Otherwise it rises by 0.393 % per kelvin, as copper does.
 
     Returns
     -------
     xarray.Dataset
-        Over ``time`` [s] `winding_temperature` and `case_temperature` [°C] and `copper_loss` [W]; `rms_torque` [N·m], and where
-        the limits have a largest temperature `headroom` [K] below it. The attribute `error_bound` [K] says by how much the temperatures
-        can be wrong because the torque is known at the samples only, and straight between them.
+        Over ``time`` [s]: `winding_temperature` and `case_temperature` [°C] and `copper_loss` [W]; `rms_torque` [N·m], and `headroom`
+        [K] if the limits have a largest temperature. The attribute `error_bound` [K] bounds the error of the temperatures that
+        results from the linear interpolation of the torque between the samples.
 
     Raises
     ------
     InputError
-        The motor lacks data, `motor` names none, or repeated motion has no end to its heat.
+        The motor lacks data, `motor` names none, or the heat of the repeated motion has no bound.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> heat = lm.sizing.temperatures(lm.simulate(lm.load("catalogue-robot-joint")))
+    >>> bool(heat["winding_temperature"][-1] > 25.0)
+    True
     """
     m, where, (_, torque, _) = _motor_of(result, motor)
     heating = torque

@@ -40,24 +40,24 @@ def study(
 ) -> Path:
     """Run a study, or resume it, into a directory of Parquet files.
 
-    Runs are computed and written in chunks; a chunk that is written is whole. Interrupted at any instant and called again, it
-    computes the chunks that are missing, so no run is lost and none is there twice. Rows depend on the study alone, not on
-    threads, workers or interruptions.
+    Runs are computed and written in chunks; each written chunk is whole. A study that was interrupted at any instant computes the
+    missing chunks when it is called again, so that no run is lost or repeated. Rows depend on the study alone, not on threads,
+    workers or interruptions.
 
     Parameters
     ----------
-    what
-        From `load_study`, or made in Python.
-    directory
-        Made if missing. ``pandas.read_parquet(directory)``, DuckDB and polars open it directly.
-    threads
-        In the core, if there is no executor: all cores, if left out.
-    executor
-        Any `concurrent.futures.Executor`, such as a process pool or that of a Dask client.
-    progress
-        Called with the number of runs done; of slow studies without executor also within a chunk, before it is written.
-    repair
-        Make damaged parts again; otherwise they are refused.
+    what : Study
+        Result of `load_study`, or made in Python.
+    directory : str or Path
+        Directory, made if missing. ``pandas.read_parquet(directory)``, DuckDB and polars open it directly.
+    threads : int, optional
+        Number of threads in the core, without an executor. Default: all cores.
+    executor : concurrent.futures.Executor, optional
+        A process pool, the executor of a Dask client, or any other.
+    progress : callable, optional
+        Called with the number of finished runs. Slow studies without executor call it within a chunk, too, before it is written.
+    repair : bool
+        Whether to make damaged parts again; otherwise they are refused.
 
     Returns
     -------
@@ -67,8 +67,19 @@ def study(
     Raises
     ------
     InputError
-        The directory holds another study or damaged parts, or cannot be written, or the executor lost its workers; what is
-        there stays.
+        The directory contains another study or damaged parts, or cannot be written, or the executor lost its workers. Existing files
+        stay.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> import lostmotion as lm
+    >>> study = lm.studies.load_study("examples/tolerance.toml")
+    >>> with TemporaryDirectory() as folder:
+    ...     directory = lm.study(study, Path(folder, "tolerance"))
+    ...     print([path.name for path in directory.glob("*.parquet")])
+    ['part-000000.parquet']
     """
     need("pyarrow", "A study", "study")
     need("scipy", "A study", "study")

@@ -21,12 +21,28 @@ from .study import Study
 
 @checked
 def load_study(path: str | Path) -> Study:
-    """Read a study file. Its key `base` names the scenario file or saved result, relative to it; `set` may change values of that.
+    """Read a study file.
+
+    Parameters
+    ----------
+    path : str or Path
+        The study file (TOML). Its key `base` names the scenario file or saved result, relative to it; `set` may change its values.
+
+    Returns
+    -------
+    Study
+        The study, for `study`.
 
     Raises
     ------
     InputError
-        With one line that names the file, the key, the value and the remedy.
+        The file cannot be used. The message names the file, the key, the value and the remedy.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> lm.studies.load_study("examples/tolerance.toml").runs
+    256
     """
     path = Path(path)
     data = read_toml(path, "a study")

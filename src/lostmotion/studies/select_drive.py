@@ -44,17 +44,17 @@ def select(
 ) -> xarray.Dataset:
     """Try every motor with every gearbox on a task.
 
-    A pair that the rules of the manufacturers refuse, for the motion that the task requires of rigid parts, is not run. All others
+    A pair that the rules of the manufacturers refuse, for the motion of rigid parts that the task requires, is not run. All others
     get gains by rule and are simulated over the cycle until it repeats.
 
     Parameters
     ----------
-    task
-        Of `load_task`, or its file.
-    directory
-        Where the rows are kept, as those of a study; called again, it resumes there. Left out, nothing is kept.
+    task : Study, str or Path
+        Result of `load_task`, or its file.
+    directory : str or Path, optional
+        Directory of the rows, as for a study; called again, the selection resumes there. Default: nothing is kept.
     threads, executor, progress
-        As of `study`.
+        As in `study`.
 
     Returns
     -------
@@ -65,7 +65,13 @@ def select(
     Raises
     ------
     InputError
-        The task cannot be read, or the directory holds something else.
+        The task cannot be read, or the directory contains something else.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> pairs = lm.select("examples/select-axis.toml")  # doctest: +SKIP
+    >>> pairs.to_dataframe().head()  # doctest: +SKIP
     """
     what = task if isinstance(task, Study) else load_task(task)
     with TemporaryDirectory() as temporary:

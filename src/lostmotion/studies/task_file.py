@@ -29,14 +29,30 @@ POSITION = {"sample_time": 1e-3, "feedforward": 1.0}
 def load_task(path: str | Path) -> Study:
     """Read a task file.
 
-    Its tables are those of a scenario (`[load]`, `[controller]` with its reference but without gains, `[motor]` and `[gearbox]`
-    with what is given beside a record), a table `[task]` (`AxisTask`), and those of a study: `[[vary]]` for motors and gearboxes,
-    all of the catalogue if left out, and `[select]`.
+    Its tables are those of a scenario (`[load]`, `[controller]` with its reference but without gains, `[motor]` and `[gearbox]` with
+    keys beside a record), a table `[task]` (`AxisTask`), and those of a study: `[[vary]]` for motors and gearboxes, by default the
+    whole catalogue, and `[select]`.
+
+    Parameters
+    ----------
+    path : str or Path
+        The task file (TOML).
+
+    Returns
+    -------
+    Study
+        The task, for `select`.
 
     Raises
     ------
     InputError
-        With one line that names the file, the key, the value and the remedy.
+        The file cannot be used. The message names the file, the key, the value and the remedy.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> type(lm.studies.load_task("examples/select-axis.toml")).__name__
+    'Study'
     """
     path = Path(path)
     try:

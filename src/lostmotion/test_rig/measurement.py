@@ -58,16 +58,35 @@ def measure(
     notes: Iterable[str] = (),
     progress: Callable[[], None] = lambda: None,
 ) -> RigReport:
-    """Measure all that data sheets say of a gearbox.
+    """Measure all data of a gearbox that data sheets print.
 
     Parameters
     ----------
-    sheet
+    gearbox : Gearbox or Gear
+        The gearbox on the rig.
+    sheet : GearboxSheet, optional
         Data to compare with.
-    notes
-        Of the loss map's making; a contradiction among the data is pointed out beside them.
-    progress
+    notes : iterable of str
+        Notes from building the loss map; a contradiction among the data is added to them.
+    progress : callable
         Called `WORK` times.
+
+    Returns
+    -------
+    RigReport
+        Measured values beside those of the data sheet, and the curves.
+
+    Raises
+    ------
+    InputError
+        The gearbox cannot be measured. The message states the reason.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> report = lm.test_rig.measure(lm.gearbox("wittenstein-tp010-mf-10"))
+    >>> f"{report.starting_torque:.3g} N·m"
+    '0.64 N·m'
     """
     rig = TestRig(gearbox)
     gearbox = rig.gearbox
