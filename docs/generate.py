@@ -23,8 +23,10 @@ from typer.main import get_command
 import lostmotion as lm
 from lostmotion.cli import app
 from lostmotion.control import references
+from lostmotion.inputs.part import Part
 from lostmotion.inputs.schema import options, unit_in_schema
 from lostmotion.model import signals
+from lostmotion.namespace import homes_of
 from lostmotion.simulation.scenario import json_schema
 from lostmotion.simulation.train_scenario import train_schema
 from lostmotion.simulation.variables import VARIABLES
@@ -362,6 +364,70 @@ def scenario_page(name: str, title: str, path: Path) -> list[str]:
     ]
 
 
+def summary_of(thing: Any) -> str:
+    """First sentence of a docstring, for a table."""
+    text = " ".join((inspect.getdoc(thing) or "").split("\n\n")[0].split())
+    return text.replace("``", "`").replace("|", "\\|")
+
+
+def api_page(dotted: str) -> str:
+    """The page of one public name, `servo.tune` for example; the fields of a part with units, ranges and defaults."""
+    thing: Any = lm
+    for word in dotted.split("."):
+        thing = getattr(thing, word)
+    lines = [f"# lm.{dotted}", "", "```{eval-rst}"]
+    if not inspect.isclass(thing):
+        kind = "autofunction" if callable(thing) else "autodata"
+        return "\n".join([*lines, f".. {kind}:: lostmotion.{dotted}", "```", ""])
+    if issubclass(thing, BaseException):
+        return "\n".join([*lines, f".. autoexception:: lostmotion.{dotted}", "```", ""])
+    if not issubclass(thing, Part):
+        lines += [f".. autoclass:: lostmotion.{dotted}", "   :members:", "   :special-members: __getitem__", "```", ""]
+        return "\n".join(lines)
+    lines += [f".. autoclass:: lostmotion.{dotted}", "   :no-members:", "```", "", "## Fields", ""]
+    schema = thing.model_json_schema()
+    rows: list[str] = []
+    write_table("top level", schema, schema, rows, set())
+    return (
+        "\n".join([*lines, *rows[rows.index("| key | unit | range | default | meaning |") :]]).split("\n## `[")[0]
+        + "\n"
+    )
+
+
+def api_list(dotted: Iterable[str], prefix: str) -> str:
+    """Table of names with links to their pages, which `prefix` leads to, and the entries of the table of contents."""
+    lines = ["| name | purpose |", "|---|---|"]
+    names = list(dotted)
+    for name in names:
+        thing: Any = lm
+        for word in name.split("."):
+            thing = getattr(thing, word)
+        lines.append(f"| [`lm.{name}`]({prefix}{name}.md) | {summary_of(thing)} |")
+    return "\n".join([*lines, "", "```{toctree}", ":hidden:", "", *(prefix + name for name in names), "```", ""])
+
+
+def api(out: Path) -> None:
+    """One page for each public function and class, and a list for each namespace, into the directory `api` of `out`."""
+    pages = out / "api"
+    pages.mkdir(exist_ok=True)
+    flat = homes_of("lostmotion")
+    spaces = [name for name, home in flat.items() if home == "lostmotion"]
+    names = sorted(set(flat) - set(spaces) - {"__version__"}, key=str.lower)
+    kinds: dict[str, list[str]] = {"functions": [], "classes": [], "errors": []}
+    for name in names:
+        thing = getattr(lm, name)
+        kind = "classes" if inspect.isclass(thing) else "functions"
+        kinds["errors" if inspect.isclass(thing) and issubclass(thing, BaseException) else kind].append(name)
+    for kind, found in kinds.items():
+        (pages / f"{kind}.inc").write_text(api_list(found, "_generated/api/"), encoding="utf-8")
+    for space in spaces:
+        found = [f"{space}.{name}" for name in sorted(homes_of(f"lostmotion.{space}"), key=str.lower)]
+        (pages / f"{space}.inc").write_text(api_list(found, "../_generated/api/"), encoding="utf-8")
+        names += found
+    for name in names:
+        (pages / f"{name}.md").write_text(api_page(name), encoding="utf-8")
+
+
 def introduction(path: Path) -> str:
     """The first comment of a scenario file."""
     block: list[str] = []
@@ -391,6 +457,7 @@ def collect(writers: Iterable[Any], out: Path) -> None:
 def generate(out: Path = OUT) -> None:
     """All pages into a directory, made if missing."""
     out.mkdir(exist_ok=True)
+    api(out)
     pages = {
         "scenario": scenario_reference(),
         "train": train_reference(),

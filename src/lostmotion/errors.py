@@ -22,7 +22,17 @@ def visible(text: str, kept: str = "") -> str:
 
 
 class InputError(ValueError):
-    """Input that cannot be used. Its text is one line: the file, the key, the value and the remedy."""
+    """Input that cannot be used. Its text is one line: the file, the key, the value and the remedy.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> try:
+    ...     lm.Load(inertia=-1.0)
+    ... except lm.InputError as error:
+    ...     print(error)
+    key inertia: -1.0 must be greater than 0
+    """
 
     def __init__(self, text: str = "") -> None:
         super().__init__(visible(str(text)))

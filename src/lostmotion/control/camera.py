@@ -10,7 +10,7 @@ from .described import CameraFields, TrackerFields
 
 
 class Camera(CameraFields):
-    """Measures how far the target is beside the line of sight of the shaft that the reference is of, on which it sits.
+    """Camera on the shaft of the reference, which measures the angle between the target and the line of sight.
 
     Frame n, at n ``sample_time``: ``p floor((o + noise N_n)/p + 1/2)`` of the offset o while ``|o| <= field/2``, added to what the encoder of
     the position says then; N_n are standard normal, p is ``pixel/pixel_parts``.
@@ -31,7 +31,7 @@ class Camera(CameraFields):
 
 
 class Tracker(TrackerFields):
-    """Follows the target by the frames of the camera; the loops follow what it expects for the present.
+    """Filter of the camera's frames that predicts the position of the target for the loops.
 
     With the expected x, v, a at a frame and r = measured - x: ``x += alpha r``, ``v += (beta/T) r``, ``a += (gamma/(2 T^2)) r`` (Kalata 1984).
     """

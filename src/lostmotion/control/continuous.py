@@ -111,7 +111,9 @@ class _PID(Part):
 
 
 class PositionPID(_PID):
-    """``k_p (b r - phi) + k_i integral of (r - phi) + k_d d/dt (c r - phi)/(1 + filter_time d/dt)``"""
+    """PID controller of a position: ``k_p (b r - phi) + k_i integral of (r - phi) + k_d d/dt (c r - phi)/(1 +
+    filter_time d/dt)``.
+    """
 
     gain: Annotated[Stiffness, NotNegative] = 0.0
     """k_p"""
@@ -122,7 +124,9 @@ class PositionPID(_PID):
 
 
 class SpeedPID(_PID):
-    """``k_p (b r - w) + k_i integral of (r - w) + k_d d/dt (c r - w)/(1 + filter_time d/dt)``"""
+    """PID controller of a speed: ``k_p (b r - w) + k_i integral of (r - w) + k_d d/dt (c r - w)/(1 + filter_time
+    d/dt)``.
+    """
 
     gain: Annotated[ViscousFriction, NotNegative] = 0.0
     """k_p"""
@@ -141,7 +145,9 @@ class SpeedPID(_PID):
 
 
 class StateSpace(Part):
-    """x' = A x + B e, v = C x + D e in SI: of the error, or of reference and measured value if B and D have two columns."""
+    """State space ``x' = A x + B e, v = C x + D e`` in SI, of the error, or of reference and measured value if B and
+    D have two columns.
+    """
 
     A: tuple[Row, ...] = ()
     B: tuple[Row, ...] = ()
@@ -189,7 +195,14 @@ class StateSpace(Part):
 
 
 class ContinuousController(Part):
-    """A controller without sample time, whose states are states of the train: for theory, and for exact limit cycles."""
+    """A controller without sample time, whose states are states of the train: for theory, and for exact limit cycles.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> lm.load("hunting-with-static-friction").controllers["servo"].position.gain
+    8.0
+    """
 
     kind: Literal["continuous"]
     reference: Annotated[PositionSignal | SpeedSignal, Field(discriminator="kind")]

@@ -35,6 +35,13 @@ class Controller(Part):
 
     At each sample instant the encoders are read, the loops that are due are computed, the outermost first, and what the innermost
     one gives acts `delay` sample times later.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> controller = lm.load("position-axis").controller
+    >>> controller.sample_time, controller.position.gain
+    (0.000125, 10.0)
     """
 
     kind: Literal["sampled"] = "sampled"

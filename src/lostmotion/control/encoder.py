@@ -18,6 +18,12 @@ class Encoder(EncoderFields):
     Its resolution q is that of an incremental encoder of so many `lines`, 2 pi/(4 lines); of an absolute one of so many
     `bits` in a turn, 2 pi/2**bits; with `lines` and `bits` of one with sine and cosine, 2 pi/(lines 2**bits). A linear scale on a slide
     has a `grating_period` p: p/4, or with `bits` p/2**bits.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> lm.control.Encoder(shaft="motor", bits=20).bits
+    20
     """
 
     shaft: str | None = None

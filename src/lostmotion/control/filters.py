@@ -56,7 +56,7 @@ class Notch(Part):
 
 
 class TransferFunction(Part):
-    """A transfer function in z at the sample time of the loop that it stands in."""
+    """A transfer function in z at the sample time of its loop."""
 
     kind: Literal["transfer_function"] = "transfer_function"
     numerator: tuple[Number, ...] = Field(min_length=1)

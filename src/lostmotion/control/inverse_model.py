@@ -21,14 +21,15 @@ class FrictionAdaptationLaw(FrictionAdaptationLawFields):
 
 
 class LoadObserver(LoadObserverFields):
-    """The load torque from the motor's torque and speed, through the losses of the gear; it joins the feedforward.
+    """Observer of the load torque from the motor's torque and speed, through the losses of the gear; it adds to the
+    feedforward.
 
     ``T_1 = LP[M - J w' - b w - T_10 sgn w]``, ``T_2/i + sgn(w) kappa M_2B(T_2)/|i| = T_1``, ``M_Z = LP[T_2 - J_Z phi'' - b_Z phi']``
     """
 
 
 class InverseModel(InverseModelFields):
-    """Torque of the motor and twist of the gear that the reference needs, by the data of the drive itself.
+    """Feedforward of the motor torque and the twist that the reference requires, by the data of the drive.
 
     ``T_2* = J_Z a + b_Z w + M_Z``, ``M = J_MR i a + b_MR i w + T_2*/i + sgn(i w) (T_10 + kappa M_2B(T_2*)/|i|)`` for the speed w
     and the acceleration a of the reference. With the encoder on the motor its position runs ahead by the twist under T_2*.

@@ -21,7 +21,7 @@ SIGNATURE = (
 
 @dataclass(frozen=True)
 class Law:
-    """A function that is called at each sample time in the place of the loops.
+    """A function that is called at each sample time in place of the loops.
 
     In Python ``function(time, measured, reference, state) -> command``; compiled, a numba cfunc or a ctypes function
     pointer of the C type `SIGNATURE`, which writes the command and returns 0 (anything else ends the run).

@@ -151,7 +151,15 @@ class Move(Part):
 
 
 class PositionReference(Reference[Angle]):
-    """A position [rad] over time: the sum of all that is given, or a list of moves."""
+    """A position [rad] over time: the sum of all that is given, or a list of moves.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> reference = lm.PositionReference(moves=[{"to": "90 deg"}], speed="1 rad/s", acceleration="5 rad/s^2")
+    >>> [round(value, 3) for value in reference.at(0.1)]
+    [np.float64(0.025), np.float64(0.5), np.float64(5.0), np.float64(0.0)]
+    """
 
     kind: Literal["position"] = "position"
     start: Angle = 0.0

@@ -79,7 +79,8 @@ class ScrewSheet(LinearSheet, ScrewData):
 
     Examples
     --------
-    >>> sheet = ScrewSheet(name="my-screw", lead="10 mm", nut_stiffness="320 N/um", efficiency=0.9)
+    >>> import lostmotion as lm
+    >>> sheet = lm.data_sheets.ScrewSheet(name="my-screw", lead="10 mm", nut_stiffness="320 N/um", efficiency=0.9)
     >>> sheet.missing()
     {}
     """
@@ -127,7 +128,8 @@ class RackSheet(LinearSheet, RackData):
 
     Examples
     --------
-    >>> RackSheet(name="my-rack", module="2 mm", rated_force="8 kN").missing()
+    >>> import lostmotion as lm
+    >>> lm.data_sheets.RackSheet(name="my-rack", module="2 mm", rated_force="8 kN").missing()
     {}
     """
 
@@ -165,7 +167,8 @@ class BeltSheet(LinearSheet, BeltData):
 
     Examples
     --------
-    >>> sheet = BeltSheet(name="my-belt", pitch="5 mm", width="25 mm", rated_force="1750 N")
+    >>> import lostmotion as lm
+    >>> sheet = lm.data_sheets.BeltSheet(name="my-belt", pitch="5 mm", width="25 mm", rated_force="1750 N")
     >>> sheet.missing()
     {'specific_stiffness': "see the manufacturer's data sheet"}
     """
@@ -209,7 +212,8 @@ class LinearMotorSheet(LinearSheet, LinearMotorData):
 
     Examples
     --------
-    >>> sheet = LinearMotorSheet(name="my-motor", kind="ironless", rated_force="100 N", mass="0.3 kg")
+    >>> import lostmotion as lm
+    >>> sheet = lm.data_sheets.LinearMotorSheet(name="my-motor", kind="ironless", rated_force="100 N", mass="0.3 kg")
     >>> sheet.values()
     {'mass': 0.3, 'rated_force': 100.0}
     """

@@ -34,7 +34,7 @@ VISCOSITY_EXPONENT = 2.0 / 3.0
 
 @dataclass(frozen=True)
 class BuiltMap:
-    """A loss map and how it came about."""
+    """A loss map, with notes on its data."""
 
     losses: LossMap
     origin: tuple[tuple[str, ...], ...]

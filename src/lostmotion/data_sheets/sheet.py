@@ -41,7 +41,7 @@ class Remark(Part):
 
 
 class Source(Remark):
-    """Where data come from."""
+    """Origin of data: their status, and the text that contains them."""
 
     data: tuple[str, ...]
     """keys of the record that it covers"""

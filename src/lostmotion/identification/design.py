@@ -23,7 +23,7 @@ PRIOR = 1e-3  # information on a scaled parameter that nothing else is known of:
 
 @dataclass(frozen=True)
 class Candidate:
-    """What an experiment would add to the logs that there are."""
+    """An experiment with its information about the parameters, in addition to the existing logs."""
 
     name: str
     gain: float

@@ -12,7 +12,7 @@ from .prepare import Prepared
 
 @dataclass(frozen=True)
 class LogError:
-    """Of one measured channel of one log."""
+    """Error of one measured channel of one log."""
 
     log: str
     channel: str

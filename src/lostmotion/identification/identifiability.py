@@ -22,7 +22,7 @@ SAME = 0.2  # of the change of the runs with one parameter alone, below which th
 
 @dataclass(frozen=True)
 class Undetermined:
-    """A direction in the space of parameters in which the logs say little."""
+    """A direction in the space of parameters that the logs hardly determine."""
 
     changes: dict[str, float]
     """relative changes of the parameters along it, the largest 1"""

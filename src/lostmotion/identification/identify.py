@@ -38,7 +38,7 @@ Notify = Callable[[str, int, float], None]
 
 @dataclass
 class IdentificationResult:
-    """What the logs say of the rig."""
+    """Values, intervals and errors of an identification, with the unidentifiable parameters."""
 
     task: Identification
     rungs: list[RungResult]

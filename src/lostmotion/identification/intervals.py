@@ -18,7 +18,7 @@ CHI_SQUARE = 1.920729  # half the 95 % point of chi-square with one degree of fr
 
 @dataclass(frozen=True)
 class Interval:
-    """95 % interval of a value, SI."""
+    """Interval of 95 % of a value, in SI."""
 
     low: float
     high: float

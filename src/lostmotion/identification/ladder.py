@@ -40,7 +40,7 @@ Notify = Callable[[str, int, float], None]
 
 @dataclass
 class RungResult:
-    """One rung: its fit and its errors."""
+    """One candidate model with its fit and its errors."""
 
     name: str
     fit: Fit

@@ -63,7 +63,7 @@ class Channel:
 
 @dataclass(frozen=True)
 class Log:
-    """What was measured in one run."""
+    """The record of one measurement: channels, header and notes."""
 
     name: str
     """of its file"""

@@ -43,7 +43,7 @@ Notify = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class LogEstimate:
-    """What one log says of the parameters."""
+    """Parameter values of one log, with their intervals."""
 
     log: str
     """name of the log"""
@@ -172,22 +172,29 @@ def monitor(
 
     Parameters
     ----------
-    source
-        The identification file (TOML); its table ``monitor`` says what is watched.
-    logs
-        Files, patterns or directories, relative to the working directory; left out, those of ``logs.files``.
-    progress
-        Is called with the name of each log, its number and how many there are.
+    source : str or Path
+        The identification file (TOML). Its table ``monitor`` names the watched values.
+    logs : sequence of str or Path
+        Files, patterns or directories, relative to the working directory. Default: those of ``logs.files``.
+    progress : callable, optional
+        Called with the name of each log, its number and the number of logs.
 
     Returns
     -------
     MonitorResult
-        Trends with intervals, what each log could tell, changes, and the state of each limit.
+        Trends with intervals, estimates of each log, changes, and the state of each limit.
 
     Raises
     ------
     InputError
-        The file, a log or the rig cannot be used; the message names file, key, value and remedy.
+        The file, a log or the rig cannot be used. The message names file, key, value and remedy.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> result = lm.monitor("examples/cycloidal/baseline.toml")
+    >>> result.watched["friction"].text
+    'friction: not decided; 3 of the 3 logs of the baseline tell it, 5 are needed'
     """
     task, directory = load_identification(source)
     if logs:

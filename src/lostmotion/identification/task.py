@@ -150,7 +150,7 @@ class FitOptions(Part):
 
 
 class Identification(Part):
-    """All of an identification file."""
+    """Content of an identification file."""
 
     title: str = ""
     scenario: str

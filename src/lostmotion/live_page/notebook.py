@@ -38,7 +38,7 @@ export default {
 
 
 class LivePage:
-    """A scenario in the browser, as the last line of a notebook's cell shows it.
+    """A scenario on the live page, shown as the last line of a notebook cell.
 
     With anywidget installed, `values` and `scenario` follow the sliders; without, the page is shown alone.
     """

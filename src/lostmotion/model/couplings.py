@@ -53,7 +53,14 @@ class Commanded(Part):
 
 
 class Brake(Commanded):
-    """A holding brake: dry friction between a shaft and the frame."""
+    """A holding brake: dry friction between a shaft and the frame.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> lm.Brake(shaft="motor", torque="2 N*m").torque
+    2.0
+    """
 
     shaft: str
     """that it holds"""
@@ -64,7 +71,14 @@ class Brake(Commanded):
 
 
 class Clutch(Commanded):
-    """Dry friction between two shafts."""
+    """Dry friction between two shafts.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> lm.Clutch(input="engine", output="drum", torque="30 N*m").torque
+    30.0
+    """
 
     kind: Literal["friction", "safety"] = "friction"
     """`friction`: engaged by its command; `safety`: always engaged, slips at its torque"""
@@ -85,7 +99,14 @@ class Clutch(Commanded):
 
 
 class Freewheel(Part):
-    """A one-way clutch: it drives the output forward and never backward."""
+    """A one-way clutch: it drives the output forward and never backward.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> lm.Freewheel(input="motor", output="drum").input
+    'motor'
+    """
 
     input: str
     """shaft"""

@@ -11,7 +11,15 @@ from .shaft import DragCurve, EddyCurrentDrag, QuadraticDrag
 
 
 class Damper(Part):
-    """A torque over the slip, the speed of the input less that of the output: it drives the output and brakes the input."""
+    """A torque over the slip, the speed of the input less that of the output: it drives the output and brakes the
+    input.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> lm.Damper(input="motor", output="ring", viscous_friction="0.1 N*m*s").viscous_friction
+    0.1
+    """
 
     input: str
     """shaft"""

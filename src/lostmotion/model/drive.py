@@ -19,7 +19,15 @@ from .train import DriveTrain
 
 
 class Drive(Part):
-    """Motor, gearbox and load."""
+    """Motor, gearbox and load.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> drive = lm.Drive(motor=lm.motor("maxon-ec-i-52-606793"), gearbox=lm.gearbox("wittenstein-tp010-mf-10"), load=lm.Load(inertia=0.5))
+    >>> drive.gearbox.ratio
+    10.0
+    """
 
     motor: Motor
     gearbox: Gearbox

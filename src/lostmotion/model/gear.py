@@ -12,7 +12,14 @@ from .torsion import LinearStiffness, Rigid, TorsionCurve
 
 
 class Gear(Transmission):
-    """A stage between two shafts: a gearbox, a belt, a worm, or, with the ratio 1, a coupling."""
+    """A stage between two shafts: a gearbox, a belt, a worm, or, with the ratio 1, a coupling.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> lm.Gear(input="motor", output="table", ratio=10, stiffness={"kind": "linear", "stiffness": "5e4 N*m/rad"}).ratio
+    10.0
+    """
 
     input: str
     """shaft"""

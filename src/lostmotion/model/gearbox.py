@@ -20,7 +20,7 @@ from .torsion import Hysteresis, LinearStiffness, Rigid, TorsionCurve
 
 
 class GearboxLimits(Part):
-    """What a gearbox can stand. No run depends on it; the drive check compares with it."""
+    """Limits of a gearbox. No run depends on them; the drive check compares with them."""
 
     average_output_torque: Annotated[Torque, Positive] | None = None
     peak_output_torque: Annotated[Torque, Positive] | None = None
@@ -101,7 +101,14 @@ class Transmission(Part):
 
 
 class Gearbox(Transmission):
-    """A compliance and a loss law, each chosen freely."""
+    """A compliance and a loss law, each chosen freely.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> lm.gearbox("wittenstein-tp010-mf-10").rated_output_torque
+    81.0
+    """
 
     rated_input_speed: Annotated[Speed, Positive]
     """n_1R"""

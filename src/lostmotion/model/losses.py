@@ -30,7 +30,15 @@ class ConstantEfficiency(Part):
 
 
 class LossMap(Part):
-    """Loss coefficient m_2B over relative speed and signed relative load (12), linear on triangles."""
+    """Loss coefficient m_2B over relative speed and signed relative load (12), linear on triangles.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> losses = lm.gearbox("wittenstein-tp010-mf-10").losses
+    >>> len(losses.values) == len(losses.loads), len(losses.values[0]) == len(losses.speeds)
+    (True, True)
+    """
 
     kind: Literal["map"] = "map"
     speeds: tuple[Annotated[Number, NotNegative], ...] = Field(min_length=2)

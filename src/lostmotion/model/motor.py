@@ -32,7 +32,7 @@ from .synchronous_motor import PhaseValues, Winding
 
 
 class MotorLimits(Part):
-    """What a motor can stand. No run depends on it; the drive check compares with it."""
+    """Limits of a motor. No run depends on them; the drive check compares with them."""
 
     continuous_torque: Annotated[Torque, Positive] | None = None
     peak_torque: Annotated[Torque, Positive] | None = None
@@ -94,7 +94,16 @@ SAID_BY_WINDING = ("resistance", "torque_constant", "max_current")
 
 
 class Motor(Part):
-    """DC motor with servo amplifier (eq. 2), synchronous motor with ideal field orientation, or a torque source in its place."""
+    """DC motor with servo amplifier (eq. 2), synchronous motor with ideal field orientation, or a torque source in
+    its place.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> motor = lm.Motor(kind="torque_source", rotor_inertia="1 kg*cm^2", rated_torque="1 N*m")
+    >>> f"{motor.rotor_inertia:g} kg·m²"
+    '0.0001 kg·m²'
+    """
 
     kind: Literal["dc", "torque_source", "synchronous"] = "dc"
     """`torque_source`: the command times `rated_torque` acts on the rotor without delay; `synchronous`: command 1 is the largest
@@ -357,7 +366,15 @@ class Motor(Part):
 
 
 class ShaftMotor(Motor):
-    """A motor on a shaft of a drive train."""
+    """A motor on a shaft of a drive train.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> motor = lm.ShaftMotor(shaft="motor", kind="torque_source", rotor_inertia="1 kg*cm^2", rated_torque="1 N*m")
+    >>> motor.shaft
+    'motor'
+    """
 
     shaft: str
     """that it turns"""

@@ -146,7 +146,14 @@ def _departure(a: float, b: float) -> float:
 
 
 class Shaft(Part):
-    """A shaft of a drive train. Rotors of motors and inertias of gears on it are added to it."""
+    """A shaft of a drive train. Rotors of motors and inertias of gears on it are added to it.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> lm.Shaft(inertia="2 kg*m^2", friction_torque="1 N*m").inertia
+    2.0
+    """
 
     domain: Literal["rotation", "translation"] = "rotation"
     """translation: a slide, which scenarios have in the table `slides`; its numbers are in kg, m and N"""

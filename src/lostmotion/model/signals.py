@@ -282,7 +282,15 @@ def _polyline(times: Any, values: list[float]) -> list[Breakpoint]:
 
 
 class CommandSignal(Signal[Number]):
-    """A command E_C over time: the sum of all that is given."""
+    """A command E_C over time: the sum of all that is given.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> signal = lm.CommandSignal(mean=0.1, amplitude=0.5, frequency="2 Hz")
+    >>> signal.mean
+    0.1
+    """
 
 
 class ForceSignal(Signal[Force]):
@@ -325,7 +333,14 @@ class AccelerationSignal(Signal[Number]):
 
 
 class TorqueSignal(Signal[Torque]):
-    """A torque [N·m] over time: the sum of all that is given."""
+    """A torque [N·m] over time: the sum of all that is given.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> lm.TorqueSignal(mean="5 N*m").mean
+    5.0
+    """
 
     wind: AnyWind | None = None
 

@@ -13,6 +13,12 @@ class Spring(Part):
     """A spring between a shaft and the frame: the torque ``-P(phi - rest_angle)`` on the shaft.
 
     With `backlash`, a torsion curve leaves the shaft free between two elastic end stops.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> lm.Spring(shaft="joint", stiffness={"kind": "linear", "stiffness": "20 N*m/rad"}).shaft
+    'joint'
     """
 
     shaft: str

@@ -40,6 +40,12 @@ class TorsionCurve(Part):
 
     `backlash` (total gap at the output) and `preload` change the given segments: a gap of half the backlash comes
     before the first, or the segments below the preload torque drop out, as where two flanks are pressed together.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> lm.model.TorsionCurve(slopes=["1e4 N*m/rad", "2e4 N*m/rad"], breaks=["1 mrad"]).slopes
+    (10000.0, 20000.0)
     """
 
     kind: Literal["curve"] = "curve"

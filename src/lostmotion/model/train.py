@@ -84,7 +84,14 @@ class TrainElements(Part):
 
 
 class DriveTrain(TrainElements):
-    """Shafts, and what joins, turns, holds and loads them."""
+    """A drive train: shafts, gears, clutches and dampers between them, motors, brakes and torques over angle.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> list(lm.load("worm-lowering").train().gears)
+    ['coupling', 'worm_gear']
+    """
 
     shafts: Elements[Shaft] = Field(min_length=1)
 

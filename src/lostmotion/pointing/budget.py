@@ -29,7 +29,7 @@ PROBABLE = 0.6744897501960817  # of a normal distribution, in standard deviation
 
 @dataclass(frozen=True)
 class PointingError:
-    """Of one axis over a run [rad]."""
+    """Errors of one axis over a run [rad]."""
 
     rms: float
     peak: float
@@ -43,7 +43,7 @@ class PointingError:
 
 @dataclass(frozen=True)
 class View:
-    """How long the target is within the field of view."""
+    """Share of the time in which the target is within the field of view."""
 
     share: float
     """of the time"""
@@ -57,7 +57,7 @@ Errors = Mapping[str, PointingError]
 
 @dataclass(frozen=True)
 class PointingBudget:
-    """What pointing axes miss, and why."""
+    """Pointing errors of axes with their causes."""
 
     scenario: Scenario | TrainScenario
     after: float

@@ -138,6 +138,8 @@ def spectrum(
 
     Examples
     --------
+    >>> import math
+    >>> import lostmotion as lm
     >>> drive = lm.TrainScenario(
     ...     shafts={"motor": {}, "load": {"inertia": 1e-3, "torque": 0.0}},
     ...     motors={"m": {"shaft": "motor", "kind": "torque_source", "rotor_inertia": 1e-3, "rated_torque": 1.0}},

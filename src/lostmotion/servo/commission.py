@@ -34,7 +34,7 @@ from .sampled import SampledLoop
 
 @dataclass(frozen=True)
 class LoopSheet:
-    """One loop in one regime: exact, linear, at the samples of the loop."""
+    """One loop in one regime, linear at the samples of the loop."""
 
     loop: str
     regime: str
@@ -88,7 +88,7 @@ class Stiffness:
 
 @dataclass(frozen=True)
 class ServoReport:
-    """The sheet of one axis."""
+    """The report of one axis."""
 
     scenario: Scenario | TrainScenario
     motor: str

@@ -33,7 +33,7 @@ MAX_POINTS = 1_000_000  # of a map
 
 @dataclass(frozen=True)
 class Hunting:
-    """A limit cycle, or why there is none."""
+    """A limit cycle, or the reason why there is none."""
 
     verdict: Verdict
     """hunts; at rest, of a state that is shown to be an equilibrium; not decided"""

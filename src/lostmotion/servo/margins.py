@@ -48,7 +48,7 @@ class Margins:
 
 @dataclass(frozen=True)
 class Bandwidth:
-    """Where a closed loop ceases to follow its reference; NaN where that lies beyond half its sampling frequency."""
+    """Bandwidth of a closed loop; NaN beyond half its sampling frequency."""
 
     three_decibels: float
     """where the gain first falls below -3 dB [Hz]"""

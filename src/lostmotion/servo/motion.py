@@ -196,7 +196,7 @@ class Following:
 
 @dataclass(frozen=True)
 class Settling:
-    """After one move."""
+    """Settling of an axis after one move."""
 
     end: float
     """of the move [s]"""
@@ -268,7 +268,7 @@ def settling(axis: Axis, followed: Following, window: float) -> list[Settling]:
 
 @dataclass(frozen=True)
 class AtRest:
-    """What an axis does after its reference has come to rest."""
+    """Motion of an axis after its reference has come to rest."""
 
     verdict: Verdict
     reason: str

@@ -57,7 +57,7 @@ EVALUATIONS = 80
 
 @dataclass(frozen=True)
 class Tuning:
-    """Gains of an axis, and the scenario with them."""
+    """Gains of an axis, and the scenario with these gains."""
 
     rule: str
     why: str

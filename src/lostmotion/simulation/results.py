@@ -63,7 +63,7 @@ class RunArrays:
     >>> import lostmotion as lm
     >>> result = lm.simulate(lm.load("paper-2dof-nl-small"), output="arrays")
     >>> result.names[:3]
-    ('command', 'motor_torque', 'motor_speed')
+    ('command', 'load_torque', 'motor_torque')
     >>> result.units["motor_torque"], result["motor_torque"].shape == result.time.shape
     ('N*m', True)
     >>> result.switchings["instant"].shape == (result.attrs["switching_count"],)

@@ -43,7 +43,14 @@ class LoadTable(Load):
 
 
 class Initial(Part):
-    """State at t = 0."""
+    """State of a drive at t = 0.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> lm.Initial(motor_speed="3000 rpm", load_speed="30 rpm").load_speed
+    3.141592653589793
+    """
 
     motor_torque: Torque = 0.0
     motor_speed: Speed = 0.0
@@ -104,7 +111,14 @@ class SimulationTable(Part):
 
 
 class Scenario(Part):
-    """A drive, what acts on it, and what is wanted of it."""
+    """A drive with its inputs, controller, task and the duration of its run.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> lm.load("paper-2dof-nl-small").replace(**{"load.inertia": "3 kg*m^2"}).load.inertia
+    3.0
+    """
 
     title: str = ""
     command: CommandSignal = CommandSignal()

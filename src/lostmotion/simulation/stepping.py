@@ -92,12 +92,13 @@ class Simulation:
 
     Examples
     --------
-    >>> sim = Simulation(drive)                                       # doctest: +SKIP
-    >>> sim.advance(1e-3, command=0.1)                                # doctest: +SKIP
-    >>> sim["load_speed"]                                             # doctest: +SKIP
-    >>> sim["load_speed", "twist"]                                    # doctest: +SKIP
-    >>> ring = Simulation(train)                                      # doctest: +SKIP
-    >>> ring.advance(1e-3, m1_command=0.4, m2_command=-0.4)           # doctest: +SKIP
+    >>> import lostmotion as lm
+    >>> simulation = lm.Simulation(lm.load("paper-2dof-nl-small"))
+    >>> simulation.advance("10 ms", command=0.5)
+    >>> f"{simulation['load_speed']:.4g} rad/s"
+    '0.28 rad/s'
+    >>> simulation["load_speed", "twist"].shape
+    (2,)
 
     Notes
     -----

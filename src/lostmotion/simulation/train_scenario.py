@@ -53,7 +53,14 @@ class SlideTable(Slide):
 
 
 class TrainInitial(Part):
-    """State at t = 0; what is left out is 0."""
+    """State of a drive train at t = 0; missing values are 0.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> lm.TrainInitial(speeds={"motor": "100 rpm"}).speeds["motor"]
+    10.471975511965978
+    """
 
     speeds: Elements[Speed] = Field(default_factory=nothing)
     """of shafts"""
@@ -94,7 +101,14 @@ LINEAR_INITIAL = {
 
 
 class TrainScenario(LinearElements):
-    """A drive train, what acts on it, and what is wanted of it."""
+    """A drive train with its inputs, controllers, task and the duration of its run.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> list(lm.load("two-motors-one-ring").motors)
+    ['first_motor', 'second_motor']
+    """
 
     # Why it is refused where another object is wanted, and what to use.
     refused_as: ClassVar[Mapping[str, str]] = {
