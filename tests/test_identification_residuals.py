@@ -8,15 +8,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lostmotion.identification.engine import Engine
+from lostmotion import Simulation, load
+from lostmotion.identification.engine import Engine, Point
+from lostmotion.identification.fit import Fit, Problem
 from lostmotion.identification.identify import IdentificationResult, identify_logs
+from lostmotion.identification.intervals import bootstrap
 from lostmotion.identification.ladder import problem_of, start_point
 from lostmotion.identification.logs import Channel, Log
 from lostmotion.identification.misfit import misfits
+from lostmotion.identification.parameters import FreeParameter
 from lostmotion.identification.prepare import prepared
 from lostmotion.identification.recorded import course_of
 from lostmotion.identification.rig import Rig
-from lostmotion.identification.task import Identification
+from lostmotion.identification.task import FitOptions, Identification
 from lostmotion.identification.virtual import virtual_log
 from lostmotion.reports.identification import write_identification
 
@@ -161,3 +165,104 @@ def test_a_command_that_repeats_its_values_is_held(tmp_path: Path) -> None:
     log = virtual_log(rig, plan, {"friction": 5e-3}, noise={"angle": NOISE})
     result = identify_logs(rig, [prepared(rig.task, log, rig.units)], threads=1)
     assert result.inputs == ["drive_command: held between samples, since the channel repeats its values"]
+
+
+# --- what is missing in the model ---
+
+SPINDLE = """
+[shafts.spindle]
+viscous_friction = 0.02
+friction_torque = 0.1
+[motors.drive]
+shaft = "spindle"
+kind = "torque_source"
+rated_torque = 1.0
+rotor_inertia = 5e-3
+[simulation]
+duration = "1 s"
+sample_interval = "2 ms"
+"""
+SPINDLE_NOISE = 1e-3  # rad
+
+
+def spindle_result(directory: Path, drag: float, **more: Any) -> IdentificationResult:
+    """Of five logs of a spindle with a quadratic drag; the model has Coulomb and viscous friction."""
+    (directory / "spindle.toml").write_text(SPINDLE)
+    task = Identification(
+        **{
+            "scenario": "spindle.toml",
+            "logs": {"files": ["*.csv"]},
+            "inputs": {"drive_command": {"channel": "torque", "interpolation": "hold"}},
+            "measured": {"angle": {"channel": "angle", "variable": "spindle_angle", "deviation": SPINDLE_NOISE}},
+            "set": {
+                "motors.drive.rotor_inertia": "inertia",
+                "shafts.spindle.viscous_friction": "viscous",
+                "shafts.spindle.friction_torque": "coulomb",
+            },
+            "parameters": {
+                "inertia": {"start": 6e-3, "min": 1e-4, "max": 1.0},
+                "viscous": {"start": 0.03, "max": 1.0, "off": 0.0},
+                "coulomb": {"start": 0.12, "max": 2.0},
+            },
+        }
+        | more
+    )
+    rig = Rig(task, directory)
+    rng, time = np.random.default_rng(7), 2e-3 * np.arange(1000)
+    change = {"shafts.spindle.drag": {"kind": "quadratic", "coefficient": drag, "max_speed": 60.0}} if drag else {}
+    train = load(directory / "spindle.toml").replace(**change).train()
+    logs = []
+    for k in range(5):
+        torque = np.round(0.4 * np.sin((3.0 + k) * time + k) + 0.25 * np.sin(11.0 * time), 4)
+        drive, angle = Simulation(train, step=2e-3), np.zeros(len(time))
+        for n, u in enumerate(torque):
+            angle[n] = drive["spindle_angle"]
+            drive.advance(2e-3, drive_command=u)
+        angle += SPINDLE_NOISE * rng.normal(size=len(time))
+        log = Log(f"{k}.csv", time, {"torque": Channel(torque), "angle": Channel(angle)})
+        logs.append(prepared(task, log, rig.units))
+    return identify_logs(rig, logs, threads=1)
+
+
+def test_a_wrong_friction_law_is_named_and_flagged_at_every_interval(tmp_path: Path) -> None:
+    wrong, right = spindle_result(tmp_path, 1e-3), spindle_result(tmp_path, 0.0)
+    (misfit,) = wrong.misfits
+    assert misfit.shapes[0][0] == "speed"
+    assert "have a shape over speed (" in str(wrong)
+    assert all(
+        i.flag.startswith("may miss the value: structured residuals over speed") for i in wrong.intervals.values()
+    )
+    page = write_identification(tmp_path / "out", "spindle", wrong).read_text()
+    assert page.count("may miss the value: structured residuals over speed") >= 3
+    assert right.misfits == []
+    assert not any(i.flag for i in right.intervals.values())
+    for name, value in {"inertia": 5e-3, "viscous": 0.02, "coulomb": 0.1}.items():
+        i = right.intervals[name]
+        assert abs(right.values[name] - value) < 4.0 * (i.high - i.low) / (2.0 * 1.96), name
+
+
+def test_an_interval_contains_the_value_of_the_model_next_to_the_one_taken(tmp_path: Path) -> None:
+    ladder = [{"name": "dry", "free": ["inertia", "coulomb"]}, {"name": "viscous", "free": ["viscous"]}]
+    result = spindle_result(tmp_path, 1e-3, ladder=ladder)
+    assert result.chosen == 1
+    for name in ("inertia", "coulomb"):
+        i = result.intervals[name]
+        assert i.low <= result.rungs[0].fit.point.values[name] <= i.high
+        assert i.low <= result.values[name] <= i.high
+
+
+def test_errors_that_last_through_a_log_widen_the_interval() -> None:
+    """Eight logs of twelve alike pieces: drawing pieces sees a twelfth of the variance that drawing logs does."""
+    g = np.array([1.0, -1.0, 2.0, -2.0, 0.5, -0.5, 1.5, -1.5])
+    scores = [np.full((12, 1), 1000.0 * value / 12.0) for value in g]
+    p = FreeParameter(start=0.0, min=-1e6, max=1e6, scale=1.0)
+    point = Point({"x": 0.0}, {})
+    fit = Fit(point, 0.0, 0.0, np.ones(1), ("x",), 1, normal=np.array([[1e4]]), scores=scores)
+    options = FitOptions(leave_out=())
+    logs: list[Any] = [None] * 8
+    alone: Any = Problem(None, logs, 0, {"x": p}, {}, options)  # type: ignore[arg-type]
+    i = bootstrap(alone, fit)["x"]
+    # Student's t with 7 degrees of freedom for the sum of eight values. A quantile of 2000 draws has a standard error of 3 %.
+    expected = 2.365 * np.sqrt(8.0) * 1000.0 * np.std(g, ddof=1) / 1e4
+    assert i.high == pytest.approx(expected, rel=0.1)
+    assert i.low == pytest.approx(-expected, rel=0.1)

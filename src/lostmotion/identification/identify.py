@@ -22,7 +22,7 @@ from .identifiability import Undetermined, at_bounds, resting_on
 from .intervals import Interval, bootstrap, profile, widest
 from .ladder import GAIN, RungResult, begun_with, chosen, climb, first_fit, free_on, is_rough, problem_of, start_point
 from .leave_out import ConditionError, left_out_errors
-from .misfit import Misfit, hidden, misfits
+from .misfit import Misfit, hidden, misfits, with_shapes
 from .odd_logs import OddLog, odd_logs
 from .pauses import split_at_pauses
 from .prepare import DEFAULT, Prepared
@@ -135,7 +135,8 @@ class IdentificationResult:
                 continue
             i = self.intervals[name]
             unit = f" {p.unit}" if p.unit else ""
-            lines.append(f"  {name} = {p.shown(self.values[name])} ({p.shown(i.low)} to {p.shown(i.high)}){unit}")
+            flag = f"; {i.flag}" if i.flag else ""
+            lines.append(f"  {name} = {p.shown(self.values[name])} ({p.shown(i.low)} to {p.shown(i.high)}){unit}{flag}")
         for channel in self.task.measured:
             for held_out, what in ((False, "fitted"), (True, "held out")):
                 mae, rmse = self.error(channel, held_out=held_out)
@@ -359,8 +360,10 @@ def _answer(found_by: _Climbed, profiles: bool) -> IdentificationResult:
     fit, free = rungs[best].fit, free_on(task, best)
     train = [log for log in logs if not log.held_out]
     problem: Problem = problem_of(rig, engine, train, best)
-    misfit = misfits(problem, engine.residuals(train, fit.point, best))
+    residuals = engine.residuals(train, fit.point, best)
+    misfit = with_shapes(problem, fit.point, residuals, misfits(problem, residuals))
     intervals, found = _intervals(problem, fit, misfit, rungs[best].minima, profiles)
+    intervals = _with_model_error(intervals, misfit, rungs, best)
     first = logs[0]
     return IdentificationResult(
         task,
@@ -420,6 +423,26 @@ def _intervals(
             if is_rough(problem.engine.rig, name, problem.rung):
                 intervals[name] = Interval(p.min, p.max, "bounds")
     return intervals, found
+
+
+def _with_model_error(
+    intervals: dict[str, Interval], misfit: list[Misfit], rungs: list[RungResult], best: int
+) -> dict[str, Interval]:
+    """Flagged where residuals have a structure, and wide enough for the values of the model next to the one that is taken."""
+    structured = [m for m in misfit if m.structured]
+    if not structured:
+        return intervals
+    shapes = dict.fromkeys(name for m in structured for name, _ in m.shapes)
+    over = f" over {' and '.join(shapes)}" if shapes else ""
+    flag = f"may miss the value: structured residuals{over}"
+    found = {name: replace(i, flag=flag) for name, i in intervals.items()}
+    if len(rungs) > 1:
+        other = rungs[best - 1] if best > 0 else rungs[best + 1]
+        loose = {name for u in other.undetermined for name in u.changes}
+        for name in set(other.fit.free) & found.keys() - loose:
+            value = other.fit.point.values[name]
+            found[name] = widest(found[name], Interval(value, value, found[name].method))
+    return found
 
 
 def _notes(logs: list[Prepared]) -> dict[str, tuple[str, ...]]:

@@ -11,6 +11,7 @@ from ..errors import need
 from .fit import Fit, Problem, moved, room_of, search, slope_of
 
 RESAMPLES = 2000
+CLUSTERS = 5  # logs or conditions, from which on they are drawn as wholes
 LEVEL = 0.95
 PART_OF_DIRECTION = 1e-4  # of the largest part: a parameter with less has none, but for rounding
 CHI_SQUARE = 1.920729  # half the 95 % point of chi-square with one degree of freedom
@@ -24,6 +25,8 @@ class Interval:
     high: float
     method: str
     """``bootstrap`` or ``profile``; ``bounds``, where the fit says nothing of the value"""
+    flag: str = ""
+    """why the interval may miss the value: the structure of the residuals; empty if these are noise"""
 
 
 def bootstrap(problem: Problem, fit: Fit, seed: int = 0, hidden: float = 0.0) -> dict[str, Interval]:
@@ -31,7 +34,8 @@ def bootstrap(problem: Problem, fit: Fit, seed: int = 0, hidden: float = 0.0) ->
 
     The pieces of the gradient of half a second each are drawn anew with replacement, so that errors that last, as those of a
     model that is not quite right do, widen the interval. It is at least that of independent errors: a few blocks say little.
-    With `hidden`, weighted squares of residuals that no noise explains, it is wider by all that these can be the effect of.
+    With `CLUSTERS` logs or more, whole logs are drawn, too, and so are whole conditions of ``fit.leave_out``: errors that last
+    through a log widen the interval. With `hidden`, weighted squares of residuals that no noise explains, it is wider by all that these can be the effect of.
     Along the directions that neither logs nor priors determine, the parameters go on together until one is at its bound.
     """
     names = list(problem.parameters)
@@ -48,9 +52,12 @@ def bootstrap(problem: Problem, fit: Fit, seed: int = 0, hidden: float = 0.0) ->
     weak = values < 1e-8 * max(float(values.max()), 1e-300)
     inverse = vectors[:, ~weak] @ np.diag(1.0 / values[~weak]) @ vectors[:, ~weak].T
     draw = np.random.default_rng(seed)
-    count = draw.multinomial(len(blocks), np.full(len(blocks), 1.0 / len(blocks)), size=RESAMPLES)
-    steps = (count @ blocks) @ inverse * math.sqrt(len(blocks) / max(1, len(blocks) - len(names)))
+    steps = _drawn(blocks, draw) @ inverse * math.sqrt(len(blocks) / max(1, len(blocks) - len(names)))
     low, high = np.percentile(steps, [50.0 * (1.0 - LEVEL), 50.0 * (1.0 + LEVEL)], axis=0)
+    for clusters in _clusters(problem, fit):
+        ends = np.percentile(_drawn(clusters, draw) @ inverse, [50.0 * (1.0 - LEVEL), 50.0 * (1.0 + LEVEL)], axis=0)
+        few = _student(len(clusters) - 1) / 1.96 * math.sqrt(len(clusters) / (len(clusters) - 1))
+        low, high = np.minimum(low, few * ends[0]), np.maximum(high, few * ends[1])
     normal = 1.96 * np.sqrt(np.diag(inverse))  # of independent errors
     wider = np.sqrt(hidden * np.diag(inverse))
     low, high = np.minimum(low, -normal) - wider, np.maximum(high, normal) + wider
@@ -63,6 +70,30 @@ def bootstrap(problem: Problem, fit: Fit, seed: int = 0, hidden: float = 0.0) ->
         p, value = problem.parameters[name], fit.point.values[name]
         found[name] = Interval(moved(p, value, low[k]), moved(p, value, high[k]), "bootstrap")
     return found
+
+
+def _drawn(blocks: np.ndarray, draw: np.random.Generator) -> np.ndarray:
+    """Sums of as many blocks as there are, drawn with replacement: draws x parameters."""
+    count = draw.multinomial(len(blocks), np.full(len(blocks), 1.0 / len(blocks)), size=RESAMPLES)
+    return np.asarray(count @ blocks)
+
+
+def _clusters(problem: Problem, fit: Fit) -> list[np.ndarray]:
+    """Pieces of the gradient of whole logs, and of the logs of each condition: clusters x parameters, about their mean."""
+    of_logs = np.array([score.sum(axis=0) for score in fit.scores])
+    found = [of_logs]
+    for key in problem.options.leave_out:
+        values = [repr(log.facts.get(key)) for log in problem.logs]
+        if len(values) == len(of_logs):
+            found.append(np.array([of_logs[[v == value for v in values]].sum(axis=0) for value in sorted(set(values))]))
+    return [c - c.mean(axis=0) for c in found if len(c) >= CLUSTERS]
+
+
+def _student(freedom: int) -> float:
+    """97.5 % point of Student's t."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(freedom, 0.975))
 
 
 def widest(a: Interval, b: Interval) -> Interval:

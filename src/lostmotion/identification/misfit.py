@@ -1,20 +1,27 @@
-"""Whether residuals are those of noise: their size against the stated deviation, their runs and their correlation."""
+"""Whether residuals are those of noise: their size against the stated deviation, their runs, their correlation and their shape."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .engine import Point
 from .fit import Problem, correlation_of
+from .rig import Rig
+from .runs import run_logs
 
 LARGE = 1.5  # times the stated deviation, from which on residuals are called too large
 WIDENED = 1.1  # the same, from which on structured residuals widen the intervals
 CORRELATED = 0.2  # lag-one correlation, from which on residuals may have a structure
 FEW_RUNS = -6.0  # standard deviations from the number of runs that independent residuals have (Wald and Wolfowitz 1940)
 STEPS = 0.6  # steps of the resolution, below which it explains a structure
+BINS = 12  # of equal numbers of samples, whose means are a shape
+SHARE = 0.1  # of the variance of residuals, from which on a shape over a variable is named
+WIDTHS = (15, 61)  # samples of the filters of derivatives
+CHANCE = 1e-4  # probability of such a shape by chance, up to which it is named
 
 
 @dataclass(frozen=True)
@@ -33,6 +40,13 @@ class Misfit:
     expected: float
     """runs of as many independent residuals"""
     structured: bool
+    shapes: tuple[tuple[str, float], ...] = ()
+    """variables over which the residuals have a shape, and its share of their variance, the largest first"""
+
+    @property
+    def shape(self) -> str:
+        """The shapes in words; empty without one."""
+        return " and ".join(f"{name} ({share:.0%})" for name, share in self.shapes)
 
     @property
     def large(self) -> bool:
@@ -50,7 +64,7 @@ class Misfit:
         if self.structured:
             found.append(
                 f"residuals are no noise (correlation of neighbours {self.correlation:.2f}, {self.runs} runs of one sign "
-                f"instead of {self.expected:.0f})"
+                f"instead of {self.expected:.0f})" + (f" and have a shape over {self.shape}" if self.shapes else "")
             )
         wider = "; the intervals are widened by what such errors can hide" if self.large else ""
         return (
@@ -73,6 +87,104 @@ def misfits(problem: Problem, residuals: Sequence[np.ndarray]) -> list[Misfit]:
         structured = rho > CORRELATED and z < FEW_RUNS and not quantised
         found.append(Misfit(name, rms, ratio, rho, runs, expected, structured))
     return found
+
+
+def with_shapes(
+    problem: Problem, point: Point, residuals: Sequence[np.ndarray], found: Sequence[Misfit]
+) -> list[Misfit]:
+    """With the variables over which structured residuals have a shape: time, and speed, angle and load of the rig."""
+    if not any(m.structured for m in found):
+        return list(found)
+    variables = shape_variables(problem.engine.rig)
+    requests = [(log, point.of(log)) for log in problem.logs]
+    seen = run_logs(
+        problem.engine.rig, requests, problem.rung, extra=tuple(variables.values()), threads=problem.engine.threads
+    )
+    courses = {"time": np.concatenate([log.time for log in problem.logs])}
+    for name, variable in variables.items():
+        courses[name] = np.concatenate(
+            [
+                run.extra.get(variable, np.full(len(log.time), np.nan))
+                for log, run in zip(problem.logs, seen, strict=True)
+            ]
+        )
+    out = []
+    for k, m in enumerate(found):
+        rows = [row[k] for row in problem.compared(residuals)]
+        shares = dict.fromkeys(courses, 0.0)
+        for r, independent in _with_derivatives(rows, m) if m.structured else ():
+            for name, x in courses.items():
+                shares[name] = max(shares[name], _share_over(x, r, independent))
+        named = sorted(((n, share) for n, share in shares.items() if share > 0.0), key=lambda pair: -pair[1])
+        out.append(replace(m, shapes=tuple(named)))
+    return out
+
+
+def _with_derivatives(rows: Sequence[np.ndarray], m: Misfit) -> list[tuple[np.ndarray, float]]:
+    """(residuals of all logs, number of independent ones): as they are, and their first and second derivatives by filters.
+
+    A torque that the model lacks is a function of speed, load or angle. In a residual of an angle it is summed up twice.
+    """
+    r = np.concatenate(rows)
+    found = [(r, np.isfinite(r).sum() * (1.0 - m.correlation) / (1.0 + m.correlation))]
+    for order in (1, 2):
+        for width in WIDTHS:
+            filtered = [_derivative(x, width, order) for x in rows]
+            r = np.concatenate(filtered)
+            found.append((r, np.isfinite(r).sum() / width))
+    return found
+
+
+def _derivative(x: np.ndarray, width: int, order: int) -> np.ndarray:
+    """By samples, of local cubics; NaN where there is no number, and near the ends."""
+    from scipy.signal import savgol_filter
+
+    there = np.isfinite(x)
+    if len(x) < 3 * width or there.sum() < 0.5 * len(x):
+        return np.full(len(x), np.nan)
+    at = np.arange(len(x))
+    found = savgol_filter(np.interp(at, at[there], x[there]), width, 3, deriv=order)
+    found[~there] = np.nan
+    found[: width // 2] = found[-(width // 2) :] = np.nan
+    return np.asarray(found)
+
+
+def shape_variables(rig: Rig) -> dict[str, str]:
+    """Variables of the rig over which residuals are looked at: speed and angle of the first measured shaft, and loads of gears."""
+    measured = next(iter(rig.task.measured.values())).variable
+    shaft = measured.removesuffix("_angle").removesuffix("_position").removesuffix("_speed")
+    found = {
+        "speed": f"{shaft}_speed",
+        "angle": rig.scenario.train().angle_of(shaft) if shaft in rig.scenario.train().shafts else f"{shaft}_angle",
+    }
+    loads = [name for name in rig.units if name.endswith(("_output_torque", "_output_force"))]
+    for name in loads:
+        found["load" if len(loads) == 1 else f"load of {name.rsplit('_', 2)[0]}"] = name
+    return {name: variable for name, variable in found.items() if variable in rig.units}
+
+
+def _share_over(x: np.ndarray, r: np.ndarray, independent: float) -> float:
+    """Share of the variance of residuals that the means over classes of a variable have; 0 if chance explains it.
+
+    Parameters
+    ----------
+    independent
+        Number of independent residuals.
+    """
+    from scipy.stats import f
+
+    there = np.isfinite(x) & np.isfinite(r)
+    x, r = x[there], r[there]
+    edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, BINS + 1))) if len(x) else np.zeros(0)
+    classes = len(edges) - 1
+    if classes < 2 or independent <= classes + 1:
+        return 0.0
+    which = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, classes - 1)
+    counts = np.maximum(np.bincount(which, minlength=classes), 1)
+    means = np.bincount(which, weights=r, minlength=classes) / counts
+    share = float(np.sum(counts * (means - r.mean()) ** 2) / max(np.sum((r - r.mean()) ** 2), 1e-300))
+    ratio = share / (classes - 1) / max((1.0 - share) / (independent - classes), 1e-300)
+    return share if share >= SHARE and f.sf(ratio, classes - 1, independent - classes) < CHANCE else 0.0
 
 
 def _runs(rows: Sequence[np.ndarray]) -> tuple[int, float, float]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..identification.identify import IdentificationResult, residual_table
 from ..identification.ladder import RungResult, free_on
+from ..identification.misfit import shape_variables
 from ..model.gear import Gear
 from ..model.losses import LossMap, MeshEfficiency, WormMesh, efficiency_map
 from ..simulation.train_scenario import TrainScenario
@@ -103,7 +104,8 @@ def identification_report(name: str, result: IdentificationResult) -> Report:
 
 
 INTERVALS = (
-    "Values and 95 % intervals. Those of the bootstrap come from drawing blocks of half a second of the residuals anew."
+    "Values and 95 % intervals. Those of the bootstrap come from drawing blocks of half a second of the residuals anew, and of five logs or more whole logs. "
+    "Where residuals have a structure, the interval contains the value of the model next to the one that is taken, and is marked."
 )
 
 
@@ -158,7 +160,12 @@ def parameter_rows(result: IdentificationResult) -> list[list[str]]:
         ends = (
             ["", "", p.unit, "given"]
             if interval is None
-            else [p.shown(interval.low), p.shown(interval.high), p.unit, interval.method]
+            else [
+                p.shown(interval.low),
+                p.shown(interval.high),
+                p.unit,
+                "; ".join(filter(None, (interval.method, interval.flag))),
+            ]
         )
         rows.append([name, p.shown(value), *ends])
     return rows
@@ -199,16 +206,9 @@ LAWS = (
 def _variables(result: IdentificationResult) -> dict[str, str]:
     """Variables of the rig that residuals are shown over, with their labels."""
     assert result.rig is not None
-    units, found = result.rig.units, {}
-    measured = next(iter(result.task.measured.values())).variable
-    shaft = measured.removesuffix("_angle").removesuffix("_speed")
-    for name in (f"{shaft}_speed", f"{shaft}_angle"):
-        if name in units:
-            found[name] = f"{name} [{units[name]}]"
-    for name in units:
-        if name.endswith(("_output_torque", "_twist")):
-            found[name] = f"{name} [{units[name]}]"
-    return found
+    units = result.rig.units
+    names = [*shape_variables(result.rig).values(), *(name for name in units if name.endswith("_twist"))]
+    return {name: f"{name} [{units[name]}]" for name in names}
 
 
 def _overlays(result: IdentificationResult, log: str, held_out: bool, run: dict[str, np.ndarray]) -> list[Panel]:
