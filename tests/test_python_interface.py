@@ -124,13 +124,13 @@ def test_the_schema_describes_fields_by_their_docstrings() -> None:
     def described(part: type[BaseModel], field: str) -> str | None:
         return part.model_json_schema()["properties"][field].get("description")
 
-    assert str(described(lm.Brake, "shaft")) == "that it holds"
+    assert str(described(lm.Brake, "shaft")) == "shaft that the brake holds"
     assert str(described(lm.Brake, "torque")).startswith("capacity while it slips")  # of its base
     assert described(Own, "colour") == "as it is painted"
     assert described(Own, "torque") is None  # annotated anew, without one
     assert described(Own, "engagement_delay") == "from a step up of the command until it acts"
     brakes = lm.TrainScenario.model_json_schema()["$defs"]["Brake"]["properties"]
-    assert brakes["shaft"]["description"] == "that it holds"
+    assert brakes["shaft"]["description"] == "shaft that the brake holds"
 
 
 # --- plots ---

@@ -20,7 +20,7 @@ def select(
     scheduler: SchedulerOption = None,
     figures: FiguresOption = None,
 ) -> None:
-    """Which motor and gearbox for a task? Judge every pair by the manufacturers' rules, tune and simulate those that pass.
+    """Choose motor and gearbox for a task: judge each pair by the manufacturers' rules, tune and simulate those that pass.
 
     The task file has the motion, the load and what is wanted; motors and gearboxes are all of the catalogue, or those that it
     names. Ranks the pairs, says why the others do not fit, and writes a page with the Pareto front. Interrupted, it resumes.

@@ -125,7 +125,7 @@ def _show(directory: Path, best: str | None, figures: str | None) -> None:
 
 
 def print_outcome(directory: Path, total: int) -> None:
-    """Where the runs are, and whether some have failed."""
+    """Print the directory of the runs, and the failed ones."""
     from ..studies.table import failures
 
     print(f"{total} runs are in {directory}; `lostmotion study show {directory}` shows them")

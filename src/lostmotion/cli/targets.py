@@ -32,7 +32,7 @@ def try_file(path: Path) -> None:
 
 
 def try_page(path: Path) -> None:
-    """As `try_file`, of the page of a report.
+    """Test whether the page of a report can be written, as `try_file` does.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def try_directory(path: Path) -> None:
 
 @contextmanager
 def writing(directory: Path, then: str = "") -> Iterator[None]:
-    """What goes wrong with a directory that is written to, as one line."""
+    """Turn errors of a directory that is written to into one line."""
     try:
         yield
     except OSError as error:

@@ -1,4 +1,4 @@
-"""What commands show while they work: errors as one line, progress bars."""
+"""Output of commands while they work: errors as one line, progress bars."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ REFRESH = 0.2  # [s]
 
 @contextmanager
 def busy(what: str) -> Iterator[Callable[[str], None]]:
-    """What is being done and since when, on stderr where that is a terminal, for work whose length is not known.
+    """Show the present activity and its start on stderr, for work of unknown length, if stderr is a terminal.
 
     Gives a function that takes how far it has got.
     """
@@ -153,7 +153,7 @@ def busy(what: str) -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def simulating(what: str, scenario: Any, tolerance: float = 0.0) -> Iterator[Callable[[str], None]]:
-    """As `busy`, of a run of a scenario; of one that takes more than a minute, an estimate and how far it has got, on stderr.
+    """Show a run of a scenario as `busy` does; for more than a minute also an estimate and the progress, on stderr.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def simulating(what: str, scenario: Any, tolerance: float = 0.0) -> Iterator[Cal
 
 
 def _progress(passed: float, expected: float) -> str:
-    """How far a run has got by an estimate of its length, both in seconds."""
+    """Progress of a run by an estimate of its length, both in seconds."""
     if passed < expected:
         return f"about {100.0 * passed / expected:.0f} %, {_span(expected - passed)} left by estimate"
     return f"{_span(passed)} so far, longer than estimated; Ctrl-C ends it"

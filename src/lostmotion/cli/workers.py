@@ -1,4 +1,4 @@
-"""Who computes the runs of a study beside the core's own threads."""
+"""Workers that compute the runs of a study beside the core's own threads."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What controls a drive: references, with their derivatives."""
+"""Controllers of a drive, and references with their derivatives."""
 
 from ..namespace import namespace
 

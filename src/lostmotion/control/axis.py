@@ -32,7 +32,7 @@ NO_LAWS: Mapping[str, Law] = MappingProxyType({})
 
 
 def turns(train: DriveTrain, start: str, end: str) -> float | None:
-    """How often shaft `start` turns for one turn of `end`, through gears and clutches; None if none lead there."""
+    """Ratio of the turns of shaft `start` to those of `end`, through gears and clutches; None without a path."""
     found, waiting = {start: 1.0}, [start]
     joints = [(g.input, g.output, g.ratio) for g in train.fixed_gears().values()]
     joints += train.held_together()
@@ -48,7 +48,7 @@ def turns(train: DriveTrain, start: str, end: str) -> float | None:
 
 @dataclass(frozen=True)
 class _Place:
-    """Where a controller is in a train."""
+    """Position of a controller in a train."""
 
     train: DriveTrain
     name: str
@@ -125,7 +125,7 @@ class _Place:
         return out
 
     def _encoder(self, key: str, target: str, samples: int) -> dict[str, Any] | None:
-        """Of an encoder, read as the angle of the shaft `target`."""
+        """Fields of an encoder, read as the angle of the shaft `target`."""
         encoder: Encoder | None = getattr(self.controller, key)
         if encoder is None:
             return None
@@ -194,8 +194,8 @@ class _Place:
         phase, current = m.winding.phase_values(), math.sqrt(2.0) * m.winding.max_current
         if (phase.inductance_d - phase.inductance_q) * current >= phase.flux_linkage:
             raise InputError(
-                'current.kind: "field_oriented": L_d - L_q times the largest current is not below the flux linkage, so that field '
-                "weakening would turn the torque around; exchange inductance_d and inductance_q, or lower the largest current"
+                'current.kind: "field_oriented": L_d - L_q times the largest current must be below the flux linkage; exchange '
+                "inductance_d and inductance_q, or lower the largest current"
             )
         c = self.controller
         times = {"sample_time": c.loop_time("current"), "delay_time": c.delay * c.sample_time}
@@ -261,7 +261,7 @@ def own(control: Bound) -> Bound:
 
 
 def driven(controller: Controller | ContinuousController) -> MotorLaw | None:
-    """What a current loop makes of its motor; None where the motor stays what it is.
+    """Motor as its current loop makes it; None if the motor stays unchanged.
 
     One of first order is the law of (2) with k_N = 1: tau dM/dt = M* - M.
     """
@@ -280,7 +280,7 @@ def driven(controller: Controller | ContinuousController) -> MotorLaw | None:
 
 
 def motor_laws(controllers: Mapping[str, Controller | ContinuousController]) -> dict[str, MotorLaw | None]:
-    """What the current loops make of the motors, by name."""
+    """Laws of the motors with their current loops, by name."""
     return {name: driven(controller) for name, controller in controllers.items()}
 
 

@@ -183,7 +183,7 @@ class StateSpace(Part):
         return bool((poles.real > -1e-9 * abs(poles).max()).any()) if poles.any() else True
 
     def system(self) -> LinearSystem:
-        """Of reference and measured value."""
+        """Matrices for reference and measured value as inputs."""
         n = len(self.C)
         A = np.array(self.A, float).reshape(n, n)
         B, D = np.array(self.B, float).reshape(n, len(self.D)), np.array(self.D, float)
@@ -206,9 +206,9 @@ class ContinuousController(Part):
 
     kind: Literal["continuous"]
     reference: Annotated[PositionSignal | SpeedSignal, Field(discriminator="kind")]
-    """of the angle or the speed of `shaft`"""
+    """reference of the angle or the speed of `shaft`"""
     shaft: str | None = None
-    """whose angle or speed is compared with the reference; left out, the last one"""
+    """shaft whose angle or speed is compared with the reference; left out, the last one"""
     position: PositionPID | None = None
     """controller of a position, which gives the torque of the motor"""
     speed: SpeedPID | None = None
@@ -216,7 +216,7 @@ class ContinuousController(Part):
     state_space: StateSpace | None = None
     """controller of either, which gives the torque of the motor [N·m], or the relative voltage if current.kind is "voltage\""""
     limit: Annotated[Torque, Positive] | None = None
-    """of the magnitude of the torque; torque_limit and the largest current of the motor hold beside it"""
+    """limit of the magnitude of the torque; torque_limit and the largest current of the motor act, too"""
     anti_windup_time: Annotated[Time, Positive] | None = None
     """with which the integrator follows the limited output (back-calculation); left out, gain/integral_gain"""
     current: Annotated[IdealCurrent | FirstOrderCurrent | VoltageCommand, Field(discriminator="kind")] = IdealCurrent()
@@ -249,7 +249,7 @@ class ContinuousController(Part):
         return self
 
     def system(self) -> LinearSystem:
-        """Of the controller that is given."""
+        """Matrices of the given controller."""
         pid = self.position or self.speed
         if pid is not None:
             return pid.system(self.anti_windup_time)
@@ -260,7 +260,7 @@ class ContinuousController(Part):
         return "reference_rate" in self.system().signals
 
     def signals(self, motor: str) -> dict[str, Signal[Any]]:
-        """What enters the train in place of the motor's command, by the name of its result variable."""
+        """Signals that enter the train in place of the motor's command, by the name of the result variable."""
         found: dict[str, Signal[Any]] = {f"{motor}_reference": self.reference}
         if self._needs_rate():
             found[f"{motor}_reference_rate"] = _rate(self.reference)
@@ -276,7 +276,7 @@ class ContinuousController(Part):
         return {f"{motor}_filter": pid.derivative_weight * value - measured}
 
     def output_limit(self, motor: Motor) -> float:
-        """Of the command, in units of the rated torque or of the rated voltage."""
+        """Limit of the command, in units of the rated torque or of the rated voltage."""
         if isinstance(self.current, VoltageCommand):
             return math.inf if motor.command_limit is None else motor.command_limit
         return min(motor.largest_torque, math.inf if self.limit is None else self.limit) / motor.rated_torque

@@ -46,17 +46,17 @@ class Controller(Part):
 
     kind: Literal["sampled"] = "sampled"
     reference: AnyReference
-    """of the position, the speed or the torque: what the outermost loop follows; with a camera, where the target is"""
+    """reference of the position, the speed or the torque, which the outermost loop follows; with a camera, the path of the target"""
     sample_time: Annotated[Time, Positive]
-    """of the innermost loop, and of those that give none of their own"""
+    """sample time of the innermost loop, and of loops without their own"""
     delay: Annotated[Whole, Field(ge=0, le=1)] = 1
     """sample times from reading the encoders until the result acts"""
     shaft: str | None = None
-    """that position and speed of the reference are of; left out, the last one"""
+    """shaft of the position and the speed of the reference; left out, the last one"""
     encoder: Encoder | None = None
-    """of the speed loop, and of the position loop unless that has its own"""
+    """encoder of the speed loop, and of the position loop unless that has its own"""
     position_encoder: Encoder | None = None
-    """of the position loop, such as one on the load"""
+    """encoder of the position loop, such as one on the load"""
     blend_time: Annotated[Time, Positive] | None = None
     """time constant with which the position encoder is taken over beyond that of the speed loop; left out, it counts alone"""
     position: PositionLoop | None = None
@@ -68,7 +68,7 @@ class Controller(Part):
     camera: Camera | None = None
     """on the shaft of the reference: the loops then know of the target what it shows"""
     tracker: Tracker | None = None
-    """of the frames of the camera"""
+    """filter of the frames of the camera"""
     law: Switch = False
     """the loops are a function of your own, which `simulate(..., law=function)` gives"""
     phase: Annotated[Time, NotNegative] = 0.0
@@ -122,7 +122,7 @@ class Controller(Part):
             )
 
     def schedules(self) -> Iterator[tuple[str, float, int]]:
-        """Of each loop its name, sample time [s] and how many of the controller's that is.
+        """Name, sample time [s] and multiple of the controller's sample time for each loop.
 
         Raises
         ------

@@ -21,7 +21,7 @@ class Described(Part):
     """keys of these"""
 
     def core_fields(self) -> dict[str, Any]:
-        """What the core takes, in SI units; None is left out."""
+        """Fields for the core, in SI units, without those that are None."""
         return {key: getattr(self, key) for key in self.described}
 
 

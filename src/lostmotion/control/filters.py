@@ -21,7 +21,7 @@ class LowPass(Part):
     kind: Literal["low_pass"]
     frequency: Annotated[Frequency, Positive]
     damping: Annotated[Number, Positive] | None = None
-    """of second order; left out, it is of first order"""
+    """damping of a filter of second order; left out, the filter is of first order"""
 
     def continuous(self) -> tuple[list[float], list[float]]:
         """Numerator and denominator in s/w, the highest power first."""
@@ -37,7 +37,7 @@ class Notch(Part):
 
     kind: Literal["notch"]
     frequency: Annotated[Frequency, Positive]
-    """of the zeros"""
+    """frequency of the zeros"""
     depth: Annotated[Number, NotNegative] = 0.0
     """D_z, damping of the zeros"""
     width: Annotated[Number, Positive] = 0.5
@@ -63,7 +63,7 @@ class TransferFunction(Part):
     """coefficients of z, the highest power first"""
     denominator: tuple[Number, ...] = Field(min_length=1, max_length=MAX_ORDER + 1)
     sample_time: Annotated[Time, Positive] | None = None
-    """that it was made for; left out, that of its loop"""
+    """sample time for which it was made; left out, that of its loop"""
 
     @model_validator(mode="after")
     def _can_be_computed(self) -> Self:

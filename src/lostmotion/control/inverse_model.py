@@ -56,7 +56,7 @@ class InverseModel(InverseModelFields):
         return self
 
     def solver_fields(self, train: DriveTrain, motor: str, shaft: str, *, on_motor: bool) -> dict[str, Any]:
-        """What the solver takes for a motor whose reference is of a shaft; `on_motor`: the position is measured on the motor.
+        """Fields for the solver, for a motor whose reference is of a shaft; `on_motor`: the position is measured on the motor.
 
         Raises
         ------

@@ -35,9 +35,9 @@ class Law:
 
     function: Any
     states: int = 0
-    """how many numbers it keeps from call to call; they begin at 0, and belong to the state of the run"""
+    """number of values that it keeps from call to call; they begin at 0, and belong to the state of the run"""
     data: Any = None
-    """of a compiled function: a ctypes object or a contiguous numpy array, whose address it is given"""
+    """data of a compiled function: a ctypes object or a contiguous numpy array, whose address the function gets"""
     repeatable: bool = False
     """whether a run may be made again with it, as the error bound of field-oriented control needs: it then keeps nothing from call to
     call but its `states`"""

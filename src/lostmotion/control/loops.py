@@ -63,7 +63,7 @@ class SpeedLoop(SpeedLoopFields):
     """
 
     estimate: Annotated[Difference | Observer | ExactSpeed, Field(discriminator="kind")] = Difference()
-    """how the speed is made of the angles read"""
+    """method that makes the speed from the angles read"""
     reference_filters: tuple[Filter, ...] = ()
     torque_filters: tuple[Filter, ...] = ()
     sample_time: Annotated[Time, Positive] | None = None

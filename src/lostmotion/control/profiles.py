@@ -19,7 +19,7 @@ JERK_SIGNS = (1.0, 0.0, -1.0, 0.0, -1.0, 0.0, 1.0, 0.0)
 
 
 def segment_durations(distance: Any, speed: Any, acceleration: Any, jerk: Any) -> tuple[Any, Any, Any, Any]:
-    """Of a move: the duration of one segment with jerk, of one with constant acceleration, and of that with constant speed [s];
+    """Durations of a move's segments with jerk, with constant acceleration, and with constant speed [s];
     the largest acceleration that it reaches [rad/s^2].
 
     The arguments may be arrays; limits are above 0. An infinite jerk gives the trapezoidal speed, with segments with jerk of no

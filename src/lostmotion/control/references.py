@@ -165,7 +165,7 @@ class PositionReference(Reference[Angle]):
     start: Angle = 0.0
     """position before the first move"""
     begin: Annotated[Time, NotNegative] = 0.0
-    """of the first move"""
+    """position at the begin of the first move"""
     speed: Annotated[Speed, Positive] | None = None
     """limit of all moves that have none of their own"""
     acceleration: Annotated[Acceleration, Positive] | None = None
@@ -206,7 +206,7 @@ class PositionReference(Reference[Angle]):
                 )
 
     def _of(self, move: Move, key: str) -> Any:
-        """What is given for a move, or for all moves."""
+        """Limits of one move, or of all moves."""
         own = getattr(move, key)
         return getattr(self, key) if own is None else own
 

@@ -10,7 +10,7 @@ MAX_SAMPLES = 1_000_000  # of the shortest sample time in another
 
 
 def whole_multiple(time: float, base: float, key: str) -> int:
-    """How many times `base` a sample time is.
+    """Whole number by which a sample time is a multiple of `base`.
 
     Raises
     ------

@@ -40,7 +40,7 @@ class Satellite(TargetPath):
     begin: datetime
     """UTC at t = 0, such as 2024-05-01T20:15:00Z"""
     latitude: Annotated[Angle, Limit(ge=-math.pi / 2, le=math.pi / 2)]
-    """of the station, geodetic"""
+    """latitude of the station, geodetic"""
     longitude: Angle
     """east"""
     altitude: Length = 0.0

@@ -24,12 +24,12 @@ Jet = np.ndarray
 
 
 def product(a: Jet, b: Jet) -> Jet:
-    """Of two series."""
+    """Product of two series."""
     return np.array([sum(a[j] * b[k - j] for j in range(k + 1)) for k in range(len(a))])
 
 
 def quotient(a: Jet, b: Jet) -> Jet:
-    """Of two series."""
+    """Quotient of two series."""
     out: list[np.ndarray] = []
     for k in range(len(a)):
         out.append((a[k] - sum((out[j] * b[k - j] for j in range(k)), np.zeros_like(a[0]))) / b[0])
@@ -55,7 +55,7 @@ def angle_of(y: Jet, x: Jet) -> Jet:
 
 
 def sine_and_cosine(angle: np.ndarray, rate: float) -> tuple[Jet, Jet]:
-    """Of an angle that grows at a constant rate [rad/s]."""
+    """Series of sine and cosine of an angle that grows at a constant rate [rad/s]."""
     factors = np.array([1.0, rate, rate * rate / 2.0, rate * rate * rate / 6.0])[:, None]
     s, c = sin(angle), cos(angle)
     return factors * np.array([s, c, -s, -c]), factors * np.array([c, -s, -c, s])
@@ -69,11 +69,11 @@ def straight(start: np.ndarray | float, rate: float, t: np.ndarray) -> Jet:
 
 
 class TargetPath(Part):
-    """Where a target is over time, and which axis follows it."""
+    """Path of a target over time, and the axis that follows it."""
 
     axis: Literal["traverse", "elevation"]
     bearing: Angle = 0.0
-    """of the direction y, which the path is given in; it adds to the traverse"""
+    """bearing of the direction y, in which the path is given; it adds to the traverse"""
     duration: Annotated[Time, Positive] = 60.0
     """for which the axis follows; after it the reference stays"""
 
@@ -168,12 +168,12 @@ class Circle(TargetPath):
 
     path: Literal["circle"]
     distance: Annotated[Length, NotNegative]
-    """of its centre, horizontal, along the bearing"""
+    """distance of its centre, horizontal, along the bearing"""
     radius: Annotated[Length, Positive]
     height: Length = 0.0
     speed: Annotated[LinearSpeed, Positive]
     start: Angle = 0.0
-    """where on the circle it begins, from the point farthest along the bearing, to the right"""
+    """starting point on the circle, as an angle from the point farthest along the bearing, to the right"""
 
     @model_validator(mode="after")
     def _misses_the_station(self) -> Self:

@@ -26,7 +26,7 @@ class Conditions(Part):
     """Under which conditions a record is used: keys of `[gearbox]` beside `from`."""
 
     temperature: Temperature | None = None
-    """of the lubricant; left out, that of the data"""
+    """temperature of the lubricant; left out, that of the data"""
     added_backlash: Annotated[Angle, NotNegative] = 0.0
     """wear"""
     loss_factor: Annotated[Number, Positive] = 1.0
@@ -118,7 +118,7 @@ def _change(table: dict[str, Any], changes: Mapping[str, Any]) -> None:
 
 
 def _hysteresis(record: GearboxSheet, sheet: GearboxSheet, stiffness: Any) -> dict[str, Any] | None:
-    """That of the record as printed; what it lacks for it comes from the changes."""
+    """Hysteresis of the record as printed; missing values come from the changes."""
     if isinstance(stiffness, Mapping) and stiffness.get("kind") == "rigid":
         return None
     printed = sheet if record.rated_output_torque is None else record

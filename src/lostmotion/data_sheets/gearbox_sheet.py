@@ -143,7 +143,7 @@ class GearboxSheet(Record):
         return self
 
     def missing(self) -> dict[str, str]:
-        """What a run needs and the record lacks: the key of `[gearbox]`, and what to look for."""
+        """Data that a run requires and the record lacks: the key of `[gearbox]`, and a hint to its place."""
         out = {}
         if self.rated_output_torque is None:
             out["rated_output_torque"] = f"see {self.where('rated_output_torque')}"
@@ -158,7 +158,7 @@ class GearboxSheet(Record):
         return out
 
     def loss_estimate(self) -> LossEstimate | None:
-        """That of its kind, where the sheet prints no efficiency; None if it does, or nothing is known of the kind."""
+        """Loss estimate of the kind, if the sheet prints no efficiency; None if it does, or if the kind has no estimate."""
         if not self.losses.empty:
             return None
         found = [estimate for ratio, estimate in ESTIMATES.get(self.kind, ()) if self.ratio > ratio]
@@ -173,11 +173,11 @@ class GearboxSheet(Record):
         return self.model_copy(update={"losses": self.losses.model_copy(update={"efficiency": (point,)})})
 
     def level(self) -> str | None:
-        """How it runs with the data that it has: ``"printed losses"``, ``"estimated losses"``, or None."""
+        """Level of a run with these data: ``"printed losses"``, ``"estimated losses"``, or None."""
         return None if self.missing() else "printed losses" if self.loss_estimate() is None else "estimated losses"
 
     def assumptions(self) -> tuple[str, ...]:
-        """What a run of it takes for granted beyond its data, one sentence each."""
+        """Assumptions of a run beyond the data, one sentence each."""
         estimate = self.loss_estimate()
         if estimate is None:
             return ()
@@ -218,7 +218,7 @@ class GearboxSheet(Record):
         return Hysteresis(efficiency=1.0 - 2.0 * q)
 
     def limits(self) -> GearboxLimits:
-        """What the drive check compares with."""
+        """Limits for the drive check."""
         return GearboxLimits(
             average_output_torque=self.average_output_torque,
             peak_output_torque=self.peak_output_torque,
@@ -228,5 +228,5 @@ class GearboxSheet(Record):
         )
 
     def scalars(self) -> dict[str, Any]:
-        """Those keys of `[gearbox]` that the sheet has too."""
+        """Keys of `[gearbox]` that the sheet has too."""
         return {name: getattr(self, name) for name in SCALARS if getattr(self, name) is not None}

@@ -30,7 +30,7 @@ STIFFNESSES = (("stiffness",), ("stiffness_curve",))
 
 
 class LinearSheet(Record):
-    """What data sheets of linear parts have in common: a table of scenarios has their data under the same keys.
+    """Base of the data sheets of linear parts: a table of scenarios has their data under the same keys.
 
     A sheet is checked for units and ranges when it is read, and for what belongs together where it is used, with the
     keys beside `from`.
@@ -43,21 +43,21 @@ class LinearSheet(Record):
     PARTNERS: ClassVar[dict[str, tuple[str, ...]]] = {}
     """for some keys those of which one must be given too; without them they are data for nothing but the list"""
     CHOICES: ClassVar[dict[str, str]] = {}
-    """what no record can say, since the axis decides it"""
+    """values that no record can state, since they depend on the axis"""
     NEEDS: ClassVar[dict[str, tuple[str, ...]]] = {}
-    """what a run needs, and the keys each of which says it"""
+    """values that a run requires, with the alternative keys of each"""
 
     def values(self) -> dict[str, Any]:
-        """Those data that the table of a scenario has too."""
+        """Data that the table of a scenario has too."""
         names = (name for name in type(self).PART.model_fields if name in self.model_fields_set)
         return {name: value for name in names if (value := getattr(self, name)) is not None}
 
     def missing(self) -> dict[str, str]:
-        """What a run needs and the record lacks: the key, and where to look for it."""
+        """Data that a run requires and the record lacks: the key, and a hint to its place."""
         return {key: f"see {self.where(key)}" for key in self._lacking()}
 
     def open_choices(self, values: Mapping[str, Any]) -> dict[str, str]:
-        """Those choices that some values leave open: none of the keys that say the same is complete."""
+        """Choices that are incomplete: none of the alternative keys has a value."""
         return {
             key: text
             for key, text in type(self).CHOICES.items()
@@ -92,7 +92,7 @@ class ScrewSheet(LinearSheet, ScrewData):
     """C_0"""
     ball_diameter: Annotated[Length, Positive] | None = None
     nut_preload: Annotated[Force, Positive] | None = None
-    """of the nut, at which nut_stiffness and drag_torque hold"""
+    """preload of the nut, at which nut_stiffness and drag_torque hold"""
     nut_mass: Annotated[Mass, Positive] | None = None
     max_input_speed: Annotated[Speed, Positive] | None = None
 
@@ -136,9 +136,9 @@ class RackSheet(LinearSheet, RackData):
     kind: Literal["straight", "helical"] = "straight"
     pressure_angle: Annotated[Angle, Positive] | None = None
     width: Annotated[Length, Positive] | None = None
-    """of the bar, across the teeth"""
+    """width of the bar, across the teeth"""
     height: Annotated[Length, Positive] | None = None
-    """of the bar, from its back to the tips of the teeth"""
+    """height of the bar, from its back to the tips of the teeth"""
     pitch_line_height: Annotated[Length, Positive] | None = None
     """from the back of the bar to the pitch line"""
     bar_length: Annotated[Length, Positive] | None = None
@@ -181,7 +181,7 @@ class BeltSheet(LinearSheet, BeltData):
     """largest one of the tension members in operation"""
     breaking_force: Annotated[Force, Positive] | None = None
     tooth_force: Annotated[Force, Positive] | None = None
-    """of one tooth in mesh, at standstill"""
+    """tooth force of one tooth in mesh, at standstill"""
     mass_per_length: Annotated[MassPerLength, Positive] | None = None
 
     PART: ClassVar[type[Part]] = BeltData

@@ -1,4 +1,4 @@
-"""What a data sheet says of the losses of a gearbox."""
+"""Loss data of a gearbox as a data sheet prints them."""
 
 from dataclasses import dataclass
 from typing import Annotated, Self
@@ -76,7 +76,7 @@ class LossEstimate:
     source: str
 
     def factors(self) -> tuple[float, float]:
-        """What the losses of the best and of the worst of the kind are of those of the estimate."""
+        """Losses of the best and of the worst of the kind, relative to the estimate."""
 
         def lost(efficiency: float) -> float:
             return 1.0 / efficiency - 1.0
@@ -103,7 +103,7 @@ class LossData(Part):
     static_efficiency: Efficiency | None = None
     """when breaking loose under load, as printed for worm gears"""
     temperature: Temperature = 20.0
-    """of all data that name no other"""
+    """temperature of all data that name no other"""
     lubricant: Lubricant | None = None
     static_load_factor: Annotated[Number, Positive] = 1.2
     """load-dependent loss at standstill / that in motion, where no static or back-driving datum says it"""

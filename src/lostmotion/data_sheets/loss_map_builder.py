@@ -38,7 +38,7 @@ class BuiltMap:
 
     losses: LossMap
     origin: tuple[tuple[str, ...], ...]
-    """of each value, in the shape of `losses.values`"""
+    """origin of each value, in the shape of `losses.values`"""
     notes: tuple[str, ...] = ()
     """contradictions and assumptions, one sentence each"""
 

@@ -55,11 +55,11 @@ class MotorSheet(Record):
     """terminal, at 25 °C"""
     inductance: Annotated[Inductance, Positive] | None = None
     pole_pairs: Annotated[Whole, Field(gt=0)] | None = None
-    """of a brushless motor"""
+    """pole pairs of a brushless motor"""
     winding: Winding | None = None
-    """of a synchronous motor"""
+    """winding of a synchronous motor"""
     dc_voltage: Annotated[Voltage, Positive] | None = None
-    """of the amplifier of a synchronous motor"""
+    """dc voltage of the amplifier of a synchronous motor"""
     friction_torque: Annotated[Torque, NotNegative] | None = None
     armature_voltage_constant: Annotated[Number, Limit(gt=1.0)] | None = None
     """k_N, where it is known itself"""
@@ -71,7 +71,7 @@ class MotorSheet(Record):
     thermal_resistance_case_ambient: Annotated[ThermalResistance, Positive] | None = None
     thermal_time_constant_winding: Annotated[Time, Positive] | None = None
     thermal_time_constant_motor: Annotated[Time, Positive] | None = None
-    """of the case against the ambient"""
+    """thermal time constant motor of the case against the ambient"""
     max_winding_temperature: Temperature | None = None
 
     @model_validator(mode="after")
@@ -86,7 +86,7 @@ class MotorSheet(Record):
         return self
 
     def missing(self) -> dict[str, str]:
-        """What a run needs and the record lacks."""
+        """Data that a run requires and the record lacks."""
         need = {
             "rotor_inertia": self.rotor_inertia,
             "rated_torque": self.rated_torque or (self.rated_current and self.torque_constant),
@@ -94,7 +94,7 @@ class MotorSheet(Record):
         return {key: f"see {self.where(key)}" for key, value in need.items() if not value}
 
     def level(self) -> str | None:
-        """How it runs with the data that it has: ``"synchronous motor"``, ``"DC-equivalent motor"``, ``"torque source"``, or None."""
+        """Level of a run with these data: ``"synchronous motor"``, ``"DC-equivalent motor"``, ``"torque source"``, or None."""
         if self.missing():
             return None
         if self.kind == "synchronous":
@@ -103,7 +103,7 @@ class MotorSheet(Record):
         return DC_EQUIVALENT if constants or self.armature_voltage_constant is not None else TORQUE_SOURCE
 
     def assumptions(self) -> tuple[str, ...]:
-        """What a run of it takes for granted beyond its data, one sentence each."""
+        """Assumptions of a run beyond the data, one sentence each."""
         level, out = self.level(), []
         if level == TORQUE_SOURCE:
             lacks = "its dc voltage is not given" if self.winding is not None else "its winding is not given"

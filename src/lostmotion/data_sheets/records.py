@@ -80,7 +80,7 @@ def _texts() -> dict[str, str]:
 
 @cache
 def _entries_of(file: str) -> tuple[Entry, ...]:
-    """What the records of a file of the catalogue are made of."""
+    """Entries from which the records of a catalogue file are made."""
     return tuple(_entries(tomllib.loads(_texts()[file]), file))
 
 
@@ -183,7 +183,7 @@ def find(reference: str, table: str) -> Sheet:
 
 
 def find_one_of(reference: str, tables: Sequence[str]) -> Sheet:
-    """As `find`, of one of several kinds.
+    """Find a record of one of several kinds, as `find` does.
 
     Raises
     ------

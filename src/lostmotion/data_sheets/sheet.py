@@ -1,4 +1,4 @@
-"""What every record of a data sheet has: sources of its data, and gaps."""
+"""Common fields of the records of data sheets: sources of the data, and gaps."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
@@ -32,7 +32,7 @@ def in_lower_case(name: Any) -> Any:
 
 
 class Remark(Part):
-    """What is said of data."""
+    """A remark on some data."""
 
     @model_validator(mode="before")
     @classmethod
@@ -55,21 +55,21 @@ class Gap(Remark):
 
     datum: str
     where: str
-    """where one would read it"""
+    """place to read it"""
 
 
 class Record(Part):
-    """What data sheets of all kinds have."""
+    """Base of the records of all kinds."""
 
     name: Annotated[str, BeforeValidator(in_lower_case)] = Field(pattern=r"^[a-z0-9][a-z0-9.-]*$")
     """letters, digits, dots and dashes; capitals are read as small letters"""
     manufacturer: str = ""
     title: str = ""
-    """as the manufacturer calls it"""
+    """name of the product at the manufacturer"""
     note: str = ""
-    """what a reader of results must know"""
+    """note for readers of results"""
     total_mass: Annotated[Mass, Positive] | None = None
-    """of the whole component, for the choice"""
+    """mass of the whole component, for the choice"""
     overall_length: Annotated[Length, Positive] | None = None
     """along the axis, for the space that it takes"""
     price: Annotated[Number, Positive] | None = None
@@ -91,15 +91,15 @@ class Record(Part):
         return sorted(out)
 
     def missing(self) -> dict[str, str]:
-        """What a run needs and the record lacks, with where to read it."""
+        """Data that a run requires and the record lacks, with a hint to their place."""
         raise NotImplementedError
 
     def level(self) -> str | None:
-        """How it runs with the data that it has; None if it does not."""
+        """Level of a run with these data; None if it cannot run."""
         return None if self.missing() else "all data"
 
     def assumptions(self) -> tuple[str, ...]:
-        """What a run of it takes for granted beyond its data, one sentence each."""
+        """Assumptions of a run beyond the data, one sentence each."""
         return ()
 
     def source_of(self, datum: str) -> Source | None:
@@ -110,5 +110,5 @@ class Record(Part):
         return None
 
     def where(self, datum: str) -> str:
-        """Where one would read a datum that is missing."""
+        """Place to read a missing datum."""
         return next((gap.where for gap in self.gaps if gap.datum == datum), "the manufacturer's data sheet")

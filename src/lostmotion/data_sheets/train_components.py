@@ -43,7 +43,7 @@ def use_train_records(data: dict[str, Any]) -> None:
 
 
 def without_record(table: str, element: Mapping[str, Any]) -> dict[str, Any]:
-    """What of an element is no value of its record, so that another record can take the place."""
+    """Keys of an element that are not values of its record, so that another record can replace it."""
     return {key: value for key, value in element.items() if key in RECORDS[table][1]}
 
 

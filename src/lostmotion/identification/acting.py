@@ -1,4 +1,4 @@
-"""What acts on the rig in a part of a log: inputs of the train, and references of sampled controllers."""
+"""Inputs in a part of a log: inputs of the train, and references of sampled controllers."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Acting:
         self._pieces = {name: self._samples(name, known) for name in task.inputs}
 
     def inputs(self, built: Built, known: Mapping[str, Any]) -> list[_core.Signal]:
-        """Of the train, in its order."""
+        """Inputs of the train, in its order."""
         of_scenario = built.scenario.signals() if set(built.inputs) - set(self._task.inputs) else {}
         return [
             self._signal(name, known) if name in self._task.inputs else of_scenario[name].core()

@@ -158,7 +158,7 @@ def _attributes(node: Any) -> dict[str, Any]:
 
 
 def read_parquet_log(path: Path, *, time: str = "") -> Log:
-    """Of a Parquet table; a field's metadata ``unit`` is the unit of its column, other metadata of the table the header.
+    """Read a Parquet table; a field's metadata ``unit`` is the unit of its column, other metadata of the table the header.
 
     Columns without numbers are not read.
 
@@ -200,7 +200,7 @@ def read_parquet_log(path: Path, *, time: str = "") -> Log:
 
 
 def read_mdf_log(path: Path, *, time: str = "") -> Log:
-    """Of an MDF 4 file by asammdf: all channels at the instants of the channel `time`, or of the first.
+    """Read an MDF 4 file by asammdf: all channels at the instants of the channel `time`, or of the first.
 
     Algebraic conversions are read by `conversion_of`. Databases of buses that a file attaches are not read.
 
@@ -300,7 +300,7 @@ def _signal(file: Any, name: str, at: Sequence[tuple[int, int]], formulas: Formu
 
 
 def read_tdms_log(path: Path, *, time: str = "") -> Log:
-    """Of a TDMS file by npTDMS: the channels of all groups; their time is a channel, or increments of the waveform.
+    """Read a TDMS file by npTDMS: the channels of all groups; their time is a channel, or increments of the waveform.
 
     Channels without numbers are not read.
 

@@ -80,7 +80,7 @@ def experiments(gearbox: Gearbox, ripple: TorqueHarmonic | None = None) -> list[
 
 
 def _triangle(x: np.ndarray) -> np.ndarray:
-    """Of period 1, between -1 and 1, from 0 upwards."""
+    """Triangle wave of period 1, between -1 and 1, from 0 upwards."""
     return np.asarray(2.0 / math.pi * np.arcsin(np.sin(2 * math.pi * x)))
 
 
@@ -114,7 +114,7 @@ def rig_scenario(gearbox: Gearbox, title: str = "", ripple: TorqueHarmonic | Non
 
 
 def mesh_damping(gearbox: Gearbox) -> float:
-    """Of the gear on the rig [N·m·s/rad]: its own, or by a damping ratio of 5 % on the first stiffness; 0 of a rigid one."""
+    """Mesh damping of the gear on the rig [N·m·s/rad]: its own, or 5 % of critical on the first stiffness; 0 if rigid."""
     if gearbox.mesh_damping > 0.0:
         return gearbox.mesh_damping
     slopes = [k for k in gearbox.stiffness.pieces()[1] if k > 0.0] if gearbox.stiffness.kind != "rigid" else []
@@ -125,7 +125,7 @@ def mesh_damping(gearbox: Gearbox) -> float:
 
 
 def parameters(gearbox: Gearbox, ripple: TorqueHarmonic | None = None) -> tuple[dict[str, float], dict[str, Any]]:
-    """What the campaign is to find: values by name, SI, and the formulas of the scenario by dotted key."""
+    """Parameters of the campaign: values by name, SI, and the formulas of the scenario by dotted key."""
     values = {"inertia": gearbox.inertia}
     formulas: dict[str, Any] = {"gears.gearbox.inertia": "inertia"}
     match gearbox.stiffness:
@@ -175,7 +175,7 @@ def _has_hysteresis(gearbox: Gearbox) -> bool:
 
 
 def _ladder(gearbox: Gearbox, names: Iterable[str]) -> dict[str, Any]:
-    """Of a gearbox with hysteresis: models without and with it, and the smaller loop held out, by which one is chosen."""
+    """Models of a gearbox with hysteresis: without and with it, and the held-out smaller loop that decides between them."""
     if not _has_hysteresis(gearbox):
         return {}
     plain = [name for name in names if name != "hysteresis_efficiency"]

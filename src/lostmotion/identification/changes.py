@@ -135,7 +135,7 @@ class _Rows:
         self.columns = np.column_stack([np.ones(len(x)), conditions]) * scale[:, None]
 
     def deviation(self, count: int) -> float:
-        """Of the first values around their level."""
+        """Deviation of the first values around their level."""
         A, x = self.columns[:count], self.x[:count]
         rest = x - A @ np.linalg.lstsq(A, x, rcond=None)[0]
         return math.sqrt(float(rest @ rest) / max(1, count - np.linalg.matrix_rank(A)))

@@ -27,7 +27,7 @@ class Candidate:
 
     name: str
     gain: float
-    """how many nats of information on all parameters: half the change of the log-determinant of the information"""
+    """information on all parameters in nats: half the change of the log-determinant of the information"""
     widths: dict[str, float]
     """by parameter, width of its interval after it over that before"""
 

@@ -52,7 +52,7 @@ class Engine:
         """by log: why it has no run, where residuals were last asked for"""
 
     def residuals(self, logs: Sequence[Prepared], point: Point, rung: int) -> list[np.ndarray]:
-        """Of each log measured less computed, times the weights of the samples, one row for each measured channel, SI; NaN where the rig has no motion,
+        """Residuals of each log, weighted, one row for each measured channel, SI; NaN if the rig has no motion,
         0 where the log has no number.
         """
         rows, self.failed = self._residuals([(log, point.of(log)) for log in logs], rung)
@@ -61,7 +61,7 @@ class Engine:
     def jacobians(
         self, logs: Sequence[Prepared], point: Point, rung: int, parameters: Mapping[str, FreeParameter]
     ) -> list[np.ndarray]:
-        """Of each log the derivative of its residuals by each parameter: channels x samples x parameters.
+        """Derivatives of the residuals of each log by each parameter: channels x samples x parameters.
 
         From where a motion only touches a condition it has no derivative: there, and of parameters by which there is none, it
         is a central difference over a hundredth of the parameter's scale. One on its bound is changed to the inner side alone.
@@ -100,7 +100,7 @@ class Engine:
         rung: int,
         parameters: Mapping[str, FreeParameter],
     ) -> list[np.ndarray]:
-        """Of residuals, for (number of a log, parameter)."""
+        """Differences of residuals, for (number of a log, parameter)."""
         work, widths = [], []
         for k, name in wanted:
             log, values = requests[k]
@@ -115,7 +115,7 @@ class Engine:
     def _residuals(
         self, requests: Sequence[tuple[Prepared, Mapping[str, float]]], rung: int
     ) -> tuple[list[np.ndarray], dict[str, str]]:
-        """Of each request; and by log why it has no run."""
+        """Residuals of each request; and by log the reason for a missing run."""
         self.runs += len(requests)
         found = run_logs(self.rig, requests, rung, threads=self.threads)
         failed = {

@@ -1,4 +1,4 @@
-"""How far a run is from a log: MAE, RMSE and fit of each."""
+"""Errors of runs against logs: MAE, RMSE and fit of each."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class LogError:
 
 
 def log_errors(logs: Sequence[Prepared], residuals: Sequence[np.ndarray]) -> list[LogError]:
-    """Of each log and each measured channel, of residuals with their weights; the errors are without. NaN of a log that has no run."""
+    """Errors of each log and channel from weighted residuals, without the weights; NaN of a log that has no run."""
     found = []
     for log, rows in zip(logs, residuals, strict=True):
         for (name, values), row, there in zip(log.measured.items(), rows / log.weight, log.valid, strict=True):

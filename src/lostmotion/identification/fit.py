@@ -21,29 +21,29 @@ LARGEST_DAMPING = 1e8
 
 @dataclass
 class Fit:
-    """Where a search has ended."""
+    """Result of a search."""
 
     point: Point
     mae: float
     """mean absolute residual, in units of the deviations if the task gives them, else SI"""
     cost: float
-    """of the logs that were fitted, with priors; half the sum of squares in units of the deviations"""
+    """cost of the logs that were fitted, with priors; half the sum of squares in units of the deviations"""
     deviations: np.ndarray
-    """of the residuals, one for each measured channel, SI"""
+    """deviations of the residuals, one for each measured channel, SI"""
     free: tuple[str, ...]
     iterations: int
     history: list[float] = field(default_factory=list)
     normal: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     """J'WJ of the scaled parameters, nuisances eliminated, without priors"""
     scores: list[np.ndarray] = field(default_factory=list)
-    """of each log blocks x parameters: pieces of the gradient, for the bootstrap"""
+    """blocks x parameters of each log: parts of the gradient, for the bootstrap"""
     correlation: float = 1.0
-    """how many residuals in a row say what one independent one would"""
+    """number of residuals in a row that count as one independent"""
 
 
 @dataclass
 class Problem:
-    """What is fitted to what.
+    """Problem of a fit: the model and the logs.
 
     Parameters of the search are ``(value - start)/step``, or of logarithmic ones ``log(value/start)/log(1.1)``.
     """
@@ -72,7 +72,7 @@ class Problem:
         return [np.where(log.valid, r, np.nan) for log, r in zip(self.logs, residuals, strict=True)]
 
     def weights(self, scaled: np.ndarray) -> np.ndarray:
-        """Of residuals in units of their deviations: 1, and with the robust loss less beyond `outlier`."""
+        """Weights of residuals in units of their deviations: 1, and with the robust loss less beyond `outlier`."""
         if self.options.loss == "linear":
             return np.ones_like(scaled)
         size = np.maximum(np.abs(scaled), 1e-300)
@@ -185,7 +185,7 @@ def linearised(
 
 
 def correlation_of(residuals: Sequence[np.ndarray]) -> float:
-    """How many residuals in a row say what one independent one would: (1 + rho)/(1 - rho), rho the lag-one correlation.
+    """Number of residuals in a row that count as one independent: (1 + rho)/(1 - rho), rho the lag-one correlation.
 
     NaN stands where there is no residual.
     """

@@ -101,12 +101,12 @@ def formula(text: str) -> Formula:
 
 
 def names_in(text: str | float) -> frozenset[str]:
-    """What a formula names."""
+    """Names in a formula."""
     return formula(text).names if isinstance(text, str) else frozenset()
 
 
 def names_within(value: object) -> frozenset[str]:
-    """What the formulas in a value, a list or a table name; texts that are no formulas name nothing."""
+    """Names in the formulas of a value, a list or a table; texts that are not formulas have none."""
     if isinstance(value, list | tuple):
         return frozenset().union(*map(names_within, value))
     if isinstance(value, dict):

@@ -84,7 +84,7 @@ def distinct_names(paths: list[Path]) -> list[str]:
 
 
 def _without(text: str, path: Path, name: str) -> str:
-    """What is wrong with a file, without its name before it."""
+    """Message of an error without the name of the file."""
     for known in (str(path), name):
         if text.startswith(known):
             text = text.removeprefix(known).lstrip(":, ")
@@ -118,7 +118,7 @@ def _unlike(rig: Rig, log: Prepared, known: frozenset[str]) -> str:
 
 
 def _lacking(formulas: Mapping[str, Any], values: Mapping[str, Any], known: frozenset[str]) -> str:
-    """What the header of a log lacks, and those of others have."""
+    """Header entries that a log lacks and others have."""
     for key, formula in formulas.items():
         for name in sorted(names_of(formula)):
             if name not in values and name in known:

@@ -1,4 +1,4 @@
-"""What the firmware of a servo makes of its goal before the controller follows it: a filter, and limits of rate and acceleration.
+"""Goal shaping by the firmware of a servo: a filter, and limits of rate and acceleration.
 
 The goal does not depend on the motion, so its course is computed beforehand: at a grid that is finer than the samples of the log,
 in straight lines from one point of the grid to the next.

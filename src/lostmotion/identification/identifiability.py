@@ -1,4 +1,4 @@
-"""What the logs cannot tell, in words: the null directions of the scaled Jacobian."""
+"""Unidentifiable parameters in words: the null directions of the scaled Jacobian."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def undetermined(problem: Problem, fit: Fit) -> list[Undetermined]:
 def resting_on(
     rig: Rig, fit: Fit, parameters: Mapping[str, FreeParameter], normal: np.ndarray, name: str
 ) -> list[Undetermined]:
-    """That the values rest on the value of a parameter that is not free, if the logs would not tell it to within its scale.
+    """Dependence on the value of a parameter that is not free, if the logs do not determine it to within its scale.
 
     Parameters
     ----------

@@ -42,13 +42,13 @@ class IdentificationResult:
 
     task: Identification
     rungs: list[RungResult]
-    """of the ladder, from the lowest"""
+    """candidate models, from the first"""
     chosen: int
     """the rung that is taken"""
     intervals: dict[str, Interval]
     """95 % intervals of the parameters, SI"""
     undetermined: list[Undetermined]
-    """what the logs cannot tell"""
+    """unidentifiable parameters"""
     at_bounds: list[str]
     """parameters that have ended at a bound"""
     notes: dict[str, tuple[str, ...]]
@@ -56,7 +56,7 @@ class IdentificationResult:
     left_out: dict[str, str] = field(default_factory=dict, kw_only=True)
     """by log that cannot be used: why"""
     inputs: list[str] = field(default_factory=list, kw_only=True)
-    """how inputs go on between samples, of those that the task leaves open: and why"""
+    """course of inputs between samples, if the task leaves it open, with the reason"""
     misfits: list[Misfit] = field(default_factory=list, kw_only=True)
     """channels whose residuals are no noise, or far above the stated deviation"""
     conditions: list[ConditionError] = field(default_factory=list, kw_only=True)
@@ -72,23 +72,23 @@ class IdentificationResult:
     touching: dict[str, str] = field(default_factory=dict)
     """logs whose derivatives were so from some instant on, at the values found: why"""
     start: Regression = field(default_factory=Regression)
-    """where the search began"""
+    """start of the search"""
     rig: Rig | None = field(default=None, repr=False)
     logs: list[Prepared] = field(default_factory=list, repr=False)
 
     @property
     def fit(self) -> Fit:
-        """Of the rung that is taken."""
+        """Fit of the chosen model."""
         return self.rungs[self.chosen].fit
 
     @property
     def values(self) -> dict[str, float]:
-        """Of all parameters, SI."""
+        """Values of all parameters, SI."""
         return dict(self.fit.point.values)
 
     @property
     def errors(self) -> list[LogError]:
-        """Of each log and channel."""
+        """Errors of each log and channel."""
         return self.rungs[self.chosen].errors
 
     def error(self, channel: str | None = None, *, held_out: bool = False) -> tuple[float, float]:
@@ -190,7 +190,7 @@ class IdentificationResult:
         return found
 
     def differences(self) -> list[str]:
-        """Where the derivatives were differences of runs, and why."""
+        """Parameters and logs whose derivatives were differences of runs, with the reason."""
         found = [f"{name}: derivatives by differences, since {why}" for name, why in self.by_differences.items()]
         if self.touching:
             first = next(iter(self.touching))
@@ -201,11 +201,11 @@ class IdentificationResult:
         return found
 
     def starts(self) -> list[str]:
-        """Which start values came from a regression, and why others did not; empty if the task wants none."""
+        """Start values from a regression, and reasons for the others; empty if the task wants none."""
         return self.start.lines(self.task.parameters) if self.task.fit.regression else []
 
     def source(self) -> str:
-        """What the values were identified from, for records."""
+        """Source of the values, for records."""
         fitted = sum(not log.held_out for log in self.logs)
         files, rung = ", ".join(self.task.logs.files), self.rungs[self.chosen].name
         text = f"identified from {_logs(fitted)} ({files}), {rung}"
@@ -301,7 +301,7 @@ def identify_task(
     profiles: bool = False,
     notify: Notify = _no_notice,
 ) -> IdentificationResult:
-    """As `identify`, of a task that has been read."""
+    """Identify the values of a task that has been read, as `identify` does."""
     rig = Rig(task, directory)
     logs, left_out = gathered(rig, directory)
     result = identify_logs(rig, logs, threads=threads, profiles=profiles, notify=notify)
@@ -312,7 +312,7 @@ def identify_task(
 def identify_logs(
     rig: Rig, logs: list[Prepared], *, threads: int | None = None, profiles: bool = False, notify: Notify = _no_notice
 ) -> IdentificationResult:
-    """As `identify`, of logs that have been prepared."""
+    """Identify the values from prepared logs, as `identify` does."""
     rig, logs, left_out = split_at_pauses(rig, logs)
     spoiled: list[OddLog] = []
     while True:
@@ -354,7 +354,7 @@ def _climbed(rig: Rig, logs: list[Prepared], threads: int | None, notify: Notify
 
 
 def _answer(found_by: _Climbed, profiles: bool) -> IdentificationResult:
-    """What the fitted models say, with intervals."""
+    """Answer of the fitted models, with intervals."""
     engine, logs, rungs, best = found_by.engine, found_by.logs, found_by.rungs, found_by.best
     rig, task = engine.rig, engine.rig.task
     fit, free = rungs[best].fit, free_on(task, best)
@@ -465,7 +465,7 @@ def _notes(logs: list[Prepared]) -> dict[str, tuple[str, ...]]:
 
 
 def _resting(problem: Problem, fit: Fit) -> list[Undetermined]:
-    """What the values rest on: parameters of higher rungs that the model of this one has, and that the logs would not tell."""
+    """Parameters of higher models on which the values depend and which the logs do not determine."""
     rig, rung = problem.engine.rig, problem.rung
     above = free_on(rig.task, len(rig.rungs()) - 1)
     found = []

@@ -102,7 +102,7 @@ def widest(a: Interval, b: Interval) -> Interval:
 
 
 def reach(directions: np.ndarray, room: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """How far each parameter can go, down and up, if all go together along some of the directions and stay within their room.
+    """Reach of each parameter, down and up, if all move along some of the directions within their room.
 
     Parameters
     ----------

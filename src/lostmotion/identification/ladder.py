@@ -52,7 +52,7 @@ class RungResult:
     failed: dict[str, str]
     """by log held out that has no run with the values of this rung: why"""
     undetermined: list[Undetermined]
-    """what the logs cannot tell of the parameters of this rung"""
+    """unidentifiable parameters of this model"""
     minima: list[Point] = field(default_factory=list)
     """other minima of the cost that these logs do not tell from the one found"""
 
@@ -199,7 +199,7 @@ def _other_minima(
 
 
 def grown(problem: Problem, start: Point) -> Point:
-    """Where fits to the first parts of the logs lead, each longer than the one before: there are few impacts in the first."""
+    """Results of fits to growing first parts of the logs: there are few impacts in the first."""
     for share in PARTS:
         logs = [log.part(0, max(LEAST, round(share * len(log.time)))) for log in problem.logs]
         if all(log.valid.any(axis=1).all() for log in logs):
@@ -234,7 +234,7 @@ def _cost(problem: Problem, fit: Fit, other: Fit) -> float:
 
 
 def with_own(rig: Rig, engine: Engine, logs: Sequence[Prepared], point: Point, rung: int) -> Point:
-    """What a log that is held out has of its own, such as its zero, is fitted to it; the parameters stay."""
+    """Fit the nuisances of a held-out log, such as its zero; the parameters stay."""
     held_out = [log for log in logs if log.held_out]
     if not rig.task.nuisance or not held_out:
         return point

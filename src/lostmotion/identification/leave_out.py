@@ -32,9 +32,9 @@ class ConditionError:
     """
 
     key: str
-    """of the header, or ``file`` or ``folder``"""
+    """key of the header, or ``file`` or ``folder``"""
     value: Any
-    """of the key in these logs"""
+    """value of the key in these logs"""
     logs: int
     """number of these logs"""
     fitted: float

@@ -17,7 +17,7 @@ from ..inputs.validation import MAX_LISTED, did_you_mean, shortened
 
 
 def reason(error: Exception) -> str:
-    """What a library says of a file that it cannot read, in one line."""
+    """Message of a library on a file that it cannot read, in one line."""
     if isinstance(error, MemoryError):
         return "it announces more than fits into memory"
     return shortened(" ".join(str(error).split()), MAX_LISTED) or "it is damaged"
@@ -25,7 +25,7 @@ def reason(error: Exception) -> str:
 
 @contextmanager
 def warnings_of(library: str) -> Iterator[list[str]]:
-    """What a library logs about a file, in place of its output to the terminal."""
+    """Collect the log messages of a library about a file instead of printing them."""
     said: list[str] = []
     handler = logging.Handler(logging.WARNING)
     handler.emit = lambda record: said.append(" ".join(record.getMessage().split()))  # type: ignore[method-assign]
@@ -58,7 +58,7 @@ class Channel:
 
     values: np.ndarray
     unit: str = ""
-    """as its file says; empty where it says nothing"""
+    """unit as in the file; empty if the file has none"""
 
 
 @dataclass(frozen=True)
@@ -66,17 +66,17 @@ class Log:
     """The record of one measurement: channels, header and notes."""
 
     name: str
-    """of its file"""
+    """name of its file"""
     time: np.ndarray
     """[s]"""
     channels: Mapping[str, Channel]
     header: Mapping[str, Any] = field(default_factory=dict)
     """numbers and words that hold for the whole log, such as the mass that was moved"""
     notes: tuple[str, ...] = ()
-    """what was dropped or looks wrong, one line each"""
+    """dropped samples and doubtful items, one line each"""
 
     def values(self, name: str) -> np.ndarray:
-        """Of a channel, as the file has them.
+        """Values of a channel as in the file.
 
         Raises
         ------

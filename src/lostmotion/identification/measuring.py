@@ -51,7 +51,7 @@ class Measuring:
         self._rates = rates
 
     def probes(self) -> list[Probe]:
-        """What a run has to show: of each channel its variable and, where there is one, its rate."""
+        """Variables that a run must record: for each channel its variable and, if it exists, its rate."""
         found = []
         for name, m in self._channels.items():
             at = self._at(name)
@@ -160,7 +160,7 @@ def _interpolated(at: np.ndarray, t: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def _slopes(at: np.ndarray, t: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Of the straight lines of `_interpolated`."""
+    """Slopes of the straight lines of `_interpolated`."""
     h = t[1] - t[0]
     k = np.clip(((at - t[0]) / h).astype(int), 0, len(t) - 2)
     return np.asarray((x[k + 1] - x[k]) / h)

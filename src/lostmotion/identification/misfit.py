@@ -26,17 +26,17 @@ CHANCE = 1e-4  # probability of such a shape by chance, up to which it is named
 
 @dataclass(frozen=True)
 class Misfit:
-    """Of one measured channel, over all logs that were fitted."""
+    """Misfit of one measured channel, over all fitted logs."""
 
     channel: str
     rms: float
-    """of the residuals, SI"""
+    """rms of the residuals, SI"""
     ratio: float
     """to the stated deviation; NaN without one"""
     correlation: float
-    """of residuals of two samples in a row"""
+    """correlation of residuals of two samples in a row"""
     runs: int
-    """of residuals of one sign"""
+    """number of runs of residuals of one sign"""
     expected: float
     """runs of as many independent residuals"""
     structured: bool
@@ -54,7 +54,7 @@ class Misfit:
         return self.ratio > LARGE
 
     def text(self, unit: str) -> str:
-        """As a sentence."""
+        """Misfit as a sentence."""
         found = []
         if self.large:
             stated = f"{self.rms / self.ratio:.4g} {unit}".rstrip()
@@ -73,7 +73,7 @@ class Misfit:
 
 
 def misfits(problem: Problem, residuals: Sequence[np.ndarray]) -> list[Misfit]:
-    """Of each measured channel."""
+    """Misfits of all measured channels."""
     compared = problem.compared(residuals)
     found = []
     for k, name in enumerate(problem.engine.rig.task.measured):

@@ -116,7 +116,7 @@ class MonitorResult:
 
     @property
     def alarms(self) -> list[Watched]:
-        """What has changed or is beyond a limit."""
+        """Values that have changed or exceed a limit."""
         return [w for w in self.watched.values() if w.alarm]
 
     def series(self, name: str) -> dict[str, np.ndarray]:
@@ -211,7 +211,7 @@ def monitor(
 
 
 def monitor_logs(rig: Rig, logs: Sequence[Prepared], *, notify: Notify | None = None) -> MonitorResult:
-    """As `monitor`, of logs that have been prepared."""
+    """Monitor prepared logs, as `monitor` does."""
     order = _in_order(rig.task, logs)
     count = rig.task.monitor.baseline
     rig, parts, left_out = split_at_pauses(rig, [log for log, _ in order])
@@ -262,7 +262,7 @@ class _Reference:
     values: Mapping[str, float]
     free: Mapping[str, FreeParameter]
     deviations: np.ndarray | None
-    """of the residuals of the measured channels, SI; None: by those of the log"""
+    """deviations of the residuals of the measured channels, SI; None: by those of the log"""
 
 
 def _at_start(rig: Rig) -> _Reference:
@@ -333,7 +333,7 @@ class _Estimator:
         return float(np.median(found)) if found else self.reference.values[name]
 
     def estimate(self, log: Prepared, at: float, parts: Sequence[Prepared]) -> LogEstimate:
-        """Of one log in its parts between pauses."""
+        """Estimate from one log in its parts between pauses."""
         task, free = self.reference.rig.task, self.reference.free
         try:
             conditions = tuple(number(text, log.facts, "monitor.conditions") for text in task.monitor.conditions)
@@ -445,7 +445,7 @@ class _Series:
         self.variances = _variances(values, deviations, self.count) if self.enough else np.ones(len(logs))
 
     def change(self, direction: str, rate: float) -> Change | None:
-        """Of the series; nothing if the baseline is too short."""
+        """Change of the series; None if the baseline is too short."""
         if not self.enough:
             return None
         return find_change(

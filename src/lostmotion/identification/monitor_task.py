@@ -18,7 +18,7 @@ class Watch(Part):
     """A parameter that is watched."""
 
     direction: Literal["up", "down", "both"] = "both"
-    """of the changes that are of interest"""
+    """direction of the changes that are of interest"""
     min: Limit = None
     """least value without an alarm, SI or text with the unit of the parameter"""
     max: Limit = None
@@ -26,7 +26,7 @@ class Watch(Part):
 
 
 class Monitoring(Part):
-    """How the logs of a drive are compared over its life."""
+    """Settings for comparing the logs of a drive over its life."""
 
     watch: Elements[Watch] = Field(default_factory=nothing)
     """parameters that are watched, by name; left out, all that are free"""

@@ -68,7 +68,7 @@ def measured_course(rig: Rig, log: Prepared, channel: str, known: Mapping[str, A
 
 
 def names_of_channel(rig: Rig, channel: str) -> frozenset[str]:
-    """What the scale, the offset and the delay of a measured channel name."""
+    """Names in the scale, the offset and the delay of a measured channel."""
     m = rig.task.measured[channel]
     return names_in(m.scale) | names_in(m.offset) | names_in(m.delay)
 

@@ -43,7 +43,7 @@ class _Seen:
 
     name: str
     units: list[str] = field(default_factory=list)
-    """as files say, each once"""
+    """units as in the files, each once"""
     logs: int = 0
     low: float = math.inf
     high: float = -math.inf
@@ -52,7 +52,7 @@ class _Seen:
 
     @property
     def words(self) -> list[str]:
-        """Of its name."""
+        """Words of its name."""
         return "".join(c.lower() if c.isalnum() else " " for c in self.name).split()
 
     @property
@@ -199,7 +199,7 @@ def _roles(seen: Sequence[_Seen]) -> tuple[list[_Seen], list[_Seen]]:
 def _doubts(
     logs: Sequence[tuple[Path, Log]], seen: Sequence[_Seen], measured: Sequence[_Seen], inputs: Sequence[_Seen]
 ) -> list[str]:
-    """What is wrong with logs, or different between them."""
+    """Defects of logs, and differences between them."""
     notes: dict[str, list[str]] = {}
     for path, log in logs:
         own = [c.name for c in measured if c.name in log.channels]

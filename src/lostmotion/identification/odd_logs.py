@@ -63,9 +63,9 @@ class OddLog:
     rms: float
     """root mean square of the residuals of the channel, SI"""
     ratio: float
-    """of these residuals to the median of the other logs"""
+    """ratio of these residuals to the median of the other logs"""
     fault: str
-    """what explains the log; empty if nothing does that was tried"""
+    """fault that explains the log; empty if none of those tried does"""
     mended: float
     """residuals with the fault undone, SI; NaN without a fault"""
     held_out: bool

@@ -1,4 +1,4 @@
-"""What is identified: parameters with start values, bounds, scales and priors."""
+"""Parameters of an identification: start values, bounds, scales and priors."""
 
 import math
 from typing import Annotated, Any, Self

@@ -43,7 +43,7 @@ class Restart:
     ratios: Mapping[str, float]
     """turns of each shaft for one of the measured one"""
     keys: Mapping[str, Mapping[str, str]]
-    """of `initial` for speed and angle of each shaft"""
+    """keys of `initial` for speed and angle of each shaft"""
 
 
 def split_at_pauses(rig: Rig, logs: Sequence[Prepared]) -> tuple[Rig, list[Prepared], dict[str, str]]:

@@ -46,11 +46,11 @@ class Prepared:
     measured: dict[str, np.ndarray]
     """NaN where a channel has no number: such samples are not compared, and what acts goes on"""
     facts: dict[str, Any]
-    """what formulas may name: its header, and ``first_CHANNEL`` and ``mean_CHANNEL`` in SI"""
+    """names for formulas: its header, and ``first_CHANNEL`` and ``mean_CHANNEL`` in SI"""
     segments: tuple[Segment, ...]
     held_out: bool
     weight: np.ndarray
-    """of each sample, by which its errors are multiplied"""
+    """weight of each sample, by which its errors are multiplied"""
     first: bool
     """whether the search is to begin with it"""
     begin: float = 0.0
@@ -64,7 +64,7 @@ class Prepared:
 
     @property
     def name(self) -> str:
-        """Of its file."""
+        """Name of its file."""
         return self.log.name
 
     def changed(
@@ -114,7 +114,7 @@ class Prepared:
 
 
 def channel_factor(written: str, of_file: str, unit: str, where: str) -> float:
-    """What one of the unit of a channel is in SI; see `channel_unit`."""
+    """Factor from the unit of a channel to SI; see `channel_unit`."""
     return channel_unit(written, of_file, unit, where)[0]
 
 
@@ -258,7 +258,7 @@ def _switches(task: Identification, log: Log) -> list[str]:
 
 
 def _facts(log: Log) -> dict[str, Any]:
-    """What formulas may name of a log."""
+    """Facts of a log that formulas may name."""
     facts = {key: value for key, value in log.header.items() if isinstance(value, int | float | str)}
     for name, channel in log.channels.items():
         if (there := np.isfinite(channel.values)).any():
@@ -282,12 +282,12 @@ def first_values_named(task: Identification) -> set[str]:
 
 
 def _named(task: Identification) -> frozenset[str]:
-    """What the formulas of a task name."""
+    """Names in the formulas of a task."""
     return names_within(task.model_dump(include={"set", "phases", "ladder", "logs", "measured", "inputs", "monitor"}))
 
 
 def _facts_of(channel: str) -> tuple[str, str]:
-    """What formulas call the first value and the mean of a channel."""
+    """Names of the first value and the mean of a channel in formulas."""
     key = "".join(c if c.isalnum() else "_" for c in channel)
     return f"first_{key}", f"mean_{key}"
 
@@ -300,7 +300,7 @@ def _fact(text: Any, facts: Mapping[str, Any], log: Log, key: str) -> Any:
 
 
 def _segments(task: Identification, log: Log, facts: Mapping[str, Any]) -> tuple[Segment, ...]:
-    """Where the rig is in which phase."""
+    """Phases of the rig with their intervals."""
     n = len(log.time)
     phase = np.full(n, -1)
     for k, entry in enumerate(task.phases):

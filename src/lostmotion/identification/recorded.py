@@ -1,4 +1,4 @@
-"""How an input goes on between two samples: held or in straight lines, by how its channel was recorded."""
+"""Course of an input between two samples: held or linear, by the way in which its channel was recorded."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ NEARER = 1e-3  # of the error, by which one way must be better
 
 
 def course_of(x: np.ndarray) -> str:
-    """What a channel looks like: ``constant``, ``steps``, ``staircase``, ``rough`` or ``smooth``."""
+    """Course of a channel: ``constant``, ``steps``, ``staircase``, ``rough`` or ``smooth``."""
     step = np.diff(x)
     changed = np.flatnonzero(step)
     if not len(changed):

@@ -1,4 +1,4 @@
-"""What would determine a parameter that the logs do not tell: experiments that the rig can run, and channels that are missing."""
+"""Remedies for unidentifiable parameters: experiments that the rig can run, and channels that are missing."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ OTHERWISE = "give a value with a tolerance as a prior, or a log in which they ac
 
 
 def remedy_for(rig: Rig, names: Sequence[str]) -> str:
-    """What would determine parameters, by the keys of the scenario and of channels that they enter."""
+    """Remedies for parameters, by the keys of the scenario and of channels that they enter."""
     keys = [keys_of(rig.task, name) for name in names]
 
     def enter(*parts: str) -> bool:

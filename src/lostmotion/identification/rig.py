@@ -35,12 +35,12 @@ class Built:
 
     @cached_property
     def names(self) -> list[str]:
-        """Of the channels of a run."""
+        """Names of the channels of a run."""
         return [str(channel) for channel, *_ in self.core.channels()]
 
     @cached_property
     def smooth(self) -> list[str]:
-        """Those of them that have derivatives."""
+        """Channels that have derivatives."""
         return channels_of(self.core)
 
     def terms(self, variable: str) -> dict[str, float]:
@@ -56,7 +56,7 @@ class Built:
 
     @cached_property
     def ratios(self) -> tuple[Any, ...]:
-        """Of its gears, by which angles follow from each other, and what else they do so by."""
+        """Ratios of its gears, by which angles follow from each other, and other relations between angles."""
         return tuple((g.ratio, repr(g.transmission_error)) for g in self.scenario.train().gears.values())
 
     @cached_property
@@ -71,7 +71,7 @@ class Built:
 
 
 class Rig:
-    """What a task measures, with the formulas by which logs and parameters change it.
+    """The rig of a task, with the formulas by which logs and parameters change it.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ class Rig:
                 )
 
     def rungs(self) -> tuple[Rung, ...]:
-        """Of the task."""
+        """Models of the task."""
         return self.task.rungs()
 
     def _signals(self) -> list[str]:
@@ -158,7 +158,7 @@ class Rig:
         return units
 
     def formulas(self, rung: int, phase: int) -> dict[str, Any]:
-        """Of the values of the scenario, by dotted key."""
+        """Formulas of the values of the scenario, by dotted key."""
         if (rung, phase) not in self._formulas:
             of_phase = self._phases[phase] if phase >= 0 else {}
             self._formulas[rung, phase] = {**self._set, **self._rungs[rung], **of_phase}
@@ -172,7 +172,7 @@ class Rig:
         return self._keys[where]
 
     def leaves_of(self, name: str, rung: int, phase: int) -> list[str]:
-        """As `keys_of`, down to the keys within tables."""
+        """Keys as in `keys_of`, down to the keys within tables."""
         formulas = self.formulas(rung, phase)
         return [leaf for key in self.keys_of(name, rung, phase) for leaf in _leaves(formulas[key], key, name)]
 
@@ -238,7 +238,7 @@ class Rig:
 
 
 def names_of(node: Any) -> frozenset[str]:
-    """What formulas name, those within lists and tables too."""
+    """Names in formulas, also within lists and tables."""
     if isinstance(node, Formula):
         return node.names
     inner = node.values() if isinstance(node, dict) else node if isinstance(node, list) else ()

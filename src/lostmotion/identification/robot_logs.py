@@ -30,7 +30,7 @@ PER_CHARACTER = 10  # bytes of memory for a character of JSON
 
 @dataclass
 class Recording:
-    """What a file holds: (time [ns], message) by topic, encodings of the topics that are left out, and its header."""
+    """Content of a file: (time [ns], message) by topic, encodings of the topics that are left out, and its header."""
 
     path: Path
     topics: dict[str, list[tuple[int, Any]]] = field(default_factory=dict)
@@ -55,7 +55,7 @@ class Recording:
 
 
 def read_mcap_log(path: Path, *, time: str = "") -> Log:
-    """Of an MCAP file: the numbers of its messages are channels ``TOPIC.FIELD``, ``TOPIC.FIELD[0]`` of lists; units are SI.
+    """Read an MCAP file: the numbers of its messages are channels ``TOPIC.FIELD``, ``TOPIC.FIELD[0]`` of lists; units are SI.
 
     All are at the publish times of one topic; those of others are read from straight lines between their messages. Metadata
     of the file are the header.
@@ -83,7 +83,7 @@ def read_mcap_log(path: Path, *, time: str = "") -> Log:
 
 
 def read_ros_bag(path: Path, *, time: str = "") -> Log:
-    """Of a bag of ROS 1 (``.bag``) or ROS 2 (``.db3``): channels as of MCAP files, at the times of recording.
+    """Read a bag of ROS 1 (``.bag``) or ROS 2 (``.db3``): channels as of MCAP files, at the times of recording.
 
     Messages of ROS 2 bags that do not hold their definitions are taken for those of Humble.
 
@@ -404,7 +404,7 @@ def _shallow(path: Path, topic: str, message: Any, long: set[str]) -> Iterator[t
 
 
 def _numbers(node: Any, name: str, long: set[str], levels: int = MOST_LEVELS) -> Iterator[tuple[str, float]]:
-    """Of a message, those within lists and objects too; words are left out."""
+    """Numbers of a message, also within lists and objects; words are left out."""
     if levels == 0:
         raise RecursionError
     if isinstance(node, dict):

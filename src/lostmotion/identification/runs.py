@@ -36,7 +36,7 @@ Values = Mapping[str, float]
 
 @dataclass
 class Seen:
-    """What the measured channels of a log should be."""
+    """Computed values of the measured channels of a log."""
 
     values: np.ndarray
     """channels x samples, SI"""
@@ -99,7 +99,7 @@ def run_logs(
 
 
 def run_log(rig: Rig, log: Prepared, values: Values, rung: int, extra: tuple[str, ...] = ()) -> dict[str, np.ndarray]:
-    """What the measured channels of a log should be, by name, and more variables of the rig, at its instants.
+    """Computed values of the measured channels of a log, by name, and more variables of the rig, at its instants.
 
     Raises
     ------
@@ -216,7 +216,7 @@ class _Course:
     def _beside(
         self, name: str, p: FreeParameter, changes: Mapping[str, Any], built: Built, acting: Acting, segment: Segment
     ) -> list[Any]:
-        """What is other beside the value of a parameter, as the core takes it."""
+        """Values of the core that differ beside the value of a parameter."""
         rig, task, phase = self._rig, self._rig.task, segment.phase
         keys = rig.keys_of(name, self._rung, phase)
         of_rig = [key for key in keys if not key.startswith("initial.")]
@@ -251,14 +251,14 @@ class _Course:
         return out
 
     def _note_terms(self, parameter: int, at: Built, weight: float) -> None:
-        """How factors of sums of channels differ beside the value of a parameter, such as the ratio of a gear."""
+        """Differences of factors of sums of channels beside the value of a parameter, such as the ratio of a gear."""
         for probe, terms, by in zip(self._probes, self._terms, self._terms_by, strict=True):
             if terms.keys() != {probe.variable}:
                 for name, factor in at.terms(probe.variable).items():
                     by[parameter][name] += weight * (factor - terms[name])
 
     def take(self, row: Any) -> None:
-        """What the core has found of `case`."""
+        """Result of the core for `case`."""
         if row.error:
             self._error = _core.SolverError(row.error)
             return
@@ -286,7 +286,7 @@ class _Course:
                 self._state_by = {name: derivatives[p][rows, -1] for p, name in enumerate(self._by)}
 
     def seen(self) -> Seen:
-        """Of the whole log."""
+        """Computed values of the whole log."""
         if self._error is not None:
             shape = (len(self._log.measured), len(self._log.time))
             return Seen(np.full(shape, np.nan), np.full((*shape, len(self._by)), np.nan), error=self._error)

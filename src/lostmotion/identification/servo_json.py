@@ -18,7 +18,7 @@ PER_SIGN = {"{": 64, "[": 64, ":": 100, ",": 32}
 
 
 def read_servo_json(path: Path, *, time: str = "") -> Log:
-    """Of a file ``{"mass": 0.5, ..., "entries": [{"timestamp": 0.0, "position": 0.1, ...}, ...]}``; units are SI.
+    """Read a file ``{"mass": 0.5, ..., "entries": [{"timestamp": 0.0, "position": 0.1, ...}, ...]}``; units are SI.
 
     Keys of the header with hyphens are read with underscores. Words and lists of the header are kept as they are.
 

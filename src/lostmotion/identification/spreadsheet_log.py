@@ -97,7 +97,7 @@ def _rows(sheet: Any, comments: list[str]) -> Iterator[Row]:
 
 
 def _number(cell: Any) -> float | None:
-    """Of a cell; None where it is none."""
+    """Number in a cell; None if the cell has no number."""
     if isinstance(cell, bool | int | float):
         with suppress(OverflowError):
             return float(cell)
@@ -127,7 +127,7 @@ def _check(path: Path, archive: zipfile.ZipFile) -> None:
 
 
 class _Part:
-    """What a part of a workbook holds, by a parser that keeps nothing of it."""
+    """Content of a part of a workbook, by a parser that keeps nothing of it."""
 
     def __init__(self, path: Path, name: str) -> None:
         self.path, self.name = path, name

@@ -29,7 +29,7 @@ PER_PARAMETER = 3  # blocks
 
 @dataclass(frozen=True)
 class Regression:
-    """Which start values the regression has replaced, and why others are as given."""
+    """Start values that the regression has replaced, and the reasons for the others."""
 
     found: Mapping[str, float] = field(default_factory=dict)
     """start values by parameter, SI"""
@@ -39,7 +39,7 @@ class Regression:
     """why there is none at all"""
 
     def lines(self, parameters: Mapping[str, FreeParameter]) -> list[str]:
-        """As text."""
+        """Lines of text."""
         if self.why_not:
             return [f"start values as given, without a regression of inverse dynamics: {self.why_not}"]
         found = [
@@ -91,7 +91,7 @@ def regressed(
 
 
 def _windows_or_logs(rig: Rig, logs: Sequence[Prepared], point: Point) -> Sequence[Prepared]:
-    """What runs are compared with: short windows where the state is measured, so that errors do not add up."""
+    """Data for runs: short windows if the state is measured, so that errors do not add up."""
     try:
         length = WINDOW * WIDTHS[-1] * max(log.log.interval for log in logs)
         return windows(rig, logs, point, 0, length)

@@ -283,7 +283,7 @@ def _numbers(
 
 
 def _remedy(cell: Any) -> str:
-    """What to do about a cell that is no number."""
+    """Remedy for a cell that is not a number."""
     if _nanoseconds(cell) is not None:
         return "; if it is the time, name the column with logs.time"
     if plain_number(str(cell).replace(",", "").replace(".", "")) is not None:

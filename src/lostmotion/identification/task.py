@@ -28,18 +28,18 @@ Setting = FormulaText | tuple["Setting", ...] | dict[str, Any]
 
 
 class LogFiles(Part):
-    """Which logs, and which of them are kept from the fit."""
+    """Files of the logs, and the held-out ones."""
 
     files: tuple[str, ...] = Field(min_length=1)
     """names or patterns, relative to the identification file; a directory stands for all logs in it"""
     time: str = ""
     """channel of the time, where it is not found by itself"""
     decimal: Literal["", ".", ","] = ""
-    """what separates decimals in text files; left out, a comma only where a file has no other reading, with a note"""
+    """decimal separator in text files; left out, a comma only if a file has no other reading, with a note"""
     held_out: FormulaText | None = None
     """condition on the header, such as ``kp == 8`` or ``folder == "long arm"``; logs that meet it are compared, not fitted"""
     header: Elements[Any] = Field(default_factory=nothing)
-    """of logs that lack it: values by key, such as ``arm_mass = 0``"""
+    """header values for logs that lack them, by key, such as ``arm_mass = 0``"""
     channels: Elements[str] = Field(default_factory=nothing)
     """further values of the header: 1 where a log has the channel, 0 where it has not"""
     stated: Elements[str] = Field(default_factory=nothing)
@@ -49,7 +49,7 @@ class LogFiles(Part):
     last: Annotated[Time, Positive] | None = None
     """after which a log is not used; left out, to its end"""
     weight: FormulaText = 1.0
-    """of samples, by the header or by channels that switch, such as ``1 + 9*(ramp < 100)``: their errors count as if they were larger
+    """weight of samples, by the header or by channels that switch, such as ``1 + 9*(ramp < 100)``: their errors count as if they were larger
     by that factor"""
 
 
@@ -60,7 +60,7 @@ class InputChannel(Part):
     default: Number | None = None
     """value in logs that lack the channel; left out, such logs are refused"""
     unit: str = ""
-    """of the channel; left out, as its file says, else SI"""
+    """unit of the channel; left out, that of its file, else SI"""
     scale: FormulaText = 1.0
     """factor on it"""
     offset: FormulaText = 0.0
@@ -84,7 +84,7 @@ class MeasuredChannel(Part):
     variable: str
     """result variable of the rig"""
     unit: str = ""
-    """of the channel; left out, as its file says, else SI"""
+    """unit of the channel; left out, that of its file, else SI"""
     scale: FormulaText = 1.0
     offset: FormulaText = 0.0
     """SI"""
@@ -116,18 +116,18 @@ class Rung(Part):
     set: dict[str, Any] = Field(default_factory=dict)
     """values of the scenario by dotted key, beside those of the rungs below"""
     multi_start: Elements[tuple[Number, ...]] = Field(default_factory=nothing)
-    """of parameters that the motion does not depend on smoothly: the values that are tried, SI or text with a unit"""
+    """values to try of parameters on which the motion does not depend smoothly, SI or text with a unit"""
 
 
 class FitOptions(Part):
-    """How the search is made."""
+    """Options of the search."""
 
     loss: Literal["huber", "linear"] = "huber"
-    """of a residual; huber: linear beyond `outlier` standard deviations"""
+    """loss of a residual; huber: linear beyond `outlier` standard deviations"""
     outlier: Annotated[Number, Positive] = 1.345
     iterations: Annotated[Whole, Field(ge=1, le=500)] = 30
     first_logs: Annotated[Whole, Field(ge=1)] = 12
-    """of which the search begins, before it takes all"""
+    """number of logs with which the search begins, before it takes all"""
     leave_out: tuple[str, ...] = ()
     """keys of the header, ``file`` or ``folder``: for each value of one, the model taken is fitted again without the logs that have it, and
     their error is reported"""
@@ -139,7 +139,7 @@ class FitOptions(Part):
     """lengths of windows, rising: the logs are fitted in windows of the first, each run of which begins at the angle and the speed
     measured there, then of the next, and at last whole"""
     sample_interval: Annotated[Time, Positive] | None = None
-    """of the runs behind a channel with a filter; left out, that of the log, at most 2 ms"""
+    """sample interval of the runs behind a channel with a filter; left out, that of the log, at most 2 ms"""
 
     @model_validator(mode="after")
     def _horizon_grows(self) -> Self:
@@ -171,7 +171,7 @@ class Identification(Part):
     record: str = ""
     """``gear.NAME`` of the rig, of which a data sheet is written"""
     monitor: Monitoring = Monitoring()
-    """what `lostmotion monitor` compares over the life of a drive"""
+    """values that `lostmotion monitor` compares over the life of a drive"""
 
     @model_validator(mode="before")
     @classmethod

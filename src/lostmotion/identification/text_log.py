@@ -34,13 +34,13 @@ class Reading:
     line: int = 0
 
     def cells(self, line: str) -> list[str]:
-        """Of a line."""
+        """Cells of a line."""
         if self.separator == " ":
             return split_at_spaces(line)
         return next(csv.reader([line], delimiter=self.separator))
 
     def number(self, cell: Any) -> float | None:
-        """Of a cell; None where it is none."""
+        """Number in a cell; None if the cell has no number."""
         if self.decimal == "." or "," not in cell:
             return plain_number(cell) if self.decimal == "." or "." not in cell else None
         if not WITH_COMMA.fullmatch(cell):

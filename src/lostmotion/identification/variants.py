@@ -83,13 +83,13 @@ class Variants:
 
 @cache
 def _element(table: str) -> TypeAdapter[Any] | None:
-    """Of a table of elements by name: how one of them is read."""
+    """Reader of one element of a table of elements by name."""
     kind = TrainScenario.model_fields[table].annotation
     return TypeAdapter(get_args(kind)[1]) if get_origin(kind) is dict else None
 
 
 def _shape(value: Any) -> Any:
-    """What a value is, but for its numbers."""
+    """Shape of a value without its numbers."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         return float
     if isinstance(value, list | tuple):

@@ -1,4 +1,4 @@
-"""What public functions are given, checked by their annotations: whatever object comes, the error is one `InputError`."""
+"""Checks of the arguments of public functions by their annotations: any wrong object ends in one `InputError`."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
 def misfit(
     function: str, parameters: Iterable[str], given: Iterable[str], problem: str = "", lacking: str | None = None
 ) -> ArgumentError:
-    """What is wrong with the names or the number of the arguments of a call.
+    """Error in the names or the number of the arguments of a call.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def _unit(option: str) -> str | None:
 
 
 def _several(option: str) -> str | None:
-    """Of what a list is."""
+    """Element type of a list."""
     head, bracket, inner = option.partition("[")
     return inner.removesuffix("]") if bracket and head in ("Sequence", "Iterable", "list", "tuple") else None
 

@@ -1,4 +1,4 @@
-"""How a part shows itself: as one line of text, and as HTML in notebooks."""
+"""Representation of parts: as one line of text, and as HTML in notebooks."""
 
 from __future__ import annotations
 

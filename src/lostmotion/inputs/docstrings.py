@@ -10,7 +10,7 @@ from functools import cache
 
 
 def docstring_of(cls: type, field: str) -> str | None:
-    """What is written below a field where it was last annotated, in the class or the first of its bases."""
+    """Text below a field where it was last annotated, in the class or the first of its bases."""
     owner = next((c for c in cls.__mro__ if field in vars(c).get("__annotations__", {})), None)
     if owner is None:
         return None

@@ -1,4 +1,4 @@
-"""What an HDF5 file asks of its reader, checked before anything of it is read."""
+"""Resources that an HDF5 file requires of its reader, checked before anything of it is read."""
 
 from __future__ import annotations
 

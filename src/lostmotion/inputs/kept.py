@@ -1,4 +1,4 @@
-"""What follows from an immutable part is made once and kept with the part."""
+"""Values derived from an immutable part, made once and kept with the part."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def kept(function: Callable[[P], R]) -> Callable[[P], R]:
 
 
 def kept_while_used(method: Callable[[P], R]) -> Callable[[P], R]:
-    """As `kept`, of a value that is large: kept with the part only while something else holds it."""
+    """Keep a large value as `kept` does, but only while something else holds it."""
 
     @wraps(method)
     def call(part: P) -> R:

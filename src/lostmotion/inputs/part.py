@@ -36,7 +36,7 @@ class Part(BaseModel):
         return described
 
     def __repr_args__(self) -> Iterator[tuple[str, Any]]:
-        """What differs from its default; of long lists the ends."""
+        """Values that differ from their defaults; the ends of long lists."""
         for name, field in type(self).model_fields.items():
             value = getattr(self, name)
             if value != field.default:
@@ -62,7 +62,7 @@ class Part(BaseModel):
 
     @classmethod
     def model_validate(cls, obj: Any, **options: Any) -> Self:
-        """As the constructor, from a mapping."""
+        """Make the part from a mapping, as the constructor does."""
         with cls._one_error(obj):
             return super().model_validate(plain(obj), **options)
 
@@ -74,12 +74,12 @@ class Part(BaseModel):
 
     @classmethod
     def model_validate_json(cls, json_data: str | bytes | bytearray, **options: Any) -> Self:
-        """As the constructor, from JSON."""
+        """Make the part from JSON, as the constructor does."""
         with cls._one_error():
             return super().model_validate_json(json_data, **options)
 
     def kept_values(self) -> dict[Any, Any]:
-        """What `inputs.kept.kept` keeps with this object."""
+        """Values that `inputs.kept.kept` keeps with this object."""
         try:
             values: dict[Any, Any] = object.__getattribute__(self, "_made")
         except AttributeError:
@@ -112,7 +112,7 @@ class Part(BaseModel):
 
     @classmethod
     def _subject(cls) -> str:
-        """What it is, for messages: the torsion curve."""
+        """Name of the part in messages: the torsion curve."""
         return "the " + " ".join(re.findall("[A-Z][a-z]*", cls.__name__.split("[")[0])).lower()
 
 

@@ -1,4 +1,4 @@
-"""What is wrong with a value that a part refuses, in one line: the key, the value and what would be right."""
+"""Messages for values that a part refuses, in one line: the key, the value and what would be right."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def describe(error: ValidationError, schema: Mapping[str, Any], subject: str, gi
 
 
 def unknown_key(key: str, known: Iterable[str], inner: Iterable[str] = ()) -> str:
-    """What is said of a key that is none of those that are known.
+    """Message for an unknown key.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def did_you_mean(given: str, choices: Iterable[str], otherwise: str) -> str:
 
 
 def names_like(given: str, names: Iterable[str], otherwise: str, count: int = 3) -> str:
-    """As `did_you_mean`, of names of files and records, of which a part may have been left out."""
+    """Suggestions as in `did_you_mean`, for names of files and records, of which a part may be missing."""
     near = difflib.get_close_matches(given[:MAX_NAME], list(names), n=count, cutoff=0.5)
     return f"did you mean {' or '.join(near)}?" if near else beginning(otherwise)
 
@@ -246,7 +246,7 @@ class _Problem:
         return list(dict.fromkeys(kind for kind in said if kind is not None))
 
     def _wanted(self) -> str:
-        """What a value must be, by the kind of its problem."""
+        """Required form of a value, by the kind of its problem."""
         c = self.context
         match self.kind:
             case "greater_than":
@@ -298,7 +298,7 @@ def _one_of(choices: list[str], value: Any = "") -> str:
 
 
 def _at(given: Any, keys: tuple[int | str, ...]) -> Any:
-    """What stands at these keys; None if nothing does."""
+    """Value at these keys; None if there is none."""
     for key in keys:
         try:
             given = given[key]

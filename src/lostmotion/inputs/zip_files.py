@@ -1,4 +1,4 @@
-"""What a ZIP archive asks of its reader, checked before anything of it is decompressed."""
+"""Resources that a ZIP archive requires of its reader, checked before anything of it is decompressed."""
 
 from __future__ import annotations
 

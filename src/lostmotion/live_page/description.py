@@ -99,7 +99,7 @@ def _closed_gap(scenario: Scenario | TrainScenario) -> str | None:
 
 
 def _inputs(scenario: Scenario | TrainScenario) -> list[tuple[str, Signal[Any]]]:
-    """What acts, in the order of the core, by its table in the scenario file; references of controllers, which the page does not
+    """Inputs, in the order of the core, by its table in the scenario file; references of controllers, which the page does not
     change, without."""
     if isinstance(scenario, Scenario):
         return [("command", scenario.command), ("load.torque", scenario.load.torque)]
@@ -115,7 +115,7 @@ def _inputs(scenario: Scenario | TrainScenario) -> list[tuple[str, Signal[Any]]]
 
 
 def _signal(signal: Signal[Any], duration: float) -> dict[str, Any]:
-    """As page/src/core_input.ts describes it, with a sine and a step of height 0 for the sliders of one."""
+    """Signal as page/src/core_input.ts describes it, with a sine and a step of height 0 for the sliders of one."""
     others = (signal.chirp, signal.samples, getattr(signal, "wind", None))
     return {
         "mean": signal.mean,
@@ -180,7 +180,7 @@ def _reference_sliders(scenario: Scenario | TrainScenario) -> Iterator[sliders.S
 
 
 def _torque_at(scenario: Scenario | TrainScenario, shaft: str) -> float:
-    """What a shaft may have to carry [N·m]: the rated torque of the gear or the motor that drives it, else 1."""
+    """Typical torque of a shaft [N·m]: the rated torque of the gear or the motor that drives it, else 1."""
     if isinstance(scenario, Scenario):
         return scenario.gearbox.rated_output_torque if shaft == "load" else scenario.motor.rated_torque or 1.0
     train = scenario.train()

@@ -1,4 +1,4 @@
-"""What the page draws of a scenario: its elements with the names of their variables, as page/src/description.ts describes them."""
+"""Drawing of a scenario on the page: its elements with the names of their variables, as page/src/description.ts describes them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..simulation.train_scenario import TrainScenario
 
 
 def drawn_drive(scenario: Scenario) -> dict[str, Any]:
-    """Of a scenario in the short form."""
+    """Drawing of a scenario in the short form."""
     rigid = isinstance(scenario.gearbox.stiffness, Rigid)
     contacts = [
         ("motor", "input_contact"),
@@ -57,7 +57,7 @@ def drawn_drive(scenario: Scenario) -> dict[str, Any]:
 
 
 def drawn_train(scenario: TrainScenario) -> dict[str, Any]:
-    """Of a scenario in the long form."""
+    """Drawing of a scenario in the long form."""
     names = [name for name, *_ in scenario.core().channels()]
 
     def known(name: str) -> str | None:

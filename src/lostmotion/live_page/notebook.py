@@ -54,7 +54,7 @@ class LivePage:
 
     @property
     def values(self) -> dict[str, float]:
-        """What the sliders have changed, by keys of the scenario file [SI].
+        """Values that the sliders have changed, by keys of the scenario file [SI].
 
         Raises
         ------

@@ -17,7 +17,7 @@ LIMITS = (("speed", "rad/s"), ("acceleration", "rad/s^2"), ("jerk", "rad/s^3"))
 
 
 def reference_view(reference: Reference[Any], duration: float) -> dict[str, Any] | None:
-    """As page/src/core_input.ts describes it, with a sine and a step of height 0 for the sliders of one.
+    """Reference as page/src/core_input.ts describes it, with a sine and a step of height 0 for the sliders of one.
 
     None for what follows a target, which the page cannot change.
     """
@@ -47,7 +47,7 @@ def reference_sliders(
     duration: float,
     sliding: tuple[bool, bool] = (False, False),
 ) -> Iterator[Slider]:
-    """Of its moves; without any, of its mean, its first sine and its steps.
+    """Sliders of the moves of a reference; without moves, of its mean, its first sine and its steps.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What can be changed on the page: which values of a scenario, in which unit, and how far."""
+"""Sliders of the page: values of a scenario with unit and range."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Place = list[str | int]
 
 @dataclass(frozen=True)
 class Range:
-    """How far a slider goes [SI]."""
+    """Range of a slider [SI]."""
 
     min: float
     max: float
@@ -38,7 +38,7 @@ class Slider:
     needs: Mapping[str, float] | None = None  # other keys that the file needs with it
 
     def to_page(self) -> dict[str, Any]:
-        """As page/src/description.ts describes it."""
+        """Slider as page/src/description.ts describes it."""
         unit, factor = unit_of(self.si_unit, max(abs(self.value), 0.3 * self.range.max))
         shown = {key: value for key, value in vars(self).items() if value is not None}
         del shown["si_unit"], shown["range"]
@@ -244,13 +244,13 @@ def no_step(duration: float) -> tuple[float, float]:
 
 
 def duration(value: float, sample_interval: float) -> Slider:
-    """Of the run."""
+    """Duration of the run."""
     reach = Range(max(value / 5.0, sample_interval), 5.0 * value, logarithmic=True)
     return Slider("simulation.duration", "Run", "duration", "s", value, reach, "duration")
 
 
 def ordered(found: Iterable[Slider]) -> list[Slider]:
-    """What acts first, then the controllers, then the drive, then the run; in each group as they were found."""
+    """Sliders in the order inputs, controllers, drive, run; within each group as they were found."""
     ranks = ("Command", "Reference", "Controller")
 
     def rank(slider: Slider) -> int:

@@ -1,4 +1,4 @@
-"""What depends on the angle of a shaft: gravity, cogging, ripple, and the transmission error of a gear."""
+"""Elements that depend on the angle of a shaft: gravity, cogging, ripple, and the transmission error of a gear."""
 
 import itertools
 import math
@@ -54,13 +54,13 @@ class AngleCurve(Part):
 
 
 class PeriodicTorque:
-    """What is a torque on a shaft over its angle."""
+    """Base of the torques on a shaft over its angle."""
 
     def core(self) -> _core.PeriodicCurve:
         raise NotImplementedError
 
     def core_fields(self) -> dict[str, Any]:
-        """What the core takes, in SI units."""
+        """Fields for the core, in SI units."""
         return {"torque": self.core()}
 
 
@@ -124,12 +124,12 @@ class Gravity(PeriodicTorque, Part):
     """A mass off the axis of a horizontal shaft: the torque ``-m g r sin(phi + angle)``, by straight lines."""
 
     shaft: str
-    """that carries it"""
+    """shaft that carries the mass"""
     mass: Annotated[Mass, Positive]
     radius: Annotated[Length, Positive]
-    """of the centre of mass from the axis"""
+    """distance of the centre of mass from the axis"""
     angle: Angle = 0.0
-    """of the mass when the shaft's angle is 0; 0: it hangs straight down, positive in the direction of the shaft's angle"""
+    """angle of the mass when the shaft's angle is 0; 0: it hangs straight down, positive in the direction of the shaft's angle"""
     error: Annotated[Torque, Positive] | None = None
     """by which the straight lines depart from the sine at most; left out, 0.1 % of m g r"""
 

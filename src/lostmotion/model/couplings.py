@@ -1,4 +1,4 @@
-"""What holds a shaft or joins two at the same speed: brakes, clutches, freewheels."""
+"""Elements that hold a shaft or join two at the same speed: brakes, clutches, freewheels."""
 
 from typing import Annotated, Any, Literal, Self
 
@@ -63,10 +63,10 @@ class Brake(Commanded):
     """
 
     shaft: str
-    """that it holds"""
+    """shaft that the brake holds"""
 
     def core_fields(self) -> dict[str, Any]:
-        """What the core takes, in SI units."""
+        """Fields for the core, in SI units."""
         return {"torque": self.torque, "breakaway_torque": self.holding()}
 
 
@@ -94,7 +94,7 @@ class Clutch(Commanded):
         return self
 
     def core_fields(self) -> dict[str, Any]:
-        """What the core takes, in SI units."""
+        """Fields for the core, in SI units."""
         return {"torque": self.torque, "breakaway_torque": self.holding(), "safety": self.kind == "safety"}
 
 
@@ -114,5 +114,5 @@ class Freewheel(Part):
     """shaft, which may run ahead"""
 
     def core_fields(self) -> dict[str, Any]:
-        """What the core takes: no values."""
+        """Fields for the core: none."""
         return {}

@@ -37,6 +37,6 @@ class Damper(Part):
         return self
 
     def core_fields(self) -> dict[str, Any]:
-        """What the core takes, in SI units."""
+        """Fields for the core, in SI units."""
         drag = _core.TorsionCurve([], [0.0]) if self.drag is None else self.drag.core()
         return {"viscous_friction": self.viscous_friction, "drag": drag}

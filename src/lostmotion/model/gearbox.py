@@ -33,7 +33,7 @@ class GearboxLimits(Part):
 
 
 class Transmission(Part):
-    """What gearboxes and gears of a drive train have in common: ratio, inertia, compliance."""
+    """Base of gearboxes and gears of a drive train: ratio, inertia, compliance."""
 
     ratio: Number
     """i_C, input speed / output speed; below 0, the output turns against the input"""
@@ -54,10 +54,10 @@ class Transmission(Part):
     backlash"""
     limits: GearboxLimits | None = None
     loss_range: tuple[Annotated[Number, Positive], Annotated[Number, Positive]] | None = None
-    """of losses that are estimated: between which multiples of them those of such gearboxes lie. No run depends on it; the drive check says
+    """range of estimated losses: the multiples between which those of such gearboxes lie. No run depends on it; the drive check says
     which of its verdicts hold at both ends"""
     note: str = ""
-    """what a reader of the results must know, such as that a loss table is a stand-in"""
+    """note for readers of the results, such as that a loss table is a stand-in"""
 
     @field_validator("ratio")
     @classmethod

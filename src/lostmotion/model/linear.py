@@ -101,7 +101,7 @@ class Slide(Part):
     friction_curve: ForceCurve | None = None
     """dry friction over speed, in place of friction_force and stribeck_speed"""
     inclination: Annotated[Angle, Limit(ge=-0.5 * math.pi, le=0.5 * math.pi)] = 0.0
-    """of the positive direction above the horizontal; 90 deg: vertical, positive upwards. The weight's share along the slide acts
+    """inclination of the positive direction above the horizontal; 90 deg: vertical, positive upwards. The weight's share along the slide acts
     against it"""
     end_stops: EndStops | None = None
 
@@ -150,7 +150,7 @@ class StiffnessCurve(Part):
     """Force over deflection: odd, continuous, piecewise linear, as the nut, the screw and its bearings give way together."""
 
     slopes: tuple[Annotated[AxialStiffness, NotNegative], ...] = Field(min_length=1, max_length=MAX_PIECES)
-    """of the segments, from deflection 0 outwards"""
+    """slopes of the segments, from deflection 0 outwards"""
     breaks: tuple[Annotated[Length, Positive], ...] = ()
     """deflections at which the slope changes; one fewer than slopes"""
 
@@ -193,7 +193,7 @@ PitchError = Annotated[PitchHarmonic | PitchCurve, Field(discriminator="kind")]
 
 
 class LinearDrive(Part):
-    """What screws, racks and belts have in common: losses, compliance, play, pitch error, and what is on the input shaft."""
+    """Base of screws, racks and belts: losses, compliance, backlash, pitch error, and the values of the input shaft."""
 
     efficiency: Annotated[Number, Limit(gt=0.0, le=1.0)] | None = None
     """while the input drives; left out, none is lost"""
@@ -213,13 +213,13 @@ class LinearDrive(Part):
     pitch_error: PitchError | None = None
     """e over the angle of the input shaft, at the slide: deflection = input angle/ratio - position - e"""
     inertia: Annotated[Inertia, NotNegative] = 0.0
-    """of what turns with the input shaft"""
+    """inertia of all that turns with the input shaft"""
     viscous_friction: Annotated[ViscousFriction, NotNegative] = 0.0
     """on the input shaft"""
     drag_torque: Annotated[Torque, NotNegative] = 0.0
     """dry friction on the input shaft, such as that of the preload"""
     note: str = ""
-    """what a reader of the results must know"""
+    """note for readers of the results"""
 
     @model_validator(mode="after")
     def _compliance_is_clear(self) -> Self:
@@ -292,7 +292,7 @@ class LinearDrive(Part):
 
 
 def _one_way(part: Part, ways: dict[str, tuple[str, ...]], optional: tuple[str, ...] = ()) -> str:
-    """Which of several sets of keys is given, each saying the same."""
+    """Choice among equivalent sets of keys."""
     given = {way: [key for key in keys if getattr(part, key) is not None] for way, keys in ways.items()}
     used = [way for way, keys in given.items() if keys]
     text = ", or ".join(" and ".join(keys) for keys in ways.values())
@@ -332,15 +332,15 @@ class ScrewData(LinearDrive):
     """in series with the next ones, in place of stiffness"""
     bearing_stiffness: Annotated[AxialStiffness, Positive] | None = None
     supported_length: Annotated[Length, Positive] | None = None
-    """of the screw between bearing and nut; between both bearings where both ends are fixed, the nut in the middle"""
+    """length of the screw between bearing and nut; with both ends fixed, between both bearings, the nut in the middle"""
     core_diameter: Annotated[Length, Positive] | None = None
-    """of the screw's thread root"""
+    """core diameter of the screw's thread root"""
     elastic_modulus: Annotated[Pressure, Positive] | None = None
     """left out, that of steel, 206 GPa"""
     support: Literal["one end", "both ends"] | None = None
     """at which the screw is fixed axially: stiffness E A/L (left out, this), or 4 E A/L"""
     diameter: Annotated[Length, Positive] | None = None
-    """of the screw: with length, in place of inertia"""
+    """diameter of the screw: with length, in place of inertia"""
     length: Annotated[Length, Positive] | None = None
     density: Annotated[Density, Positive] | None = None
     """left out, that of steel, 7850 kg/m^3"""
@@ -434,7 +434,7 @@ class RackData(LinearDrive):
     module: Annotated[Length, Positive] | None = None
     """normal module"""
     teeth: Annotated[Whole, Field(ge=4, le=1000)] | None = None
-    """of the pinion"""
+    """teeth of the pinion"""
     helix_angle: Annotated[Angle, Limit(ge=0.0, le=0.25 * math.pi)] | None = None
     """left out, 0: straight teeth"""
     travel_per_turn: Annotated[Length, Positive] | None = None
@@ -465,15 +465,15 @@ class BeltData(LinearDrive):
     pulley_diameter: Annotated[Length, Positive] | None = None
     """at the belt's pitch line"""
     teeth: Annotated[Whole, Field(ge=4, le=1000)] | None = None
-    """of the pulley"""
+    """teeth of the pulley"""
     pitch: Annotated[Length, Positive] | None = None
-    """of the belt"""
+    """pitch of the belt"""
     travel_per_turn: Annotated[Length, Positive] | None = None
     """in place of both"""
     specific_stiffness: Annotated[Force, Positive] | None = None
     """c_sp, force to unit strain: with free_lengths, in place of stiffness"""
     free_lengths: tuple[Annotated[Length, Positive], ...] | None = Field(None, min_length=1, max_length=10)
-    """of the strands between pulley and slide that carry together: stiffness = c_sp (1/L_1 + 1/L_2 ...)"""
+    """lengths of the strands between pulley and slide that carry together: stiffness = c_sp (1/L_1 + 1/L_2 ...)"""
 
     @model_validator(mode="after")
     def _is_a_belt(self) -> Self:
@@ -558,9 +558,9 @@ class LinearMotorData(Part):
     """
 
     mass: Annotated[Mass, NotNegative] = 0.0
-    """of the part that moves"""
+    """mass of the part that moves"""
     rated_force: Annotated[Force, Positive] | None = None
-    """that of command 1"""
+    """force at command 1"""
     peak_force: Annotated[Force, Positive] | None = None
     """at which the force ends; left out, without limit"""
     force_constant: Annotated[ForceConstant, Positive] | None = None
@@ -576,7 +576,7 @@ class LinearMotorData(Part):
     pole_pitch: Annotated[Length, Positive] | None = None
     """tau, from a north pole to the next south pole: half a magnetic period"""
     note: str = ""
-    """what a reader of the results must know"""
+    """note for readers of the results"""
 
     @model_validator(mode="after")
     def _is_a_motor(self) -> Self:

@@ -39,19 +39,19 @@ class MotorLimits(Part):
     """for seconds, as in acceleration"""
     max_speed: Annotated[Speed, Positive] | None = None
     resistance: Annotated[Resistance, Positive] | None = None
-    """of the winding, at 25 °C"""
+    """resistance of the winding, at 25 °C"""
     torque_constant: Annotated[TorqueConstant, Positive] | None = None
     thermal_resistance: Annotated[ThermalResistance, Positive] | None = None
     """winding to ambient, in place of its two parts"""
     thermal_resistance_winding_case: Annotated[ThermalResistance, Positive] | None = None
     thermal_resistance_case_ambient: Annotated[ThermalResistance, Positive] | None = None
     thermal_time_constant_winding: Annotated[Time, Positive] | None = None
-    """of the winding against a case of constant temperature"""
+    """thermal time constant winding of the winding against a case of constant temperature"""
     thermal_time_constant_motor: Annotated[Time, Positive] | None = None
-    """of the case against the ambient"""
+    """thermal time constant motor of the case against the ambient"""
     max_winding_temperature: Temperature | None = None
     max_voltage: Annotated[Voltage, Positive] | None = None
-    """of the amplifier of a torque source; of a DC motor `voltage_limit` says it"""
+    """voltage limit of the amplifier of a torque source; a DC motor has `voltage_limit`"""
     max_current: Annotated[Current, Positive] | None = None
     """the smaller of those of motor and amplifier"""
 
@@ -135,12 +135,12 @@ class Motor(Part):
     voltage_limit: Annotated[Voltage, Positive] | None = None
     """largest voltage of the amplifier"""
     winding: Winding | None = None
-    """of a synchronous motor; of a torque source that is one, for its current and its heat"""
+    """winding of a synchronous motor, or of one that is modelled as a torque source, for its current and its heat"""
     dc_voltage: Annotated[Voltage, Positive] | None = None
-    """of the amplifier that feeds a synchronous motor"""
+    """dc voltage of the amplifier that feeds a synchronous motor"""
     limits: MotorLimits | None = None
     note: str = ""
-    """what a reader of the results must know, such as that the friction is not printed"""
+    """note for readers of the results, such as that the friction is not printed"""
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
@@ -230,7 +230,7 @@ class Motor(Part):
             raise ValueError(f"has {', '.join(idle)}, {why}; leave {'it' if len(idle) == 1 else 'them'} out")
 
     def _check_synchronous(self, phase: PhaseValues) -> None:
-        """What a motor with a winding cannot have beside it."""
+        """Refuse keys that exclude a winding."""
         if self.kind == "dc":
             raise ValueError('has a winding, which only a motor of kind "synchronous" or "torque_source" can have')
         if self.limits is not None:
@@ -377,7 +377,7 @@ class ShaftMotor(Motor):
     """
 
     shaft: str
-    """that it turns"""
+    """shaft that the motor turns"""
     torque_limit: Annotated[Torque, Positive] | None = None
     """largest torque of a torque source"""
 

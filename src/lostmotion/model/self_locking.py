@@ -1,4 +1,4 @@
-"""What a gear does while its load drives it, said before any run: it locks, lowers smoothly, chatters or jams.
+"""Behaviour of a gear while its load drives it, before any run: it locks, lowers smoothly, chatters or jams.
 
 docs/self-locking.md derives it. The laws are those of the solver: losses and linear regimes come from the core.
 """
@@ -35,7 +35,7 @@ class Overrunning:
     load_torque: float
     """M at the output, > 0 [N·m]"""
     input_speed: float
-    """of the motion [rad/s]"""
+    """input speed of the motion [rad/s]"""
     forward_efficiency: float
     """eta_f in motion, while the input drives"""
     backward_efficiency: float
@@ -88,9 +88,9 @@ class SelfLocking:
     inertia_ratio: float
     """J_2/(J_1 i²) of what is rigidly joined to output and input of the gear"""
     least_torque: float
-    """of the motor, breaks the load loose downward, with the dry friction up to it [N·m]; < 0: the load drives the motor"""
+    """least torque of the motor that breaks the load loose downward, with the dry friction up to it [N·m]; < 0: the load drives the motor"""
     motor: str
-    """whose torque that is; empty: there is none, and it is that at the input of the gear"""
+    """motor with that torque; empty: there is none, and the torque is that at the input of the gear"""
     moves_slide: bool = False
     """whether the load torque is a force [N] on a slide"""
 
@@ -101,7 +101,7 @@ class SelfLocking:
 
     @property
     def brief(self) -> str:
-        """What lowering the load takes, and how it goes."""
+        """Torque for lowering the load, and the kind of the motion."""
         torque = f"{abs(self.least_torque):.4g} N·m of {self.motor or 'the input'}"
         takes = f"takes more than {torque}" if self.least_torque > 0.0 else f"is held back by at least {torque}"
         return f"{takes}; {self._motion()}"

@@ -129,7 +129,7 @@ MOST_POINTS = 100
 
 
 def _chord_end(begin: float, error: float) -> float:
-    """Where a chord of ``2 s/(1 + s^2)`` ends that begins at a value of s and departs from the curve by an error."""
+    """End of a chord of ``2 s/(1 + s^2)`` that begins at a value of s and departs from the curve by an error."""
     low, high = begin, begin + 1.0
     while _departure(begin, high) < error and high < 1e9:
         high = begin + 2.0 * (high - begin)

@@ -118,12 +118,12 @@ class TimeFunction(Part, Generic[V]):
     """The sum of all that is given; a bare number is a constant."""
 
     derivatives: ClassVar[int] = 1
-    """of which the breakpoints tell, beside the value; all higher ones are 0 between them"""
+    """derivatives, beside the value, that change at breakpoints; all higher ones are 0 between them"""
 
     mean: V = 0.0  # type: ignore[assignment]
     """constant part"""
     amplitude: V | None = None
-    """of one sine, with frequency and phase"""
+    """amplitude of one sine, with frequency and phase"""
     frequency: Annotated[Frequency, Positive] | None = None
     phase: Angle = 0.0
     sines: tuple[Sine[V], ...] = ()
@@ -219,7 +219,7 @@ class Signal(TimeFunction[V], Generic[V]):
         return self.model_copy(update={"steps": tuple(later)})
 
     def upper_bound(self) -> float:
-        """Which the signal never exceeds: of all but the sines the greatest value, and their amplitudes beyond."""
+        """Upper bound of the signal: the largest value without the sines, plus the amplitudes of the sines."""
         lines = self.breakpoint_list()
         values = [value for _, value, _ in lines]
         values += [value + slope * (end - begin) for (begin, value, slope), (end, *_) in itertools.pairwise(lines)]

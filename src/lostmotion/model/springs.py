@@ -26,8 +26,8 @@ class Spring(Part):
     stiffness: Annotated[TorsionCurve | LinearStiffness, Field(discriminator="kind")]
     """P over the angle from the rest angle on"""
     rest_angle: Angle = 0.0
-    """of the shaft, where the spring has no torque"""
+    """angle of the shaft at which the spring has no torque"""
 
     def core_fields(self) -> dict[str, Any]:
-        """What the core takes, in SI units."""
+        """Fields for the core, in SI units."""
         return {"curve": self.stiffness.core(), "rest_angle": self.rest_angle}

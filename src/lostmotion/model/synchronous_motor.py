@@ -47,7 +47,7 @@ class Forms(NamedTuple):
     question: str
     unit: str
     common: str
-    """what all forms are converted to"""
+    """form to which all others are converted"""
     factors: dict[str, float]
     """key of a form: the common value to one of it"""
 
@@ -183,9 +183,9 @@ class Winding(Part):
     inductance_line_to_line: Annotated[Inductance, Positive] | None = None
     """between two terminals, 2 L_d = 2 L_q"""
     inductance_line_to_line_min: Annotated[Inductance, Positive] | None = None
-    """of a salient rotor, the least over its angle, 2 L_d"""
+    """least inductance of a salient rotor over its angle, 2 L_d"""
     inductance_line_to_line_max: Annotated[Inductance, Positive] | None = None
-    """of a salient rotor, the greatest over its angle, 2 L_q"""
+    """largest inductance of a salient rotor over its angle, 2 L_q"""
     inductance_d: Annotated[Inductance, Positive] | None = None
     """L_d"""
     inductance_q: Annotated[Inductance, Positive] | None = None
@@ -207,7 +207,7 @@ class Winding(Part):
     torque_constant_block: Annotated[TorqueConstant, Positive] | None = None
     """to one ampere of the supply with block commutation, (3 sqrt(3)/pi) p psi"""
     continuous_current_rms: Annotated[Current, Positive] | None = None
-    """that the motor stands for ever, at rest"""
+    """current that the motor withstands permanently, at rest"""
     continuous_current_peak: Annotated[Current, Positive] | None = None
     max_current_rms: Annotated[Current, Positive] | None = None
     """the smaller of those of motor and amplifier"""
@@ -331,7 +331,7 @@ class Winding(Part):
 
 
 def _readings(key: str, value: Any) -> str:
-    """What a key may mean that does not say it."""
+    """Possible meanings of an ambiguous key."""
     forms = UNCLEAR[key]
     try:
         number = Unit(forms.unit).read(value)

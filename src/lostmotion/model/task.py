@@ -1,4 +1,4 @@
-"""What is asked of a drive: the duty cycle and the requirements that the drive check compares with."""
+"""Task of a drive: the duty cycle and the requirements that the drive check compares with."""
 
 from typing import Annotated
 
@@ -7,7 +7,7 @@ from ..inputs.quantities import Angle, Positive, Switch, Temperature, Time
 
 
 class Task(Part):
-    """What is asked of the drive. No run depends on it; the drive check compares with it."""
+    """Requirements of a drive. No run depends on them; the drive check compares with them."""
 
     cycle: Annotated[Time, Positive] | None = None
     """period after which the motion of the run repeats, pause included; left out, it repeats without a pause"""

@@ -50,7 +50,7 @@ class TorsionCurve(Part):
 
     kind: Literal["curve"] = "curve"
     slopes: tuple[Annotated[Stiffness, NotNegative], ...] = Field(min_length=1, max_length=MAX_PIECES)
-    """of the segments, from twist 0 outwards"""
+    """slopes of the segments, from twist 0 outwards"""
     breaks: tuple[Annotated[Angle, Positive], ...] = ()
     """breakpoints: twists at which the slope changes; one fewer than slopes"""
     backlash: Annotated[Angle, NotNegative] = 0.0

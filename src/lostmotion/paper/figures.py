@@ -361,7 +361,7 @@ def draw(spec: FigureSpec) -> Figure:
 
 
 def charts_of(spec: FigureSpec) -> tuple[Chart, ...]:
-    """What a page shows of a spec, with plain labels."""
+    """Charts of a specification on a page, with plain labels."""
     if spec.number == SCHEMATICS.number:
         return tuple(Drawing(sketch.title, sketch.svg(), sketch.width > 12.0) for sketch in sketches())
     if spec.number == LOSS_MAP.number:

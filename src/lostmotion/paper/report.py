@@ -50,7 +50,7 @@ def render(specs: list[FigureSpec], table: list[Constant], facts: Facts, *, live
 
 
 def _verdict(facts: Facts) -> Headline:
-    """What the three models agree on, and what they do not."""
+    """Agreement and disagreement of the three models."""
     stuck = {model: f"{100.0 * facts.stuck[model, 'small']:.0f} %" for model in MODELS}
     traditional = " and ".join(f"{stuck[model]} ({model})" for model in MODELS if model != "2-DOF-NL")
     return Headline(

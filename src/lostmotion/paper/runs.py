@@ -36,7 +36,7 @@ class Results:
     first_loading: tuple[Any, Any]
     """twist [rad] and torque [N·m] of 2-DOF-NL with the input locked"""
     loops: tuple[Loop, ...]
-    """of the same, at the amplitudes `LOOPS`"""
+    """loops of the same, at the amplitudes `LOOPS`"""
 
     def load_response(self, model: str, amplitude: str) -> Any:
         """F(w)/F(E) [rad/s] of the load's speed over `FREQUENCIES`."""

@@ -57,7 +57,7 @@ class Sketch:
             axes.text(x, y, text, ha="center", va="center", fontsize=8, zorder=3)
 
     def svg(self) -> str:
-        """As SVG, in the colours of the page."""
+        """Sketch as SVG, in the colours of the page."""
         parts = []
         for points, linewidth in self.lines:
             path = "L".join(f"{a:.1f} {b:.1f}" for a, b in map(self._place, points))

@@ -1,4 +1,4 @@
-"""What pointing axes miss, and what causes it."""
+"""Pointing errors of axes, and their causes."""
 
 from ..namespace import namespace
 

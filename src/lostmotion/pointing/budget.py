@@ -37,8 +37,8 @@ class PointingError:
     probable: float
     """0.6745 standard deviations"""
     measured_rms: float
-    """of the measured direction: with a camera, where the target is less where its tracker expects it; else the angle of the load less what the
-    encoder says"""
+    """rms of the measured direction: with a camera, target minus expected target of its tracker; else the angle of the load minus that of the
+    encoder"""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class View:
     """Share of the time in which the target is within the field of view."""
 
     share: float
-    """of the time"""
+    """share of the time"""
     probability: float
     """product over the axes of normal distributions of these means and deviations"""
 
@@ -71,7 +71,7 @@ class PointingBudget:
     measured: Mapping[str, np.ndarray]
     """error of the measured direction [rad] over time, as in `PointingError`"""
     whole: Errors
-    """of the scenario as it is"""
+    """errors of the scenario as it is"""
     without: Mapping[str, Errors]
     """with one cause taken away, by its name"""
     alone: Mapping[str, Errors]
@@ -89,7 +89,7 @@ class PointingBudget:
     pixels: Mapping[str, float]
     """angle of a pixel [rad] of the axes with a camera"""
     view: View | None = None
-    """where a field of view is given, or cameras have one"""
+    """view, if a field of view is given or cameras have one"""
 
     def contributions(self, axis: str) -> dict[str, float]:
         """By how much the mean square error of an axis falls [rad²] with each cause as all are taken away one after another.
@@ -263,7 +263,7 @@ def _cases(scenario: TrainScenario, *, robustness: bool = True) -> dict[Case, Se
 
 
 def runs_of(scenario: Scenario | TrainScenario) -> int:
-    """How many runs a budget makes, but for those that find the end of the start-up transient."""
+    """Number of runs of a budget, without those that find the end of the start-up transient."""
     return len(_cases(in_long_form(scenario)))
 
 

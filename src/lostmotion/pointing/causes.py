@@ -1,4 +1,4 @@
-"""What makes an axis miss its target, and the axis without it."""
+"""Causes of pointing errors, and the axis without each."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ VARIANTS: dict[str, Callable[[Tables], None]] = {
 
 
 def present(scenario: TrainScenario, table: Mapping[K, Callable[[Tables], None]]) -> dict[K, Callable[[Tables], None]]:
-    """Those changes of a table that change the scenario at all."""
+    """Changes of a table that change the scenario at all."""
     return {name: change for name, change in table.items() if _changed(scenario, [change]) is not None}
 
 

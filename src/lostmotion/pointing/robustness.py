@@ -64,7 +64,7 @@ def _keep_knowledge(data: Tables, factor: float) -> None:
 
 
 def _warm_winding(motor: Tables, resistance: float, flux: float) -> None:
-    """Of (2): stall torque with flux/resistance, no-load speed with 1/flux, time constant with 1/resistance."""
+    """Warm motor of (2): stall torque with flux/resistance, no-load speed with 1/flux, time constant with 1/resistance."""
     k = motor["armature_voltage_constant"]
     no_load = motor["rated_speed"] * k / (k - 1.0) if k > 1.0 else math.inf
     motor["armature_voltage_constant"] = warm = k * flux / resistance

@@ -1,4 +1,4 @@
-"""What a checkout compiles when it is first needed."""
+"""Libraries that a checkout compiles when they are first needed."""
 
 from __future__ import annotations
 

@@ -236,7 +236,7 @@ def _reference(scenario: Scenario | TrainScenario, prefix: str, kind: str) -> tu
 def _model(
     scenario: Scenario | TrainScenario, parameters: tuple[Parameter, ...], guid: str, references_given: bool
 ) -> Model:
-    """What modelDescription.xml says."""
+    """Content of modelDescription.xml."""
     core, signals, axes = scenario.core(), scenario.signals(), scenario.by_prefix()
     shown = {v.name for v in axis_variables(axes)}
     controlled = {f"{prefix}command" for prefix in axes}

@@ -1,4 +1,4 @@
-"""What an FMU declares, whatever the version of the standard, and its page."""
+"""Declarations of an FMU, for all versions of the standard, and its page."""
 
 from __future__ import annotations
 
@@ -94,18 +94,18 @@ class Model:
     """values of the inputs at t = 0"""
     outputs: list[Declared]
     states: list[Declared]
-    """of Model Exchange; empty: the FMU is for Co-Simulation alone"""
+    """states of Model Exchange; empty: the FMU is for Co-Simulation alone"""
     state_starts: list[float]
     """values of the states at t = 0"""
     indicators: int
-    """how many event indicators there are"""
+    """number of event indicators"""
     parameters: list[Parameter]
     references_given: bool
     """whether the references of sampled controllers are inputs"""
     note: str
 
     def names(self) -> str:
-        """What the library reads to know which variable has which value reference: bindings/fmu/variables.hpp."""
+        """Names of the variables by value reference, for the library: bindings/fmu/variables.hpp."""
         lines = [self.guid, *(["references"] if self.references_given else []), f"indicators {self.indicators}"]
         lines += [f"input {v.name}" for v in self.inputs] + [f"output {v.name}" for v in self.outputs]
         text = "\n".join([*lines, *(f"state {v.name} {v.decade}" for v in self.states)]) + "\n"
@@ -140,7 +140,7 @@ def add_units(root: ET.Element, model: Model, *, input_rates: bool) -> None:
 
 
 def _powers(unit: str, *, per_second: bool = False) -> list[int]:
-    """Of the base units."""
+    """Powers of the base units."""
     powers = [0, 0, -1 if per_second else 0, 0, 0, 0]
     for name, n in _product(unit).items():
         powers = [a + n * b for a, b in zip(powers, _BASE[name], strict=True)]
@@ -173,7 +173,7 @@ def add_default_experiment(root: ET.Element, model: Model) -> None:
 
 
 def parameter_meaning(p: Parameter) -> str:
-    """What a parameter is."""
+    """Meaning of a parameter."""
     return f"value of the key {p.key}" + (", at t = 0" if is_of_start(p) else "")
 
 
@@ -189,7 +189,7 @@ def is_of_start(p: Parameter) -> bool:
 
 
 def document(root: ET.Element) -> bytes:
-    """As a file."""
+    """XML document as text."""
     ET.indent(root)
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n'.encode()
 

@@ -1,4 +1,4 @@
-"""Which values of a scenario can be changed in its numbers alone, and how these follow from them."""
+"""Values of a scenario that can be changed in its numbers alone, and the rules by which these follow from them."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Parameter:
     """the range of its value in scenario files"""
 
     def core(self) -> tuple[str, str, float, tuple[float, float, float], list[tuple[int, bool, float, float]]]:
-        """As `write_description` of the core takes it."""
+        """Parameters as `write_description` of the core takes them."""
         limit = self.limit
         bounds = [(limit.gt, -math.inf), (limit.ge, -math.inf), (limit.le, math.inf)]
         above, at_least, at_most = (none if bound is None else bound for bound, none in bounds)
@@ -63,7 +63,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Parameters:
-    """What was found of the values of a scenario."""
+    """Dependence of the numbers on the values of a scenario."""
 
     parameters: tuple[Parameter, ...]
     refused: dict[str, str]

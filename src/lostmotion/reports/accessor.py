@@ -1,4 +1,4 @@
-"""What a result can do by itself: `result.lm`, an accessor of xarray datasets."""
+"""Accessor `result.lm` of xarray datasets: plots, energy, explanation."""
 
 from __future__ import annotations
 

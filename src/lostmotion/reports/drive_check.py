@@ -12,7 +12,7 @@ MARKS = {"ok": "ok", "warning": "WARNING", "unknown": "not judged"}
 
 
 def counted(findings: Sequence[Finding]) -> str:
-    """How many points are exceeded, and how many are not judged."""
+    """Number of exceeded rules, and of those that are not judged."""
     warnings, unknown = (sum(f.verdict == verdict for f in findings) for verdict in ("warning", "unknown"))
     text = "No warnings." if warnings == 0 else f"{warnings} warning{'s' if warnings > 1 else ''}."
     return f"{text} {unknown} not judged (?)." if unknown else text

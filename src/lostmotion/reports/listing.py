@@ -92,7 +92,7 @@ def list_records(
 
 
 def summary() -> str:
-    """How many records of each kind there are, how they run, and between which ratings."""
+    """Number of records of each kind, their levels, and the range of their ratings."""
     rows = []
     of_kind: dict[tuple[str, str], list[Sheet]] = {}
     for record in catalogue():

@@ -34,7 +34,7 @@ class Html(str):
 
 @dataclass(frozen=True)
 class Headline:
-    """What a report comes to, in at most three lines."""
+    """Headline of a report, in at most three lines."""
 
     state: Literal["good", "bad", "open"]
     lines: tuple[str, ...]
@@ -99,7 +99,7 @@ def render(report: Report) -> str:
 
 
 def verdict(found: Headline) -> str:
-    """What a report comes to, as HTML."""
+    """Headline of a report as HTML."""
     state = {"good": "Verdict", "bad": "Verdict: not in order", "open": "Verdict, with reservations"}[found.state]
     lines = "".join(f"<p>{_text(line)}</p>\n" for line in found.lines)
     return f'<section class="verdict {found.state}"><h2>{state}</h2>\n{lines}</section>'
@@ -137,7 +137,7 @@ def style() -> str:
 
 
 def _script() -> str:
-    """What makes the charts move; empty where it is not built, and cannot be."""
+    """Script of the charts; empty if it is not built and cannot be."""
     if not SCRIPT.is_file() and shutil.which("npm") is not None:
         try:
             made_here("page-report", [], "the script of reports")
@@ -147,7 +147,7 @@ def _script() -> str:
 
 
 def _text(text: str) -> str:
-    """As HTML; `code` as code."""
+    """Text as HTML, with `code` as code."""
     return text if isinstance(text, Html) else re.sub(r"`([^`]+)`", r"<code>\1</code>", escape(text))
 
 
@@ -217,7 +217,7 @@ def _legend(chart: Chart) -> str:
 
 
 def scale_of(ground: Ground) -> str:
-    """What the shades of a map mean."""
+    """Legend of the shades of a map."""
     values = ground.values[np.isfinite(ground.values)]
     if len(values) == 0:
         return "no values"

@@ -1,4 +1,4 @@
-"""What commands write: self-contained HTML pages, the data of their charts and tables as CSV, pictures on request."""
+"""Files that commands write: self-contained HTML pages, data of charts and tables as CSV, pictures on request."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a figure shows, before it is drawn. Pages carry it as data (`packed`, `static`); `plots` draws pictures of it."""
+"""Content of a figure before it is drawn. Pages carry it as data (`packed`, `static`); `plots` draws pictures of it."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ class Bars:
 
     title: str
     label: str
-    """of the values"""
+    """label of the values"""
     values: Mapping[str, tuple[float, ...]]
     series: tuple[str, ...] = ()
     """names of the values of a bar, where there are two"""
@@ -121,7 +121,7 @@ class Bars:
 
 @dataclass(frozen=True)
 class Histogram:
-    """How often a quantity takes which values."""
+    """Histogram of a quantity."""
 
     title: str
     label: str
@@ -140,7 +140,7 @@ class Matrix:
 
 @dataclass(frozen=True)
 class Contacts:
-    """Which contacts are stuck, and which way the others slip: -1, 0, +1 at instants of equal distance."""
+    """Stuck contacts, and the direction of slipping ones: -1, 0, +1 at equidistant instants."""
 
     title: str
     time: Any
@@ -149,7 +149,7 @@ class Contacts:
 
 @dataclass(frozen=True)
 class Flows:
-    """Where energy comes from and where it goes [J]: the ledger of a run."""
+    """Energy flows of a run [J]: sources and sinks of the ledger."""
 
     title: str
     energies: Mapping[str, float]
@@ -157,7 +157,7 @@ class Flows:
 
 @dataclass(frozen=True)
 class Drawing:
-    """What is drawn as SVG, without data."""
+    """A drawing as SVG, without data."""
 
     title: str
     svg: str

@@ -17,7 +17,7 @@ NUMBERS = ("rms", "peak", "probable", "mean", "measured, rms")
 
 
 def header(budget: PointingBudget) -> list[str]:
-    """Of the table; in pixels too where there are any."""
+    """Header of the table; with pixels if there are any."""
     units = [f"{name} [mrad]" for name in NUMBERS]
     return ["axis", "run", *units, *(["rms [px]", "peak [px]"] if budget.pixels else [])]
 
@@ -44,7 +44,7 @@ CONTRIBUTIONS = ("axis", "taken away", "mean square falls by [µrad²]", "share 
 
 
 def contribution_rows(budget: PointingBudget) -> list[list[str]]:
-    """What each cause takes away as all are taken away one after another; the sum is what they make together."""
+    """Contribution of each cause as all causes are removed one after another; the sum is their total."""
     rows = []
     for axis, whole in budget.whole.items():
         total = whole.rms**2 - budget.ideal[axis].rms ** 2
@@ -60,7 +60,7 @@ def _share(part: float, whole: PointingError) -> list[str]:
 
 
 def view_line(budget: PointingBudget) -> str:
-    """How long the target is in view, or nothing."""
+    """Share of the time in which the target is in view, or nothing."""
     if budget.view is None:
         return ""
     return f"in view {100.0 * budget.view.share:.4g} % of the time, with probability {100.0 * budget.view.probability:.6g} %"
@@ -76,7 +76,7 @@ def _unit(budget: PointingBudget) -> tuple[float, str]:
 
 
 def error_panels(budget: PointingBudget) -> list[Panel]:
-    """Of each axis its error and that of the measured direction over time, from when on they count."""
+    """Error of each axis and of the measured direction over time, from the instant at which they count."""
     kept = budget.time >= budget.after
     time = budget.time[kept]
     factor, unit = _unit(budget)
@@ -145,7 +145,7 @@ def _number(name: str) -> float:
 
 
 def _bars(budget: PointingBudget) -> Group:
-    """What each cause contributes to the mean square error of each axis."""
+    """Contributions of the causes to the mean square error of each axis."""
     charts = tuple(
         Bars(
             axis, "mean square falls by [µrad²]", {n: (1e12 * part,) for n, part in budget.contributions(axis).items()}

@@ -138,7 +138,7 @@ def dead_zone_line(found: xarray.Dataset) -> list[str]:
 
 
 def motion_lines(result: xarray.Dataset) -> list[str]:
-    """How many motions were found, how well they repeat, and why others were not found."""
+    """Number of motions found, their residuals, and the reasons for missing ones."""
     reasons = [r for r in result["reason"].values.ravel() if r]
     repeating = (result["reason"] == "") & ~(result["spread"] > 0.0 if "spread" in result else False)
     worst = float(result["residual"].where(repeating).max())
@@ -149,7 +149,7 @@ def motion_lines(result: xarray.Dataset) -> list[str]:
 
 
 def _closed_loop_lines(result: xarray.Dataset) -> list[str]:
-    """Which frequencies had to fit the sample times, and which motions do not repeat."""
+    """Frequencies that were adapted to the sample times, and motions that do not repeat."""
     f, asked = result["frequency"].values, result["asked_frequency"].values
     off, lines = abs(f / asked - 1.0), []
     if off.max() > 1e-9:

@@ -97,7 +97,7 @@ def _printed_torsion(sheet: GearboxSheet) -> list[Curve]:
 
 
 def summary_rows(report: RigReport) -> list[tuple[str, str]]:
-    """What the rig says of itself, beside the comparison."""
+    """Measurements of the rig without a printed value."""
     back = report.backdriving_torque
     return [
         ("starting torque at the input", f"{report.starting_torque:.4g} N·m"),
@@ -145,7 +145,7 @@ def _overrunning_rows(report: RigReport) -> list[tuple[str, str]]:
 
 
 def largest_difference(comparisons: Sequence[Comparison]) -> str:
-    """How far the rig is from the sheet."""
+    """Largest difference between the rig and the data sheet."""
     if not comparisons:
         return "There is no data sheet to compare with."
     worst = max(comparisons, key=lambda c: abs(c.difference))
@@ -154,7 +154,7 @@ def largest_difference(comparisons: Sequence[Comparison]) -> str:
 
 
 def _verdict(report: RigReport) -> Headline:
-    """How far the rig is from the sheet, and what the torsion and the locking are."""
+    """Agreement of rig and data sheet, torsion and locking, in words."""
     lines = [largest_difference(report.comparisons)]
     differs = [c for c in report.comparisons if c.remark]
     for c in differs[:1]:

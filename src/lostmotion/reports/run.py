@@ -65,7 +65,7 @@ def summary(result: xarray.Dataset | RunArrays) -> str:
 
 
 def contact_lines(result: xarray.Dataset | RunArrays) -> list[str]:
-    """How often each contact has come to stick, slipped again and turned around, of the switchings that the result keeps."""
+    """Number of stops, break-aways and reversals of each contact, among the switchings that the result keeps."""
     if not result.attrs.get(SWITCHINGS):
         return []
     names = names_in(result.attrs)

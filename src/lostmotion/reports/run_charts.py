@@ -1,4 +1,4 @@
-"""What is shown of a run: its axes, commands, speeds, torques, twists, contacts, energy, and the way through its loss maps."""
+"""Charts of a run: axes, commands, speeds, torques, twists, contacts, energy, and the path through its loss maps."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def _panel(result: xarray.Dataset, title: str, label: str, series: list[Series])
 
 
 def _drive(result: xarray.Dataset) -> Iterator[Chart]:
-    """Of a drive in the short form."""
+    """Charts of a drive in the short form."""
     time, ratio = result["time"].values, _ratio(result)
 
     def curve(name: str, style: Mapping[str, Any], factor: float = 1.0, label: str = "") -> Curve:
@@ -153,7 +153,7 @@ def _contacts(result: xarray.Dataset, names: Mapping[str, str]) -> Contacts:
 
 
 def _train(result: xarray.Dataset) -> Iterator[Chart]:
-    """Of a drive train: commands, speeds, torques, twists and contacts of all elements."""
+    """Charts of a drive train: commands, speeds, torques, twists and contacts of all elements."""
     scenario = scenario_of(result)
     assert isinstance(scenario, TrainScenario)
     train = scenario.train()
@@ -239,7 +239,7 @@ def ratios_to(train: DriveTrain, last: str) -> dict[str, float]:
 
 
 def gear_charts(result: xarray.Dataset) -> list[Panel]:
-    """Of each gear torque over twist, and the working point over its loss map."""
+    """Torque over twist of each gear, and the operating point over its loss map."""
     scenario = scenario_of(result)
     gears: list[tuple[str, Any, str, str, str]]
     slides: set[str] = set()

@@ -61,7 +61,7 @@ def panels(report: ScrewReport, sheet: ScrewSheet | None) -> list[Panel]:
 
 
 def summary_rows(report: ScrewReport) -> list[tuple[str, str]]:
-    """What the rig says of itself, beside the comparison."""
+    """Measurements of the rig without a printed value."""
     back = report.backdriving_force
     bare = "" if report.screw.drag_torque > 0.0 else ", as no drag is given"
     rows = [

@@ -231,7 +231,7 @@ def _stiffness_group(report: ServoReport) -> list[Group]:
 
 
 def _loop_groups(report: ServoReport) -> tuple[Group, Group]:
-    """What supports the verdict: the outermost loop and the run; then all other loops."""
+    """Loops in two groups: the outermost loop with the run, then all others."""
     *inner, outer = _loops(report)
     main = Group(
         "axis",

@@ -32,7 +32,7 @@ POINTS: dict[str, Any] = {
 
 
 def figures_of(directory: Path) -> Path:
-    """Where the page goes: not among the data, all of which readers of Parquet directories try to read."""
+    """Directory of the page: not among the data, all of which readers of Parquet directories try to read."""
     whole = directory.resolve()
     return whole.with_name(f"{whole.name}-figures")
 
@@ -183,7 +183,7 @@ def _counted(table: pa.Table, study: Study) -> str:
 
 
 def _task_page(study: Study, table: pa.Table, name: str) -> tuple[Report, list[str], dict[str, str]]:
-    """Of a task: its ranking alone, since what varies are names."""
+    """Page of a task: its ranking alone, since the varied values are names."""
     shown = show_selection(table, study)
     main, *parts = shown.parts if isinstance(shown.parts[0], Group) else (Group("none", "", "", ()), *shown.parts)
     assert isinstance(main, Group)

@@ -71,7 +71,7 @@ def show_selection(table: pa.Table, study: Study) -> Shown:
 
 
 def _verdict(table: pa.Table, ranked: list[Candidate], costs: list[Price], select: Selection) -> Headline:
-    """How many fit, which is best, and which limit costs most."""
+    """Number of pairs that fit, the best one, and the limit that costs most."""
     fitting = [c for c in ranked if c.fits]
     failed = sum(NOT_RUN in c.violated for c in ranked)
     cannot = f", {failed} cannot be run" if failed else ""

@@ -41,7 +41,7 @@ class AxisSignal:
 
     name: str
     slot: int
-    """where it is, among what all controllers remember"""
+    """slot in the memory of all controllers"""
     every: int
     """ticks from one value to the next; 0: it varies between the ticks"""
     phase: int
@@ -50,21 +50,21 @@ class AxisSignal:
 
 @dataclass(frozen=True)
 class Motion:
-    """What was found at one point."""
+    """Motion at one point."""
 
     plant: np.ndarray
     """variables of the drive or train over the samples, (channel, sample) of one window or more"""
     signals: dict[str, tuple[np.ndarray, np.ndarray]]
-    """of each variable of a controller the angles of the sine at its instants [rad], and its values"""
+    """for each variable of a controller the angles of the sine at its instants [rad], and its values"""
     residual: float
     windows: int
     """followed, all in all"""
     jumps: int
     """extrapolations that were taken"""
     advance: float
-    """of the angle that is told, over a period [rad]"""
+    """advance of the reported angle over a period [rad]"""
     spread: float
-    """of the first harmonic of the output from window to window / its mean; 0 of a periodic motion"""
+    """spread of the first harmonic of the output from window to window / its mean; 0 of a periodic motion"""
 
 
 class ClosedLoop:
@@ -139,7 +139,7 @@ class _UnderSine(Simulation):
 
 
 def running_slots(control: Bound) -> Iterator[int]:
-    """Where, among what all controllers remember, instants and energies of windings are, which no periodic motion brings back."""
+    """Slots in the memory of all controllers with instants and energies of windings, which no periodic motion restores."""
     first = 0
     for axis, *_ in control[1]:
         count, running = axis.slots()
@@ -321,7 +321,7 @@ def slowest(controller: Controller) -> float:
 
 
 def change(numbers: np.ndarray, scale: np.ndarray, free: bool) -> float:
-    """Of the last state over its window, in units of a scale; with a free angle, of the change itself."""
+    """Change of the last state over its window, in units of a scale; for a free angle, change of the change."""
     moved = np.diff(numbers, n=2 if free else 1, axis=0)[-1]
     return float(np.max(np.abs(moved[scale > 0.0]) / scale[scale > 0.0], initial=0.0))
 

@@ -87,7 +87,7 @@ def respond_closed(
     threads: int,
     progress: Callable[[], None] | None,
 ) -> dict[str, Any]:
-    """What `respond` returns of open loops: arrays with a row for each amplitude and window."""
+    """Arrays as `respond` returns them for open loops, with a row for each amplitude and window."""
     assert plant.closed is not None
     signals = list(axis_signals(plant.closed))
 

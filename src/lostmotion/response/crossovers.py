@@ -86,7 +86,7 @@ def three_decibels_down(frequencies: np.ndarray, gain: np.ndarray) -> float:
 
 
 def _falls_through(frequencies: np.ndarray, y: np.ndarray, level: float) -> float:
-    """Where a curve over the logarithm of the frequency first falls through a level."""
+    """First fall of a curve over the logarithm of the frequency through a level."""
     x = np.log(frequencies)
     below = np.flatnonzero((y[:-1] >= level) & (y[1:] < level))
     if len(below) == 0:

@@ -30,13 +30,13 @@ MAX_SWITCHINGS = 20_000
 
 @dataclass(frozen=True)
 class Found:
-    """What became of the search."""
+    """Result of the search."""
 
     verdict: Verdict
     reason: str
     """why there is no limit cycle, or none was found; empty if there is one"""
     result: dict[str, Any] = field(default_factory=dict, repr=False)
-    """of the core's search, of one point"""
+    """result of the core's search, of one point"""
     channels: tuple[str, ...] = ()
 
     @property
@@ -56,7 +56,7 @@ class Loop:
     core: _core.Train
     inputs: Sequence[_core.Signal]
     constants: Sequence[_core.Signal]
-    """what the inputs have come to"""
+    """constant values that the inputs have reached"""
     start: Mapping[str, float]
     capacities: Mapping[str, float]
     settled: float
@@ -68,7 +68,7 @@ class Loop:
 
     @classmethod
     def of(cls, scenario: TrainScenario) -> Loop:
-        """Of a scenario whose inputs come to rest.
+        """Loop of a scenario whose inputs come to rest.
 
         Raises
         ------
@@ -98,7 +98,7 @@ class Loop:
         return core_run(case, (duration, duration / samples, samples, False, 0.0, MAX_SWITCHINGS))
 
     def outlook(self, duration: float) -> Outlook:
-        """What follows from the state so long after the inputs have come to rest."""
+        """Conclusion from the state at a time after the inputs have come to rest."""
         watch = Watch(self.scenario, (self.watched,))
         watch.follow(duration, FEW)
         return watch.outlook(duration / FEW)[0]

@@ -56,13 +56,13 @@ class LinearModel:
     point: dict[str, float]
     """operating point (SI): states, inputs and, of a drive, the hysteresis capacity, by name"""
     units: dict[str, str]
-    """of states, inputs and outputs, by name"""
+    """units of states, inputs and outputs, by name"""
     states: tuple[str, ...] = STATES
     inputs: tuple[str, ...] = INPUTS
     outputs: tuple[str, ...] = OUTPUTS
 
     def __repr__(self) -> str:
-        """Which operating point and regime it is."""
+        """Operating point and regime as text."""
         words = {-1: "slips in reverse", 0: "is stuck", 1: "slips forward"}
         modes = [f"{c.replace('_', ' ')} {words[m]}" for c, m in self.contacts.items() if m in words]
         moved = ", ".join(f"{name} {value:.6g}" for name, value in self.point.items() if value != 0.0)
@@ -386,7 +386,7 @@ def train_model(
 
 
 def _why_several_regimes(drive: Drive) -> str:
-    """What gives a drive more than one regime; empty if it has one."""
+    """Reason for more than one regime of a drive; empty if it has one."""
     m, g = drive.motor, drive.gearbox
     reasons = {
         "dry friction": m.friction_torque > 0.0 or drive.load.friction_torque > 0.0,
@@ -399,7 +399,7 @@ def _why_several_regimes(drive: Drive) -> str:
 
 
 def _why_several_regimes_of(train: DriveTrain, core: _core.Train) -> str:
-    """What gives a train more than one regime; empty if it has one."""
+    """Reason for more than one regime of a train; empty if it has one."""
     gears, motors, shafts = train.gears.values(), train.motors.values(), train.shafts.values()
     rigid = {f"{train.twist_of(name)}_contact" for name, g in train.gears.items() if isinstance(g.stiffness, Rigid)}
     dry = [name for name in core.contact_names() if name not in rigid]

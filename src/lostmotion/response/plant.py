@@ -1,4 +1,4 @@
-"""What a response is asked of: a drive or a drive train, with the inputs that act on it."""
+"""Plant of a response: a drive or a drive train, with its inputs."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ class Plant:
     source: str | None
     """the input that is meant if none is named: command or reference of the only motor"""
     start: Mapping[str, float]
-    """of the scenario, by component; what is left out is 0"""
+    """initial state of the scenario, by component; missing values are 0"""
     rest: Mapping[str, float]
-    """where responses begin: at rest, a train with the angles and twists of its scenario, on which gravity may depend"""
+    """initial state of responses: at rest, a train with the angles and twists of its scenario, on which gravity may depend"""
     start_of: Callable[[Any], Mapping[str, float]]
     """the same of another initial state"""
     channels: tuple[str, ...]
@@ -49,7 +49,7 @@ class Plant:
     output: str
     """the variable that is looked at if none is named: the speed of the load"""
     angle: str
-    """whose advance over a period is told: that of the load"""
+    """angle whose advance over a period is reported: that of the load"""
     floors: Mapping[str, float]
     """rated magnitudes of the variables by which motions are compared"""
     attributes: Mapping[str, float]
@@ -57,7 +57,7 @@ class Plant:
     """the scenario, if it has controllers"""
 
     references: Mapping[str, AnyReference] = field(default_factory=dict)
-    """of its controllers, by the name of the input"""
+    """references of its controllers, by the name of the input"""
 
     def known_source(self, source: str | None) -> str:
         """The name of an input, if it is one, or of the only motor's command or reference.
@@ -84,7 +84,7 @@ class Plant:
         return self.output if output is None else known_output(output, self.channels)
 
     def unit(self, source: str) -> str:
-        """Of an input."""
+        """Unit of an input."""
         if source in self.references:
             return UNITS[self.references[source].kind]
         return next(v.unit for v in self.variables if v.name == source)

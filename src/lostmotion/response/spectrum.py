@@ -60,7 +60,7 @@ class Spectrum:
     against: str
     """"reference", or "motor" for the transmission error"""
     shaft: str
-    """whose error it is"""
+    """shaft with the error"""
     over: str
     """shaft of the motor, over whose angle it repeats"""
     unit: str
@@ -68,7 +68,7 @@ class Spectrum:
     turns: dict[str, float]
     """revolutions of each shaft that were evaluated"""
     angle: np.ndarray
-    """of the motor's shaft, equally spaced [rad]"""
+    """angle of the motor's shaft, equally spaced [rad]"""
     error: np.ndarray
     """without its mean and its drift [rad, m]"""
     peak_to_peak: float
@@ -377,7 +377,7 @@ def _cause(order: float, width: float, sources: list[tuple[str, float, bool]]) -
 
 
 def _sources(long: TrainScenario, train: DriveTrain, over: str) -> Iterator[tuple[str, float, bool]]:
-    """Of each part that states a period: its name, the order per turn of the motor, and whether it has multiples of it."""
+    """Name, order per turn of the motor, and presence of multiples, for each part that states a period."""
 
     def of(shaft: str, order: float) -> float:
         ratio = turns(train, over, shaft)

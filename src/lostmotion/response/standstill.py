@@ -48,12 +48,12 @@ NOTHING_MOVES = "the state is an equilibrium, as no number of drive and controll
 
 @dataclass(frozen=True)
 class Outlook:
-    """What follows from a state in which all contacts are stuck."""
+    """Conclusion from a state in which all contacts are stuck."""
 
     breaks_away: float
     """time until a contact breaks away [s]; infinite at an equilibrium, NaN where it does not follow from the state"""
     contact: str = ""
-    """that breaks away"""
+    """contact that breaks away"""
 
     @property
     def rests(self) -> bool:
@@ -78,7 +78,7 @@ class _Look:
     key: tuple[int, ...]
     contacts: tuple[str, ...]
     margins: np.ndarray
-    """of each contact the torque that frees it forward, and in reverse [N·m]"""
+    """torques of each contact that free it forward, and in reverse [N·m]"""
     scales: np.ndarray
     """capacities that these belong to [N·m]"""
     creep: float
@@ -197,7 +197,7 @@ class Watch:
         return found
 
     def outlook(self, window: float) -> tuple[Outlook, list[_Look] | None]:
-        """What follows from the state now and over three windows [s] from now on."""
+        """Conclusion from the state now and over three windows [s] from now on."""
         looks = self.looks(window)
         if looks is None:
             return UNKNOWN, None
@@ -299,13 +299,13 @@ class Watch:
 
 
 def _value(points: Sequence[tuple[float, ...]], begin: float, time: float) -> float:
-    """Of a signal at a time within its piece that begins at or before another."""
+    """Value of a signal at a time within its segment that begins at or before another."""
     t, value, slope = next(p for p in reversed(points) if p[0] <= begin)
     return value + slope * (time - t)
 
 
 def _zero(values: np.ndarray, rounding: float) -> float:
-    """How many steps after the last of four values their parabola is 0; infinite if never."""
+    """Number of steps after the last of four values until their parabola is 0; infinite if never."""
     value, step = values[-1], values[-1] - values[-2]
     bend = values[-1] - 2.0 * values[-2] + values[-3]
     bend = bend if abs(bend) > 8.0 * rounding else 0.0
@@ -330,7 +330,7 @@ def frequency_of(time: np.ndarray, values: np.ndarray) -> float:
 
 @dataclass(frozen=True)
 class Decision:
-    """What a watch has found."""
+    """Decision of a watch."""
 
     verdict: Verdict
     reason: str

@@ -48,7 +48,7 @@ class Window:
         return np.asarray((np.arange(self.samples) * self.stride + 0.5) / self.points)
 
     def angle(self, offsets: np.ndarray) -> np.ndarray:
-        """Of the sine after so many ticks, modulo whole turns [rad]."""
+        """Angle of the sine after a number of sample instants, modulo whole turns [rad]."""
         return np.asarray(2.0 * np.pi * (np.mod(self.periods * offsets, self.ticks) / self.ticks))
 
 

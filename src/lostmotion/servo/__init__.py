@@ -1,4 +1,4 @@
-"""What a servo engineer reads off a closed loop, and the gains that rules, margins or a search give it."""
+"""Analysis of closed loops for servo engineers, and gains by rules, margins or a search."""
 
 from ..namespace import namespace
 

@@ -44,15 +44,15 @@ class LoopSheet:
     bandwidth: Bandwidth
     """from reference to measured value, both of the reference's shaft, nothing fed forward"""
     with_feedforward: Bandwidth | None
-    """of the outermost loop, where something is fed forward"""
+    """bandwidth of the outermost loop, if something is fed forward"""
     frequency: np.ndarray
     """[Hz]"""
     open_loop: np.ndarray
     """L(exp(j w T))"""
     closed_loop: np.ndarray
-    """as of bandwidth"""
+    """closed loop as for the bandwidth"""
     unstable: Instability | None
-    """of the complete loop, where this one alone has a pole outside the unit circle"""
+    """pole of the complete loop outside the unit circle, if this loop alone has one"""
 
     @property
     def verdict(self) -> str:
@@ -68,7 +68,7 @@ class Stiffness:
 
     regime: str
     shaft: str
-    """of load torque and angle"""
+    """shaft of load torque and angle"""
     frequency: np.ndarray
     """[Hz]"""
     stiffness: np.ndarray
@@ -98,15 +98,15 @@ class ServoReport:
     steps: tuple[StepResponse, ...]
     following: Following
     window: float
-    """that settling is asked for [rad]"""
+    """window of settling [rad]"""
     settling: tuple[Settling, ...]
     stiffness: tuple[Stiffness, ...]
     limit_cycle: LimitCycle | None
     """None without a position loop"""
     motor_unit: str = "rad"
-    """of the motor's angle; m of a linear motor"""
+    """motor unit of the motor's angle; m of a linear motor"""
     load_unit: str = "rad"
-    """of the angle of the reference's shaft; m of a slide"""
+    """load unit of the angle of the reference's shaft; m of a slide"""
 
     @property
     def stable(self) -> bool:
@@ -193,7 +193,7 @@ class ServoReport:
         return [*rows, ("at rest", self.rest())]
 
     def rest(self) -> str:
-        """What the axis does at rest, in one line."""
+        """Behaviour of the axis at rest, in one line."""
         cycle = self.limit_cycle
         if cycle is None:
             return "not looked at: there is no position loop that could hold a place"
@@ -288,12 +288,12 @@ def commission(
 
 
 def work(scenario: Scenario | TrainScenario, motor: str | None = None) -> int:
-    """How often `commission` reports progress."""
+    """Number of progress reports of `commission`."""
     return len(axis_of(scenario, motor).loops) + 2
 
 
 def loop_sheet(axis: Axis, regime: Regime, loop: str) -> LoopSheet:
-    """Of one loop in one regime."""
+    """Report of one loop in one regime."""
     cut, closed = (SampledLoop(axis, regime, loop, is_cut) for is_cut in (True, False))
     f = frequencies(cut, closed)
     fed = None

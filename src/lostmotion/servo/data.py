@@ -1,4 +1,4 @@
-"""What the rules of tuning need of an axis: its inertias, stiffness and lags."""
+"""Data of an axis for the tuning rules: inertias, stiffness and lags."""
 
 from __future__ import annotations
 

@@ -51,9 +51,9 @@ class Bandwidth:
     """Bandwidth of a closed loop; NaN beyond half its sampling frequency."""
 
     three_decibels: float
-    """where the gain first falls below -3 dB [Hz]"""
+    """frequency at which the gain first falls below -3 dB [Hz]"""
     ninety_degrees: float
-    """where the phase first falls through -90 degrees [Hz]"""
+    """frequency at which the phase first falls through -90 degrees [Hz]"""
     resonance_peak: float
     """greatest gain"""
 
@@ -63,10 +63,10 @@ class Instability:
     """A pole of the complete sampled loop outside the unit circle."""
 
     loop: str
-    """whose closing causes it: without this loop and those around it all poles are within"""
+    """loop whose closing causes it: without this loop and those around it all poles are within"""
     regime: str
     magnitude: float
-    """of the pole, over the sample time of the outermost loop"""
+    """magnitude of the pole, over the sample time of the outermost loop"""
     frequency: float
     """[Hz]"""
     growth: float
@@ -80,7 +80,7 @@ class Instability:
 
 
 def instability(axis: Axis, regime: Regime) -> Instability | None:
-    """What is unstable with all loops of an axis closed; None where nothing is."""
+    """Unstable pole with all loops of an axis closed; None if there is none."""
     found = None
     for loop in reversed(axis.loops):
         closed = SampledLoop(axis, regime, loop, False)
@@ -123,7 +123,7 @@ def roots(curve: np.ndarray, f: np.ndarray, exact: Callable[[float], float], fal
 
 
 def margins(cut: SampledLoop, closed: SampledLoop) -> Margins:
-    """Of a loop, cut and closed."""
+    """Margins of a loop, cut and closed."""
     from scipy.optimize import minimize_scalar
 
     f = frequencies(cut, closed)
@@ -159,7 +159,7 @@ def margins(cut: SampledLoop, closed: SampledLoop) -> Margins:
 
 
 def bandwidth_of(f: np.ndarray, response: Response) -> Bandwidth:
-    """Of a closed loop, its frequency response as a function of [Hz]."""
+    """Bandwidth of a closed loop, from its frequency response as a function of [Hz]."""
     T = response(f)
     magnitude = np.maximum(np.abs(T), SMALLEST)
     if magnitude.max() < NOTHING:  # what is measured does not move, as behind an open gap

@@ -42,12 +42,12 @@ class StepResponse:
     loop: str
     size: float
     unit: str
-    """of reference and value: N·m, rad/s at the motor, rad at the reference's shaft"""
+    """unit of reference and value: N·m, rad/s at the motor, rad at the reference's shaft"""
     limited: bool
     """whether a limit of torque, speed or voltage acted even on the smallest step that was tried"""
     time: np.ndarray
     value: np.ndarray
-    """of the motor's torque, of the motor's speed, of the position at the reference's shaft"""
+    """value of the motor's torque, of the motor's speed, or of the position at the reference's shaft"""
 
     @property
     def rise_time(self) -> float:
@@ -99,7 +99,7 @@ def with_controller(axis: Axis, **fields: Any) -> Axis:
 
 
 def step_response(axis: Axis, loop: str) -> StepResponse:
-    """Of one loop. The step is halved until no limit acts on it."""
+    """Step response of one loop. The step is halved until no limit acts on it."""
     size, limited = _first_size(axis, loop), True
     for _ in range(HALVINGS):
         data = _step(axis, loop, size)
@@ -199,7 +199,7 @@ class Settling:
     """Settling of an axis after one move."""
 
     end: float
-    """of the move [s]"""
+    """end of the move [s]"""
     to: float
     """position [rad]"""
     time: float
@@ -229,7 +229,7 @@ def following(axis: Axis) -> Following:
 
 
 def encoder_shaft(axis: Axis) -> str:
-    """That the position is measured at."""
+    """Shaft at which the position is measured."""
     c = axis.controller
     if c.position_encoder is not None:
         return c.position_encoder.shaft or axis.shaft
@@ -310,7 +310,7 @@ class LimitCycle:
 
 
 def limit_cycle(axis: Axis) -> LimitCycle | None:
-    """Of an axis with a position loop; None for others."""
+    """Limit cycle of an axis with a position loop; None for others."""
     if axis.controller.position is None:
         return None
     whole = at_rest(axis)

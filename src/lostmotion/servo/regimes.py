@@ -54,7 +54,7 @@ class Axis:
 
     @property
     def shaft(self) -> str:
-        """That position and speed of the reference are of."""
+        """Shaft of the position and the speed of the reference."""
         return self.controller.shaft or list(self.train.shafts)[-1]
 
     @cached_property
@@ -161,7 +161,7 @@ class Regime:
     over_tick: np.ndarray
     """Phi and Gamma of x[k+1] = Phi x[k] + Gamma u[k], u the command of the motor held over a base tick: (n, n + 1)"""
     winding: OrientedWinding | None = None
-    """of a motor under field-oriented control, whose command is the torque of its currents"""
+    """winding of a motor under field-oriented control, whose command is the torque of its currents"""
 
     @classmethod
     def of(cls, axis: Axis, name: str, meaning: str, model: LinearModel) -> Regime:

@@ -71,14 +71,14 @@ class SampledLoop:
 
     @property
     def sample_time(self) -> float:
-        """Of the loop [s]."""
+        """Sample time of the loop [s]."""
         return self.every(self.loop) * self.tick
 
     # --- matrices of each tick ---
 
     @cached_property
     def ticks(self) -> list[tuple[np.ndarray, np.ndarray, dict[str, Row]]]:
-        """Of each tick of one sample time: state to state, inputs to state, and the signals."""
+        """Matrices of each sample instant: state to state, inputs to state, and the signals."""
         first = self.axis.law[0].position_phase if self.loop == "position" else 0
         ticks = [self._tick(first + k) for k in range(self.every(self.loop))]
         # What neither the plant nor an input reaches stays as it is, such as the integrators of the loops left open.
@@ -158,7 +158,7 @@ class SampledLoop:
 
     @cached_property
     def _onward(self) -> np.ndarray:
-        """Of each tick: from the state after it to the state at the next sample of the loop."""
+        """Matrix of each sample instant: from the state after it to the state at the next sample of the loop."""
         found = [np.eye(len(self.ticks[0][0]))]
         for F, _, _ in self.ticks[:0:-1]:
             found.append(found[-1] @ F)
@@ -166,11 +166,11 @@ class SampledLoop:
 
     @cached_property
     def _entered(self) -> np.ndarray:
-        """Of each tick: from its inputs to the state at the next sample of the loop."""
+        """Matrix of each sample instant: from its inputs to the state at the next sample of the loop."""
         return np.asarray(self._onward @ np.array([G for _, G, _ in self.ticks]))
 
     def _turned(self, w: np.ndarray) -> np.ndarray:
-        """How far a sine is on at each tick, exp(j w t), over frequencies and ticks."""
+        """Phase factor of a sine at each sample instant, exp(j w t), over frequencies and sample instants."""
         return np.asarray(np.exp(1j * self.tick * np.outer(w, np.arange(len(self.ticks)))))
 
     def _summed(self, w: np.ndarray, matrices: np.ndarray, entering: np.ndarray) -> np.ndarray:
@@ -219,7 +219,7 @@ class SampledLoop:
         return self._samples(signal or f"{self.loop}_measured", w, self._summed(w, self._entered, inputs), inputs)
 
     def closed_loop(self, frequency: Any, *, feedforward: bool = False) -> np.ndarray:
-        """As `response`, with what is measured as the reference has it: the speed of the motor as that of the reference's shaft [Hz]."""
+        """Closed loop as `response`, with the measured value at the reference's shaft [Hz]."""
         of_load = self.loop == "speed" and self.axis.controller.reference.kind == "speed"
         return self.response(frequency, feedforward=feedforward) / (self.axis.ratio if of_load else 1.0)
 

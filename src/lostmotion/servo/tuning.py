@@ -61,7 +61,7 @@ class Tuning:
 
     rule: str
     why: str
-    """what they were made of, in one line"""
+    """data of the gains, in one line"""
     scenario: Scenario | TrainScenario
     gain: float
     """K_p of the speed loop, torque of the motor per speed of the motor [N·m·s/rad]"""
@@ -72,7 +72,7 @@ class Tuning:
     filter_time: float
     """time constant of the filter of the speed reference [s]; 0: none"""
     torque_constant: float | None
-    """of the motor [N·m/A], where its data say it; of a winding per ampere of amplitude of a phase"""
+    """torque constant of the motor [N·m/A], if its data contain it; for a winding per ampere of amplitude of a phase"""
     changed: Mapping[str, tuple[Any, Any]] = field(default_factory=dict)
     """old and new value [SI] of each key of the scenario that differs; None where there is none"""
     linear_motor: bool = False
@@ -90,7 +90,7 @@ class Tuning:
         )
 
     def changes(self) -> list[tuple[str, str, str]]:
-        """What tuning changed: (key of the scenario, old value, new value), with units.
+        """Changes by the tuning: (key of the scenario, old value, new value), with units.
 
         Examples
         --------
@@ -481,7 +481,7 @@ def _with(axis: Axis, gains: SpeedGains, K_v: float | None) -> Axis:
 
 
 def _known(axis: Axis) -> dict[str, Any]:
-    """What the scenario says of the drive, as feedforward."""
+    """Feedforward values that the scenario states."""
     viscous, dry = frictions(axis)
     torques = {"inertia": sum(inertias(axis)), "viscous_friction": viscous, "friction_torque": dry}
     known = axis.controller.feedforward.model_copy(update={key: _as_in_files(x) for key, x in torques.items()})

@@ -69,7 +69,7 @@ class OrientedWinding:
     lag: float
     """electrical angle by which the rotor is ahead of what is read, at the speed of the regime [rad]"""
     speed: float
-    """of the rotor [rad/s]"""
+    """speed of the rotor [rad/s]"""
     torque: float
     """mean torque of the motor [N·m]"""
     largest_voltage: float
@@ -78,7 +78,7 @@ class OrientedWinding:
     """amplitude of a phase [A]"""
     model: LinearModel
     command: np.ndarray
-    """how the rates of the plant's states depend on the torque of the motor [1/(N·m)]"""
+    """dependence of the rates of the plant's states on the torque of the motor [1/(N·m)]"""
     speed_row: np.ndarray
     """the speed of the rotor over the plant's states"""
 
@@ -138,7 +138,7 @@ class OrientedWinding:
 
     @property
     def sample_time(self) -> float:
-        """Of the currents [s]."""
+        """Sample time of the currents [s]."""
         return self.every * self.tick
 
     @property
@@ -250,9 +250,8 @@ class OrientedWinding:
         if found is None:
             needed = float(np.hypot(*self._motion(0.0, 0.0).asked))
             raise InputError(
-                f"the motor turns at {self.speed:.4g} rad/s in the servo sheet, half of the largest speed of the reference, where its winding needs "
-                f"{needed:.4g} V of a phase and the inverter gives {self.largest_voltage:.4g} V; ask for a lower speed of the reference, or "
-                "give current.field_weakening or a higher motor.dc_voltage"
+                f"half of the largest reference speed, {self.speed:.4g} rad/s, requires {needed:.4g} V of a phase, and the inverter gives "
+                f"{self.largest_voltage:.4g} V; lower the speed, or give current.field_weakening or a higher motor.dc_voltage"
             )
         for _ in range(30):
             half = 0.5 * (low + high)
@@ -278,7 +277,7 @@ class OrientedWinding:
 
     @cached_property
     def over_ticks(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Of each tick after a sample of the currents: from (plant, i_d, i_q, u_d, u_q) at its beginning to the plant and the
+        """Matrices of each sample instant after a sample of the currents: from (plant, i_d, i_q, u_d, u_q) at its beginning to the plant and the
         currents at its end, (n + 2, n + 4), and to the same from each of Gauss's points, (12, n + 2, n + 4)."""
         return [self._over_tick(start) for start in self._starts]
 
@@ -297,7 +296,7 @@ class OrientedWinding:
         return np.asarray(turn(self.placed(since)) @ self.steady.asked)
 
     def _rates(self, values: np.ndarray) -> np.ndarray:
-        """Of the deviations of (plant, i_d, i_q, u_d, u_q), where the steady ones are these."""
+        """Rates of the deviations of (plant, i_d, i_q, u_d, u_q) from these steady values."""
         m, n, p = self.phase, len(self.model.states), self.phase.pole_pairs
         i_d, i_q, u_d, u_q, _ = values
         out = np.zeros((n + 4, n + 4))
@@ -334,7 +333,7 @@ class OrientedWinding:
         return whole[: n + 2], np.array(from_points[-2:0:-1])[:, : n + 2]
 
     def forced(self, load: np.ndarray, w: np.ndarray, since: int) -> np.ndarray:
-        """What a sine exp(j w t) on the plant's states [1/s] has made of plant and currents at the end of a tick: (w, n + 2)."""
+        """Response of plant and currents at the end of a sample to a sine exp(j w t) on the plant's states [1/s]: (w, n + 2)."""
         _, from_points = self.over_ticks[since]
         each = from_points[:, :, : len(load)] @ load  # (point, n + 2)
         waves = np.exp(1j * np.outer(w, POINTS * self.tick)) * WEIGHTS * self.tick

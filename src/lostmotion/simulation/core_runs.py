@@ -18,7 +18,7 @@ Case = tuple[_core.Train, Sequence[_core.Signal], Mapping[str, float], Mapping[s
 
 
 def core_case(scenario: Scenario | TrainScenario) -> Case:
-    """What every run of the core begins with."""
+    """Initial part of every run of the core."""
     return scenario.core(), *_around(scenario)
 
 

@@ -117,7 +117,7 @@ class Explanation:
         SelfLocking, ...
     ]  # of the gears that lock or chatter under their present torque, or the rated one
     slides: tuple[str, ...] = ()
-    """those of the shafts that move along a straight line"""
+    """shafts that move along a straight line"""
 
     @property
     def command_forward(self) -> float:

@@ -1,4 +1,4 @@
-"""How long a run will take, by runs of the first parts of it."""
+"""Estimate of the time of a run, by runs of its first parts."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ENOUGH = 0.1  # [s] after which no longer part is tried
 
 
 class Forecast(NamedTuple):
-    """What a run takes if it goes on as it begins."""
+    """Estimated time of a run if it continues as it begins."""
 
     seconds: float
     """[s] of processor time"""

@@ -39,7 +39,7 @@ class Course:
 
 
 def motion_given(name: str, values: Any) -> dict[str, float]:
-    """What is given for the end of a step, in SI.
+    """Given motion at the end of a step, in SI.
 
     Raises
     ------

@@ -83,7 +83,7 @@ class _Copies:
 
 
 def _change_what_follows(data: dict[str, Any], key: str, value: Any, given: Sequence[str], own: _Copies) -> None:
-    """What goes with the kind or the rated voltage of a motor; beside `from` the record sees to it."""
+    """Change the values that depend on the kind or the rated voltage of a motor; beside `from` the record does so."""
     where, _, last = key.rpartition(".")
     *table, name = where.split(".")
     parent = data.get("motors") if table == ["motors"] else data if where == "motor" else None

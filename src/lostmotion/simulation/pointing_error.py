@@ -14,7 +14,7 @@ NAME = "pointing_error"
 
 
 def pointing_names(scenario: Scenario | TrainScenario) -> Iterator[tuple[str, str]]:
-    """Of each axis that follows a position its motor, and what its error is called."""
+    """Motor and name of the error, for each axis that follows a position."""
     for motor, controller in scenario.axes().items():
         if controller.reference.kind == "position":
             yield motor, f"{scenario.prefix(motor)}{NAME}"

@@ -133,7 +133,7 @@ def _made_again(*fields: Any) -> RunArrays:
 def raw_result(
     scenario: Scenario | TrainScenario, core: _core.Train, result: dict[str, Any], solver: str, *, ledger: bool
 ) -> RunArrays:
-    """What the solver returned, with all that belongs to it."""
+    """Result of the solver with all its parts."""
     time = _time(scenario)
     data = dict(zip(_channels(scenario), result["values"], strict=True))
     data |= named_signals(scenario.by_prefix(), result["control"])

@@ -179,7 +179,7 @@ def run(
     energy: bool = True,
     law: Any = None,
 ) -> RunArrays:
-    """As `simulate`, of a scenario, with the result as plain arrays."""
+    """Run a scenario as `simulate` does, with the result as plain arrays."""
     if solver not in ("exact", "dormand-prince"):
         raise InputError(f'solver {solver!r} is not known; it must be "exact" or "dormand-prince"')
     exact = solver == "exact"

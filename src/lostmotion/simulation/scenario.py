@@ -91,7 +91,7 @@ def check_on_reference(initial: Any, controllers: Mapping[str, Controller], keys
 
 
 class SimulationTable(Part):
-    """How long, and at which instants the result is wanted. Neither affects the motion."""
+    """Duration and instants of the result. Neither affects the motion."""
 
     duration: Annotated[Time, Positive]
     sample_interval: Annotated[Time, Positive]
@@ -124,7 +124,7 @@ class Scenario(Part):
     command: CommandSignal = CommandSignal()
     """E_C: 1 is rated voltage, or with a torque source rated torque"""
     controller: Controller | None = None
-    """of the motor, which then has no command; its shafts are `motor` and `load`"""
+    """controller of the motor, which then has no command; its shafts are `motor` and `load`"""
     motor: Motor
     gearbox: Gearbox
     load: LoadTable
@@ -140,8 +140,8 @@ class Scenario(Part):
             isinstance(controller, Mapping) and controller.get("kind") == "continuous"
         ):
             raise InputError(
-                "key controller.kind: a continuous controller makes a drive train of the drive, since its states are states of the "
-                'train; read the scenario by lm.load from a file, or make a TrainScenario with controllers={"motor": ...}'
+                "key controller.kind: a continuous controller requires a drive train; read the file by lm.load, or make a "
+                'TrainScenario with controllers={"motor": ...}'
             )
         return data
 
@@ -175,15 +175,15 @@ class Scenario(Part):
         return {} if self.controller is None else {"": self.controller}
 
     def prefix(self, motor: str) -> str:  # noqa: ARG002
-        """What the names of the variables of a motor's controller begin with."""
+        """Prefix of the names of the variables of a motor's controller."""
         return ""
 
     def sliding(self) -> dict[str, tuple[bool, bool]]:
-        """Which of its controllers move slides: none."""
+        """Controllers that move slides: none."""
         return {}
 
     def note(self) -> str:
-        """What the sheets of gearbox and motor say beside their numbers."""
+        """Notes of the sheets of gearbox and motor."""
         return " ".join(filter(None, [self.gearbox.note, self.motor.note]))
 
     def continuous(self) -> dict[str, ContinuousController]:

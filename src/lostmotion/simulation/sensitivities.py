@@ -45,7 +45,7 @@ class Neighbour:
     """A scenario at another value of a parameter."""
 
     offset: float
-    """of the value [SI unit]"""
+    """offset of the value [SI unit]"""
     weight: float
     """df/dp = sum of weight (f - f at the value itself)"""
     scenario: AnyScenario
@@ -178,7 +178,7 @@ class Sensitivities:
 
 @dataclass(frozen=True)
 class CoreDerivatives:
-    """What the core returns of one run."""
+    """Derivatives of one run from the core."""
 
     error: str
     """why the motion has no continuation; then there are no values"""
@@ -272,7 +272,7 @@ def _add_derived(
 
 
 def _derived(scenario: AnyScenario, data: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Those variables alone."""
+    """Derived variables alone."""
     out = dict(data)
     add_derived(scenario, out, next(iter(data.values())))
     return {name: v for name, v in out.items() if name not in data}

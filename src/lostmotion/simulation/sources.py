@@ -1,4 +1,4 @@
-"""Where a scenario may come from: a file, the name of a shipped one, or a saved result."""
+"""Sources of a scenario: a file, the name of a shipped one, or a saved result."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def load(source: ScenarioName | Path, overrides: Mapping[str, Any] | Iterable[st
 
 
 def load_drive(source: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> Scenario:
-    """As `load`, where only the short form will do.
+    """Load a scenario as `load` does, if only the short form is allowed.
 
     Raises
     ------

@@ -12,7 +12,7 @@ State = tuple[Any, dict[str, float], dict[str, float]]
 
 
 class StepBound:
-    """How far two simulations have been apart at the ends of the steps.
+    """Largest distance of two simulations at the ends of the steps.
 
     Parameters
     ----------

@@ -61,11 +61,11 @@ class SimulationState:
     """[s]"""
     values: tuple[Any, ...] = field(repr=False)
     drive: Drive | DriveTrain = field(repr=False)
-    """whose state it is"""
+    """drive of this state"""
     controllers: dict[str, Controller | ContinuousController] = field(default_factory=dict, repr=False)
-    """that turn its motors"""
+    """controllers of its motors"""
     bound: Any = field(default=None, repr=False)
-    """of the simulation that is taken along for an error bound"""
+    """state of the second simulation for an error bound"""
 
 
 class Simulation:
@@ -172,7 +172,7 @@ class Simulation:
         self.reset(initial)
 
     def _place_inputs(self, names: Sequence[str]) -> None:
-        """Where the core has what `advance` is given."""
+        """Slots of the core for the inputs of `advance`."""
         self._inputs = len(names)
         self._motions = {  # speed and acceleration of each shaft
             name: (names.index(f"{name}_given_speed"), names.index(f"{name}_given_acceleration"))
@@ -184,7 +184,7 @@ class Simulation:
         self._required = [name for name in self._input_places if not name.endswith("load_torque")]
 
     def _add_signals(self, scenario: Scenario | TrainScenario | None) -> None:
-        """What the controllers show, and in the place of the straight line that drives the mechanics the torque of a winding."""
+        """Add the signals of controllers, and the torque of a winding in place of the straight line that drives the mechanics."""
         if scenario is None or not self._controllers:
             return
         names = (*ALL_SIGNALS, *WINDING_SIGNALS)
@@ -206,7 +206,7 @@ class Simulation:
         return torque
 
     def winding_torques(self) -> Iterator[tuple[int, Derived]]:
-        """Of motors under field-oriented control the channel of the solver's torque, and how the true one follows from the channels."""
+        """Channel of the solver's torque of each motor under field-oriented control, and the true torque from the channels."""
         channels = {v.name: k for k, v in enumerate(self._variables)}
         for name, derived in self._derived.items():
             if name.endswith("_torque") and name not in self._channel:
@@ -265,7 +265,7 @@ class Simulation:
             self._bound.forget()
 
     def _begin_motions(self, start: Initial | TrainInitial) -> None:
-        """Where a motion is given, the speed that its shaft begins with is what has been given."""
+        """Set the initial speeds of shafts with a given motion."""
         if not self._motions or not isinstance(start, TrainInitial):
             return
         state: list[Any] = list(self._core.get_state())
@@ -530,7 +530,7 @@ class Simulation:
         return fed_in / driving if fed_in < 0.0 else 0.0
 
     def _derived_of(self, train: DriveTrain) -> dict[str, Derived]:
-        """What the solver does not integrate: twists of rigid gears, and the angles that follow through the gears."""
+        """Values that the solver does not integrate: twists of rigid gears, and the angles that follow through the gears."""
 
         def angle_of(source: str, name: str, forward: bool) -> Derived:
             gear, twist, angle = train.gears[name], train.twist_of(name), train.angle_of(source)
@@ -575,7 +575,7 @@ class Simulation:
 def _parts(
     what: Drive | Scenario | DriveTrain | TrainScenario, loaded: Sequence[str] | None, given: Sequence[str] | None
 ) -> tuple[Drive | DriveTrain, DriveTrain, _core.Train, tuple[str, ...], tuple[str, ...], Initial | TrainInitial]:
-    """What is simulated, the same as a train, the solver's train, the shafts that a load torque may act on, those whose motion is
+    """Parts of a simulation: its subject, the same as a train, the solver's train, the shafts that a load torque may act on, those whose motion is
     given, and the start."""
     if isinstance(what, DriveTrain | TrainScenario):
         train, shafts, moved = given_train(what, loaded, given)

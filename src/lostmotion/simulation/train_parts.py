@@ -108,7 +108,7 @@ def _stands_on(element: Any) -> str:
 
 
 def control_of_part(control: Bound, whole: TrainScenario, part: TrainScenario) -> Bound:
-    """Those controllers that are of a part."""
+    """Controllers that belong to a part."""
     tick, axes = control
     motors, shafts = list(whole.train().motors), list(whole.train().shafts)
     motor_of = {motors.index(name): k for k, name in enumerate(part.train().motors)}
@@ -123,7 +123,7 @@ def control_of_part(control: Bound, whole: TrainScenario, part: TrainScenario) -
 def joined_results(
     whole: TrainScenario, parts: Sequence[TrainScenario], results: Sequence[dict[str, Any]], most: int
 ) -> dict[str, Any]:
-    """What the core would have given for the whole train.
+    """Result of the whole train from those of its parts.
 
     Parameters
     ----------

@@ -63,24 +63,24 @@ class TrainInitial(Part):
     """
 
     speeds: Elements[Speed] = Field(default_factory=nothing)
-    """of shafts"""
+    """speeds of shafts"""
     angles: Elements[Angle] = Field(default_factory=nothing)
-    """of shafts; those of others follow through the gears"""
+    """angles of shafts; those of others follow through the gears"""
     twists: Elements[Angle] = Field(default_factory=nothing)
-    """of gears with a stiffness"""
+    """twists of gears with a stiffness"""
     positions: Elements[Length] = Field(default_factory=nothing)
-    """of slides"""
+    """positions of slides"""
     slide_speeds: Elements[LinearSpeed] = Field(default_factory=nothing)
-    """of slides"""
+    """slide speeds of slides"""
     deflections: Elements[Length] = Field(default_factory=nothing)
-    """of screws, racks and belts with a stiffness"""
+    """deflections of screws, racks and belts with a stiffness"""
     motor_torques: Elements[Torque] = Field(default_factory=nothing)
-    """of DC motors"""
+    """motor torques of DC motors"""
     controller_states: Elements[Number] = Field(default_factory=nothing)
-    """of continuous controllers, by their result variables (SI), such as ``MOTOR_integral``; the filter of a derivative that is
+    """states of continuous controllers, by their result variables (SI), such as ``MOTOR_integral``; the filter of a derivative that is
     left out has settled"""
     hysteresis_capacities: Elements[Annotated[Torque, NotNegative]] = Field(default_factory=nothing)
-    """of gears with hysteresis: what the last turning point before t = 0 left behind"""
+    """capacities of gears with hysteresis after the last turning point before t = 0"""
     hysteresis_forces: Elements[Annotated[Force, NotNegative]] = Field(default_factory=nothing)
     """the same of screws, racks and belts"""
     on_reference: Switch = False
@@ -120,11 +120,11 @@ class TrainScenario(LinearElements):
     title: str = ""
     shafts: Elements[ShaftTable] = Field(default_factory=nothing)
     slides: Elements[SlideTable] = Field(default_factory=nothing)
-    """what moves along a straight line; in the order of results, and where a last shaft is meant, they follow the shafts"""
+    """parts that move along a straight line; they follow the shafts in the order of results"""
     command: Elements[CommandSignal] = Field(default_factory=nothing)
-    """of each motor (1 is rated voltage, or with a torque source rated torque; left out, 0), brake and friction clutch (0: open, 1: the full torque)"""
+    """command of each motor (1 is rated voltage, or with a torque source rated torque; left out, 0), brake and friction clutch (0: open, 1: the full torque)"""
     controllers: Elements[AnyController] = Field(default_factory=nothing)
-    """of motors, which then have no command"""
+    """controllers of motors, which then have no command"""
     initial: TrainInitial = TrainInitial()
     simulation: SimulationTable
 
@@ -219,7 +219,7 @@ class TrainScenario(LinearElements):
         return {self.prefix(name): c for name, c in self.axes().items()}
 
     def sliding(self) -> dict[str, tuple[bool, bool]]:
-        """Of each controller, by what the names of its variables begin with: whether its motor moves a slide, and whether its
+        """For each controller, by the prefix of its variables: whether its motor moves a slide, and whether its
         position is that of one."""
         train = self.train()
         return {
@@ -240,14 +240,14 @@ class TrainScenario(LinearElements):
         return self.train().commanded()
 
     def note(self) -> str:
-        """What the sheets of gears and motors say beside their numbers."""
+        """Notes of the sheets of gears and motors."""
         notes = {name: part.note for name, part in self.train().gears.items()}
         notes |= {name: part.note for name, part in self.motors.items()}
         notes |= {name: part.note for name, part in self.linear_motors.items()}
         return " ".join(f"{name}: {note}" for name, note in notes.items() if note)
 
     def prefix(self, motor: str) -> str:
-        """What the names of the variables of a motor's controller begin with."""
+        """Prefix of the names of the variables of a motor's controller."""
         return f"{motor}_"
 
     def capacities(self, initial: TrainInitial | None = None) -> dict[str, float]:

@@ -81,7 +81,7 @@ def signals_of(controller: Controller) -> Iterator[str]:
 def axis_variables(
     controllers: Mapping[str, Controller], sliding: Mapping[str, tuple[bool, bool]] = {}
 ) -> tuple[Variable, ...]:
-    """What the controllers of a run show, by what its names begin with.
+    """Variables of the controllers of a run, by the prefix of their names.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def axis_variables(
 
 
 def named_signals(controllers: Mapping[str, Controller], values: Any) -> dict[str, np.ndarray]:
-    """What the core has recorded of the controllers, axis by axis and signal by signal, as `axis_variables` calls it."""
+    """Signals of the controllers from the core, axis by axis and signal by signal, as `axis_variables` names them."""
     return {
         f"{prefix}{name}": row
         for (prefix, controller), rows in zip(controllers.items(), values, strict=True)
@@ -110,7 +110,7 @@ def named_signals(controllers: Mapping[str, Controller], values: Any) -> dict[st
 
 
 def angles_through_gears(train: DriveTrain, known: Collection[str]) -> Iterator[tuple[str, str, str, bool]]:
-    """How the angles that the solver does not integrate follow from those that it does.
+    """Relation of the angles that the solver does not integrate to those that it does.
 
     Parameters
     ----------

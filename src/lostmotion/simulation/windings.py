@@ -21,7 +21,7 @@ AGREEMENT = 1e-10  # relative, to which the passes and rounding hold currents an
 
 
 def oriented(scenario: Scenario | TrainScenario) -> Iterator[tuple[str, str, PhaseValues]]:
-    """Of each motor under field-oriented control what its variables and that of its speed begin with, and its winding."""
+    """Prefixes of the variables and of the speed of each motor under field-oriented control, and its winding."""
     for name, controller in scenario.axes().items():
         if controller.current.kind != "field_oriented":
             continue
@@ -76,7 +76,7 @@ def bounds_of(names: Mapping[str, str], largest: Mapping[str, float], apart: Map
 
 
 def bound_names(scenario: Scenario | TrainScenario) -> Iterator[tuple[str, str, str]]:
-    """What the bounds are called as values of a run, with the variable that each is of and its unit."""
+    """Names of the bounds as values of a run, with the variable that each belongs to and its unit."""
     for name in bounded(scenario):
         unit = next(unit for end, unit in UNITS.items() if name.endswith(end))
         yield f"{name}_{ATTRIBUTE}", name, unit
@@ -91,7 +91,7 @@ def bound_values(
 
 
 def too_slow(scenario: Scenario | TrainScenario, values: Mapping[str, Any]) -> str:
-    """Which currents are sampled too seldom for how fast their rotor has turned in a run; empty where all is well."""
+    """Currents whose sample time is too long for the speed of their rotor in a run; empty if all is well."""
     found = []
     for prefix, shaft, phase in oriented(scenario):
         motor = prefix.removesuffix("_") or "motor"

@@ -92,7 +92,7 @@ def _findings(scenario: Scenario | TrainScenario) -> list[Finding]:
 
 
 def _over_estimates(scenario: Scenario | TrainScenario, findings: list[Finding]) -> list[Finding]:
-    """Which of the verdicts hold wherever estimated losses lie in their range; nothing where none are estimated."""
+    """Verdicts that hold over the whole range of estimated losses; nothing if none are estimated."""
     ends = [_known_losses(scenario, end) for end in (0, 1)]
     if scenario in ends:
         return []

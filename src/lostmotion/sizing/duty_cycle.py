@@ -25,7 +25,7 @@ STEADY = 0.01  # of the largest motor torque, within which it does not change at
 
 @dataclass(frozen=True)
 class DutyCycle:
-    """What repeats."""
+    """The repeated cycle."""
 
     time: np.ndarray
     """instants of the motion [s]"""
@@ -36,7 +36,7 @@ class DutyCycle:
     motor_torque: np.ndarray
     """[N·m]"""
     holding_torque: float | None
-    """of the motor, at rest after the motion [N·m]; None: the run ends in motion"""
+    """holding torque of the motor, at rest after the motion [N·m]; None: the run ends in motion"""
     period: float | None
     """`task.cycle` [s]; None: no pause"""
 
@@ -53,7 +53,7 @@ class DutyCycle:
 
     @property
     def duration(self) -> float:
-        """Of the motion [s]."""
+        """Duration of the motion [s]."""
         return float(self.time[-1] - self.time[0])
 
     def _integral(self, values: np.ndarray) -> float:

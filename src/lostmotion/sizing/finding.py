@@ -50,7 +50,7 @@ class Finding:
 
     @property
     def source(self) -> str:
-        """Where the rule comes from."""
+        """Source of the rule."""
         return RULES[self.rule]
 
     def __str__(self) -> str:

@@ -19,7 +19,7 @@ RAMP = 1.0  # [s], of the load torque from 0
 
 @dataclass(frozen=True)
 class Holding:
-    """What one load torque does to the drive with command 0.
+    """Effect of one load torque on the drive with command 0.
 
     Speeds [rad/s] of the load; 0: it stays, or comes to rest; infinite: it gets ever faster.
     """
@@ -40,7 +40,7 @@ class Holding:
 
 
 def holding(scenario: Scenario, load_torque: float, speed: float) -> Holding:
-    """How a drive with command 0 bears a constant load torque.
+    """Determine the motion of a drive with command 0 under a constant load torque.
 
     Parameters
     ----------

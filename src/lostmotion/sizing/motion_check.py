@@ -26,7 +26,7 @@ def load_torques(result: RunArrays) -> list[float]:
 
 
 def inertia(scenario: Scenario) -> Finding:
-    """That of the load with that of the motor side."""
+    """Inertia of the load relative to that of the motor side."""
     return inertia_ratio(scenario.motor, scenario.gearbox, scenario.load.inertia)
 
 
@@ -128,7 +128,7 @@ def _at(speed: float) -> str:
 
 
 def _static_holding(g: Gearbox) -> str:
-    """What the gearbox alone holds at rest."""
+    """Torque that the gearbox alone holds at rest."""
     back = TestRig(g).backdriving_torque() if g.losses.kind == "map" and not isinstance(g.stiffness, Rigid) else 0.0
     if back is None:
         return "the gearbox alone holds more than three times rated torque at rest"

@@ -78,7 +78,7 @@ def heat(
 
 
 def _rise(m: Motor, cycle: DutyCycle, torque: float, ambient: float) -> float | None:
-    """Of the winding over the ambient [K]: where the data suffice its peak in the repeated cycle, else that of the rms torque [N·m];
+    """Rise of the winding over the ambient [K]: its peak in the repeated cycle, or with fewer data that of the rms torque [N·m];
     None if it is not known."""
     steady, bodies = rms_rise(m, torque, ambient), TwoBodies.of(m, ambient)
     if steady is None or bodies is None or cycle.held_longer:
@@ -89,7 +89,7 @@ def _rise(m: Motor, cycle: DutyCycle, torque: float, ambient: float) -> float | 
 
 
 def rms_rise(m: Motor, torque: float, ambient: float) -> float | None:
-    """Of the winding over the ambient [K] in the long run under an rms torque [N·m]; None if it is not known."""
+    """Rise of the winding over the ambient [K] in the long run under an rms torque [N·m]; None if unknown."""
     copper = m.copper_loss()
     resistance = None if m.limits is None else m.limits.winding_to_ambient
     if copper is None or resistance is None:

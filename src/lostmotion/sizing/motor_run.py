@@ -1,4 +1,4 @@
-"""What happened inside a motor in a run: current, voltage, temperatures."""
+"""Motor quantities of a run: current, voltage, temperatures."""
 
 from __future__ import annotations
 

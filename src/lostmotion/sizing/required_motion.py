@@ -1,4 +1,4 @@
-"""What a periodic motion asks of a motor and a gearbox, before any run: all compliance left out, the reference followed exactly."""
+"""Demands of a periodic motion on a motor and a gearbox, before any run: all compliance left out, the reference followed exactly."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class RequiredMotion:
     acceleration: np.ndarray
     """[rad/s²]"""
     torque: np.ndarray
-    """that the gearbox gives [N·m]"""
+    """torque of the gearbox [N·m]"""
     cycle: float
     """[s]"""
 
@@ -71,7 +71,7 @@ def values_at(signal: TimeFunction[Any], time: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class InputDemand:
-    """What the input shaft of a gearbox has to do in a required motion."""
+    """Demands on the input shaft of a gearbox in a required motion."""
 
     motion: RequiredMotion
     gearbox: Gearbox
@@ -94,7 +94,7 @@ class InputDemand:
 
 
 def input_demand(motion: RequiredMotion, g: Gearbox) -> InputDemand:
-    """That of a gearbox, its losses as the solver takes them: T_1 = (T_2 + s m_2B T_2R)/i, s the direction of the load."""
+    """Demand on the input of a gearbox, with losses as in the solver: T_1 = (T_2 + s m_2B T_2R)/i, s the direction of the load."""
     speed, acceleration = g.ratio * motion.speed, g.ratio * motion.acceleration
     s = np.sign(motion.speed)
     if isinstance(g.losses, ConstantEfficiency):

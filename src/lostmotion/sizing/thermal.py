@@ -46,7 +46,7 @@ class TwoBodies:
 
     @classmethod
     def of(cls, motor: Motor, ambient: float, alpha: float = COPPER) -> TwoBodies | None:
-        """Those of a motor; None if its data do not suffice (`needed` names what lacks)."""
+        """Bodies of a motor; None if its data do not suffice (`needed` names the missing ones)."""
         if needed(motor):
             return None
         limits, copper = motor.limits, motor.copper_loss()
@@ -59,7 +59,7 @@ class TwoBodies:
         return cls(*limits.thermal_parts, *times, *copper, ambient, alpha)
 
     def steps(self, time: np.ndarray, square: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Of each interval between instants [s] the map x -> F x + g of the temperatures x = (T_w, T_c) - T_a: F (n, 2, 2) and
+        """For each interval between instants [s]: the map x -> F x + g of the temperatures x = (T_w, T_c) - T_a: F (n, 2, 2) and
         g (n, 2), by the mean of M² over it [(N·m)²]."""
         h = np.diff(time)
         heat = self.loss * square
@@ -97,7 +97,7 @@ class TwoBodies:
         return every[:, 0], every[:, 1]
 
     def error_bound(self, time: np.ndarray, torque: np.ndarray, hottest: float) -> float:
-        """Of the temperatures [K], through the mean of M² over each interval.
+        """Error bound of the temperatures [K], through the mean of M² over each interval.
 
         The heat of an interval h whose values lie within dP of each other leads or lags by at most h dP/4, and the
         temperature that one joule leaves behind decays: h dP/(4 C_w), and as much again within an interval.
@@ -146,7 +146,7 @@ def rms(time: np.ndarray, torque: np.ndarray) -> float:
 
 
 def _from_start(F: np.ndarray, g: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of steps x -> F x + g the maps from the start to the end of each: within blocks first, all of them side by side."""
+    """Maps from the start to the end of each of the steps x -> F x + g: within blocks first, all of them side by side."""
     n = len(F)
     size = math.isqrt(n - 1) + 1
     blocks = -(-n // size)
@@ -163,7 +163,7 @@ def _from_start(F: np.ndarray, g: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _integral(rate: np.ndarray, h: np.ndarray) -> np.ndarray:
-    """Of e^(rate s) from 0 to h."""
+    """Integral of e^(rate s) from 0 to h."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(rate == 0.0, h, np.expm1(rate * h) / rate)
 
@@ -185,7 +185,7 @@ def _divided(l_1: np.ndarray, l_2: np.ndarray, h: np.ndarray) -> np.ndarray:
 
 
 def need_two_bodies(motor: Motor, ambient: float, alpha: float, where: str) -> TwoBodies:
-    """As `TwoBodies.of`.
+    """Bodies as `TwoBodies.of` returns them; an error if data are missing.
 
     Raises
     ------

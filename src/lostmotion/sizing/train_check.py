@@ -21,7 +21,7 @@ NOT_JUDGED = ("inertia_ratio", "resonance", "dead_zone", "lost_motion", "holding
 
 
 def check_train(scenario: TrainScenario) -> tuple[Finding, ...]:
-    """As `check_drive`. The motion of each gear and motor is taken to repeat without a pause, at the ambient temperature of `Task`.
+    """Check a train as `check_drive` does. Motions repeat without a pause, at the ambient temperature of `Task`.
 
     Raises
     ------

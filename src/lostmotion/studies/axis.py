@@ -1,4 +1,4 @@
-"""What an axis has to do, and the scenario of one motor and gearbox that does it: tuned by rule, its cycle repeated."""
+"""Task of an axis, and the scenario of one motor and gearbox for it: tuned by rule, its cycle repeated."""
 
 import math
 from functools import lru_cache
@@ -35,18 +35,18 @@ REQUIREMENTS = {
 
 
 class AxisTask(Task):
-    """What an axis has to do, beside the motion of its reference."""
+    """Requirements of an axis, beside the motion of its reference."""
 
     cycle: Annotated[Time, Positive]
     """after which the motion repeats, pause included"""
     max_cycles: Annotated[Whole, Field(ge=FEWEST, le=1000)] = 4
-    """that are run at most, until two of them agree within 1 %"""
+    """largest number of cycles to run, until two of them agree within 1 %"""
     max_inertia_ratio: Annotated[Number, Positive] = INERTIA_RATIO
-    """of the load to the motor side"""
+    """largest inertia of the load relative to the motor side"""
     max_tracking_error: Annotated[Angle, Positive] | None = None
-    """of the load, largest over the cycle"""
+    """largest tracking error of the load over the cycle"""
     max_reversal_error: Annotated[Angle, Positive] | None = None
-    """of the load: mean position at rest after motion in one direction, less that after the other"""
+    """largest reversal error of the load: mean position at rest after motion in one direction, minus that after the other"""
     settling_window: Annotated[Angle, Positive] | None = None
     """plus and minus this: how near the load must stay to where a move ends"""
     max_settling_time: Annotated[Time, Positive] | None = None

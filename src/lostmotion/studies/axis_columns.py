@@ -1,4 +1,4 @@
-"""What one cycle of an axis took: the columns of its row."""
+"""Columns of the row of an axis: demands of one cycle."""
 
 from __future__ import annotations
 

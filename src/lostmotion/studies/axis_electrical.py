@@ -1,4 +1,4 @@
-"""What the motor of an axis takes in each sample time of its controller, exactly: torque, current, energy."""
+"""Torque, current and energy of the motor of an axis in each sample time of its controller, exactly."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Electrical:
 
     @classmethod
     def of(cls, scenario: Scenario, result: RunArrays, here: slice) -> Electrical:
-        """Of the last cycle of a run that is sampled at each tick of its controller.
+        """Quantities of the last cycle of a run that is sampled at each sample instant of its controller.
 
         Under field-oriented control the core has integrated energy and heat. Any other motor has the command E for the whole of a
         tick, and with tau dm/dt = k_N E - (k_N - 1) w/w_DR - m the integral of its torque over it is known; between its ends
@@ -68,7 +68,7 @@ class Electrical:
 
 
 def _angle(scenario: Scenario, result: RunArrays, here: slice) -> np.ndarray:
-    """Of the motor [rad]."""
+    """Angle of the motor [rad]."""
     return np.asarray(scenario.gearbox.ratio * (result["load_angle"][here] + result["twist"][here]))
 
 

@@ -67,7 +67,7 @@ class Axes:
         return self.study.scenario
 
     def _once(self, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
-        """What is made at most once; an error is kept as such."""
+        """Value that is made at most once; an error is kept as such."""
         kept = self.study.kept
         if key not in kept:
             try:
@@ -77,7 +77,7 @@ class Axes:
         return kept[key]
 
     def gearbox(self, row: np.ndarray) -> tuple[InputDemand, list[Finding]] | InputError:
-        """What its input has to do, and what the rules say of it alone."""
+        """Demands on the input of the gearbox, and the rules for it alone."""
         key = ("demand", *self.study.part_key("gearbox", row))
         return self._once(key, lambda: self._demand(self.study.part("gearbox", row)))  # type: ignore[no-any-return]
 

@@ -49,7 +49,7 @@ def pieces(study: Study, first: int, last: int) -> list[tuple[int, int]]:
 
 
 def _arrays(study: Study) -> int:
-    """How many variables of each run are held at once."""
+    """Number of variables of each run that are held at once."""
     wanted = needed(study)
     if isinstance(study.scenario, TrainScenario) and together(study):
         return 0 if reductions(study) else len(channels(study))

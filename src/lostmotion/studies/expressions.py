@@ -1,4 +1,4 @@
-"""What a study stores of each run: expressions of the result variables, read by a grammar of their own.
+"""Expressions of the result variables that a study stores of each run, read by a grammar of their own.
 
 An expression is parsed, and each of its parts turned into an entry of the tables of `study_functions`; a part that is none of
 the listed ones is refused. Nothing of it is ever run as Python.

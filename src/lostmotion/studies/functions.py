@@ -23,7 +23,7 @@ from 0 to 1; a written whole number; a written instant; the text 'time'; the tex
 
 
 class Parameter(NamedTuple):
-    """Of a function or method."""
+    """Parameter of a function or method."""
 
     name: str
     kind: Kind = "series"
@@ -31,7 +31,7 @@ class Parameter(NamedTuple):
 
 
 class Function(NamedTuple):
-    """Of values (arrays of xarray over run and time) and of measures, both in the order of its parameters."""
+    """Function of values (arrays of xarray over run and time) and of measures, both in the order of its parameters."""
 
     parameters: tuple[Parameter, ...]
     of_values: Callable[..., Any]

@@ -1,4 +1,4 @@
-"""What is known of a value in a study's expression before anything runs: its unit, and whether it has a value for each instant."""
+"""Properties of a value in a study's expression before any run: its unit, and whether it has a value for each instant."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ NAMES = {symbol: name for symbol, (name, _) in PREFIXED.items()} | {"J": "joule"
 
 
 class Measure(NamedTuple):
-    """Of one value."""
+    """Measure of one value."""
 
     unit: Powers | None = None
     """None where it cannot be determined, as of a number that may be a factor or a change of unit"""
@@ -25,7 +25,7 @@ class Measure(NamedTuple):
 
 
 def measure(unit: str, *, over_time: bool = False) -> Measure:
-    """That of a value with a unit; ``"1"`` for a plain number."""
+    """Measure of a value with a unit; ``"1"`` for a plain number."""
     found: Powers = {}
     for over, symbol, exponent in re.findall(r"(/?)([A-Za-zΩ]+)(?:\^([0-9]+))?", unit):
         found = _times(found, {NAMES[symbol]: float(exponent or 1)}, -1 if over else 1)
@@ -38,31 +38,31 @@ def plain(*parts: Measure, boolean: bool = False) -> Measure:
 
 
 def total(a: Measure, b: Measure) -> Measure:
-    """Of a sum or difference."""
+    """Measure of a sum or difference."""
     fit = a.unit is not None and b.unit is not None and dimension_of(a.unit) == dimension_of(b.unit)
     return Measure(a.unit if fit else None, _any_over_time(a, b))
 
 
 def product(a: Measure, b: Measure, power: int = 1) -> Measure:
-    """Of a product, or with power -1 of a quotient."""
+    """Measure of a product, or with power -1 of a quotient."""
     unit = None if a.unit is None or b.unit is None else _times(a.unit, b.unit, power)
     return Measure(unit, _any_over_time(a, b))
 
 
 def power(a: Measure, exponent: float | None, *parts: Measure) -> Measure:
-    """Of a power; None: the exponent is no written number."""
+    """Measure of a power; None: the exponent is not a written number."""
     unit = None if a.unit is None or exponent is None else _times({}, a.unit, exponent)
     return Measure(unit, _any_over_time(a, *parts))
 
 
 def one_of(a: Measure, *others: Measure) -> Measure:
-    """Of a value that may come from each of several; a written number has the unit of the rest."""
+    """Measure of a value that may come from each of several; a written number has the unit of the rest."""
     unit = a.unit if all(o.unit in (None, a.unit) for o in others) else None
     return Measure(unit, _any_over_time(a, *others))
 
 
 def reduced(a: Measure, exponent: int = 1) -> Measure:
-    """Of a reduction over time that gives a value of the same kind, or its square."""
+    """Measure of a reduction over time that gives a value of the same kind, or its square."""
     return Measure(None if a.unit is None else _times({}, a.unit, exponent))
 
 

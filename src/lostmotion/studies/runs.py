@@ -1,4 +1,4 @@
-"""What comes of the runs of a piece of a study."""
+"""Results of the runs of a chunk of a study."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 
 class Runs(SimpleNamespace):
-    """Of a piece: parameters (runs x parameters), samples (variable -> runs x samples), what the core has made of them instead
+    """Results of a chunk: parameters (runs x parameters), samples (variable -> runs x samples), what the core has made of them instead
     (column -> runs), energy (entry -> runs), columns of the drive check, switchings, errors; of drives the ratio (runs)."""
 
     parameters: np.ndarray

@@ -1,4 +1,4 @@
-"""What a study selects by: the table `[select]` of its file."""
+"""Selection of a study: the table `[select]` of its file."""
 
 from typing import Any, Literal, Self
 
@@ -49,7 +49,7 @@ class Bound(Part):
 
 
 class Selection(Part):
-    """Which runs fit the task, and which of these are best."""
+    """Runs that fit the task, and the best of these."""
 
     objectives: dict[str, Direction] = Field(min_length=1)
     """columns, each to be least or largest; the first ranks the runs, the first two make the Pareto plot"""

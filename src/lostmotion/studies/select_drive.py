@@ -1,4 +1,4 @@
-"""Which motor and gearbox for a task: every pair judged and run, ranked, as one table."""
+"""Selection of motor and gearbox for a task: every pair judged and run, ranked, as one table."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which runs of a study fit the task, which are best, and what each limit costs."""
+"""Runs of a study that fit the task, the best of them, and the price of each limit."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ class Candidate:
 
     run: int
     name: str
-    """what varies, as text"""
+    """varied values as text"""
     violated: tuple[str, ...]
     """rules of the drive check, columns with a limit, or `NOT_RUN`"""
     why: str
     not_judged: str
     """rules of the drive check that have no limit to compare with"""
     values: dict[str, float]
-    """of the objectives"""
+    """values of the objectives"""
     tightest: str = ""
     """the rule of the drive check whose limit is used critical, and its share"""
 
@@ -45,7 +45,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Price:
-    """What one limit costs."""
+    """Price of one limit."""
 
     limit: str
     excludes: int
@@ -111,7 +111,7 @@ def _candidate(
 
 
 def prices(ranked: list[Candidate], select: Selection) -> list[Price]:
-    """What each limit costs that some run violates, the one that excludes critical first.
+    """Price of each limit that some run violates, the most critical first.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def prices(ranked: list[Candidate], select: Selection) -> list[Price]:
 
 
 def pareto_front(ranked: list[Candidate], select: Selection) -> list[Candidate]:
-    """Those that fit and of which none that fits is better in one objective without being worse in another."""
+    """Runs that fit and of which none that fits is better in one objective without being worse in another."""
     fitting = [c for c in ranked if c.fits]
     ranks = np.array([_rank(c, select) for c in fitting]).reshape(len(fitting), len(select.objectives))
     return [c for c, rank in zip(fitting, ranks, strict=True) if not _dominated(rank, ranks)]

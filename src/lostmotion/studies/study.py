@@ -51,14 +51,14 @@ class Study(Part):
     design: Literal["grid", "list", "latin_hypercube", "sobol", "random", "saltelli"] = "grid"
     """grid: every combination; list: the first value of each, then the second, ...; saltelli: for Sobol indices"""
     runs: Annotated[Whole, Field(ge=1, le=MAX_RUNS)] | None = None
-    """of a random design; of saltelli the base samples, a power of two"""
+    """number of runs of a random design; for saltelli the base samples, a power of two"""
     seed: Annotated[Whole, Field(ge=0)] = 0
     vary: tuple[Vary, ...] = Field(min_length=1)
     keep: dict[str, str] = Field(default={})
     """column = expression of the result variables, such as peak(load_speed) or energy.gear_losses"""
     trajectories: Trajectories | None = None
     select: Selection | None = None
-    """which runs fit the task, and which of these are best"""
+    """criteria of the runs that fit the task, and of the best of these"""
     axis: AxisTask | None = None
     """each run is a cycle of this task, under gains by rule; it keeps the columns of `axis_columns.COLUMNS`"""
 
@@ -214,7 +214,7 @@ class Study(Part):
 
     @property
     def vocabulary(self) -> Vocabulary:
-        """What its expressions may name."""
+        """Names that its expressions may use."""
         if self._vocabulary is None:
             self._vocabulary = vocabulary_of(self.scenario)
         return self._vocabulary
@@ -243,7 +243,7 @@ class Study(Part):
         return axis_scenario(self.scenario, motor, gearbox, self.axis.cycle, cycles)
 
     def part_key(self, kind: str, row: np.ndarray) -> tuple[Any, ...]:
-        """What of a row decides on its ``"gearbox"`` or its ``"motor"``."""
+        """Column of a row that determines its ``"gearbox"`` or its ``"motor"``."""
         return (kind, *((k, float(row[k])) for k, v in enumerate(self.vary) if v.all_keys[0].split(".")[0] == kind))
 
     def part(self, kind: str, row: np.ndarray) -> Any:
@@ -303,7 +303,7 @@ class Study(Part):
 
     @property
     def kept(self) -> dict[Any, Any]:
-        """What its runs have in common, made once."""
+        """Common values of its runs, made once."""
         return self._kept
 
     @property
@@ -315,7 +315,7 @@ class Study(Part):
 
     @property
     def expressions(self) -> dict[str, Expression]:
-        """What to keep, read."""
+        """Expressions to keep, parsed."""
         return {name: read_expression(text, self.vocabulary) for name, text in self.keep.items()}
 
     @property

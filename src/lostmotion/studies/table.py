@@ -1,4 +1,4 @@
-"""What a study has written, read back as one table."""
+"""Result of a study, read back as one table."""
 
 from __future__ import annotations
 

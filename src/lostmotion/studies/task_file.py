@@ -111,7 +111,7 @@ def task_of(tables: dict[str, Any], directory: Path = Path()) -> Study:
 
 
 def _table(tables: dict[str, Any], key: str) -> dict[str, Any]:
-    """What is given of a motor or gearbox, beside its record or in full."""
+    """Values of a motor or gearbox, beside its record or in full."""
     given = tables.get(key, {})
     if isinstance(given, str):
         return {"from": given}
@@ -133,7 +133,7 @@ def _controller(given: dict[str, Any]) -> dict[str, Any]:
 
 
 def _vary(tables: dict[str, Any], directory: Path) -> list[Any]:
-    """What varies: as the file says, else all records of what the file does not name or write out."""
+    """Varied values: those of the file, else all records of parts that the file does not name or write out."""
     entries = tables.get("vary")
     if entries is None:
         entries = [{"key": kind, "catalogue": {}} for kind in ("gearbox", "motor") if not _whole(tables, kind)]

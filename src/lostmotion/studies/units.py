@@ -56,7 +56,7 @@ def _unit(key: str, schema: Callable[[], dict[str, Any]]) -> str | None:
 
 
 def _nodes(key: str, schema: Callable[[], dict[str, Any]]) -> list[Mapping[str, Any]]:
-    """Of a dotted key, in the JSON Schema; none if it is not known."""
+    """Nodes of a dotted key in the JSON Schema; none if it is unknown."""
     place = tuple(int(part) if part.isdecimal() else part for part in key.split("."))
     found, nodes = follow(_made(schema), place)
     if found != place:

@@ -52,7 +52,7 @@ class Vary(Part):
     relative: Switch = False
     """the value multiplies what the base scenario has (of a list, each entry)"""
     values: tuple[float | str, ...] | None = None
-    """as they are, or names of records; in a random design each is as likely"""
+    """values as they are, or names of records; in a random design each is equally likely"""
     grid: tuple[float, float, int] | None = None
     """first, last, how many"""
     uniform: tuple[float, float] | None = None
@@ -119,11 +119,11 @@ class Vary(Part):
 
     @property
     def unit(self) -> str:
-        """Of the values."""
+        """Unit of the values."""
         return (unit_of_key(self.all_keys[0]) if not self.relative else None) or "1"
 
     def value(self, number: float) -> float | str:
-        """What a number of `levels` or `quantile` stands for: itself, or the name at this place."""
+        """Value of a number of `levels` or `quantile`: itself, or the name at this index."""
         return float(number) if self.names is None else self.names[int(number)]
 
     def levels(self) -> np.ndarray | None:
@@ -170,7 +170,7 @@ def _with_names(data: Mapping[str, Any], table: str) -> dict[str, Any]:
 
 
 def base_value(scenario: Scenario | TrainScenario, key: str) -> Any:
-    """What a scenario has under a dotted key.
+    """Value of a scenario at a dotted key.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What the expressions of a study may name: the result variables and energies of its base scenario, and what else a run has."""
+"""Names in the expressions of a study: the result variables and energies of its base scenario, and further values of a run."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ command; the bandwidth [Hz] of the load speed, a function of the command's ampli
 
 
 class Vocabulary(NamedTuple):
-    """Of one drive, or of one drive train."""
+    """Vocabulary of one drive, or of one drive train."""
 
     variables: tuple[tuple[str, str], ...]
     """result variables, each with its unit"""
     channels: tuple[str, ...]
-    """those of them that the core gives; the others follow from these"""
+    """variables that the core returns; the others follow from these"""
     energies: tuple[tuple[str, str], ...]
     """entries of the ledger, each as expressions call it and as the ledger does"""
     of_the_run: tuple[str, ...]
@@ -39,7 +39,7 @@ OF_DRIVES = Vocabulary(
 
 
 def _controlled(scenario: Scenario | TrainScenario) -> Iterator[tuple[str, str]]:
-    """What controllers add: their signals, by how much each axis misses its reference, and how far windings may be wrong."""
+    """Names that controllers add: their signals, the pointing errors of the axes, and the error bounds of windings."""
     for variable in axis_variables(scenario.by_prefix(), scenario.sliding()):
         yield variable.name, variable.unit
     for motor, name in pointing_names(scenario):
@@ -50,7 +50,7 @@ def _controlled(scenario: Scenario | TrainScenario) -> Iterator[tuple[str, str]]
 
 
 def vocabulary_of(scenario: Scenario | TrainScenario) -> Vocabulary:
-    """What expressions may name of a run of this scenario.
+    """Names that expressions may use for a run of this scenario.
 
     An entry of a train's ledger, such as ``first_gear: mesh``, is called ``first_gear_mesh``.
     """

@@ -1,4 +1,4 @@
-"""What a study wants of its runs: result variables, reductions of them, energies, the drive check."""
+"""Values that a study takes from its runs: result variables, reductions of them, energies, the drive check."""
 
 from __future__ import annotations
 

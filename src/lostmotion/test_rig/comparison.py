@@ -1,4 +1,4 @@
-"""What the rig measures beside what the data sheet says."""
+"""Measurements of the rig beside the values of the data sheet."""
 
 from __future__ import annotations
 

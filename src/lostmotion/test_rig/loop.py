@@ -26,7 +26,7 @@ class Loop:
         return abs(self._end(slice(0, half + 1), +1.0) - self._end(slice(half, None), -1.0))
 
     def _end(self, branch: slice, sign: float) -> float:
-        """Where a branch that unloads from this sign reaches zero torque, by its last two points before."""
+        """Zero of a branch that unloads from this sign, by its last two points before."""
         twist, torque = self.twist[branch], sign * self.torque[branch]
         k = np.flatnonzero(torque > 1e-3 * self.amplitude)
         run = k[: np.argmax(np.diff(k, append=len(twist) + 1) > 1) + 1][-2:] if len(k) > 2 else k

@@ -86,7 +86,7 @@ class TestRig:
         return Load(inertia=k / omega**2, viscous_friction=2.0 * k / omega)
 
     def _twist_at(self, torque: float) -> float:
-        """Where the torsion curve has this torque: a start without transient."""
+        """Twist of the torsion curve at this torque, for a start without transient."""
         if self.rigid:
             return 0.0
         rest, previous = abs(torque), 0.0

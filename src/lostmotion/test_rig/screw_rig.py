@@ -132,7 +132,7 @@ class ScrewRig:
         )
 
     def _deflection(self, result: RunArrays) -> Any:
-        """Of the slide towards the side that the force pushes it to [m]."""
+        """Deflection of the slide towards the side to which the force pushes it [m]."""
         return -(result["slide_position"] - result["slide_position"][0])
 
     @checked
@@ -223,7 +223,7 @@ class ScrewRig:
         return 0.0 if self.rigid else 2.0 * float(np.sqrt(self._k * LIGHT))
 
     def _at(self, force: float) -> float:
-        """Where the screw has this force, for a start without transient."""
+        """Deflection of the screw at this force, for a start without transient."""
         if self.rigid or self.screw.stiffness_curve is not None:
             return 0.0
         return float(np.copysign(0.5 * self.screw.backlash + abs(force) / self._k, force))

@@ -71,7 +71,7 @@ def to_si(text: str, unit: str) -> float:
 
 
 def si_value(text: str, unit: str) -> float:
-    """As `to_si`, where a text cannot but be a string: a bare number is in `unit`.
+    """Value as `to_si` returns it, for a text that cannot but be a string: a bare number is in `unit`.
 
     Raises
     ------
@@ -186,7 +186,7 @@ def _known(unit: str) -> Product:
 
 
 def _ratio(units: Product, other: Product) -> Decimal | None:
-    """How many of the other one of the first is; None if they measure something else."""
+    """Ratio of two units; None if they measure different quantities."""
     if angle_of(units) != angle_of(other) or dimension_of(units) != dimension_of(other):
         return None
     with suppress(ArithmeticError):
@@ -205,7 +205,7 @@ def _factor(units: Product, unit: str) -> Decimal | None:
 
 
 def _readings(units: Product, wanted: Product) -> Iterator[Product]:
-    """What a product may mean where `wanted` is: as it stands, with turns for a speed in 1/min, with pounds as forces."""
+    """Possible meanings of a product where `wanted` is required: as written, with turns for a speed in 1/min, with pounds as forces."""
     if any(name.endswith("hertz") for name in units) and not any(name.endswith("hertz") for name in wanted):
         return  # whether turns or radians are counted cannot be determined
     turns = angle_of(wanted)
