@@ -6,11 +6,13 @@ from pydantic import Field, field_validator, model_validator
 
 from ..inputs.part import Part
 from ..inputs.quantities import (
+    Force,
     Inertia,
     NotNegative,
     Number,
     Positive,
     Speed,
+    Time,
     Torque,
     ViscousFriction,
 )
@@ -30,6 +32,14 @@ class GearboxLimits(Part):
     average_input_speed: Annotated[Speed, Positive] | None = None
     """for the mean over a duty cycle; left out, the rated speed stands in for it"""
     max_input_speed: Annotated[Speed, Positive] | None = None
+    rated_life: Annotated[Time, Positive] | None = None
+    """L10h at rated torque and rated speed"""
+    life_exponent: Annotated[Number, Positive] = 3.0
+    """p of the life over the torque; 10/3 where roller bearings decide"""
+    max_radial_force: Annotated[Force, Positive] | None = None
+    """on the output bearing"""
+    max_axial_force: Annotated[Force, Positive] | None = None
+    """on the output bearing"""
 
 
 class Transmission(Part):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..studies.select import SHARES, USE, Selection
+from ..studies.select import TASK_SHARES, USE, Selection
 from ..studies.selection import NOT_RUN, Candidate, Price, candidates, pareto_front, prices
 from ..studies.study import Study
 from ..studies.table import labelled
@@ -162,7 +162,7 @@ def pareto_figure(table: pa.Table, ranked: list[Candidate], front: list[Candidat
 
 def _selection_csv(table: pa.Table, study: Study, ranked: list[Candidate], front: list[Candidate]) -> str:
     """One row a run: rank, what varies, whether and why it fits, and all its numbers."""
-    uses = [f"{USE}{rule}" for rule in SHARES if f"{USE}{rule}" in table.column_names]
+    uses = [f"{USE}{rule}" for rule in TASK_SHARES if f"{USE}{rule}" in table.column_names]
     names = [*(v.title for v in study.vary), *study.kept_units, *uses]
     rows, on_front = [], {c.run for c in front}
     by_run = {row["run"]: row for row in table.to_pylist()}

@@ -34,13 +34,33 @@ RULES = {
     "loss_map": "the run, and the data of gearbox.losses",
 }
 
+# Rules that only tasks have.
+TASK_RULES = {
+    "gearbox_life": "L10h from the rated point, cubic or with limits.life_exponent: Harmonic Drive, CSF & CSG catalogue; ISO 281",
+    "output_bearing": "the gearbox's data sheet",
+    "emergency_stop": "momentary peak torque: Harmonic Drive, CSF & CSG catalogue, selection procedure",
+    "holding_brake": "static torque of the brake against the load without friction: data sheets of servo motors",
+    "screw_life": "L10h of the cubic mean load: ISO 3408-5; THK general catalogue, A-735",
+    "screw_static": "static capacity against the largest load: THK general catalogue, A-733",
+    "buckling": "half of Euler's load, 147 MPa at most: THK general catalogue, A-685",
+    "critical_speed": "0.8 of the first bending speed: THK general catalogue, A-687; Rexroth R310RU3301, p. 120",
+    "screw_speed": "path of the balls, 70 m rpm, or the data sheet: THK general catalogue, A-688",
+    "belt_force": "pretension + circumferential force: Elatech and Mulco, timing belts, linear drives",
+    "belt_teeth": "teeth in mesh, 12 at most: Elatech and Mulco, timing belts",
+    "rack_force": "the rack's data sheet",
+    "amplifier_current": "rms current over the cycle with the continuous current of the amplifier",
+    "bus_voltage": "energy balance of the capacitors: HIWIN MM99TE07-1701, p. 118",
+    "brake_resistor": "energy beyond the capacitors: HIWIN MM99TE07-1701, p. 118",
+}
+SOURCES = RULES | TASK_RULES
+
 
 @dataclass(frozen=True)
 class Finding:
     """One point of the check."""
 
     rule: str
-    """key of `RULES`"""
+    """key of `SOURCES`"""
     what: str
     value: str
     verdict: Verdict
@@ -50,8 +70,8 @@ class Finding:
 
     @property
     def source(self) -> str:
-        """Source of the rule."""
-        return RULES[self.rule]
+        """Where the rule comes from."""
+        return SOURCES[self.rule]
 
     def __str__(self) -> str:
         mark = {"ok": "ok     ", "warning": "WARNING", "unknown": "?      "}[self.verdict]

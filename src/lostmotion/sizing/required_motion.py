@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..control.references import PositionReference
+from ..model.duty import Duty
 from ..model.gearbox import Gearbox
 from ..model.losses import ConstantEfficiency
 from ..model.motor import Motor
@@ -21,6 +22,7 @@ from .motion_check import inertia_ratio
 from .motor_check import current, heat, largest_speed, needed_command, rms_rise, voltage
 
 POINTS = 1000  # of a cycle at least
+LINES = 1e-3  # of the largest torque
 WITHIN = 1e-9  # of an interval: so close to its ends, values are those on this side of a jump
 
 
@@ -38,11 +40,31 @@ class RequiredMotion:
     """torque of the gearbox [N·m]"""
     cycle: float
     """[s]"""
+    position: np.ndarray
+    """[rad]"""
+    inertia: np.ndarray
+    """of the load with its payloads [kg·m²]"""
+    holding: np.ndarray
+    """torque that holds the load at rest there, without friction [N·m]"""
 
 
-def required_motion(reference: PositionReference, load: LoadTable, cycle: float) -> RequiredMotion:
-    """The motion of a load that follows its reference over one cycle [s]: J acceleration + friction + load torque."""
-    breakpoints = {t for t, *_ in (*reference.pieces(), *load.torque.breakpoint_list()) if 0.0 < t < cycle}
+NO_DUTY = Duty()
+
+
+def required_motion(
+    reference: PositionReference, load: LoadTable, cycle: float, duty: Duty = NO_DUTY, rise: float | None = None
+) -> RequiredMotion:
+    """The motion of a load that follows its reference over one cycle [s]: J acceleration + friction + load torque.
+
+    Parameters
+    ----------
+    duty
+        What acts on the load beside.
+    rise
+        Sine of the slope of a slide; None of a rotary load. All values of a slide are in units of translation.
+    """
+    times_of = (*reference.pieces(), *load.torque.breakpoint_list())
+    breakpoints = {t for t in ({t for t, *_ in times_of} | duty.edges()) if 0.0 < t < cycle}
     edges = np.array([0.0, *sorted(breakpoints), cycle])
     frequencies = [f for signal in (reference, load.torque) for _, f, _ in signal.sine_list()]
     finest = cycle / max(POINTS, 100.0 * cycle * max(frequencies, default=0.0))
@@ -52,11 +74,39 @@ def required_motion(reference: PositionReference, load: LoadTable, cycle: float)
         inside[0], inside[-1] = a + WITHIN * (b - a), b - WITHIN * (b - a)
         times.append(inside)
     time = np.concatenate(times)
-    _, speed, acceleration, _ = reference.at(time)
+    position, speed, acceleration, _ = reference.at(time)
     speed = np.where(np.abs(speed) <= 1e-12 * np.abs(speed).max(), 0.0, speed)
     friction = load.viscous_friction * speed + load.friction_torque * np.sign(speed)
-    torque = load.inertia * acceleration + friction + values_at(load.torque, time)
-    return RequiredMotion(time, speed, acceleration, torque, cycle)
+    inertia = load.inertia + duty.inertia(time, slides=rise is not None)
+    holding = values_at(load.torque, time) + duty.torque(time, position, rise)
+    return RequiredMotion(
+        time, speed, acceleration, inertia * acceleration + friction + holding, cycle, position, inertia, holding
+    )
+
+
+def duty_torque(motion: RequiredMotion, load: LoadTable) -> tuple[np.ndarray, np.ndarray]:
+    """Instants [s] and load torque [N·m] of a run in place of duty, along the reference: what holds the load and what moves its
+    payloads, by the fewest straight lines that depart from it by 0.1 % of its peak at most."""
+    torque = motion.holding + (motion.inertia - load.inertia) * motion.acceleration
+    lines = _fewest_lines(motion.time, torque, LINES * float(np.abs(torque).max(initial=0.0)))
+    return motion.time[lines], torque[lines]
+
+
+def _fewest_lines(x: np.ndarray, y: np.ndarray, tolerance: float) -> np.ndarray:
+    """Indices of the points to keep, so that straight lines through them depart by the tolerance at most (Douglas and Peucker)."""
+    kept, waiting = np.zeros(len(x), bool), [(0, len(x) - 1)]
+    kept[[0, -1]] = True
+    while waiting:
+        a, b = waiting.pop()
+        if b - a < 2:
+            continue
+        off = np.abs(y[a] + (y[b] - y[a]) / (x[b] - x[a]) * (x[a + 1 : b] - x[a]) - y[a + 1 : b])
+        worst = int(np.argmax(off))
+        if off[worst] > tolerance:
+            k = a + 1 + worst
+            kept[k] = True
+            waiting += [(a, k), (k, b)]
+    return np.flatnonzero(kept)
 
 
 def values_at(signal: TimeFunction[Any], time: np.ndarray) -> np.ndarray:
@@ -81,6 +131,13 @@ class InputDemand:
     """[rad/s²]"""
     torque: np.ndarray
     """with losses and inertia of the gearbox [N·m]"""
+    with_stage: Gearbox | None = None
+    """the gearbox and the stage of a linear axis behind it as one"""
+
+    @property
+    def whole(self) -> Gearbox:
+        """All that is between the motor and the load."""
+        return self.with_stage or self.gearbox
 
     def cycle(self, motor_torque: np.ndarray) -> DutyCycle:
         """With the torque of the motor [N·m], the duty cycle that the rules are for."""
@@ -93,8 +150,11 @@ class InputDemand:
         return np.asarray(self.torque + own)
 
 
-def input_demand(motion: RequiredMotion, g: Gearbox) -> InputDemand:
-    """Demand on the input of a gearbox, with losses as in the solver: T_1 = (T_2 + s m_2B T_2R)/i, s the direction of the load."""
+def input_demand(motion: RequiredMotion, g: Gearbox, with_stage: Gearbox | None = None) -> InputDemand:
+    """Demand on a gearbox whose output has this motion, with losses as the solver takes them: T_1 = (T_2 + s m_2B T_2R)/i.
+
+    s is the direction of the load.
+    """
     speed, acceleration = g.ratio * motion.speed, g.ratio * motion.acceleration
     s = np.sign(motion.speed)
     if isinstance(g.losses, ConstantEfficiency):
@@ -104,7 +164,9 @@ def input_demand(motion: RequiredMotion, g: Gearbox) -> InputDemand:
         points = zip((s * motion.torque / R).tolist(), (np.abs(speed) / g.rated_input_speed).tolist(), strict=True)
         lost = np.array([law(mu, v) for mu, v in points])
         through = (motion.torque + s * lost * R) / g.ratio
-    return InputDemand(motion, g, speed, acceleration, through + g.inertia * acceleration + g.viscous_friction * speed)
+    return InputDemand(
+        motion, g, speed, acceleration, through + g.inertia * acceleration + g.viscous_friction * speed, with_stage
+    )
 
 
 def check_gearbox(demand: InputDemand) -> list[Finding]:
@@ -128,5 +190,5 @@ def check_motor(
         *heat(motor, cycle, ambient, rise=rise),
         voltage(motor, needed_command(motor, torque, demand.speed), torque, demand.speed),
         current(motor, torque),
-        inertia_ratio(motor, demand.gearbox, load_inertia, largest),
+        inertia_ratio(motor, demand.whole, load_inertia, largest),
     ]

@@ -2,7 +2,7 @@
 
 import math
 from functools import lru_cache
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -12,14 +12,30 @@ from ..control.loops import Feedforward
 from ..control.references import Move, PositionReference
 from ..control.sample_times import whole_multiple
 from ..control.tuning import TwoInertias, suited
-from ..inputs.quantities import Angle, Number, Positive, Time, Whole
+from ..inputs.part import Part
+from ..inputs.quantities import (
+    Acceleration,
+    Angle,
+    Force,
+    Length,
+    Limit,
+    NotNegative,
+    Number,
+    Positive,
+    Time,
+    Whole,
+)
+from ..inputs.validation import unknown_key
+from ..model.duty import Duty, HoldingBrake, Supply
 from ..model.gearbox import Gearbox
 from ..model.motor import Motor
-from ..model.signals import TimeFunction, TorqueSignal
+from ..model.signals import Samples, TimeFunction, TorqueSignal
 from ..model.task import Task
 from ..servo.data import lag_sum, secant
-from ..simulation.scenario import Initial, Scenario, SimulationTable
+from ..simulation.scenario import Initial, LoadTable, Scenario, SimulationTable
+from ..sizing.finding import SOURCES
 from ..sizing.motion_check import INERTIA_RATIO
+from ..sizing.required_motion import duty_torque, required_motion
 from .select import Bound
 
 REPEATS = 0.01  # relative difference of two cycles, within which the motion repeats
@@ -34,7 +50,17 @@ REQUIREMENTS = {
 }
 
 
-class AxisTask(Task):
+class LinearAxis(Part):
+    """What makes a task one of a linear axis: its last stage and the slope of its slide."""
+
+    kind: Literal["screw", "rack", "belt"]
+    stage: dict[str, Any] = Field(default={})
+    """the table `[screw]`, `[rack]` or `[belt]`, of which a record may vary"""
+    rise: Annotated[Number, Limit(ge=-1.0, le=1.0)] = 0.0
+    """sine of the slide's inclination"""
+
+
+class AxisTask(Task, Duty):
     """Requirements of an axis, beside the motion of its reference."""
 
     cycle: Annotated[Time, Positive]
@@ -51,6 +77,71 @@ class AxisTask(Task):
     """plus and minus this: how near the load must stay to where a move ends"""
     max_settling_time: Annotated[Time, Positive] | None = None
     """from the end of the reference's move until the load stays in the window"""
+    altitude: Annotated[Length, NotNegative] = 0.0
+    """above the sea; the continuous torque of the motor falls by 1 % to each 100 m above 1000 m"""
+    life: Annotated[Time, Positive] | None = None
+    """wanted L10h of gearbox and screw"""
+    emergency_stop: Annotated[Acceleration, Positive] | None = None
+    """at which the load is stopped from any speed of the cycle"""
+    radial_force: Annotated[Force, NotNegative] | None = None
+    """on the output bearing of the gearbox"""
+    axial_force: Annotated[Force, NotNegative] | None = None
+    """on the output bearing of the gearbox"""
+    brake: HoldingBrake | None = None
+    supply: Supply | None = None
+    safety_factors: dict[str, Annotated[Number, Positive]] = Field(default={})
+    """by rule"""
+    linear: LinearAxis | None = None
+    """of the tables `[slide]` and `[screw]`, `[rack]` or `[belt]`; all values of the load are then in units of translation"""
+
+    @model_validator(mode="after")
+    def _rules_are_known(self) -> Self:
+        for rule in self.safety_factors:
+            if rule not in SOURCES:
+                raise ValueError(f"has safety_factors.{rule}: {unknown_key(rule, list(SOURCES))}")
+        if self.gravity is not None and self.linear is not None:
+            raise ValueError("has gravity, which is of a rotary load; give slide.inclination in its place")
+        for k, payload in enumerate(self.payload):
+            if payload.end > self.cycle * (1.0 + WHOLE):
+                raise ValueError(f"has payload[{k}].end = {payload.end:g} s, after its cycle of {self.cycle:g} s")
+            if self.linear is not None and payload.inertia > 0.0:
+                raise ValueError(f"has payload[{k}].inertia, which a slide has no use for; give its mass")
+            if self.linear is None and payload.mass > 0.0 and payload.radius is None:
+                raise ValueError(f"has payload[{k}].mass without its radius from the axis; add payload[{k}].radius")
+        wanted = "torques" if self.linear is None else "forces"
+        for k, process in enumerate(self.process):
+            if getattr(process, wanted) is None:
+                what = "a rotary load" if self.linear is None else "a slide"
+                raise ValueError(f"has process[{k}] without {wanted}, which {what} needs")
+            if process.times is not None and process.times[-1] > self.cycle * (1.0 + WHOLE):
+                raise ValueError(f"has process[{k}].times that end after its cycle of {self.cycle:g} s")
+        return self
+
+    @property
+    def rise(self) -> float | None:
+        """Sine of the slope of a slide; None of a rotary load."""
+        return None if self.linear is None else self.linear.rise
+
+    def fed(self, motor: Motor) -> Motor:
+        """A motor with the inertia of the brake, at the least voltage of the supply.
+
+        Raises
+        ------
+        InputError
+            The motor has a voltage that contradicts it.
+        """
+        changes: dict[str, Any] = {}
+        if self.brake is not None and self.brake.inertia > 0.0:
+            changes["rotor_inertia"] = motor.rotor_inertia + self.brake.inertia
+        voltage = None if self.supply is None else self.supply.min_voltage
+        if voltage is not None:
+            if motor.kind == "dc":
+                changes["voltage_limit"] = voltage if motor.voltage_limit is None else min(voltage, motor.voltage_limit)
+            elif motor.winding is not None:
+                changes["dc_voltage"] = voltage
+            elif motor.limits is not None:
+                changes["limits"] = motor.limits.model_copy(update={"max_voltage": voltage})
+        return motor.model_copy(update=changes) if changes else motor
 
     @model_validator(mode="after")
     def _window_and_time(self) -> Self:
@@ -168,7 +259,23 @@ def repeated_torque(torque: TorqueSignal, cycle: float, count: int) -> TorqueSig
     return torque.model_copy(update={"samples": _tiled(torque.samples, cycle, count, 0.0, "load.torque")})
 
 
-def axis_scenario(base: Scenario, motor: Motor, gearbox: Gearbox, cycle: float, count: int) -> Scenario:
+def load_torque_of(base: Scenario, task: AxisTask) -> TorqueSignal:
+    """The load torque of one cycle: that of the base, with what the duty of the task adds along the reference."""
+    if not task.anything:
+        return base.load.torque
+    duty = Duty(gravity=task.gravity, payload=task.payload, process=task.process)
+    return _duty_torque(reference_of(base), base.load, task.cycle, duty, task.rise)
+
+
+@lru_cache(maxsize=32)
+def _duty_torque(
+    reference: PositionReference, load: LoadTable, cycle: float, duty: Duty, rise: float | None
+) -> TorqueSignal:
+    times, torques = duty_torque(required_motion(reference, load, cycle, duty, rise), load)
+    return TorqueSignal(samples=Samples(times=tuple(times.tolist()), values=tuple(torques.tolist())))
+
+
+def axis_scenario(base: Scenario, motor: Motor, gearbox: Gearbox, task: AxisTask, count: int) -> Scenario:
     """The base with a motor, a gearbox and gains by rule for them, over so many cycles, from rest where the reference begins.
 
     Raises
@@ -176,14 +283,15 @@ def axis_scenario(base: Scenario, motor: Motor, gearbox: Gearbox, cycle: float, 
     InputError
         The parts do not fit together.
     """
-    reference = reference_of(base)
+    reference, cycle = reference_of(base), task.cycle
     controller = tuned(base, motor, gearbox)
+    torque = load_torque_of(base, task)
     return base.model_copy(
         update={
             "motor": motor,
             "gearbox": gearbox,
             "controller": controller.model_copy(update={"reference": repeated(reference, cycle, count)}),
-            "load": base.load.model_copy(update={"torque": repeated_torque(base.load.torque, cycle, count)}),
+            "load": base.load.model_copy(update={"torque": repeated_torque(torque, cycle, count)}),
             "simulation": SimulationTable(duration=count * cycle, sample_interval=controller.sample_time),
             "initial": Initial(load_angle=float(reference.at(0.0)[0])),
         }

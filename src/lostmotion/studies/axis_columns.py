@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from ..model.motor import Motor
+from ..simulation.linear_units import of_slides
 from ..simulation.results import RunArrays
 from ..simulation.scenario import Scenario
 from ..sizing.duty_cycle import DutyCycle
@@ -42,6 +43,22 @@ COLUMNS = {
     "change": ("1", "relative difference of the last two cycles"),
 }
 """each with its unit and meaning"""
+
+OF_LOAD = (
+    "output_torque_peak",
+    "output_torque_mean",
+    "tracking_error_peak",
+    "tracking_error_rms",
+    "reversal_error",
+)
+"""columns in units of translation where the load is a slide"""
+
+
+def unit_of_column(name: str, *, slides: bool) -> str:
+    """The unit of a column."""
+    unit = COLUMNS[name][0]
+    return of_slides(unit, positions=True, forces=True) if slides and name in OF_LOAD else unit
+
 
 TOGETHER = 8  # sample times whose heat is taken as even
 

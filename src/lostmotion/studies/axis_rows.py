@@ -15,9 +15,22 @@ from ..model.motor import Motor
 from ..simulation.results import RunArrays
 from ..simulation.run import run
 from ..simulation.scenario import Scenario
+from ..sizing.axis_rules import (
+    amplifier_current,
+    derated,
+    electrical_power,
+    emergency_stop,
+    gearbox_life,
+    holding_brake,
+    output_bearing,
+    returned,
+    stage_rules,
+    supply_rules,
+    with_safety,
+)
 from ..sizing.finding import Finding
+from ..sizing.formulas import derating
 from ..sizing.gearbox_check import input_speeds, loads, lost_motion
-from ..sizing.motion_check import inertia_ratio
 from ..sizing.motor_check import command_of_run, current, heat, largest_speed, voltage
 from ..sizing.motor_run import oriented_amplitudes
 from ..sizing.required_motion import (
@@ -28,10 +41,11 @@ from ..sizing.required_motion import (
     input_demand,
     required_motion,
 )
+from ..sizing.stages import DIRECT, Stage, at_input, together
 from ..worker_threads import thread_pool
 from .axis import FEWEST, REPEATS, AxisTask, reference_of
 from .axis_columns import COLUMNS, change, duty_cycle_of, last_cycle, row_of
-from .check import COLUMNS as CHECKS
+from .check import TASK_COLUMNS as CHECKS
 from .check import columns_of
 from .runs import Runs
 from .study import Study
@@ -56,8 +70,10 @@ class Axes:
 
     def motion(self) -> RequiredMotion:
         """One cycle at the load of the base scenario."""
-        base = self._base
-        found = self._once(("motion",), lambda: required_motion(reference_of(base), base.load, self.task.cycle))
+        base, task = self._base, self.task
+        found = self._once(
+            ("motion",), lambda: required_motion(reference_of(base), base.load, task.cycle, task, task.rise)
+        )
         assert isinstance(found, RequiredMotion)
         return found
 
@@ -77,15 +93,55 @@ class Axes:
         return kept[key]
 
     def gearbox(self, row: np.ndarray) -> tuple[InputDemand, list[Finding]] | InputError:
-        """Demands on the input of the gearbox, and the rules for it alone."""
-        key = ("demand", *self.study.part_key("gearbox", row))
-        return self._once(key, lambda: self._demand(self.study.part("gearbox", row)))  # type: ignore[no-any-return]
+        """What its input has to do, and what the rules say of it and of the stage behind it."""
+        key = ("demand", self.study.part_key("gearbox", row), self._stage_key(row))
+        return self._once(key, lambda: self._demand(row))  # type: ignore[no-any-return]
 
-    def _demand(self, g: Gearbox) -> tuple[InputDemand, list[Finding]]:
-        demand = input_demand(self.motion(), g)
-        findings = check_gearbox(demand)
-        if self.task.max_lost_motion is not None:
-            findings.append(lost_motion(g, self.task.max_lost_motion))
+    def _stage_key(self, row: np.ndarray) -> Any:
+        linear = self.task.linear
+        return None if linear is None else self.study.part_key(linear.kind, row)
+
+    def stage(self, row: np.ndarray) -> tuple[Stage, RequiredMotion, list[Finding]] | None:
+        """The last stage of a linear axis, the motion of its shaft and what its rules say; None of a rotary load.
+
+        Raises
+        ------
+        InputError
+            Its record lacks data.
+        """
+        if self.task.linear is None:
+            return None
+        found = self._once(("stage motion", self._stage_key(row)), lambda: self._stage(row))
+        if isinstance(found, InputError):
+            raise found
+        return found  # type: ignore[no-any-return]
+
+    def _stage(self, row: np.ndarray) -> tuple[Stage, RequiredMotion, list[Finding]]:
+        stage: Stage = self.study.part("stage", row)
+        motion = self.motion()
+        return stage, at_input(motion, stage), stage_rules(motion, stage, self.task.life)
+
+    def _demand(self, row: np.ndarray) -> tuple[InputDemand, list[Finding]]:
+        g: Gearbox = self.study.part("gearbox", row)
+        stage, task = self.stage(row), self.task
+        findings: list[Finding] = []
+        if stage is None:
+            demand = input_demand(self.motion(), g)
+        else:
+            demand = input_demand(stage[1], g, together(g, stage[0]))
+            findings += stage[2]
+        if g != DIRECT:
+            findings += check_gearbox(demand)
+            if task.life is not None:
+                findings.append(gearbox_life(demand, task.life))
+            if task.emergency_stop is not None:
+                rate = task.emergency_stop * (1.0 if stage is None else stage[0].ratio())
+                findings.append(emergency_stop(demand.motion, g, rate))
+            findings += output_bearing(g, task.radial_force, task.axial_force)
+        if task.brake is not None or (task.hold_without_power and (task.gravity is not None or task.rise)):
+            findings.append(holding_brake(demand, task.brake))
+        if task.max_lost_motion is not None:
+            findings.append(lost_motion(demand.whole, task.max_lost_motion))
         return demand, findings
 
     def motor(self, row: np.ndarray) -> Motor | InputError:
@@ -93,21 +149,47 @@ class Axes:
         key = ("checked", *self.study.part_key("motor", row))
         return self._once(key, lambda: self.study.part("motor", row))  # type: ignore[no-any-return]
 
-    def refused(self, row: np.ndarray) -> Row | None:
-        """The columns of a pair that the rules refuse; None if it is to be run."""
+    def judged(self, row: np.ndarray) -> list[Finding] | InputError:
+        """What the rules say of a pair before any run; the error of a record that lacks what a run needs."""
         gearbox, motor = self.gearbox(row), self.motor(row)
         lacking = [str(error) for error in (gearbox, motor) if isinstance(error, InputError)]
         if lacking:
-            return CHECKS | {"violated": NO_DATA, "why": "; ".join(lacking)}
+            return InputError("; ".join(lacking))
         assert not isinstance(gearbox, InputError)
         assert not isinstance(motor, InputError)
         demand, findings = gearbox
-        load = self._base.load.inertia
-        found = [
-            *findings,
-            *check_motor(demand, motor, load, self.task.ambient_temperature, self.task.max_inertia_ratio),
-        ]
-        return columns_of(found) if any(f.verdict == "warning" for f in found) else None
+        task, load = self.task, float(self.motion().inertia.max())
+        found = check_motor(demand, motor, load, task.ambient_temperature, task.max_inertia_ratio)
+        return self._under_task([*findings, *found, *self._supplied(demand, motor)], motor)
+
+    def _supplied(self, demand: InputDemand, motor: Motor) -> list[Finding]:
+        """The rules of supply and amplifier."""
+        supply = self.task.supply
+        if supply is None:
+            return []
+        found = []
+        if supply.continuous_current is not None:
+            found.append(amplifier_current(demand, motor, supply.continuous_current))
+        if supply.voltage_limit is not None or supply.capacitance is not None:
+            power = electrical_power(demand, motor)
+            unknown = bool(np.isnan(power).any())
+            back = None if unknown else returned(demand.motion.time, power, demand.motion.cycle)
+            found += supply_rules(back, supply)
+        return found
+
+    def _under_task(self, findings: list[Finding], motor: Motor) -> list[Finding]:
+        """Findings with the derating and the safety factors of the task."""
+        task = self.task
+        hottest = None if motor.limits is None else motor.limits.max_winding_temperature
+        share = derating(task.altitude, task.ambient_temperature, hottest)
+        return with_safety(derated(findings, share), task.safety_factors)
+
+    def refused(self, row: np.ndarray) -> Row | None:
+        """The columns of a pair that the rules refuse; None if it is to be run."""
+        found = self.judged(row)
+        if isinstance(found, InputError):
+            return CHECKS | {"violated": NO_DATA, "why": str(found)}
+        return columns_of(found, CHECKS) if any(f.verdict == "warning" for f in found) else None
 
     def measured(self, row: np.ndarray) -> tuple[Row, int]:
         """The columns of a pair that is run, and its switchings.
@@ -119,8 +201,8 @@ class Axes:
         """
         scenario, result, count = self.until_it_repeats(row)
         columns = row_of(scenario, self.task, result, count)
-        found = self._after_run(scenario, result, count, columns["winding_temperature"])
-        return columns_of(found) | columns, int(result.attrs["switching_count"])
+        found = self._after_run(row, scenario, result, count, columns["winding_temperature"])
+        return columns_of(found, CHECKS) | columns, int(result.attrs["switching_count"])
 
     def until_it_repeats(self, row: np.ndarray) -> tuple[Scenario, RunArrays, int]:
         """Runs twice as many cycles again and again, until the last two agree, or there are as many as the task permits."""
@@ -132,16 +214,17 @@ class Axes:
                 return scenario, result, count
             count = min(2 * count, self.task.max_cycles)
 
-    def _after_run(self, scenario: Scenario, result: RunArrays, count: int, winding: float) -> list[Finding]:
-        """The same rules, of the cycle that was run, and the temperature of its winding [°C]."""
+    def _after_run(
+        self, row: np.ndarray, scenario: Scenario, result: RunArrays, count: int, winding: float
+    ) -> list[Finding]:
+        """The same rules, of the cycle that was run, and the temperature of its winding [°C]; those that only the required motion
+        has are of that."""
         here, task = last_cycle(result, count), self.task
         duty, g, m = duty_cycle_of(result, here, task.cycle), scenario.gearbox, scenario.motor
         command, torque, speed = (result[name][here] for name in ("command", "motor_torque", "motor_speed"))
         command = command_of_run(m, scenario.controller, command, torque, speed)
         oriented = oriented_amplitudes(result, "motor")
-        found = [
-            *loads(g, float(np.abs(duty.output_torque).max()), duty),
-            *input_speeds(g, duty),
+        of_motor = [
             largest_speed(m, duty.peak_input_speed),
             *heat(
                 m,
@@ -151,9 +234,15 @@ class Axes:
             ),
             voltage(m, command, torque, speed, oriented=None if oriented is None else oriented[1][here]),
             current(m, torque),
-            inertia_ratio(m, g, scenario.load.inertia, task.max_inertia_ratio),
         ]
-        return [*found, lost_motion(g, task.max_lost_motion)] if task.max_lost_motion is not None else found
+        of_gearbox: list[Finding] = []
+        if task.linear is None:
+            of_gearbox = [*loads(g, float(np.abs(duty.output_torque).max()), duty), *input_speeds(g, duty)]
+        found = self._under_task([*of_gearbox, *of_motor], m)
+        again = {f.rule for f in found}
+        before = self.judged(row)
+        assert not isinstance(before, InputError)
+        return [*found, *(f for f in before if f.rule not in again)]
 
 
 def run_axes(study: Study, parameters: np.ndarray, threads: int) -> Runs:

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
 from ..sizing.drive_check import check_drive
-from ..sizing.finding import RULES, Finding
-from .select import SHARES, USE
+from ..sizing.finding import SOURCES, Finding
+from .select import SHARES, TASK_SHARES, USE
 
 TEXTS = ("violated", "why", "not judged")
 """rules that are violated, in words, and rules without a limit to compare with"""
 COLUMNS: dict[str, float | str] = {f"{USE}{rule}": math.nan for rule in SHARES} | dict.fromkeys(TEXTS, "")
 """each with what stands in the row of a run that has failed"""
+TASK_COLUMNS: dict[str, float | str] = {f"{USE}{rule}": math.nan for rule in TASK_SHARES} | dict.fromkeys(TEXTS, "")
+"""the same of tasks"""
 
 
 def check_columns(scenario: Scenario | TrainScenario) -> dict[str, float | str]:
@@ -28,16 +30,16 @@ def check_columns(scenario: Scenario | TrainScenario) -> dict[str, float | str]:
     return columns_of(check_drive(scenario))
 
 
-def columns_of(findings: Iterable[Finding]) -> dict[str, float | str]:
+def columns_of(findings: Iterable[Finding], columns: Mapping[str, float | str] = COLUMNS) -> dict[str, float | str]:
     """Findings as columns; of those of one rule the one that uses most of its limit."""
-    row, findings = dict(COLUMNS), list(findings)
+    row, findings = dict(columns), list(findings)
     for finding in findings:
         column = f"{USE}{finding.rule}"
         if finding.use is not None:
             before = float(row[column])
             row[column] = finding.use if math.isnan(before) else max(before, finding.use)
     wrong = [f for f in findings if f.verdict == "warning"]
-    row["violated"] = " ".join(rule for rule in RULES if any(f.rule == rule for f in wrong))
+    row["violated"] = " ".join(rule for rule in SOURCES if any(f.rule == rule for f in wrong))
     row["why"] = "; ".join(f"{f.what}: {f.value}" + (f" ({f.remark})" if f.remark else "") for f in wrong)
-    row["not judged"] = " ".join(f.rule for f in findings if f.verdict == "unknown")
+    row["not judged"] = " ".join(dict.fromkeys(f.rule for f in findings if f.verdict == "unknown"))
     return row

@@ -15,7 +15,7 @@ from ..simulation.variables import CHANNEL_NAMES
 from ..worker_threads import thread_pool
 from .records import kind_of_record
 from .runs import Runs
-from .select import SHARES, USE
+from .select import TASK_SHARES, USE
 from .study import Study
 from .wanted import DERIVED, asks_for, needed, used
 
@@ -53,7 +53,7 @@ def tabulate(study: Study, units: dict[str, str], first: int, last: int, runs: R
 def units_of(study: Study) -> dict[str, str]:
     """Units of the columns; empty where an expression's cannot be determined."""
     units = {v.title: v.unit for v in study.vary if v.names is None} | study.kept_units
-    units |= {f"{USE}{rule}": "1" for rule in SHARES}
+    units |= {f"{USE}{rule}": "1" for rule in TASK_SHARES}
     of = dict(study.vocabulary.variables)
     return units | {f"{n} over time": of[n] for n in (study.trajectories.variables if study.trajectories else ())}
 

@@ -24,7 +24,9 @@ _RECORD_KEYS = {
     "gearbox": re.compile(r"(gearbox)(\.from)?|(gears\.[^.]+)\.gearbox"),
     "motor": re.compile(r"(motor)(\.from)?|(motors\.[^.]+)\.from"),
 } | {
-    RECORD_KINDS[table]: re.compile(rf"({table}\.[^.]+)\.from") for table in RECORDS if table not in ("gears", "motors")
+    RECORD_KINDS[table]: re.compile(rf"({RECORD_KINDS[table]})|({table}\.[^.]+)\.from")  # the first of a task
+    for table in RECORDS
+    if table not in ("gears", "motors")
 }
 # Of keys that hold beside the name of a record: the part.
 _CONDITION = re.compile(

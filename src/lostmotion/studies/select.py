@@ -6,7 +6,7 @@ from pydantic import Field, field_validator, model_validator
 
 from ..inputs.part import Part
 from ..inputs.quantities import Switch
-from ..sizing.finding import RULES
+from ..sizing.finding import RULES, TASK_RULES
 from .units import in_si
 
 Direction = Literal["least", "largest"]
@@ -15,6 +15,8 @@ USE = "use of "
 """begins the columns of the drive check: the share of each limit that is used"""
 SHARES = tuple(rule for rule in RULES if rule not in ("resonance", "dead_zone", "holding", "loss_map"))
 """rules of the drive check that compare a value with a limit"""
+TASK_SHARES = (*SHARES, *TASK_RULES)
+"""the same of tasks"""
 
 
 class Bound(Part):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..units.practical import practical
-from .select import SHARES, USE, Selection
+from .select import TASK_SHARES, USE, Selection
 from .study import Study
 from .table import unit_of
 
@@ -104,7 +104,7 @@ def _candidate(
         if math.isnan(value):
             violated.append(column)
             why.append(f"{column} has no value")
-    uses = {rule: use for rule in SHARES if math.isfinite(use := row.get(f"{USE}{rule}", math.nan))}
+    uses = {rule: use for rule in TASK_SHARES if math.isfinite(use := row.get(f"{USE}{rule}", math.nan))}
     critical = max(uses, key=lambda rule: uses[rule], default="")
     tightest = f"{critical} {100.0 * uses[critical]:.0f} %" if critical else ""
     return Candidate(row["run"], name, tuple(violated), "; ".join(why), row.get("not judged", ""), values, tightest)

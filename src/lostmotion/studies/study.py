@@ -13,12 +13,14 @@ from ..inputs.quantities import Whole
 from ..inputs.validation import listed
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario, is_train
+from ..sizing.stages import stage_of, together
 from .axis import FEWEST, AxisTask, axis_scenario
 from .axis_columns import COLUMNS as AXIS_COLUMNS
+from .axis_columns import unit_of_column
 from .design import unit_cube
 from .expressions import Expression, read_expression
 from .records import is_condition, kind_of_record, name_key, names_a_record, owner_of, with_records
-from .select import SHARES, USE, Selection, check_bounds
+from .select import SHARES, TASK_SHARES, USE, Selection, check_bounds
 from .units import unit_in, unit_of_key
 from .vary import Vary, base_value, check_key, check_spelling, scaled
 from .vocabulary import Vocabulary, vocabulary_of
@@ -104,9 +106,13 @@ class Study(Part):
         if not isinstance(self.scenario, Scenario):
             raise ValueError("is the task of a drive train, but only a drive can be selected; write the short form")
         for key in (key for v in self.vary for key in v.all_keys):
-            if key.split(".", maxsplit=1)[0] not in ("gearbox", "motor"):
-                raise ValueError(f"varies {key}, but of a task motor and gearbox vary; change it in the task")
+            if key.split(".", maxsplit=1)[0] not in ("gearbox", "motor") and not self._is_stage(key):
+                raise ValueError(f"varies {key}, but of a task motor, gearbox and stage vary; change it in the task")
         task.check(self.scenario)
+
+    def _is_stage(self, key: str) -> bool:
+        """Whether it is the key of the last stage of a linear task."""
+        return self.axis is not None and self.axis.linear is not None and key == self.axis.linear.kind
 
     def _check_names(self) -> None:
         titles = [v.title for v in self.vary]
@@ -167,7 +173,7 @@ class Study(Part):
 
     def _check_keys(self) -> None:
         """Sees that the keys are there to be varied: in the base, or where records vary, with one that can be run."""
-        keys = [(key, v.relative) for v in self.vary for key in v.all_keys]
+        keys = [(key, v.relative) for v in self.vary for key in v.all_keys if not self._is_stage(key)]
         owners = {owner_of(key) for key, _ in keys if kind_of_record(key)}
         for key, _ in keys:
             if kind_of_record(key) or is_condition(key):
@@ -189,7 +195,7 @@ class Study(Part):
 
     def _with_first_records(self) -> Scenario | TrainScenario:
         """The base with the first of the varied records that can be run."""
-        named = {v.all_keys[0]: v.names for v in self.vary if v.names is not None}
+        named = {v.all_keys[0]: v.names for v in self.vary if v.names is not None and not self._is_stage(v.all_keys[0])}
         for names in itertools.islice(itertools.product(*named.values()), 1000):
             try:
                 return with_records(self.tables, dict(zip(named, names, strict=True)))
@@ -201,7 +207,7 @@ class Study(Part):
         numbers = {v.title: v.unit for v in self.vary if v.names is None}
         units = numbers | self.kept_units
         if select.drive_check:
-            units |= {f"{USE}{rule}": "1" for rule in SHARES}
+            units |= {f"{USE}{rule}": "1" for rule in (SHARES if self.axis is None else TASK_SHARES)}
         for column in select.named():
             if column not in units:
                 raise ValueError(f"select: {column!r} is no column of numbers; they are {listed(units)}")
@@ -240,23 +246,32 @@ class Study(Part):
         motor, gearbox = self.part("motor", row), self.part("gearbox", row)
         assert self.axis is not None
         assert isinstance(self.scenario, Scenario)
-        return axis_scenario(self.scenario, motor, gearbox, self.axis.cycle, cycles)
+        if self.axis.linear is not None:
+            gearbox = together(gearbox, self.part("stage", row))
+        return axis_scenario(self.scenario, motor, gearbox, self.axis, cycles)
 
     def part_key(self, kind: str, row: np.ndarray) -> tuple[Any, ...]:
         """Column of a row that determines its ``"gearbox"`` or its ``"motor"``."""
         return (kind, *((k, float(row[k])) for k, v in enumerate(self.vary) if v.all_keys[0].split(".")[0] == kind))
 
     def part(self, kind: str, row: np.ndarray) -> Any:
-        """The ``"gearbox"`` or the ``"motor"`` of a row of a task, made once.
+        """The ``"gearbox"``, the ``"motor"`` or the ``"stage"`` of a row of a task, made once.
 
         Raises
         ------
         InputError
             There is none.
         """
-        key = self.part_key(kind, row)
+        linear = None if self.axis is None else self.axis.linear
+        key = self.part_key(linear.kind if kind == "stage" and linear is not None else kind, row)
         if key not in self.kept:
-            self.kept[key] = getattr(self.scenario_with(dict(key[1:])), kind)
+            if kind == "stage":
+                assert linear is not None
+                names = [self.vary[k].value(number) for k, number in key[1:]]
+                self.kept[key] = stage_of(linear.kind, {"from": names[0], **linear.stage} if names else linear.stage)
+            else:
+                found = getattr(self.scenario_with(dict(key[1:])), kind)
+                self.kept[key] = self.axis.fed(found) if kind == "motor" and self.axis is not None else found
         return self.kept[key]
 
     def scenario_with(self, numbers: Mapping[int, float]) -> Scenario | TrainScenario:
@@ -310,7 +325,8 @@ class Study(Part):
     def kept_units(self) -> dict[str, str]:
         """The columns of numbers that it keeps, each with its unit."""
         if self.axis is not None:
-            return {name: unit for name, (unit, _) in AXIS_COLUMNS.items()}
+            slides = self.axis.linear is not None
+            return {name: unit_of_column(name, slides=slides) for name in AXIS_COLUMNS}
         return {name: e.unit for name, e in self.expressions.items()}
 
     @property

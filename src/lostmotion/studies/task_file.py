@@ -8,18 +8,26 @@ from typing import Any
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import argument
+from ..inputs.schema import follow, unit_in_schema
 from ..inputs.toml_files import read_toml
 from ..inputs.validation import shown, unknown_key
+from ..model.linear import Slide
+from ..model.signals import ForceSignal, TorqueSignal
 from ..model.task import Task
+from ..reproducible import sin
+from ..simulation.linear_units import in_si, of_slides
 from ..simulation.scenario import from_tables
+from ..simulation.train_scenario import train_schema
+from ..sizing.stages import DIRECT, STAGES, stage_of
 from .axis import AxisTask
 from .file import find_sheets
 from .records import kind_of_record, names_that_fit
 from .select import Selection
 from .study import Study
 
-TABLES = ("title", "task", "load", "controller", "motor", "gearbox", "vary", "select")
+TABLES = ("title", "task", "load", "slide", *STAGES, "controller", "motor", "gearbox", "vary", "select")
 OBJECTIVES = {"energy": "least", "tracking_error_peak": "least"}
+SLIDE_KEYS = ("mass", "viscous_friction", "friction_force", "inclination", "force")
 GAINS = {"position": {"gain": 1.0}, "speed": {"gain": 1.0}}  # which the rule replaces
 CONTROLLER = {"sample_time": 125e-6, "encoder": {"lines": 2048}, "current": {"kind": "pi"}}
 POSITION = {"sample_time": 1e-3, "feedforward": 1.0}
@@ -72,10 +80,15 @@ def task_of(tables: dict[str, Any], directory: Path = Path()) -> Study:
     for key in tables:
         if key not in TABLES:
             raise InputError(f"key {key}: {unknown_key(key, TABLES)}")
-    for key in ("task", "load", "controller"):
+    linear = linear_axis(tables)
+    for key in ("task", "load" if linear is None else "slide", "controller"):
         if not isinstance(tables.get(key), dict):
             raise InputError(f"key {key}: must be a table [{key}]; add it")
-    task = AxisTask(**tables["task"])
+    given = tables["task"]
+    if linear is not None:
+        tables = {**tables, **in_translation(tables)}
+        given = tables["task"] | {"linear": linear}
+    task = AxisTask(**given)
     controller = _controller(tables["controller"])
     time = argument("controller.sample_time", controller["sample_time"], "s")
     written = {
@@ -88,10 +101,12 @@ def task_of(tables: dict[str, Any], directory: Path = Path()) -> Study:
         "simulation": {"duration": task.cycle, "sample_interval": time},
     }
     vary = _vary(tables, directory)
+    if linear is not None and not written["gearbox"] and not _varied({"vary": vary}, "gearbox"):
+        written["gearbox"] = DIRECT.model_dump()
     for entry in vary:
         if (
             isinstance(entry, dict)
-            and kind_of_record(str(entry.get("key")))
+            and kind_of_record(str(entry.get("key"))) in ("gearbox", "motor")
             and "from" not in written[entry["key"].split(".")[0]]
         ):
             _first(written, entry)
@@ -108,6 +123,93 @@ def task_of(tables: dict[str, Any], directory: Path = Path()) -> Study:
         axis=task,
         select=chosen,
     )
+
+
+def linear_axis(tables: dict[str, Any]) -> dict[str, Any] | None:
+    """What makes a task one of a linear axis, or None.
+
+    Raises
+    ------
+    InputError
+        A table is missing, or does not fit the others.
+    """
+    given = [kind for kind in STAGES if kind in tables or _varied(tables, kind)]
+    if "slide" not in tables and not given:
+        return None
+    if "load" in tables:
+        raise InputError("keys load, slide: the load turns or slides; leave one of them out")
+    if len(given) != 1:
+        what = f"has {' and '.join(given)}; keep one" if given else f"lacks one of {', '.join(STAGES)}; add it"
+        raise InputError(f"key slide: what moves it {what}")
+    (kind,) = given
+    stage = tables.get(kind, {})
+    stage = {"from": stage} if isinstance(stage, str) else stage
+    if not isinstance(stage, dict):
+        raise InputError(f"key {kind}: {shown(stage)} must be a table [{kind}], or the name of a record")
+    if not _varied(tables, kind):
+        stage_of(kind, stage)
+    slope = argument("slide.inclination", tables.get("slide", {}).get("inclination", 0.0), "rad")
+    return {"kind": kind, "stage": dict(stage), "rise": sin(slope)}
+
+
+def _varied(tables: dict[str, Any], kind: str) -> bool:
+    entries = tables.get("vary")
+    return isinstance(entries, list) and any(isinstance(v, dict) and v.get("key") == kind for v in entries)
+
+
+def in_translation(tables: dict[str, Any]) -> dict[str, Any]:
+    """The tables of a linear task as those of a rotary one with the same numbers: kg for kg m², m for rad, N for N m.
+
+    The equations of a slide behind a screw are those of a load behind a gear of the ratio 2 pi/lead.
+
+    Raises
+    ------
+    InputError
+        A value has the unit of something else.
+    """
+    slide = tables["slide"]
+    for key in slide:
+        if key not in SLIDE_KEYS:
+            raise InputError(f"key slide.{key}: {unknown_key(key, SLIDE_KEYS)}")
+    own = Slide(**{key: value for key, value in slide.items() if key != "force"})
+    given = slide.get("force", 0.0)
+    force = ForceSignal(**given) if isinstance(given, dict) else ForceSignal(mean=given)
+    torque = TorqueSignal(**force.model_dump())
+    load = {
+        "inertia": own.mass,
+        "viscous_friction": own.viscous_friction,
+        "friction_torque": own.friction_force,
+        "torque": torque.model_copy(update={"mean": torque.mean + own.weight()}).model_dump(),
+    }
+    train = {"slides": {"slide": {}}, "controllers": {"motor": {**tables["controller"], "shaft": "slide"}}}
+    controller = in_si(train, train_schema)["controllers"]["motor"]
+    encoder = controller.get("position_encoder")
+    if isinstance(encoder, dict) and "grating_period" in encoder:  # a scale, as an encoder of the same steps
+        period = argument("controller.position_encoder.grating_period", encoder["grating_period"], "m")
+        step = period / 2.0 ** encoder["bits"] if "bits" in encoder else 0.25 * period
+        rest = {key: value for key, value in encoder.items() if key not in ("grating_period", "bits")}
+        controller["position_encoder"] = {"shaft": "load", **rest, "resolution": step}
+    controller["shaft"] = "load"
+    return {"load": load, "controller": controller, "task": _task_in_translation(tables["task"])}
+
+
+def _task_in_translation(task: Any) -> Any:
+    """A task with its angles read as lengths."""
+    if not isinstance(task, dict):
+        return task
+    schema = AxisTask.model_json_schema()
+
+    def read(value: Any, path: tuple[int | str, ...]) -> Any:
+        if isinstance(value, dict):
+            return {key: read(inner, (*path, key)) for key, inner in value.items()}
+        if isinstance(value, list):
+            return [read(inner, (*path, k)) for k, inner in enumerate(value)]
+        units = {unit for node in follow(schema, path)[1] if (unit := unit_in_schema(node)) is not None}
+        if not isinstance(value, str) or len(units) != 1 or "rad" not in (unit := units.pop()):
+            return value
+        return argument(".".join(("task", *map(str, path))), value, of_slides(unit, positions=True, forces=False))
+
+    return read(task, ())
 
 
 def _table(tables: dict[str, Any], key: str) -> dict[str, Any]:
@@ -136,7 +238,8 @@ def _vary(tables: dict[str, Any], directory: Path) -> list[Any]:
     """Varied values: those of the file, else all records of parts that the file does not name or write out."""
     entries = tables.get("vary")
     if entries is None:
-        entries = [{"key": kind, "catalogue": {}} for kind in ("gearbox", "motor") if not _whole(tables, kind)]
+        kinds = ("motor",) if "slide" in tables and "gearbox" not in tables else ("gearbox", "motor")
+        entries = [{"key": kind, "catalogue": {}} for kind in kinds if not _whole(tables, kind)]
     if not isinstance(entries, list):
         raise InputError(f"key vary: {shown(entries)} must be tables; write [[vary]] with double brackets")
     for entry in entries:

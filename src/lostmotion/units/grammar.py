@@ -61,6 +61,9 @@ SPELLINGS = {
     "volt": "volt volts",
     "ampere": "amp amps ampere amperes",
     "ohm": "ohms",
+    "farad": "farad farads",  # F alone is a temperature
+    "millifarad": "mF",
+    "microfarad": "uF",
     "kelvin": "kelvin",
     "degree_Celsius": "degC °C C celsius",
     "degree_Fahrenheit": "degF °F F fahrenheit",

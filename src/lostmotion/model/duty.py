@@ -1,0 +1,205 @@
+"""What acts on the load of an axis over its cycle beside inertia and friction: gravity, payloads, forces of a process; and what
+stands around the axis: supply, brake."""
+
+from __future__ import annotations
+
+from typing import Annotated, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from ..inputs.part import Part
+from ..inputs.quantities import (
+    Angle,
+    Capacitance,
+    Current,
+    Force,
+    Inertia,
+    Length,
+    Mass,
+    NotNegative,
+    Positive,
+    Power,
+    Resistance,
+    Switch,
+    Time,
+    Torque,
+    Voltage,
+)
+from ..reproducible import interpolate, sin
+from .angle_torques import STANDARD_GRAVITY
+
+
+class ArmGravity(Part):
+    """Weight of a body on an arm: against the motion acts m g r sin(position - hanging).
+
+    Examples
+    --------
+    >>> round(float(ArmGravity(mass="4 kg", radius="0.3 m").torque(0.5 * 3.141592653589793)), 4)
+    11.768
+    """
+
+    mass: Annotated[Mass, Positive]
+    radius: Annotated[Length, Positive]
+    """of its centre of gravity"""
+    hanging: Angle = 0.0
+    """position at which it hangs straight down; a quarter of a turn on, the arm is level"""
+
+    def torque(
+        self, position: np.ndarray | float, mass: float | None = None, radius: float | None = None
+    ) -> np.ndarray:
+        """Torque [N·m] that holds it, or another mass [kg] at another radius [m]."""
+        m, r = self.mass if mass is None else mass, self.radius if radius is None else radius
+        return np.asarray(m * STANDARD_GRAVITY * r * sin(np.asarray(position) - self.hanging))
+
+
+class Payload(Part):
+    """What the load carries during a part of the cycle."""
+
+    begin: Annotated[Time, NotNegative]
+    end: Annotated[Time, Positive]
+    mass: Annotated[Mass, NotNegative] = 0.0
+    radius: Annotated[Length, Positive] | None = None
+    """of its centre of gravity from the axis of a rotary load"""
+    inertia: Annotated[Inertia, NotNegative] = 0.0
+    """about its own centre of gravity, of a rotary load"""
+
+    @model_validator(mode="after")
+    def _lasts(self) -> Self:
+        if self.end <= self.begin:
+            raise ValueError(f"has end = {self.end:g} s, which is not after begin = {self.begin:g} s; exchange them")
+        if self.mass == 0.0 and self.inertia == 0.0:
+            raise ValueError("has neither mass nor inertia; add one")
+        return self
+
+    def carried(self, time: np.ndarray) -> np.ndarray:
+        """Whether it is carried, over time [s]."""
+        return np.asarray((time >= self.begin) & (time < self.end))
+
+    def added_inertia(self, *, slides: bool) -> float:
+        """Inertia [kg·m²], of a slide mass [kg], that the load has more."""
+        return self.mass if slides else self.inertia + self.mass * (self.radius or 0.0) * (self.radius or 0.0)
+
+
+class Process(Part):
+    """A torque or a force against the motion in the positive direction, over time or over the position: straight lines through
+    points; before the first and after the last the value stays."""
+
+    times: tuple[Annotated[Time, NotNegative], ...] | None = Field(None, min_length=2)
+    positions: tuple[Angle, ...] | None = Field(None, min_length=2)
+    """of the load, in place of times"""
+    torques: tuple[Torque, ...] | None = None
+    """on a rotary load"""
+    forces: tuple[Force, ...] | None = None
+    """on a slide"""
+
+    @model_validator(mode="after")
+    def _is_a_curve(self) -> Self:
+        for one, other in (("times", "positions"), ("torques", "forces")):
+            if (getattr(self, one) is None) == (getattr(self, other) is None):
+                raise ValueError(f"needs one of {one} and {other}")
+        if len(self.points()) != len(self.values()):
+            raise ValueError(f"has {len(self.points())} points and {len(self.values())} values; give as many of each")
+        if any(b <= a for a, b in zip(self.points(), self.points()[1:], strict=False)):
+            raise ValueError(f"has {'times' if self.positions is None else 'positions'} that do not rise; order them")
+        return self
+
+    def points(self) -> tuple[float, ...]:
+        """Times [s] or positions."""
+        found = self.times if self.positions is None else self.positions
+        assert found is not None
+        return found
+
+    def values(self) -> tuple[float, ...]:
+        """Torques [N·m] or forces [N]."""
+        found = self.torques if self.forces is None else self.forces
+        assert found is not None
+        return found
+
+    def at(self, time: np.ndarray, position: np.ndarray) -> np.ndarray:
+        """Torque [N·m] or force [N] over the motion."""
+        return interpolate(time if self.positions is None else position, self.points(), self.values())
+
+
+class Duty(Part):
+    """What acts on the load of an axis over its cycle, beside what `[load]` or `[slide]` has."""
+
+    gravity: ArmGravity | None = None
+    """of a rotary load"""
+    payload: tuple[Payload, ...] = ()
+    process: tuple[Process, ...] = ()
+
+    def edges(self) -> set[float]:
+        """Instants at which something jumps or bends [s]."""
+        return {t for p in self.payload for t in (p.begin, p.end)} | {t for p in self.process for t in p.times or ()}
+
+    def inertia(self, time: np.ndarray, *, slides: bool) -> np.ndarray:
+        """That of the payloads over time [kg·m²], of a slide [kg]."""
+        found = np.zeros_like(time)
+        for payload in self.payload:
+            found += payload.added_inertia(slides=slides) * payload.carried(time)
+        return found
+
+    def torque(self, time: np.ndarray, position: np.ndarray, rise: float | None) -> np.ndarray:
+        """What the axis has to hold against over its motion [N·m], of a slide [N]; `rise`: sine of the slope of a slide, None of a
+        rotary load."""
+        found = np.zeros_like(time)
+        if self.gravity is not None:
+            found += self.gravity.torque(position)
+        for payload in self.payload:
+            if rise is not None:
+                found += payload.mass * STANDARD_GRAVITY * rise * payload.carried(time)
+            elif self.gravity is not None and payload.mass > 0.0:
+                found += self.gravity.torque(position, payload.mass, payload.radius) * payload.carried(time)
+        for process in self.process:
+            found += process.at(time, position)
+        return found
+
+    @property
+    def anything(self) -> bool:
+        """Whether there is any of it."""
+        return self.gravity is not None or bool(self.payload or self.process)
+
+
+class HoldingBrake(Part):
+    """Brake on the shaft of the motor."""
+
+    torque: Annotated[Torque, Positive]
+    """static, that it holds"""
+    inertia: Annotated[Inertia, NotNegative] = 0.0
+
+
+class Supply(Part):
+    """DC bus and amplifier that feed the motor."""
+
+    min_voltage: Annotated[Voltage, Positive] | None = None
+    """of the bus: at it the motor must reach its torque and speed"""
+    max_voltage: Annotated[Voltage, Positive] | None = None
+    """of the bus before energy is returned to it: at it the bus must take what returns"""
+    voltage_limit: Annotated[Voltage, Positive] | None = None
+    """that the bus may reach: of the amplifier, or that at which its brake resistor is switched on"""
+    capacitance: Annotated[Capacitance, Positive] | None = None
+    """of the bus"""
+    brake_resistance: Annotated[Resistance, Positive] | None = None
+    """of the brake resistor, switched on at voltage_limit"""
+    brake_power: Annotated[Power, Positive] | None = None
+    """that the brake resistor carries off continuously"""
+    continuous_current: Annotated[Current, Positive] | None = None
+    """of the amplifier, rms over the cycle"""
+    returns_to_mains: Switch = False
+    """the energy goes back to the mains, or a battery takes it: neither capacitors nor resistor are judged"""
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if self.min_voltage is not None and self.max_voltage is not None and self.max_voltage < self.min_voltage:
+            raise ValueError("has max_voltage below min_voltage; exchange them")
+        start = self.max_voltage or self.min_voltage
+        if self.voltage_limit is not None and start is not None and self.voltage_limit <= start:
+            raise ValueError(
+                f"has voltage_limit = {self.voltage_limit:g} V, which is not above {start:g} V, the voltage of the bus"
+            )
+        return self
+
+    def start(self) -> float | None:
+        """Voltage of the bus before energy returns [V]."""
+        return self.max_voltage or self.min_voltage

@@ -1,0 +1,330 @@
+"""Rules that tasks add to those of the drive check: each compares a demand of the cycle with a datum of a part.
+
+A rule whose datum is missing gives the verdict "unknown" with the key that would give it, and never passes.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..model.duty import HoldingBrake, Supply
+from ..model.gearbox import Gearbox
+from ..model.motor import Motor
+from ..units.practical import RPM
+from .finding import Finding, within
+from .formulas import (
+    belt_force,
+    buckling_force,
+    bus_voltage,
+    capacitor_energy,
+    compression_force,
+    critical_speed,
+    dn_speed,
+    gear_life,
+    mean_load,
+    nominal_life,
+    tooth_forces,
+)
+from .motor_run import current_voltage_power
+from .required_motion import InputDemand, RequiredMotion
+from .stages import BeltStage, RackStage, ScrewStage, Stage
+
+HOUR = 3600.0
+PLACES = 4
+
+
+def least(rule: str, what: str, value: float, wanted: float, unit: str, name: str) -> Finding:
+    """Compares a value with the least one that is wanted; `use` is their quotient, above 1 where the value is too small."""
+    if math.isinf(value):
+        return Finding(rule, what, f"without end of {wanted:.{PLACES}g} {unit} wanted", "ok", "", 0.0)
+    use = math.inf if value <= 0.0 else wanted / value
+    remark = "" if use <= 1.0 else f"is {100.0 * (1.0 - value / wanted):.0f} % short of the {name}"
+    text = f"{value:.{PLACES}g} of {wanted:.{PLACES}g} {unit} wanted"
+    return Finding(rule, what, text, "ok" if use <= 1.0 else "warning", remark, use)
+
+
+def missing(rule: str, what: str, key: str) -> Finding:
+    """A rule that cannot be judged."""
+    return Finding(rule, what, "not judged", "unknown", f"{key} is missing")
+
+
+def gearbox_life(demand: InputDemand, wanted: float) -> Finding:
+    """L10h of a gearbox in its cycle, L (n_r/n_m) (T_r/T_m)^p with the mean of exponent p, against the wanted life [s].
+
+    Source: `formulas.gear_life`.
+    """
+    what, g, m = "life of the gearbox, L10h", demand.gearbox, demand.motion
+    if g.limits is None or g.limits.rated_life is None:
+        return missing("gearbox_life", what, "gearbox.limits.rated_life")
+    p = g.limits.life_exponent
+    steps, speed = np.diff(m.time), np.abs(demand.speed)
+    mean_speed = float(np.sum(0.5 * (speed[1:] + speed[:-1]) * steps)) / m.cycle
+    turned = 0.5 * (speed[1:] * steps + speed[:-1] * steps)
+    torque = np.abs(m.torque) ** p
+    work = float(np.sum(0.5 * (torque[1:] + torque[:-1]) * turned))
+    mean_torque = (work / float(turned.sum())) ** (1.0 / p) if work > 0.0 else 0.0
+    life = gear_life(g.limits.rated_life, g.rated_input_speed, g.rated_output_torque, mean_speed, mean_torque, p)
+    return least("gearbox_life", what, life / HOUR, wanted / HOUR, "h", "wanted life")
+
+
+def output_bearing(g: Gearbox, radial: float | None, axial: float | None) -> list[Finding]:
+    """Radial and axial force on the output bearing [N] against those of the data sheet. Source: the data sheet."""
+    limits = g.limits
+    found = []
+    for name, force in (("radial", radial), ("axial", axial)):
+        if force is None:
+            continue
+        limit = None if limits is None else getattr(limits, f"max_{name}_force")
+        what, key = f"{name} force on the output bearing", f"gearbox.limits.max_{name}_force"
+        if limit is None:
+            found.append(missing("output_bearing", what, key))
+        else:
+            found.append(within("output_bearing", what, force, limit, "N", f"{name} force of the gearbox", key=key))
+    return found
+
+
+def emergency_stop(motion: RequiredMotion, g: Gearbox, deceleration: float) -> Finding:
+    """Torque at the gearbox output while the load is stopped at a rate from anywhere in the cycle: |T_hold - sgn(w) J a|.
+
+    The friction of the load, which helps, is left out. Source: Harmonic Drive, selection procedure: momentary peak torque.
+    """
+    moving = motion.speed != 0.0
+    stop = motion.holding - np.sign(motion.speed) * motion.inertia * deceleration
+    peak = float(np.abs(stop[moving]).max(initial=0.0))
+    what = "output torque in an emergency stop"
+    limit = g.limits and (g.limits.momentary_output_torque or g.limits.peak_output_torque)
+    if not limit:
+        return missing("emergency_stop", what, "gearbox.limits.momentary_output_torque")
+    return within("emergency_stop", what, peak, limit, "N·m", "momentary torque of the gearbox")
+
+
+def holding_brake(demand: InputDemand, brake: HoldingBrake | None) -> Finding:
+    """Static torque of a brake on the motor against the largest holding torque of the cycle, max |T_hold|/i, without friction.
+
+    Source: data sheets of servo motors; friction of gearbox and load, which may vanish by vibration, is not counted.
+    """
+    need = float(np.abs(demand.motion.holding).max()) / demand.gearbox.ratio
+    what = "torque that the holding brake carries"
+    if brake is None:
+        return missing("holding_brake", f"{what}: {need:.4g} N·m", "task.brake.torque")
+    return within("holding_brake", what, need, brake.torque, "N·m", "torque of the brake")
+
+
+def stage_rules(motion: RequiredMotion, stage: Stage, wanted_life: float | None) -> list[Finding]:
+    """The rules of the stage of a linear axis for the motion of its slide."""
+    if isinstance(stage, ScrewStage):
+        return screw_rules(motion, stage, wanted_life)
+    if isinstance(stage, BeltStage):
+        return belt_rules(motion, stage)
+    return rack_rules(motion, stage)
+
+
+def screw_mean_load(motion: RequiredMotion) -> float:
+    """Cubic mean of the axial load over the travel in its direction [N]: of both directions the larger, each over all of the travel.
+
+    The balls carry one flank at a time. Source: THK general catalogue, A-734; ISO 3408-5.
+    """
+    steps = np.diff(motion.time)
+    speed = 0.5 * (np.abs(motion.speed[1:]) + np.abs(motion.speed[:-1]))
+    force = 0.5 * (motion.torque[1:] + motion.torque[:-1])
+    if not speed.any():
+        return 0.0
+    loads = (np.maximum(sign * force, 0.0).tolist() for sign in (1.0, -1.0))
+    return max(mean_load(load, speed.tolist(), steps.tolist()) for load in loads)
+
+
+def screw_rules(motion: RequiredMotion, screw: ScrewStage, wanted_life: float | None) -> list[Finding]:
+    """Life, static load, buckling, bending speed and ball speed of a screw. Sources: `formulas` and `TASK_RULES`."""
+    turning = 2.0 * math.pi / screw.travel()
+    peak = float(np.abs(motion.torque).max())
+    fastest = turning * float(np.abs(motion.speed).max())
+    found = []
+    if wanted_life is not None:
+        what = "life of the screw, L10h"
+        if screw.dynamic_capacity is None:
+            found.append(missing("screw_life", what, "screw.dynamic_capacity"))
+        else:
+            revolutions = nominal_life(screw.dynamic_capacity, screw_mean_load(motion), 3.0, screw.load_factor)
+            steps, speed = np.diff(motion.time), np.abs(motion.speed)
+            turns = turning * float(np.sum(0.5 * (speed[1:] + speed[:-1]) * steps)) / (2.0 * math.pi)
+            hours = math.inf if turns == 0.0 else revolutions / turns * motion.cycle / HOUR
+            found.append(least("screw_life", what, hours, wanted_life / HOUR, "h", "wanted life"))
+    if screw.static_capacity is None:
+        found.append(missing("screw_static", "axial load of the screw, largest", "screw.static_capacity"))
+    else:
+        what, name = "axial load of the screw, largest", "static capacity of the screw"
+        found.append(within("screw_static", what, peak, screw.static_capacity, "N", name))
+    what = "axial load of the screw against buckling"
+    if screw.core_diameter is None or screw.supported_length is None:
+        key = "screw.core_diameter" if screw.core_diameter is None else "screw.supported_length"
+        found += [missing("buckling", what, key), missing("critical_speed", "speed of the screw against bending", key)]
+    else:
+        d, length = screw.core_diameter, screw.supported_length
+        limit = min(buckling_force(d, length, screw.mounting), compression_force(d))
+        found.append(within("buckling", what, peak, limit, "N", "load at which the screw may buckle"))
+        limit = critical_speed(d, length, screw.mounting)
+        what, name = "speed of the screw against bending", "critical speed"
+        found.append(within("critical_speed", what, RPM * fastest, RPM * limit, "rpm", name))
+    speed = screw.max_input_speed
+    if speed is None and screw.ball_circle_diameter is not None:
+        speed = dn_speed(screw.ball_circle_diameter)
+    what = "speed of the screw against that of its balls"
+    if speed is None:
+        found.append(missing("screw_speed", what, "screw.max_input_speed or screw.ball_circle_diameter"))
+    else:
+        found.append(within("screw_speed", what, RPM * fastest, RPM * speed, "rpm", "largest speed of the screw"))
+    return found
+
+
+def belt_rules(motion: RequiredMotion, belt: BeltStage) -> list[Finding]:
+    """Tension of a belt and the load of its teeth. Sources: `formulas.belt_force` and `formulas.tooth_forces`."""
+    peak = float(np.abs(motion.torque).max())
+    found = []
+    what = "force of the belt, with pretension"
+    if belt.rated_force is None:
+        found.append(missing("belt_force", what, "belt.rated_force"))
+    else:
+        force = belt_force(peak, belt.pretension)
+        found.append(within("belt_force", what, force, belt.rated_force, "N", "force of the belt in operation"))
+    what = "circumferential force on the teeth of the belt"
+    if belt.tooth_force is None or belt.teeth is None:
+        key = "belt.tooth_force" if belt.tooth_force is None else "belt.teeth"
+        found.append(missing("belt_teeth", what, key))
+    else:
+        limit = tooth_forces(belt.tooth_force, belt.teeth)
+        found.append(within("belt_teeth", what, peak, limit, "N", "force of the teeth in mesh"))
+    return found
+
+
+def rack_rules(motion: RequiredMotion, rack: RackStage) -> list[Finding]:
+    """Largest force along a rack against its peak force, or else its rated one. Source: the data sheet."""
+    peak, limit = float(np.abs(motion.torque).max()), rack.peak_force or rack.rated_force
+    what = "force along the rack, largest"
+    if limit is None:
+        return [missing("rack_force", what, "rack.rated_force")]
+    name = "peak force of the rack" if rack.peak_force else "rated force of the rack"
+    return [within("rack_force", what, peak, limit, "N", name)]
+
+
+# --- supply ---
+
+
+@dataclass(frozen=True)
+class Returned:
+    """Energy that one cycle of an axis, or of several on one DC bus, returns."""
+
+    largest: float
+    """without a pause [J]"""
+    each: tuple[float, ...]
+    """of all such times of the cycle [J]"""
+    power: float
+    """largest [W]"""
+    cycle: float
+    """[s]"""
+
+
+def electrical_power(demand: InputDemand, motor: Motor) -> np.ndarray:
+    """Power that a motor takes over its cycle [W], M w + copper loss; NaN where its data do not tell."""
+    torque = demand.motor_torque(motor)
+    copper = motor.copper_loss()
+    if copper is None:
+        return np.full_like(torque, np.nan)
+    return np.asarray(torque * demand.speed + copper[0] * torque**2)
+
+
+def returned(time: np.ndarray, power: np.ndarray, cycle: float) -> Returned:
+    """What a power over one cycle [W] returns; the cycle repeats, so that what begins before its end may end after it."""
+    steps = np.diff(time)
+    energy = np.minimum(0.5 * (power[1:] + power[:-1]), 0.0) * steps
+    each: list[float] = []
+    for returns, group in itertools.groupby(energy.tolist(), key=lambda e: e < 0.0):
+        each.append(-sum(group) if returns else 0.0)
+    if len(each) > 1 and each[0] > 0.0 and each[-1] > 0.0:
+        each[0] += each.pop()
+    found = tuple(e for e in each if e > 0.0)
+    return Returned(max(found, default=0.0), found, float(-min(power.min(), 0.0)), cycle)
+
+
+def supply_rules(back: Returned | None, supply: Supply) -> list[Finding]:
+    """Bus voltage, or with a brake resistor its largest and its mean power, for the energy returned in a cycle.
+
+    Source: HIWIN MM99TE07-1701, p. 118: what the capacitors take up to the limit goes there first, the rest to the resistor.
+    """
+    rule = "bus_voltage" if supply.brake_resistance is None else "brake_resistor"
+    what = "DC bus after braking" if supply.brake_resistance is None else "brake resistor"
+    if supply.returns_to_mains:
+        return []
+    if back is None:
+        return [missing(rule, what, "motor.limits.resistance")]
+    if back.largest == 0.0:
+        return [Finding(rule, what, "no energy returns", "ok", "", 0.0)]
+    start = supply.start()
+    for key, value in (
+        ("voltage_limit", supply.voltage_limit),
+        ("capacitance", supply.capacitance),
+        ("max_voltage", start),
+    ):
+        if value is None:
+            return [missing(rule, f"{what}: {back.largest:.4g} J return at once", f"task.supply.{key}")]
+    assert supply.voltage_limit is not None
+    assert supply.capacitance is not None
+    assert start is not None
+    if supply.brake_resistance is None:
+        voltage = bus_voltage(supply.capacitance, start, back.largest)
+        return [within(rule, what, voltage, supply.voltage_limit, "V", "largest voltage of the bus")]
+    most = supply.voltage_limit**2 / supply.brake_resistance
+    found = [within(rule, "brake resistor, largest power", back.power, most, "W", "power of the brake resistor")]
+    taken = capacitor_energy(supply.capacitance, supply.voltage_limit, start)
+    mean = sum(max(e - taken, 0.0) for e in back.each) / back.cycle
+    what = "brake resistor, mean power"
+    if supply.brake_power is None:
+        return [*found, missing(rule, f"{what}: {mean:.4g} W", "task.supply.brake_power")]
+    return [*found, within(rule, what, mean, supply.brake_power, "W", "continuous power of the brake resistor")]
+
+
+def amplifier_current(demand: InputDemand, motor: Motor, limit: float) -> Finding:
+    """Root mean square of the motor current over the cycle against the continuous current of the amplifier [A]."""
+    torque = demand.motor_torque(motor)
+    current = current_voltage_power(motor, np.zeros_like(torque), torque, demand.speed)[0]
+    what = "current, rms over the cycle"
+    if np.isnan(current).any():
+        return missing("amplifier_current", what, "motor.limits.torque_constant")
+    if motor.winding is not None:
+        current = current / math.sqrt(2.0)  # amplitude of a phase
+    steps = np.diff(demand.motion.time)
+    square = float(np.sum(0.5 * (current[1:] ** 2 + current[:-1] ** 2) * steps)) / demand.motion.cycle
+    return within("amplifier_current", what, math.sqrt(square), limit, "A", "continuous current of the amplifier")
+
+
+def derated(findings: list[Finding], share: float) -> list[Finding]:
+    """Findings of a motor that has this share of its continuous torque left. Source: `formulas.derating`."""
+    if share == 1.0:
+        return findings
+    return [
+        _tightened(f, 1.0 / share if share > 0.0 else math.inf, f"derated to {100.0 * share:.0f} %")
+        if f.rule == "motor_torque" and f.use is not None
+        else f
+        for f in findings
+    ]
+
+
+def with_safety(findings: list[Finding], factors: Mapping[str, float]) -> list[Finding]:
+    """Findings under the safety factors of a task: the share of a limit that is used is multiplied by that of its rule."""
+    return [
+        _tightened(f, factors[f.rule], f"with the safety factor {factors[f.rule]:g}")
+        if f.rule in factors and f.use is not None
+        else f
+        for f in findings
+    ]
+
+
+def _tightened(finding: Finding, factor: float, why: str) -> Finding:
+    assert finding.use is not None
+    use = finding.use * factor
+    remark = "; ".join(filter(None, [finding.remark, f"{why}: {100.0 * use:.0f} % of the limit"]))
+    return replace(finding, use=use, verdict="warning" if use > 1.0 else finding.verdict, remark=remark)

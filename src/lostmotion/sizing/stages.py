@@ -1,0 +1,242 @@
+"""The last stage of a linear axis, a screw, a rack or a belt: what it asks of the shaft that drives it, and the gearbox that it makes
+together with the one before it."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+import numpy as np
+
+from ..data_sheets.linear_components import linear_table
+from ..inputs.quantities import Force, Length, Number, Positive, Speed
+from ..model.gearbox import Gearbox
+from ..model.linear import BeltData, LinearDrive, RackData, ScrewData
+from ..model.losses import ConstantEfficiency, LossMap, efficiency_map
+from ..model.torsion import Hysteresis, LinearStiffness, Rigid, TorsionCurve
+from .formulas import Mounting
+from .required_motion import RequiredMotion
+
+SAME = 1e-9  # relative, within which two breaks of a curve are one
+
+
+class ScrewStage(ScrewData):
+    """A ball screw or a lead screw of an axis, with the data that its rules need.
+
+    Examples
+    --------
+    >>> ScrewStage(lead="10 mm", efficiency=0.9, dynamic_capacity="20 kN").dynamic_capacity
+    20000.0
+    """
+
+    dynamic_capacity: Annotated[Force, Positive] | None = None
+    """C: axial load for a million turns of nominal life"""
+    static_capacity: Annotated[Force, Positive] | None = None
+    """C_0"""
+    load_factor: Annotated[Number, Positive] = 1.0
+    """f_w of the life: 1.2 to 1.5 for normal motion, more with shocks"""
+    mounting: Mounting = "fixed-supported"
+    """of the ends of the screw, for buckling and bending along supported_length"""
+    ball_circle_diameter: Annotated[Length, Positive] | None = None
+    max_input_speed: Annotated[Speed, Positive] | None = None
+    """left out, 70 m rpm/ball_circle_diameter"""
+
+
+class RackStage(RackData):
+    """A rack and its pinion of an axis, with the data that their rules need.
+
+    Examples
+    --------
+    >>> RackStage(module="2 mm", teeth=20, rated_force="8 kN").rated_force
+    8000.0
+    """
+
+    rated_force: Annotated[Force, Positive] | None = None
+    """along the rack, continuous"""
+    peak_force: Annotated[Force, Positive] | None = None
+
+
+class BeltStage(BeltData):
+    """A toothed belt of an axis, with the data that its rules need.
+
+    Examples
+    --------
+    >>> BeltStage(teeth=20, pitch="5 mm", rated_force="1.7 kN", stiffness="1 N/um").rated_force
+    1700.0
+    """
+
+    rated_force: Annotated[Force, Positive] | None = None
+    """largest one of the tension members in operation"""
+    tooth_force: Annotated[Force, Positive] | None = None
+    """of one tooth in mesh"""
+    pretension: Annotated[Force, Positive] | None = None
+    """of a strand; left out, the largest circumferential force, so that no strand is slack"""
+
+
+Stage = ScrewStage | RackStage | BeltStage
+STAGES: dict[str, type[ScrewStage] | type[RackStage] | type[BeltStage]] = {
+    "screw": ScrewStage,
+    "rack": RackStage,
+    "belt": BeltStage,
+}
+
+
+def stage_of(kind: str, table: Mapping[str, Any]) -> Stage:
+    """The stage of a table `[screw]`, `[rack]` or `[belt]`, with or without the name of a record in `from`.
+
+    Raises
+    ------
+    InputError
+        The record lacks what a run needs, or a value cannot be used.
+    """
+    part = STAGES[kind]
+    name = table.get("from")
+    if name is None:
+        return part(**table)
+    from ..data_sheets.records import find
+
+    base = part.__mro__[1].model_fields  # type: ignore[attr-defined]
+    beside = {key: value for key, value in table.items() if key != "from"}
+    only_here = {key: value for key, value in beside.items() if key in part.model_fields and key not in base}
+    values = linear_table(kind, name, {k: v for k, v in beside.items() if k not in only_here}, kind)
+    record = find(name, kind)
+    printed = {
+        key: value for key in part.model_fields if key not in base and (value := getattr(record, key, None)) is not None
+    }
+    return part(**values, **(printed | only_here))
+
+
+def without_record(kind: str, table: Mapping[str, Any]) -> bool:
+    """Whether a table has the stage in full."""
+    return "from" not in table and bool(set(table) & set(STAGES[kind].model_fields))
+
+
+def at_input(motion: RequiredMotion, stage: LinearDrive) -> RequiredMotion:
+    """The motion of a slide as that of the shaft that drives its stage: torques [N·m] with losses, drag and inertia of the stage."""
+    ratio = stage.ratio()
+    speed, acceleration, s = ratio * motion.speed, ratio * motion.acceleration, np.sign(motion.speed)
+    forward, back = stage.efficiencies() or (1.0, 1.0)
+    through = motion.torque * np.where(s * motion.torque > 0.0, 1.0 / forward, np.where(s == 0.0, 1.0, back)) / ratio
+    own = stage.gear("in", "out")
+    torque = through + stage.drag_torque * s + own.inertia * acceleration + own.viscous_friction * speed
+    return RequiredMotion(
+        motion.time,
+        speed,
+        acceleration,
+        torque,
+        motion.cycle,
+        ratio * motion.position,
+        motion.inertia / ratio**2 + own.inertia,
+        motion.holding / ratio,
+    )
+
+
+DIRECT = Gearbox(
+    ratio=1.0,
+    rated_input_speed=1.0,
+    rated_output_torque=1e3,
+    stiffness=Rigid(),
+    losses=ConstantEfficiency(efficiency=1.0),
+    note="no gearbox",
+)
+"""in the place of a gearbox where the motor drives the stage directly; no rule judges it"""
+
+
+def together(g: Gearbox, stage: LinearDrive) -> Gearbox:
+    """A gearbox and the stage behind it as one gear between the motor and a slide, in units of translation at its output."""
+    own, ratio = stage.gear("in", "out"), stage.ratio()
+    forward, back = stage.efficiencies() or (1.0, 1.0)
+    drag = stage.drag_torque / g.rated_output_torque
+    return Gearbox(
+        ratio=g.ratio * ratio,
+        inertia=g.inertia + own.inertia / g.ratio**2,
+        viscous_friction=g.viscous_friction + own.viscous_friction / g.ratio**2,
+        rated_input_speed=g.rated_input_speed,
+        rated_output_torque=g.rated_output_torque * ratio,
+        stiffness=_in_series(g, own.stiffness, ratio),
+        hysteresis=own.hysteresis or (None if isinstance(g.stiffness, Rigid) else _hysteresis(g.hysteresis)),
+        losses=_losses(g, forward, back, drag),
+        note=g.note,
+    )
+
+
+def _hysteresis(found: Hysteresis | None) -> Hysteresis | None:
+    return None if found is None or found.efficiency == 1.0 else found
+
+
+def _losses(g: Gearbox, forward: float, back: float, drag: float) -> LossMap:
+    """Loss over speed and load of both, relative to the rated torque of the gearbox, at its output.
+
+    The load mu at the stage is mu/eta_f + d at its input while it drives, and mu eta_b + d while it is driven, with the drag d.
+    """
+    if isinstance(g.losses, ConstantEfficiency):
+        eta = g.losses.efficiency
+        speeds, loads, values = efficiency_map(eta, 2.0 - 1.0 / eta).whole()
+    else:
+        speeds, loads, values = g.losses.whole()
+
+    def through(mu: float) -> float:
+        return (mu / forward if mu > 0.0 else mu * back) + drag
+
+    def before(at_input: float) -> float:
+        x = at_input - drag
+        return x * forward if x > 0.0 else x / back
+
+    inside = {0.0, *(loads if back <= 0.0 else (before(x) for x in loads))}
+    places = [a for a, b in itertools.pairwise([*sorted(inside), math.inf]) if b - a > SAME * loads[-1]]
+    rows = []
+    for mu in places:
+        x = through(mu)
+        lost = [float(np.interp(x, loads, [row[k] for row in values])) for k in range(len(speeds))]
+        beyond = _beyond(x, loads, values)
+        rows.append(tuple(x + (beyond[k] if beyond else lost[k]) - mu for k in range(len(speeds))))
+    return LossMap(speeds=tuple(speeds), loads=tuple(places), values=tuple(rows))
+
+
+def _beyond(x: float, loads: list[float], values: list[list[float]]) -> list[float] | None:
+    """Losses outside the loads of a map, along its last segment; None inside."""
+    if loads[0] <= x <= loads[-1]:
+        return None
+    a, b = (0, 1) if x < loads[0] else (-2, -1)
+    share = (x - loads[a]) / (loads[b] - loads[a])
+    return [p + share * (q - p) for p, q in zip(values[a], values[b], strict=True)]
+
+
+def _in_series(g: Gearbox, own: Any, ratio: float) -> TorsionCurve | LinearStiffness | Rigid:
+    """Force over deflection at the slide: the deflections of both at the same force add up."""
+    curves = [
+        [(b / scale, k * scale**2) for b, k in zip([*breaks, math.inf], slopes, strict=True)]
+        for curve, scale in ((g.stiffness, ratio), (own, 1.0))
+        if not isinstance(curve, Rigid)
+        for breaks, slopes in [curve.pieces()]
+    ]
+    if not curves:
+        return Rigid()
+    gap = 0.0
+    segments: list[list[tuple[float, float]]] = []  # of each curve: (force up to which it holds, slope)
+    for curve in curves:
+        force, previous = 0.0, 0.0
+        found: list[tuple[float, float]] = []
+        for end, slope in curve:
+            if slope == 0.0 and not found:
+                gap += end
+                previous = end
+                continue
+            force += slope * (end - previous)
+            found.append((force, slope))
+            previous = end
+        segments.append(found)
+    ends = sorted({force for found in segments for force, _ in found})
+    slopes, breaks, before, deflection = [], [], 0.0, 0.0
+    for end in ends:
+        compliance = sum(1.0 / next(k for force, k in found if force >= end) for found in segments)
+        slopes.append(1.0 / compliance)
+        if math.isfinite(end):
+            deflection += (end - before) * compliance
+            breaks.append(deflection)
+            before = end
+    if len(slopes) == 1 and gap == 0.0:
+        return LinearStiffness(stiffness=slopes[0])
+    return TorsionCurve(slopes=tuple(slopes), breaks=tuple(breaks), backlash=2.0 * gap)
