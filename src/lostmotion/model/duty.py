@@ -1,8 +1,6 @@
 """What acts on the load of an axis over its cycle beside inertia and friction: gravity, payloads, forces of a process; and what
 stands around the axis: supply, brake."""
 
-from __future__ import annotations
-
 from typing import Annotated, Self
 
 import numpy as np

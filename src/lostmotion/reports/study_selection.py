@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..studies.axis_rows import NO_DATA
+from ..studies.nearest import Lacking, Miss, misses, not_judged
 from ..studies.select import TASK_SHARES, USE, Selection
 from ..studies.selection import NOT_RUN, Candidate, Price, candidates, pareto_front, prices
 from ..studies.study import Study
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PARETO = "Point at a candidate to read its name and values."
+NEAREST = 5  # candidates that do not fit, for which a slower cycle is sought
 MAX_LINES = 10  # lines of each list that are printed; selection.csv has all
 MAX_ROWS = 25  # of a table on the page
 
@@ -42,7 +45,7 @@ def show_selection(table: pa.Table, study: Study) -> Shown:
     ranked = candidates(table, study)
     costs, front = prices(ranked, select), pareto_front(ranked, select)
     objective = next(iter(select.objectives))
-    header = ["limit", "excludes", "alone", "best without it", objective, "gain"]
+    header = ["limit", "excludes", "alone", "best without it", objective, "relaxed by", "gain"]
     rows = [
         [
             p.limit,
@@ -50,11 +53,15 @@ def show_selection(table: pa.Table, study: Study) -> Shown:
             p.alone,
             p.best.name if p.best else "",
             p.best.values[objective] if p.best else "",
+            p.opens,
             p.gain,
         ]
         for p in costs
     ]
-    lines = [*_ranking(table, ranked, front, select), *_costs(table, costs, objective), *_misfits(ranked)]
+    near = misses(study, ranked, NEAREST) if study.axis is not None else []
+    unknown = not_judged(ranked)
+    told = _misses(near) if near else _misfits(ranked)
+    lines = [*_ranking(table, ranked, front, select), *_costs(table, costs, objective), *told, *_unknown(unknown)]
     several = len(select.objectives) > 1
     chart = [Group("pareto", "", PARETO, (pareto_panel(table, ranked, front, select),), 1)] if several else []
     return Shown(
@@ -64,7 +71,9 @@ def show_selection(table: pa.Table, study: Study) -> Shown:
             *chart,
             *_ranking_tables(table, ranked, front, select),
             *([_costs_table(table, costs, objective)] if costs else []),
+            *_miss_tables(near),
             *_misfit_tables(ranked),
+            *_unknown_tables(unknown),
         ),
         tables={"selection.csv": _selection_csv(table, study, ranked, front), "limits.csv": table_csv(header, rows)},
     )
@@ -115,16 +124,24 @@ def _costs_table(table: pa.Table, costs: list[Price], objective: str) -> Table:
     rows = []
     for p in costs:
         found = p.best is not None and p.alone
-        best = p.best.name if p.best is not None and p.alone else "nothing more fits"
+        best = p.best.name if p.best is not None and p.alone else "not run" if p.alone else "nothing more fits"
         value = f"{p.best.values[objective]:.5g}" if p.best is not None and found else ""
         gain = f"{100.0 * p.gain:.1f} %" if found and math.isfinite(p.gain) else ""
-        rows.append([p.limit, str(p.excludes), str(p.alone), best, value, gain])
-    header = ("limit", "excludes", "of these alone", "best without it", labelled(table, objective), "better by")
+        rows.append([p.limit, str(p.excludes), str(p.alone), _share(p.opens), best, value, gain])
+    header = (
+        "limit",
+        "excludes",
+        "of these alone",
+        "relaxed by",
+        "best without it",
+        labelled(table, objective),
+        "better by",
+    )
     return Table("What each limit costs", header, rows)
 
 
 def _misfit_tables(ranked: list[Candidate]) -> list[Table]:
-    out = [c for c in ranked if not c.fits]
+    out = [c for c in ranked if not c.fits and NO_DATA not in c.violated]
     if not out:
         return []
     note = f"The first {MAX_ROWS} of {len(out)}; all are in `selection.csv`." if len(out) > MAX_ROWS else ""
@@ -204,16 +221,58 @@ def _costs(table: pa.Table, costs: list[Price], objective: str) -> list[str]:
     lines = ["What each limit costs:", "  " + "limit".ljust(width) + "  excludes  of these alone  best without it"]
     for p in costs:
         best = "nothing more fits"
+        if p.best is None and p.alone:
+            best = "not run"
         if p.best is not None and p.alone:
             best = f"{p.best.name}, {labelled(table, objective)} {p.best.values[objective]:.5g}"
             if math.isfinite(p.gain):
                 best += f" ({100.0 * p.gain:.1f} % better)" if p.gain > 0.0 else " (as now)"
+        if math.isfinite(p.opens):
+            best += f"; {_share(p.opens)} more of the limit opens the first"
         lines.append(f"  {p.limit.ljust(width)}{p.excludes:>10}{p.alone:>16}  {best}")
     return lines
 
 
+def _share(x: float) -> str:
+    return f"{100.0 * x:.2g} %" if math.isfinite(x) else ""
+
+
+def _misses(near: list[Miss]) -> list[str]:
+    return ["Nearest misses:", *(f"  {miss.candidate.name}: {miss}" for miss in near)]
+
+
+def _miss_tables(near: list[Miss]) -> list[Table]:
+    if not near:
+        return []
+    rows = [
+        [miss.candidate.name, ", ".join(f"{name} {_share(x)}" for name, x in miss.lacks.items()), miss.then]
+        for miss in near
+    ]
+    note = "Over a limit, as a share of it. A slower cycle is judged by the rules and run; moves and rests take longer alike."
+    return [Table("Nearest misses", ("candidate", "over its limits by", "with a slower cycle"), rows, note)]
+
+
+def _unknown(groups: list[Lacking]) -> list[str]:
+    if not groups:
+        return []
+    lines = ["Not judged, since a record lacks what a run needs:"]
+    lines += [f"  {len(g.candidates)}, such as {g.candidates[0]}: {g.datum}" for g in groups[:MAX_LINES]]
+    return (
+        [*lines, f"  and {len(groups) - MAX_LINES} more reasons, see selection.csv"]
+        if len(groups) > MAX_LINES
+        else lines
+    )
+
+
+def _unknown_tables(groups: list[Lacking]) -> list[Table]:
+    if not groups:
+        return []
+    rows = [[str(len(g.candidates)), g.candidates[0], g.datum] for g in groups[:MAX_ROWS]]
+    return [Table("Not judged: data that are missing", ("candidates", "such as", "what is missing"), rows)]
+
+
 def _misfits(ranked: list[Candidate]) -> list[str]:
-    out = [c for c in ranked if not c.fits]
+    out = [c for c in ranked if not c.fits and NO_DATA not in c.violated]
     lines = ["Why the others do not fit:"] if out else []
     lines += [f"  {c.name}: {c.why}" for c in out[:MAX_LINES]]
     return [*lines, f"  and {len(out) - MAX_LINES} more, see selection.csv"] if len(out) > MAX_LINES else lines

@@ -108,7 +108,7 @@ def holding_brake(demand: InputDemand, brake: HoldingBrake | None) -> Finding:
 
     Source: data sheets of servo motors; friction of gearbox and load, which may vanish by vibration, is not counted.
     """
-    need = float(np.abs(demand.motion.holding).max()) / demand.gearbox.ratio
+    need = float(np.abs(demand.motion.holding).max()) / abs(demand.gearbox.ratio)
     what = "torque that the holding brake carries"
     if brake is None:
         return missing("holding_brake", f"{what}: {need:.4g} N·m", "task.brake.torque")

@@ -19,7 +19,7 @@ from .duty_cycle import DutyCycle
 from .finding import Finding
 from .gearbox_check import input_speeds, loads
 from .motion_check import inertia_ratio
-from .motor_check import current, heat, largest_speed, needed_command, rms_rise, voltage
+from .motor_check import current, heat, largest_speed, needed_command, peak_torque, rms_rise, voltage
 
 POINTS = 1000  # of a cycle at least
 LINES = 1e-3  # of the largest torque
@@ -187,6 +187,7 @@ def check_motor(
     rise = rms_rise(motor, cycle.rms_motor_torque(), ambient)
     return [
         largest_speed(motor, cycle.peak_input_speed),
+        *peak_torque(motor, torque),
         *heat(motor, cycle, ambient, rise=rise),
         voltage(motor, needed_command(motor, torque, demand.speed), torque, demand.speed),
         current(motor, torque),

@@ -1,8 +1,6 @@
 """The last stage of a linear axis, a screw, a rack or a belt: what it asks of the shaft that drives it, and the gearbox that it makes
 together with the one before it."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Mapping
@@ -12,6 +10,7 @@ import numpy as np
 
 from ..data_sheets.linear_components import linear_table
 from ..inputs.quantities import Force, Length, Number, Positive, Speed
+from ..model.gear import Gear
 from ..model.gearbox import Gearbox
 from ..model.linear import BeltData, LinearDrive, RackData, ScrewData
 from ..model.losses import ConstantEfficiency, LossMap, efficiency_map
@@ -156,10 +155,25 @@ def together(g: Gearbox, stage: LinearDrive) -> Gearbox:
         rated_input_speed=g.rated_input_speed,
         rated_output_torque=g.rated_output_torque * ratio,
         stiffness=_in_series(g, own.stiffness, ratio),
+        mesh_damping=_damping(g, own, ratio),
         hysteresis=own.hysteresis or (None if isinstance(g.stiffness, Rigid) else _hysteresis(g.hysteresis)),
         losses=_losses(g, forward, back, drag),
         note=g.note,
     )
+
+
+def _damping(g: Gearbox, own: Gear, ratio: float) -> float:
+    """Damping of both at the slide [N s/m]: forces are alike, and what damps each is its share of the deflection rate, so that
+    c/k^2 add up to first order."""
+    both = [
+        (gear.mesh_damping * scale**2, gear.stiffness.pieces()[1][-1] * scale**2)
+        for gear, scale in ((g, ratio), (own, 1.0))
+        if not isinstance(gear.stiffness, Rigid)
+    ]
+    if not both:
+        return 0.0
+    stiffness = 1.0 / sum(1.0 / k for _, k in both)
+    return sum(c / k**2 for c, k in both) * stiffness**2
 
 
 def _hysteresis(found: Hysteresis | None) -> Hysteresis | None:

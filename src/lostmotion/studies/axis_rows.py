@@ -31,7 +31,7 @@ from ..sizing.axis_rules import (
 from ..sizing.finding import Finding
 from ..sizing.formulas import derating
 from ..sizing.gearbox_check import input_speeds, loads, lost_motion
-from ..sizing.motor_check import command_of_run, current, heat, largest_speed, voltage
+from ..sizing.motor_check import command_of_run, current, heat, largest_speed, peak_torque, voltage
 from ..sizing.motor_run import oriented_amplitudes
 from ..sizing.required_motion import (
     InputDemand,
@@ -226,6 +226,7 @@ class Axes:
         oriented = oriented_amplitudes(result, "motor")
         of_motor = [
             largest_speed(m, duty.peak_input_speed),
+            *peak_torque(m, torque),
             *heat(
                 m,
                 duty,

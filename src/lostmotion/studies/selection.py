@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -35,7 +35,11 @@ class Candidate:
     values: dict[str, float]
     """values of the objectives"""
     tightest: str = ""
-    """the rule of the drive check whose limit is used critical, and its share"""
+    """the rule of the drive check whose limit is used most, and its share"""
+    ran: bool = True
+    """whether it was run: of a task, those that the rules refuse are not"""
+    over: dict[str, float] = field(default_factory=dict)
+    """by limit: by how much it is exceeded, as a share of it, where that is a number"""
 
     @property
     def fits(self) -> bool:
@@ -54,6 +58,8 @@ class Price:
     """runs that violate it and nothing else"""
     best: Candidate | None
     """the best that would fit without it"""
+    opens: float
+    """by how much, as a share of it, the limit would have to be relaxed so that one more candidate fits; NaN where it is not known"""
     gain: float
     """by how much the first objective would then be better, as a share of its value now; NaN where there is no such value"""
 
@@ -92,11 +98,13 @@ def _candidate(
     if row["error"]:
         return Candidate(row["run"], name, (NOT_RUN,), row["error"], "", values)
     violated, why = row.get("violated", "").split(), [row["why"]] if row.get("why") else []
+    over = {rule: use - 1.0 for rule in violated if math.isfinite(use := row.get(f"{USE}{rule}", math.nan))}
     if study.axis is not None and math.isnan(row["cycles"]):  # refused before any run
-        return Candidate(row["run"], name, tuple(violated), row["why"], row["not judged"], values)
+        return Candidate(row["run"], name, tuple(violated), row["why"], row["not judged"], values, ran=False, over=over)
     for column, (low, high) in bounds.items():
         if not low <= row[column] <= high:
             violated.append(column)
+            over |= _excess(column, row[column], low, high)
             unit = study.kept_units.get(column, "") if study.axis is not None else ""
             found, limit = (practical(x, unit, 6) for x in (row[column], high if row[column] > high else low))
             why.append(f"{column} {found} is {'above' if row[column] > high else 'below'} {limit}")
@@ -107,7 +115,15 @@ def _candidate(
     uses = {rule: use for rule in TASK_SHARES if math.isfinite(use := row.get(f"{USE}{rule}", math.nan))}
     critical = max(uses, key=lambda rule: uses[rule], default="")
     tightest = f"{critical} {100.0 * uses[critical]:.0f} %" if critical else ""
-    return Candidate(row["run"], name, tuple(violated), "; ".join(why), row.get("not judged", ""), values, tightest)
+    unjudged = row.get("not judged", "")
+    return Candidate(row["run"], name, tuple(violated), "; ".join(why), unjudged, values, tightest, over=over)
+
+
+def _excess(column: str, value: float, low: float, high: float) -> dict[str, float]:
+    """By how much a value is beyond its bounds, as a share of the one that it violates."""
+    bound = high if value > high else low
+    share = abs(value - bound) / abs(bound) if bound != 0.0 else math.inf
+    return {column: share} if math.isfinite(share) else {}
 
 
 def prices(ranked: list[Candidate], select: Selection) -> list[Price]:
@@ -123,14 +139,16 @@ def prices(ranked: list[Candidate], select: Selection) -> list[Price]:
     limits = dict.fromkeys(limit for c in ranked for limit in c.violated if limit != NOT_RUN)
     out = []
     for limit in limits:
-        alone = [c for c in ranked if set(c.violated) == {limit} and not math.isnan(c.values[objective])]
-        without = min(alone + ([best] if best else []), key=lambda c: _rank(c, select), default=None)
+        alone = [c for c in ranked if set(c.violated) == {limit}]
+        known = [c for c in alone if not math.isnan(c.values[objective])]  # what the rules refuse has no run
+        without = min(known + ([best] if best else []), key=lambda c: _rank(c, select), default=None)
         gain = math.nan
         if best is not None and without is not None and best.values[objective] != 0.0:
             better = select.direction(objective) * (best.values[objective] - without.values[objective])
             gain = better / abs(best.values[objective])
         excluded = sum(limit in c.violated for c in ranked)
-        out.append(Price(limit, excluded, len(alone), without, gain))
+        opens = min((c.over.get(limit, math.nan) for c in alone), default=math.nan)
+        out.append(Price(limit, excluded, len(alone), without, opens, gain))
     return sorted(out, key=lambda p: -p.excludes)
 
 

@@ -1,0 +1,200 @@
+"""Where nothing fits, or little: which candidates come nearest, what each lacks, and how much slower the cycle would have to be."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..control.references import PositionReference
+from ..errors import InputError
+from ..simulation.scenario import Scenario
+from .axis import AxisTask, reference_of
+from .axis_rows import NO_DATA, Axes
+from .selection import Candidate
+from .study import Study
+
+SLOWEST = 10.0  # times as long as the cycle of the task, the longest that is tried
+STEPS = 12  # halvings: the factor is found to 0.3 % at most
+DIGITS = 100.0  # of a factor: it is rounded up to hundredths
+
+
+@dataclass(frozen=True)
+class Miss:
+    """A candidate that does not fit, with what it lacks."""
+
+    candidate: Candidate
+    lacks: dict[str, float]
+    """by rule or column: by how much its limit is exceeded, as a share of it"""
+    slower: float | None
+    """a cycle so many times as long passes the rules, by evaluation; None: none up to `SLOWEST` does, or it was not tried"""
+    then: str = ""
+    """what the run of that cycle says"""
+
+    @property
+    def worst(self) -> float:
+        """The largest of what it lacks."""
+        return max(self.lacks.values(), default=math.inf)
+
+    def __str__(self) -> str:
+        short = ", ".join(f"{name} {100.0 * x:.3g} % over its limit" for name, x in self.lacks.items())
+        return f"{short or self.candidate.why}{'; ' if self.then else ''}{self.then}"
+
+
+def misses(study: Study, ranked: list[Candidate], count: int) -> list[Miss]:
+    """Those candidates of a task that come nearest to fitting, the nearest first: the largest excess over a limit ranks them.
+
+    Parameters
+    ----------
+    study
+        The task.
+    ranked
+        From `candidates`.
+    count
+        How many of them; for these a slower cycle is sought, and tried by rules and run.
+    """
+    found = [
+        Miss(c, {limit: c.over[limit] for limit in c.violated}, None)
+        for c in ranked
+        if not c.fits and all(limit in c.over for limit in c.violated)
+    ]
+    found.sort(key=lambda miss: (miss.worst, miss.candidate.run))
+    return [_tried(study, miss) for miss in found[:count]]
+
+
+def slowed(study: Study, factor: float) -> Study:
+    """The task with a cycle that takes so many times as long: moves, rests, payloads and process alike.
+
+    Its loads over time are stretched; torques of a process and of the load keep their values.
+
+    Raises
+    ------
+    InputError
+        The motion has parts that cannot be stretched, such as a target in space.
+    """
+    task, base = study.axis, study.scenario
+    assert task is not None
+    assert isinstance(base, Scenario)
+    assert base.controller is not None
+    reference = _slowed_reference(reference_of(base), factor)
+    torque = _slowed_signal(base.load.torque, factor)
+    changes: dict[str, Any] = {"cycle": factor * task.cycle}
+    changes["payload"] = tuple(
+        p.model_copy(update={"begin": factor * p.begin, "end": factor * p.end}) for p in task.payload
+    )
+    changes["process"] = tuple(
+        p if p.times is None else p.model_copy(update={"times": tuple(factor * t for t in p.times)})
+        for p in task.process
+    )
+    step = base.controller.sample_time
+    changes["cycle"] = step * math.ceil(changes["cycle"] / step * (1.0 - 1e-12))  # a whole number of them
+    new: AxisTask = task.model_copy(update=changes)
+    scenario = base.model_copy(
+        update={
+            "controller": base.controller.model_copy(update={"reference": reference}),
+            "load": base.load.model_copy(update={"torque": torque}),
+        }
+    )
+    out = study.model_copy(update={"axis": new, "scenario": scenario})
+    out._kept = {
+        key: part for key, part in study.kept.items() if key[0] in ("gearbox", "motor", "screw", "rack", "belt")
+    }
+    return out
+
+
+def _slowed_reference(reference: PositionReference, factor: float) -> PositionReference:
+    if reference.target is not None:
+        raise InputError("controller.reference.target: cannot be stretched")
+    rates = {"speed": 1, "acceleration": 2, "jerk": 3, "dwell": -1, "begin": -1}
+
+    def scaled(part: Any) -> dict[str, Any]:
+        values = ((key, power, getattr(part, key, None)) for key, power in rates.items())
+        return {key: value / factor**power for key, power, value in values if value is not None}
+
+    moves = tuple(move.model_copy(update=scaled(move)) for move in reference.moves)
+    own = scaled(reference) if reference.moves else {}
+    found: PositionReference = _slowed_signal(reference.model_copy(update={**own, "moves": moves}), factor)
+    return found
+
+
+def _slowed_signal(signal: Any, factor: float) -> Any:
+    """A signal over time whose instants are so many times as late."""
+    changes: dict[str, Any] = {}
+    if signal.frequency is not None:
+        changes["frequency"] = signal.frequency / factor
+    changes["sines"] = tuple(s.model_copy(update={"frequency": s.frequency / factor}) for s in signal.sines)
+    if signal.samples is not None:
+        times = tuple(factor * t for t in signal.samples.times)
+        changes["samples"] = signal.samples.model_copy(update={"times": times})
+    return signal.model_copy(update=changes)
+
+
+def _tried(study: Study, miss: Miss) -> Miss:
+    """With the least factor by which the cycle has to be longer, if there is one, and what rules and run say of it."""
+    row = study.parameters(miss.candidate.run, miss.candidate.run + 1)[0]
+    if miss.candidate.ran:  # its rules pass, and the run of a slower cycle is not monotonic in its errors
+        return miss
+    try:
+        factor = least_factor(study, row)
+        if factor is None:
+            return Miss(miss.candidate, miss.lacks, None, f"no cycle up to {SLOWEST:g} times as long passes the rules")
+        return Miss(miss.candidate, miss.lacks, factor, _said(study, slowed(study, factor), row, factor))
+    except (InputError, RuntimeError) as error:
+        return Miss(miss.candidate, miss.lacks, None, f"a slower cycle was not tried: {error}")
+
+
+def least_factor(study: Study, row: np.ndarray) -> float | None:
+    """The least factor in hundredths by which the cycle has to be longer, so that the rules pass; None if none up to `SLOWEST` does."""
+
+    def passes(factor: float) -> bool:
+        return Axes(slowed(study, factor)).refused(row) is None
+
+    if not passes(SLOWEST):
+        return None
+    low, high = 1.0, SLOWEST
+    for _ in range(STEPS):
+        middle = math.sqrt(low * high)
+        low, high = (low, middle) if passes(middle) else (middle, high)
+    factor = math.ceil(high * DIGITS * (1.0 - 1e-12)) / DIGITS
+    return factor if passes(factor) else high
+
+
+def _said(study: Study, slower: Study, row: np.ndarray, factor: float) -> str:
+    """What the rules and the run of the slower cycle say, with the times of cycle and longest move."""
+    before, after = study.axis, slower.axis
+    assert before is not None
+    assert after is not None
+    assert study.select is not None
+    assert isinstance(study.scenario, Scenario)
+    moves = reference_of(study.scenario).intervals()
+    longest = max((b - a for a, b in moves), default=0.0)
+    what = f"its longest move {factor * longest:.4g} s instead of {longest:.4g} s" if longest else ""
+    times = f"the cycle takes {after.cycle:.4g} s instead of {before.cycle:.4g} s{', ' if what else ''}{what}"
+    columns, _ = Axes(slower).measured(row)
+    over = [rule for rule in str(columns["violated"]).split() if rule]
+    for name, bound in study.select.limits.items():
+        low, high = bound.in_unit(study.kept_units.get(name))
+        if name in columns and not low <= float(columns[name]) <= high:
+            over.append(name)
+    if over:
+        return f"passes the rules if {times}; the run then violates {', '.join(over)}"
+    return f"fits if {times}"
+
+
+@dataclass(frozen=True)
+class Lacking:
+    """Candidates that cannot be judged, by what their records lack."""
+
+    datum: str
+    candidates: tuple[str, ...]
+
+
+def not_judged(ranked: list[Candidate]) -> list[Lacking]:
+    """The records that lack what a run needs, grouped by the datum, with the candidates that this concerns."""
+    groups: dict[str, list[str]] = {}
+    for c in ranked:
+        if NO_DATA in c.violated:
+            groups.setdefault(c.why, []).append(c.name)
+    return [Lacking(text, tuple(names)) for text, names in sorted(groups.items(), key=lambda pair: -len(pair[1]))]

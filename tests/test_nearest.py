@@ -1,0 +1,110 @@
+"""What comes nearest where nothing fits: excesses over limits, and slower cycles against the law of similarity."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import lostmotion as lm
+from lostmotion.control.references import PositionReference
+from lostmotion.studies.axis import reference_of
+from lostmotion.studies.axis_rows import Axes
+from lostmotion.studies.engine import study
+from lostmotion.studies.nearest import least_factor, misses, not_judged, slowed
+from lostmotion.studies.selection import candidates, prices
+from lostmotion.studies.study import Study
+from lostmotion.studies.table import read_table
+from lostmotion.studies.task_file import task_of
+from test_axis_tasks import ARM, GEARBOX, MOTOR
+
+EXCESS = 0.44
+"""by which the current is beyond its limit: a cycle so much longer that 1/s^2 makes up for it takes 1.2 times as long"""
+
+# Inertia alone: 0.8 kg m2 and 5 rad/s2 at 100:1 are 0.04 N m, 0.4 A.
+INERTIAL: dict[str, Any] = {
+    **ARM,
+    "task": {"cycle": "4 s", "max_inertia_ratio": 1e9, "hold_without_power": False},
+    "load": {"inertia": 0.8},
+    "gearbox": {**GEARBOX, "inertia": 0.0, "losses": {"kind": "constant_efficiency", "efficiency": 1.0}},
+    "motor": {**MOTOR, "rotor_inertia": 1e-12, "limits": {**MOTOR["limits"], "max_current": 0.4 / (1.0 + EXCESS)}},
+}
+
+
+@pytest.fixture(scope="module")
+def task() -> Study:
+    return task_of(INERTIAL)
+
+
+@pytest.fixture(scope="module")
+def ranked(task: Study, tmp_path_factory: pytest.TempPathFactory) -> Any:
+    return candidates(read_table(study(task, tmp_path_factory.mktemp("near") / "rows")), task)
+
+
+def test_a_torque_of_inertia_falls_with_the_square_of_the_time(task: Study):
+    factor = least_factor(task, task.parameters(0, 1)[0])
+    # Found to 0.3 %, and rounded up to hundredths.
+    assert math.sqrt(1.0 + EXCESS) <= factor <= 1.0031 * math.sqrt(1.0 + EXCESS) + 0.01
+
+
+def test_a_slower_cycle_has_the_same_path(task: Study):
+    before, after = reference_of(task.scenario), reference_of(slowed(task, 1.5).scenario)
+    for t in (0.1, 0.7, 1.9, 2.6, 3.5):
+        x, v, a, _ = (float(d) for d in before.at(t))
+        assert [float(d) for d in after.at(1.5 * t)[:3]] == pytest.approx([x, v / 1.5, a / 1.5**2], abs=1e-12)
+    assert slowed(task, 1.5).axis.cycle == pytest.approx(6.0)
+
+
+def test_sines_samples_payloads_and_processes_are_stretched():
+    duty = {
+        "payload": [{"begin": "1 s", "end": "2 s", "inertia": 0.1}],
+        "process": [{"times": [0.0, 1.0], "torques": [0.0, 1.0]}],
+    }
+    reference = {"kind": "position", "amplitude": 0.3, "frequency": 0.5}
+    tables = {
+        **INERTIAL,
+        "task": {**INERTIAL["task"], **duty},
+        "controller": {**ARM["controller"], "reference": reference},
+    }
+    slow = slowed(task_of(tables), 2.0)
+    assert slow.axis.payload[0].end == 4.0
+    assert slow.axis.process[0].times == (0.0, 2.0)
+    assert reference_of(slow.scenario).frequency == 0.25
+    sampled = PositionReference(samples={"times": [0.0, 4.0], "values": [0.0, 1.0]})
+    tables["controller"] = {**ARM["controller"], "reference": sampled.model_dump(exclude_none=True)}
+    assert reference_of(slowed(task_of(tables), 2.0).scenario).samples.times == (0.0, 8.0)
+
+
+def test_the_nearest_miss_says_what_it_lacks_and_when_it_fits(task: Study, ranked: Any):
+    (miss,) = misses(task, ranked, 3)
+    assert miss.lacks == pytest.approx({"current": EXCESS}, rel=1e-6)
+    assert miss.slower == pytest.approx(1.2, abs=0.015)
+    longest = max(b - a for a, b in reference_of(task.scenario).intervals())
+    assert f"its longest move {miss.slower * longest:.4g} s instead of {longest:.4g} s" in miss.then
+    assert "current 44 % over its limit" in str(miss)
+    row = task.parameters(miss.candidate.run, miss.candidate.run + 1)[0]
+    assert Axes(slowed(task, miss.slower)).refused(row) is None
+    assert Axes(slowed(task, 0.98 * miss.slower)).refused(row)["violated"] == "current"
+
+
+def test_what_a_limit_would_have_to_give(task: Study, ranked: Any):
+    (price,) = prices(ranked, task.select)
+    assert (price.limit, price.excludes, price.alone) == ("current", 1, 1)
+    assert price.opens == pytest.approx(EXCESS, rel=1e-6)
+
+
+def test_a_weight_is_not_carried_by_going_slower():
+    heavy = {**INERTIAL, "task": {**INERTIAL["task"], "gravity": {"mass": 20.0, "radius": 0.5}}}
+    assert least_factor(task_of(heavy), task_of(heavy).parameters(0, 1)[0]) is None
+
+
+def test_records_without_data_are_listed_apart(tmp_path: Path):
+    lacking = next(r.name for r in lm.catalogue() if isinstance(r, lm.data_sheets.GearboxSheet) and r.missing())
+    tables = {key: value for key, value in INERTIAL.items() if key != "gearbox"}
+    tables["vary"] = [{"key": "gearbox", "values": ["schaeffler-rt1-h-20-100", lacking]}]
+    what = task_of(tables)
+    ranked = candidates(read_table(study(what, tmp_path / "rows")), what)
+    (group,) = not_judged(ranked)
+    assert lacking in group.candidates[0]
+    assert "lacks" in group.datum
+    assert all(lacking not in miss.candidate.name for miss in misses(what, ranked, 5))
