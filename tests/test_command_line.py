@@ -421,6 +421,15 @@ def test_long_work_shows_what_it_does_and_short_work_nothing(tmp_path: Path) -> 
     assert on_a_terminal(script.format(0.01), tmp_path) == ""
 
 
+def test_long_work_without_a_terminal_prints_a_line_now_and_then() -> None:
+    script = (
+        "from lostmotion.cli import terminal\nterminal.LONG, terminal.EVERY = 0.0, 0.0\n"
+        "with terminal.busy('Identifying') as tell: tell('model, iteration 3')"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert re.fullmatch(r"Identifying: model, iteration 3, [0-9.]+ s so far\n", done.stderr)
+
+
 LONG_RUN = ("simulation.duration=1e7", "simulation.sample_interval=1000")  # ten million periods of the command
 
 

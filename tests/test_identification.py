@@ -25,6 +25,7 @@ from lostmotion.identification.intervals import reach
 from lostmotion.identification.ladder import RungResult, chosen, climb, free_on, problem_of, start_point
 from lostmotion.identification.logs import Channel
 from lostmotion.identification.prepare import prepared
+from lostmotion.identification.progress import Progress
 from lostmotion.identification.rig import Rig
 from lostmotion.identification.task import Identification
 from lostmotion.reports import plots
@@ -279,7 +280,9 @@ def test_of_several_starts_the_fit_with_the_smallest_error_is_taken(starts: tupl
         task = Identification(**(data | {"ladder": [rung]}))
         rig = Rig(task, SERVO)
         read = [prepared(task, log, rig.units) for log in read_all(task, SERVO)]
-        (only,) = climb(rig, Engine(rig, threads=1), read, start_point(task, read), lambda *_: None)
+        (only,) = climb(
+            rig, Engine(rig, threads=1), read, start_point(task, read), lambda *_: None, Progress(None).of(task, read)
+        )
         return only.fit.mae
 
     alone = [error(value) for value in starts]

@@ -112,7 +112,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "first_task": (lm.identification.first_task, {"directory": "none", "home": "", "rig": "", "progress": dangle}),
     "spectrum": (lm.spectrum, {"scenario": SCENARIO, "against": "motor", "motor": None, "start": None, "max_order": 4.0}),
     "Findings": (lm.sizing.Findings, {"findings": ()}),
-    "identify": (lm.identify, {"source": "none.toml", "threads": 1, "profiles": False, "progress": dangle}),
+    "identify": (lm.identify, {"source": "none.toml", "threads": 1, "profiles": False, "progress": dangle, "resume": None}),
     "monitor": (lm.monitor, {"source": "none.toml", "logs": [], "progress": dangle}),
     "load_identification": (lm.identification.load_identification, {"path": "none.toml"}),
     "read_log": (lm.identification.read_log, {"path": "none.csv", "time": "", "decimal": ""}),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,12 +12,13 @@ import typer
 
 from .arguments import FiguresOption
 from .targets import try_directory, writing
-from .terminal import busy
+from .terminal import busy, fail
 
 if TYPE_CHECKING:
     from ..identification.identify import IdentificationResult
 
 NOTES = 10  # lines of them in the terminal
+PROGRESS = "identify-progress.json"
 
 
 def identify(
@@ -44,12 +46,16 @@ def identify(
     profiles: Annotated[
         bool, typer.Option("--profiles", help="Also intervals by the profile of the likelihood (takes longer).")
     ] = False,
+    all_logs: Annotated[
+        bool, typer.Option("--all-logs", help="Draw all logs; else of many logs the worst, median and best.")
+    ] = False,
     figures: FiguresOption = None,
 ) -> None:
     """Identify a drive from measured logs: values with intervals, and what the logs cannot tell.
 
     Writes identified.toml (the rig with the values that were found, a scenario), identified.html (one page), errors.csv (of each
-    log), parameters.csv and, with the key record, gearbox.toml (a data sheet). What was dropped of logs is listed.
+    log), parameters.csv and, with the key record, gearbox.toml (a data sheet). What was dropped of logs is listed. An interrupted command
+    keeps the models that it has fitted in identify-progress.json, and continues with the next one.
 
     `new` looks at the logs in DIR and writes a first identification file: channels, units, sample times, and what is in doubt about
     them. A file that exists is never overwritten.
@@ -71,17 +77,28 @@ def identify(
     try_directory(output)
     from ..identification.identify import identify as run
 
-    with busy("Identifying") as tell:
+    kept = output / PROGRESS
+    if kept.is_file():
+        print(f"Continuing with the models that {kept} keeps", file=sys.stderr)
+    try:
+        with busy("Identifying") as tell:
 
-        def notify(rung: str, iteration: int, cost: float) -> None:
-            tell(f"{rung}, iteration {iteration}, cost {cost:.5g}")
+            def notify(rung: str, iteration: int, cost: float) -> None:
+                tell(f"{rung}, iteration {iteration}, cost {cost:.5g}")
 
-        result = run(file, profiles=profiles, progress=notify)
+            result = run(file, profiles=profiles, progress=notify, resume=kept)
+    except KeyboardInterrupt:
+        if not kept.is_file():
+            raise
+        fail(
+            f"interrupted; {kept} keeps the models that were fitted, and the same command continues with the next", 130
+        )
+    _print_summary(result)
+    sys.stdout.flush()
     with writing(output), busy("Writing"):
         from ..reports.identification import write_identification
 
-        page = write_identification(output, file.stem, result, pictures)
-    _print_summary(result)
+        page = write_identification(output, file.stem, result, pictures, all_logs=all_logs)
     print(f"The page is at {page}")
 
 

@@ -106,6 +106,20 @@ def _lines(total: int, what: str) -> Step:
     return step
 
 
+def _now_and_then(what: str) -> Callable[[str], None]:
+    """Prints how far the work has got, once it takes long."""
+    begin = last = time.monotonic()
+
+    def tell(how_far: str) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - begin > LONG and now - last > EVERY:
+            last = now
+            print(f"{what}: {how_far}, {_span(now - begin)} so far", file=sys.stderr, flush=True)
+
+    return tell
+
+
 MAX_LINE = 300  # characters of an error
 SILENCE = 0.5  # [s] after which something must be seen
 LONG = 60.0  # [s] from which on work is said to take long
@@ -115,18 +129,17 @@ REFRESH = 0.2  # [s]
 
 @contextmanager
 def busy(what: str) -> Iterator[Callable[[str], None]]:
-    """Show the present activity and its start on stderr, for work of unknown length, if stderr is a terminal.
+    """Show the present activity and its start on stderr, for work of unknown length; without a terminal, print a line now and then.
 
     Gives a function that takes how far it has got.
     """
+    if not sys.stderr.isatty():
+        yield _now_and_then(what)
+        return
     words = [what]
 
     def tell(how_far: str) -> None:
         words[0] = f"{what}: {how_far}"
-
-    if not sys.stderr.isatty():
-        yield tell
-        return
 
     def show() -> None:
         from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn

@@ -11,9 +11,10 @@ import numpy as np
 from .parameters import FreeParameter
 from .prepare import Prepared
 from .rig import Rig
-from .runs import NoDerivativeError, run_logs
+from .runs import NoDerivativeError, Seen, run_logs
 
 STEP = 1e-2  # of a parameter's scale, in differences
+TOGETHER = 32  # logs that are run at once: the scenarios of more take much memory
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ class Engine:
         while True:
             exact = {name: p for name, p in parameters.items() if name not in self.by_differences}
             try:
-                found = run_logs(self.rig, requests, rung, exact, threads=self.threads)
+                found = self._run(requests, rung, exact)
                 break
             except NoDerivativeError as refused:
                 self.by_differences[refused.name] = str(refused)
@@ -92,6 +93,19 @@ class Engine:
             J = out[k][..., names.index(name)]
             J[...] = np.where(np.isnan(J), np.nan_to_num(column), J)
         return out
+
+    def _run(
+        self,
+        requests: Sequence[tuple[Prepared, Mapping[str, float]]],
+        rung: int,
+        parameters: Mapping[str, FreeParameter],
+    ) -> list[Seen]:
+        """Runs of some requests after the others."""
+        return [
+            seen
+            for k in range(0, len(requests), TOGETHER)
+            for seen in run_logs(self.rig, requests[k : k + TOGETHER], rung, parameters, threads=self.threads)
+        ]
 
     def _differences(
         self,
@@ -117,7 +131,7 @@ class Engine:
     ) -> tuple[list[np.ndarray], dict[str, str]]:
         """Residuals of each request; and by log the reason for a missing run."""
         self.runs += len(requests)
-        found = run_logs(self.rig, requests, rung, threads=self.threads)
+        found = self._run(requests, rung, {})
         failed = {
             log.name: str(seen.error or "the run has no finite values")
             for (log, _), seen in zip(requests, found, strict=True)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -26,10 +27,11 @@ from .misfit import Misfit, hidden, misfits, with_shapes
 from .odd_logs import OddLog, odd_logs
 from .pauses import split_at_pauses
 from .prepare import DEFAULT, Prepared
+from .progress import Progress
 from .record import gear_sheet, sheet_text
 from .recorded import as_recorded, nearer_ways
 from .rig import Rig
-from .runs import run_log
+from .runs import run_logs
 from .start import Regression, regressed
 from .task import Identification, load_identification
 
@@ -251,6 +253,7 @@ def identify(
     threads: Count | None = None,
     profiles: bool = False,
     progress: Callable[[str, int, float], None] | None = None,
+    resume: str | Path | None = None,
 ) -> IdentificationResult:
     """Identify the values of a rig from measured logs.
 
@@ -264,6 +267,8 @@ def identify(
         Whether to compute intervals by the profile of the likelihood, too. They take as long as the fit for each parameter.
     progress : callable, optional
         Called with the name of the model, the iteration and the cost.
+    resume : str or Path, optional
+        File that keeps the models fitted so far. A call that was interrupted continues with the next model. The file is removed at the end.
 
     Returns
     -------
@@ -288,7 +293,9 @@ def identify(
     """
     task, directory = load_identification(source)
     try:
-        return identify_task(task, directory, threads=threads, profiles=profiles, notify=progress or _no_notice)
+        return identify_task(
+            task, directory, threads=threads, profiles=profiles, notify=progress or _no_notice, resume=resume
+        )
     except InputError as error:
         raise InputError(f"{source}: {error}") from None
 
@@ -300,23 +307,33 @@ def identify_task(
     threads: int | None = None,
     profiles: bool = False,
     notify: Notify = _no_notice,
+    resume: str | Path | None = None,
 ) -> IdentificationResult:
     """Identify the values of a task that has been read, as `identify` does."""
     rig = Rig(task, directory)
     logs, left_out = gathered(rig, directory)
-    result = identify_logs(rig, logs, threads=threads, profiles=profiles, notify=notify)
+    kept = Progress(None if resume is None else Path(resume))
+    result = identify_logs(rig, logs, threads=threads, profiles=profiles, notify=notify, progress=kept)
+    kept.finish()
     result.left_out = {**left_out, **result.left_out}
     return result
 
 
 def identify_logs(
-    rig: Rig, logs: list[Prepared], *, threads: int | None = None, profiles: bool = False, notify: Notify = _no_notice
+    rig: Rig,
+    logs: list[Prepared],
+    *,
+    threads: int | None = None,
+    profiles: bool = False,
+    notify: Notify = _no_notice,
+    progress: Progress | None = None,
 ) -> IdentificationResult:
     """Identify the values from prepared logs, as `identify` does."""
+    kept = progress or Progress(None)
     rig, logs, left_out = split_at_pauses(rig, logs)
     spoiled: list[OddLog] = []
     while True:
-        found = _climbed(rig, logs, threads, notify)
+        found = _climbed(rig, logs, threads, notify, kept)
         if not (more := [o for o in found.odd if o.left_out]):
             break
         spoiled += more
@@ -343,11 +360,11 @@ class _Climbed:
     odd: list[OddLog]
 
 
-def _climbed(rig: Rig, logs: list[Prepared], threads: int | None, notify: Notify) -> _Climbed:
+def _climbed(rig: Rig, logs: list[Prepared], threads: int | None, notify: Notify, progress: Progress) -> _Climbed:
     """All models fitted to logs; the intervals wait until no log is left out any more."""
     rig, logs, point, start, ways = _begun(rig, logs, threads, notify)
     engine = Engine(rig, threads)
-    rungs = climb(rig, engine, logs, point, notify)
+    rungs = climb(rig, engine, logs, point, notify, progress.of(rig.task, logs))
     best = chosen(rungs)
     odd = odd_logs(rig, engine, logs, point, rungs[best].fit, best)
     return _Climbed(engine, logs, start, ways, rungs, best, odd)
@@ -480,14 +497,24 @@ def _resting(problem: Problem, fit: Fit) -> list[Undetermined]:
     return found
 
 
-def residual_table(result: IdentificationResult, variables: tuple[str, ...] = ()) -> dict[str, dict[str, np.ndarray]]:
-    """By log: time, measured and computed channels, and variables of the rig along the run; NaN of a log that has no run."""
+def residual_table(
+    result: IdentificationResult, variables: tuple[str, ...] = (), logs: Sequence[str] | None = None
+) -> dict[str, dict[str, np.ndarray]]:
+    """By log: time, measured and computed channels, and variables of the rig along the run; NaN of a log that has no run.
+
+    Parameters
+    ----------
+    logs
+        Names of the logs; left out, all.
+    """
     assert result.rig is not None
+    shown = [log for log in result.logs if logs is None or log.name in logs]
+    requests = [(log, result.values_for(log.name)) for log in shown]
+    seen = run_logs(result.rig, requests, result.chosen, extra=variables, threads=os.cpu_count() or 1)
     out = {}
-    for log in result.logs:
-        if log.name in result.rungs[result.chosen].failed:
-            run = {name: np.full(len(log.time), np.nan) for name in (*log.measured, *variables)}
-        else:
-            run = run_log(result.rig, log, result.values_for(log.name), result.chosen, variables)
-        out[log.name] = {"time": log.time, **{f"measured {n}": v for n, v in log.measured.items()}, **run}
+    for log, run in zip(shown, seen, strict=True):
+        own = dict(zip(log.measured, run.values, strict=True)) | run.extra
+        if run.error is not None:
+            own = {name: np.full(len(log.time), np.nan) for name in (*log.measured, *variables)}
+        out[log.name] = {"time": log.time, **{f"measured {n}": v for n, v in log.measured.items()}, **own}
     return out

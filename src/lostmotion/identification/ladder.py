@@ -21,6 +21,7 @@ from .misfit import explained
 from .motion import windows
 from .parameters import FreeParameter
 from .prepare import Prepared
+from .progress import Models
 from .rig import Rig
 from .task import Identification
 
@@ -103,8 +104,15 @@ def begun_with(task: Identification, train: Sequence[Prepared]) -> list[Prepared
     return [log for log in train if log.first] or several(train, task.fit.first_logs)
 
 
-def climb(rig: Rig, engine: Engine, logs: Sequence[Prepared], start: Point, notify: Notify) -> list[RungResult]:
+def climb(
+    rig: Rig, engine: Engine, logs: Sequence[Prepared], start: Point, notify: Notify, models: Models
+) -> list[RungResult]:
     """All rungs of the ladder.
+
+    Parameters
+    ----------
+    models
+        Those that an interrupted identification has fitted: the search goes on from their values.
 
     Raises
     ------
@@ -120,39 +128,53 @@ def climb(rig: Rig, engine: Engine, logs: Sequence[Prepared], start: Point, noti
     found: list[RungResult] = []
     point = start
     for rung, entry in enumerate(task.rungs()):
-        added = {n: p for n, p in free_on(task, rung).items() if rung == 0 or n not in free_on(task, rung - 1)}
-        if rung > 0:
-            point = replace(point, values=point.values | {n: p.start for n, p in added.items()})
-        best: Fit | None = None
-        problem = problem_of(rig, engine, train, rung)
-        for tried in _starts(point, entry.multi_start):
-            fit = _one(rig, engine, train, rung, tried, entry.name, notify)
-            if best is None or _cost(problem, fit, best) < best.cost:
-                best = fit
-        assert best is not None
-        if found and _cost(problem_of(rig, engine, train, rung - 1), found[-1].fit, best) < best.cost * (1.0 - 1e-9):
-            # The rung should contain that below: begin there, with what is new switched off.
-            below = {n: p.off if p.off is not None else p.start for n, p in added.items()}
-            again = _one(
-                rig,
-                engine,
-                train,
-                rung,
-                replace(found[-1].fit.point, values=found[-1].fit.point.values | below),
-                entry.name,
-                notify,
-            )
-            if _cost(problem, again, best) < best.cost:
-                best = again
-        rough = [name for name in added if name not in entry.multi_start and is_rough(rig, name, rung)]
-        best, minima = _other_minima(rig, engine, train, rung, point, best, rough, notify)
+        kept = models.fitted(entry.name)
+        if kept is not None:
+            minima = kept[1]
+            best = search(problem_of(rig, engine, train, rung), kept[0], iterations=task.fit.iterations)
+        else:
+            best, minima = _rung(rig, engine, train, rung, point, found[-1].fit if found else None, notify)
+            models.keep(entry.name, best.point, minima)
         point = best.point
         best.point = point = with_own(rig, engine, logs, point, rung)
-        unsure = undetermined(problem, best)
+        unsure = undetermined(problem_of(rig, engine, train, rung), best)
         errors = log_errors(logs, engine.residuals(logs, point, rung))
         means = mean_errors(task, errors, best)
         found.append(RungResult(entry.name, best, errors, *means, engine.failed, unsure, minima))
     return found
+
+
+def _rung(
+    rig: Rig, engine: Engine, train: list[Prepared], rung: int, point: Point, below: Fit | None, notify: Notify
+) -> tuple[Fit, list[Point]]:
+    """(fit of a rung, other minima) from where the rung below has ended."""
+    task, entry = rig.task, rig.rungs()[rung]
+    added = {n: p for n, p in free_on(task, rung).items() if rung == 0 or n not in free_on(task, rung - 1)}
+    if rung > 0:
+        point = replace(point, values=point.values | {n: p.start for n, p in added.items()})
+    best: Fit | None = None
+    problem = problem_of(rig, engine, train, rung)
+    for tried in _starts(point, entry.multi_start):
+        fit = _one(rig, engine, train, rung, tried, entry.name, notify)
+        if best is None or _cost(problem, fit, best) < best.cost:
+            best = fit
+    assert best is not None
+    if below is not None and _cost(problem_of(rig, engine, train, rung - 1), below, best) < best.cost * (1.0 - 1e-9):
+        # The rung should contain that below: begin there, with what is new switched off.
+        off = {n: p.off if p.off is not None else p.start for n, p in added.items()}
+        again = _one(
+            rig,
+            engine,
+            train,
+            rung,
+            replace(below.point, values=below.point.values | off),
+            entry.name,
+            notify,
+        )
+        if _cost(problem, again, best) < best.cost:
+            best = again
+    rough = [name for name in added if name not in entry.multi_start and is_rough(rig, name, rung)]
+    return _other_minima(rig, engine, train, rung, point, best, rough, notify)
 
 
 def is_rough(rig: Rig, name: str, rung: int) -> bool:

@@ -22,7 +22,7 @@ from .shaft_angles import angle_terms
 from .task import CHANNEL_FORMULAS, Identification, Rung
 from .variants import Variants
 
-KEPT = 4000  # scenarios that are kept ready, a tenth of a megabyte each; few serve again once the search has moved on
+KEPT = 800  # scenarios that are kept ready, a tenth of a megabyte each; few serve again once the search has moved on
 
 
 @dataclass(frozen=True)

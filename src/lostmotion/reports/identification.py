@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ import numpy as np
 from ..identification.identify import IdentificationResult, residual_table
 from ..identification.ladder import RungResult, free_on
 from ..identification.misfit import shape_variables
+from ..identification.prepare import Prepared
 from ..model.gear import Gear
 from ..model.losses import LossMap, MeshEfficiency, WormMesh, efficiency_map
 from ..simulation.train_scenario import TrainScenario
@@ -25,6 +26,9 @@ MEASURED: dict[str, Any] = {"color": "0.45", "linestyle": "-", "linewidth": 1.3}
 CLOUD: dict[str, Any] = {"color": PALETTE["first"], "linestyle": "none", "marker": "o", "markersize": 1.6, "alpha": 0.4}
 FIRST = 4  # overlays before the tables
 PER_FIGURE = 24  # overlays
+ALL = 12  # logs, up to which all are drawn
+OF_EACH = 4  # logs of the worst, median and best
+CLOUDS = 24  # logs, about, whose residuals are shown in clouds where not all logs are drawn
 LOOPS = 3  # logs whose loops are drawn
 PAIRS = 8  # of the strongest correlations, in words
 MANY = 5_000  # points of a cloud of residuals
@@ -36,9 +40,21 @@ HEADER = ("log", "channel", "part", "MAE", "RMSE", "fit [%]", "unit of MAE and R
 
 
 def write_identification(
-    directory: Path, name: str, result: IdentificationResult, pictures: Sequence[str] = ()
+    directory: Path,
+    name: str,
+    result: IdentificationResult,
+    pictures: Sequence[str] = (),
+    *,
+    all_logs: bool = False,
 ) -> Path:
     """``identified.html``, tables (CSV) and the rig as a scenario in a directory, made if missing; on request pictures.
+
+    Values are written first, then the page, then pictures.
+
+    Parameters
+    ----------
+    all_logs
+        Draw all logs; else of many logs the worst, median and best.
 
     Returns
     -------
@@ -53,16 +69,20 @@ def write_identification(
         names, C = correlations(result)
         rows = [[name, *(f"{value:.6g}" for value in row)] for name, row in zip(names, C, strict=True)]
         tables["correlation.csv"] = table_csv(["parameter", *names], rows)
-    page = write_report(directory, "identified.html", identification_report(name, result), tables, pictures)
+    directory.mkdir(parents=True, exist_ok=True)
     write_text(directory / "identified.toml", result.scenario_text())
     if result.task.record:
         write_text(directory / "gearbox.toml", result.record_text())
-    return page
+    for file, text in tables.items():
+        write_text(directory / file, text)
+    return write_report(
+        directory, "identified.html", identification_report(name, result, all_logs=all_logs), {}, pictures
+    )
 
 
-def identification_report(name: str, result: IdentificationResult) -> Report:
-    """The page of an identification."""
-    main, *groups = _groups(result)
+def identification_report(name: str, result: IdentificationResult, *, all_logs: bool = False) -> Report:
+    """The page of an identification; of many logs it shows the worst, median and best, or on request all."""
+    main, *groups = _groups(result, {} if all_logs else _chosen_logs(result))
     unit = f" [{result.error_unit}]" if result.error_unit else ""
     rungs = [[r.name, f"{r.train:.5g}", _held_out(r)] for r in result.rungs]
     left_out = [list(pair) for pair in result.left_out.items()]
@@ -174,16 +194,46 @@ def parameter_rows(result: IdentificationResult) -> list[list[str]]:
 # --- charts ---
 
 
-def _groups(result: IdentificationResult) -> list[Group]:
-    """All charts, those of some logs first."""
+def _chosen_logs(result: IdentificationResult) -> dict[str, str]:
+    """Names of the logs that are drawn of many, with their rank: the worst, median and best; empty if all are drawn."""
+    if len(result.logs) <= ALL:
+        return {}
+    unit = dict(zip(result.task.measured, result.fit.deviations, strict=True))
+    worst: dict[str, float] = {}
+    for e in result.errors:
+        worst[e.log] = max(worst.get(e.log, 0.0), e.rmse / unit[e.channel] if math.isfinite(e.rmse) else math.inf)
+    ranked = sorted(worst, key=lambda log: -worst[log])
+    middle = (len(ranked) - OF_EACH) // 2
+    parts = {"worst": ranked[:OF_EACH], "median": ranked[middle : middle + OF_EACH], "best": ranked[-OF_EACH:]}
+    return {log: rank for rank, logs in parts.items() for log in logs}
+
+
+def _groups(result: IdentificationResult, chosen: Mapping[str, str]) -> list[Group]:
+    """All charts, those of some logs first.
+
+    Parameters
+    ----------
+    chosen
+        Names of the logs that are drawn, with their rank; empty: all.
+    """
     variables = _variables(result)
-    table = residual_table(result, tuple(variables))
+    spread = [log.name for log in result.logs[:: max(1, len(result.logs) // CLOUDS)]]
+    table = residual_table(result, tuple(variables), [*chosen, *spread] if chosen else None)
     logs = sorted(result.logs, key=lambda log: not log.held_out)  # those that were not fitted say most
-    overlays = [panel for log in logs for panel in _overlays(result, log.name, log.held_out, table[log.name])]
+    if chosen:
+        order = list(chosen)
+        logs = sorted((log for log in logs if log.name in chosen), key=lambda log: order.index(log.name))
+    count = len(logs) * len(result.task.measured)
+    overlays = [
+        panel for log in logs for panel in _overlays(result, log, chosen.get(log.name, ""), table[log.name], count)
+    ]
     caption = "What was measured, and the run of the identified rig."
+    if chosen:
+        caption += f" Drawn are the worst, median and best of {len(result.logs)} logs."
     found = [Group("overlays", "Logs", caption, tuple(overlays[:FIRST]))]
     if panels := _clouds(result, table, variables):
-        text = "Measured less computed, all logs: a shape here is missing in the model."
+        logs_shown = f"{len(table)} of {len(result.logs)} logs" if len(table) < len(result.logs) else "all logs"
+        text = f"Measured less computed, {logs_shown}: a shape here is missing in the model."
         found.append(Group("residuals", "Residuals", text, tuple(panels)))
     if result.fit.free:
         found.append(_correlation_group(result))
@@ -211,13 +261,22 @@ def _variables(result: IdentificationResult) -> dict[str, str]:
     return {name: f"{name} [{units[name]}]" for name in names}
 
 
-def _overlays(result: IdentificationResult, log: str, held_out: bool, run: dict[str, np.ndarray]) -> list[Panel]:
-    least, most, together = POINTS
-    count = max(least, min(most, together // (2 * len(result.logs) * len(result.task.measured))))
+def _overlays(
+    result: IdentificationResult, log: Prepared, rank: str, run: dict[str, np.ndarray], panels: int
+) -> list[Panel]:
+    """Measured and computed channels of a log.
 
+    Parameters
+    ----------
+    panels
+        Number of all overlays, which share the points of the page.
+    """
+    least, most, together = POINTS
+    count = max(least, min(most, together // (2 * panels)))
+    marks = ", ".join([*([rank] if rank else []), *(["held out"] if log.held_out else [])])
     return [
         Panel(
-            f"{_short(log)}{' (held out)' if held_out else ''}",
+            f"{_short(log.name)}{f' ({marks})' if marks else ''}",
             "time [s]",
             _labelled(result, channel),
             (
