@@ -1,6 +1,7 @@
 // Thin binding: the core as a Python module.
 #include "descriptions.hpp"
 #include "elementary.hpp"
+#include "joint_trains.hpp"
 #include "names.hpp"
 #include "responses.hpp"
 #include "sensitivities.hpp"
@@ -18,6 +19,7 @@ NB_MODULE(CORE_MODULE, m) {
     bind_sensitivities(m);
     bind_instants(m);
     bind_stepping(m);
+    bind_joint_trains(m);
     bind_responses(m);
     bind_descriptions(m);
 }

@@ -14,6 +14,7 @@ import limit_cycles_figures
 import live_pages
 import motors_figures
 import reference_figures
+import robots_figures
 import self_locking_figures
 import servo_figures
 import tracking_figures
@@ -43,6 +44,7 @@ WRITERS = (
     control_figures,
     limit_cycles_figures,
     identification_figures,
+    robots_figures,
 )
 
 

@@ -29,7 +29,7 @@ LAYERS = [
     {"data_sheets", "control"},
     {"simulation"},
     {"response", "test_rig"},
-    {"sizing", "servo", "pointing"},
+    {"sizing", "servo", "pointing", "mujoco"},
     {"studies", "identification"},
     {"portable"},
     {"live_page"},

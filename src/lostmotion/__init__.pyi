@@ -3,6 +3,7 @@ from . import data_sheets as data_sheets
 from . import identification as identification
 from . import live_page as live_page
 from . import model as model
+from . import mujoco as mujoco
 from . import pointing as pointing
 from . import portable as portable
 from . import reports as reports

@@ -1,9 +1,10 @@
 from collections.abc import Callable, Mapping, Sequence
 import enum
-from typing import Any, overload
+from typing import Annotated, Any, overload
 
 import numpy
 import numpy.typing
+from numpy.typing import NDArray
 
 
 class SolverError(RuntimeError):
@@ -270,6 +271,32 @@ class Simulation:
         """
 
     def time(self) -> float: ...
+
+def joint_rows() -> list[str]: ...
+
+class JointTrains:
+    def __init__(self, trains: Sequence[Simulation], shafts: Sequence[int]) -> None: ...
+
+    def set_input(self, joint: int, input: int, value: float) -> None: ...
+
+    def guesses(self) -> list[tuple[float, float]]: ...
+
+    def set_guesses(self, guesses: Sequence[tuple[float, float]]) -> None:
+        """Load torque [N m] and mean acceleration [rad/s^2] of each joint."""
+
+    def set_reference(self, joint: int, value: float, rate: float) -> None: ...
+
+    def step(self, interval: float, substeps: int, mass: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], force: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], mass_rate: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], force_rate: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], out: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu')]) -> None: ...
+
+    def go_back(self) -> None: ...
+
+    def read(self, out: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu')]) -> None: ...
+
+    @property
+    def evaluations(self) -> int: ...
+
+    @property
+    def unsettled(self) -> int: ...
 
 def respond(train: Train, points: Sequence[tuple[Sequence[Signal], float, Mapping[str, float]]], samples: int, harmonics: int, max_periods: int, tolerance: float, keep_table: bool, limit_cycle: bool, threads: int, progress: Callable[[int], None] | None = None) -> dict[str, Any]: ...
 

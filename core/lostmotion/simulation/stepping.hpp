@@ -60,11 +60,16 @@ class SimulationOf {
 
     // Advances by `interval` [s] with each input running in a straight line from its first to its second value; those
     // that a controller gives are not looked at. On any status but done the state is left as it was.
-    Status advance(double interval, Inputs begin, Inputs end);
+    Status advance(double interval, Inputs begin, Inputs end) {
+        Observer<System> nobody;
+        return advance(interval, begin, end, nobody);
+    }
+    Status advance(double interval, Inputs begin, Inputs end, Observer<System>& observer);
     // The regime at the present instant, with the inputs at their last values. A state that nothing has advanced yet
     // must have one.
     Status find_regime();
     const Regime& regime();
+    RegimeCache<System>& regimes() { return solver_.cache(); }
     // What the controller of an axis follows from now on: value + rate (t - now), in the place of its reference.
     void set_reference(std::size_t axis, double value, double rate) {
         laws_[axis].reference = {{{now_.time, {value, rate}}}, {}};
@@ -127,10 +132,9 @@ auto SimulationOf<System>::inputs() const -> Inputs {
 }
 
 template <class System>
-Status SimulationOf<System>::advance(double interval, Inputs begin, Inputs end) {
+Status SimulationOf<System>::advance(double interval, Inputs begin, Inputs end, Observer<System>& observer) {
     resume(begin, end, interval);
     const bool steady = begin == end && sines_.empty(), unchanged = now_.steady && steady && begin == now_.input;
-    Observer<System> nothing;
     Status status = Status::done;
     if (!now_.started)
         status = begin_motion();
@@ -140,7 +144,7 @@ Status SimulationOf<System>::advance(double interval, Inputs begin, Inputs end) 
     }
     const double to = now_.time + interval;
     if (status == Status::done)
-        status = controllers_ ? controllers_->advance(to, nothing, nullptr) : solver_.advance(to, nothing);
+        status = controllers_ ? controllers_->advance(to, observer, nullptr) : solver_.advance(to, observer);
     if (status == Status::done) keep(end, steady);
     return status;
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "stepping.hpp"
+#include "torque_response.hpp"
 #include "train_run.hpp"
 
 namespace lostmotion {
@@ -32,15 +33,38 @@ class TrainSimulationIn : private OwnTrain<D>, public SimulationOf<model::TrainS
     bool too_many_guards() const { return Own::own_system.overflowed(); }
     TrainPoint point();
     std::vector<double> values();
+
+    // advance(), and how the state at the end depends on one of the inputs, which is shifted all over the interval:
+    // response().
+    Status respond(double interval, const typename Base::Inputs& begin, const typename Base::Inputs& end, int shifted);
+    const ComponentsOf<D>& response() const { return response_.derivative(); }
+    // Copies of the state: that of a substep, and that of the step which it is part of.
+    void keep_here() { kept_ = Base::snapshot(); }
+    void go_back() { Base::restore(kept_); }
+    void keep_begin() { begin_ = Base::snapshot(); }
+    void go_back_to_begin() { Base::restore(begin_); }
+
+ private:
+    TorqueResponse<model::TrainSystem<D>> response_;
+    typename Base::Snapshot kept_, begin_;
 };
 
 template <class D>
 TrainSimulationIn<D>::TrainSimulationIn(const TrainRun& run, double step, const Control& control,
                                         const InputSines& sines)
-    : Own(run), Base(Own::own_system, Own::own_system.balanced_scale(), step, run.assembly().layout().inputs, sines) {
+    : Own(run),
+      Base(Own::own_system, Own::own_system.balanced_scale(), step, run.assembly().layout().inputs, sines),
+      response_(Own::own_system) {
     if (control.present())
         Base::close_loop(control,
                          [&](const auto& laws) { return closed_loop_of<D>(Own::model.assembly, control, laws); });
+}
+
+template <class D>
+Status TrainSimulationIn<D>::respond(double interval, const typename Base::Inputs& begin,
+                                     const typename Base::Inputs& end, int shifted) {
+    response_.begin(Base::regimes(), shifted);
+    return Base::advance(interval, begin, end, response_);
 }
 
 template <class D>

@@ -1,0 +1,214 @@
+#include "joint_trains.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace lostmotion {
+
+namespace {
+
+// The place of the angle of a shaft among the states of the layout, or nowhere.
+int angle_of(const model::Assembly& a, int shaft) {
+    const model::Places& places = a.places();
+    if (const int state = places.shafts[static_cast<std::size_t>(shaft)].angle; state != model::nowhere) return state;
+    for (std::size_t part = 0; part < places.last_shaft.size(); ++part)
+        if (places.last_shaft[part] == shaft) return a.layout().coupled + static_cast<int>(part);
+    return model::nowhere;
+}
+
+}  // namespace
+
+int JointTrains::unsuitable(const TrainSimulation& train, int shaft) {
+    const model::Assembly& a = train.assembly();
+    const bool loaded = a.places().shafts[static_cast<std::size_t>(shaft)].load != model::nowhere;
+    return loaded && angle_of(a, shaft) != model::nowhere ? -1 : shaft;
+}
+
+JointTrains::JointTrains(std::vector<Joint> joints) : joints_(std::move(joints)) {
+    const std::size_t n = joints_.size();
+    for (Joint& j : joints_) {
+        const model::Assembly& a = j.train->assembly();
+        const model::Layout& layout = a.layout();
+        const auto& shaft = a.places().shafts[static_cast<std::size_t>(j.shaft)];
+        const int angle = angle_of(a, j.shaft);
+        j.speed_state = shaft.speed;
+        j.angle_state = j.train->with([&]<class S>(const S&) {
+            return angle < layout.coupled ? angle : angle - layout.coupled + static_cast<int>(S::D::coupled);
+        });
+        j.load = shaft.load;
+        j.inputs.assign(static_cast<std::size_t>(layout.inputs), 0.0);
+        inertia_.push_back(a.train().shafts[static_cast<std::size_t>(j.shaft)].inertia);
+    }
+    answer_.resize(n);
+    residual_.resize(n);
+    best_torque_.resize(n);
+    change_.resize(n);
+    begin_speed_.resize(n);
+    matrix_.resize(n * n);
+    mass_.resize(n * n);
+    force_.resize(n);
+    slope_.resize(n);
+    read();
+}
+
+auto JointTrains::guess(std::size_t joint) const -> Guess {
+    const Joint& j = joints_[joint];
+    return {j.inputs[static_cast<std::size_t>(j.load)], answer_[joint].acceleration};
+}
+
+void JointTrains::set_guess(std::size_t joint, const Guess& g) {
+    Joint& j = joints_[joint];
+    j.inputs[static_cast<std::size_t>(j.load)] = g.torque;
+    answer_[joint].acceleration = g.acceleration;
+}
+
+void JointTrains::read() {
+    for (Joint& j : joints_)
+        j.train->with([&](const auto& s) {
+            j.speed = s.snapshot().x[j.speed_state];
+            j.angle = s.snapshot().x[j.angle_state];
+        });
+}
+
+Status JointTrains::respond(std::size_t joint, double interval, double slope, Answer& answer) {
+    Joint& j = joints_[joint];
+    ++evaluations_;
+    return j.train->with([&]<class S>(S& s) {
+        InputsOf<typename S::D> begin{}, end{};
+        std::copy(j.inputs.begin(), j.inputs.end(), begin.begin());
+        end = begin;
+        begin[j.load] -= 0.5 * interval * slope;
+        end[j.load] += 0.5 * interval * slope;
+        const double before = s.snapshot().x[j.speed_state];
+        const Status status = s.respond(interval, begin, end, j.load);
+        if (status != Status::done) {
+            failed_ = joint;
+            return status;
+        }
+        const double after = s.snapshot().x[j.speed_state];
+        answer.acceleration = (after - before) / interval;
+        answer.rounding = 0x1p-52 * std::fmax(std::fabs(before), std::fabs(after)) / interval;
+        answer.compliance = std::fmax(0.0, -s.response()[j.speed_state] / interval);
+        return status;
+    });
+}
+
+// The linear equations of Newton's method, by elimination with row pivoting; the residuals become the changes.
+bool JointTrains::solve() {
+    const std::size_t n = joints_.size();
+    for (std::size_t r = 0; r < n; ++r)
+        for (std::size_t c = 0; c < n; ++c)
+            matrix_[r * n + c] =
+                (r == c ? 1.0 : 0.0) + (mass_[r * n + c] - (r == c ? inertia_[r] : 0.0)) * answer_[c].compliance;
+    change_ = residual_;
+    for (std::size_t k = 0; k < n; ++k) {
+        std::size_t pivot = k;
+        for (std::size_t r = k + 1; r < n; ++r)
+            if (std::fabs(matrix_[r * n + k]) > std::fabs(matrix_[pivot * n + k])) pivot = r;
+        if (matrix_[pivot * n + k] == 0.0) return false;
+        if (pivot != k) {
+            std::swap_ranges(&matrix_[k * n], &matrix_[k * n] + n, &matrix_[pivot * n]);
+            std::swap(change_[k], change_[pivot]);
+        }
+        for (std::size_t r = k + 1; r < n; ++r) {
+            const double factor = matrix_[r * n + k] / matrix_[k * n + k];
+            if (factor == 0.0) continue;
+            for (std::size_t c = k; c < n; ++c) matrix_[r * n + c] -= factor * matrix_[k * n + c];
+            change_[r] -= factor * change_[k];
+        }
+    }
+    for (std::size_t k = n; k-- > 0;) {
+        for (std::size_t c = k + 1; c < n; ++c) change_[k] -= matrix_[k * n + c] * change_[c];
+        change_[k] /= matrix_[k * n + k];
+    }
+    return true;
+}
+
+Status JointTrains::substep(double interval) {
+    const std::size_t n = joints_.size();
+    for (Joint& j : joints_) j.train->with([](auto& s) { s.keep_here(); });
+    double best = 0.0;
+    double share = 1.0;  // of the last change that is taken
+    for (int iteration = 0;; ++iteration) {
+        for (std::size_t k = 0; k < n; ++k) {
+            if (iteration > 0) joints_[k].train->with([](auto& s) { s.go_back(); });
+            if (const Status status = respond(k, interval, slope_[k], answer_[k]); status != Status::done)
+                return status;
+        }
+        double worst = 0.0;  // over what rounding leaves
+        bool settled = true;
+        for (std::size_t r = 0; r < n; ++r) {
+            const double load = joints_[r].inputs[static_cast<std::size_t>(joints_[r].load)];
+            double sum = -force_[r] - load, size = std::fabs(force_[r]) + std::fabs(load), rounding = 0.0;
+            for (std::size_t c = 0; c < n; ++c) {
+                const double coupled = mass_[r * n + c] - (r == c ? inertia_[r] : 0.0);
+                sum += coupled * answer_[c].acceleration;
+                size += std::fabs(coupled * answer_[c].acceleration);
+                rounding += std::fabs(coupled) * answer_[c].rounding;
+            }
+            residual_[r] = sum;
+            settled = settled && std::fabs(sum) <= 1e-11 * size + 16.0 * rounding;
+            worst = std::fmax(worst, std::fabs(sum));
+        }
+        if (settled) break;
+        if (iteration == most_iterations) {
+            ++unsettled_;
+            break;
+        }
+        if (iteration > 0 && worst >= best && share > 0x1p-6) {
+            share *= 0.5;  // a switching lies between: less of the last change
+        } else {
+            for (std::size_t k = 0; k < n; ++k)
+                best_torque_[k] = joints_[k].inputs[static_cast<std::size_t>(joints_[k].load)];
+            best = worst;
+            share = 1.0;
+            if (!solve()) {
+                ++unsettled_;
+                break;
+            }
+        }
+        for (std::size_t k = 0; k < n; ++k)
+            joints_[k].inputs[static_cast<std::size_t>(joints_[k].load)] = best_torque_[k] + share * change_[k];
+    }
+    for (std::size_t k = 0; k < n; ++k) {
+        Joint& j = joints_[k];
+        j.compliance = answer_[k].compliance;
+        j.torque += inertia_[k] * answer_[k].acceleration + j.inputs[static_cast<std::size_t>(j.load)];
+    }
+    return Status::done;
+}
+
+Status JointTrains::step(double interval, int substeps, const Mechanics& m) {
+    const std::size_t n = joints_.size();
+    for (std::size_t k = 0; k < joints_.size(); ++k) {
+        joints_[k].train->with([](auto& s) { s.keep_begin(); });
+        begin_speed_[k] = joints_[k].speed;
+        joints_[k].torque = 0.0;
+    }
+    for (int s = 0; s < substeps; ++s) {
+        const double away = interval * ((s + 0.5) / substeps - 0.5);  // from the middle of the step
+        for (std::size_t k = 0; k < n * n; ++k) mass_[k] = m.mass[k] + away * m.mass_rate[k];
+        for (std::size_t k = 0; k < n; ++k) {
+            force_[k] = m.force[k] + away * m.force_rate[k];
+            slope_[k] = -m.force_rate[k];
+            for (std::size_t j = 0; j < n; ++j) slope_[k] += m.mass_rate[k * n + j] * answer_[j].acceleration;
+        }
+        if (const Status status = substep(interval / substeps); status != Status::done) {
+            go_back();
+            return status;
+        }
+    }
+    read();
+    for (std::size_t k = 0; k < joints_.size(); ++k) {
+        joints_[k].acceleration = (joints_[k].speed - begin_speed_[k]) / interval;
+        joints_[k].torque /= substeps;
+    }
+    return Status::done;
+}
+
+void JointTrains::go_back() {
+    for (Joint& j : joints_) j.train->with([](auto& s) { s.go_back_to_begin(); });
+    read();
+}
+
+}  // namespace lostmotion

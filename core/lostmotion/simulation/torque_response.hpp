@@ -1,0 +1,137 @@
+// How the motion at the end of a step depends on a torque that is constant over the step.
+//
+// Within a regime the components y follow y' = A y + b M + ..., so that their derivative D = dy/dM follows
+// D' = A D + b. Where a guard g falls through zero at t*, a change of M shifts that instant by
+//     dt*/dM = -(g_y D + g_M)/g',
+// and D becomes R_y D + (R_y f_before + R_t - f_after) dt*/dM, with R what the switching sets anew (Leine and
+// Nijmeijer 2004). This is exact away from grazing, except that the direct part of M in torques which a rest leaves
+// open is not followed.
+#pragma once
+
+#include <algorithm>
+#include <optional>
+
+#include "../model/components.hpp"
+#include "../solver/exact_solver.hpp"
+
+namespace lostmotion {
+
+template <class System>
+class TorqueResponse final : public Observer<System> {
+ public:
+    using D = typename System::Dims;
+    using Regime = typename System::Regime;
+    using State = StateOf<D>;
+    using Components = ComponentsOf<D>;
+
+    explicit TorqueResponse(const System& system) : laws_(system) {}
+
+    // input: the number of the torque among the inputs.
+    void begin(RegimeCache<System>& cache, int input) {
+        cache_ = &cache;
+        input_ = input;
+        derivative_ = {};
+        segments_ = 0;
+        inputs_.reset();
+    }
+    // Of each state, [1/(N m)] times its unit.
+    const Components& derivative() const { return derivative_; }
+
+    bool segment(const Segment<System>& s) override {
+        if (!inputs_) inputs_.emplace(s.at.input());
+        const Regime& r = s.entry.regime;
+        regime_ = &r;
+        x_ = s.x_end;
+        memory_ = s.memory;
+        const double length = s.end - s.begin;
+        if (!(length > 0.0)) return true;
+        // Nearly all steps are of one regime and one length.
+        const bool first = segments_++ == 0;
+        if (first && last_entry_ == &s.entry && last_key_ == r.key &&
+            std::fabs(length - last_length_) < 1e-9 * length) {
+            derivative_ = last_;
+            return true;
+        }
+        State rate{};
+        for (int row = 0; row < D::states; ++row) {
+            const auto& c = r.rate[row].c;
+            rate[row] = c[D::first_input + input_];
+            for (int k = 0; k < D::states; ++k) rate[row] += c[k] * derivative_[k];
+            for (int k = 0; k < D::memory; ++k) rate[row] += c[D::first_memory + k] * derivative_[D::states + k];
+        }
+        State change;
+        (s.entry.propagator.integral(length) * load<D>(rate)).store(change.data());
+        for (int row = 0; row < D::states; ++row) derivative_[row] += change[row];
+        if (first) {
+            last_entry_ = &s.entry;
+            last_key_ = r.key;
+            last_length_ = length;
+            last_ = derivative_;
+        }
+        return true;
+    }
+
+    bool wants_switching() const override { return true; }
+    void switching(const SwitchingOf<System>& w) override {
+        if (!inputs_) return;  // at the begin of the step: nothing depends on the torque yet
+        ++segments_;
+        const Regime &old = *regime_, &next = cache_->regime(w.after);
+        inputs_->anchor_left(w.time);
+        const auto u = inputs_->template jet<2>();
+        auto u_after = u;
+        if (w.input_jump) {
+            inputs_->anchor(w.time);
+            u_after = inputs_->template jet<2>();
+        }
+        auto jump = JacobianOf<D>::identity();
+        const auto reset = laws_.reset({w, old, next, x_, memory_, u, u_after}, jump);
+        Components out{};
+        for (int r = 0; r < component_count<D>; ++r)
+            for (int k = 0; k < component_count<D>; ++k) out[r] += jump.row[r][k] * derivative_[k];
+        if (w.guard >= 0) {
+            const Components before = flow(old, x_, memory_, u[0]), after = flow(next, w.x, w.memory, u_after[0]);
+            const auto& g = old.guards[w.guard].form.c;
+            double fall = 0.0, change = g[D::first_input + input_];
+            for (int i = 0; i < D::inputs; ++i) fall += g[D::first_input + i] * u[1][i];
+            for (int k = 0; k < D::states; ++k) {
+                fall += g[k] * before[k];
+                change += g[k] * derivative_[k];
+            }
+            for (int k = 0; k < D::memory; ++k) change += g[D::first_memory + k] * derivative_[D::states + k];
+            if (fall < 0.0) {
+                const double shift = -change / fall;
+                for (int r = 0; r < component_count<D>; ++r) {
+                    double gap = reset.by_time[r] - after[r];
+                    for (int k = 0; k < component_count<D>; ++k) gap += jump.row[r][k] * before[k];
+                    out[r] += gap * shift;
+                }
+            }
+        }
+        derivative_ = out;
+    }
+
+ private:
+    static Components flow(const Regime& r, const State& x, const typename D::Memory& m, const InputsOf<D>& u) {
+        Components f{};
+        for (int k = 0; k < D::states; ++k) f[k] = evaluate<D>(r.rate[k], x, m, u);
+        return f;
+    }
+
+    const ComponentLaws<System> laws_;
+    RegimeCache<System>* cache_ = nullptr;
+    int input_ = 0;
+    Components derivative_{};
+    int segments_ = 0;
+    std::optional<InputState<D>> inputs_;
+    // Where the last segment ended.
+    const Regime* regime_ = nullptr;
+    State x_{};
+    typename D::Memory memory_{};
+    // The first segment of an earlier step.
+    const void* last_entry_ = nullptr;
+    typename System::Key last_key_{};
+    double last_length_ = 0.0;
+    Components last_{};
+};
+
+}  // namespace lostmotion

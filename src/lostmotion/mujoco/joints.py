@@ -1,0 +1,34 @@
+"""Joints of a MuJoCo model by name."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..errors import InputError
+from ..inputs.validation import did_you_mean, listed, shown
+
+if TYPE_CHECKING:
+    import mujoco
+
+
+def joint_id(model: mujoco.MjModel, name: str) -> int:
+    """The number of a hinge.
+
+    Raises
+    ------
+    InputError
+        The model has no such joint, or it is no hinge.
+    """
+    import mujoco
+
+    found = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
+    if found < 0:
+        hinges = [
+            model.joint(k).name for k in range(model.njnt) if model.jnt_type[k] == int(mujoco.mjtJoint.mjJNT_HINGE)
+        ]
+        raise InputError(
+            f"joint {shown(name)}: is not in the model; {did_you_mean(name, hinges, f'its hinges are {listed(hinges)}')}"
+        )
+    if model.jnt_type[found] != int(mujoco.mjtJoint.mjJNT_HINGE):
+        raise InputError(f"joint {name!r}: is no hinge; a drive turns a hinge")
+    return int(found)

@@ -1,0 +1,252 @@
+"""Drives as the numbers that MuJoCo and URDF have for a joint, and back."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import InputError, need
+from ..inputs.arguments import checked
+from ..inputs.quantities import Angle, Frequency, Torque
+from ..inputs.validation import shown
+from ..model.drive import Drive
+from ..model.gearbox import Gearbox
+from ..model.load import Load
+from ..model.losses import ConstantEfficiency
+from ..model.motor import Motor
+from ..model.torsion import Rigid
+from ..simulation.joint_trains import joint_drive
+from ..simulation.scenario import Scenario
+from ..simulation.stepping import Simulation
+from .joints import joint_id
+
+if TYPE_CHECKING:
+    import mujoco
+
+STEPS_PER_PERIOD = 2000
+FASTEST_SHARE = 0.1
+"""Bandwidth of the loop that makes the motion, over the natural frequency of the mesh."""
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """What describes a drive best in MuJoCo for one motion."""
+
+    armature: float
+    """inertia of the drive at the joint [kg·m²]"""
+    damping: float
+    """[N·m·s/rad]"""
+    frictionloss: float
+    """[N·m]"""
+    gear: float
+    """torque on the joint over torque of the motor"""
+    torque_error: float
+    """root mean square [N·m] of what this leaves of the torque on the joint"""
+    torque: float
+    """root mean square of the torque on the joint [N·m]"""
+
+    @property
+    def error(self) -> float:
+        """Share of the torque on the joint that is not described."""
+        return self.torque_error / self.torque
+
+    def mjcf(self, joint: str) -> str:
+        """The joint and its motor as MJCF."""
+        return (
+            f'<joint name="{joint}" armature="{self.armature:.6g}" damping="{self.damping:.6g}" frictionloss="{self.frictionloss:.6g}"/>\n'
+            f'<motor name="{joint}" joint="{joint}" gear="{self.gear:.6g}"/>'
+        )
+
+    def urdf(self, joint: str) -> str:
+        """The joint as URDF, whose dynamics has no armature: it is a comment there."""
+        return (
+            f'<joint name="{joint}" type="revolute">\n'
+            f'  <dynamics damping="{self.damping:.6g}" friction="{self.frictionloss:.6g}"/>  <!-- armature {self.armature:.6g} kg m2, gear {self.gear:.6g} -->\n'
+            "</joint>"
+        )
+
+
+@checked
+def reduce(
+    drive: Drive | Scenario,
+    amplitude: Angle,
+    frequency: Frequency,
+    load_torque: Torque = 0.0,
+) -> Reduction:
+    """Describe a drive by armature, damping, friction loss and gear, best for one motion.
+
+    The drive moves its load along a sum of two sines, of the frequency with the amplitude and of 2.3 times the frequency with a
+    third of it, against a constant load torque. Least squares then fit
+    ``gear * motor_torque - armature * a - damping * v - frictionloss * sign(v)`` to the torque on the joint.
+
+    Parameters
+    ----------
+    drive
+        With the inertia of its load, and a motor of any kind, which is taken as a torque source.
+    amplitude
+        Of the joint [rad].
+    frequency
+        [Hz]
+    load_torque
+        Constant torque against the joint [N·m], such as gravity. The efficiency of the gear acts on it.
+
+    Returns
+    -------
+    Reduction
+
+    Raises
+    ------
+    InputError
+        The drive does not follow the motion, or its gearbox swings too slowly for it.
+
+    Examples
+    --------
+    >>> found = lm.mujoco.reduce(lm.load("catalogue-robot-joint"), 0.5, 1.0)    # doctest: +SKIP
+    >>> print(found.mjcf("elbow"))                                              # doctest: +SKIP
+    """
+    for name, value in (("amplitude", amplitude), ("frequency", frequency)):
+        if not value > 0.0:
+            raise InputError(f"{name}: {shown(value)} must be positive")
+    if isinstance(drive, Scenario):
+        drive = drive.drive()
+    columns, target = _along_sines(drive, amplitude, frequency, load_torque)
+    if load_torque == 0.0:
+        # Without a load torque only the product of gear and motor torque counts: the gear is its ratio.
+        ratio = drive.gearbox.ratio
+        values = np.array([ratio, *_not_negative(columns[:, 1:], target - ratio * columns[:, 0])])
+    else:
+        values = _not_negative(columns, target)
+    left = target - columns @ values
+    gear, armature, damping, loss = map(float, values)
+    rms = [float(np.sqrt(np.mean(x * x))) for x in (left, target)]
+    return Reduction(armature, damping, loss, gear, *rms)
+
+
+def _along_sines(drive: Drive, amplitude: float, frequency: float, load_torque: float) -> tuple[np.ndarray, np.ndarray]:
+    """Motor torque, acceleration, speed and its sign (the last three negative), and the torque on the joint, over two periods."""
+    motor = Motor(
+        kind="torque_source",
+        rotor_inertia=drive.motor.rotor_inertia,
+        friction_torque=drive.motor.friction_torque,
+    )
+    source = Drive(motor=motor, gearbox=drive.gearbox, load=drive.load)
+    step = 1.0 / (STEPS_PER_PERIOD * frequency)
+    simulation = Simulation(source, step=step)
+    made = joint_drive("joint", source, drive.load.inertia, step)
+    omega = 2.0 * math.pi * frequency
+    bandwidth = 20.0 * omega
+    if made.mesh_frequency > 0.0:
+        bandwidth = min(bandwidth, FASTEST_SHARE * made.mesh_frequency)
+    if bandwidth < 4.0 * omega:
+        raise InputError(
+            f"frequency {frequency:g} Hz: is too fast for a mesh that swings at {made.mesh_frequency / (2.0 * math.pi):.4g} Hz; give a lower one"
+        )
+    ratio, inertia = drive.gearbox.ratio, drive.load.inertia
+    whole = inertia + made.reflected_inertia
+    friction = drive.load.friction_torque + abs(ratio) * drive.motor.friction_torque
+    rows: list[tuple[float, float, float, float]] = []
+    targets: list[float] = []
+    for k in range(4 * STEPS_PER_PERIOD):
+        t = (k + 0.5) * step
+        q = v = a = 0.0
+        for size, w in ((amplitude, omega), (amplitude / 3.0, 2.3 * omega)):
+            q += size * (1.0 - math.cos(w * t))
+            v += size * w * math.sin(w * t)
+            a += size * w * w * math.cos(w * t)
+        # By the motor's own angle and speed, which holds a compliant gear in check.
+        angle, motor_speed = simulation["load_angle"] + simulation["twist"], simulation["motor_speed"] / ratio
+        speed = simulation["load_speed"]
+        wanted = whole * (a + 2.0 * bandwidth * (v - motor_speed) + bandwidth * bandwidth * (q - angle))
+        torque = (wanted + load_torque + math.copysign(friction, v)) / ratio
+        simulation.advance(step, command=torque, load_torque=load_torque)
+        after = simulation["load_speed"]
+        if k >= 2 * STEPS_PER_PERIOD:
+            mean, acceleration = 0.5 * (speed + after), (after - speed) / step
+            rows.append((torque, -acceleration, -mean, -float(np.sign(mean))))
+            targets.append(inertia * acceleration + load_torque)
+    if abs(simulation["load_angle"] - q) > 0.5 * amplitude:
+        raise InputError(
+            "the drive does not follow the motion; give a larger amplitude, or a load torque that it can move"
+        )
+    return np.array(rows), np.array(targets)
+
+
+def _not_negative(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Least squares in which what would be negative is left out, one after the other."""
+    scale = np.maximum(np.abs(columns).max(axis=0), 1e-300)
+    kept = list(range(columns.shape[1]))
+    while True:
+        found = np.linalg.lstsq(columns[:, kept] / scale[kept], target, rcond=None)[0] / scale[kept]
+        if len(kept) == 1 or found.min() >= 0.0:
+            out = np.zeros(columns.shape[1])
+            out[kept] = found
+            return out
+        kept.pop(int(found.argmin()))
+
+
+def from_mjcf(model: mujoco.MjSpec | mujoco.MjModel, joint: str, *, ratio: float | None = None) -> Drive:
+    """The drive that a joint of a MuJoCo model describes: a rigid gear without losses, its friction on the load.
+
+    Parameters
+    ----------
+    model
+        With the joint and perhaps an actuator on it.
+    joint
+        Name of the hinge. Its armature is the rotor's inertia at the joint, damping and frictionloss act on the load.
+    ratio
+        Of the gear; left out, the gear of the actuator of the joint.
+
+    Returns
+    -------
+    Drive
+        With a load of 1 kg·m², which `attach` replaces.
+
+    Raises
+    ------
+    InputError
+        The joint is unknown, has no armature, or has no actuator and no ratio is given.
+    MissingLibraryError
+        MuJoCo is not installed.
+    """
+    need("mujoco", "lostmotion.mujoco", "mujoco")
+    import mujoco
+
+    if isinstance(model, mujoco.MjSpec):
+        model = model.copy().compile()
+    if not isinstance(model, mujoco.MjModel):
+        raise InputError(f"model: {shown(model)} must be a mujoco.MjSpec or a mujoco.MjModel")
+    number = joint_id(model, joint)
+    dof = model.jnt_dofadr[number]
+    if ratio is None:
+        gears = [
+            float(model.actuator_gear[k, 0])
+            for k in range(model.nu)
+            if model.actuator_trntype[k] == int(mujoco.mjtTrn.mjTRN_JOINT) and model.actuator_trnid[k, 0] == number
+        ]
+        if not gears:
+            raise InputError(f"joint {joint!r}: has no actuator that says the gear; give ratio=")
+        ratio = gears[0]
+    values: dict[str, Any] = {
+        key: float(np.ravel(array[dof])[0])
+        for key, array in (
+            ("armature", model.dof_armature),
+            ("damping", model.dof_damping),
+            ("frictionloss", model.dof_frictionloss),
+        )
+    }
+    if not values["armature"] > 0.0:
+        raise InputError(f"joint {joint!r}: has no armature, which is the inertia of the rotor; give the joint one")
+    return Drive(
+        motor=Motor(kind="torque_source", rotor_inertia=values["armature"] / (ratio * ratio)),
+        gearbox=Gearbox(
+            ratio=ratio,
+            rated_input_speed=1.0,
+            rated_output_torque=1.0,
+            stiffness=Rigid(),
+            losses=ConstantEfficiency(efficiency=1.0),
+        ),
+        load=Load(inertia=1.0, viscous_friction=values["damping"], friction_torque=values["frictionloss"]),
+    )
