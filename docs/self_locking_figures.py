@@ -1,4 +1,4 @@
-"""Figures and the table of docs/self-locking.md, from the exact solver and from `lostmotion.self_locking`."""
+"""Figures and the table of docs/self-locking.md, from the exact solver and from `lostmotion.sizing.self_locking`."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 /** What the core takes: the description of a scenario, and what is changed in it. All values in SI. */
 
 export interface CoreInput {
-  /** the numbers of lostmotion.description: doubles, lowest byte first, in base64 */
+  /** the numbers of lostmotion.portable.description: doubles, lowest byte first, in base64 */
   numbers: string;
   /** of the same scenario with a gap where it has none, which is another torsion curve: taken while the key has a value above 0 */
   with_gap: { key: string; numbers: string } | null;
