@@ -186,7 +186,7 @@ lint: $(VENV)/dev
 .PHONY: stub
 stub: $(VENV)/built
 	$(BIN)/python -m nanobind.stubgen -q -m lostmotion._core -o src/lostmotion/_core.pyi
-	$(BIN)/python -c 'from lostmotion.control.described import stub; print(stub(), end="")' > src/lostmotion/control/described.pyi
+	$(BIN)/python -c 'from lostmotion.inputs.described import stub; print(stub(), end="")' > src/lostmotion/inputs/described.pyi
 
 format: $(VENV)/dev
 	$(BIN)/ruff check --fix .

@@ -3,6 +3,7 @@
 
 #include <initializer_list>
 #include <limits>
+#include <optional>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -54,6 +55,10 @@ class NamedFields {
     template <class Curve>
     void curve(const char* name, Curve& v) {
         take(name, v);
+    }
+    template <class Curve>
+    void curve_if(const char* name, bool& there, Curve& v) {
+        if (take(name, v)) there = true;
     }
     template <class T, class Use>
     void each(const char* name, std::vector<T>& v, Use&& use) {
@@ -133,11 +138,24 @@ class DescribedFields {
     void flag(const Field& field, bool v) {
         add(field, "flag", nb::make_tuple(nb::none(), nb::none(), nb::none()), nb::bool_(v));
     }
+    // What is a part of its own in scenario files, or follows from others.
+    void number(const char*, double, Range = Range::any) {}
+    template <class Enum>
+    void choice(const char*, Enum, std::initializer_list<const char*>) {}
+    template <class Value>
+    void flag(const char*, Value) {}
+    template <class Curve>
+    void curve(const char*, const Curve&) {}
+    template <class Curve>
+    void curve_if(const char*, bool, const Curve&) {}
+    template <class T, class Use>
+    void optional(const char*, const std::optional<T>&, const T&, Use&&) {}
 
  private:
     static nb::tuple limits(Range range) {
         const nb::object none = nb::none(), zero = nb::float_(0.0), one = nb::float_(1.0);
         switch (range) {
+            case Range::above_one: return nb::make_tuple(one, none, none);
             case Range::positive:
             case Range::limit: return nb::make_tuple(zero, none, none);
             case Range::not_negative:

@@ -28,7 +28,7 @@ inline void bind_names(nb::module_& m) {
         "parameters",
         [] {
             std::vector<std::pair<std::string, std::string>> all;
-            for (const model::Parameter& p : model::parameters) all.emplace_back(p.key, p.unit);
+            for (const model::Parameter& p : model::parameters()) all.emplace_back(p.key, p.unit);
             return all;
         },
         nb::sig("def parameters() -> list[tuple[str, str]]"), "Of a drive: key and unit.");

@@ -21,17 +21,6 @@
 
 namespace lostmotion::binding {
 
-// Parameters by their keys in scenario files, of which a motor or a gear is taken.
-inline model::Train with_parameters(const std::map<std::string, double>& values) {
-    model::Train t = model::drive_train();
-    for (const auto& [key, value] : values) {
-        const model::Parameter* p = model::find_parameter(key);
-        if (p == nullptr) throw nb::value_error(("a drive has no parameter " + key).c_str());
-        p->in(t) = value;
-    }
-    return t;
-}
-
 // Name, symbol, unit, meaning.
 using ChannelRow = std::tuple<std::string, std::string, std::string, std::string>;
 inline std::vector<ChannelRow> channel_rows(const std::vector<TrainChannel>& channels) {
@@ -114,29 +103,24 @@ class TrainDescription : public model::TrainDescription {
             if (s.name == shaft)
                 s.domain = domain == "translation" ? model::Domain::translation : model::Domain::rotation;
     }
-    void add_motor(const std::string& name, const std::string& shaft, const Named& parameters, bool torque_source,
-                   double torque_limit) {
-        Motor law = with_parameters(parameters).motors[0].law;
-        law.kind = torque_source ? Motor::torque_source : Motor::dc;
-        model::TrainDescription::add_motor(name, shaft, law, torque_limit);
+    void add_motor(const std::string& name, const std::string& shaft, const nb::dict& fields) {
+        model::ShaftMotor m;
+        m.name = name;
+        NamedFields named(fields);
+        m.law.describe(named);
+        m.describe(named);
+        named.refuse_unknown();
+        model::TrainDescription::add(std::move(m), shaft);
     }
-    void add_gear(const std::string& name, const std::string& input, const std::string& output, const Named& parameters,
-                  const TorsionCurve* curve, const LossMap* map,
-                  const std::optional<std::pair<double, double>>& efficiencies, bool damping_limited,
-                  const model::PeriodicCurve* transmission_error) {
-        model::Gear gear = with_parameters(parameters).gears[0];
-        if (curve != nullptr) {
-            gear.law.compliance = Gearbox::torsion_curve;
-            gear.law.curve = *curve;
-        }
-        if (map != nullptr) {
-            gear.law.losses = Gearbox::loss_map;
-            gear.law.map = *map;
-        }
-        if (efficiencies) gear.efficiencies.emplace(efficiencies->first, efficiencies->second);
-        gear.damping_limited = damping_limited;
-        if (transmission_error != nullptr) gear.transmission_error = *transmission_error;
-        model::TrainDescription::add_gear(name, input, output, std::move(gear));
+    void add_gear(const std::string& name, const std::string& input, const std::string& output,
+                  const nb::dict& fields) {
+        model::Gear g;
+        g.name = name;
+        NamedFields named(fields);
+        g.law.describe(named);
+        g.describe(named);
+        named.refuse_unknown();
+        model::TrainDescription::add(std::move(g), input, output);
     }
 
     void add(const std::string& table, const std::string& name, const std::string& shaft, const nb::dict& fields) {
@@ -376,11 +360,12 @@ inline void bind_train(nb::module_& m) {
         .def(nb::init<>())
         .def("add_shaft", &TrainDescription::add_shaft, "name"_a, "inertia"_a, "viscous_friction"_a, "friction"_a,
              "drag"_a.none(), "loaded"_a, "given_motion"_a = false)
-        .def("add_motor", &TrainDescription::add_motor, "name"_a, "shaft"_a, "parameters"_a, "torque_source"_a,
-             "torque_limit"_a)
-        .def("add_gear", &TrainDescription::add_gear, "name"_a, "input"_a, "output"_a, "parameters"_a,
-             "torsion_curve"_a.none(), "loss_map"_a.none(), "efficiencies"_a.none(), "damping_limited"_a,
-             "transmission_error"_a.none())
+        .def("add_motor", &TrainDescription::add_motor, "name"_a, "shaft"_a, "fields"_a,
+             nb::sig("def add_motor(self, name: str, shaft: str, fields: collections.abc.Mapping[str, typing.Any]) -> "
+                     "None"))
+        .def("add_gear", &TrainDescription::add_gear, "name"_a, "input"_a, "output"_a, "fields"_a,
+             nb::sig("def add_gear(self, name: str, input: str, output: str, fields: collections.abc.Mapping[str, "
+                     "typing.Any]) -> None"))
         .def("set_domain", &TrainDescription::set_domain, "shaft"_a, "domain"_a)
         .def("set_housing", &TrainDescription::set_housing, "gear"_a, "shaft"_a)
         .def("add", &TrainDescription::add, "table"_a, "name"_a, "shaft"_a, "fields"_a,

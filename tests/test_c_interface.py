@@ -12,8 +12,8 @@ import pytest
 
 import lostmotion as lm
 from conftest import ROOT, TRAINS
+from lostmotion import _core
 from lostmotion.model.angle_torques import TorqueCurve
-from lostmotion.model.parameters import numbers
 from lostmotion.model.shaft import DragCurve
 from lostmotion.model.torsion import Rigid
 from lostmotion.simulation.train_state import start_values
@@ -125,7 +125,9 @@ class Train:
             )
 
     def parameters(self, part: Any, table: str) -> tuple[Any, int]:
-        given = numbers(part, table)
+        keys = dict(_core.parameters())
+        values = {f"{table}.{key}": value for key, value in part.core_fields().items() if value is not None}
+        given = {key: float(value) for key, value in values.items() if key in keys}
         array = (Parameter * max(1, len(given)))(*(Parameter(k.encode(), v) for k, v in given.items()))
         return array, len(given)
 

@@ -11,8 +11,7 @@ import pytest
 
 import lostmotion
 from conftest import ROOT, run_in_build
-from lostmotion import _core
-from lostmotion.control import described
+from lostmotion.inputs import described
 from public_names import PATHS, public
 
 PACKAGE = ROOT / "src" / "lostmotion"
@@ -246,39 +245,48 @@ def test_every_public_name_exists_and_is_documented() -> None:
 GENERATED = {"_core.pyi", "described.pyi"}
 
 
-# Of three loops the gain, and parameters that no other part has by the same name: what states them.
+# Of an element, a gear and controllers: parameters that no other part has by the same name, and the gains of three loops.
 STATED = {
     "the gain of the position loop": r""" "gain",\s*"K_v" """,
     "the gain of the speed loop": r""" "gain",\s*"k_p" """,
     "the gain of the current loop": r""" "gain",\s*"g" """,
+    # sliders and campaigns use its key
+    "mesh_damping": r""" "mesh_damping",\s*"[^"]*",\s*"|^\s+mesh_damping: |def_\w+\("mesh_damping" """,
 } | {
     key: rf"""["']{key}["']|^\s+{key}: |def_\w+\("{key}" """
-    for key in ("reference_weight", "decoupling", "weakening_voltage", "tracking_index", "speed_bandwidth")
+    for key in (
+        "rest_angle",
+        "reference_weight",
+        "decoupling",
+        "weakening_voltage",
+        "tracking_index",
+        "speed_bandwidth",
+    )
 }
 
 
 @pytest.mark.parametrize("name", STATED)
-def test_a_parameter_of_a_controller_is_stated_in_one_file(name: str) -> None:
+def test_a_parameter_is_stated_in_one_file(name: str) -> None:
     """By its key in quotes, as a field of a class, or as a member of a binding; with its test and its text it has three places."""
     rooms = [ROOT / room for room in ("core/lostmotion", "bindings", "src/lostmotion", "page/src")]
     sources = [p for room in rooms for p in room.rglob("*") if p.suffix in (".hpp", ".cpp", ".h", ".py", ".pyi", ".ts")]
     stated = re.compile(STATED[name].strip(), re.MULTILINE)
     files = [p.relative_to(ROOT) for p in sources if p.name not in GENERATED and stated.search(p.read_text())]
     assert len(files) == 1, files
-    assert files[0].parts[:3] == ("core", "lostmotion", "control")
-    assert "def_rw" not in (ROOT / "bindings" / "control.hpp").read_text()
+    assert files[0].parts[:2] == ("core", "lostmotion")
+    assert not any("def_rw" in p.read_text() for p in (ROOT / "bindings").glob("*.hpp"))
 
 
-def test_no_part_of_a_controller_states_again_what_the_core_describes() -> None:
+def test_no_part_states_again_what_the_core_describes() -> None:
     parts = [part for made in described.Described.__subclasses__() for part in made.__subclasses__()]
-    assert len(parts) == len(_core.control_tables())
+    assert {part.__name__ for part in parts} >= described.tables().keys()
     assert {part.__name__: set(part.described) & set(vars(part).get("__annotations__", {})) for part in parts} == {
         part.__name__: set() for part in parts
     }
 
 
-def test_every_described_parameter_of_a_controller_says_what_it_is() -> None:
-    for table, rows in _core.control_tables().items():
+def test_every_described_parameter_says_what_it_is() -> None:
+    for table, rows in described.tables().items():
         for key, kind, symbol, unit, meaning, _, needed, default in rows:
             assert symbol or meaning, f"{table}.{key}"
             assert unit or kind != "pair" or key == "limits", f"{table}.{key}"
@@ -298,7 +306,7 @@ def test_the_extension_s_stub_is_current(tmp_path: Path) -> None:
     ]
     subprocess.run(command, check=True)
     assert (tmp_path / "_core.pyi").read_text() == (PACKAGE / "_core.pyi").read_text(), "run: make stub"
-    assert described.stub() == (PACKAGE / "control" / "described.pyi").read_text(), "run: make stub"
+    assert described.stub() == (PACKAGE / "inputs" / "described.pyi").read_text(), "run: make stub"
 
 
 def test_a_build_of_the_core_that_is_not_there_is_refused() -> None:

@@ -81,10 +81,10 @@ std::string read(const lm_loss_map& m, const std::string& what, lm::LossMap& to)
 // A train with these parameters, of which a motor or gear is taken.
 std::string read(const lm_parameter* parameters, std::size_t n, const std::string& what, lm::model::Train& to) {
     for (std::size_t k = 0; k < n; ++k) {
-        const lm::model::Parameter* p = lm::model::find_parameter(text(parameters[k].key));
-        if (p == nullptr) return what + ": there is no parameter '" + text(parameters[k].key) + "'";
+        double* value = lm::model::find_parameter(to, text(parameters[k].key));
+        if (value == nullptr) return what + ": there is no parameter '" + text(parameters[k].key) + "'";
         if (!std::isfinite(parameters[k].value)) return what + ": " + text(parameters[k].key) + " must be finite";
-        p->in(to) = parameters[k].value;
+        *value = parameters[k].value;
     }
     return {};
 }
@@ -106,9 +106,13 @@ extern "C" {
 
 int lm_interface_version(void) { return LM_INTERFACE_VERSION; }
 
-size_t lm_parameter_count(void) { return std::size(lm::model::parameters); }
-const char* lm_parameter_key(size_t k) { return k < lm_parameter_count() ? lm::model::parameters[k].key : nullptr; }
-const char* lm_parameter_unit(size_t k) { return k < lm_parameter_count() ? lm::model::parameters[k].unit : nullptr; }
+size_t lm_parameter_count(void) { return lm::model::parameters().size(); }
+const char* lm_parameter_key(size_t k) {
+    return k < lm_parameter_count() ? lm::model::parameters()[k].key.c_str() : nullptr;
+}
+const char* lm_parameter_unit(size_t k) {
+    return k < lm_parameter_count() ? lm::model::parameters()[k].unit.c_str() : nullptr;
+}
 
 lm_train* lm_train_new(void) { return new (std::nothrow) lm_train; }
 void lm_train_free(lm_train* train) { delete train; }
@@ -139,7 +143,9 @@ int lm_add_motor(lm_train* train, const char* name, const char* shaft, const lm_
         if (wrong.empty()) wrong = read(parameters, n, "motor '" + text(name) + "'", drive);
         if (!wrong.empty()) return wrong;
         drive.motors[0].law.kind = torque_source != 0 ? lm::Motor::torque_source : lm::Motor::dc;
-        train->description.add_motor(name, text(shaft), drive.motors[0].law, torque_limit);
+        drive.motors[0].name = name;
+        drive.motors[0].torque_limit = torque_limit;
+        train->description.add(std::move(drive.motors[0]), text(shaft));
         return wrong;
     });
 }
@@ -166,7 +172,8 @@ int lm_add_gear(lm_train* train, const char* name, const char* input, const char
             wrong = read(*transmission_error, what + ": transmission error", gear.transmission_error);
         if (!wrong.empty()) return wrong;
         if (efficiencies != nullptr) gear.efficiencies.emplace(efficiencies[0], efficiencies[1]);
-        train->description.add_gear(name, text(input), text(output), gear);
+        gear.name = name;
+        train->description.add(std::move(gear), text(input), text(output));
         return wrong;
     });
 }

@@ -20,8 +20,9 @@ void add_signal_fields(std::vector<BatchField>& fields, const std::string& prefi
 const std::vector<BatchField>& batch_fields() {
     static const std::vector<BatchField> all = [] {
         std::vector<BatchField> fields;
-        for (const model::Parameter& p : model::parameters)
-            fields.push_back({p.key, [in = p.in](TrainCase& c, double v) { in(c.train) = v; }});
+        for (std::size_t k = 0; k < model::parameters().size(); ++k)
+            fields.push_back({model::parameters()[k].key,
+                              [k](TrainCase& c, double v) { *model::parameters_of(c.train)[k].value = v; }});
         // A factor on what the drive has, not the value itself.
         fields.push_back({"gearbox.stiffness.slopes", [](TrainCase& c, double v) {
                               Gearbox& law = c.train.gears[0].law;

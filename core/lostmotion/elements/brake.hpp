@@ -22,8 +22,7 @@ struct Brake {
 
     template <class Fields>
     void describe(Fields& f) {
-        f.number("torque", torque, Fields::Range::not_negative);
-        f.number("breakaway_torque", breakaway_torque, Fields::Range::not_negative);
+        describe_capacity(f, torque, breakaway_torque);
     }
 };
 

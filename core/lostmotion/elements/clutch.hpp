@@ -25,8 +25,7 @@ struct Clutch {
 
     template <class Fields>
     void describe(Fields& f) {
-        f.number("torque", torque, Fields::Range::not_negative);
-        f.number("breakaway_torque", breakaway_torque, Fields::Range::not_negative);
+        describe_capacity(f, torque, breakaway_torque);
         f.flag("safety", safety);
     }
 };

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "../parts/field.hpp"
 #include "regime.hpp"
 
 namespace lostmotion::model {
@@ -17,6 +18,17 @@ void add_limit_guards(const Terms& terms, const Row& u, double low, double high,
 // A torque in proportion to a command between 0 and 1.
 inline Row commanded(const Terms& terms, double torque, int input, int at) {
     return at < 0 ? Row{} : at > 0 ? terms.one(torque) : terms.input(input, torque);
+}
+
+// The capacities of what a command applies, a brake or a clutch [N m].
+template <class Fields>
+void describe_capacity(Fields& f, double& torque, double& breakaway_torque) {
+    f.number({"torque", "", "N*m", Range::positive, Given::needed,
+              "capacity while it slips, at command 1; between 0 and 1 in proportion, below 0 it is open"},
+             torque);
+    f.number({"breakaway_torque", "", "N*m", Range::positive, Given::may_be_left_out,
+              "capacity at rest, at command 1; left out, the same"},
+             breakaway_torque);
 }
 
 }  // namespace lostmotion::model

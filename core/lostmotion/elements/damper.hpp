@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "../parts/field.hpp"
 #include "coupling_element.hpp"
 #include "pieces.hpp"
 
@@ -19,7 +20,9 @@ struct Damper {
 
     template <class Fields>
     void describe(Fields& f) {
-        f.number("viscous_friction", viscous_friction, Fields::Range::not_negative);
+        f.number({"viscous_friction", "b", "N*m*s/rad", Range::not_negative, Given::has_default,
+                  "torque over the slip, in proportion"},
+                 viscous_friction);
         f.curve("drag", drag);
     }
 };

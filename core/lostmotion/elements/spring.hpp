@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "../parts/field.hpp"
 #include "pieces.hpp"
 #include "shaft_element.hpp"
 
@@ -20,7 +21,9 @@ struct Spring {
     template <class Fields>
     void describe(Fields& f) {
         f.curve("curve", curve);
-        f.number("rest_angle", rest_angle);
+        f.number({"rest_angle", "", "rad", Range::any, Given::has_default,
+                  "angle of the shaft at which the spring has no torque"},
+                 rest_angle);
     }
 };
 

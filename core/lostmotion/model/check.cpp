@@ -178,7 +178,7 @@ std::string TrainCheck::rigid_loops() const {
 }
 
 std::string TrainCheck::given_motions(const std::vector<ContactPlace>& rigid) const {
-    Given given;
+    GivenShafts given;
     for (std::size_t s = 0; s < train_.shafts.size(); ++s)
         if (train_.shafts[s].given_motion) given.shafts |= 1u << s;
     const std::vector<std::int8_t> stuck(rigid.size(), 0);

@@ -1,8 +1,11 @@
 // The drive of the paper as a train, and its parameters by their keys in scenario files.
 #pragma once
 
-#include <array>
+#include <initializer_list>
+#include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "train.hpp"
 
@@ -25,50 +28,64 @@ inline Train drive_train() {
 }
 
 struct Parameter {
-    const char *key, *unit;
-    double& (*in)(Train&);  // of a train in the short form
+    std::string key, unit;
+    double* value;  // of the train that it was found in
 };
 
-template <double Motor::* member>
-double& of_motor(Train& t) {
-    return t.motors[0].law.*member;
-}
-template <double Gearbox::* member>
-double& of_gearbox(Train& t) {
-    return t.gears[0].law.*member;
-}
-template <double Shaft::* member>
-double& of_load(Train& t) {
-    return t.shafts[1].*member;
-}
-inline double& mesh_damping(Train& t) { return t.gears[0].mesh_damping; }
-inline double& friction_of_load(Train& t) { return t.shafts[1].friction.torque; }
+// The parameters of a train in the short form that are single numbers, as its parts describe them.
+class ParameterFinder {
+ public:
+    static constexpr bool reads = false;
 
-inline constexpr std::array parameters{
-    Parameter{"motor.rotor_inertia", "kg*m^2", of_motor<&Motor::rotor_inertia>},
-    Parameter{"motor.friction_torque", "N*m", of_motor<&Motor::friction_torque>},
-    Parameter{"motor.rated_torque", "N*m", of_motor<&Motor::rated_torque>},
-    Parameter{"motor.rated_speed", "rad/s", of_motor<&Motor::rated_speed>},
-    Parameter{"motor.electrical_time_constant", "s", of_motor<&Motor::electrical_time_constant>},
-    Parameter{"motor.armature_voltage_constant", "", of_motor<&Motor::armature_voltage_constant>},
-    Parameter{"motor.command_limit", "", of_motor<&Motor::voltage_limit>},
-    Parameter{"gearbox.ratio", "", of_gearbox<&Gearbox::ratio>},
-    Parameter{"gearbox.inertia", "kg*m^2", of_gearbox<&Gearbox::inertia>},
-    Parameter{"gearbox.viscous_friction", "N*m*s/rad", of_gearbox<&Gearbox::viscous_friction>},
-    Parameter{"gearbox.rated_input_speed", "rad/s", of_gearbox<&Gearbox::rated_input_speed>},
-    Parameter{"gearbox.rated_output_torque", "N*m", of_gearbox<&Gearbox::rated_output_torque>},
-    Parameter{"gearbox.mesh_damping", "N*m*s/rad", mesh_damping},
-    Parameter{"gearbox.hysteresis.efficiency", "", of_gearbox<&Gearbox::hysteresis_efficiency>},
-    Parameter{"gearbox.losses.efficiency", "", of_gearbox<&Gearbox::efficiency>},
-    Parameter{"load.inertia", "kg*m^2", of_load<&Shaft::inertia>},
-    Parameter{"load.viscous_friction", "N*m*s/rad", of_load<&Shaft::viscous_friction>},
-    Parameter{"load.friction_torque", "N*m", friction_of_load},
+    std::vector<Parameter> found;
+
+    template <class Part>
+    void add(const std::string& table, Part& part) {
+        table_ = table;
+        part.describe(*this);
+    }
+    void number(const char*, double, Range = Range::any) {}
+    void number(const Field& field, double& v) { found.push_back({table_ + '.' + field.key, field.unit, &v}); }
+    template <class Enum>
+    void choice(const char*, Enum, std::initializer_list<const char*>) {}
+    template <class Value>
+    void flag(const Field&, Value) {}
+    template <class... Other>
+    void optional(Other&&...) {}
+    template <class... Other>
+    void curve(Other&&...) {}
+    template <class... Other>
+    void curve_if(Other&&...) {}
+
+ private:
+    std::string table_;
 };
 
-// nullptr: there is none of this key.
-inline const Parameter* find_parameter(std::string_view key) {
-    for (const Parameter& p : parameters)
-        if (p.key == key) return &p;
+inline std::vector<Parameter> parameters_of(Train& t) {
+    ParameterFinder of;
+    of.add("motor", t.motors[0].law);
+    of.add("gearbox", t.gears[0].law);
+    of.add("gearbox", t.gears[0]);
+    of.add("load", t.shafts[1]);
+    of.found.push_back({"load.friction_torque", "N*m", &t.shafts[1].friction.torque});
+    return std::move(of.found);
+}
+
+// Their keys and units.
+inline const std::vector<Parameter>& parameters() {
+    static const std::vector<Parameter> all = [] {
+        Train t = drive_train();
+        std::vector<Parameter> named = parameters_of(t);
+        for (Parameter& p : named) p.value = nullptr;
+        return named;
+    }();
+    return all;
+}
+
+// The value of a parameter; nullptr: there is none of this key.
+inline double* find_parameter(Train& t, std::string_view key) {
+    for (const Parameter& p : parameters_of(t))
+        if (p.key == key) return p.value;
     return nullptr;
 }
 

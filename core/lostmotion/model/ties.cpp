@@ -38,7 +38,7 @@ static int lightest(unsigned moves, const std::array<double, max_shafts>& speed,
     return found;
 }
 
-bool stop_contact(const ContactPlace& c, int shafts, Ties& t, const double* inertia, Given given) {
+bool stop_contact(const ContactPlace& c, int shafts, Ties& t, const double* inertia, GivenShafts given) {
     std::array<double, max_shafts> speed;
     const unsigned moves = tied_speed(c, t, speed);
     unsigned may_follow = moves & ~given.shafts;
@@ -63,7 +63,7 @@ bool stop_contact(const ContactPlace& c, int shafts, Ties& t, const double* iner
 }
 
 Ties tie(const std::vector<ContactPlace>& contacts, int shafts, const std::int8_t* modes, const double* inertia,
-         Given given) {
+         GivenShafts given) {
     Ties t;
     for (int s = 0; s < shafts; ++s) {
         t.free[s] = static_cast<std::uint16_t>(1u << s);

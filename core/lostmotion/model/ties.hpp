@@ -19,7 +19,7 @@ inline constexpr double loop_rounding = 1e-12;
 
 // Shafts whose motion is given, as bits. Their speeds follow no other one, unless contacts at rest at one instant are
 // to have no speed to the last bit: then they do where nothing else is left.
-struct Given {
+struct GivenShafts {
     unsigned shafts = 0;
     bool follow = false;
 };
@@ -30,12 +30,12 @@ unsigned tied_speed(const ContactPlace& c, const Ties& t, std::array<double, max
 // Makes the last of the free shafts that the speed of a contact depends on follow the others; with the inertias of the
 // shafts, the one that carries least, so that the heavy ones stay free. False if it follows from those before that its
 // speed is zero, or if its speed is given.
-bool stop_contact(const ContactPlace& c, int shafts, Ties& t, const double* inertia = nullptr, Given given = {});
+bool stop_contact(const ContactPlace& c, int shafts, Ties& t, const double* inertia = nullptr, GivenShafts given = {});
 
 // stuck: a contact is at rest where this is 0. Frame contacts come first, so that it is a gear or coupling whose
 // torque is redundant where a shaft is held twice. With given motions, rigid gears come before them.
 Ties tie(const std::vector<ContactPlace>& contacts, int shafts, const std::int8_t* modes,
-         const double* inertia = nullptr, Given given = {});
+         const double* inertia = nullptr, GivenShafts given = {});
 
 // Is the speed of a contact kept at zero by these ties?
 bool kept_at_rest(const ContactPlace& c, const Ties& t);

@@ -2,14 +2,6 @@
 
 namespace lostmotion::model {
 
-void TrainDescription::add_gear(const std::string& name, const std::string& input, const std::string& output,
-                                Gear gear) {
-    gear.name = name;
-    gear.input = place_of(input);
-    gear.output = place_of(output);
-    train.gears.push_back(std::move(gear));
-}
-
 void TrainDescription::set_housing(const std::string& gear, const std::string& shaft) {
     for (Gear& g : train.gears)
         if (g.name == gear) g.housing = place_of(shaft);

@@ -1,7 +1,6 @@
 // A train as it is described from outside: elements by name, added in the order of the equations.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -16,10 +15,15 @@ class TrainDescription {
     Train train;
 
     void add_shaft(Shaft shaft) { train.shafts.push_back(std::move(shaft)); }
-    void add_motor(const std::string& name, const std::string& shaft, const Motor& law, double torque_limit) {
-        train.motors.push_back({name, place_of(shaft), law, torque_limit});
+    void add(ShaftMotor motor, const std::string& shaft) {
+        motor.shaft = place_of(shaft);
+        train.motors.push_back(std::move(motor));
     }
-    void add_gear(const std::string& name, const std::string& input, const std::string& output, Gear gear);
+    void add(Gear gear, const std::string& input, const std::string& output) {
+        gear.input = place_of(input);
+        gear.output = place_of(output);
+        train.gears.push_back(std::move(gear));
+    }
     // Puts the housing of a gear, by default on the frame, on a shaft.
     void set_housing(const std::string& gear, const std::string& shaft);
     // What acts on one shaft.

@@ -13,7 +13,8 @@ enum class Range {
     not_negative,
     up_to_one,  // > 0 and <= 1
     share,      // >= 0 and <= 1
-    limit,      // > 0, or infinite
+    above_one,
+    limit,  // > 0, or infinite
     limit_or_zero,
     bound,  // any, or infinite
 };

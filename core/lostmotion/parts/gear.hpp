@@ -31,6 +31,26 @@ struct Gear {
     bool damping_limited = false;
     PeriodicCurve transmission_error;  // e [rad, at the output] over the angle of the input shaft
 
+    // What a gear has beside the law of a gearbox.
+    template <class Fields>
+    void describe(Fields& f) {
+        f.optional("efficiencies", efficiencies, MeshEfficiency(1.0, 1.0), [&](MeshEfficiency& e) {
+            double driving = e.driving(), overrunning = e.overrunning();
+            f.number("driving", driving, Range::positive);
+            f.number("overrunning", overrunning);
+            e = MeshEfficiency(driving, overrunning);
+        });
+        f.number({"mesh_damping", "", "N*m*s/rad", Range::not_negative, Given::has_default,
+                  "at the output, while the flanks touch; they part when it would pull"},
+                 mesh_damping);
+        f.flag({"damping_limited", "", "", Range::any, Given::has_default,
+                "whether the torque of the mesh damping is at most that of the spring, so that no torque jumps where "
+                "flanks meet; needs backlash"},
+               damping_limited);
+        bool present = transmission_error.present();
+        f.curve_if("transmission_error", present, transmission_error);
+    }
+
     bool rigid() const { return law.compliance == Gearbox::rigid; }
     bool has_dry_losses() const { return efficiencies || law.losses == Gearbox::loss_map; }
     bool has_backlash() const { return !rigid() && law.curve.slope(0) == 0.0; }

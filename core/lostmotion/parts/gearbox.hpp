@@ -1,6 +1,7 @@
 // The gearbox: a compliance and a loss law, chosen independently.
 #pragma once
 
+#include "field.hpp"
 #include "loss_map.hpp"
 #include "torsion_curve.hpp"
 
@@ -23,6 +24,35 @@ struct Gearbox {
     LossMap map;                       // m_2B(mu, v), for loss_map (12)
     double rated_input_speed = 1.0;    // n_1R [rad/s], scales v
     double rated_output_torque = 1.0;  // T_2R [N m], scales mu and m_2B
+
+    template <class Fields>
+    void describe(Fields& f) {
+        f.number({"ratio", "i_C", "", Range::any, Given::needed,
+                  "i_C, input speed / output speed; below 0, the output turns against the input"},
+                 ratio);
+        f.number({"inertia", "J_R", "kg*m^2", Range::not_negative, Given::has_default, "J_R, on the input shaft"},
+                 inertia);
+        f.number({"viscous_friction", "b_MR", "N*m*s/rad", Range::not_negative, Given::has_default,
+                  "b_MR, on the input shaft"},
+                 viscous_friction);
+        bool compliant = compliance == torsion_curve;
+        f.curve_if("stiffness", compliant, curve);
+        compliance = compliant ? torsion_curve : rigid;
+        f.number({"hysteresis.efficiency", "eta_H", "", Range::up_to_one, Given::none}, hysteresis_efficiency);
+        f.choice("losses", losses, {"constant_efficiency", "loss_map"});
+        f.number({"losses.efficiency", "eta_C", "", Range::positive, Given::none}, efficiency);
+        if (losses == loss_map) f.curve("loss_map", map);
+        f.number({"rated_input_speed", "n_1R", "rad/s", Range::positive, Given::may_be_left_out, "n_1R"},
+                 rated_input_speed);
+        f.number({"rated_output_torque", "T_2R", "N*m", Range::positive, Given::may_be_left_out, "T_2R"},
+                 rated_output_torque);
+        if constexpr (Fields::reads) {
+            if (f.well() && ratio == 0.0) f.wrong("ratio", "must not be 0");
+            if (f.well() && compliant && !(curve.max_slope() > 0.0)) f.wrong("stiffness", "must be > 0 somewhere");
+            for (int k = 0; f.well() && k <= curve.outermost_piece(); ++k)
+                if (curve.slope(k) < 0.0) f.wrong("stiffness", "must not fall");
+        }
+    }
 
     bool has_hysteresis() const { return compliance == torsion_curve && hysteresis_efficiency < 1.0; }
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "field.hpp"
+
 namespace lostmotion {
 
 struct Motor {
@@ -16,6 +18,26 @@ struct Motor {
     double electrical_time_constant = 1e-3;  // tau_a [s]; 0: the torque follows voltage and speed at once
     double armature_voltage_constant = 2.0;  // k_N [-], stall torque / rated torque at rated voltage
     double voltage_limit = std::numeric_limits<double>::infinity();  // of |E_Z| [-]
+
+    template <class Fields>
+    void describe(Fields& f) {
+        f.choice("kind", kind, {"dc", "torque_source"});
+        f.number({"rotor_inertia", "J_M", "kg*m^2", Range::not_negative, Given::needed, "J_M"}, rotor_inertia);
+        f.number({"friction_torque", "T_10", "N*m", Range::not_negative, Given::has_default,
+                  "T_10, dry friction of the bearings"},
+                 friction_torque);
+        f.number({"rated_torque", "M_DR", "N*m", Range::positive, Given::has_default, "M_DR"}, rated_torque);
+        f.number({"rated_speed", "omega_DR", "rad/s", Range::positive, Given::may_be_left_out, "omega_DR"},
+                 rated_speed);
+        f.number({"electrical_time_constant", "tau_a", "s", Range::not_negative, Given::may_be_left_out,
+                  "tau_a; 0: the torque follows voltage and speed at once, which is the default with stall_torque and "
+                  "no_load_speed"},
+                 electrical_time_constant);
+        f.number({"armature_voltage_constant", "k_N", "", Range::above_one, Given::may_be_left_out,
+                  "k_N, stall torque / rated torque at rated voltage"},
+                 armature_voltage_constant);
+        f.number({"command_limit", "", "", Range::limit, Given::none}, voltage_limit);
+    }
 
     // The terms of its forms: M_D, w_M, the command E_C and 1.
     struct Terms {

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "dry_friction.hpp"
+#include "field.hpp"
 #include "torsion_curve.hpp"
 
 namespace lostmotion::model {
@@ -25,6 +26,16 @@ struct Shaft {
     bool given_motion = false;
     // Torque [N m] against the motion over speed [rad/s]: odd, piecewise linear; present if it has a slope.
     TorsionCurve drag{{}, {0.0}};
+
+    // Its own numbers; friction and drag are parts of it.
+    template <class Fields>
+    void describe(Fields& f) {
+        f.number({"inertia", "J", "kg*m^2", Range::not_negative, Given::has_default,
+                  "of the shaft and what is fixed to it, without rotors and inertias of gears"},
+                 inertia);
+        f.number({"viscous_friction", "b", "N*m*s/rad", Range::not_negative, Given::has_default, "against the frame"},
+                 viscous_friction);
+    }
 
     bool has_drag() const { return drag.max_slope() > 0.0; }
     // A quadratic drag c w |w| up to `top` [rad/s], by chords that depart from it by at most `error` [N m]; beyond, it

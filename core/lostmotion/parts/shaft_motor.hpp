@@ -15,6 +15,12 @@ struct ShaftMotor {
     Motor law;
     double torque_limit = std::numeric_limits<double>::infinity();  // [N m] of a torque source
 
+    template <class Fields>
+    void describe(Fields& f) {
+        f.number({"torque_limit", "", "N*m", Range::limit, Given::may_be_left_out, "largest torque of a torque source"},
+                 torque_limit);
+    }
+
     // A limit of the input: of the voltage, or of the torque that is asked for.
     bool limited() const {
         return law.kind == Motor::dc ? law.limits_voltage() : torque_limit < std::numeric_limits<double>::infinity();

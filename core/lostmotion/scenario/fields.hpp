@@ -101,6 +101,11 @@ class FieldWriter {
     void curve(const char*, Curve& v) {
         describe(*this, v);
     }
+    // A curve that is there or not.
+    template <class Curve>
+    void curve_if(const char* name, bool& there, Curve& v) {
+        present(name, there, [&] { describe(*this, v); });
+    }
 };
 
 class FieldReader {
@@ -189,6 +194,10 @@ class FieldReader {
     template <class Curve>
     void curve(const char* name, Curve& v) {
         part(name, [&] { describe(*this, v); });
+    }
+    template <class Curve>
+    void curve_if(const char* name, bool& there, Curve& v) {
+        present(name, there, [&] { describe(*this, v); });
     }
 
  private:

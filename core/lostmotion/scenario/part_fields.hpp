@@ -80,40 +80,6 @@ void describe(F& f, PeriodicCurve& curve) {
 }  // namespace model
 
 template <class F>
-void describe(F& f, Motor& m) {
-    f.choice("kind", m.kind, 2);
-    f.number("rotor_inertia", m.rotor_inertia, Range::not_negative);
-    f.number("friction_torque", m.friction_torque, Range::not_negative);
-    f.number("rated_torque", m.rated_torque, Range::positive);
-    f.number("rated_speed", m.rated_speed, Range::positive);
-    f.number("electrical_time_constant", m.electrical_time_constant, Range::not_negative);
-    f.number("armature_voltage_constant", m.armature_voltage_constant, Range::positive);
-    f.number("command_limit", m.voltage_limit, Range::limit);
-}
-
-template <class F>
-void describe(F& f, Gearbox& g) {
-    f.number("ratio", g.ratio);
-    f.number("inertia", g.inertia, Range::not_negative);
-    f.number("viscous_friction", g.viscous_friction, Range::not_negative);
-    f.choice("compliance", g.compliance, 2);
-    if (g.compliance == Gearbox::torsion_curve) f.part("stiffness", [&] { describe(f, g.curve); });
-    f.number("hysteresis_efficiency", g.hysteresis_efficiency, Range::up_to_one);
-    f.choice("losses", g.losses, 2);
-    f.number("efficiency", g.efficiency, Range::positive);
-    if (g.losses == Gearbox::loss_map) f.part("loss_map", [&] { describe(f, g.map); });
-    f.number("rated_input_speed", g.rated_input_speed, Range::positive);
-    f.number("rated_output_torque", g.rated_output_torque, Range::positive);
-    if constexpr (F::reads) {
-        if (f.well() && g.ratio == 0.0) f.wrong("ratio", "must not be 0");
-        if (f.well() && g.compliance == Gearbox::torsion_curve && !(g.curve.max_slope() > 0.0))
-            f.wrong("stiffness", "must be > 0 somewhere");
-        for (int k = 0; f.well() && k <= g.curve.outermost_piece(); ++k)
-            if (g.curve.slope(k) < 0.0) f.wrong("stiffness", "must not fall");
-    }
-}
-
-template <class F>
 void describe(F& f, Sine& s) {
     f.number("amplitude", s.amplitude);
     f.number("frequency", s.frequency, Range::positive);
@@ -157,8 +123,7 @@ template <class F>
 void describe(F& f, Shaft& s) {
     f.text("name", s.name);
     f.choice("domain", s.domain, 2);
-    f.number("inertia", s.inertia, Range::not_negative);
-    f.number("viscous_friction", s.viscous_friction, Range::not_negative);
+    s.describe(f);
     f.part("friction", [&] { describe(f, s.friction); });
     f.part("drag", [&] { describe(f, s.drag); });
     f.flag("loaded", s.loaded);
@@ -169,8 +134,8 @@ template <class F>
 void describe(F& f, ShaftMotor& m) {
     f.text("name", m.name);
     f.integer("shaft", m.shaft, 0, max_number);
-    describe(f, m.law);
-    f.number("torque_limit", m.torque_limit, Range::limit);
+    m.law.describe(f);
+    m.describe(f);
 }
 
 template <class F>
@@ -179,18 +144,8 @@ void describe(F& f, Gear& g) {
     f.integer("input", g.input, 0, max_number);
     f.integer("output", g.output, 0, max_number);
     f.integer("housing", g.housing, -1, max_number);
-    describe(f, g.law);
-    f.optional("efficiencies", g.efficiencies, MeshEfficiency(1.0, 1.0), [&](MeshEfficiency& e) {
-        double driving = e.driving(), overrunning = e.overrunning();
-        f.number("driving", driving, Range::positive);
-        f.number("overrunning", overrunning);
-        e = MeshEfficiency(driving, overrunning);
-    });
-    f.number("mesh_damping", g.mesh_damping, Range::not_negative);
-    f.flag("damping_limited", g.damping_limited);
-    bool present = g.transmission_error.present();
-    f.flag("transmission_error", present);
-    if (present) f.part("transmission_error", [&] { describe(f, g.transmission_error); });
+    g.law.describe(f);
+    g.describe(f);
 }
 
 template <class F>
@@ -236,6 +191,22 @@ void describe(F& f, Train& t) {
             e.describe(f);
         });
     });
+}
+
+// The parts of trains whose numbers scenario files have, by the names of these parts: use(name, describe).
+template <class Use>
+void each_table(Use&& use) {
+    use("Shaft", [](auto& f) { Shaft().describe(f); });
+    use("Motor", [](auto& f) { Motor().describe(f); });
+    use("ShaftMotor", [](auto& f) { ShaftMotor().describe(f); });
+    use("Transmission", [](auto& f) {
+        Gear g;
+        g.law.describe(f);
+        g.describe(f);
+    });
+    use("Commanded", [](auto& f) { Brake().describe(f); });
+    use("Damper", [](auto& f) { Damper().describe(f); });
+    use("Spring", [](auto& f) { Spring().describe(f); });
 }
 
 }  // namespace model

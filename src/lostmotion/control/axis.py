@@ -12,13 +12,12 @@ from typing import Any
 
 from .. import _core
 from ..errors import InputError
+from ..inputs.described import Described
 from ..inputs.validation import did_you_mean, shown
-from ..model.motor import Motor
-from ..model.parameters import MotorLaw
+from ..model.motor import Motor, MotorLaw
 from ..model.train import DriveTrain
 from .continuous import ContinuousController
 from .controller import Controller
-from .described import Described
 from .encoder import Encoder
 from .filters import core_filter
 from .law import Law
@@ -260,6 +259,10 @@ def own(control: Bound) -> Bound:
     return base, [(_core.Axis(axis), motor, position, speed, aim) for axis, motor, position, speed, aim in axes]
 
 
+TORQUE_SOURCE = ("kind", "torque_source")
+"""what a current loop makes of a motor whose torque it sets without a state of its own"""
+
+
 def driven(controller: Controller | ContinuousController) -> MotorLaw | None:
     """Motor as its current loop makes it; None if the motor stays unchanged.
 
@@ -270,13 +273,15 @@ def driven(controller: Controller | ContinuousController) -> MotorLaw | None:
         return None
     if isinstance(current, FirstOrderCurrent):
         changes = {
-            "motor.electrical_time_constant": current.time_constant,
-            "motor.armature_voltage_constant": 1.0,
-            "motor.rated_speed": 1.0,
-            "motor.command_limit": math.inf,
+            "kind": "dc",
+            "electrical_time_constant": current.time_constant,
+            "armature_voltage_constant": 1.0,
+            "rated_speed": 1.0,
+            "command_limit": math.inf,
+            "torque_limit": math.inf,
         }
-        return tuple(changes.items()), False
-    return (), True
+        return tuple(changes.items())
+    return TORQUE_SOURCE, ("torque_limit", math.inf)
 
 
 def motor_laws(controllers: Mapping[str, Controller | ContinuousController]) -> dict[str, MotorLaw | None]:
@@ -300,7 +305,7 @@ def check_torques(controllers: Mapping[str, Controller], torques: Mapping[str, f
     """
     for name, controller in controllers.items():
         kind = controller.current.kind
-        if torques.get(name, 0.0) != 0.0 and driven(controller) == ((), True):
+        if torques.get(name, 0.0) != 0.0 and TORQUE_SOURCE in (driven(controller) or ()):
             begins = "no current" if kind == "field_oriented" else "the torque that the controller asks for"
             raise InputError(
                 f'key {key.format(name)}: with current.kind = "{kind}" a run begins with {begins}; leave it out'

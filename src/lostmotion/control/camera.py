@@ -5,8 +5,8 @@ from typing import Annotated, Self
 from pydantic import model_validator
 
 from .. import _core
+from ..inputs.described import CameraFields, TrackerFields
 from ..inputs.quantities import NotNegative, Positive, Time
-from .described import CameraFields, TrackerFields
 
 
 class Camera(CameraFields):

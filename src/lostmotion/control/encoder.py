@@ -6,8 +6,8 @@ from pydantic import Field, model_validator
 
 from .. import _core
 from ..errors import InputError
+from ..inputs.described import EncoderFields
 from ..inputs.quantities import Whole
-from .described import EncoderFields
 
 RESOLUTION_KEYS = ("lines", "bits", "grating_period", "resolution")
 

@@ -5,11 +5,16 @@ from typing import Any, Self
 from pydantic import model_validator
 
 from ..errors import InputError
+from ..inputs.described import (
+    FrictionAdaptationLawFields,
+    InverseModelFields,
+    LoadObserverFields,
+    LossAdaptationLawFields,
+)
 from ..model.gear import Gear
 from ..model.losses import ConstantEfficiency, LossMap, MeshEfficiency, WormMesh, efficiency_map
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
-from .described import FrictionAdaptationLawFields, InverseModelFields, LoadObserverFields, LossAdaptationLawFields
 
 
 class LossAdaptationLaw(LossAdaptationLawFields):

@@ -4,9 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from ..inputs.part import Part
-from ..inputs.quantities import Positive, Time
-from .described import (
+from ..inputs.described import (
     CurrentLoopFields,
     DifferenceFields,
     FeedforwardFields,
@@ -15,6 +13,8 @@ from .described import (
     PositionLoopFields,
     SpeedLoopFields,
 )
+from ..inputs.part import Part
+from ..inputs.quantities import Positive, Time
 from .filters import Filter
 
 

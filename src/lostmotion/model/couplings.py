@@ -4,21 +4,26 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import model_validator
 
+from ..inputs.described import CommandedFields
 from ..inputs.part import Part
-from ..inputs.quantities import NotNegative, Positive, Time, Torque
+from ..inputs.quantities import NotNegative, Time
 from .signals import CommandSignal
 
 FULL_COMMAND = 1.0 + 1e-9
 """Greatest command of a brake or clutch: the full torque, up to the rounding of a sum of signals."""
 
 
-class Commanded(Part):
-    """Dry friction with a capacity that its command applies, with the delays of a data sheet."""
+class BetweenShafts(Part):
+    """What joins two shafts."""
 
-    torque: Annotated[Torque, Positive]
-    """capacity while it slips, at command 1; between 0 and 1 in proportion, below 0 it is open"""
-    breakaway_torque: Annotated[Torque, Positive] | None = None
-    """capacity at rest, at command 1; left out, the same"""
+    input: str
+    """shaft"""
+    output: str
+    """shaft"""
+
+
+class Commanded(CommandedFields):
+    """Dry friction with a capacity that its command applies, with the delays of a data sheet."""
 
     engagement_delay: Annotated[Time, NotNegative] = 0.0
     """from a step up of the command until it acts"""
@@ -65,12 +70,8 @@ class Brake(Commanded):
     shaft: str
     """shaft that the brake holds"""
 
-    def core_fields(self) -> dict[str, Any]:
-        """Fields for the core, in SI units."""
-        return {"torque": self.torque, "breakaway_torque": self.holding()}
 
-
-class Clutch(Commanded):
+class Clutch(Commanded, BetweenShafts):
     """Dry friction between two shafts.
 
     Examples
@@ -82,10 +83,6 @@ class Clutch(Commanded):
 
     kind: Literal["friction", "safety"] = "friction"
     """`friction`: engaged by its command; `safety`: always engaged, slips at its torque"""
-    input: str
-    """shaft"""
-    output: str
-    """shaft"""
 
     @model_validator(mode="after")
     def _only_commanded_clutches_have_delays(self) -> Self:
@@ -95,7 +92,7 @@ class Clutch(Commanded):
 
     def core_fields(self) -> dict[str, Any]:
         """Fields for the core, in SI units."""
-        return {"torque": self.torque, "breakaway_torque": self.holding(), "safety": self.kind == "safety"}
+        return super().core_fields() | {"safety": self.kind == "safety"}
 
 
 class Freewheel(Part):

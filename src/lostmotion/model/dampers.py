@@ -4,13 +4,12 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
-from .. import _core
-from ..inputs.part import Part
-from ..inputs.quantities import NotNegative, ViscousFriction
+from ..inputs.described import DamperFields
+from .couplings import BetweenShafts
 from .shaft import DragCurve, EddyCurrentDrag, QuadraticDrag
 
 
-class Damper(Part):
+class Damper(DamperFields, BetweenShafts):
     """A torque over the slip, the speed of the input less that of the output: it drives the output and brakes the
     input.
 
@@ -21,12 +20,6 @@ class Damper(Part):
     0.1
     """
 
-    input: str
-    """shaft"""
-    output: str
-    """shaft"""
-    viscous_friction: Annotated[ViscousFriction, NotNegative] = 0.0
-    """torque over the slip, in proportion"""
     drag: Annotated[DragCurve | QuadraticDrag | EddyCurrentDrag, Field(discriminator="kind")] | None = None
     """torque over the magnitude of the slip, in addition"""
 
@@ -38,5 +31,4 @@ class Damper(Part):
 
     def core_fields(self) -> dict[str, Any]:
         """Fields for the core, in SI units."""
-        drag = _core.TorsionCurve([], [0.0]) if self.drag is None else self.drag.core()
-        return {"viscous_friction": self.viscous_friction, "drag": drag}
+        return super().core_fields() | {"drag": self.drag and self.drag.core()}

@@ -11,8 +11,7 @@ from .gear import Gear
 from .gearbox import Gearbox
 from .load import Load
 from .losses import LossMap
-from .motor import Motor, ShaftMotor
-from .parameters import MotorLaw
+from .motor import Motor, MotorLaw, ShaftMotor
 from .shaft import Shaft
 from .torsion import Rigid
 from .train import DriveTrain

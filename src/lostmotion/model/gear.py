@@ -1,17 +1,18 @@
 """A gear of a drive train: a stage between two shafts."""
 
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
 from ..errors import InputError
 from .angle_torques import TransmissionError
+from .couplings import BetweenShafts
 from .gearbox import Gearbox, Transmission
 from .losses import ConstantEfficiency, LossMap, MeshEfficiency, WormMesh, efficiency_map
 from .torsion import LinearStiffness, Rigid, TorsionCurve
 
 
-class Gear(Transmission):
+class Gear(Transmission, BetweenShafts):
     """A stage between two shafts: a gearbox, a belt, a worm, or, with the ratio 1, a coupling.
 
     Examples
@@ -21,10 +22,6 @@ class Gear(Transmission):
     10.0
     """
 
-    input: str
-    """shaft"""
-    output: str
-    """shaft"""
     housing: str | None = None
     """shaft that carries the housing, or the ring of a planetary gear from its sun to its carrier: input speed - housing speed =
     ratio * (output speed - housing speed); left out, the frame"""
@@ -49,6 +46,11 @@ class Gear(Transmission):
                 if getattr(self, key) is None:
                     raise ValueError(f"lacks {key}, by which the loss map is scaled; add it")
         return self
+
+    def core_fields(self) -> dict[str, Any]:
+        """Fields for the core, in SI units, without those that are None."""
+        error = self.transmission_error
+        return super().core_fields() | self.losses.core_fields() | {"transmission_error": error and error.core()}
 
     def gearbox(self) -> Gearbox:
         """The same gear alone, as the test rig takes it: without transmission error, its losses as a map. One that

@@ -1,20 +1,18 @@
 """Gearboxes: parameters and ratings."""
 
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
 from pydantic import Field, field_validator, model_validator
 
+from ..inputs.described import TransmissionFields
 from ..inputs.part import Part
 from ..inputs.quantities import (
     Force,
-    Inertia,
-    NotNegative,
     Number,
     Positive,
     Speed,
     Time,
     Torque,
-    ViscousFriction,
 )
 from ..units.practical import practical
 from .losses import ConstantEfficiency, LossMap
@@ -42,26 +40,11 @@ class GearboxLimits(Part):
     """on the output bearing"""
 
 
-class Transmission(Part):
+class Transmission(TransmissionFields):
     """Base of gearboxes and gears of a drive train: ratio, inertia, compliance."""
 
-    ratio: Number
-    """i_C, input speed / output speed; below 0, the output turns against the input"""
-    inertia: Annotated[Inertia, NotNegative] = 0.0
-    """J_R, on the input shaft"""
-    viscous_friction: Annotated[ViscousFriction, NotNegative] = 0.0
-    """b_MR, on the input shaft"""
-    rated_input_speed: Annotated[Speed, Positive] | None = None
-    """n_1R"""
-    rated_output_torque: Annotated[Torque, Positive] | None = None
-    """T_2R"""
     stiffness: Annotated[TorsionCurve | LinearStiffness | Rigid, Field(discriminator="kind")]
     hysteresis: Hysteresis | None = None
-    mesh_damping: Annotated[ViscousFriction, NotNegative] = 0.0
-    """at the output, while the flanks touch; they part when it would pull"""
-    damping_limited: bool = False
-    """whether the torque of the mesh damping is at most that of the spring, so that no torque jumps where flanks meet; needs
-    backlash"""
     limits: GearboxLimits | None = None
     loss_range: tuple[Annotated[Number, Positive], Annotated[Number, Positive]] | None = None
     """range of estimated losses: the multiples between which those of such gearboxes lie. No run depends on it; the drive check says
@@ -108,6 +91,13 @@ class Transmission(Part):
         if self.damping_limited and not (self.mesh_damping > 0.0 and backlash):
             raise ValueError("has damping_limited, which needs mesh_damping and a stiffness with backlash; give both")
         return self
+
+    def core_fields(self) -> dict[str, Any]:
+        """Fields for the core, in SI units, without those that are None."""
+        return super().core_fields() | {
+            "stiffness": None if isinstance(self.stiffness, Rigid) else self.stiffness.core(),
+            "hysteresis.efficiency": None if self.hysteresis is None else self.hysteresis.efficiency,
+        }
 
 
 class Gearbox(Transmission):

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
@@ -27,6 +27,10 @@ class ConstantEfficiency(Part):
 
     kind: Literal["constant_efficiency"] = "constant_efficiency"
     efficiency: Annotated[Number, Limit(gt=0.0, le=1.0)]
+
+    def core_fields(self) -> dict[str, Any]:
+        """Fields for the core of a gear with these losses."""
+        return {"losses.efficiency": self.efficiency}
 
 
 class LossMap(Part):
@@ -97,6 +101,10 @@ class LossMap(Part):
         speeds, loads, values = self.whole()
         return _core.LossMap(speeds, loads, [x for row in values for x in row])
 
+    def core_fields(self) -> dict[str, Any]:
+        """Fields for the core of a gear with these losses."""
+        return {"losses": "loss_map", "loss_map": self.core()}
+
 
 def efficiency_map(eta_f: float, eta_b: float) -> LossMap:
     """An efficiency for each direction of power flow as a loss map: the same losses at all loads and speeds."""
@@ -105,7 +113,19 @@ def efficiency_map(eta_f: float, eta_b: float) -> LossMap:
     return LossMap(speeds=(0.0, 1.0), loads=(-1.0, 0.0, 1.0), values=values)
 
 
-class MeshEfficiency(Part):
+class TwoEfficiencies(Part):
+    """Losses with an efficiency for each direction of power flow."""
+
+    def efficiencies(self) -> tuple[float, float]:
+        """(eta_f, eta_b)."""
+        raise NotImplementedError
+
+    def core_fields(self) -> dict[str, Any]:
+        """Fields for the core of a gear with these losses."""
+        return {"efficiencies": dict(zip(("driving", "overrunning"), self.efficiencies(), strict=True))}
+
+
+class MeshEfficiency(TwoEfficiencies):
     """An efficiency for each direction of power flow, as printed for worm gears. Only in drive trains."""
 
     kind: Literal["mesh_efficiency"] = "mesh_efficiency"
@@ -119,7 +139,7 @@ class MeshEfficiency(Part):
         return self.drive_efficiency, self.backdrive_efficiency
 
 
-class WormMesh(Part):
+class WormMesh(TwoEfficiencies):
     """A worm and its wheel with friction: eta_f = tan g/tan(g + r), eta_b = tan(g - r)/tan g. Only in drive trains.
 
     The lead angle g is given, or follows from module, number of starts and reference diameter of the worm; the friction

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import model_validator
 
 from ..errors import InputError
 from ..inputs.arguments import checked
+from ..inputs.described import MotorFields, ShaftMotorFields
 from ..inputs.part import Part
 from ..inputs.quantities import (
     Current,
-    Inertia,
-    Limit,
-    NotNegative,
-    Number,
     Positive,
     Resistance,
     Speed,
@@ -29,6 +26,9 @@ from ..inputs.quantities import (
 from ..reproducible import total
 from ..units.practical import practical
 from .synchronous_motor import PhaseValues, Winding
+
+MotorLaw = tuple[tuple[str, Any], ...]
+"""fields of a motor that a current loop replaces"""
 
 
 class MotorLimits(Part):
@@ -93,7 +93,7 @@ POINT_KEYS = ("rated_speed", "armature_voltage_constant")
 SAID_BY_WINDING = ("resistance", "torque_constant", "max_current")
 
 
-class Motor(Part):
+class Motor(MotorFields):
     """DC motor with servo amplifier (eq. 2), synchronous motor with ideal field orientation, or a torque source in
     its place.
 
@@ -108,21 +108,9 @@ class Motor(Part):
     kind: Literal["dc", "torque_source", "synchronous"] = "dc"
     """`torque_source`: the command times `rated_torque` acts on the rotor without delay; `synchronous`: command 1 is the largest
     voltage that the amplifier can give, dc_voltage/sqrt(3), amplitude of a phase"""
-    rotor_inertia: Annotated[Inertia, NotNegative]
-    """J_M"""
-    friction_torque: Annotated[Torque, NotNegative] = 0.0
-    """T_10, dry friction of the bearings"""
-    rated_torque: Annotated[Torque, Positive] = 1.0
-    """M_DR"""
-    rated_speed: Annotated[Speed, Positive] | None = None
-    """omega_DR"""
     rated_voltage: Annotated[Voltage, Positive] | None = None
     """u_ZR, that of command 1. A change over a record or a base, by `--set` or in a study is the same motor at another voltage: rated_speed and
     armature_voltage_constant follow so that stall torque and no-load speed go with the voltage, unless they are given too"""
-    electrical_time_constant: Annotated[Time, NotNegative] | None = None
-    """tau_a; 0: the torque follows voltage and speed at once, which is the default with stall_torque and no_load_speed"""
-    armature_voltage_constant: Annotated[Number, Limit(gt=1.0)] | None = None
-    """k_N, stall torque / rated torque at rated voltage"""
     stall_torque: Annotated[Torque, Positive] | None = None
     """at rated voltage, with no_load_speed in place of rated_speed and armature_voltage_constant; what the shaft gives, if the currents
     are stated"""
@@ -284,6 +272,10 @@ class Motor(Part):
             }
         )
 
+    def core_fields(self) -> dict[str, Any]:
+        """Fields for the core of a motor that is not synchronous, in SI units, without those that are None."""
+        return super().core_fields() | {"kind": self.kind, "command_limit": self.command_limit}
+
     def copper_loss(self) -> tuple[float, float] | None:
         """Heat of the winding to a torque squared [W/(N·m)²], and the temperature [°C] that it holds at; None if it is not known."""
         if self.winding is not None:
@@ -365,7 +357,7 @@ class Motor(Part):
         )
 
 
-class ShaftMotor(Motor):
+class ShaftMotor(ShaftMotorFields, Motor):
     """A motor on a shaft of a drive train.
 
     Examples
@@ -378,8 +370,6 @@ class ShaftMotor(Motor):
 
     shaft: str
     """shaft that the motor turns"""
-    torque_limit: Annotated[Torque, Positive] | None = None
-    """largest torque of a torque source"""
 
     @property
     def largest_torque(self) -> float:

@@ -17,7 +17,7 @@ from ..inputs.validation import did_you_mean
 from .gear import Gear
 from .gearbox import Gearbox
 from .torsion import Rigid
-from .train import DriveTrain, add_gear
+from .train import DriveTrain
 
 if TYPE_CHECKING:
     import numpy as np
@@ -164,7 +164,7 @@ def overrunning(
     """
     part = gear if isinstance(gear, Gear) else Gear.of(gear, input="input", output="output")
     core = _core.Train()
-    add_gear(core, "gear", part)
+    core.add_gear("gear", part.input, part.output, part.core_fields())
     return _overrunning(core, 0, part, load_torque, input_speed)
 
 

@@ -7,15 +7,14 @@ from pydantic import Field, model_validator
 
 from .. import _core
 from ..inputs.breakpoints import check_apart
+from ..inputs.described import ShaftFields
 from ..inputs.part import Part
 from ..inputs.quantities import (
-    Inertia,
     NotNegative,
     Positive,
     QuadraticFriction,
     Speed,
     Torque,
-    ViscousFriction,
 )
 
 SHARE = 1e-3  # of the largest value, by which straight lines depart from a smooth law if no error is given
@@ -145,7 +144,7 @@ def _departure(a: float, b: float) -> float:
     return max(abs(f[k] - (f[0] + (f[-1] - f[0]) * k / 32.0)) for k in range(33))
 
 
-class Shaft(Part):
+class Shaft(ShaftFields):
     """A shaft of a drive train. Rotors of motors and inertias of gears on it are added to it.
 
     Examples
@@ -157,8 +156,6 @@ class Shaft(Part):
 
     domain: Literal["rotation", "translation"] = "rotation"
     """translation: a slide, which scenarios have in the table `slides`; its numbers are in kg, m and N"""
-    inertia: Annotated[Inertia, NotNegative] = 0.0
-    viscous_friction: Annotated[ViscousFriction, NotNegative] = 0.0
     friction_torque: Annotated[Torque, NotNegative] = 0.0
     """T_C, dry friction while it slips"""
     breakaway_torque: Annotated[Torque, NotNegative] | None = None

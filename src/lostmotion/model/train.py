@@ -1,6 +1,5 @@
 """A drive train: shafts joined by gears, clutches and dampers, turned by motors, held by brakes, as frozen objects in SI units."""
 
-import math
 import re
 from collections.abc import Collection, Iterator, Mapping
 from typing import Annotated, Self, TypeVar
@@ -16,12 +15,9 @@ from .angle_torques import AngleTorque, Gravity
 from .couplings import Brake, Clutch, Freewheel
 from .dampers import Damper
 from .gear import Gear
-from .losses import LossMap, MeshEfficiency, WormMesh
-from .motor import ShaftMotor
-from .parameters import MotorLaw, numbers
+from .motor import MotorLaw, ShaftMotor
 from .shaft import Shaft
 from .springs import Spring
-from .torsion import Rigid
 
 V = TypeVar("V")
 
@@ -205,11 +201,11 @@ class DriveTrain(TrainElements):
                 train.set_domain(name, s.domain)
         for name, m in self.motors.items():
             law = driven.get(name)
-            limit = m.torque_limit if m.torque_limit is not None and law is None else math.inf
-            changes, torque_source = law or ((), m.kind == "torque_source")
-            train.add_motor(name, m.shaft, numbers(m.as_dc(), "motor") | dict(changes), torque_source, limit)
+            train.add_motor(name, m.shaft, m.as_dc().core_fields() | dict(() if law is None else law))
         for name, g in self.gears.items():
-            add_gear(train, name, g)
+            train.add_gear(name, g.input, g.output, g.core_fields())
+            if g.housing is not None:
+                train.set_housing(name, g.housing)
         for table in COUPLINGS:
             for name, coupling in getattr(self, table).items():
                 train.add_coupling(table, name, coupling.input, coupling.output, coupling.core_fields())
@@ -217,21 +213,3 @@ class DriveTrain(TrainElements):
             for name, element in getattr(self, table).items():
                 train.add(kind, name, element.shaft, element.core_fields())
         return train
-
-
-def add_gear(train: _core.Train, name: str, gear: Gear) -> None:
-    """Adds a gear to the solver's train."""
-    stiffness, losses, error = gear.stiffness, gear.losses, gear.transmission_error
-    train.add_gear(
-        name,
-        gear.input,
-        gear.output,
-        numbers(gear, "gearbox"),
-        torsion_curve=None if isinstance(stiffness, Rigid) else stiffness.core(),
-        loss_map=losses.core() if isinstance(losses, LossMap) else None,
-        efficiencies=losses.efficiencies() if isinstance(losses, MeshEfficiency | WormMesh) else None,
-        damping_limited=gear.damping_limited,
-        transmission_error=None if error is None else error.core(),
-    )
-    if gear.housing is not None:
-        train.set_housing(name, gear.housing)

@@ -23,7 +23,7 @@ from ..inputs.quantities import Angle, Force, Length, LinearSpeed, NotNegative, 
 from ..inputs.validation import did_you_mean, shown
 from ..model.linear import Slide
 from ..model.linear_train import LinearElements
-from ..model.parameters import MotorLaw
+from ..model.motor import MotorLaw
 from ..model.shaft import Shaft
 from ..model.signals import CommandSignal, ForceSignal, Signal, SpeedSignal, TorqueSignal
 from ..model.torsion import Rigid

@@ -1,6 +1,6 @@
-"""The parameters of controllers as the core describes them: keys, units, ranges, defaults and meanings of each part.
+"""The parameters of parts as the core describes them: keys, units, ranges, defaults and meanings.
 
-What a part adds to them in `loops.py` and its neighbours is what the core does not see: tables within, and what must fit together.
+What a part in `model` and `control` adds to them is what the core does not see: tables within, and what must fit together.
 The names for type checkers are in `described.pyi`, which ``make stub`` writes.
 """
 
@@ -9,9 +9,9 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field, create_model
 
 from .. import _core
-from ..inputs.part import Part
-from ..inputs.quantities import Limit, Switch, Whole
 from ..units.conversion import Unit
+from .part import Part
+from .quantities import Limit, Switch, Whole
 
 
 class Described(Part):
@@ -22,7 +22,8 @@ class Described(Part):
 
     def core_fields(self) -> dict[str, Any]:
         """Fields for the core, in SI units, without those that are None."""
-        return {key: getattr(self, key) for key in self.described}
+        keys = (key for base in reversed(type(self).__mro__) for key in vars(base).get("described", ()))
+        return {key: getattr(self, key) for key in keys}
 
 
 def _type(kind: str, unit: str, limits: tuple[float | None, float | None, float | None]) -> Any:
@@ -51,17 +52,24 @@ def _part(name: str, rows: list[tuple[Any, ...]]) -> type[Described]:
     return part
 
 
-globals().update({f"{name}Fields": _part(name, rows) for name, rows in _core.control_tables().items()})
+def tables() -> dict[str, list[tuple[Any, ...]]]:
+    """Rows of the parameters of each part: key, kind, symbol, unit, meaning, range, whether it is needed, default."""
+    return _core.described_tables(of_controllers=False) | _core.described_tables(of_controllers=True)
+
+
+globals().update({f"{name}Fields": _part(name, rows) for name, rows in tables().items()})
 
 
 def stub() -> str:
     """The text of `described.pyi`."""
     types = {"number": "float", "pair": "tuple[float, float]", "integer": "int", "flag": "bool"}
-    lines = ["from typing import Any, ClassVar", "", "from ..inputs.part import Part", "", "class Described(Part):"]
+    lines = ["from typing import Any, ClassVar", "", "from .part import Part", "", "class Described(Part):"]
     lines += ["    described: ClassVar[tuple[str, ...]]", "    def core_fields(self) -> dict[str, Any]: ..."]
-    for name, rows in _core.control_tables().items():
+    for name, rows in tables().items():
         lines += ["", f"class {name}Fields(Described):"]
         for key, kind, _, _, _, _, needed, default in rows:
             optional = " | None" if default is None and not needed else ""
             lines.append(f"    {key}: {types[kind]}{optional}{'' if needed else ' = ...'}")
-    return "\n".join([*lines, "", "def stub() -> str: ...", ""])
+    return "\n".join(
+        [*lines, "", "def tables() -> dict[str, list[tuple[Any, ...]]]: ...", "def stub() -> str: ...", ""]
+    )
