@@ -89,7 +89,7 @@ def test_a_file_in_the_long_form_gives_the_train_in_si(file: Path) -> None:
         ("gears.wrm.ratio=3", "keys gears.wrm.input, gears.wrm.output: are missing; add them"),
         (
             "gears.belt.ratio=0",
-            "key gears.belt: has the ratio 0; give input speed / output speed, below 0 for a gear that reverses",
+            "key gears.belt.ratio: 0 is no ratio; give input speed / output speed, below 0 for a gear that reverses",
         ),
         (
             "shafts.table.inertia=2 kg",
