@@ -36,7 +36,7 @@ def in_python(_time, measured, reference, state):
 
 
 def axis() -> lm.Scenario:
-    """The shipped axis with a law in the place of its loops."""
+    """The shipped axis with a law in place of its loops."""
     shipped = lm.load("position-axis")
     controller = shipped.controller.model_dump(exclude_none=True)
     for loop in ("position", "speed", "feedforward"):

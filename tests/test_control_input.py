@@ -57,7 +57,7 @@ BROKEN = [
     ("speed gain of the wrong unit", '"8.29e-3 N*m*s/rad"', '"8.29e-3 N*m/rad"', ["controller.speed.gain"]),
     ("speed gain of zero", '"8.29e-3 N*m*s/rad"', "0", ["controller.speed.gain"]),
     ("integral gain of the wrong sign", '"0.1266 N*m/rad"', "-0.1", ["controller.speed.integral_gain"]),
-    ("gain that is no number", '"10 1/s"', "nan", ["controller.position.gain"]),
+    ("gain that is not a number", '"10 1/s"', "nan", ["controller.position.gain"]),
     ("encoder without resolution", ENCODER, "encoder = {}", ["controller.encoder", "resolution", "lines"]),
     ("no encoder", ENCODER, "", ["controller", "encoder", "lines"]),
     ("encoder twice", "lines = 2048", "lines = 2048, resolution = 1e-4", ["controller.encoder", "resolution"]),

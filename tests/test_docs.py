@@ -285,48 +285,6 @@ def test_the_readme_has_no_time_of_its_own(quotes: Any) -> None:
     assert set(re.findall(r"[\w.]+ (?:[nuµm]?s|(?:milli|micro)?seconds?)\b", text)) <= {"2 s", "1 s", "0.3 s"}
 
 
-# Phrases of our own, and what is written in their place.
-PLAIN_WORDS = {
-    r"go(es)? on where": "resume",
-    r"hand-?over": "export",
-    r"what matters": "selected results",
-    r"rises? without end": "thermal runaway",
-    r"the other way backward": "in reverse",
-    r"truth value": "Boolean",
-    r"\ba look tests|between two looks": "each check covers",
-    r"\bsoft (mesh|zone)": "mesh compliance, low stiffness",
-    r"\bone's own": "your own",
-    r"nothing beside": "self-contained",
-    r"in plain words": "",
-    r"\b[Mm]akers?\b": "manufacturer",
-    r"\b[Rr]eckon": "compute",
-    r"\bcannot be told\b": "cannot be determined",
-    r"\bvirgin": "initial loading",
-    r"\bknots?\b": "breakpoint",
-    r"\bheld[ _]torque": "locked torque",
-    r"\b(stands?|standing) still": "at rest",
-    r"\b(own|printed|missing) figures?\b|\bfigures? of (a|the|your) (data )?sheet": "datum, data, value",
-}
-
-
-@pytest.mark.parametrize("wrong", PLAIN_WORDS)
-def test_the_prose_uses_the_words_of_the_field(wrong: str) -> None:
-    package = ROOT / "src" / "lostmotion"
-    files = [
-        *ROOT.glob("*.md"),
-        *(ROOT / "docs").glob("*.md"),
-        *package.rglob("*.py"),
-        *package.rglob("*.jinja"),
-        *package.rglob("*.toml"),
-    ]
-    former = r"""[`"](maker|virgin_\.\.\.|held_torque)[`"]"""  # names that were, in the change log and where they are still read
-    for path in files:
-        if path.name in ("theory.md", "verification.md"):
-            continue
-        for line in re.sub(former, "", path.read_text()).splitlines():
-            assert not re.search(wrong, line), f"{path.name}: {line.strip()} ({PLAIN_WORDS[wrong]})"
-
-
 THEORY = (ROOT / "docs" / "theory.md").read_text()
 ROWS = [
     line.strip("| ").split(" | ") for line in THEORY.splitlines() if re.match(r"\| .*`\w+\.(hpp|py)`|\| .*`\w+/", line)

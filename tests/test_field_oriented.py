@@ -506,7 +506,7 @@ def test_currents_that_are_sampled_too_seldom_are_told() -> None:
 
 
 def motulator_run(ticks: int) -> tuple[np.ndarray, np.ndarray]:
-    """The two-mass example of motulator under its own current vector control and speed control, integrated at 1e-12 in the place of its 1e-3.
+    """The two-mass example of motulator under its own current vector control and speed control, integrated at 1e-12 in place of its 1e-3.
 
     Returns the states at the ticks (i_d, i_q, motor speed, load speed, twist), and the voltages [V] in coordinates of the stator
     that act from there on.

@@ -1,4 +1,4 @@
-"""Identification: a servo whose values are known is found again; what the logs cannot tell is said."""
+"""Identification: a servo whose values are known is found again; unidentifiable parameters are reported."""
 
 from __future__ import annotations
 

@@ -85,7 +85,7 @@ def test_what_is_in_doubt_is_said(logs: Path) -> None:
     for line in (
         "# Sample time: 10 to 20 ms; logs last 1.98 to 1.99 s.",
         "# Header: share is 1, 0.5 (in 2 of 3 logs)",
-        "is no number; it is left out",
+        "is not a number; it is left out",
         "# Doubt: c.txt: its commas are read as decimal commas",
         "# Doubt: channel carriage speed has the units 'rad/s', '' in different logs",
         "# Doubt: channel force is in 2 of 3 logs; the others cannot be used",

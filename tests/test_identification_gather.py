@@ -87,11 +87,11 @@ UNUSABLE: dict[str, tuple[dict[str, Any] | str, str]] = {
     "a number of 5000 digits": ('{"entries": [{"timestamp": ' + "9" * 5000 + "}]}", "is not JSON"),
     "a time as text": (
         changed(lambda log: log["entries"][5].update(timestamp="0.05")),
-        "entries[5].timestamp: '0.05' is no number; put one there, or null",
+        "entries[5].timestamp: '0.05' is not a number; put one there, or null",
     ),
     "a word at the first place": (
         changed(lambda log: log["entries"][0].update(position="x")),
-        "entries[0].position: 'x' is no number",
+        "entries[0].position: 'x' is not a number",
     ),
     "no time": (without("timestamp"), "entries[0] lacks timestamp; add it to each entry, or the interval dt"),
     "a step of time below 0": (without("timestamp", dt=-0.01), "entries[0] lacks timestamp; add it"),
@@ -104,7 +104,7 @@ UNUSABLE: dict[str, tuple[dict[str, Any] | str, str]] = {
     "a mass below 0": (servo_log(mass=-1.0), "key gravity.pendulum.mass: -0.95 must be greater than 0"),
     "no length": (servo_log(length=0), "key gravity.pendulum.radius: 0.0 must be greater than 0"),
     "no gain": (servo_log(kp=0), "key controllers.servo.position: has no gain; give gain"),
-    "a gain that is no number": (servo_log(kp=float("nan")), "has the value nan, which is no finite number"),
+    "a gain that is not a number": (servo_log(kp=float("nan")), "has the value nan, which is no finite number"),
     "a channel of the phases missing": (
         without("torque_enable"),
         "'torque_enable' in 'torque_enable == 0' has no value",
@@ -138,11 +138,11 @@ NOTED: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "a value beyond all": (
         changed(lambda log: log["entries"][5].update(position=1e300)),
-        "dropped 1 samples in which position is no number",
+        "dropped 1 samples in which position is not a number",
     ),
     "a switch of nothing": (
         changed(lambda log: log["entries"][7].update(torque_enable=None)),
-        "dropped 1 samples in which torque_enable is no number",
+        "dropped 1 samples in which torque_enable is not a number",
     ),
     "times in ms": (each(timestamp=lambda k: 10.0 * k), "its samples are 10 s apart; times are read in s"),
     "a header with a parameter's name": (servo_log(resistance=99.0), "resistance is known of the log, and a parameter"),

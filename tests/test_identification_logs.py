@@ -422,7 +422,7 @@ def test_a_comma_that_the_task_declares_needs_no_doubt(tmp_path: Path) -> None:
     path.write_text("time;x\n0;1,500\n1;2,250\n")
     log = read_log(path, decimal=",")
     assert log.values("x").tolist() == [1.5, 2.25] and log.notes == ()
-    with pytest.raises(lm.InputError, match="line 2: '1,500' in column x is no number; write all numbers"):
+    with pytest.raises(lm.InputError, match="line 2: '1,500' in column x is not a number; write all numbers"):
         read_log(path, decimal=".")
     path.write_text("time;x\n0;1,500\n1;0,5\n")  # no number has a nought before thousands
     assert read_log(path).values("x").tolist() == [1.5, 0.5]
@@ -528,7 +528,7 @@ SCREENED: dict[str, tuple[Log, str]] = {
         "dropped 1 samples with the time stamp of the sample before",
     ),
     "time goes back": (log_of(changed(TIME, 50, 0.2)), "dropped 1 samples whose time goes back"),
-    "time is no number": (log_of(changed(TIME, 50, np.nan)), "dropped 1 samples without a time"),
+    "time is not a number": (log_of(changed(TIME, 50, np.nan)), "dropped 1 samples without a time"),
     "coarse clock": (
         log_of(np.floor(TIME / 0.04 + 1e-9) * 0.04),
         "the clock moves in steps of 0.04 s with 4.0 samples each",
@@ -536,7 +536,7 @@ SCREENED: dict[str, tuple[Log, str]] = {
     "pause": (log_of(np.where(TIME > 1.0, TIME + 0.5, TIME)), "1 pauses in the samples, the longest of 0.51 s"),
     "values missing": (
         log_of(position=changed(ANGLE, slice(20, 25), np.nan)),
-        "dropped 5 samples in which position is no number",
+        "dropped 5 samples in which position is not a number",
     ),
     "stall": (
         log_of(
@@ -607,16 +607,16 @@ FILES: dict[str, tuple[str, bytes | str, str]] = {
     "text for a number": (
         "e.json",
         '{"entries": [{"timestamp": 0, "x": 1}, {"timestamp": 1, "x": "fast"}]}',
-        "is no number",
+        "is not a number",
     ),
     "cut line": ("g.csv", "time,x\n0,1\n1\n", "line 3: has 1 values for 2 columns"),
-    "word in a column": ("h.csv", "time,x\n0,1\n1,fast\n", "'fast' in column x is no number"),
+    "word in a column": ("h.csv", "time,x\n0,1\n1,fast\n", "'fast' in column x is not a number"),
     "column twice": ("i.csv", "time,x,x\n0,1,1\n1,2,2\n", "twice"),
     "unit of the time": ("j.csv", "time [fortnight],x\n0,1\n1,2\n", "the unit 'fortnight' of the time"),
     "decimal commas and points": (
         "o.csv",
         "time;x\n0,1;1\n1.2;2\n",
-        "line 3: '1.2' in column time is no number; write all numbers with decimal points",
+        "line 3: '1.2' in column time is not a number; write all numbers with decimal points",
     ),
     "commas between columns and before decimals": (
         "q.csv",
@@ -638,9 +638,9 @@ FILES: dict[str, tuple[str, bytes | str, str]] = {
     "time stamps in a column that is not the time": (
         "v.csv",
         "x,when\n1,2024-05-01T12:00:00Z\n2,2024-05-01T12:00:01Z\n",
-        "in column when is no number; if it is the time, name the column with logs.time",
+        "in column when is not a number; if it is the time, name the column with logs.time",
     ),
-    "no such date": ("w.csv", "time,x\n2024-02-30T12:00:00Z,1\n2024-05-01T12:00:01Z,2\n", "line 2: .* is no number"),
+    "no such date": ("w.csv", "time,x\n2024-02-30T12:00:00Z,1\n2024-05-01T12:00:01Z,2\n", "line 2: .* is not a number"),
     "too long a cell": ("p.csv", "time,x\n0,1\n1," + "1" * 200_000, r"line 3: cannot be read \(field larger"),
     "not text": ("k.csv", b"\xff\xfe\x00\x01", "is not UTF-8"),
     "not MATLAB": ("l.mat", b"something else", "is not a MATLAB file"),

@@ -1,4 +1,4 @@
-"""What the logs cannot tell follows from the null direction, and what would tell it from the channels that are missing."""
+"""Unidentifiable parameters follow from the null directions, and their remedies from the missing channels."""
 
 from __future__ import annotations
 

@@ -379,7 +379,7 @@ def test_linear_scale_reads_its_grating_in_steps():
         ({"axis.screw.leed": 1.0}, "axis.screw.leed"),
         ({"axis.slide.mass": "3 N"}, "axis.slide.mass"),
         ({"axis.sled": {}}, "axis.sled"),
-        ({"load": {}}, "does not stand beside [axis]"),
+        ({"load": {}}, "is not allowed beside [axis]"),
         ({"command": 1.0}, "both turn the motor"),
     ],
 )

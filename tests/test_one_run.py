@@ -1,4 +1,4 @@
-"""One run from Python: what a scenario keeps for its next run, arrays in the place of a dataset, the ledger when it is asked for."""
+"""One run from Python: what a scenario keeps for its next run, arrays in place of a dataset, the ledger when it is asked for."""
 
 import copy
 import gc

@@ -1,4 +1,4 @@
-"""The pointing sheet: closed forms of what an axis misses, and how causes are taken away."""
+"""The pointing report: closed forms of pointing errors, and the removal of causes."""
 
 from __future__ import annotations
 

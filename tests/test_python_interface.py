@@ -23,7 +23,7 @@ from public_names import FLAT, NAMESPACES, PATHS, public
 SMALL = lm.load("paper-2dof-nl-small")
 
 
-# --- scenarios in the place of drives ---
+# --- scenarios in place of drives ---
 
 
 def test_every_function_that_needs_a_drive_takes_a_scenario() -> None:

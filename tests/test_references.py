@@ -393,7 +393,7 @@ BAD = [
     ({"moves": [{"to": 1, "dwell": -1}]}, "key moves[0].dwell: -1.0 must be at least 0"),
     ({"moves": [{"to": 1, "jerk": 0}]}, "key moves[0].jerk: 0.0 must be greater than 0"),
     ({"begin": -1}, "key begin: -1.0 must be at least 0"),
-    ({"mean": 1.0}, "has mean = 1 and moves between positions; give start in the place of mean"),
+    ({"mean": 1.0}, "has mean = 1 and moves between positions; give start in place of mean"),
     ({"steps": [{"height": 1}]}, "has steps, jumps of position that exceed every limit of speed; give moves"),
     ({"moves": [], "steps": [{"height": 1}]}, "has steps, jumps of position that exceed every limit of speed; give moves"),
     ({"moves": [{"to": 1e308}, {"to": -1e308}]}, "has moves[1] from "),

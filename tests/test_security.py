@@ -665,7 +665,7 @@ WORKBOOKS: dict[str, tuple[str, bytes, str]] = {
     "an error": (
         "xl/worksheets/sheet1.xml",
         SHEET % row(2, b'<c r="A2"><v>1</v></c><c r="B2" t="e"><f>1/0</f><v>#DIV/0!</v></c>'),
-        "row 2: '#DIV/0!' in column x is no number",
+        "row 2: '#DIV/0!' in column x is not a number",
     ),
 }
 

@@ -1,4 +1,4 @@
-"""The servo sheet of an axis under field-oriented control: closed forms at rest, and small sines through the whole core at speed."""
+"""The servo report of an axis under field-oriented control: closed forms at rest, and small sines through the whole core at speed."""
 
 import math
 from typing import Any

@@ -714,7 +714,7 @@ peak = "peak(load_speed)"
         ('peak = "peak', 'run = "peak', "a name that is taken"),
         ("[keep]", "[kept]", "kept"),
         ("values = [1, 2]", "values = [1, 2]\nvalue = 3", "not known"),
-        ("values = [1, 2]", "values = [true]", "load.inertia: true is no number$"),
+        ("values = [1, 2]", "values = [true]", "load.inertia: true is not a number$"),
         ("values = [1, 2]", "grid = [1, 2, 2.5]", r"key vary\[0\]\.grid\[2\]: 2.5 must be a whole number$"),
         ("values = [1, 2]", "values = [1, inf]", r"key vary\[0\]\.values\[1\]: inf must be a finite number"),
         ("values = [1, 2]", "grid = [1, 2, 1000000000]", "grid needs 1 to 1000000 values, not 1000000000"),

@@ -226,7 +226,7 @@ HARMFUL = [
     "bandwidth(load_speed)",
     "bandwidth(0.1, 0.2)",
     "tracking_error(load_speed)",
-    # what is no number, name or operator of the grammar
+    # what is not a number, name or operator of the grammar
     "'f'",
     "b'f'",
     "True",

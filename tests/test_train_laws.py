@@ -274,7 +274,7 @@ def test_a_command_that_delays_cannot_shift_is_refused(command: Any, delays: dic
     ],
 )
 def test_a_brake_is_commanded_up_to_its_full_torque(command: Any, reached: str) -> None:
-    """Such as a torque of 8 N·m in the place of a share."""
+    """Such as a torque of 8 N·m in place of a share."""
     with pytest.raises(lm.InputError) as refused:
         braked(command)
     message = f"key command.b: may reach {reached}; it is a share, and 1 is the full torque, 4 N*m"

@@ -7,7 +7,7 @@ from unicodedata import category
 
 
 def visible(text: str, kept: str = "") -> str:
-    """A text with escapes in the place of what a terminal would obey or not show.
+    """A text with escapes in place of what a terminal would obey or not show.
 
     Parameters
     ----------

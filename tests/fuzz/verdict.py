@@ -54,7 +54,7 @@ def refused(make: Callable[[], R], names: Iterable[str] = (), *others: type[Exce
 
 
 class Alarm(BaseException):
-    """Interrupts a run in the place of Ctrl-C."""
+    """Interrupts a run in place of Ctrl-C."""
 
 
 def ends(make: Callable[[], R], seconds: float) -> R | None:

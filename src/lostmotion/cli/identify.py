@@ -51,7 +51,7 @@ def identify(
     ] = False,
     figures: FiguresOption = None,
 ) -> None:
-    """Identify a drive from measured logs: values with intervals, and what the logs cannot tell.
+    """Identify a drive from measured logs: values with intervals, and unidentifiable parameters.
 
     Writes identified.toml (the rig with the values that were found, a scenario), identified.html (one page), errors.csv (of each
     log), parameters.csv and, with the key record, gearbox.toml (a data sheet). What was dropped of logs is listed. An interrupted command

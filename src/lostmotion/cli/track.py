@@ -41,7 +41,7 @@ def track(
     overrides: Overrides = None,
     figures: FiguresOption = None,
 ) -> None:
-    """Pointing sheet: how far axes miss the direction that they follow, and what each cause contributes.
+    """Pointing report: how far axes miss the direction that they follow, and what each cause contributes.
 
     Writes track.html (one page) and its data as CSV: errors over time, over the speed of the target, and with wrong losses, at other temperatures, with wear;
     what each cause contributes.

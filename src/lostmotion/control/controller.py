@@ -64,7 +64,7 @@ class Controller(Part):
     current: AnyCurrent = IdealCurrent()
     feedforward: Feedforward = Feedforward()
     inverse_model: InverseModel | None = None
-    """feedforward by the model of the drive, with adaptation; in the place of `feedforward`"""
+    """feedforward by the model of the drive, with adaptation; in place of `feedforward`"""
     camera: Camera | None = None
     """on the shaft of the reference: the loops then know of the target what it shows"""
     tracker: Tracker | None = None

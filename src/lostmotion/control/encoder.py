@@ -67,7 +67,7 @@ class Encoder(EncoderFields):
                         f"{key}: counts a turn, and this encoder is on a slide; give grating_period, or resolution"
                     )
             if self.error > 0.0 and self.grating_period is None:
-                raise InputError("error: has no period; give grating_period in the place of resolution")
+                raise InputError("error: has no period; give grating_period in place of resolution")
 
     @property
     def step(self) -> float:

@@ -192,7 +192,7 @@ class PositionReference(Reference[Angle]):
                 raise ValueError(f"has {given[0]} but no moves; add moves = [{{ to = 1.0 }}], or leave it out")
             return
         if self.mean != 0.0:
-            raise ValueError(f"has mean = {self.mean:g} and moves between positions; give start in the place of mean")
+            raise ValueError(f"has mean = {self.mean:g} and moves between positions; give start in place of mean")
         for k, move in enumerate(self.moves):
             lacking = [key for key in ("speed", "acceleration") if self._of(move, key) is None]
             if lacking:

@@ -320,7 +320,7 @@ def at_voltage(table: Mapping[str, Any], voltage: Any, given: Collection[str], w
 
 
 def use_records(data: dict[str, Any]) -> None:
-    """Puts the values of a record in the place of `from`; the other keys of the table go before them."""
+    """Puts the values of a record in place of `from`; the other keys of the table go before them."""
     for table in ("gearbox", "motor"):
         changes = data.get(table)
         if isinstance(changes, str):

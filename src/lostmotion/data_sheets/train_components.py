@@ -30,7 +30,7 @@ CONDITIONS: dict[str, type[Part]] = {"gears": Conditions, "screws": ScrewConditi
 
 
 def use_train_records(data: dict[str, Any]) -> None:
-    """Puts the values of a record in the place of the key that names it, such as `gears.NAME.gearbox` and `screws.NAME.from`.
+    """Puts the values of a record in place of the key that names it, such as `gears.NAME.gearbox` and `screws.NAME.from`.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Identification: from measured logs to the values of a drive, their intervals, and what the logs cannot tell."""
+"""Identification: from measured logs to the values of a drive, their intervals, and unidentifiable parameters."""
 
 from ..namespace import namespace
 

@@ -135,7 +135,9 @@ def _check(scenario: TrainScenario) -> None:
     """Whether its torques are those of the formula above."""
     for table in ("clutches", "freewheels", "brakes"):
         if names := list(getattr(scenario, table)):
-            raise InputError(f"{table}.{names[0]} holds or lets go as it likes")
+            raise InputError(
+                f"{table}.{names[0]} has a torque that depends on the contact state; this is not supported"
+            )
     train = scenario.train()
     for name, gear in train.gears.items():
         losses = gear.losses

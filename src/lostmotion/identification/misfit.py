@@ -136,7 +136,7 @@ def _with_derivatives(rows: Sequence[np.ndarray], m: Misfit) -> list[tuple[np.nd
 
 
 def _derivative(x: np.ndarray, width: int, order: int) -> np.ndarray:
-    """By samples, of local cubics; NaN where there is no number, and near the ends."""
+    """By samples, of local cubics; NaN where there is not a number, and near the ends."""
     from scipy.signal import savgol_filter
 
     there = np.isfinite(x)

@@ -275,8 +275,8 @@ def _ratios(rig: Rig, log: Prepared, sizes: _Sizes) -> Mapping[float, str]:
     for name, gear in rig.scenario_at(log, sizes.point.of(log), sizes.rung).gears.items():
         ratio = abs(float(gear.ratio))
         if abs(ratio - 1.0) > 0.01:
-            found[ratio] = f"that of the other side of gear {name} (a factor of {ratio:.6g} too small)"
-            found[1.0 / ratio] = f"that of the other side of gear {name} (a factor of {ratio:.6g} too large)"
+            found[ratio] = f"measured on the other side of gear {name} (a factor of {ratio:.6g} too small)"
+            found[1.0 / ratio] = f"measured on the other side of gear {name} (a factor of {ratio:.6g} too large)"
     return found
 
 

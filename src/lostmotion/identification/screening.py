@@ -134,7 +134,7 @@ def _spread(log: Log) -> Log:
 
 
 def _numbers(log: Log, measured: list[str], inputs: list[str]) -> Log:
-    """With NaN where a measured channel is no number, and without samples in which an input is none."""
+    """With NaN where a measured channel is not a number, and without samples in which an input is none."""
     for name in dict.fromkeys((*inputs, *measured)):
         bad = ~(np.abs(log.values(name)) < HUGE)
         if bad.all():
@@ -147,7 +147,7 @@ def _numbers(log: Log, measured: list[str], inputs: list[str]) -> Log:
             )
         if bad.any():
             log = _without(
-                log, name, bad, name in inputs, f"dropped {np.sum(bad)} samples in which {name} is no number"
+                log, name, bad, name in inputs, f"dropped {np.sum(bad)} samples in which {name} is not a number"
             )
     return log
 

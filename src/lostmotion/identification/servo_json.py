@@ -89,7 +89,7 @@ def _column(path: Path, entries: list[dict[str, Any]], key: str) -> np.ndarray:
             )
         value = entry[key]
         if value is not None and not _is_number(value):
-            raise InputError(f"{path}: entries[{k}].{key}: {value!r} is no number; put one there, or null")
+            raise InputError(f"{path}: entries[{k}].{key}: {value!r} is not a number; put one there, or null")
         try:
             out[k] = np.nan if value is None else float(value)
         except OverflowError:

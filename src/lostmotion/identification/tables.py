@@ -99,7 +99,7 @@ def table_log(
     rows
         Those with something in them; a heading first, unless the first row is numbers, and a row of units below it.
     number
-        Value of a cell; None of a cell that is no number.
+        Value of a cell; None of a cell that is not a number.
     comments
         Those read so far; ``key: value``, ``key = value`` and ``unit COLUMN: deg`` are the header. More may be added with the rows.
     time
@@ -276,7 +276,7 @@ def _numbers(
                     raise UnreadError(row, str(problem)) from None
             if value is None and cell is not None and str(cell).strip():
                 raise UnreadError(
-                    row, f"{str(cell).strip()[:40]!r} in column {shortened(names[j])} is no number{_remedy(cell)}"
+                    row, f"{str(cell).strip()[:40]!r} in column {shortened(names[j])} is not a number{_remedy(cell)}"
                 )
             found.append(math.nan if value is None else value)
     return np.frombuffer(found).reshape(-1, max(1, len(names)))

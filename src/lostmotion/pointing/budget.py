@@ -1,4 +1,4 @@
-"""The pointing sheet: the error of each axis over time, and what each cause contributes."""
+"""The pointing report: the error of each axis over time, and what each cause contributes."""
 
 from __future__ import annotations
 

@@ -103,7 +103,7 @@ class ClosedLoop:
         windings = list(self.simulation.winding_torques())
         for sample in range(1, self.window.samples + 1):
             row = self.core.read()
-            for channel, torque in windings:  # in the place of the straight line that drives the mechanics
+            for channel, torque in windings:  # in place of the straight line that drives the mechanics
                 row[channel] = torque(row)
             rows.append(row)
             slots.append([*self.core.get_state()[-1][1:], *self.core.control_signals()])

@@ -74,7 +74,7 @@ class LinearModel:
         b, c, d = self._pair(output, source)
         frequencies = arguments("frequency", frequency, "Hz")
         if 0.0 in frequencies:
-            raise InputError(f"frequency {shown(frequency)} must not be 0 Hz, where the load angle grows without end")
+            raise InputError(f"frequency {shown(frequency)} must not be 0 Hz, where the load angle grows without limit")
         s = 2j * np.pi * np.array(frequencies)
         eye = np.eye(len(self.A))
         return np.array([c @ np.linalg.solve(x * eye - self.A, b) + d for x in s])

@@ -182,7 +182,7 @@ def without_saturation(train: TrainScenario) -> TrainScenario | None:
 
 
 def _sampled(train: TrainScenario, motor: str | None, *, causes: bool) -> Hunting:
-    """By a long run, as the servo sheet has it."""
+    """By a long run, as the servo report has it."""
     from .motion import limit_cycle as watched
 
     axis = axis_of(train, motor)

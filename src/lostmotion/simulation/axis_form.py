@@ -59,7 +59,7 @@ def long_form(tables: Mapping[str, Any]) -> dict[str, Any]:
     for key in tables:
         if key not in ("axis", *BESIDE):
             meant = did_you_mean(key, ("axis", *BESIDE), f"beside [axis] there may be {', '.join(BESIDE)}")
-            raise InputError(f"key {key}: does not stand beside [axis]; {meant}")
+            raise InputError(f"key {key}: is not allowed beside [axis]; {meant}")
     axis = tables["axis"]
     parts = (MOTOR, GEARBOX, *DRIVES, SLIDE)
     all_parts = f"they are {', '.join(parts)}"

@@ -32,7 +32,7 @@ class ContactState:
     capacity_forward: float  # it holds torques up to this before it slips forward
     capacity_backward: float  # and down to minus this before it slips in reverse
     shares: dict[str, tuple[float, float]] = field(default_factory=dict)  # of a train: of the capacities, by element
-    slides: bool = False  # along a straight line: [m/s] and [N] in the place of [rad/s] and [N·m]
+    slides: bool = False  # along a straight line: [m/s] and [N] in place of [rad/s] and [N·m]
 
     @property
     def to_free_forward(self) -> float:

@@ -57,7 +57,7 @@ def value_at(scenario: AnyScenario, key: str) -> float:
     Raises
     ------
     InputError
-        There is no number.
+        There is not a number.
     """
     node: Any = scenario.model_dump()
     for part in key.split("."):

@@ -47,7 +47,7 @@ INPUTS_OF_STATE = 4  # where the core's state of a simulation has the last value
 MIN_INTERVAL, MAX_INTERVAL = 1e-12, 1e12
 """Of a step [s]: below, it is lost in the rounding of the time; above, in that of a motion's phase."""
 
-_GIVE: Any = object()  # in the place of what has no default
+_GIVE: Any = object()  # in place of what has no default
 
 Ramp = float | str | tuple[float | str, float | str]
 Derived = Callable[[list[float]], float]

@@ -32,7 +32,7 @@ def oriented(scenario: Scenario | TrainScenario) -> Iterator[tuple[str, str, Pha
 
 
 def set_torques(scenario: Scenario | TrainScenario, data: dict[str, np.ndarray]) -> None:
-    """Puts the torque that belongs to the currents in the place of the straight lines that the mechanics were driven by."""
+    """Puts the torque that belongs to the currents in place of the straight lines that the mechanics were driven by."""
     for prefix, _, phase in oriented(scenario):
         data[f"{prefix or 'motor_'}torque"] = phase.torque(
             data[f"{prefix}direct_current"], data[f"{prefix}quadrature_current"]
@@ -40,7 +40,7 @@ def set_torques(scenario: Scenario | TrainScenario, data: dict[str, np.ndarray])
 
 
 def coarser(control: Bound) -> Bound:
-    """Copies of the controllers, with one exchange of torque and speed in each tick in the place of two."""
+    """Copies of the controllers, with one exchange of torque and speed in each tick in place of two."""
     tick, axes = own(control)
     for axis, *_ in axes:
         if axis.is_oriented:

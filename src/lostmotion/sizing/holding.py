@@ -13,7 +13,7 @@ MAX_DURATION = 1000.0  # [s]
 SAMPLES = 2000
 SLOW = 0.01  # of the rated input speed, where the run itself does not move
 STEADY = 1e-3  # relative change from one quarter of a run to the next at which the speed is taken to last
-RUNAWAY = 30.0  # [s]; a load that still gets faster then is taken to do so without end
+RUNAWAY = 30.0  # [s]; a load that still gets faster then is taken to do so without limit
 RAMP = 1.0  # [s], of the load torque from 0
 
 

@@ -315,7 +315,7 @@ def _numeric(x: Any) -> Any:
 
 
 def _combine(how: Callable[[Any, Any], Any], a: Any, b: Any) -> Any:
-    """Arithmetic and comparisons as of floating-point numbers: a division by 0 gives infinity, and no number grows without end."""
+    """Arithmetic and comparisons as of floating-point numbers: a division by 0 gives infinity, and no number grows without limit."""
     a, b = _numeric(a), _numeric(b)
     if isinstance(a, int | float) and isinstance(b, int | float):
         a, b = np.float64(a), np.float64(b)

@@ -51,7 +51,7 @@ def checksums(directory: Path) -> dict[str, str]:
     Raises
     ------
     InputError
-        There is something else in the place of their file.
+        There is something else in place of their file.
     """
     path = directory / CHECKSUMS
     if not os.path.lexists(path):

@@ -29,7 +29,7 @@ class Bound(Part):
     @classmethod
     def _no_boolean(cls, value: Any) -> Any:
         if isinstance(value, bool):
-            raise ValueError(f"{str(value).lower()} is no number")
+            raise ValueError(f"{str(value).lower()} is not a number")
         return value
 
     @model_validator(mode="after")

@@ -77,10 +77,10 @@ def in_si(value: Any, unit: str | None) -> Any:
     Raises
     ------
     ValueError
-        A string is no number with a unit, or has the unit of something else; or a value is anything else.
+        A string is not a number with a unit, or has the unit of something else; or a value is anything else.
     """
     if isinstance(value, bool):
-        raise ValueError(f"{str(value).lower()} is no number")
+        raise ValueError(f"{str(value).lower()} is not a number")
     if isinstance(value, str):
         try:
             return value if unit is None else to_si(value, unit)
@@ -91,5 +91,5 @@ def in_si(value: Any, unit: str | None) -> Any:
     if isinstance(value, dict):
         return {k: in_si(x, unit) for k, x in value.items()}
     if value is not None and not is_number(value):
-        raise ValueError(f"{shown(value)} {objection(value) or 'is no number'}")
+        raise ValueError(f"{shown(value)} {objection(value) or 'is not a number'}")
     return value

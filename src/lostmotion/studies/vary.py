@@ -156,7 +156,7 @@ class Vary(Part):
 
 
 def _with_names(data: Mapping[str, Any], table: str) -> dict[str, Any]:
-    """A filter of the catalogue in the place of the names that it lets through."""
+    """A filter of the catalogue in place of the names that it lets through."""
     out = dict(data)
     if "catalogue" in out:
         if "values" in out:

@@ -217,7 +217,7 @@ def _readings(units: Product, wanted: Product) -> Iterator[Product]:
 
 
 def _with(units: Product, name: str, other: Product) -> Product:
-    """A product with another one, to the same power, in the place of a unit."""
+    """A product with another one, to the same power, in place of a unit."""
     rest = {n: power for n, power in units.items() if n != name}
     for n, power in other.items():
         rest[n] = rest.get(n, 0) + power * units[name]
@@ -314,7 +314,7 @@ class Unit:
         Raises
         ------
         ValueError
-            It is no number, or a string that is not one with a fitting unit.
+            It is not a number, or a string that is not one with a fitting unit.
         """
         if type(value) is float:  # nearly always, and large tables are read often
             return value
