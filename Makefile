@@ -170,7 +170,7 @@ bench: $(VENV)/dev fmu-library
 	$(BIN)/python benchmarks/baseline.py build/baseline
 	$(BIN)/cmake -S . -B build/bench -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) -DLOSTMOTION_BENCHMARKS=ON -DLOSTMOTION_BUILD=all -DLOSTMOTION_WERROR=ON -DLOSTMOTION_BASELINE=$(abspath build/baseline) >build/bench.log
 	$(BIN)/cmake --build build/bench
-	$(BIN)/python benchmarks/bench.py build/bench
+	PYTHONPATH=tests $(BIN)/python benchmarks/bench.py build/bench
 
 docs: $(VENV)/dev page
 	$(BIN)/pip install -q "lostmotion[docs]"

@@ -19,6 +19,7 @@ import identification
 import live
 import one_run
 import quotes
+import robots
 import studies
 import tasks
 import trains
@@ -70,6 +71,7 @@ def main() -> None:
     trains.section(report, programs)
     closed_loops.section(report, programs)
     gradients.section(report)
+    robots.section(report)
     identification.section(report)
     costs.section(report, scenario, build, programs)
     studies.section(report, scenario)

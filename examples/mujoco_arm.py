@@ -88,7 +88,7 @@ def track(*, ideal: bool, duration: float = 4.0) -> tuple[np.ndarray, np.ndarray
         q, v, a = reference(k * STEP)
         plan.qpos[:], plan.qvel[:], plan.qacc[:] = q, v, a
         mujoco.mj_inverse(robot.model, plan)
-        # What the encoders of the motors say, at the joint; the twist that gravity makes is fed forward as well.
+        # The encoder of each motor, divided by the ratio.
         motor = robot["load_angle"] + (0.0 if ideal else robot["twist"])
         torque = plan.qfrc_inverse + rotors * a + stiff * (q - motor) + damping * (v - robot["motor_speed"] / ratios)
         robot.step(torque / ratios)
