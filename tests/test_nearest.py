@@ -12,6 +12,7 @@ from lostmotion.studies.axis import reference_of
 from lostmotion.studies.axis_rows import Axes
 from lostmotion.studies.engine import study
 from lostmotion.studies.nearest import least_factor, misses, not_judged, slowed
+from lostmotion.studies.records import names_that_fit
 from lostmotion.studies.selection import candidates, prices
 from lostmotion.studies.study import Study
 from lostmotion.studies.table import read_table
@@ -108,3 +109,8 @@ def test_records_without_data_are_listed_apart(tmp_path: Path):
     assert lacking in group.candidates[0]
     assert "lacks" in group.datum
     assert all(lacking not in miss.candidate.name for miss in misses(what, ranked, 5))
+
+
+def test_illustrative_records_are_no_candidates_unless_asked_for():
+    assert "paper-gearbox" not in names_that_fit("gearbox", {"ratio": [85.0, 95.0]})
+    assert names_that_fit("gearbox", {"name": "paper-*"}) == ["paper-gearbox"]

@@ -6,12 +6,12 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from ..inputs.part import Part
-from ..inputs.quantities import Length, Mass, Number, Positive, Time
+from ..inputs.quantities import Length, Mass, Number, Positive, Switch, Time
 from ..model.synchronous_motor import Winding
 from .loss_data import LossData
 
 # Fields of a record that are no data.
-WORDS = ("name", "manufacturer", "title", "note", "sources", "gaps")
+WORDS = ("name", "manufacturer", "title", "note", "sources", "gaps", "illustrative")
 # Sheets written before may have these words.
 FORMER_WORDS = {"maker": "manufacturer", "figures": "data", "figure": "datum"}
 
@@ -68,6 +68,8 @@ class Record(Part):
     """name of the product at the manufacturer"""
     note: str = ""
     """note for readers of results"""
+    illustrative: Switch = False
+    """no product that can be bought: a filter of the catalogue passes it over unless it asks for its name"""
     total_mass: Annotated[Mass, Positive] | None = None
     """mass of the whole component, for the choice"""
     overall_length: Annotated[Length, Positive] | None = None

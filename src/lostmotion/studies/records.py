@@ -120,7 +120,7 @@ def names_that_fit(table: str, wanted: Mapping[str, Any]) -> list[str]:
             raise ValueError(f"has catalogue.{key} = {shown(value)}, which is reversed; the least value comes first")
     found = []
     for record in catalogue():
-        if not isinstance(record, KINDS[table]):
+        if not isinstance(record, KINDS[table]) or (record.illustrative and "name" not in wanted):
             continue
         texts = all(fnmatchcase(str(getattr(record, k)), v) for k, v in wanted.items() if _is_text(k))
         numbers = {key: getattr(record, key) for key in bounds}
