@@ -1,5 +1,4 @@
-"""What acts on the load of an axis over its cycle beside inertia and friction: gravity, payloads, forces of a process; and what
-stands around the axis: supply, brake."""
+"""Gravity, payloads and process forces on the load of an axis over its cycle; its supply and its holding brake."""
 
 from typing import Annotated, Self
 
@@ -39,7 +38,7 @@ class ArmGravity(Part):
 
     mass: Annotated[Mass, Positive]
     radius: Annotated[Length, Positive]
-    """of its centre of gravity"""
+    """distance of its centre of gravity from the axis"""
     hanging: Angle = 0.0
     """position at which it hangs straight down; a quarter of a turn on, the arm is level"""
 
@@ -52,13 +51,13 @@ class ArmGravity(Part):
 
 
 class Payload(Part):
-    """What the load carries during a part of the cycle."""
+    """A body that the load carries during a part of the cycle."""
 
     begin: Annotated[Time, NotNegative]
     end: Annotated[Time, Positive]
     mass: Annotated[Mass, NotNegative] = 0.0
     radius: Annotated[Length, Positive] | None = None
-    """of its centre of gravity from the axis of a rotary load"""
+    """distance of its centre of gravity from the axis of a rotary load"""
     inertia: Annotated[Inertia, NotNegative] = 0.0
     """about its own centre of gravity, of a rotary load"""
 
@@ -85,7 +84,7 @@ class Process(Part):
 
     times: tuple[Annotated[Time, NotNegative], ...] | None = Field(None, min_length=2)
     positions: tuple[Angle, ...] | None = Field(None, min_length=2)
-    """of the load, in place of times"""
+    """positions of the load, in place of times"""
     torques: tuple[Torque, ...] | None = None
     """on a rotary load"""
     forces: tuple[Force, ...] | None = None
@@ -120,10 +119,10 @@ class Process(Part):
 
 
 class Duty(Part):
-    """What acts on the load of an axis over its cycle, beside what `[load]` or `[slide]` has."""
+    """Gravity, payloads and process forces on the load, beside the values of `[load]` or `[slide]`."""
 
     gravity: ArmGravity | None = None
-    """of a rotary load"""
+    """weight of an arm, of a rotary load"""
     payload: tuple[Payload, ...] = ()
     process: tuple[Process, ...] = ()
 
@@ -132,15 +131,20 @@ class Duty(Part):
         return {t for p in self.payload for t in (p.begin, p.end)} | {t for p in self.process for t in p.times or ()}
 
     def inertia(self, time: np.ndarray, *, slides: bool) -> np.ndarray:
-        """That of the payloads over time [kg·m²], of a slide [kg]."""
+        """Inertia of the payloads over time [kg·m²], of a slide [kg]."""
         found = np.zeros_like(time)
         for payload in self.payload:
             found += payload.added_inertia(slides=slides) * payload.carried(time)
         return found
 
     def torque(self, time: np.ndarray, position: np.ndarray, rise: float | None) -> np.ndarray:
-        """What the axis has to hold against over its motion [N·m], of a slide [N]; `rise`: sine of the slope of a slide, None of a
-        rotary load."""
+        """Torque to hold the load over its motion [N·m], of a slide force [N].
+
+        Parameters
+        ----------
+        rise
+            Sine of the slope of a slide; None for a rotary load.
+        """
         found = np.zeros_like(time)
         if self.gravity is not None:
             found += self.gravity.torque(position)
@@ -171,19 +175,19 @@ class Supply(Part):
     """DC bus and amplifier that feed the motor."""
 
     min_voltage: Annotated[Voltage, Positive] | None = None
-    """of the bus: at it the motor must reach its torque and speed"""
+    """least voltage of the bus, at which the motor must reach its torque and speed"""
     max_voltage: Annotated[Voltage, Positive] | None = None
-    """of the bus before energy is returned to it: at it the bus must take what returns"""
+    """largest voltage of the bus before energy returns to it"""
     voltage_limit: Annotated[Voltage, Positive] | None = None
-    """that the bus may reach: of the amplifier, or that at which its brake resistor is switched on"""
+    """largest voltage that the bus may reach; with a brake resistor the voltage at which it is switched on"""
     capacitance: Annotated[Capacitance, Positive] | None = None
-    """of the bus"""
+    """capacitance of the bus"""
     brake_resistance: Annotated[Resistance, Positive] | None = None
-    """of the brake resistor, switched on at voltage_limit"""
+    """resistance of the brake resistor, which is switched on at voltage_limit"""
     brake_power: Annotated[Power, Positive] | None = None
-    """that the brake resistor carries off continuously"""
+    """continuous power of the brake resistor"""
     continuous_current: Annotated[Current, Positive] | None = None
-    """of the amplifier, rms over the cycle"""
+    """continuous current of the amplifier, rms over the cycle"""
     returns_to_mains: Switch = False
     """the energy goes back to the mains, or a battery takes it: neither capacitors nor resistor are judged"""
 

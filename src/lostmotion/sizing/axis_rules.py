@@ -221,7 +221,7 @@ class Returned:
     largest: float
     """without a pause [J]"""
     each: tuple[float, ...]
-    """of all such times of the cycle [J]"""
+    """energy of each stretch of braking [J]"""
     power: float
     """largest [W]"""
     cycle: float
@@ -238,7 +238,7 @@ def electrical_power(demand: InputDemand, motor: Motor) -> np.ndarray:
 
 
 def returned(time: np.ndarray, power: np.ndarray, cycle: float) -> Returned:
-    """What a power over one cycle [W] returns; the cycle repeats, so that what begins before its end may end after it."""
+    """Energy that a power over one cycle [W] returns; the cycle repeats, so that braking may begin before its end and end after it."""
     steps = np.diff(time)
     energy = np.minimum(0.5 * (power[1:] + power[:-1]), 0.0) * steps
     each: list[float] = []

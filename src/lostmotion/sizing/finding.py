@@ -70,7 +70,7 @@ class Finding:
 
     @property
     def source(self) -> str:
-        """Where the rule comes from."""
+        """Source of the rule."""
         return SOURCES[self.rule]
 
     def __str__(self) -> str:

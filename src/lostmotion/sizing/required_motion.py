@@ -43,7 +43,7 @@ class RequiredMotion:
     position: np.ndarray
     """[rad]"""
     inertia: np.ndarray
-    """of the load with its payloads [kg·m²]"""
+    """inertia of the load with its payloads [kg·m²]"""
     holding: np.ndarray
     """torque that holds the load at rest there, without friction [N·m]"""
 

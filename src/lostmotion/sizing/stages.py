@@ -37,7 +37,7 @@ class ScrewStage(ScrewData):
     load_factor: Annotated[Number, Positive] = 1.0
     """f_w of the life: 1.2 to 1.5 for normal motion, more with shocks"""
     mounting: Mounting = "fixed-supported"
-    """of the ends of the screw, for buckling and bending along supported_length"""
+    """mounting of the ends of the screw, for buckling and bending along supported_length"""
     ball_circle_diameter: Annotated[Length, Positive] | None = None
     max_input_speed: Annotated[Speed, Positive] | None = None
     """left out, 70 m rpm/ball_circle_diameter"""
@@ -69,9 +69,9 @@ class BeltStage(BeltData):
     rated_force: Annotated[Force, Positive] | None = None
     """largest one of the tension members in operation"""
     tooth_force: Annotated[Force, Positive] | None = None
-    """of one tooth in mesh"""
+    """force that one tooth in mesh carries"""
     pretension: Annotated[Force, Positive] | None = None
-    """of a strand; left out, the largest circumferential force, so that no strand is slack"""
+    """force of a strand at rest; left out, the largest circumferential force, so that no strand is slack"""
 
 
 Stage = ScrewStage | RackStage | BeltStage
@@ -140,7 +140,7 @@ DIRECT = Gearbox(
     losses=ConstantEfficiency(efficiency=1.0),
     note="no gearbox",
 )
-"""in the place of a gearbox where the motor drives the stage directly; no rule judges it"""
+"""stands for a gearbox if the motor drives the stage directly; no rule judges it"""
 
 
 def together(g: Gearbox, stage: LinearDrive) -> Gearbox:

@@ -51,7 +51,7 @@ REQUIREMENTS = {
 
 
 class LinearAxis(Part):
-    """What makes a task one of a linear axis: its last stage and the slope of its slide."""
+    """Last stage of a linear axis and the slope of its slide."""
 
     kind: Literal["screw", "rack", "belt"]
     stage: dict[str, Any] = Field(default={})
@@ -92,7 +92,7 @@ class AxisTask(Task, Duty):
     safety_factors: dict[str, Annotated[Number, Positive]] = Field(default={})
     """by rule"""
     linear: LinearAxis | None = None
-    """of the tables `[slide]` and `[screw]`, `[rack]` or `[belt]`; all values of the load are then in units of translation"""
+    """tables `[slide]` and `[screw]`, `[rack]` or `[belt]`; all values of the load are then in units of translation"""
 
     @model_validator(mode="after")
     def _rules_are_known(self) -> Self:

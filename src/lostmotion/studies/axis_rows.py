@@ -93,7 +93,7 @@ class Axes:
         return kept[key]
 
     def gearbox(self, row: np.ndarray) -> tuple[InputDemand, list[Finding]] | InputError:
-        """What its input has to do, and what the rules say of it and of the stage behind it."""
+        """Demands on the input of the gearbox, and the rules for it and for the stage behind it."""
         key = ("demand", self.study.part_key("gearbox", row), self._stage_key(row))
         return self._once(key, lambda: self._demand(row))  # type: ignore[no-any-return]
 
@@ -150,7 +150,7 @@ class Axes:
         return self._once(key, lambda: self.study.part("motor", row))  # type: ignore[no-any-return]
 
     def judged(self, row: np.ndarray) -> list[Finding] | InputError:
-        """What the rules say of a pair before any run; the error of a record that lacks what a run needs."""
+        """Findings for a pair before any run, or the error of a record that lacks data for a run."""
         gearbox, motor = self.gearbox(row), self.motor(row)
         lacking = [str(error) for error in (gearbox, motor) if isinstance(error, InputError)]
         if lacking:

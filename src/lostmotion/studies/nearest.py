@@ -1,4 +1,4 @@
-"""Where nothing fits, or little: which candidates come nearest, what each lacks, and how much slower the cycle would have to be."""
+"""Nearest misses: candidates that almost fit, what each lacks, and how much slower the cycle would have to be."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Miss:
     slower: float | None
     """a cycle so many times as long passes the rules, by evaluation; None: none up to `SLOWEST` does, or it was not tried"""
     then: str = ""
-    """what the run of that cycle says"""
+    """result of the rules and the run for that cycle"""
 
     @property
     def worst(self) -> float:
@@ -44,7 +44,7 @@ class Miss:
 
 
 def misses(study: Study, ranked: list[Candidate], count: int) -> list[Miss]:
-    """Those candidates of a task that come nearest to fitting, the nearest first: the largest excess over a limit ranks them.
+    """Find the candidates of a task that come nearest to fitting, the nearest first: the largest excess over a limit ranks them.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def least_factor(study: Study, row: np.ndarray) -> float | None:
 
 
 def _said(study: Study, slower: Study, row: np.ndarray, factor: float) -> str:
-    """What the rules and the run of the slower cycle say, with the times of cycle and longest move."""
+    """Result of the rules and the run of the slower cycle, with the times of cycle and longest move."""
     before, after = study.axis, slower.axis
     assert before is not None
     assert after is not None

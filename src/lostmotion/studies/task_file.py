@@ -126,7 +126,7 @@ def task_of(tables: dict[str, Any], directory: Path = Path()) -> Study:
 
 
 def linear_axis(tables: dict[str, Any]) -> dict[str, Any] | None:
-    """What makes a task one of a linear axis, or None.
+    """Last stage and slope of a linear task, or None for a rotary one.
 
     Raises
     ------
