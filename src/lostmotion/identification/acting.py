@@ -12,6 +12,7 @@ from .. import _core
 from ..control.axis import OPEN_LOOP, Bound, own
 from ..errors import InputError
 from .formulas import number
+from .given_motion import GIVEN_ACCELERATION, GIVEN_SPEED, given_speed, rates_of, speed_of
 from .goal_shaping import shaped
 from .prepare import Prepared
 from .rig import Built
@@ -19,7 +20,7 @@ from .task import Identification
 
 NUMBERS = ("scale", "offset", "delay", "rate_limit", "acceleration_limit", "filter_time")
 DELAY = NUMBERS.index("delay")
-Points = list[tuple[float, float, float]]
+KEPT = 4  # courses of a whole log that are kept; each is also in a signal of the core
 
 
 def numbers_of_input(task: Identification, name: str, known: Mapping[str, Any]) -> tuple[float, ...]:
@@ -39,6 +40,8 @@ def course_of_input(
 ) -> tuple[np.ndarray, np.ndarray, bool, int]:
     """(instants without the delay [s], values there in SI, whether they are held, points for one sample)."""
     scale, offset, _, rate, acceleration, filter_time = numbers
+    if name.endswith(GIVEN_SPEED):
+        return log.time, scale * given_speed(task, log, name) + offset, False, 1
     t, v = log.time, scale * log.inputs[name] + offset
     held = task.inputs[name].interpolation != "linear"
     if math.isinf(rate) and math.isinf(acceleration) and filter_time == 0.0:
@@ -66,9 +69,16 @@ class Acting:
         """Inputs of the train, in its order."""
         of_scenario = built.scenario.signals() if set(built.inputs) - set(self._task.inputs) else {}
         return [
-            self._signal(name, known) if name in self._task.inputs else of_scenario[name].core()
+            self._signal(name, known)
+            if name in self._task.inputs or speed_of(name) in self._task.inputs
+            else of_scenario[name].core()
             for name in built.inputs
         ]
+
+    def given_speeds(self, known: Mapping[str, Any]) -> dict[str, float]:
+        """Given speeds of shafts at `begin`."""
+        given = [name for name in self._task.inputs if name.endswith(GIVEN_SPEED)]
+        return {name.removesuffix(GIVEN_SPEED): float(self._points(name, known)[0, 1]) for name in given}
 
     def control(self, built: Built, known: Mapping[str, Any]) -> Bound:
         """The sampled controllers with their references."""
@@ -79,7 +89,8 @@ class Acting:
         for (axis, *_), name in zip(control[1], axes, strict=True):
             signal = f"{name}_reference"
             if signal in self._task.inputs:
-                axis.set_reference([(t, v, slope, 0.0, 0.0) for t, v, slope in self._points(signal, known)], [])
+                points = self._points(signal, known).tolist()
+                axis.set_reference([(t, v, slope, 0.0, 0.0) for t, v, slope in points], [])
         return control
 
     def _numbers(self, name: str, known: Mapping[str, Any]) -> tuple[float, ...]:
@@ -95,15 +106,17 @@ class Acting:
         return first, last + 1, bool(time[first] > 0.0)
 
     def _signal(self, name: str, known: Mapping[str, Any]) -> _core.Signal:
+        if name.endswith(GIVEN_ACCELERATION):
+            return _core.Signal(list(map(tuple, rates_of(self._points(speed_of(name), known)).tolist())), [])
         key = ("signal", name, *self._numbers(name, known), *self._pieces[name], self._begin)
-        return self._kept(key, lambda: _core.Signal(self._points(name, known), []))  # type: ignore[no-any-return]
+        return self._kept(key, lambda: _core.Signal(list(map(tuple, self._points(name, known).tolist())), []))  # type: ignore[no-any-return]
 
-    def _points(self, name: str, known: Mapping[str, Any]) -> Points:
-        """(time, value, slope) of an input from `begin` on."""
+    def _points(self, name: str, known: Mapping[str, Any]) -> np.ndarray:
+        """Array (points, 3) of time, value and slope of an input from `begin` on."""
         numbers = self._numbers(name, known)
         return self._kept((name, *numbers, *self._pieces[name], self._begin), lambda: self._made(name, numbers))  # type: ignore[no-any-return]
 
-    def _made(self, name: str, numbers: tuple[float, ...]) -> Points:
+    def _made(self, name: str, numbers: tuple[float, ...]) -> np.ndarray:
         first, end, late = self._pieces[name]
         t, v, held, count = course_of_input(self._task, self._log, name, numbers)
         which = slice(first * count, (end - 1) * count + 1)
@@ -117,12 +130,13 @@ class Acting:
             v = v.copy()
             v[0] -= slope[0] * t[0]
             t = np.append(0.0, t[1:])
-        return list(zip(t.tolist(), v.tolist(), slope.tolist(), strict=True))
+        return np.column_stack([t, v, slope])
 
     def _kept(self, key: Any, make: Any) -> Any:
         cache = self._log.cache
         if key not in cache:
-            if len(cache) > 200:
+            points = sum(len(x) for x in cache.values() if isinstance(x, np.ndarray))
+            if len(cache) > 200 or points > KEPT * len(self._log.time):
                 cache.clear()
             cache[key] = make()
         return cache[key]

@@ -14,6 +14,7 @@ from ..errors import InputError
 from ..model.train import DriveTrain
 from .engine import Point
 from .formulas import names_in
+from .given_motion import refuse_given_motion
 from .measuring import numbers_of
 from .prepare import Prepared, Segment
 from .rig import Rig
@@ -40,6 +41,7 @@ def shown_motion(rig: Rig) -> Shown:
     InputError
         None does.
     """
+    refuse_given_motion(rig.scenario)
     train = rig.scenario.train()
     plain = {name: m.variable for name, m in rig.task.measured.items() if m.filter_time == 0.0}
     by_variable = {train.angle_of(s): s for s in train.shafts}

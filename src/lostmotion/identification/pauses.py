@@ -17,6 +17,7 @@ from ..control.axis import turns
 from ..errors import InputError
 from ..model.torsion import Rigid
 from .formulas import number
+from .given_motion import refuse_given_motion
 from .ladder import start_point
 from .measuring import numbers_of
 from .motion import depends_on_angle
@@ -119,6 +120,7 @@ def shown_by(rig: Rig, log: Prepared, known: Mapping[str, Any]) -> Restart:
     scenario = built.scenario
     if scenario.axes() or built.remembers:
         raise InputError("no channel shows the states of its controller")
+    refuse_given_motion(scenario)
     for table in ("clutches", "freewheels", "dampers"):
         if names := list(getattr(scenario, table)):
             raise InputError(f"no channel shows the state of {table}.{names[0]}")

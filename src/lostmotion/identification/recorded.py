@@ -11,6 +11,7 @@ import numpy as np
 
 from .engine import Point
 from .fit import Fit
+from .given_motion import GIVEN_SPEED
 from .prepare import Prepared
 from .rig import Rig
 
@@ -44,6 +45,9 @@ def as_recorded(rig: Rig, logs: Sequence[Prepared]) -> tuple[Rig, dict[str, str]
     undecided: dict[str, Way] = {}
     for name, channel in rig.task.inputs.items():
         if channel.interpolation is not None:
+            continue
+        if name.endswith(GIVEN_SPEED):
+            ways[name] = "linear"
             continue
         courses = {course_of(log.inputs[name]) for log in logs}
         ways[name] = "linear" if "smooth" in courses and not courses & {"staircase", "rough"} else "hold"

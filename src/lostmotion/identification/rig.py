@@ -92,8 +92,15 @@ class Rig:
         self.scenario = in_long_form(loaded)
         self._variants = Variants(self.scenario)
         self._built: dict[Any, Built] = {}
+        self._with_given: dict[Any, dict[str, float]] = {}
         self.units = self._units()
-        for name in task.inputs:
+        for name, channel in task.inputs.items():
+            if name.endswith("_given_acceleration") and name in self._signals():
+                raise InputError(f"key inputs.{name}: follows from the given speed; give that alone")
+            if channel.interpolation == "hold" and name.endswith("_given_speed"):
+                raise InputError(f'key inputs.{name}.interpolation: "hold" would make the speed jump; leave it out')
+            if channel.smoothing > 0.0 and not name.endswith("_given_speed"):
+                raise InputError(f"key inputs.{name}.smoothing: is of a given speed alone; give filter_time")
             if name not in self._signals():
                 meant = did_you_mean(name, self._signals(), f"what acts on the rig is {', '.join(self._signals())}")
                 raise InputError(f"key inputs.{name}: is nothing that acts on {task.scenario}; {meant}")
@@ -151,6 +158,9 @@ class Rig:
             for name in train.shafts
             if angle_terms(self.scenario, name, units)
         }
+        for name in self.scenario.signals():
+            if name.endswith("_given_speed"):
+                units[name] = units[name.replace("_given_speed", "_speed")]
         for name, c in self.scenario.axes().items():
             motor, position = self.scenario.sliding()[self.scenario.prefix(name)]
             slides = position and c.reference.kind != "torque"
@@ -222,6 +232,23 @@ class Rig:
             initial = TrainInitial(**data["initial"])
             log.cache[key] = built.scenario.start(initial), built.scenario.capacities(initial)
         return log.cache[key]  # type: ignore[no-any-return]
+
+    def driven(self, start: dict[str, float], built: Built, speeds: Mapping[str, float]) -> dict[str, float]:
+        """A start with other given speeds of shafts, and of all that turns with them."""
+        if not speeds:
+            return start
+        found = dict(start)
+        for shaft, speed in speeds.items():
+            signal = built.scenario.shafts[shaft].speed
+            assert signal is not None
+            change = speed - signal.at_start()
+            key = (shaft, built.ratios)
+            if key not in self._with_given:
+                at = [built.scenario.replace(**{f"shafts.{shaft}.speed": {"mean": v}}).start() for v in (0.0, 1.0)]
+                self._with_given[key] = {name: b - at[0][name] for name, b in at[1].items() if b != at[0][name]}
+            for name, ratio in self._with_given[key].items():
+                found[name] += ratio * change
+        return found
 
     @staticmethod
     def sets_start(built: Built, keys: Sequence[str]) -> bool:

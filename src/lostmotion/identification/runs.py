@@ -17,6 +17,7 @@ from ..errors import InputError
 from ..simulation.sensitivities import CENTRAL, ONE_SIDED, run_cases
 from .acting import NUMBERS, Acting
 from .formulas import names_in, number
+from .given_motion import GIVEN_SPEED
 from .measuring import Measuring, Probe, delays_that_name, numbers_of, rate_of
 from .parameters import FreeParameter
 from .prepare import Prepared, Segment
@@ -186,6 +187,8 @@ class _Course:
         built = rig.built(changes)
         acting = Acting(rig.task, self._log, self._known, begin, end)
         start, capacities = rig.start(self._log, built, changes) if self._state is None else (self._state, {})
+        if self._state is None:
+            start = rig.driven(start, built, acting.given_speeds(self._known))
         self._at = np.unique(
             np.concatenate([*(p.at[w] - begin for p, w in zip(self._probes, self._within, strict=True)), [end - begin]])
         )
@@ -227,6 +230,7 @@ class _Course:
         moved = self._state_by.get(name)
         own_start = any(name in names_in(formula) for formula in (segment.initial or {}).values())
         other_start = self._state is None and (own_start or len(keys) > len(of_rig) or rig.sets_start(built, of_rig))
+        other_start |= self._state is None and any(i.endswith(GIVEN_SPEED) for i in acts)
         other_inputs = bool(acts - axes) or any(_SIGNALS.fullmatch(key) for key in of_rig)
         if not (keys or acts or own_start or moved is not None):
             return []
@@ -244,7 +248,8 @@ class _Course:
                 assert self._state is not None
                 start = ({s: v + offset * d for (s, v), d in zip(self._state.items(), moved, strict=True)}, {})
             elif other_start:
-                start = rig.start(self._log, at, there)
+                own, capacities = rig.start(self._log, at, there)
+                start = rig.driven(own, at, acting.given_speeds(known)), capacities
             inputs = acting.inputs(at, known) if other_inputs else None
             control = acting.control(at, known) if of_control else None
             out.append((offset, weight, at.composed if of_rig else None, inputs, start, control))
