@@ -59,7 +59,7 @@ def describe(scenario: Scenario | TrainScenario, name: str) -> dict[str, Any]:
         "version": __version__,
         "core": core,
         **drawn,
-        "open_loop": not (scenario.axes() or (isinstance(scenario, TrainScenario) and scenario.controllers)),
+        "open_loop": not (scenario.axes() or scenario.continuous()),
         "loops": [view for motor in scenario.axes() for view in loop_views(scenario, motor)],
         "figures": [
             figure
@@ -67,7 +67,7 @@ def describe(scenario: Scenario | TrainScenario, name: str) -> dict[str, Any]:
             for figure in axis_figures(
                 c,
                 motor,
-                isinstance(scenario, TrainScenario),
+                bool(scenario.prefix(motor)),
                 scenario.sliding().get(scenario.prefix(motor), (False, False)),
             )
         ],
@@ -80,16 +80,9 @@ def _packed(numbers: np.ndarray) -> str:
     return base64.b64encode(numbers.astype("<f8").tobytes()).decode()
 
 
-def _gears(scenario: Scenario | TrainScenario) -> dict[str, Any]:
-    """By the table in the scenario file."""
-    if isinstance(scenario, Scenario):
-        return {"gearbox": scenario.gearbox}
-    return {f"{scenario.kind_of(name)}s.{name}": gear for name, gear in scenario.train().gears.items()}
-
-
 def _closed_gap(scenario: Scenario | TrainScenario) -> str | None:
     """The key of the backlash of the one gear whose torsion curve has none."""
-    curves = {key: g.stiffness for key, g in _gears(scenario).items() if isinstance(g.stiffness, TorsionCurve)}
+    curves = {key: g.stiffness for key, g in scenario.gears_by_key().items() if isinstance(g.stiffness, TorsionCurve)}
     closed = [
         f"{key}.stiffness.backlash"
         for key, c in curves.items()
@@ -131,7 +124,7 @@ def _sliders(
 ) -> list[sliders.Slider]:
     usual: dict[str, float] = {}
     views: dict[str, sliders.Place] = {}
-    for k, key in enumerate(_gears(scenario)):
+    for k, key in enumerate(scenario.gears_by_key()):
         views |= {f"{key}.ratio": ["gears", k, "ratio"], f"{key}.stiffness.backlash": ["gears", k, "backlash"]}
         views |= {f"{key}.backlash": ["gears", k, "backlash"]}
     if closed is not None:
@@ -172,7 +165,7 @@ def _signal_sliders(scenario: Scenario | TrainScenario) -> Iterator[sliders.Slid
 def _reference_sliders(scenario: Scenario | TrainScenario) -> Iterator[sliders.Slider]:
     several = len(scenario.axes()) > 1
     for number, (motor, controller) in enumerate(scenario.axes().items()):
-        table = "controller" if isinstance(scenario, Scenario) else f"controllers.{motor}"
+        table = scenario.controller_key(motor)
         group = f"Reference of {motor.replace('_', ' ')}" if several else "Reference"
         sliding = scenario.sliding().get(scenario.prefix(motor), (False, False))
         duration = scenario.simulation.duration

@@ -18,7 +18,7 @@ from ..atomic_writer import write_whole
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count
-from ..model.signals import CommandSignal, Signal
+from ..model.signals import Signal
 from ..reproducible import sin, total
 from ..simulation.results import variables_of
 from ..simulation.run import run
@@ -119,7 +119,7 @@ def export_fmu(
             f"title: {scenario.title!r} holds a control character, which modelDescription.xml cannot; remove it"
         )
     if not controllers:
-        scenario = without_controllers(scenario)
+        scenario = scenario.without_controllers()
     if references:
         _check_references(scenario)
     if libraries is None:
@@ -148,34 +148,7 @@ def export_fmu(
                 archive.writestr(f"binaries/{name}", content)
 
     write_whole(path, write)
-    return {v.name: _key_of(scenario, v.name) for v in model.inputs}
-
-
-def without_controllers(scenario: Scenario | TrainScenario) -> Scenario | TrainScenario:
-    """The scenario with its motors turned by commands of 0."""
-    if isinstance(scenario, Scenario):
-        return scenario.replace(controller=None)
-    commands = {name: CommandSignal() for name in scenario.controllers}
-    return scenario.replace(controllers={}, command={**scenario.command, **commands})
-
-
-def _key_of(scenario: Scenario | TrainScenario, name: str) -> str:
-    """The key of the scenario whose signal an input replaces."""
-    if isinstance(scenario, Scenario):
-        return {"load_torque": "load.torque", "reference": "controller.reference"}.get(name, name)
-    if name.endswith("_load_force"):
-        slide = name.removesuffix("_load_force")
-        inclined = scenario.slides[slide].weight(1.0) != 0.0
-        return f"slides.{slide}.force" + (" and the weight" if inclined else "")
-    for suffix, key in (
-        ("_load_torque", "shafts.{}.torque"),
-        ("_given_speed", "shafts.{}.speed"),
-        ("_given_acceleration", "shafts.{}.speed"),
-        ("_reference", "controllers.{}.reference"),
-    ):
-        if name.endswith(suffix):
-            return key.format(name.removesuffix(suffix))
-    return f"command.{name.removesuffix('_command')}"
+    return {v.name: scenario.input_key(v.name) for v in model.inputs}
 
 
 def _libraries(directory: Any, places: Mapping[str, str], kernel: str) -> dict[str, bytes]:
@@ -246,7 +219,7 @@ def _model(
     # From tick to tick, or from one switching to the next. Where there is no contact, its variable follows a sign.
     held = controlled | shown | set(core.contact_names())
     by_name = {v.name: Declared(v.name, v.unit, v.meaning, sizes.get(v.name, 0.0), v.name in held) for v in variables}
-    for shaft in scenario.given() if isinstance(scenario, TrainScenario) else ():
+    for shaft in scenario.given():
         by_name |= {v.name: v for v in _given_motion(shaft)}
     windings = any(c.current.kind == "field_oriented" for c in axes.values())
     given = {f"{prefix}reference": c for prefix, c in axes.items() if references_given}
@@ -260,7 +233,7 @@ def _model(
         duration=scenario.simulation.duration,
         step=scenario.simulation.sample_interval,
         inputs=[
-            replace(v, meaning=f"{v.meaning}; until it is set: {_key_of(scenario, v.name)} of the scenario")
+            replace(v, meaning=f"{v.meaning}; until it is set: {scenario.input_key(v.name)} of the scenario")
             for v in (*(by_name[name] for name in inputs), *references)
         ],
         starts=[

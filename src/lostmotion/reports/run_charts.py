@@ -97,7 +97,7 @@ def _axes(result: xarray.Dataset) -> Iterator[Panel]:
     sliding = scenario.sliding()
     for motor, controller in scenario.axes().items():
         for figure in axis_figures(
-            controller, motor, isinstance(scenario, TrainScenario), sliding.get(scenario.prefix(motor), (False, False))
+            controller, motor, bool(scenario.prefix(motor)), sliding.get(scenario.prefix(motor), (False, False))
         ):
             series = [s for s in figure["series"] if s["variable"] in result]
             error = any("minus" in s for s in series)

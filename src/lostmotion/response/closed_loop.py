@@ -158,14 +158,12 @@ def under_sine(plant: Plant, source: str, amplitude: float, frequency: float) ->
     assert scenario is not None
     axes = {}
     for motor, controller in scenario.axes().items():
-        name = f"{motor}_reference" if isinstance(scenario, TrainScenario) else "reference"
+        name = f"{scenario.prefix(motor)}reference"
         wave = {"amplitude": amplitude, "frequency": frequency} if name == source else {}
         mean = mean_of(controller.reference)
         reference = type(controller.reference).model_validate({"mean": mean, **wave})
         axes[motor] = controller.model_copy(update={"reference": reference})
-    if isinstance(scenario, TrainScenario):
-        return scenario.model_copy(update={"controllers": axes})
-    return scenario.model_copy(update={"controller": axes["motor"]})
+    return scenario.with_axes(axes)
 
 
 class Search:

@@ -46,7 +46,7 @@ def axis_signals(scenario: Scenario | TrainScenario) -> Iterator[AxisSignal]:
     """The variables of the controllers; of windings those that repeat, behind all that the controllers remember."""
 
     def titled(name: str, motor: str) -> str:
-        return name if isinstance(scenario, Scenario) else f"{motor}_{name}"
+        return f"{scenario.prefix(motor)}{name}"
 
     base, axes = scenario.control({name: Law(_nothing) for name, c in scenario.axes().items() if c.law})
     first, own, winding = 0, len(_core.axis_signals()), _core.winding_signals()

@@ -253,7 +253,8 @@ def _ramp(value: float, rate: float) -> _core.Signal:
 
 
 def _model_now(simulation: Simulation) -> LinearModel:
-    need_free_motion(simulation._scenario, "linearize")
+    if simulation._scenario is not None:
+        need_free_motion(simulation._scenario, "linearize")
     with simulation._turn:
         rows = simulation._idle().linearize()
     return _model(simulation._train, simulation._core_train, *rows)
@@ -276,9 +277,12 @@ def _model_of_train(
     inputs: Mapping[str, float],
     rates: Mapping[str, float],
 ) -> LinearModel:
-    need_free_motion(what, "linearize")
     train, loaded = loaded_train(what)
-    core = what.core(sampled=False) if isinstance(what, TrainScenario) else train.core(loaded)
+    if isinstance(what, DriveTrain):
+        core = train.core(loaded)
+    else:
+        need_free_motion(what, "linearize")
+        core = what.core(sampled=False)
     if not isinstance(state, TrainInitial | None):
         raise InputError("state: is that of a drive; give a TrainInitial")
     if state is None:

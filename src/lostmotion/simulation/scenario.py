@@ -18,7 +18,7 @@ from ..inputs.kept import kept, kept_while_used
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, NotNegative, Positive, Speed, Switch, Time, Torque
 from ..model.drive import Drive
-from ..model.gearbox import Gearbox
+from ..model.gearbox import Gearbox, Transmission
 from ..model.load import Load
 from ..model.motor import Motor
 from ..model.signals import CommandSignal, Signal, TorqueSignal
@@ -177,6 +177,30 @@ class Scenario(Part):
     def prefix(self, motor: str) -> str:  # noqa: ARG002
         """Prefix of the names of the variables of a motor's controller."""
         return ""
+
+    def controller_key(self, motor: str) -> str:  # noqa: ARG002
+        """Key of the table of a motor's controller."""
+        return "controller"
+
+    def with_axes(self, axes: Mapping[str, Controller]) -> Scenario:
+        """The same scenario with other sampled controllers, by the names of their motors."""
+        return self.model_copy(update={"controller": axes["motor"]})
+
+    def without_controllers(self) -> Scenario:
+        """The same scenario with its motor turned by a command of 0."""
+        return self.replace(controller=None)
+
+    def given(self) -> list[str]:
+        """Names of the shafts whose motion is given: none."""
+        return []
+
+    def input_key(self, name: str) -> str:
+        """Key of the signal or reference that an input of the core stands for."""
+        return {"load_torque": "load.torque", "reference": "controller.reference"}.get(name, name)
+
+    def gears_by_key(self) -> dict[str, Transmission]:
+        """The gear by the key of its table."""
+        return {"gearbox": self.gearbox}
 
     def sliding(self) -> dict[str, tuple[bool, bool]]:
         """Controllers that move slides: none."""

@@ -21,6 +21,7 @@ from ..inputs.named import Named, nothing
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, Force, Length, LinearSpeed, NotNegative, Number, Speed, Switch, Torque
 from ..inputs.validation import did_you_mean, shown
+from ..model.gearbox import Transmission
 from ..model.linear import Slide
 from ..model.linear_train import LinearElements
 from ..model.motor import MotorLaw
@@ -249,6 +250,39 @@ class TrainScenario(LinearElements):
     def prefix(self, motor: str) -> str:
         """Prefix of the names of the variables of a motor's controller."""
         return f"{motor}_"
+
+    def controller_key(self, motor: str) -> str:
+        """Key of the table of a motor's controller."""
+        return f"controllers.{motor}"
+
+    def with_axes(self, axes: Mapping[str, Controller]) -> TrainScenario:
+        """The same scenario with other sampled controllers, by the names of their motors."""
+        return self.model_copy(update={"controllers": dict(axes)})
+
+    def without_controllers(self) -> TrainScenario:
+        """The same scenario with the motors of its controllers turned by commands of 0."""
+        commands = {name: CommandSignal() for name in self.controllers}
+        return self.replace(controllers={}, command={**self.command, **commands})
+
+    def input_key(self, name: str) -> str:
+        """Key of the signal or reference that an input of the core stands for."""
+        if name.endswith("_load_force"):
+            slide = name.removesuffix("_load_force")
+            inclined = self.slides[slide].weight(1.0) != 0.0
+            return f"slides.{slide}.force" + (" and the weight" if inclined else "")
+        for suffix, key in (
+            ("_load_torque", "shafts.{}.torque"),
+            ("_given_speed", "shafts.{}.speed"),
+            ("_given_acceleration", "shafts.{}.speed"),
+            ("_reference", "controllers.{}.reference"),
+        ):
+            if name.endswith(suffix):
+                return key.format(name.removesuffix(suffix))
+        return f"command.{name.removesuffix('_command')}"
+
+    def gears_by_key(self) -> dict[str, Transmission]:
+        """The gears by the keys of their tables."""
+        return {f"{self.kind_of(name)}s.{name}": gear for name, gear in self.train().gears.items()}
 
     def capacities(self, initial: TrainInitial | None = None) -> dict[str, float]:
         """Hysteresis capacities at t = 0 [N·m] by gear; what is not among them is 0."""
@@ -510,7 +544,8 @@ def need_open_loop(scenario: Scenario | TrainScenario, function: str) -> None:
     InputError
     """
     if scenario.axes():
-        table, none = ("controllers", "{}") if isinstance(scenario, TrainScenario) else ("controller", "None")
+        table = scenario.controller_key("").partition(".")[0]
+        none = "None" if table == "controller" else "{}"
         has = f"a {table}" if table == "controller" else table
         raise InputError(
             f"{function}: the scenario has {has}, and this takes a drive whose commands are given; for the drive without, give "
@@ -518,14 +553,14 @@ def need_open_loop(scenario: Scenario | TrainScenario, function: str) -> None:
         )
 
 
-def need_free_motion(scenario: object, function: str) -> None:
+def need_free_motion(scenario: Scenario | TrainScenario, function: str) -> None:
     """Refuses a train in which the motion of a shaft is given, for what torques alone are to move.
 
     Raises
     ------
     InputError
     """
-    if isinstance(scenario, TrainScenario) and (given := scenario.given()):
+    if given := scenario.given():
         raise InputError(
             f"{function}: key shafts.{given[0]}.speed gives the motion of a shaft, and this takes a train that torques alone "
             "move; leave the speed out"

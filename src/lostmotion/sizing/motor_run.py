@@ -88,9 +88,8 @@ def oriented_amplitudes(result: xarray.Dataset | RunArrays, where: str) -> tuple
 
 def _controller_of(result: xarray.Dataset, where: str) -> Controller | ContinuousController | None:
     scenario = scenario_of(result)
-    if isinstance(scenario, TrainScenario):
-        return scenario.controllers.get(where.removeprefix("motors."))
-    return scenario.controller
+    controllers: dict[str, Controller | ContinuousController] = {**scenario.axes(), **scenario.continuous()}
+    return controllers.get(where.removeprefix("motors."))
 
 
 def current_voltage_power(

@@ -51,7 +51,7 @@ def pieces(study: Study, first: int, last: int) -> list[tuple[int, int]]:
 def _arrays(study: Study) -> int:
     """Number of variables of each run that are held at once."""
     wanted = needed(study)
-    if isinstance(study.scenario, TrainScenario) and together(study):
+    if together(study):
         return 0 if reductions(study) else len(channels(study))
     if core_can(study) and reductions(study):
         return 0

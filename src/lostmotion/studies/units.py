@@ -33,7 +33,7 @@ def unit_in(form: type[Scenario | TrainScenario], key: str) -> str | None:
 def unit_for(scenario: Scenario | TrainScenario, key: str) -> str | None:
     """SI unit of a dotted key of a scenario, where its controllers move slides in units of translation."""
     unit = unit_in(type(scenario), key)
-    if not unit or not key.startswith("controllers.") or not isinstance(scenario, TrainScenario):
+    if not unit or not key.startswith("controllers."):
         return unit
     return unit_of_slides(scenario.model_dump(), key, unit)
 
