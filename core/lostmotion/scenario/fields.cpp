@@ -10,7 +10,7 @@ bool within(Range range, double v) {
         case Range::not_negative: return finite && v >= 0.0;
         case Range::up_to_one: return v > 0.0 && v <= 1.0;
         case Range::share: return v >= 0.0 && v <= 1.0;
-        case Range::above_one: return finite && v > 1.0;
+        case Range::above_one: return finite && v >= 1.0;  // 1, which no file has, is that of a motor in a current loop
         case Range::limit: return v > 0.0;
         case Range::limit_or_zero: return v >= 0.0;
         case Range::bound: return !std::isnan(v);
@@ -25,7 +25,7 @@ const char* range_text(Range range) {
         case Range::not_negative: return "finite and >= 0";
         case Range::up_to_one: return "> 0 and <= 1";
         case Range::share: return ">= 0 and <= 1";
-        case Range::above_one: return "finite and > 1";
+        case Range::above_one: return "finite and >= 1";
         case Range::limit: return "> 0";
         case Range::limit_or_zero: return ">= 0";
         case Range::bound: return "a number";
