@@ -94,7 +94,8 @@ def test_the_first_commands_run(tmp_path: Path) -> None:
         words = [sys.executable, "-m", "lostmotion", *shlex.split(command)]
         printed.append(subprocess.run(words, cwd=tmp_path, check=True, capture_output=True, text=True).stdout)
     assert (tmp_path / "run.png").exists()
-    assert (tmp_path / "rig" / "rig.html").exists()
+    assert [path.name for path in tmp_path.iterdir()] == ["run.png"]  # nothing is written that was not asked for
+    assert "All charts on a page: lostmotion rig schaeffler-rt1-h-20-100 -o rig" in printed[1]
     for page in pages[1:]:
         for shown in re.findall(r"```text\n(.*?)```", (ROOT / page).read_text(), re.S):
             for line in shown.strip().splitlines():
@@ -193,6 +194,7 @@ def test_every_page_is_in_one_part_of_the_site() -> None:
     listed += re.findall(r"^(contributing|verification)$", (ROOT / "docs" / "developers.md").read_text(), re.M)
     assert len(listed) == len(set(listed))
     assert {p.stem for p in (ROOT / "docs").glob("*.md")} - {"index"} <= set(listed)
+    assert {f"notebooks/{p.stem}" for p in (ROOT / "docs" / "notebooks").glob("*.ipynb")} <= set(listed)
 
 
 def test_generated_pages_name_every_key_and_variable(generate: Any) -> None:

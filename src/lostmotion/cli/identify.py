@@ -62,7 +62,7 @@ def identify(
 
     \b
     lostmotion identify new servo/logs --rig servo.toml
-    lostmotion identify servo/identify.toml -o servo
+    lostmotion identify examples/cycloidal/baseline.toml -o identified
     """
     if str(file) == "new":
         _new(directory, rig, output)

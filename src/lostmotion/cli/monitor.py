@@ -32,6 +32,7 @@ def monitor(
 
     \b
     lostmotion monitor joint.toml logs/2026-*.csv -o joint-7
+    lostmotion monitor examples/cycloidal/baseline.toml -o monitored
     """
     from ..reports.pictures import endings
 

@@ -21,6 +21,9 @@ def reproduce(
     """Reproduce the paper "Simplified dynamic model of the transmission": figures, data and a report.
 
     Writes report.html, a single self-contained page, the data of its figures as CSV, and the constants as constants.csv. `--figures png,svg` draws each figure, too.
+
+    \b
+    lostmotion reproduce -o out
     """
     from ..errors import need
     from ..reports.pictures import endings

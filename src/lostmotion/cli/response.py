@@ -69,7 +69,7 @@ def response(
     amplitude and frequency), and all numbers (bode.csv, response.csv, characteristics.csv, and response.nc where NetCDF is installed).
 
     \b
-    lostmotion response drive.toml --amplitudes 0.025,1 --frequencies 0.1..100:60
+    lostmotion response paper-2dof-nl-small --amplitudes 0.025,1 --frequencies 1..30:12 -o bode
     lostmotion response drive.toml --compare linear.toml --refine 0.5 -o bode
     """
     from ..reports.pictures import endings

@@ -10,7 +10,7 @@ import typer
 
 from ..errors import InputError
 from .arguments import FiguresOption, complete_on_rig
-from .targets import try_directory, writing
+from .targets import need_directory, try_directory, writing
 from .terminal import busy, progress
 
 if TYPE_CHECKING:
@@ -29,9 +29,12 @@ def rig(
             autocompletion=complete_on_rig,
         ),
     ],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Directory, made if missing.")] = Path(
-        "rig"
-    ),
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="DIR", help="Directory of the report, made if missing; else none is written."
+        ),
+    ] = None,
     overrides: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help='Change or add a value, e.g. --set temperature="40 degC".'),
@@ -56,7 +59,7 @@ def rig(
 ) -> None:
     """Measure a gearbox or a screw on the virtual test rig and compare with its data sheet.
 
-    Writes rig.html (one page) and the measurements as CSV. A screw is measured at a tenth of its dynamic capacity.
+    Prints the comparison; with -o, writes rig.html (one page) and the measurements as CSV. A screw is measured at a tenth of its dynamic capacity.
 
     \b
     lostmotion rig schaeffler-rt1-h-20-100
@@ -72,7 +75,9 @@ def rig(
     pictures = endings(figures)
     if ripple is not None and logs is None:
         raise InputError("--ripple: is for the logs of a campaign; give --logs DIR, too")
-    try_directory(output if logs is None else logs)
+    need_directory(figures, output)
+    if (directory := output if logs is None else logs) is not None:
+        try_directory(directory)
     sheet = find_one_of(name, ("gearbox", "screw"))
     if isinstance(sheet, ScrewSheet):
         if logs is not None:
@@ -84,7 +89,7 @@ def rig(
 
 
 def _rig_of_screw(
-    name: str, sheet: ScrewSheet, overrides: Sequence[str], output: Path, pictures: Sequence[str]
+    name: str, sheet: ScrewSheet, overrides: Sequence[str], output: Path | None, pictures: Sequence[str]
 ) -> None:
     from ..simulation.scenario_files import screw_from_record
     from ..test_rig.screw_measurement import WORK, measure_screw
@@ -92,18 +97,20 @@ def _rig_of_screw(
     screw = screw_from_record(name, overrides)
     with progress(WORK, "Measuring") as step:
         report = measure_screw(screw, sheet, progress=step)
-    with writing(output), busy("Writing"):
-        from ..reports.screw_rig import summary_rows, write_screw_sheet
+    from ..reports.screw_rig import summary_rows, write_screw_sheet
 
-        page = write_screw_sheet(output, sheet.name, report, sheet, (), pictures)
-    _print_all(sheet.title or sheet.name, report.comparisons, summary_rows(report), (), page)
+    page = None
+    if output is not None:
+        with writing(output), busy("Writing"):
+            page = write_screw_sheet(output, sheet.name, report, sheet, (), pictures)
+    _print_all(sheet.title or sheet.name, report.comparisons, summary_rows(report), (), next_line(name, page))
 
 
 def _rig_of_gearbox(
     name: str,
     sheet: GearboxSheet,
     overrides: Sequence[str],
-    output: Path,
+    output: Path | None,
     pictures: Sequence[str],
     logs: Path | None,
     ripple: str | None,
@@ -124,11 +131,18 @@ def _rig_of_gearbox(
 
     with progress(WORK, "Measuring") as step:
         report = measure(part, sheet, notes, step)
-    with writing(output), busy("Writing"):
-        from ..reports.rig import summary_rows, write_sheet
+    from ..reports.rig import summary_rows, write_sheet
 
-        page = write_sheet(output, sheet.name, report, sheet, notes, pictures)
-    _print_all(sheet.title or sheet.name, report.comparisons, summary_rows(report), notes, page)
+    page = None
+    if output is not None:
+        with writing(output), busy("Writing"):
+            page = write_sheet(output, sheet.name, report, sheet, notes, pictures)
+    _print_all(sheet.title or sheet.name, report.comparisons, summary_rows(report), notes, next_line(name, page))
+
+
+def next_line(name: str, page: Path | None) -> str:
+    """Place of the report, or the command that writes it."""
+    return f"All charts on a page: lostmotion rig {name} -o rig" if page is None else f"The report is at {page}"
 
 
 def _print_all(
@@ -136,7 +150,7 @@ def _print_all(
     comparisons: Sequence[Comparison],
     rows: Sequence[tuple[str, str]],
     notes: Sequence[str],
-    page: Path,
+    end: str,
 ) -> None:
     print(title)
     _print_comparisons(comparisons)
@@ -144,7 +158,7 @@ def _print_all(
         print(f"  {what}: {value}")
     for note in notes:
         print(f"  note: {note}")
-    print(f"The data sheet is at {page}")
+    print(end)
 
 
 def _ripple(text: str) -> TorqueHarmonic:

@@ -123,6 +123,8 @@ def run(
 
             write_page(report, run_report(Path(scenario).stem, result.dataset()))
         print(f"The page is at {report}")
+    if output is None and plot is None and report is None and explain is None and not spectrum:
+        print(f"All charts on a page: lostmotion run {scenario} --report {Path(scenario).stem}.html")
 
 
 def _draw(plot: Path, result: RunArrays, figure: str | None) -> None:

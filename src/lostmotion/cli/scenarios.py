@@ -4,7 +4,11 @@ from __future__ import annotations
 
 
 def scenarios() -> None:
-    """List the scenarios that come with the package; `run`, `response` and `drive check` take their names."""
+    """List the scenarios that come with the package; `run`, `response` and `drive check` take their names.
+
+    \b
+    lostmotion scenarios
+    """
     from ..inputs.toml_files import read_toml
     from ..simulation.shipped import shipped_scenarios
 

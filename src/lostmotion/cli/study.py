@@ -57,7 +57,7 @@ def study(
     say why, all others are there, and the exit code is 1.
 
     \b
-    lostmotion study tolerance.toml -o tolerance
+    lostmotion study examples/tolerance.toml -o tolerance
     lostmotion study show tolerance --best peak_load_speed
     lostmotion study resume tolerance --repair
     """

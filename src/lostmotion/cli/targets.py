@@ -73,3 +73,9 @@ def writing(directory: Path, then: str = "") -> Iterator[None]:
         yield
     except OSError as error:
         raise InputError(f"{directory}: cannot be written: {error.strerror}{then}") from None
+
+
+def need_directory(figures: str | None, output: Path | None) -> None:
+    """Refuse pictures of a report that is not written."""
+    if figures is not None and output is None:
+        raise InputError(f"--figures {figures}: needs the directory of the report; add -o DIR")

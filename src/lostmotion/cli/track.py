@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .arguments import FiguresOption, Overrides, SourceArgument, number
-from .targets import try_directory, writing
+from .targets import need_directory, try_directory, writing
 from .terminal import busy, console, progress
 
 if TYPE_CHECKING:
@@ -18,9 +18,12 @@ if TYPE_CHECKING:
 
 def track(
     scenario: SourceArgument,
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Directory, made if missing.")] = Path(
-        "track"
-    ),
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="DIR", help="Directory of the report, made if missing; else none is written."
+        ),
+    ] = None,
     after: Annotated[
         float | None,
         typer.Option(
@@ -41,10 +44,10 @@ def track(
     overrides: Overrides = None,
     figures: FiguresOption = None,
 ) -> None:
-    """Pointing report: how far axes miss the direction that they follow, and what each cause contributes.
+    """Pointing report: errors of axes that follow a direction, and the contribution of each cause.
 
-    Writes track.html (one page) and its data as CSV: errors over time, over the speed of the target, and with wrong losses, at other temperatures, with wear;
-    what each cause contributes.
+    Prints the errors; with -o, writes track.html (one page) and its data as CSV: errors over time, over the speed of the target, with wrong
+    losses, at other temperatures, with wear, and the contributions.
 
     \b
     lostmotion track tracking-loss-map
@@ -56,7 +59,9 @@ def track(
 
     pictures = endings(figures)
     loaded = load(scenario, overrides or ())
-    try_directory(output)
+    need_directory(figures, output)
+    if output is not None:
+        try_directory(output)
     from ..pointing.budget import pointing_budget, runs_of
 
     angles = {}
@@ -67,12 +72,15 @@ def track(
         angles[motor.strip()] = angle.strip()
     with progress(runs_of(loaded), "Runs") as step:
         budget = pointing_budget(loaded, after=after, view=angles, progress=step)
+    _print_summary(loaded.title or Path(scenario).stem, budget)
+    if output is None:
+        print(f"All charts on a page: lostmotion track {scenario} -o track")
+        return
     with writing(output), busy("Writing"):
         from ..reports.pointing import write_pointing
 
         page = write_pointing(output, Path(scenario).stem, budget, pictures)
-    _print_summary(loaded.title or Path(scenario).stem, budget)
-    print(f"The sheet is at {page}")
+    print(f"The report is at {page}")
 
 
 def _print_summary(title: str, budget: PointingBudget) -> None:

@@ -305,10 +305,10 @@ def _response_specs(results: Results) -> Iterator[FigureSpec]:
         "Frequency response, magnitude",
         "g(f) = (i_C/ω_MRC) |F(ω)|/|F(E)|. The closed form (10) drops the friction of the motor bearings; 1-DOF-L beside it has "
         "this friction, and so have the other two. The step from the closed form to 1-DOF-L is thus the bearing, from there "
-        "to 2-DOF-NL the gearbox. The line of -3 dB is that of the closed form, 1/√2. "
+        "to 2-DOF-NL the gearbox. The line at -3 dB is the bandwidth criterion of the closed form. "
         f"{len(FREQUENCIES)} frequencies; each first harmonic comes from a motion whose states repeat within "
         f"{scientific(worst)} of their magnitude from one period to the next.",
-        tuple(_response_panels(results, "magnitude g [-]", np.abs, (2e-4, 1.5), log_y=True)),
+        tuple(_response_panels(results, "magnitude g [dB]", _decibels, (-75.0, 5.0), level=-_decibels(THREE_DECIBELS))),
         size=(10.0, 4.6),
     )
     yield FigureSpec(
@@ -320,8 +320,18 @@ def _response_specs(results: Results) -> Iterator[FigureSpec]:
     )
 
 
+def _decibels(values: Any) -> Any:
+    """Gain in dB."""
+    return 20.0 * np.log10(np.abs(values))
+
+
 def _response_panels(
-    results: Results, label: str, of: Callable[[Any], Any], y_range: tuple[float, float], **options: Any
+    results: Results,
+    label: str,
+    of: Callable[[Any], Any],
+    y_range: tuple[float, float],
+    *,
+    level: float | None = None,
 ) -> Iterator[Panel]:
     """The models at each amplitude, with the cutoff that the paper prints."""
     rigid = paper_scenario("1-DOF-L", "large")
@@ -329,7 +339,7 @@ def _response_panels(
     closed = closed_form.response(FREQUENCIES, ratio)
     normal = ratio / closed_form.rated_speed
     ends = FREQUENCIES[[0, -1]]
-    level = [Curve("-3 dB", ends, np.full(2, 1.0 / THREE_DECIBELS), LEVEL)] if "log_y" in options else []
+    levels = [] if level is None else [Curve("-3 dB", ends, np.full(2, level), LEVEL)]
     printed = Curve("2.6 Hz, printed", np.full(2, 2.6), np.array(y_range), COMMAND_STYLE)
     for amplitude, value in AMPLITUDES.items():
         curves = [Curve("1-DOF-L, closed form", FREQUENCIES, of(closed * normal), CLOSED_FORM)]
@@ -337,7 +347,7 @@ def _response_panels(
             response = results.load_response(model, amplitude) * normal
             curves.append(Curve(model, FREQUENCIES, of(response), STYLES[model]))
         title = f"$E_{{CA}}$ = {value:g}"
-        yield Panel(title, "frequency [Hz]", label, (*curves, *level, printed), y_range=y_range, log_x=True, **options)
+        yield Panel(title, "frequency [Hz]", label, (*curves, *levels, printed), y_range=y_range, log_x=True)
 
 
 def _stand_in_table() -> tuple[Any, Any, Any]:

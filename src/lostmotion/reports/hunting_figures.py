@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..errors import InputError
+from ..units.practical import charted
 
 if TYPE_CHECKING:
     import xarray
@@ -28,9 +29,11 @@ def map_figure(found: xarray.Dataset) -> Figure:
     figure = Figure(figsize=(10.0, 4.0), layout="constrained")
     x, y = found[dims[1]], found[dims[0]]
     cycles = np.isfinite(found["frequency"].values)
-    labels = {"amplitude": f"amplitude of {found.attrs['variable']} (SI)", "frequency": "frequency [Hz]"}
+    amplitude, factor = _amplitude(found)
+    labels = {"amplitude": amplitude, "frequency": "frequency [Hz]"}
     for axes, (name, label) in zip(figure.subplots(1, 2, sharey=True), labels.items(), strict=True):
-        shown: Any = np.ma.masked_array(found[name].values, ~cycles)
+        values = found[name].values * (factor if name == "amplitude" else 1.0)
+        shown: Any = np.ma.masked_array(values, ~cycles)
         mesh = axes.pcolormesh(x.values, y.values, shown, cmap="cividis", shading="nearest", rasterized=True)
         unstable = np.where(cycles & ~found["stable"].values, 1.0, np.nan)
         if np.isfinite(unstable).any():
@@ -40,6 +43,15 @@ def map_figure(found: xarray.Dataset) -> Figure:
         axes.set_xlabel(_label(x))
     figure.axes[0].set_ylabel(_label(y))
     return figure
+
+
+def _amplitude(found: xarray.Dataset) -> tuple[str, float]:
+    """Label of the amplitude, and the factor from SI to its unit."""
+    name = found.attrs["variable"].replace("_", " ")
+    if "units" not in found["amplitude"].attrs:
+        return f"amplitude of {name} (SI)", 1.0
+    unit, factor = charted(found["amplitude"].attrs["units"], small=True)
+    return f"amplitude of {name} [{unit}]", factor
 
 
 def _label(key: xarray.DataArray) -> str:

@@ -95,7 +95,7 @@ def maps(response: xarray.Dataset, output: str) -> list[Panel]:
     with np.errstate(divide="ignore", invalid="ignore"):
         gain = 20.0 * np.log10(np.abs(values))
         shown = gain > np.nanmax(np.where(np.isfinite(gain), gain, -np.inf)) - MAP_DEPTH
-        harmonics = np.where(shown & (distortion > 0.0), np.log10(distortion), np.nan)
+        harmonics = np.where(shown, 100.0 * distortion, np.nan)
     phase = np.degrees(np.unwrap(np.angle(np.where(np.isfinite(values), values, 1.0)), axis=1))
     label = f"amplitude of the {response.attrs['source'].replace('_', ' ')} [{unit_of_source(response)}]"
 
@@ -111,7 +111,7 @@ def maps(response: xarray.Dataset, output: str) -> list[Panel]:
         ),
         panel("phase", "[degrees]", np.where(shown, phase, np.nan)),
         panel("mean efficiency", "[-]", response["efficiency"].values),
-        panel("harmonics above the first / first", "power of ten", harmonics),
+        panel("total harmonic distortion", "[%]", harmonics),
     ]
 
 

@@ -57,11 +57,16 @@ def summary(result: xarray.Dataset | RunArrays) -> str:
             f"  energy [J]: from the motor {e['source']:.4g}; {parts}; stored {e['kinetic_change'] + e['elastic_change']:.4g}"
         )
         if e["turned_over"] > 0.0:
-            lines.append(f"  energy balance closes to {abs(e['residual']) / e['turned_over']:.1e}")
+            lines.append(balance_line(abs(e["residual"]) / e["turned_over"]))
     lines += [*contact_lines(result), *error_lines(result)]
     lines += [f"  warning: {result.attrs['warning']}"] if "warning" in result.attrs else []
     lines += [f"  note: {result.attrs['note']}"] if "note" in result.attrs else []
     return "\n".join(lines)
+
+
+def balance_line(share: float) -> str:
+    """Error of the energy balance relative to the energy that was turned over."""
+    return f"  energy balance closes to {'rounding' if share < 1e-12 else f'{share:.1e}'}"
 
 
 def contact_lines(result: xarray.Dataset | RunArrays) -> list[str]:
@@ -132,7 +137,7 @@ def train_summary(result: xarray.Dataset | RunArrays) -> str:
         parts = ", ".join(f"{name} {value:.4g}" for name, value in e.items() if value != 0.0 and name not in apart)
         lines.append(f"  energy [J]: {parts or 'none'}")
         if e["turned_over"] > 0.0:
-            lines.append(f"  energy balance closes to {abs(e['residual']) / e['turned_over']:.1e}")
+            lines.append(balance_line(abs(e["residual"]) / e["turned_over"]))
     lines += [*contact_lines(result), *error_lines(result)]
     lines += [f"  {kind}: {result.attrs[kind]}" for kind in ("warning", "note") if kind in result.attrs]
     return "\n".join(lines)

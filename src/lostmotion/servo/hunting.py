@@ -270,12 +270,14 @@ def hunting_map(
         rows = list(pool.map(point, np.ndindex(shape)))
     columns = [np.array(column).reshape(shape) for column in zip(*rows, strict=True)]
     names = tuple(key.replace(".", "_") for key in keys)
+    last = list(plain.shafts)[-1]
+    unit = {"units": plain.angle_unit(last)} if of == plain.angle_of(last) else {}
     about = [
-        ("amplitude", {"long_name": f"half of what {of} swings by"}),
+        ("amplitude", {"long_name": f"amplitude of {of}", **unit}),
         ("frequency", {"long_name": "frequency of the limit cycle", "units": "Hz"}),
         ("stable", {"long_name": "whether neighbouring motions approach it"}),
         ("verdict", {"long_name": "hunts, at rest, or not decided"}),
-        ("reason", {"long_name": "why there is none"}),
+        ("reason", {"long_name": "reason for a missing limit cycle"}),
     ]
     data = {name: (names, column, attrs) for (name, attrs), column in zip(about, columns, strict=True)}
     coords = {n: (n, values, {"long_name": key}) for n, (key, values) in zip(names, keys.items(), strict=True)}

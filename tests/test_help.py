@@ -1,0 +1,67 @@
+"""The examples of `--help`: each command has one that runs from a checkout, leaves only what it names, and prints at most a screen."""
+
+import inspect
+import shlex
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.main import get_command
+from typer.testing import CliRunner
+
+from conftest import ROOT
+from lostmotion.cli import app
+
+SCREEN = 60  # lines
+# Commands that take minutes with any input that is worth showing; their other tests run them on less.
+LONG = {"select": "1705 pairs", "identify": "three models of three logs", "reproduce": "all figures of the paper"}
+
+
+def commands(group: Any, prefix: tuple[str, ...] = ()) -> dict[tuple[str, ...], Any]:
+    """Commands by their words, those within groups too."""
+    found: dict[tuple[str, ...], Any] = {}
+    for name, command in group.commands.items():
+        if hasattr(command, "commands"):
+            found |= commands(command, (*prefix, name))
+        else:
+            found[(*prefix, name)] = command
+    return found
+
+
+COMMANDS = commands(get_command(app))
+
+
+def examples_of(command: Any) -> list[list[str]]:
+    """Words of the examples in the help of a command, without the name of the program."""
+    _, _, block = inspect.cleandoc(command.help or "").partition("\b\n")
+    lines = [line.partition(" > ")[0].strip() for line in block.splitlines()]
+    return [shlex.split(line)[1:] for line in lines if line.startswith("lostmotion ")]
+
+
+def can_run(words: list[str]) -> bool:
+    """Whether all input files that an example names are in the checkout."""
+    targets = {words[k + 1] for k, word in enumerate(words[:-1]) if word in ("-o", "--plot", "--report", "--logs")}
+    files = [word for word in words if word.endswith((".toml", ".csv")) and word not in targets]
+    return "new" not in words and all((ROOT / file).exists() for file in files)
+
+
+@pytest.mark.parametrize("name", COMMANDS, ids=" ".join)
+def test_the_help_of_a_command_has_an_example_that_runs(
+    name: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    examples = [words for words in examples_of(COMMANDS[name]) if can_run(words)]
+    if name == ("study",):
+        examples = [words for words in examples if "show" not in words and "resume" not in words]
+    assert examples and tuple(examples[0][: len(name)]) == name
+    if name[0] in LONG:
+        pytest.skip(LONG[name[0]])
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    words = [*examples[0], "--no-open"] if name == ("live",) else examples[0]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 0, done.output
+    left = {path.name for path in tmp_path.iterdir()} - {"examples"}
+    assert left <= {Path(word).name for word in words} | {"drive.html", "paper-2dof-nl-small.html"}
+    if name not in (("schema",), ("scenarios",), ("catalogue",)):  # lists, whose length is that of their subject
+        assert len(done.stdout.splitlines()) <= SCREEN
+    assert "-0.0 " not in done.stdout
