@@ -114,3 +114,18 @@ def test_records_without_data_are_listed_apart(tmp_path: Path):
 def test_illustrative_records_are_no_candidates_unless_asked_for():
     assert "paper-gearbox" not in names_that_fit("gearbox", {"ratio": [85.0, 95.0]})
     assert names_that_fit("gearbox", {"name": "paper-*"}) == ["paper-gearbox"]
+
+
+def test_a_candidate_whose_run_violates_a_limit_is_run_in_slower_cycles(tmp_path: Path):
+    """Friction, backlash and gains are those of the pair; its tracking error falls with the speed."""
+    loose = task_of({**ARM, "task": {**ARM["task"], "max_inertia_ratio": 1e9}})
+    error = float(lm.select(loose)["tracking_error_peak"].values[0])
+    tight = task_of({**ARM, "task": {**ARM["task"], "max_inertia_ratio": 1e9, "max_tracking_error": 0.95 * error}})
+    ranked = candidates(read_table(study(tight, tmp_path / "rows")), tight)
+    (miss,) = misses(tight, ranked, 1)
+    assert miss.candidate.ran
+    assert miss.lacks == pytest.approx({"tracking_error_peak": 1.0 / 0.95 - 1.0}, rel=1e-9)
+    assert miss.slower is not None
+    row = tight.parameters(miss.candidate.run, miss.candidate.run + 1)[0]
+    columns, _ = Axes(slowed(tight, miss.slower)).measured(row)
+    assert columns["tracking_error_peak"] <= 0.95 * error

@@ -62,11 +62,11 @@ def show_selection(table: pa.Table, study: Study) -> Shown:
     unknown = not_judged(ranked)
     told = _misses(near) if near else _misfits(ranked)
     lines = [*_ranking(table, ranked, front, select), *_costs(table, costs, objective), *told, *_unknown(unknown)]
-    several = len(select.objectives) > 1
+    several = len(select.objectives) > 1 and any(all(map(math.isfinite, c.values.values())) for c in ranked)
     chart = [Group("pareto", "", PARETO, (pareto_panel(table, ranked, front, select),), 1)] if several else []
     return Shown(
         lines=lines,
-        verdict=_verdict(table, ranked, costs, select),
+        verdict=_verdict(table, ranked, costs, select, near),
         parts=(
             *chart,
             *_ranking_tables(table, ranked, front, select),
@@ -79,7 +79,9 @@ def show_selection(table: pa.Table, study: Study) -> Shown:
     )
 
 
-def _verdict(table: pa.Table, ranked: list[Candidate], costs: list[Price], select: Selection) -> Headline:
+def _verdict(
+    table: pa.Table, ranked: list[Candidate], costs: list[Price], select: Selection, near: list[Miss]
+) -> Headline:
     """Number of pairs that fit, the best one, and the limit that costs most."""
     fitting = [c for c in ranked if c.fits]
     failed = sum(NOT_RUN in c.violated for c in ranked)
@@ -92,6 +94,9 @@ def _verdict(table: pa.Table, ranked: list[Candidate], costs: list[Price], selec
         lines.append(
             f"Best: {best.name}, {labelled(table, objective)} {best.values[objective]:.5g} ({direction}){tightest}."
         )
+    elif near:
+        lines.append(f"Nearest: {near[0].candidate.name}: {near[0]}.")
+        lines.append(f"The limit {costs[0].limit} excludes most: {costs[0].excludes}.")
     dear = [p for p in costs if math.isfinite(p.gain) and p.gain > 0.0]
     if dear:
         p = max(dear, key=lambda price: price.gain)

@@ -18,6 +18,8 @@ from .study import Study
 
 SLOWEST = 10.0  # times as long as the cycle of the task, the longest that is tried
 STEPS = 12  # halvings: the factor is found to 0.3 % at most
+FITS = "fits if"  # begins what is said of a cycle that fits
+TRIES = (1.02, 1.05, 1.1, 1.2, 1.5, 2.0, 3.0)  # factors for a candidate whose run violates a limit
 DIGITS = 100.0  # of a factor: it is rounded up to hundredths
 
 
@@ -134,15 +136,29 @@ def _slowed_signal(signal: Any, factor: float) -> Any:
 def _tried(study: Study, miss: Miss) -> Miss:
     """With the least factor by which the cycle has to be longer, if there is one, and what rules and run say of it."""
     row = study.parameters(miss.candidate.run, miss.candidate.run + 1)[0]
-    if miss.candidate.ran:  # its rules pass, and the run of a slower cycle is not monotonic in its errors
-        return miss
     try:
+        if miss.candidate.ran:
+            return _run_slower(study, miss, row)
         factor = least_factor(study, row)
         if factor is None:
             return Miss(miss.candidate, miss.lacks, None, f"no cycle up to {SLOWEST:g} times as long passes the rules")
         return Miss(miss.candidate, miss.lacks, factor, _said(study, slowed(study, factor), row, factor))
     except (InputError, RuntimeError) as error:
         return Miss(miss.candidate, miss.lacks, None, f"a slower cycle was not tried: {error}")
+
+
+def _run_slower(study: Study, miss: Miss, row: np.ndarray) -> Miss:
+    """With the first of some factors whose run fits: errors of runs need not fall steadily with the time, so that none is sought between."""
+    for factor in TRIES:
+        slower = slowed(study, factor)
+        if Axes(slower).refused(row) is None and (said := _said(study, slower, row, factor)).startswith(FITS):
+            return Miss(miss.candidate, miss.lacks, factor, said)
+    return Miss(
+        miss.candidate,
+        miss.lacks,
+        None,
+        f"its run violates a limit in all cycles tried, up to {TRIES[-1]:g} times as long",
+    )
 
 
 def least_factor(study: Study, row: np.ndarray) -> float | None:
@@ -180,7 +196,7 @@ def _said(study: Study, slower: Study, row: np.ndarray, factor: float) -> str:
             over.append(name)
     if over:
         return f"passes the rules if {times}; the run then violates {', '.join(over)}"
-    return f"fits if {times}"
+    return f"{FITS} {times}"
 
 
 @dataclass(frozen=True)
