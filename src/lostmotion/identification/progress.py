@@ -53,7 +53,7 @@ class Progress:
             self._path.unlink(missing_ok=True)
 
     def read(self, key: str, name: str) -> dict[str, Any] | None:
-        """What is kept of a model."""
+        """Read what is kept of a model."""
         return self._kept.get(key, {}).get(name)
 
     def write(self, key: str, name: str, data: dict[str, Any]) -> None:

@@ -76,7 +76,7 @@ class InputChannel(Part):
     filter_time: FormulaText = 0.0
     """time constant of a first-order filter of the channel, before the limits [s]"""
     smoothing: Annotated[Time, NotNegative] = 0.0
-    """of a measured motion, ``SHAFT_given_speed``: length of the local cubics that smooth it, and differentiate a channel of an angle"""
+    """smoothing of a measured motion, ``SHAFT_given_speed``: length of the local cubics that smooth it, and differentiate a channel of an angle"""
 
 
 class MeasuredChannel(Part):

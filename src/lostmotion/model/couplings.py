@@ -14,7 +14,7 @@ FULL_COMMAND = 1.0 + 1e-9
 
 
 class BetweenShafts(Part):
-    """What joins two shafts."""
+    """Base of the elements that join two shafts."""
 
     input: str
     """shaft"""

@@ -58,7 +58,7 @@ class Actuated:
     joints
         Names of the joints with a drive, in the order of all arrays.
     drives
-        By joint: the drive, with the inertia of the robot in the place of its load's own.
+        By joint: the drive, with the inertia of the robot in place of its load's own.
     substeps
         Substeps of the drives within a step of MuJoCo, chosen so that the natural frequency of the stiffest mesh times the
         substep is at most 0.5.
@@ -113,7 +113,7 @@ class Actuated:
 
     @property
     def drives(self) -> dict[str, Driven]:
-        """By joint: the drive, with the inertia of the robot in the place of its load's own."""
+        """By joint: the drive, with the inertia of the robot in place of its load's own."""
         return {name: d.drive for name, d in self._drives.items()}
 
     def simulation(self, joint: str) -> Any:
@@ -148,7 +148,7 @@ class Actuated:
 
     @property
     def counts(self) -> dict[str, int]:
-        """How often drives have been advanced, and in how many substeps the coupling with the robot was not solved to rounding."""
+        """Number of advances of drives, and of substeps in which the coupling with the robot was not solved to rounding."""
         return {"evaluations": self._trains.evaluations, "unsettled": self._trains.unsettled}
 
     def reset(self, keyframe: int | None = None, *, held: bool = False) -> None:
@@ -377,7 +377,7 @@ def _substeps(drives: Sequence[JointDrive], step: float) -> int:
 
 
 def drive_of_joint(joint: str, given: Any, controller: Controller | None) -> Driven:
-    """What `attach` is given for a joint, as a drive, a scenario with a controller, or a train.
+    """Return the argument of `attach` for a joint as a drive, a scenario with a controller, or a train.
 
     Raises
     ------
@@ -407,7 +407,7 @@ def drive_of_joint(joint: str, given: Any, controller: Controller | None) -> Dri
 
 
 def _named(joint: str, name: str) -> Drive | Scenario:
-    """Of a shipped scenario or a scenario file that one, of a gearbox of the catalogue a drive with an ideal torque source."""
+    """Shipped scenario or scenario file by its name; for a gearbox of the catalogue a drive with an ideal torque source."""
     if name.endswith(".toml") or name in shipped_scenarios():
         return load_drive(name)
     if name not in {record.name for record in catalogue()}:
@@ -505,7 +505,7 @@ def attach(
 
 
 def _clear(model: mujoco.MjModel, name: str, *, replace: bool) -> None:
-    """What describes a drive of a joint in MuJoCo itself, off.
+    """Remove MuJoCo's own description of the drive of a joint.
 
     Raises
     ------

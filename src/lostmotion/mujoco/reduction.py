@@ -33,7 +33,7 @@ FASTEST_SHARE = 0.1
 
 @dataclass(frozen=True)
 class Reduction:
-    """What describes a drive best in MuJoCo for one motion."""
+    """Best description of a drive in MuJoCo for one motion."""
 
     armature: float
     """inertia of the drive at the joint [kg·m²]"""

@@ -27,13 +27,13 @@ class JointDrive:
     """A drive that turns a joint."""
 
     name: str
-    """of the joint"""
+    """name of the joint"""
     drive: Driven
     """with the inertia of the load that the multibody engine has given it"""
     simulation: Simulation = field(repr=False)
     train: DriveTrain = field(repr=False)
     shaft: str
-    """whose angle is that of the joint"""
+    """shaft whose angle is that of the joint"""
     command: int | None
     """place of the command among the inputs of the solver; None: a controller turns the motor"""
     command_scale: float
@@ -82,7 +82,7 @@ class JointDrive:
 
 
 def joint_drive(name: str, drive: Driven, inertia: float, step: float) -> JointDrive:
-    """A drive for a joint, with the inertia [kg·m²] of what the joint moves in the place of the load's own.
+    """A drive for a joint, with the inertia [kg·m²] of what the joint moves in place of the load's own.
 
     Raises
     ------
@@ -199,7 +199,7 @@ class JointTrains:
 
     @property
     def evaluations(self) -> int:
-        """How often a drive has been advanced since the beginning."""
+        """Number of advances of a drive since the beginning."""
         return int(self._core.evaluations)
 
     @property
@@ -209,7 +209,7 @@ class JointTrains:
 
     @property
     def state(self) -> tuple[tuple[SimulationState, ...], list[tuple[float, float]]]:
-        """Of all drives, with `guesses`."""
+        """State of all drives, with `guesses`."""
         return tuple(d.simulation.state for d in self.drives), self.guesses
 
     @state.setter
