@@ -1,6 +1,7 @@
 // What a solver knows of a motion beside its state.
 #pragma once
 
+#include <algorithm>
 #include <array>
 
 #include "../kernel/form.hpp"
@@ -16,12 +17,18 @@ struct CourseOf {
     // Of the speed of a twist, which ends the regime by touching zero, too. What rounding leaves of a zero is relative
     // to the largest magnitude of its terms.
     struct Twist {
-        bool off_zero = false;           // has it been off zero?
-        double grazing_magnitude = 0.0;  // the largest magnitude of its terms [rad/s]
-        double doubt = 0.0;              // rounding of the rate where the regime began, relative to the rate
-        double most_doubt = 0.0;         // the same as a speed of the twist [rad/s]
+        bool off_zero = false;  // has it been off zero?
+        // The largest magnitude of its terms, and of the change of speed by the terms of the first rate [rad/s].
+        double grazing_magnitude = 0.0;
+        double doubt = 0.0;       // rounding of the rate where the regime began, relative to the rate
+        double most_doubt = 0.0;  // the same as a speed of the twist [rad/s]
     };
     std::array<Twist, D::twists> twist{};
+
+    // Has the regime begun?
+    bool has_magnitudes() const {
+        return std::any_of(twist.begin(), twist.end(), [](const Twist& t) { return t.grazing_magnitude > 0.0; });
+    }
 
     // In another regime: what is kept of the numbers means nothing.
     void forget() {

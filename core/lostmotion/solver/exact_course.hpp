@@ -65,8 +65,10 @@ inline auto ExactSolver<System>::bound_ahead(Entry& e, const Coupled& x) const -
     return e.propagator.level(first_level).exponential_bound * absolute(x);
 }
 
-// Rounding of a rate that is computed from the state, where a regime begins, as far as it acts on the twists. What
-// the search for the modes takes for zero must not be seen to fall at once.
+// Rounding of the rate where a regime begins, as far as it acts on the twists. A number that the search for the modes
+// takes for zero must not be seen to fall at once. Under inputs that vary, this rounding is the least twist speed that
+// counts as zero at a touch. Torques near balance move a twist by small differences of large numbers, so that the
+// rounding of the speed exceeds that of its largest value.
 template <class System>
 inline auto ExactSolver<System>::begin_in_doubt(Entry& e, const Cursor& at, const Memory& memory) -> void {
     State magnitude = e.rates.magnitude(magnitudes(at.x()), magnitudes(memory), at.input().magnitudes());
@@ -75,6 +77,10 @@ inline auto ExactSolver<System>::begin_in_doubt(Entry& e, const Cursor& at, cons
     const Coupled ahead = bound_ahead(e, coupled(at.rate())), rounding_ahead = bound_ahead(e, coupled(magnitude));
     for (int t = 0; t < e.n_twists; ++t) {
         auto& twist = course_.twist[t];
+        if (!at.carries_rate()) {
+            twist.grazing_magnitude = rounding_ahead[e.twists[t].state];
+            continue;
+        }
         const double bound = ahead[e.twists[t].state];
         twist.most_doubt = rounding * rounding_ahead[e.twists[t].state];
         twist.doubt = bound > twist.most_doubt ? twist.most_doubt / bound : 1.0;

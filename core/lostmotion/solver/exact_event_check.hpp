@@ -27,7 +27,8 @@ inline auto ExactSolver<System>::run_regime(const Segment<System>& segment, doub
     Cursor *cursor = begin_, *end = there_;
     Ends *here = &ends_[0], *there = &ends_[1];
     const bool constant_inputs = cursor->constant_inputs();
-    if (!course_.rate_known && cursor->carries_rate()) begin_in_doubt(e, *cursor, segment.memory);
+    if (cursor->carries_rate() ? !course_.rate_known : e.may_graze && !course_.has_magnitudes())
+        begin_in_doubt(e, *cursor, segment.memory);
     if (e.regime.n_guards == 0 && LongStep<D>::pays(p, limit - time_) && leap(e, limit)) return Status::done;
     evaluate(e, constant, *cursor, *here);
     Coupled forced{};  // bound on what the fourth derivatives of the inputs add to that of the state, per second

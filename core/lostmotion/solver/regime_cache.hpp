@@ -48,6 +48,7 @@ class RegimeCache {
         };
         std::array<Twist, D::twists> twists;
         int n_twists = 0;
+        bool may_graze = false;  // has one of them such a guard?
         // The guards that are multiples of the rate of a twist: its own speed, and that of one end while the other
         // is at rest.
         struct TwistSpeed {
@@ -126,6 +127,7 @@ class RegimeCache {
         }
         void find_twists(const System& system) {
             n_twists = n_twist_speeds = 0;
+            may_graze = false;
             for (int t = 0; t < system.n_twists(); ++t) {
                 Twist& twist = twists[n_twists];
                 twist = {system.twist_state(t), -1};
@@ -137,6 +139,7 @@ class RegimeCache {
                     if (factor != 0.0 && regime.guards[g].by_grazing) twist.grazing_guard = g;
                     moves = moves || factor != 0.0;
                 }
+                may_graze |= twist.grazing_guard >= 0;
                 if (moves) ++n_twists;
             }
         }

@@ -57,16 +57,11 @@ def summary(result: xarray.Dataset | RunArrays) -> str:
             f"  energy [J]: from the motor {e['source']:.4g}; {parts}; stored {e['kinetic_change'] + e['elastic_change']:.4g}"
         )
         if e["turned_over"] > 0.0:
-            lines.append(balance_line(abs(e["residual"]) / e["turned_over"]))
+            lines.append(f"  energy balance closes to {closes_to(result)}")
     lines += [*contact_lines(result), *error_lines(result)]
     lines += [f"  warning: {result.attrs['warning']}"] if "warning" in result.attrs else []
     lines += [f"  note: {result.attrs['note']}"] if "note" in result.attrs else []
     return "\n".join(lines)
-
-
-def balance_line(share: float) -> str:
-    """Error of the energy balance relative to the energy that was turned over."""
-    return f"  energy balance closes to {'rounding' if share < 1e-12 else f'{share:.1e}'}"
 
 
 def contact_lines(result: xarray.Dataset | RunArrays) -> list[str]:
@@ -137,10 +132,16 @@ def train_summary(result: xarray.Dataset | RunArrays) -> str:
         parts = ", ".join(f"{name} {value:.4g}" for name, value in e.items() if value != 0.0 and name not in apart)
         lines.append(f"  energy [J]: {parts or 'none'}")
         if e["turned_over"] > 0.0:
-            lines.append(balance_line(abs(e["residual"]) / e["turned_over"]))
+            lines.append(f"  energy balance closes to {closes_to(result)}")
     lines += [*contact_lines(result), *error_lines(result)]
     lines += [f"  {kind}: {result.attrs[kind]}" for kind in ("warning", "note") if kind in result.attrs]
     return "\n".join(lines)
+
+
+def closes_to(result: xarray.Dataset | RunArrays) -> str:
+    """Error of the energy balance relative to the energy that was turned over."""
+    share = float(result.attrs["energy_residual"])
+    return "rounding" if share < 1e-12 else f"{share:.1e}"
 
 
 # --- the page ---
@@ -164,9 +165,7 @@ def run_report(name: str, result: xarray.Dataset) -> Report:
     told = [line for line in lines if line.startswith(("warning:", "note:"))]
     others = [line for line in lines if line not in told]
     e = energy_of(result) if "energy" in result.attrs else {}
-    closes = (
-        f"; the energy balance closes to {abs(e['residual']) / e['turned_over']:.1e}" if e.get("turned_over") else ""
-    )
+    closes = f"; the energy balance closes to {closes_to(result)}" if e.get("turned_over") else ""
     last = float(result["time"][-1])
     first = (
         f"{last:g} s with {result.attrs['switching_count']} switchings, by the {result.attrs['solver']} solver{closes}."

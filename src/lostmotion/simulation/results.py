@@ -18,7 +18,7 @@ from ..inputs.kept import kept
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
 from ..version import __version__
-from .ledger import ledger_of, with_energy
+from .ledger import largest_stored, ledger_of, with_energy
 from .scenario import Scenario
 from .switchings import ATTRIBUTE as SWITCHINGS
 from .switchings import CONTACTS_OF_TRAIN, columns_of, packed
@@ -160,7 +160,7 @@ def raw_result(
             f"of its edge. Extend {losses}."
         )
     if ledger:
-        attributes = with_energy(attributes, result["energy"])
+        attributes = with_energy(attributes, result["energy"], largest_stored(data))
     if note := scenario.note():
         attributes["note"] = note
     order = (v.name for v in variables_of(scenario) if v.name in data)
@@ -342,7 +342,8 @@ def attributes_with_energy(result: xarray.Dataset | RunArrays) -> Mapping[str, A
     scenario = result.scenario if isinstance(result, RunArrays) else scenario_of(result)
     if any(controller.law for controller in scenario.axes().values()):
         return attributes
-    return with_energy(attributes, ledger_of(scenario))
+    data = result.values if isinstance(result, RunArrays) else result
+    return with_energy(attributes, ledger_of(scenario), largest_stored(data))
 
 
 def whole(result: xarray.Dataset) -> xarray.Dataset:
