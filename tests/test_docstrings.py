@@ -3,7 +3,6 @@
 import doctest
 import importlib
 import inspect
-import os
 import re
 from collections.abc import Iterator
 from typing import Any
@@ -84,5 +83,5 @@ def test_an_example_prints_what_it_shows(name: str, monkeypatch: pytest.MonkeyPa
 
 def test_few_examples_are_skipped() -> None:
     skipped = [name for name in EXAMPLES if "+SKIP" in (inspect.getdoc({**FUNCTIONS, **CLASSES}[name]) or "")]
-    assert skipped == ["select"]  # takes a minute
-    assert os.path.exists(ROOT / "examples" / "select-axis.toml")
+    assert [name for name in skipped if not name.startswith("mujoco.")] == ["select"]  # MuJoCo is optional; a minute
+    assert (ROOT / "examples" / "select-axis.toml").exists()

@@ -39,6 +39,12 @@ def test_long_sentences_are_recognised() -> None:
     assert [len(words_of(s)) for s in found] == [5, 3, 31]
 
 
+def test_the_change_log_lists_what_a_release_has() -> None:
+    lines = (ROOT / "CHANGELOG.md").read_text().splitlines()
+    assert len(lines) <= 60  # of 0.1.0 alone; a longer one has become a diary
+    assert [line for line in lines if len(line) > 120] == []
+
+
 def length_of(node: ast.expr) -> int:
     """Characters of a text in the code; a value that is filled in counts as eight."""
     match node:

@@ -96,6 +96,7 @@ def reduce(
     Returns
     -------
     Reduction
+        The fitted values, with the error of the torque.
 
     Raises
     ------
@@ -188,7 +189,7 @@ def _not_negative(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
 
 
 def from_mjcf(model: mujoco.MjSpec | mujoco.MjModel, joint: str, *, ratio: float | None = None) -> Drive:
-    """The drive that a joint of a MuJoCo model describes: a rigid gear without losses, its friction on the load.
+    """Return the drive that a joint of a MuJoCo model describes: a rigid gear without losses, its friction on the load.
 
     Parameters
     ----------
@@ -210,6 +211,11 @@ def from_mjcf(model: mujoco.MjSpec | mujoco.MjModel, joint: str, *, ratio: float
         The joint is unknown, has no armature, or has no actuator and no ratio is given.
     MissingLibraryError
         MuJoCo is not installed.
+
+    Examples
+    --------
+    >>> drive = lm.mujoco.from_mjcf("arm.xml", "elbow", ratio=100)              # doctest: +SKIP
+    >>> drive.gearbox.ratio                                                     # doctest: +SKIP
     """
     need("mujoco", "lostmotion.mujoco", "mujoco")
     import mujoco
