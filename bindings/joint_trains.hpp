@@ -37,7 +37,7 @@ inline void bind_joint_trains(nb::module_& m) {
             [](T* self, const std::vector<TrainSimulation*>& trains, const std::vector<int>& shafts) {
                 std::vector<T::Joint> joints;
                 for (std::size_t k = 0; k < trains.size(); ++k) {
-                    if (T::unsuitable(*trains[k], shafts[k]) != -1)
+                    if (!T::suits(*trains[k], shafts[k]))
                         throw nb::value_error("a load shaft without load torque, or whose angle is no state");
                     joints.push_back({trains[k], shafts[k]});
                 }

@@ -210,6 +210,9 @@ def test_data_that_was_changed_is_noticed() -> None:
         arm.step([1.0])
     with pytest.raises(lm.InputError, match='joint "wrist" has no drive'):
         arm.step({"wrist": 1.0})
+    for wrong in ({"elbow": math.nan}, "ab", 5, [None, 1.0]):
+        with pytest.raises(lm.InputError, match="must be 2 finite numbers"):
+            arm.step(wrong)
 
 
 def test_a_gearbox_of_the_catalogue_is_attached_by_its_name() -> None:

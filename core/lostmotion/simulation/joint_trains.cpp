@@ -18,10 +18,10 @@ int angle_of(const model::Assembly& a, int shaft) {
 
 }  // namespace
 
-int JointTrains::unsuitable(const TrainSimulation& train, int shaft) {
+bool JointTrains::suits(const TrainSimulation& train, int shaft) {
     const model::Assembly& a = train.assembly();
     const bool loaded = a.places().shafts[static_cast<std::size_t>(shaft)].load != model::nowhere;
-    return loaded && angle_of(a, shaft) != model::nowhere ? -1 : shaft;
+    return loaded && angle_of(a, shaft) != model::nowhere;
 }
 
 JointTrains::JointTrains(std::vector<Joint> joints) : joints_(std::move(joints)) {

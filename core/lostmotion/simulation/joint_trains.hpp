@@ -33,10 +33,10 @@ class JointTrains {
         int speed_state = -1, angle_state = -1, load = -1;  // in the kernel, and the input
     };
 
-    // The first shaft that cannot be the load of a joint, or -1.
-    static int unsuitable(const TrainSimulation& train, int shaft);
+    // Whether a shaft can be the load of a joint: it has a load torque, and its angle is a state.
+    static bool suits(const TrainSimulation& train, int shaft);
 
-    // The trains must stay and fulfil unsuitable().
+    // The trains must stay and fulfil suits().
     explicit JointTrains(std::vector<Joint> joints);
 
     const std::vector<Joint>& joints() const { return joints_; }

@@ -53,8 +53,8 @@ class Actuated:
     ----------
     model, data
         The `mujoco.MjModel` and its `mujoco.MjData`. After `step` position, speed, time and `qacc` (mean over the step) are those
-        at the end; what follows from them (`xpos`, sensors, contacts) is that of the middle of the step. Call
-        ``mujoco.mj_forward(model, data)`` where it is wanted at the end.
+        at the end; poses of bodies and contacts are those of the middle of the step, and sensors are not evaluated. Call
+        ``mujoco.mj_forward(model, data)`` where they are wanted at the end.
     joints
         Names of the joints with a drive, in the order of all arrays.
     drives
@@ -94,9 +94,8 @@ class Actuated:
             )
         self._trains = JointTrains(made)
         self._inertias = inertias
-        self._reflected = np.array([d.reflected_inertia for d in made])
         # What contacts feel of a joint at the pose that MuJoCo scales its constraints with.
-        model.dof_armature[self._dofs] = self._reflected
+        model.dof_armature[self._dofs] = [d.reflected_inertia for d in made]
         mujoco.mj_setConst(model, self.data)
         model.dof_armature[self._dofs] = 0.0
         self._mass = mass
@@ -106,6 +105,8 @@ class Actuated:
         self._contact = np.zeros(model.nv)
         self._last: tuple[np.ndarray, np.ndarray] | None = None
         self._damping = model.dof_damping.copy().reshape(model.nv, -1)[:, 0]
+        self._damped = bool(self._damping.any())
+        self._among_drives = np.ix_(self._dofs, self._dofs)
         self.reset()
 
     def __repr__(self) -> str:
@@ -257,7 +258,7 @@ class Actuated:
         mj.mj_fullM(m, d, self._mass)
         force: np.ndarray = d.qfrc_smooth.copy()
         # Viscous friction of joints without a drive, at the mean of the speeds at both ends.
-        if self._damping.any():
+        if self._damped:
             force += 0.5 * h * self._damping * acceleration
             self._mass[np.diag_indices_from(self._mass)] += 0.5 * h * self._damping
         return force
@@ -274,9 +275,9 @@ class Actuated:
         if others.size:
             self._inverse = np.linalg.inv(mass[np.ix_(others, others)])
             self._across = mass[np.ix_(dofs, others)]
-            self._own = mass[np.ix_(dofs, dofs)] - self._across @ self._inverse @ self._across.T
+            self._own = mass[self._among_drives] - self._across @ self._inverse @ self._across.T
         else:
-            self._own = mass[np.ix_(dofs, dofs)]
+            self._own = mass[self._among_drives]
 
     def _advance(self, h: float, force: np.ndarray, *, smooth: bool) -> np.ndarray:
         """Advance the drives under forces at the middle of the step; the mean acceleration of all joints."""
@@ -330,7 +331,7 @@ class Actuated:
         values, vectors = np.linalg.eigh(0.5 * (mobility + mobility.T))
         least_mobility = 1.0 / (STIFFEST * self._inertias.max())
         stiffness = (vectors / np.maximum(values, least_mobility)) @ vectors.T
-        self._mass[np.ix_(dofs, dofs)] += stiffness - self._own
+        self._mass[self._among_drives] += stiffness - self._own
         d.M[:] = self._mass[self._rows, m.M_colind]
         mj.mj_factorM(m, d)
         d.qacc_smooth[:] = free
@@ -347,8 +348,11 @@ class Actuated:
                 if name not in self._drives:
                     meant = did_you_mean(name, self.joints, f"those are {listed(self.joints)}")
                     raise InputError(f"ctrl: joint {shown(name)} has no drive; {meant}")
-            return [float(ctrl.get(name, 0.0)) for name in self.joints]
-        values = np.asarray(ctrl, dtype=float).ravel().tolist()
+            ctrl = [ctrl.get(name, 0.0) for name in self.joints]
+        try:
+            values = [float(value) for value in ctrl]
+        except (TypeError, ValueError):
+            values = []
         if len(values) != len(self.joints) or not all(map(math.isfinite, values)):
             raise InputError(
                 f"ctrl: {shown(ctrl)} must be {len(self.joints)} finite numbers, for {listed(self.joints)}"
