@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .arguments import FiguresOption, Overrides, SourceArgument, number
+from .arguments import FiguresOption, Overrides, SourceArgument
 from .targets import try_directory, try_file, writing
 from .terminal import busy, console, fail, progress
 
@@ -32,13 +32,12 @@ def servo(
         typer.Option("--motor", metavar="NAME", help="Whose controller; may be left out where there is one."),
     ] = None,
     window: Annotated[
-        float | None,
+        str | None,
         typer.Option(
             "--window",
             metavar="ANGLE",
-            parser=number("rad"),
-            help='Within which a move has settled, e.g. "1 arcmin"; left out, four encoder steps at the reference\'s shaft, at least a '
-            "thousandth of the reference's range.",
+            help='Within which a move has settled, e.g. "1 arcmin", of a slide "5 um"; left out, four encoder steps at the reference\'s '
+            "shaft, at least a thousandth of the reference's range.",
         ),
     ] = None,
     rule: Annotated[
@@ -94,8 +93,9 @@ def servo(
         with busy("Tuning"):
             tuned = tune(loaded, rule=rule, feedforward=feedforward, motor=motor)
         loaded = tuned.scenario
+    settled = None if window is None else _settled(loaded, motor, window)
     with progress(total, "Commissioning") as step:
-        report = commission(loaded, motor=motor, window=window, progress=step)
+        report = commission(loaded, motor=motor, window=settled, progress=step)
     written = []
     for path in files:
         assert tuned is not None
@@ -118,6 +118,20 @@ def servo(
     print("\n".join([*written, _next(scenario, files, directories, rule)]))
     if not report.stable:
         fail(f"unstable: {'; '.join(map(str, report.instabilities()))}")
+
+
+def _settled(scenario: Any, motor: str | None, window: str) -> float:
+    """The window in SI: an angle, or of a slide a distance."""
+    from ..errors import InputError
+    from ..inputs.validation import shown
+    from ..servo.regimes import axis_of
+    from ..units.conversion import si_value
+
+    axis = axis_of(scenario, motor)
+    try:
+        return si_value(window, axis.train.angle_unit(axis.shaft))
+    except ValueError as error:
+        raise InputError(f"--window: {shown(window)} {error}") from None
 
 
 def _targets(output: list[Path], rule: str | None) -> tuple[list[Path], list[Path]]:

@@ -47,7 +47,7 @@ def points_csv(response: xarray.Dataset, output: str) -> str:
     reasons = map(str, response["reason"].transpose("amplitude", "frequency").values.ravel())
     rows = [[*point, *row, reason] for point, row, reason in zip(points, numbers, reasons, strict=True)]
     header = ["amplitude", "frequency [Hz]", "gain", "phase [degrees]", "distortion", "efficiency", "motor_power [W]"]
-    header += ["gear_loss [W]", "angle advance [rad]", "residual", "multiplier"]
+    header += ["gear_loss [W]", f"angle advance [{response['angle_advance'].attrs['units']}]", "residual", "multiplier"]
     return table_csv([*header, *(["spread"] if "spread" in response else []), "reason"], rows)
 
 

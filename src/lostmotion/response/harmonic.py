@@ -250,6 +250,7 @@ def _labelled(
     points, stable = _of_each_point(r, found)
     grid, each = ("amplitude", "frequency"), ("output", "amplitude", "frequency")
     units = {v.name: v.unit for v in plant.variables}
+    of_points = {**OF_EACH_POINT, "angle_advance": (units.get(plant.angle, "rad"), OF_EACH_POINT["angle_advance"][1])}
     return xr.Dataset(
         {
             "response": (each, np.moveaxis(response, -1, 0), {"long_name": f"first harmonic / that of the {source}"}),
@@ -261,7 +262,7 @@ def _labelled(
             ),
             **{
                 name: (grid, points[name], {"units": unit_, "long_name": meaning})
-                for name, (unit_, meaning) in OF_EACH_POINT.items()
+                for name, (unit_, meaning) in of_points.items()
             },
             "stable": (grid, stable),
             "reason": (grid, reasons, {"long_name": "why there is no periodic motion"}),

@@ -33,6 +33,7 @@ MAX_POINTS = 4000  # of a step response
 REST = 10.0  # of the slowest time constants of the loops, for which an axis is watched at least
 MOST_TICKS = 4e6  # for which it is watched at most
 PATIENCE = 4.0  # times as long as the whole axis, for which one without a possible cause is watched
+FINEST_BITS = 40  # of an encoder
 
 
 @dataclass(frozen=True)
@@ -420,12 +421,15 @@ def without_steps(axis: Axis) -> Axis | None:
     for key in ("encoder", "position_encoder"):
         encoder = getattr(axis.controller, key)
         if encoder is not None and encoder.step > 0.0:
-            none = {
+            none: dict[str, Any] = {
                 "lines": None,
                 "bits": None,
+                "grating_period": None,
                 "resolution": None,
                 "ideal": True,
                 "error_periods": encoder.error_periods or encoder.lines,
             }
+            if encoder.grating_period is not None and encoder.error > 0.0:  # which has that period
+                none = {"bits": FINEST_BITS}
             fields[key] = encoder.model_copy(update=none)
     return with_controller(axis, **fields) if fields else None

@@ -29,6 +29,7 @@ from ..inputs.schema import follow, unit_in_schema
 from ..inputs.validation import shown
 from ..simulation.axis_form import file_schema
 from ..simulation.keys import parse_override
+from ..simulation.linear_units import unit_of_slides
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
 from .data import frictions, inertias, lag_sum, two_inertias
@@ -100,7 +101,8 @@ class Tuning:
         controller.speed.gain: 0.00829 N·m·s/rad -> 0.00829231 N·m·s/rad
         controller.speed.integral_gain: 0.1266 N·m/rad -> 0.126631 N·m/rad
         """
-        return [(key, _value(key, old), _value(key, new)) for key, (old, new) in self.changed.items()]
+        units = {key: self._unit(key) for key in self.changed}
+        return [(key, _value(old, units[key]), _value(new, units[key])) for key, (old, new) in self.changed.items()]
 
     @checked
     def write(self, path: Path, source: ScenarioName | Path, overrides: Iterable[str] = ()) -> None:
@@ -136,10 +138,15 @@ class Tuning:
         if path.suffix != ".toml":
             raise InputError(f"{path}: a scenario is a TOML file; its name must end in .toml")
         values = dict(map(parse_override, overrides))
-        values |= {key: _with_unit(key, new) for key, (_, new) in self.changed.items()}
+        values |= {key: _with_unit(new, self._unit(key)) for key, (_, new) in self.changed.items()}
         notes = [f" by the rule {self.rule}: {self.why}"]
         notes += [f": {key}, {old} -> {new}" for key, old, new in self.changes()]
         write_changed(path, self.scenario, source, values, notes)
+
+    def _unit(self, key: str) -> str | None:
+        """The SI unit of a key of the scenario: of a slide m and N in place of rad and N*m."""
+        unit = _unit(key)
+        return unit and unit_of_slides(self.scenario.model_dump(), key, unit)
 
     def __str__(self) -> str:
         """The gains with units, in the words of a scenario and of manufacturers."""
@@ -161,8 +168,11 @@ def _conventions(
         rows.append(("", f"{gain * math.pi / 30.0:.5g} N·m/rpm", "the same per revolution in a minute"))
     if torque_constant is not None:
         amps = gain / torque_constant
-        rows.append(("", f"{amps:.5g} A/(rad/s)", f"with {torque_constant:.4g} N·m/A"))
-        rows.append(("", f"{1e3 * amps * math.pi / 30.0:.5g} mA/rpm", "the same per revolution in a minute"))
+        if linear_motor:
+            rows.append(("", f"{amps:.5g} A/(m/s)", f"with {torque_constant:.4g} N/A"))
+        else:
+            rows.append(("", f"{amps:.5g} A/(rad/s)", f"with {torque_constant:.4g} N·m/A"))
+            rows.append(("", f"{1e3 * amps * math.pi / 30.0:.5g} mA/rpm", "the same per revolution in a minute"))
     if integral_gain:
         time = gain / integral_gain
         rows.append(("speed loop, integral time", f"{1e3 * time:.5g} ms", "K_p/K_i, reset time T_N"))
@@ -535,14 +545,13 @@ def _differences(old: Any, new: Any, key: str) -> Iterator[tuple[str, tuple[Any,
 
 @cache
 def _unit(key: str) -> str | None:
-    """The SI unit of a key of a scenario."""
+    """The SI unit of a key of a scenario, for shafts."""
     _, nodes = follow(file_schema(), tuple(key.split(".")))
     return next((unit for node in nodes if (unit := unit_in_schema(node)) is not None), None)
 
 
-def _with_unit(key: str, value: Any) -> Any:
+def _with_unit(value: Any, unit: str | None) -> Any:
     """A value as a scenario file writes it."""
-    unit = _unit(key)
     if isinstance(value, float) and unit not in (None, "", "1"):
         return f"{value!r} {unit}"
     if isinstance(value, list | tuple):
@@ -550,11 +559,10 @@ def _with_unit(key: str, value: Any) -> Any:
     return value
 
 
-def _value(key: str, value: Any) -> str:
+def _value(value: Any, unit: str | None) -> str:
     """A value with its unit, for readers."""
     if value is None or (isinstance(value, list | tuple) and not value):
         return "none"
     if isinstance(value, list | tuple):
-        return ", ".join(" ".join(f"{k} {_value('', v)}" for k, v in f.items() if v is not None) for f in value)
-    unit = (_unit(key) or "").replace("*", "·") if key else ""
-    return f"{value:.6g} {unit}".strip() if isinstance(value, float) else str(value)
+        return ", ".join(" ".join(f"{k} {_value(v, None)}" for k, v in f.items() if v is not None) for f in value)
+    return f"{value:.6g} {(unit or '').replace('*', '·')}".strip() if isinstance(value, float) else str(value)

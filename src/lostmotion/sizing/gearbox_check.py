@@ -19,17 +19,21 @@ if TYPE_CHECKING:
     from ..simulation.results import RunArrays
 
 
-def loads(g: Transmission, peak: float, cycle: DutyCycle, where: str = "gearbox") -> list[Finding]:
-    """Mean and largest output torque, `peak` [N·m] being the latter. where: the table of the gearbox."""
+def loads(
+    g: Transmission, peak: float, cycle: DutyCycle, where: str = "gearbox", *, slides: bool = False
+) -> list[Finding]:
+    """Mean and largest output torque, `peak` [N·m] being the latter. where: the table of the gearbox; slides: it moves a slide, by a
+    force [N]."""
+    torque, unit = ("force", "N") if slides else ("torque", "N·m")
     average = g.limits.average_output_torque if g.limits else None
-    name = "rated output torque" if average is None else "average output torque"
+    name = f"{'rated' if average is None else 'average'} output {torque}"
     return [
         within(
             "average_output_torque",
-            "output torque, cubic mean",
+            f"output {torque}, cubic mean",
             cycle.mean_output_torque(),
             average or g.rated_output_torque,
-            "N·m",
+            unit,
             name,
             key=f"{where}.rated_output_torque",
             cycle=cycle,
@@ -37,11 +41,11 @@ def loads(g: Transmission, peak: float, cycle: DutyCycle, where: str = "gearbox"
         _with_momentary(
             within(
                 "peak_output_torque",
-                "output torque, largest",
+                f"output {torque}, largest",
                 peak,
                 g.limits.peak_output_torque if g.limits else None,
-                "N·m",
-                "repeated peak torque of the gearbox",
+                unit,
+                f"repeated peak {torque} of the gearbox",
                 key=f"{where}.limits.peak_output_torque",
             ),
             peak,
@@ -95,7 +99,7 @@ def locks(train: DriveTrain, gear: str, torques: Collection[float]) -> list[Find
     return [
         Finding(
             "self_locking",
-            f"lowering {v.overrunning.load_torque:.4g} N·m on {v.gear}",
+            f"lowering {v.overrunning.load_torque:.4g} {'N' if v.moves_slide else 'N·m'} on {v.gear}",
             v.brief,
             "ok" if v.lowering == "smooth" else "warning",
             v.remedy,

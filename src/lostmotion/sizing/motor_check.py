@@ -17,45 +17,49 @@ from .finding import Finding, Verdict, within
 from .thermal import TwoBodies, mean_square, steady_rise
 
 
-def largest_speed(m: Motor, speed: float, where: str = "motor") -> Finding:
-    """speed: the largest of the run [rad/s]. where: the table of the motor."""
+def largest_speed(m: Motor, speed: float, where: str = "motor", *, slides: bool = False) -> Finding:
+    """speed: the largest of the run [rad/s], of a motor that moves a slide [m/s]. where: the table of the motor."""
     limit = m.limits.max_speed if m.limits else None
+    factor, unit, what = (
+        (1.0, "m/s", "speed, largest") if slides else (RPM, "rpm", "input speed, largest, for the motor")
+    )
     return within(
         "max_motor_speed",
-        "input speed, largest, for the motor",
-        RPM * speed,
-        None if limit is None else RPM * limit,
-        "rpm",
+        what,
+        factor * speed,
+        None if limit is None else factor * limit,
+        unit,
         "largest speed of the motor",
         key=f"{where}.limits.max_speed",
     )
 
 
-def peak_torque(m: Motor, torque: np.ndarray, where: str = "motor") -> list[Finding]:
-    """The largest of the run [N·m]; nothing where no limit is known, as that of the current then judges."""
+def peak_torque(m: Motor, torque: np.ndarray, where: str = "motor", *, slides: bool = False) -> list[Finding]:
+    """The largest of the run [N·m], of a motor that moves a slide [N]; nothing where no limit is known, as that of the current then judges."""
     limit = m.limits.peak_torque if m.limits else None
     if limit is None:
         return []
     key = f"{where}.limits.peak_torque"
     largest = float(abs(torque).max())
-    return [
-        within("motor_peak_torque", "motor torque, largest", largest, limit, "N·m", "peak torque of the motor", key=key)
-    ]
+    word, unit = ("force", "N") if slides else ("torque", "N·m")
+    what, name = f"motor {word}, largest", f"peak {word} of the motor"
+    return [within("motor_peak_torque", what, largest, limit, unit, name, key=key)]
 
 
 def heat(
-    m: Motor, cycle: DutyCycle, ambient: float, where: str = "motor", *, rise: float | None = None
+    m: Motor, cycle: DutyCycle, ambient: float, where: str = "motor", *, rise: float | None = None, slides: bool = False
 ) -> list[Finding]:
     """Torque over the cycle and the temperature of the winding at this ambient temperature [°C]; `rise` [K] over it, where that is
-    known already."""
+    known already. slides: the motor moves a slide, by a force."""
     limits = m.limits
+    word, unit = ("force", "N") if slides else ("torque", "N·m")
     torque = cycle.rms_motor_torque()
     continuous = (
         limits.continuous_torque if limits is not None else None if m.kind == "torque_source" else m.rated_torque
     )
-    name = "continuous torque of the motor"
+    name = f"continuous {word} of the motor"
     key = f"{where}.limits.continuous_torque"
-    findings = [within("motor_torque", "motor torque, rms", torque, continuous, "N·m", name, key=key, cycle=cycle)]
+    findings = [within("motor_torque", f"motor {word}, rms", torque, continuous, unit, name, key=key, cycle=cycle)]
     if limits is None or limits.max_winding_temperature is None or m.copper_loss() is None:
         return findings
     permissible = limits.max_winding_temperature

@@ -54,7 +54,7 @@ def _gear(scenario: TrainScenario, name: str, result: RunArrays) -> list[Finding
     cycle = duty_cycle(
         result, None, speed=f"{gear.input}_speed", motor_torque=train.input_torque_of(name), output_torque=torque
     )
-    findings = loads(gear, float(abs(result[torque]).max()), cycle, where)
+    findings = loads(gear, float(abs(result[torque]).max()), cycle, where, slides=train.is_slide(gear.output))
     if gear.rated_input_speed is not None or gear.limits is not None:
         findings += input_speeds(gear, cycle, where)
     findings = _named(name, findings)
@@ -92,10 +92,11 @@ def _motor(scenario: TrainScenario, name: str, result: RunArrays) -> list[Findin
     command, T, w = (result[key] for key in (f"{name}_command", torque, speed))
     command = command_of_run(motor, scenario.controllers.get(name), command, T, w)
     oriented = oriented_amplitudes(result, where)
+    slides = train.is_slide(motor.shaft)
     findings = [
-        largest_speed(motor, float(abs(w).max()), where),
-        *peak_torque(motor, T, where),
-        *heat(motor, cycle, Task().ambient_temperature, where),
+        largest_speed(motor, float(abs(w).max()), where, slides=slides),
+        *peak_torque(motor, T, where, slides=slides),
+        *heat(motor, cycle, Task().ambient_temperature, where, slides=slides),
         voltage(motor, command, T, w, where, oriented=None if oriented is None else oriented[1]),
         current(motor, T, where),
     ]
