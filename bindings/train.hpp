@@ -103,6 +103,18 @@ class TrainDescription : public model::TrainDescription {
             if (s.name == shaft)
                 s.domain = domain == "translation" ? model::Domain::translation : model::Domain::rotation;
     }
+    void add_mass_matrix(const std::string& name, const std::vector<std::string>& shafts,
+                         const std::vector<std::vector<double>>& matrix) {
+        model::TrainDescription::add_mass_matrix(name, shafts, matrix);
+    }
+    // The same train with other numbers in one of its mass matrices.
+    TrainDescription with_mass_matrix(const std::string& name, const std::vector<std::vector<double>>& matrix) const {
+        TrainDescription other = *this;
+        other.run_.reset();
+        for (model::MassMatrix& m : other.train.mass_matrices)
+            if (m.name == name) m.matrix = matrix;
+        return other;
+    }
     void add_motor(const std::string& name, const std::string& shaft, const nb::dict& fields) {
         model::ShaftMotor m;
         m.name = name;
@@ -366,6 +378,10 @@ inline void bind_train(nb::module_& m) {
         .def("add_gear", &TrainDescription::add_gear, "name"_a, "input"_a, "output"_a, "fields"_a,
              nb::sig("def add_gear(self, name: str, input: str, output: str, fields: collections.abc.Mapping[str, "
                      "typing.Any]) -> None"))
+        .def("add_mass_matrix", &TrainDescription::add_mass_matrix, "name"_a, "shafts"_a, "matrix"_a,
+             "Inertias [kg m2] of several shafts, in place of their own.")
+        .def("with_mass_matrix", &TrainDescription::with_mass_matrix, "name"_a, "matrix"_a,
+             "The same train with other numbers in one of its mass matrices.")
         .def("set_domain", &TrainDescription::set_domain, "shaft"_a, "domain"_a)
         .def("set_housing", &TrainDescription::set_housing, "gear"_a, "shaft"_a)
         .def("add", &TrainDescription::add, "table"_a, "name"_a, "shaft"_a, "fields"_a,

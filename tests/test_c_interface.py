@@ -83,6 +83,9 @@ class Train:
             self.add(
                 "lm_add_shaft", name, s.inertia, s.viscous_friction, torque, breakaway, None, name in scenario.loaded()
             )
+        for name, mass in train.mass_matrices.items():
+            shafts = (c.c_char_p * len(mass.shafts))(*(shaft.encode() for shaft in mass.shafts))
+            self.add("lm_add_mass_matrix", name, shafts, len(mass.shafts), doubles(np.ravel(mass.matrix)))
         for name, m in train.motors.items():
             limit = m.torque_limit if m.torque_limit is not None else float("inf")
             parameters = self.parameters(m, "motor")
@@ -175,7 +178,7 @@ class Simulation:
         return np.array(values)
 
 
-PLAIN = [path for path in TRAINS if path.stem in ("worm-lowering", "two-motors-one-ring")]
+PLAIN = [path for path in TRAINS if path.stem in ("worm-lowering", "two-motors-one-ring", "two-link-arm-frozen")]
 
 
 @pytest.mark.parametrize("path", PLAIN, ids=lambda path: path.stem)

@@ -207,6 +207,10 @@ LM_API int lm_limit_mesh_damping(lm_train* train, const char* gear);
  * results have the names "<name>_position" and "<name>_load_force". The ratio of a screw of lead p that drives it is 2
  * pi/p. LM_INVALID: there is none of that name. */
 LM_API int lm_set_slide(lm_train* train, const char* shaft);
+/* The inertias of n shafts in place of their own, which are then 0: n x n numbers, row by row, symmetric and positive
+ * definite. Between two shafts [kg m2], between two slides [kg], between one of each [kg m]. */
+LM_API int lm_add_mass_matrix(lm_train* train, const char* name, const char* const* shafts, size_t n,
+                              const double* matrix);
 /* Puts the housing of a gear, by default on the frame, on a shaft. LM_INVALID: there is none of that name. */
 LM_API int lm_set_housing(lm_train* train, const char* gear, const char* shaft);
 /* torque while it slips, breakaway_torque at rest (0: the same), at command 1. */

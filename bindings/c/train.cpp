@@ -200,6 +200,23 @@ int lm_set_slide(lm_train* train, const char* shaft) {
     });
 }
 
+int lm_add_mass_matrix(lm_train* train, const char* name, const char* const* shafts, size_t n, const double* matrix) {
+    return train->attempt([&] {
+        std::string wrong = name_error(*train, name);
+        if (wrong.empty() && (shafts == nullptr || matrix == nullptr || n == 0))
+            wrong = "mass matrix '" + text(name) + "' has no shafts or no numbers";
+        if (!wrong.empty()) return wrong;
+        std::vector<std::string> names;
+        std::vector<std::vector<double>> rows;
+        for (size_t k = 0; k < n; ++k) {
+            names.push_back(text(shafts[k]));
+            rows.emplace_back(matrix + k * n, matrix + (k + 1) * n);
+        }
+        train->description.add_mass_matrix(name, names, std::move(rows));
+        return wrong;
+    });
+}
+
 int lm_set_housing(lm_train* train, const char* gear, const char* shaft) {
     return train->attempt([&] {
         const auto named = [](const char* name) {

@@ -186,6 +186,12 @@ class Train:
 
     def add_gear(self, name: str, input: str, output: str, fields: Mapping[str, Any]) -> None: ...
 
+    def add_mass_matrix(self, name: str, shafts: Sequence[str], matrix: Sequence[Sequence[float]]) -> None:
+        """Inertias [kg m2] of several shafts, in place of their own."""
+
+    def with_mass_matrix(self, name: str, matrix: Sequence[Sequence[float]]) -> Train:
+        """The same train with other numbers in one of its mass matrices."""
+
     def set_domain(self, shaft: str, domain: str) -> None: ...
 
     def set_housing(self, gear: str, shaft: str) -> None: ...

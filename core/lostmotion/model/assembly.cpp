@@ -18,6 +18,7 @@ Regime Assembly::build(const Key& key) const {
         for (Row& f : *rows) forms.push_back(&f);
     r.solvable = Statics(places(), key, r.ties, motion).solve(forms);
     equations_.set_rates(key, motion, r);
+    equations_.add_coupled_inertias(r);
     RegimeGuards(equations_, *this, r).add_all();
     return r;
 }

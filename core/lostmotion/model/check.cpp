@@ -1,10 +1,13 @@
 #include "check.hpp"
 
+#include "eigenvalue.hpp"
+
 namespace lostmotion::model {
 
 std::string TrainCheck::operator()() const {
-    for (const auto check : {&TrainCheck::shafts_exist, &TrainCheck::controllers, &TrainCheck::elements,
-                             &TrainCheck::inertias, &TrainCheck::rigid_loops, &TrainCheck::turned, &TrainCheck::sizes})
+    for (const auto check :
+         {&TrainCheck::shafts_exist, &TrainCheck::mass_matrices, &TrainCheck::controllers, &TrainCheck::elements,
+          &TrainCheck::inertias, &TrainCheck::rigid_loops, &TrainCheck::turned, &TrainCheck::sizes})
         if (std::string error = (this->*check)(); !error.empty()) return error;
     return {};
 }
@@ -136,6 +139,54 @@ std::string TrainCheck::elements() const {
     return {};
 }
 
+std::string TrainCheck::mass_matrices() const {
+    constexpr double rounding = 1e-12;  // of entries that were computed, relative to the diagonal
+    const auto number = [](double v) {
+        char text[32];
+        std::snprintf(text, sizeof text, "%.6g", v);
+        return std::string(text);
+    };
+    std::vector<std::string> of(train_.shafts.size());
+    for (std::size_t k = 0; k < train_.mass_matrices.size(); ++k) {
+        const MassMatrix& m = train_.mass_matrices[k];
+        const std::size_t n = m.shafts.size();
+        const std::string name = named("mass matrix", m.name, k);
+        if (n == 0) return name + " names no shaft; give it shafts";
+        for (const int s : m.shafts) {
+            if (!exists(s))
+                return name + " names shaft number " + std::to_string(s) + ", which the train does not have";
+            std::string& before = of[static_cast<std::size_t>(s)];
+            if (before == name) return name + " names " + shaft(s) + " twice; name it once";
+            if (!before.empty())
+                return name + " names " + shaft(s) + ", which is in " + before + " too; leave it in one";
+            before = name;
+            if (train_.shafts[static_cast<std::size_t>(s)].inertia != 0.0)
+                return name + " holds the inertia of " + shaft(s) + ", which has an inertia of its own, " +
+                       number(train_.shafts[static_cast<std::size_t>(s)].inertia) +
+                       "; leave that out and add it to the diagonal";
+        }
+        const auto& M = m.matrix;
+        if (M.size() != n || std::any_of(M.begin(), M.end(), [n](const auto& row) { return row.size() != n; }))
+            return name + " is for " + std::to_string(n) + " shafts; give its matrix " + std::to_string(n) +
+                   " rows of " + std::to_string(n) + " numbers";
+        for (std::size_t a = 0; a < n; ++a)
+            for (std::size_t b = 0; b < a; ++b)
+                if (!(std::fabs(M[a][b] - M[b][a]) <= rounding * std::sqrt(std::fabs(M[a][a] * M[b][b]))))
+                    return name + " is not symmetric: between " + shaft(m.shafts[b]) + " and " + shaft(m.shafts[a]) +
+                           " it has " + number(M[b][a]) + " and " + number(M[a][b]) + "; give both the same value";
+        bool positive = true;
+        auto scaled = M;  // to ones on the diagonal, so that units do not matter
+        for (std::size_t a = 0; a < n; ++a) {
+            positive = positive && M[a][a] > 0.0;
+            for (std::size_t b = 0; b < n; ++b) scaled[a][b] /= std::sqrt(std::fabs(M[a][a]) * std::fabs(M[b][b]));
+        }
+        if (!positive || !(smallest_eigenvalue(scaled) > rounding))
+            return name + " is not positive definite: its smallest eigenvalue is " + number(smallest_eigenvalue(M)) +
+                   "; with it some motion would have no kinetic energy";
+    }
+    return {};
+}
+
 std::string TrainCheck::inertias() const {
     const Places places(train_);
     // While all dry contacts slip: are those without at rest if all that have one are?
@@ -204,6 +255,10 @@ std::string TrainCheck::turned() const {
         act_on(c->output);
     }
     for (const ShaftMotor& m : train_.motors) act_on(m.shaft);
+    for (const CoupledInertia& c : Places(train_).coupled_inertias) {
+        act_on(c.a);
+        act_on(c.b);
+    }
     for (std::size_t s = 0; s < acted_on.size(); ++s)
         if (train_.shafts[s].given_motion) act_on(static_cast<int>(s));
     for (const auto& e : shaft_elements(train_))

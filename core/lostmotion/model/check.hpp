@@ -35,6 +35,8 @@ class TrainCheck {
 
     std::string elements() const;
 
+    // Mass matrices: their shafts, sizes, symmetry and eigenvalues.
+    std::string mass_matrices() const;
     std::string inertias() const;
 
     // Rigid gears alone: a loop either locks the train or leaves its torques undetermined.

@@ -45,8 +45,8 @@ void Equations::compose_motors(const Key& key, Regime& r) const {
     }
 }
 
-// T_2 = P(d) + H, with damping while the flanks touch, of a limited one at most another P; T_1 without the losses that act on the contact of the input
-// shaft, which are `loss`: M_2B sign(w)/i with M_2B of one cell of the loss law (12).
+// T_2 = P(d) + H, with damping while the flanks touch, of a limited one at most another P; T_1 without the losses that
+// act on the contact of the input shaft, which are `loss`: M_2B sign(w)/i with M_2B of one cell of the loss law (12).
 void Equations::compose_gear(int gear, const Key& key, Regime& r, std::vector<Row>& loss) const {
     const Gear& g = train_.gears[gear];
     const GearPlace& p = places_.gears[gear];
@@ -186,6 +186,19 @@ void Equations::add_held_shaft(int shaft, const Key& key, const Regime& r, Locke
         if (share == 0.0 || other.kind == ContactPlace::shaft) continue;
         locked.needs_torque[c] = share;
         if (other.kind == ContactPlace::gear) locked.needs -= share * forms_.spring_torque(other.element, key);
+    }
+}
+
+void Equations::add_coupled_inertias(Regime& r) const {
+    const auto add = [&](int shaft, Row& torque) {
+        places_.each_coupled_inertia(
+            shaft, [&](int other, double inertia) { torque += inertia * r.rate[places_.shafts[other].speed]; });
+    };
+    for (std::size_t k = 0; k < places_.driven.size(); ++k) add(places_.driven[k], r.drive_torque[k]);
+    for (LockedTorque<Row>& l : r.locked) {
+        if (!l.on_held_shaft) continue;
+        add(places_.contacts[l.contact].b, l.needs);
+        l.needs.c[layout_.first_memory + l.memory] = 0.0;
     }
 }
 

@@ -30,6 +30,9 @@ class Equations {
         const ShaftPlace& p = places_.shafts[shaft];
         return terms_.input(p.given_acceleration, p.inertia) - others;
     }
+    // Once the accelerations are known: what those of other shafts ask, by the mass matrix, of drives of given motions
+    // and of shafts at rest.
+    void add_coupled_inertias(Regime& r) const;
     // Rates of the states, from accelerations without reactions.
     void set_rates(const Key& key, const std::vector<Row>& acceleration, Regime& r) const;
 

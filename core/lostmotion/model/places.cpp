@@ -23,6 +23,12 @@ Places::Places(const Train& train, bool with_remainders)
         shafts[s].viscous_friction = train.shafts[s].viscous_friction;
         if (train.shafts[s].given_motion) driven.push_back(static_cast<int>(s));
     }
+    for (const MassMatrix& m : train.mass_matrices)
+        for (std::size_t a = 0; a < m.shafts.size(); ++a) {
+            shafts[m.shafts[a]].inertia = m.matrix[a][a];
+            for (std::size_t b = 0; b < a; ++b)
+                if (m.matrix[a][b] != 0.0) coupled_inertias.push_back({m.shafts[a], m.shafts[b], m.matrix[a][b]});
+        }
     for (const ShaftMotor& m : train.motors) {
         shafts[m.shaft].inertia += m.law.rotor_inertia;
         shafts[m.shaft].motor_friction += m.law.friction_torque;

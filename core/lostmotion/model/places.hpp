@@ -34,6 +34,12 @@ struct GearPlace {
     int error_turn = nowhere;    // memory
 };
 
+// What couples two shafts by a mass matrix, off its diagonal: J_a w_a' + value w_b' = T_a, and likewise of b.
+struct CoupledInertia {
+    int a, b;
+    double value;
+};
+
 struct ControllerPlace {
     int first_state = nowhere;
     int reference = nowhere, reference_rate = nowhere;  // inputs
@@ -51,6 +57,7 @@ struct Places {
     std::vector<ContactPlace> contacts;
     std::vector<int> last_shaft;  // of each part of the train, whose angle is kept
     std::vector<int> driven;      // shafts whose motion is given
+    std::vector<CoupledInertia> coupled_inertias;
 
     // with_remainders: what piecewise-linear laws leave of smooth ones enters as further inputs.
     explicit Places(const Train& train, bool with_remainders = false);
@@ -59,6 +66,15 @@ struct Places {
         unsigned given = 0;
         for (const int s : driven) given |= 1u << s;
         return tie(contacts, static_cast<int>(shafts.size()), modes, inertia, {given, given_speeds_follow});
+    }
+
+    // Calls use(shaft, inertia) for each entry of a row of the mass matrix that is not zero off the diagonal.
+    template <class Use>
+    void each_coupled_inertia(int shaft, Use&& use) const {
+        for (const CoupledInertia& c : coupled_inertias) {
+            if (c.a == shaft) use(c.b, c.value);
+            if (c.b == shaft) use(c.a, c.value);
+        }
     }
 
     template <class Now>

@@ -33,6 +33,10 @@ StoredChange stored_change(const Assembly& a, const X& from, const X& to) {
     StoredChange sum;
     for (const ShaftPlace& s : a.places().shafts)
         sum.add(&StoredChange::kinetic, kinetic_energy(s.inertia, from[s.speed], to[s.speed]));
+    for (const CoupledInertia& c : a.places().coupled_inertias) {
+        const int p = a.places().shafts[c.a].speed, q = a.places().shafts[c.b].speed;
+        sum.add(&StoredChange::kinetic, coupled_kinetic_energy(c.value, from[p], to[p], from[q], to[q]));
+    }
     for (std::size_t g = 0; g < a.train().gears.size(); ++g)
         if (const int d = a.places().gears[g].twist; !a.train().gears[g].rigid())
             sum.add(&StoredChange::elastic, a.train().gears[g].law.curve.energy(from[d], to[d]));

@@ -60,24 +60,62 @@ struct Balance {
 
 }  // namespace
 
-std::array<int, max_shafts> parts(const std::vector<ContactPlace>& contacts, const Key& key) {
+std::array<int, max_shafts> parts(const Places& places, const Key& key) {
     std::array<int, max_shafts> part;
     std::iota(part.begin(), part.end(), 0);
-    for (std::size_t k = 0; k < contacts.size(); ++k) {
-        if (key.modes[k] != 0) continue;
-        int first = part[contacts[k].a];
-        contacts[k].each_shaft([&](int s, double) { first = std::min(first, part[s]); });
-        contacts[k].each_shaft([&](int s, double) {
-            const int from = part[s];
-            std::replace(part.begin(), part.end(), from, first);
-        });
-    }
+    const auto join = [&part](int a, int b) {
+        const int first = std::min(part[a], part[b]), other = std::max(part[a], part[b]);
+        std::replace(part.begin(), part.end(), other, first);
+    };
+    for (std::size_t k = 0; k < places.contacts.size(); ++k)
+        if (key.modes[k] == 0) places.contacts[k].each_shaft([&](int s, double) { join(places.contacts[k].a, s); });
+    const auto moves_by_torques = [&](int s) { return places.shafts[s].given_acceleration == nowhere; };
+    for (const CoupledInertia& c : places.coupled_inertias)
+        if (moves_by_torques(c.a) && moves_by_torques(c.b)) join(c.a, c.b);
     return part;
 }
 
 Statics::Statics(const Places& places, const Key& key, const Ties& ties, std::vector<Row>& motion)
     : places_(places), contacts_(places.contacts), layout_(places.layout), key_(key), ties_(ties), motion_(motion) {
     for (const ShaftPlace& s : places.shafts) inertia_.push_back(s.inertia);
+    pivot_ = inertia_;
+    if (!places.coupled_inertias.empty()) factorise();
+}
+
+void Statics::factorise() {
+    const std::size_t n = inertia_.size();
+    factor_.assign(n, std::vector<double>(n));
+    Matrix left(n, std::vector<double>(n));  // of J, its lower triangle
+    for (const CoupledInertia& c : places_.coupled_inertias)
+        if (!is_given(static_cast<std::size_t>(c.a)) && !is_given(static_cast<std::size_t>(c.b)))
+            left[static_cast<std::size_t>(std::max(c.a, c.b))][static_cast<std::size_t>(std::min(c.a, c.b))] = c.value;
+    for (std::size_t k = 0; k < n; ++k)
+        for (std::size_t s = k + 1; s < n; ++s) {
+            if (left[s][k] == 0.0) continue;
+            factor_[s][k] = left[s][k] / pivot_[k];
+            for (std::size_t t = k + 1; t < s; ++t) left[s][t] -= factor_[s][k] * left[t][k];
+            pivot_[s] -= factor_[s][k] * left[s][k];
+        }
+}
+
+void Statics::divide_by_inertias() {
+    const std::size_t n = motion_.size();
+    for (std::size_t s = 0; s < n; ++s)
+        if (is_given(s)) motion_[s] = acceleration_of(s);
+    for (const CoupledInertia& c : places_.coupled_inertias) {
+        const auto a = static_cast<std::size_t>(c.a), b = static_cast<std::size_t>(c.b);
+        if (is_given(a) && !is_given(b)) motion_[b] -= c.value * motion_[a];
+        if (is_given(b) && !is_given(a)) motion_[a] -= c.value * motion_[b];
+    }
+    const auto subtract_row = [&](std::size_t to, double factor, std::size_t from) {
+        if (factor != 0.0) subtract(motion_[to], factor, motion_[from], false);
+    };
+    for (std::size_t k = 0; k < n && !factor_.empty(); ++k)
+        for (std::size_t s = k + 1; s < n; ++s) subtract_row(s, factor_[s][k], k);
+    for (std::size_t s = 0; s < n; ++s)
+        if (!is_given(s)) motion_[s] = motion_[s] / pivot_[s];
+    for (std::size_t k = n; k-- > 0 && !factor_.empty();)
+        for (std::size_t s = k + 1; s < n; ++s) subtract_row(k, factor_[s][k], s);
 }
 
 // Contacts at rest that raise the rank.
@@ -97,9 +135,8 @@ bool Statics::has_light_shafts() const {
         double least = std::numeric_limits<double>::infinity(), most = 0.0;
         const auto count = [&](std::size_t s) {
             if (is_given(s)) return;
-            const double J = inertia_[s] * speed[s] * speed[s];
-            least = std::fmin(least, J);
-            most = std::fmax(most, J);
+            least = std::fmin(least, pivot_[s] * speed[s] * speed[s]);
+            most = std::fmax(most, inertia_[s] * speed[s] * speed[s]);
         };
         count(first);
         for (bool more = true; more;) {
@@ -124,8 +161,7 @@ bool Statics::has_light_shafts() const {
 bool Statics::solve(const std::vector<Row*>& forms) {
     const std::vector<int> of = stuck();
     if (has_light_shafts()) return solve_balances(of, forms);
-    for (std::size_t s = 0; s < motion_.size(); ++s)
-        motion_[s] = is_given(s) ? acceleration_of(s) : motion_[s] / inertia_[s];
+    divide_by_inertias();
     return solve_reactions(of, forms);
 }
 
@@ -146,7 +182,7 @@ bool Statics::solve_reactions(const std::vector<int>& of, const std::vector<Row*
 }
 
 bool Statics::moves_freely(const std::vector<int>& of, const std::vector<Row>& rows) const {
-    const std::array<int, max_shafts> part = parts(contacts_, key_);
+    const std::array<int, max_shafts> part = parts(places_, key_);
     for (std::size_t p = 0; p < inertia_.size(); ++p) {
         std::vector<std::size_t> in;
         for (std::size_t k = 0; k < of.size(); ++k)
@@ -169,11 +205,11 @@ bool Statics::solve_balances(const std::vector<int>& of, const std::vector<Row*>
     if (unknowns.size() != motion_.size()) return false;
     std::vector<Balance> rows(motion_.size());
     for (int s = 0; s < shafts; ++s) {
-        const bool given = is_given(static_cast<std::size_t>(s));
-        if (given) motion_[s] = acceleration_of(static_cast<std::size_t>(s));
-        const double J = given ? 1.0 : inertia_[s];
+        if (is_given(static_cast<std::size_t>(s))) motion_[s] = acceleration_of(static_cast<std::size_t>(s));
         std::transform(motion_[s].c.begin(), motion_[s].c.end(), rows[s].c.begin(), std::negate<>());
-        heavy.each_share(s, [&](int k, double share) { rows[s].c[max_columns + k] = J * share; });
+        each_inertia(static_cast<std::size_t>(s), [&](int t, double J) {
+            heavy.each_share(t, [&](int k, double share) { rows[s].c[max_columns + k] += J * share; });
+        });
     }
     const bool free = balances_move_freely(of, heavy);
     const auto take = [](auto& f, double factor, const Balance& row) { subtract(f, factor, row, false); };
@@ -190,7 +226,7 @@ bool Statics::solve_balances(const std::vector<int>& of, const std::vector<Row*>
 }
 
 bool Statics::balances_move_freely(const std::vector<int>& of, const Ties& heavy) const {
-    const std::array<int, max_shafts> part = parts(contacts_, key_);
+    const std::array<int, max_shafts> part = parts(places_, key_);
     for (std::size_t p = 0; p < inertia_.size(); ++p) {
         std::vector<int> in;
         for (std::size_t s = 0; s < inertia_.size(); ++s)
@@ -199,10 +235,14 @@ bool Statics::balances_move_freely(const std::vector<int>& of, const Ties& heavy
         for (std::size_t row = 0; row < in.size(); ++row) {
             const int s = in[row];
             const bool given = is_given(static_cast<std::size_t>(s));
-            for (const int k : in)
-                if (heavy.free[k] >> k & 1)
-                    with[row].push_back((heavy.free[s] >> k & 1) != 0 ? (given ? 1.0 : inertia_[s]) * heavy.share[s][k]
-                                                                      : 0.0);
+            for (const int k : in) {
+                if ((heavy.free[k] >> k & 1) == 0) continue;
+                double sum = 0.0;
+                each_inertia(static_cast<std::size_t>(s), [&](int t, double J) {
+                    if ((heavy.free[t] >> k & 1) != 0) sum += J * heavy.share[t][k];
+                });
+                with[row].push_back(sum);
+            }
             without[row] = with[row];
             for (const int c : of) {
                 if (part[contacts_[c].a] != static_cast<int>(p)) continue;

@@ -9,13 +9,14 @@
 
 namespace lostmotion::model {
 
-// The first shaft of those that hang together by contacts at rest, of each shaft.
-std::array<int, max_shafts> parts(const std::vector<ContactPlace>& contacts, const Key& key);
+// For each shaft: the first shaft of those that contacts at rest and the mass matrix join to it.
+std::array<int, max_shafts> parts(const Places& places, const Key& key);
 
-// What the reactions of stuck contacts are solved from. Where the shafts of each rigidly tied part have inertias of
-// like size, reactions come first: C J^-1 (F + B lambda) = 0, C being the speeds of the contacts by those of the
-// shafts. A light shaft makes terms 1/J of that which cancel. Then all is solved at once, without a division by an
-// inertia: the balances J S a = F + B lambda of all shafts, S being their speeds by those that stay free, the heaviest.
+// What the reactions of stuck contacts are solved from, J being the mass matrix, most often diagonal. Where the shafts
+// of each rigidly tied part have inertias of like size, reactions come first: C J^-1 (F + B lambda) = 0, C being the
+// speeds of the contacts by those of the shafts. A light shaft makes terms 1/J of that which cancel. Then all is solved
+// at once, without a division by an inertia: the balances J S a = F + B lambda of all shafts, S being their speeds by
+// those that stay free, the heaviest.
 class Statics {
  public:
     // motion: of each shaft, the net torque; it becomes the acceleration. That of a shaft whose motion is given is an
@@ -28,6 +29,17 @@ class Statics {
  private:
     std::vector<int> stuck() const;
     bool has_light_shafts() const;
+    // J = L D L^T, of the shafts whose motion is not given.
+    void factorise();
+    // motion = J^-1 motion.
+    void divide_by_inertias();
+    // Calls use(shaft, inertia) for each entry of a row of J; that of a shaft whose motion is given is 1 w' = w'_given.
+    template <class Use>
+    void each_inertia(std::size_t shaft, Use&& use) const {
+        const int s = static_cast<int>(shaft);
+        use(s, is_given(shaft) ? 1.0 : inertia_[shaft]);
+        if (!is_given(shaft)) places_.each_coupled_inertia(s, use);
+    }
     bool solve_reactions(const std::vector<int>& of, const std::vector<Row*>& forms);
     bool solve_balances(const std::vector<int>& of, const std::vector<Row*>& forms);
     // Does a torque that the gears of a rigidly tied part pass on turn it forward or, while a contact of it is at its
@@ -48,7 +60,8 @@ class Statics {
     const Key& key_;
     const Ties& ties_;
     std::vector<Row>& motion_;
-    std::vector<double> inertia_;  // of each shaft
+    std::vector<double> inertia_, pivot_;      // of each shaft: the diagonals of J and of D
+    std::vector<std::vector<double>> factor_;  // L, where J is not diagonal
 };
 
 }  // namespace lostmotion::model

@@ -13,6 +13,7 @@
 #include "../elements/spring.hpp"
 #include "../parts/gear.hpp"
 #include "../parts/linear_controller.hpp"
+#include "../parts/mass_matrix.hpp"
 #include "../parts/shaft.hpp"
 #include "../parts/shaft_motor.hpp"
 
@@ -22,6 +23,7 @@ struct Train {
     // The drive of the paper: shafts `motor` and `load`, motor `motor`, gear `gearbox`. Its results have shorter names.
     bool short_form = false;
     std::vector<Shaft> shafts;
+    std::vector<MassMatrix> mass_matrices;
     std::vector<ShaftMotor> motors;
     std::vector<Gear> gears;
     std::vector<LinearController> controllers;

@@ -2,6 +2,13 @@
 
 namespace lostmotion::model {
 
+void TrainDescription::add_mass_matrix(const std::string& name, const std::vector<std::string>& shafts,
+                                       std::vector<std::vector<double>> matrix) {
+    MassMatrix m{name, {}, std::move(matrix)};
+    for (const std::string& shaft : shafts) m.shafts.push_back(place_of(shaft));
+    train.mass_matrices.push_back(std::move(m));
+}
+
 void TrainDescription::set_housing(const std::string& gear, const std::string& shaft) {
     for (Gear& g : train.gears)
         if (g.name == gear) g.housing = place_of(shaft);

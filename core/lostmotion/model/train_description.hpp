@@ -15,6 +15,8 @@ class TrainDescription {
     Train train;
 
     void add_shaft(Shaft shaft) { train.shafts.push_back(std::move(shaft)); }
+    void add_mass_matrix(const std::string& name, const std::vector<std::string>& shafts,
+                         std::vector<std::vector<double>> matrix);
     void add(ShaftMotor motor, const std::string& shaft) {
         motor.shaft = place_of(shaft);
         train.motors.push_back(std::move(motor));

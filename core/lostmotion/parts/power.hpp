@@ -27,5 +27,9 @@ inline double kinetic_energy(double inertia, double speed) { return 0.5 * inerti
 inline double kinetic_energy(double inertia, double from, double to) {
     return 0.5 * inertia * (to + from) * (to - from);
 }
+// Of two speeds that a mass matrix couples: what M_ab w_a w_b grows by.
+inline double coupled_kinetic_energy(double inertia, double a_from, double a_to, double b_from, double b_to) {
+    return 0.5 * inertia * ((a_to + a_from) * (b_to - b_from) + (a_to - a_from) * (b_to + b_from));
+}
 
 }  // namespace lostmotion

@@ -131,6 +131,13 @@ void describe(F& f, Shaft& s) {
 }
 
 template <class F>
+void describe(F& f, MassMatrix& m) {
+    f.text("name", m.name);
+    f.each("shafts", m.shafts, [&](int& s) { f.integer("shaft", s, 0, max_number); });
+    f.each("matrix", m.matrix, [&](std::vector<double>& row) { f.list("row", row); });
+}
+
+template <class F>
 void describe(F& f, ShaftMotor& m) {
     f.text("name", m.name);
     f.integer("shaft", m.shaft, 0, max_number);
@@ -173,6 +180,7 @@ void describe(F& f, Train& t) {
     const auto element = [&](auto& e) { describe(f, e); };
     f.flag("short_form", t.short_form);
     f.each("shafts", t.shafts, element);
+    f.each("mass_matrices", t.mass_matrices, element);
     f.each("motors", t.motors, element);
     f.each("gears", t.gears, element);
     Train::each_coupling_kind(t, [&](const char* table, const char*, auto& elements) {

@@ -69,11 +69,14 @@ class InverseModel(InverseModelFields):
             Not one gear alone joins the two shafts, or a gap has no rate.
         """
         gear = self._gear(train, train.motors[motor].shaft, shaft)
+        train.refuse_coupled(
+            (gear.input, gear.output), "an inverse model takes each inertia by itself; leave inverse_model out"
+        )
         here, there, m = train.shafts[gear.input], train.shafts[gear.output], train.motors[motor]
         laws = {key: getattr(self, key) for key in ("loss_adaptation", "friction_adaptation", "load_observer")}
         own = {
             "friction_torque": m.friction_torque + here.friction()[0],
-            "load_inertia": there.inertia,
+            "load_inertia": train.inertia_of(gear.output),
             **{key: value for key, value in self.core_fields().items() if value is not None},
         }
         if self.friction_adaptation is not None:
@@ -86,7 +89,7 @@ class InverseModel(InverseModelFields):
         losses = self._losses(gear)
         return own | {
             "efficiency": losses.pop("efficiency", None),
-            "motor_inertia": here.inertia + m.rotor_inertia + gear.inertia,
+            "motor_inertia": train.inertia_of(gear.input) + m.rotor_inertia + gear.inertia,
             "motor_viscous_friction": here.viscous_friction + gear.viscous_friction,
             "load_viscous_friction": there.viscous_friction,
             "losses": losses,

@@ -96,11 +96,13 @@ def missing_torque(rig: Rig, s: Stretch, known: Mapping[str, Any], rung: int, sh
     other = np.zeros(len(s.time))
     for name, shaft in train.shafts.items():
         n = ratios[name]
-        inertia, viscous = inertia + n**2 * shaft.inertia, viscous + n**2 * shaft.viscous_friction
+        inertia, viscous = inertia + n**2 * train.inertia_of(name), viscous + n**2 * shaft.viscous_friction
         slipping, _, speeds, torques = shaft.friction()
         dry += abs(n) * (np.interp(np.abs(n * s.speed), speeds, torques) if speeds else slipping)
         if name in scenario.loads():
             other += n * _acting(rig, s, known, scenario, train.load_torque_of(name))
+    for one, other_shaft, coupling in train.inertia_couplings():
+        inertia += 2.0 * ratios[one] * ratios[other_shaft] * coupling
     for gear in train.gears.values():
         n = ratios[gear.input]
         inertia, viscous = inertia + n**2 * gear.inertia, viscous + n**2 * gear.viscous_friction

@@ -59,8 +59,8 @@ class LinearElements(TrainElements):
         for name, motor in self.linear_motors.items():
             _need(f"linear_motors.{name}.slide", motor.slide, slides, shafts, "slide", "shaft")
         for key, shaft in self.references():
-            if shaft in slides:
-                table = key.partition(".")[0]
+            table = key.partition(".")[0]
+            if shaft in slides and table != "mass_matrices":
                 remedy = {
                     "gears": "write it as one of [screws], [racks] and [belts]",
                     "motors": "write it in [linear_motors]",

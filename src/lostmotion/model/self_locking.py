@@ -363,7 +363,10 @@ def _rigid_inertia(train: DriveTrain, core: _core.Train, gear: str, shaft: str) 
             if other not in factors:
                 factors[other] = factor * factors[here]
                 waiting.append(other)
-    return sum(inertias[name] * factor**2 for name, factor in factors.items())
+    together = sum(inertias[name] * factor**2 for name, factor in factors.items())
+    for one, other, coupling in train.inertia_couplings():
+        together += 2.0 * coupling * factors.get(one, 0.0) * factors.get(other, 0.0)
+    return together
 
 
 def _least_torque(

@@ -15,6 +15,7 @@ from .angle_torques import AngleTorque, Gravity
 from .couplings import Brake, Clutch, Freewheel
 from .dampers import Damper
 from .gear import Gear
+from .mass_matrix import MassMatrix
 from .motor import MotorLaw, ShaftMotor
 from .shaft import Shaft
 from .springs import Spring
@@ -33,6 +34,7 @@ COUPLINGS = ("clutches", "freewheels", "dampers")
 # What the core calls an element (core/lostmotion/model/check.hpp), and the tables that it may stand in.
 TABLES = {
     "shaft": ("shafts", "slides"),
+    "mass matrix": ("mass_matrices",),
     "motor": ("motors", "linear_motors"),
     "gear": ("gears", "screws", "racks", "belts"),
     "brake": ("brakes",),
@@ -47,6 +49,7 @@ TABLES = {
 class TrainElements(Part):
     """All of a drive train but its shafts."""
 
+    mass_matrices: Elements[MassMatrix] = Field(default_factory=nothing)
     motors: Elements[ShaftMotor] = Field(default_factory=nothing)
     gears: Elements[Gear] = Field(default_factory=nothing)
     brakes: Elements[Brake] = Field(default_factory=nothing)
@@ -72,6 +75,8 @@ class TrainElements(Part):
 
     def references(self) -> Iterator[tuple[str, str]]:
         """Each key that names a shaft, and the name."""
+        for name, mass in self.mass_matrices.items():
+            yield from ((f"mass_matrices.{name}.shafts.{k}", shaft) for k, shaft in enumerate(mass.shafts))
         for table in TrainElements.model_fields:
             for name, element in getattr(self, table).items():
                 for key in ("shaft", "input", "output", "housing"):
@@ -94,6 +99,32 @@ class DriveTrain(TrainElements):
     def is_slide(self, shaft: str) -> bool:
         """Whether it moves along a straight line."""
         return self.shafts[shaft].domain == "translation"
+
+    def inertia_of(self, shaft: str) -> float:
+        """Inertia [kg·m²] of a shaft, mass [kg] of a slide, without rotors and gears: its own or on the diagonal of a mass matrix."""
+        held = [mass.of(shaft, shaft) for mass in self.mass_matrices.values() if shaft in mass.shafts]
+        return held[0] if held else self.shafts[shaft].inertia
+
+    def refuse_coupled(self, shafts: Collection[str], what: str) -> None:
+        """Refuse shafts that a mass matrix couples to others, for what takes each inertia by itself.
+
+        Parameters
+        ----------
+        what
+            What does, and the remedy.
+
+        Raises
+        ------
+        InputError
+        """
+        for name, mass in self.mass_matrices.items():
+            for one, other, _ in mass.couples():
+                if one in shafts or other in shafts:
+                    raise InputError(f"key mass_matrices.{name}: couples {other} and {one}; {what}")
+
+    def inertia_couplings(self) -> list[tuple[str, str, float]]:
+        """(one, other, entry) of all that mass matrices couple, each pair once."""
+        return [pair for mass in self.mass_matrices.values() for pair in mass.couples()]
 
     # Names of result variables and their units, as the core has them (core/lostmotion/model/names.cpp).
 
@@ -199,6 +230,8 @@ class DriveTrain(TrainElements):
             train.add_shaft(name, s.inertia, s.viscous_friction, s.friction(), drag, name in loaded, name in given)
             if s.domain != "rotation":
                 train.set_domain(name, s.domain)
+        for name, mass in self.mass_matrices.items():
+            train.add_mass_matrix(name, mass.shafts, mass.matrix)
         for name, m in self.motors.items():
             law = driven.get(name)
             train.add_motor(name, m.shaft, m.as_dc().core_fields() | dict(() if law is None else law))

@@ -24,11 +24,13 @@ def inertias(axis: Axis, beyond: str | None = None) -> tuple[float, float]:
         train.model_copy(update={"gears": {n: g for n, g in train.gears.items() if n != beyond}}) if beyond else train
     )
     near = far = 0.0
-    for name, shaft in train.shafts.items():
+    turning = [name for name in train.shafts if turns(train, axis.motor_shaft, name) is not None]
+    train.refuse_coupled(turning, "rules for gains take the inertia of one axis alone; give the gains by hand")
+    for name in train.shafts:
         i = turns(train, axis.motor_shaft, name)
         if i is None:
             continue
-        J = shaft.inertia + sum(g.inertia for g in train.gears.values() if g.input == name)
+        J = train.inertia_of(name) + sum(g.inertia for g in train.gears.values() if g.input == name)
         J = (J + sum(m.rotor_inertia for m in train.motors.values() if m.shaft == name)) / i**2
         if turns(open_train, axis.motor_shaft, name) is None:
             far += J

@@ -60,9 +60,9 @@ class JointDrive:
         """Inertia [kg·m²] of motors and gears as the joint feels it through stiff meshes."""
         ratios = self.ratios()
         total = 0.0
-        for name, shaft in self.train.shafts.items():
+        for name in self.train.shafts:
             if name != self.shaft:
-                total += shaft.inertia * ratios[name] * ratios[name]
+                total += self.train.inertia_of(name) * ratios[name] * ratios[name]
         for motor in self.train.motors.values():
             total += motor.rotor_inertia * ratios[motor.shaft] * ratios[motor.shaft]
         for gear in self.train.gears.values():
@@ -99,6 +99,7 @@ def joint_drive(name: str, drive: Driven, inertia: float, step: float) -> JointD
             load=Load(inertia=inertia, viscous_friction=load.viscous_friction, friction_torque=load.friction_torque),
         )
     else:
+        drive.refuse_coupled(drive.shafts, f"joint {name!r} gets its inertia from the robot; leave the matrix out")
         shaft = _output_of(name, drive)
         shafts = {n: s.model_copy(update={"inertia": inertia}) if n == shaft else s for n, s in drive.shafts.items()}
         changed = drive.model_copy(update={"shafts": shafts})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from ..errors import InputError
@@ -36,7 +36,11 @@ def in_si(data: Mapping[str, Any], schema: Callable[[], Mapping[str, Any]]) -> d
         A value has the unit of something else.
     """
     slides, controllers = data.get("slides"), data.get("controllers")
-    if not isinstance(slides, Mapping) or not slides or not isinstance(controllers, Mapping):
+    if not isinstance(slides, Mapping) or not slides:
+        return dict(data)
+    if isinstance(masses := data.get("mass_matrices"), Mapping):
+        data = {**data, "mass_matrices": {name: _masses_in_si(name, mass, slides) for name, mass in masses.items()}}
+    if not isinstance(controllers, Mapping):
         return dict(data)
     of_slides: dict[str, Any] = {}
     for name, controller in controllers.items():
@@ -45,6 +49,33 @@ def in_si(data: Mapping[str, Any], schema: Callable[[], Mapping[str, Any]]) -> d
         else:
             of_slides[name] = controller
     return {**data, "controllers": of_slides}
+
+
+def _masses_in_si(name: str, mass: Any, slides: Mapping[str, Any]) -> Any:
+    """A mass matrix with the strings of slides as numbers in SI."""
+    rows = mass.get("matrix") if isinstance(mass, Mapping) else None
+    if not isinstance(rows, list | tuple) or not isinstance(mass.get("shafts"), list | tuple):
+        return mass
+
+    def read(a: int, b: int, value: Any) -> Any:
+        unit = _unit_of_mass(mass["shafts"], a, b, slides)
+        if not isinstance(value, str) or unit is None:
+            return value
+        try:
+            return Unit(unit).read(value)
+        except ValueError as error:
+            raise InputError(f"key mass_matrices.{name}.matrix.{a}.{b}: {shown(value)} {error}") from None
+
+    def row_in_si(a: int, row: Any) -> Any:
+        return [read(a, b, value) for b, value in enumerate(row)] if isinstance(row, list | tuple) else row
+
+    return {**mass, "matrix": [row_in_si(a, row) for a, row in enumerate(rows)]}
+
+
+def _unit_of_mass(shafts: Sequence[str], a: int, b: int, slides: Mapping[str, Any]) -> str | None:
+    """Unit of an entry of a mass matrix that belongs to a slide; None for others."""
+    slide = [k < len(shafts) and shafts[k] in slides for k in (a, b)]
+    return "kg" if all(slide) else "kg*m" if any(slide) else None
 
 
 def unit_of_slides(data: Mapping[str, Any], key: str, unit: str) -> str:
@@ -58,6 +89,9 @@ def unit_of_slides(data: Mapping[str, Any], key: str, unit: str) -> str:
         That it has for shafts.
     """
     table, _, rest = key.partition(".")
+    if table == "mass_matrices" and ".matrix." in rest and data.get("slides"):
+        name, _, a, b = rest.split(".")
+        return _unit_of_mass(data[table][name]["shafts"], int(a), int(b), data["slides"]) or unit
     name, _, path = rest.partition(".")
     controller = (data.get("controllers") or {}).get(name)
     if table != "controllers" or not data.get("slides") or not isinstance(controller, Mapping):

@@ -23,6 +23,7 @@ from ..inputs.quantities import Time, argument
 from ..inputs.validation import did_you_mean, listed, shown
 from ..model.couplings import FULL_COMMAND
 from ..model.drive import Drive
+from ..model.mass_matrix import MassMatrix
 from ..model.synchronous_motor import PhaseValues
 from ..model.train import DriveTrain
 from .given_motion import course_to, motion_given
@@ -64,6 +65,8 @@ class SimulationState:
     """drive of this state"""
     controllers: dict[str, Controller | ContinuousController] = field(default_factory=dict, repr=False)
     """controllers of its motors"""
+    mass_matrices: dict[str, MassMatrix] = field(default_factory=dict, repr=False)
+    """mass matrices in force at this instant"""
     bound: Any = field(default=None, repr=False)
     """state of the second simulation for an error bound"""
 
@@ -143,8 +146,9 @@ class Simulation:
         self._drive, self._train, core, self._loaded, self._given, self._initial = _parts(drive, loaded, given)
         self._core_train = core
         self._short = core.short_form
+        self._masses = dict(self._train.mass_matrices)
         names = core.input_names()
-        self._core = _core.Simulation(core, step, self._control, self._acting_always(names))
+        self._core = self._simulation_of(core)
         self._place_inputs(names)
         channels = core.channels()
         self._channel = {name: k for k, (name, *_) in enumerate(channels)}
@@ -170,6 +174,43 @@ class Simulation:
                 )
             self._bound = StepBound(_Coarser(drive, step=step, loaded=loaded, given=given, law=law), of_windings)
         self.reset(initial)
+
+    def _simulation_of(self, core: _core.Train) -> _core.Simulation:
+        return _core.Simulation(core, self._made["step"], self._control, self._acting_always(core.input_names()))
+
+    def _change_masses(self, masses: Mapping[str, MassMatrix]) -> None:
+        """Other mass matrices from now on; the contacts are found anew."""
+        changed = {name: mass for name, mass in masses.items() if mass != self._masses[name]}
+        if not changed:
+            return
+        core = self._core_train
+        for name, mass in changed.items():
+            core = core.with_mass_matrix(name, mass.matrix)
+            if problem := core.check():
+                raise InputError(f"mass_matrix: {problem}")
+        time, x, memory, regime, values, _, *rest = self._idle().get_state()
+        simulation = self._simulation_of(core)
+        simulation.set_state(time, x, memory, regime, values, False, *rest)
+        self._core, self._core_train, self._masses = simulation, core, self._masses | changed
+        if self._bound is not None:
+            self._bound.coarse._change_masses(masses)
+
+    def _masses_given(self, given: Any) -> dict[str, MassMatrix]:
+        """The mass matrices that `advance` is given, by name."""
+        if not isinstance(given, Mapping):
+            raise InputError(f"mass_matrix: {shown(given)} is no dictionary; give the rows by the name of the matrix")
+        found = {}
+        for name, matrix in given.items():
+            if name not in self._masses:
+                known = f"the mass matrices are {', '.join(self._masses) or 'none'}"
+                raise InputError(
+                    f"mass_matrix.{shown(name)}: is none of this train; {did_you_mean(name, self._masses, known)}"
+                )
+            try:
+                found[name] = MassMatrix(shafts=self._masses[name].shafts, matrix=matrix)
+            except InputError as problem:
+                raise InputError(f"mass_matrix.{name}: {problem}") from None
+        return found
 
     def _place_inputs(self, names: Sequence[str]) -> None:
         """Slots of the core for the inputs of `advance`."""
@@ -245,6 +286,7 @@ class Simulation:
             self._reset(self._initial if initial is None else initial)
 
     def _reset(self, start: Initial | TrainInitial) -> None:
+        self._change_masses(self._train.mass_matrices)
         if isinstance(start, Initial) != self._short:
             raise InputError(
                 "initial: is the state of a train; that of a drive is an Initial"
@@ -327,6 +369,7 @@ class Simulation:
         load_torque: Ramp = 0.0,
         *,
         motion: Any = None,
+        mass_matrix: Any = None,
         **inputs: Ramp,
     ) -> None:
         """Advance by an interval [s].
@@ -343,6 +386,9 @@ class Simulation:
             [rad] and ``acceleration`` [rad/s²] there. On the way from the present values the acceleration is constant; with more
             than a speed it runs in up to three straight lines, so that the end is met. The torque that this takes is the
             variable ``<shaft>_drive_torque``.
+        mass_matrix
+            By the name of a mass matrix of the train its rows [kg·m²] from now on, also in the steps that follow. The speeds stay
+            as they are; what the change of the inertia does to the motion is to be given as load torques.
         inputs
             Of a train the same by the names in `inputs`, among them the references of continuous controllers, such as ``servo_command=0.2`` and ``table_load_torque=(0.0, 5.0)``. All
             commands are to be given; a load torque that is left out is 0.
@@ -369,10 +415,26 @@ class Simulation:
                 raise InputError(f"{name} {shown(value)} is a share, and 1 is the full torque; give at most that")
         if missing := [name for name in self._required if name not in inputs]:
             raise InputError(f"{', '.join(sorted(missing))}: missing; all commands and references are to be given")
-        if motion or self._motions:
+        if mass_matrix is not None:
+            self._step_with_masses(interval, begin, end, motion, mass_matrix)
+        elif motion or self._motions:
             self._step_with_motions(interval, begin, end, motion or {})
         else:
             self._step(interval, begin, end)
+
+    def _step_with_masses(self, interval: Any, begin: list[float], end: list[float], motion: Any, given: Any) -> None:
+        """With other mass matrices from the beginning of the interval on."""
+        with self._turn:
+            before = self.state
+            try:
+                self._change_masses(self._masses_given(given))
+                if motion or self._motions:
+                    self._step_with_motions(interval, begin, end, motion or {})
+                else:
+                    self._step(interval, begin, end)
+            except (InputError, _core.SolverError):
+                self.state = before
+                raise
 
     def _step_with_motions(self, interval: Any, begin: list[float], end: list[float], motion: Any) -> None:
         """In parts, in each of which all accelerations are straight lines."""
@@ -552,7 +614,7 @@ class Simulation:
         with self._turn:
             time, *rest = self._idle().get_state()
             bound = None if self._bound is None else self._bound.state
-        return SimulationState(time, tuple(rest), self._drive, self._all_controllers(), bound)
+        return SimulationState(time, tuple(rest), self._drive, self._all_controllers(), dict(self._masses), bound)
 
     @state.setter
     def state(self, state: SimulationState) -> None:
@@ -563,6 +625,7 @@ class Simulation:
                 raise InputError("the state is of a simulation without error_bound=True; make that one with it too")
             if same:
                 with self._turn:
+                    self._change_masses(state.mass_matrices)
                     self._idle().set_state(state.time, *state.values)
                     if self._bound is not None:
                         self._bound.state = state.bound

@@ -24,7 +24,7 @@ SUMS = ("residual", "stored_change", "turned_over")  # of the ledger, over all e
 def parts_of(scenario: TrainScenario) -> list[TrainScenario]:
     """The trains that a scenario consists of, in the order of their first shafts; most often itself alone.
 
-    Shafts belong together that a gear, its housing, a clutch, a freewheel, a damper, or a controller joins.
+    Shafts belong together that a gear, its housing, a clutch, a freewheel, a damper, a mass matrix, or a controller joins.
     """
     groups = _groups(scenario)
     return [scenario] if len(groups) == 1 else [_part(scenario, shafts) for shafts in groups]
@@ -50,6 +50,7 @@ def _joined(scenario: TrainScenario) -> Iterator[list[str]]:
     for table in ("gears", *COUPLINGS):
         for element in getattr(train, table).values():
             yield [element.input, element.output, *filter(None, [getattr(element, "housing", None)])]
+    yield from ([one, other] for one, other, _ in train.inertia_couplings())
     last = list(train.shafts)[-1]
     for name, controller in scenario.controllers.items():
         shafts = [train.motors[name].shaft, controller.shaft or last]
@@ -64,8 +65,10 @@ def _part(scenario: TrainScenario, shafts: Collection[str]) -> TrainScenario:
         table: Named({name: s for name, s in getattr(scenario, table).items() if name in shafts})
         for table in ("shafts", "slides")
     }
-    for table in LinearElements.model_fields:
+    for table in LinearElements.model_fields.keys() - {"mass_matrices"}:
         kept[table] = Named({name: e for name, e in getattr(scenario, table).items() if _stands_on(e) in shafts})
+    masses = scenario.mass_matrices.items()
+    kept["mass_matrices"] = Named({n: m.among(shafts) for n, m in masses if not set(m.shafts).isdisjoint(shafts)})
     motors = {name for name, motor in train.motors.items() if motor.shaft in shafts}
     gears = {name for name, gear in train.gears.items() if gear.input in shafts}
     last = list(train.shafts)[-1]

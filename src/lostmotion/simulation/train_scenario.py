@@ -173,6 +173,14 @@ class TrainScenario(LinearElements):
                     f"key shafts.{name}.domain: is translation; write the slide as [slides.{name}], with its mass"
                 )
         self.check_places(self.shafts, self.slides)
+        for name, mass in self.mass_matrices.items():
+            for slide in mass.shafts:
+                if slide in self.slides and self.slides[slide].inclination != 0.0:
+                    raise InputError(
+                        f"keys mass_matrices.{name}, slides.{slide}.inclination: the weight of a slide follows from its mass, "
+                        "which the matrix holds; leave the inclination out and give the weight in slides."
+                        f"{slide}.force"
+                    )
         for key, linear in LINEAR_INITIAL.items():
             of_slides = self.linear_drives() if key in ("twists", "hysteresis_capacities") else self.slides
             for given, other in ((key, linear), (linear, key)):
