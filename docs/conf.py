@@ -12,7 +12,9 @@ project = "lostmotion"
 author = "the lostmotion developers"
 copyright = "2026, the lostmotion developers"
 # As text: importing the package would not be needed for it.
-release = re.findall(r'"(.*)"', (Path(__file__).parents[1] / "src" / "lostmotion" / "version.py").read_text())[0]
+release = re.findall(
+    r'__version__ = "(.*)"', (Path(__file__).parents[1] / "src" / "lostmotion" / "version.py").read_text()
+)[0]
 version = release
 extensions = [
     "myst_nb",  # pages in Markdown, and notebooks, which are executed
