@@ -219,7 +219,7 @@ PARTS = [
     ),
     (
         lambda: lm.data_sheets.GearboxSheet(name="My Gear", kind="other", ratio=3),
-        "lower-case letters, digits, dots and dashes",
+        "must consist of letters, digits, dots and dashes; capitals are read as small letters",
     ),
     (lambda: lm.gearbox("paper-gearbox", added_backlash="1,5 arcmin"), 'write "1.5 arcmin"'),
     (lambda: lm.motor("paper-motor", voltage_limit="24 A"), 'key voltage_limit: "24 A" has the unit of something else'),

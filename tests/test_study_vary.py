@@ -202,11 +202,11 @@ def test_the_catalogue_is_filtered_by_figures(tmp_path: Path):
 
 
 def test_a_record_with_gaps_is_a_row_that_says_what_it_lacks(tmp_path: Path):
-    names = [GEARBOXES[0], "harmonic-drive-csf-17-100-2uh"]
+    names = [GEARBOXES[0], "nord-sk1si50-60"]
     _, rows = rows_of(write(tmp_path, f'[[vary]]\nkey = "gearbox"\nvalues = {names}'), tmp_path)
     assert rows["error"][0] == ""
-    assert "harmonic-drive-csf-17-100-2uh" in rows["error"][1]
-    assert "lacks losses" in rows["error"][1]
+    assert "nord-sk1si50-60" in rows["error"][1]
+    assert "lacks inertia" in rows["error"][1]
 
 
 def test_a_sheet_of_one_s_own_stands_beside_the_study(tmp_path: Path):

@@ -200,7 +200,8 @@ class RandomTrains {
             g.mesh_damping = spread(0.1, 2.0);
             if (g.has_backlash()) {
                 g.law.hysteresis_efficiency = 1.0;
-                g.damping_limited = coin(0.5);
+                // Not drawn, so that seeds keep their trains.
+                g.damping_limited = std::fmod(1e6 * g.mesh_damping, 2.0) < 1.0;
             }
         }
         if (coin(0.15)) {
