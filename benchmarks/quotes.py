@@ -104,14 +104,6 @@ QUOTES = (
         lambda r: (r.number("Studies", r"100,000 runs of 1 s on 2 cores, [^:]*: ([\d.]+) s"),),
     ),
     Quote(
-        "docs/select.md",
-        "With ratios from 3 to 200 the file has {} pairs, which take {} s on two cores.",
-        lambda r: (
-            int(r.number("Whole tasks", r"select: (\d+) pairs")),
-            r.cell("Whole tasks", "select: ", "time [s]"),
-        ),
-    ),
-    Quote(
         "docs/live.md",
         "The page is one file of {} to {} kB.",
         lambda r: (

@@ -30,8 +30,7 @@ STRAIGHT = 1e-6  # of a difference, by which rounding may change it
 MARGIN = 1e-9  # of a capacity, within which a contact counts as about to break away
 AHEAD = 1000  # windows at most by which a motion is extrapolated: rounding grows by the square
 PARTS = 10  # samples of a window
-SKIPS = 20  # extrapolations of one stuck interval
-CHUNKS = 20  # of a stretch; a stuck interval is extrapolated after a chunk without motion
+SKIPS = 20  # extrapolations after one stretch
 SHORT_OF = 0.9  # of the time until a contact breaks away, by which a motion is extrapolated
 SAMPLES, FINEST = 1000, 4000  # of the first stretch that is watched, and of one at most
 CREEP = 1e-12  # of the largest number of the state, a speed [rad/s] that is none but rounding
@@ -146,23 +145,6 @@ class Watch:
         if self.frame:
             interval = math.ceil(interval / self.frame * (1.0 - 1e-9)) * self.frame
         self._record(interval, max(round(duration / interval), 1))
-
-    def follow_motion(self, duration: float, samples: int) -> None:
-        """Advance by a time [s], or to an equilibrium; extrapolated stuck intervals are not counted."""
-        chunk = duration / CHUNKS
-        window = self.window(chunk / 30.0)
-        for _ in range(CHUNKS):
-            before = len(self.rows)
-            self.follow(chunk, max(samples // CHUNKS, 1))
-            if np.ptp(self.rows[before:], axis=0).max() > NOISE:
-                continue
-            outlook, looks = self.outlook(window)
-            for _ in range(SKIPS):
-                if looks is None or not chunk < outlook.breaks_away < FOREVER or not self.skip(outlook, looks, window):
-                    break
-                outlook, looks = self.outlook(window)
-            if outlook.rests:
-                return
 
     def _record(self, interval: float, count: int) -> None:
         times, rows = [], []
@@ -374,10 +356,15 @@ def decide(watch: Watch, first: float, most: float) -> Decision:
     candidate: tuple[float, np.ndarray, float] | None = None
     while seen < most and idle < IDLE:
         before = len(watch.rows)
-        watch.follow_motion(duration, min(round(SAMPLES * duration / first), FINEST))
+        watch.follow(duration, min(round(SAMPLES * duration / first), FINEST))
         idle = idle + 1 if np.ptp(watch.rows[before:], axis=0).max() <= NOISE else 0
         seen += duration
-        outlook, _ = watch.outlook(watch.window(duration / 100.0))
+        window = watch.window(duration / 100.0)
+        outlook, looks = watch.outlook(window)
+        for _ in range(SKIPS):
+            if looks is None or not duration < outlook.breaks_away < FOREVER or not watch.skip(outlook, looks, window):
+                break
+            outlook, looks = watch.outlook(window)
         if outlook.rests:
             return _decision(watch, "at rest", NOTHING_MOVES)
         if watch.swings():
