@@ -43,7 +43,7 @@ _WITH_PAGES = (
 
 def homes_of(package: str) -> dict[str, str]:
     """Public names of a package, each with the absolute name of the module that defines it."""
-    stub = Path(str(sys.modules[package].__file__)).with_suffix(".pyi").read_text(encoding="utf-8")
+    stub = Path(str(importlib.import_module(package).__file__)).with_suffix(".pyi").read_text(encoding="utf-8")
     return {name: importlib.util.resolve_name(home, package) for home, name in _LINE.findall(stub)}
 
 
