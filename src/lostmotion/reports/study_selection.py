@@ -239,7 +239,7 @@ def _costs(table: pa.Table, costs: list[Price], objective: str) -> list[str]:
 
 
 def _share(x: float) -> str:
-    return f"{100.0 * x:.2g} %" if math.isfinite(x) else ""
+    return (f"{100.0 * x:.0f} %" if abs(x) >= 0.1 else f"{100.0 * x:.2g} %") if math.isfinite(x) else ""
 
 
 def _misses(near: list[Miss]) -> list[str]:
