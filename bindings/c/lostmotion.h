@@ -1,8 +1,8 @@
 /* lostmotion in C: drives and drive trains, exactly.
  *
- * A scenario is read from numbers that Python has written (lostmotion.portable.description), controllers and references among
- * them, its parameters are set by their keys, and it runs in one go or step by step. A train can also be built here,
- * element by element. Units are SI; angles in rad. All functions that can fail return 0 when they succeed and the
+ * A scenario is read from numbers that Python has written (lostmotion.portable.description), controllers and references
+ * among them, its parameters are set by their keys, and it runs in one go or step by step. A train can also be built
+ * here, element by element. Units are SI; angles in rad. All functions that can fail return 0 when they succeed and the
  * number of a status otherwise; lm_error() and the like give the sentence that Python would give. Names are those of
  * scenario files and result variables (docs/drive-trains.md). A text that a function returns lives as long as its
  * object.

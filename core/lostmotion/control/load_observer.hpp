@@ -1,7 +1,8 @@
 // The load torque from what the motor gives and how it moves, through the losses of the gear, and the gains that suit
 // the inertia as the motor feels it under that load.
 //
-//   T_1 = LP[M - J_MR w' - b_MR w - T_10 s],  T_2/i + s kappa M_2B(T_2)/|i| = T_1,  M_Z = LP[T_2 - J_Z phi'' - b_Z phi']
+//   T_1 = LP[M - J_MR w' - b_MR w - T_10 s],  T_2/i + s kappa M_2B(T_2)/|i| = T_1,
+//   M_Z = LP[T_2 - J_Z phi'' - b_Z phi']
 //   J = J_MR + (1 + dm_2B/dmu) J_Z/i^2,  k_p = w_c J,  k_i = k_p w_c/4
 #pragma once
 

@@ -223,9 +223,7 @@ void RegimeGuards::add_twist_pieces(int gear) {
     const Row P = terms_.state(p.twist, curve.slope(piece)) + terms_.one(curve.offset(piece)),
               damping = g.mesh_damping * forms_.twist_rate(gear, regime_.key), pressed = way * (P + damping),
               spare = way * (P - damping);
-    const auto change = [&](const Row& form, Gear::Flanks to) {
-        add(form, Guard::edge, p.contact, p.flanks, to);
-    };
+    const auto change = [&](const Row& form, Gear::Flanks to) { add(form, Guard::edge, p.contact, p.flanks, to); };
     switch (regime_.key.branch[p.flanks]) {
         case Gear::parted: return change(-1.0 * pressed, Gear::touching);
         case Gear::limited: return change(-1.0 * spare, Gear::touching);

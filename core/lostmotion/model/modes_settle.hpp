@@ -53,8 +53,8 @@ void SwitchedTrain<Sizes>::locate(const Now& now, Key& trial) const {
         double rate = assembly_.per_input(static_cast<int>(g), trial) * w_in - w_out;
         if (gear.housing != nowhere)
             rate += assembly_.per_housing(static_cast<int>(g), trial) * now.x[places().shafts[gear.housing].speed];
-        set(p.flanks, piece == 0 ? Gear::touching
-                                 : gear.flanks(piece, gear.law.curve.torque(d), gear.mesh_damping * rate));
+        set(p.flanks,
+            piece == 0 ? Gear::touching : gear.flanks(piece, gear.law.curve.torque(d), gear.mesh_damping * rate));
     }
     for (std::size_t k = 0; k < train().controllers.size(); ++k) {
         const int branch = places().controllers[k].branch;

@@ -57,8 +57,6 @@ class Actuated:
         ``mujoco.mj_forward(model, data)`` where they are wanted at the end.
     joints
         Names of the joints with a drive, in the order of all arrays.
-    drives
-        By joint: the drive, with the inertia of the robot in place of its load's own.
     substeps
         Substeps of the drives within a step of MuJoCo, chosen so that the natural frequency of the stiffest mesh times the
         substep is at most 0.5.

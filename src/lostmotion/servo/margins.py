@@ -36,7 +36,7 @@ class Margins:
     crossover: float
     """frequency of the phase margin [Hz]"""
     sensitivity_peak: float
-    """greatest |1/(1 + L)|"""
+    """greatest absolute value of 1/(1 + L)"""
     sensitivity_peak_frequency: float
     """[Hz]"""
 
