@@ -161,14 +161,12 @@ def _several(option: str) -> str | None:
 
 def _fits(value: Any, option: str, known: Mapping[str, Any]) -> bool:
     if _several(option) is not None:
-        return is_several(value) and not isinstance(value, Mapping) and not _is_dataset(value)
+        return is_several(value) and not isinstance(value, Mapping) and not _fits(value, "xarray.Dataset", known)
     if _unit(option) is not None or option == "float":
         return is_number(value) or isinstance(value, str)
     match option.partition("[")[0]:
         case "None":
             return value is None
-        case "xarray.Dataset":
-            return _is_dataset(value)
         case "Count":
             return isinstance(value, Integral) and is_number(value) and 0 < int(value) < 2**31
         case "int":
@@ -183,13 +181,11 @@ def _fits(value: Any, option: str, known: Mapping[str, Any]) -> bool:
             return callable(getattr(value, "submit", None))
         case "Mapping":
             return isinstance(value, Mapping) and all(isinstance(key, str) for key in value)
+        case kind if "." in kind:
+            library, _, name = kind.partition(".")  # who has one of its objects has imported it
+            return library in sys.modules and isinstance(value, getattr(sys.modules[library], name))
         case kind:
             return isinstance(value, known[kind])
-
-
-def _is_dataset(value: Any) -> bool:
-    library = sys.modules.get("xarray")  # who has a dataset has imported it
-    return library is not None and isinstance(value, library.Dataset)
 
 
 def _converted(name: str, value: Any, option: str, known: Mapping[str, Any]) -> Any:

@@ -15,6 +15,7 @@ from ..control.controller import Controller
 from ..data_sheets.components import gearbox
 from ..data_sheets.records import catalogue
 from ..errors import InputError, need
+from ..inputs.arguments import checked
 from ..inputs.validation import did_you_mean, listed, shown
 from ..model.drive import Drive
 from ..model.load import Load
@@ -426,6 +427,7 @@ def _named(joint: str, name: str) -> Drive | Scenario:
     return Drive(motor=motor, gearbox=box, load=Load(inertia=1.0))
 
 
+@checked
 def attach(
     model: mujoco.MjSpec | mujoco.MjModel | str | Path,
     drives: Mapping[str, Any],
@@ -467,10 +469,14 @@ def attach(
 
     Examples
     --------
-    >>> import mujoco                                                        # doctest: +SKIP
-    >>> spec = mujoco.MjSpec.from_file("arm.xml")                            # doctest: +SKIP
-    >>> arm = lm.mujoco.attach(spec, {"elbow": "schaeffler-rt1-h-20-100"})   # doctest: +SKIP
-    >>> arm.step({"elbow": 0.2})                                             # doctest: +SKIP
+    >>> import lostmotion as lm
+    >>> import mujoco
+    >>> body = "<body><joint name='elbow'/><geom size='0.1'/></body>"
+    >>> spec = mujoco.MjSpec.from_string(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+    >>> arm = lm.mujoco.attach(spec, {"elbow": "schaeffler-rt1-h-20-100"})
+    >>> arm.step({"elbow": 0.2})
+    >>> bool(arm.data.qvel[0] > 0.0)
+    True
     """
     need("mujoco", "lostmotion.mujoco", "mujoco")
     import mujoco
@@ -484,10 +490,6 @@ def attach(
             model = mujoco.MjSpec.from_file(str(model))
         except ValueError as error:
             raise InputError(f"{model}: {' '.join(str(error).split())}") from None
-    if not isinstance(model, mujoco.MjSpec | mujoco.MjModel):
-        raise InputError(f"model: {shown(model)} must be an MJCF file, a mujoco.MjSpec or a mujoco.MjModel")
-    if not isinstance(drives, Mapping) or not all(isinstance(name, str) for name in drives):
-        raise InputError(f"drives: {shown(drives)} must name joints, such as {{'elbow': drive}}")
     compiled = model.copy().compile() if isinstance(model, mujoco.MjSpec) else copy.copy(model)
     if not drives:
         raise InputError("drives: is empty; name at least one joint")

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import InputError, need
 from ..inputs.arguments import checked
-from ..inputs.quantities import Angle, Frequency, Torque
+from ..inputs.quantities import Angle, Frequency, Number, Torque
 from ..inputs.validation import shown
 from ..model.drive import Drive
 from ..model.gearbox import Gearbox
@@ -105,8 +105,11 @@ def reduce(
 
     Examples
     --------
-    >>> found = lm.mujoco.reduce(lm.load("catalogue-robot-joint"), 0.5, 1.0)    # doctest: +SKIP
-    >>> print(found.mjcf("elbow"))                                              # doctest: +SKIP
+    >>> import lostmotion as lm
+    >>> found = lm.mujoco.reduce(lm.load("catalogue-robot-joint"), 0.5, 1.0)
+    >>> print(found.mjcf("elbow"))
+    <joint name="elbow" armature="0.45..." damping="3.17..." frictionloss="11.6..."/>
+    <motor name="elbow" joint="elbow" gear="100"/>
     """
     for name, value in (("amplitude", amplitude), ("frequency", frequency)):
         if not value > 0.0:
@@ -188,7 +191,8 @@ def _not_negative(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
         kept.pop(int(found.argmin()))
 
 
-def from_mjcf(model: mujoco.MjSpec | mujoco.MjModel, joint: str, *, ratio: float | None = None) -> Drive:
+@checked
+def from_mjcf(model: mujoco.MjSpec | mujoco.MjModel, joint: str, *, ratio: Number | None = None) -> Drive:
     """Return the drive that a joint of a MuJoCo model describes: a rigid gear without losses, its friction on the load.
 
     Parameters
@@ -214,16 +218,18 @@ def from_mjcf(model: mujoco.MjSpec | mujoco.MjModel, joint: str, *, ratio: float
 
     Examples
     --------
-    >>> drive = lm.mujoco.from_mjcf("arm.xml", "elbow", ratio=100)              # doctest: +SKIP
-    >>> drive.gearbox.ratio                                                     # doctest: +SKIP
+    >>> import lostmotion as lm
+    >>> import mujoco
+    >>> body = "<body><joint name='elbow' armature='0.4'/><geom size='0.1'/></body>"
+    >>> spec = mujoco.MjSpec.from_string(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+    >>> lm.mujoco.from_mjcf(spec, "elbow", ratio=100).gearbox.ratio
+    100.0
     """
     need("mujoco", "lostmotion.mujoco", "mujoco")
     import mujoco
 
     if isinstance(model, mujoco.MjSpec):
         model = model.copy().compile()
-    if not isinstance(model, mujoco.MjModel):
-        raise InputError(f"model: {shown(model)} must be a mujoco.MjSpec or a mujoco.MjModel")
     number = joint_id(model, joint)
     dof = model.jnt_dofadr[number]
     if ratio is None:
@@ -235,6 +241,8 @@ def from_mjcf(model: mujoco.MjSpec | mujoco.MjModel, joint: str, *, ratio: float
         if not gears:
             raise InputError(f"joint {joint!r}: has no actuator that says the gear; give ratio=")
         ratio = gears[0]
+    if ratio == 0.0:
+        raise InputError(f"joint {joint!r}: has the ratio 0; give speed of the motor / speed of the joint")
     values: dict[str, Any] = {
         key: float(np.ravel(array[dof])[0])
         for key, array in (
