@@ -222,4 +222,4 @@ $(VENV)/examples: $(VENV)/portable
 	touch $@
 
 clean:
-	rm -rf build out docs/_build docs/_generated $(VENV)
+	rm -rf build out docs/_build docs/_generated docs/jupyter_execute $(VENV)

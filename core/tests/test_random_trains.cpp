@@ -40,18 +40,30 @@ TEST_CASE("both solvers agree on trains with hysteresis beside contacts at rest,
     CHECK(tally.jammed == 0);
 }
 
+struct BrakedTrain {
+    Train train;
+    std::vector<Signal> inputs;
+};
+
+// The braked train that a seed makes as the one of this number.
+BrakedTrain braked_train(unsigned seed, int number) {
+    RandomTrains random(seed);
+    BrakedTrain made;
+    for (int n = 0; n <= number; ++n) {
+        made.train = named(random.braked(random.pick(2, 4)));
+        made.inputs = random.signals(Assembly(made.train), 0.5);
+    }
+    return made;
+}
+
 // Train 1532 of seed 35. From 0.453 s on the brake on shaft 0 gives way to its command; gear and shaft 1 are at rest,
 // and the torque between them is at the limit of shaft 1. At 0.457229 s the brake has come to the torque that it holds.
 // It holds on, and the gear takes what goes beyond: shaft 1 turns from one limit to the other without a motion. Shaft 0
 // breaks away where the gear has reached the capacity of its hysteresis, which follows from the inputs alone.
 TEST_CASE("a brake at the torque that it holds does not break away while its neighbours can take more") {
-    RandomTrains random(35);
-    Train train;
-    std::vector<Signal> inputs;
-    for (int n = 0; n <= 1532; ++n) {
-        train = named(random.braked(random.pick(2, 4)));
-        inputs = random.signals(Assembly(train), 0.5);
-    }
+    const BrakedTrain made = braked_train(35, 1532);
+    const Train& train = made.train;
+    const std::vector<Signal>& inputs = made.inputs;
     const Recorded resting(train, inputs, 0.455, 0.455 / 2.0);
     REQUIRE(resting.done());
     const auto last = [&](const char* name) { return resting.channel(name)[resting.samples - 1]; };
@@ -86,13 +98,9 @@ TEST_CASE("a brake at the torque that it holds does not break away while its nei
 // its speed is proportional to 1 - cos and touches zero, where the hysteresis is set anew. The torques that cancel are
 // a thousand times what is left of them, and so is their rounding in the speed.
 TEST_CASE("a speed that touches zero is seen whatever the sample interval") {
-    RandomTrains random(41);
-    Train train;
-    std::vector<Signal> inputs;
-    for (int n = 0; n <= 73; ++n) {
-        train = named(random.braked(random.pick(2, 4)));
-        inputs = random.signals(Assembly(train), 0.5);
-    }
+    const BrakedTrain made = braked_train(41, 73);
+    const Train& train = made.train;
+    const std::vector<Signal>& inputs = made.inputs;
     const Recorded adaptive(train, inputs, 0.5, 0.5, 1e-13);
     REQUIRE(adaptive.done());
     for (const double samples : {1.0, 3.0, 7.0, 20.0, 50.0, 100.0, 1000.0}) {

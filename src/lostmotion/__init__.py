@@ -17,9 +17,4 @@ _get, __dir__ = namespace(__name__)
 
 
 def __getattr__(name: str) -> Any:
-    try:
-        return _get(name)
-    except AttributeError:
-        if name.startswith("_"):
-            raise
-    return moved(name)
+    return _get(name) if name.startswith("_") or name in __dir__() else moved(name)

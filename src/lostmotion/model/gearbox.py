@@ -1,6 +1,6 @@
 """Gearboxes: parameters and ratings."""
 
-from typing import Annotated, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 from pydantic import Field, field_validator, model_validator
 
@@ -43,6 +43,9 @@ class GearboxLimits(Part):
 class Transmission(TransmissionFields):
     """Base of gearboxes and gears of a drive train: ratio, inertia, compliance."""
 
+    if TYPE_CHECKING:
+        losses: Any  # of which kinds, each of them says
+
     stiffness: Annotated[TorsionCurve | LinearStiffness | Rigid, Field(discriminator="kind")]
     hysteresis: Hysteresis | None = None
     limits: GearboxLimits | None = None
@@ -63,10 +66,9 @@ class Transmission(TransmissionFields):
     def _range_is_of_a_map(self) -> Self:
         if self.loss_range is None:
             return self
-        losses = getattr(self, "losses")  # noqa: B009
-        if not isinstance(losses, LossMap):
+        if not isinstance(self.losses, LossMap):
             raise ValueError(
-                f"has a loss_range beside losses of kind {losses.kind!r}; only those of a map are estimated"
+                f"has a loss_range beside losses of kind {self.losses.kind!r}; only those of a map are estimated"
             )
         if self.loss_range[0] > self.loss_range[1]:
             raise ValueError(f"has a loss_range that falls, from {self.loss_range[0]:g} to {self.loss_range[1]:g}")
@@ -74,8 +76,7 @@ class Transmission(TransmissionFields):
 
     def with_losses(self, factor: float) -> Self:
         """With losses that are known: `factor` times those of the map."""
-        losses = getattr(self, "losses")  # noqa: B009
-        return self.model_copy(update={"losses": losses.scaled(factor), "loss_range": None})
+        return self.model_copy(update={"losses": self.losses.scaled(factor), "loss_range": None})
 
     @model_validator(mode="after")
     def _compliance_fits(self) -> Self:

@@ -16,6 +16,7 @@ from ..model.duty import HoldingBrake, Supply
 from ..model.gearbox import Gearbox
 from ..model.motor import Motor
 from ..units.practical import RPM
+from .duty_cycle import integral
 from .finding import Finding, within
 from .formulas import (
     belt_force,
@@ -63,7 +64,7 @@ def gearbox_life(demand: InputDemand, wanted: float) -> Finding:
         return missing("gearbox_life", what, "gearbox.limits.rated_life")
     p = g.limits.life_exponent
     steps, speed = np.diff(m.time), np.abs(demand.speed)
-    mean_speed = float(np.sum(0.5 * (speed[1:] + speed[:-1]) * steps)) / m.cycle
+    mean_speed = integral(m.time, speed) / m.cycle
     turned = 0.5 * (speed[1:] * steps + speed[:-1] * steps)
     torque = np.abs(m.torque) ** p
     work = float(np.sum(0.5 * (torque[1:] + torque[:-1]) * turned))
@@ -150,8 +151,7 @@ def screw_rules(motion: RequiredMotion, screw: ScrewStage, wanted_life: float | 
             found.append(missing("screw_life", what, "screw.dynamic_capacity"))
         else:
             revolutions = nominal_life(screw.dynamic_capacity, screw_mean_load(motion), 3.0, screw.load_factor)
-            steps, speed = np.diff(motion.time), np.abs(motion.speed)
-            turns = turning * float(np.sum(0.5 * (speed[1:] + speed[:-1]) * steps)) / (2.0 * math.pi)
+            turns = turning * integral(motion.time, np.abs(motion.speed)) / (2.0 * math.pi)
             hours = math.inf if turns == 0.0 else revolutions / turns * motion.cycle / HOUR
             found.append(least("screw_life", what, hours, wanted_life / HOUR, "h", "wanted life"))
     if screw.static_capacity is None:
@@ -296,8 +296,7 @@ def amplifier_current(demand: InputDemand, motor: Motor, limit: float) -> Findin
         return missing("amplifier_current", what, "motor.limits.torque_constant")
     if motor.winding is not None:
         current = current / math.sqrt(2.0)  # amplitude of a phase
-    steps = np.diff(demand.motion.time)
-    square = float(np.sum(0.5 * (current[1:] ** 2 + current[:-1] ** 2) * steps)) / demand.motion.cycle
+    square = integral(demand.motion.time, current**2) / demand.motion.cycle
     return within("amplifier_current", what, math.sqrt(square), limit, "A", "continuous current of the amplifier")
 
 

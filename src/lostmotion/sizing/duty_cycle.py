@@ -23,6 +23,11 @@ MIN_REST = 0.01  # of the time in motion; a shorter standstill is no rest
 STEADY = 0.01  # of the largest motor torque, within which it does not change at rest
 
 
+def integral(time: np.ndarray, values: np.ndarray) -> float:
+    """Integral of values over instants [s], straight between these."""
+    return float(np.sum(0.5 * (values[1:] + values[:-1]) * np.diff(time)))
+
+
 @dataclass(frozen=True)
 class DutyCycle:
     """The repeated cycle."""
@@ -56,9 +61,6 @@ class DutyCycle:
         """Duration of the motion [s]."""
         return float(self.time[-1] - self.time[0])
 
-    def _integral(self, values: np.ndarray) -> float:
-        return float(np.sum(0.5 * (values[1:] + values[:-1]) * np.diff(self.time)))
-
     @property
     def peak_input_speed(self) -> float:
         """Largest magnitude [rad/s]."""
@@ -66,18 +68,18 @@ class DutyCycle:
 
     def mean_input_speed(self) -> float:
         """Mean of the magnitude over the cycle, pause included [rad/s]."""
-        return self._integral(self.input_speed) / (self.period or self.duration)
+        return integral(self.time, self.input_speed) / (self.period or self.duration)
 
     def mean_output_torque(self) -> float:
         """Cubic mean of the magnitude, weighted with the input speed [N·m]; 0 where nothing turns."""
-        turned = self._integral(self.input_speed)
-        work = self._integral(self.input_speed * np.abs(self.output_torque) ** 3)
+        turned = integral(self.time, self.input_speed)
+        work = integral(self.time, self.input_speed * np.abs(self.output_torque) ** 3)
         return float((work / turned) ** (1.0 / 3.0)) if turned > 0.0 else 0.0
 
     @property
     def held_longer(self) -> bool:
         """Whether holding takes more torque than the motion, and nothing says for how long."""
-        square = self._integral(self.motor_torque**2)
+        square = integral(self.time, self.motor_torque**2)
         return self.period is None and (self.holding_torque or 0.0) ** 2 * self.duration >= square
 
     def repeated_torque(self) -> tuple[np.ndarray, np.ndarray]:
@@ -94,7 +96,7 @@ class DutyCycle:
         In the pause the motor holds what it held at the end of the run. Without `task.cycle` no pause is known, and the larger
         of motion and holding is taken, which is an upper bound for any pause.
         """
-        square = self._integral(self.motor_torque**2)
+        square = integral(self.time, self.motor_torque**2)
         held = (self.holding_torque or 0.0) ** 2
         if self.period is not None:
             return float(np.sqrt((square + (self.period - self.duration) * held) / self.period))

@@ -82,16 +82,15 @@ def slowed(study: Study, factor: float) -> Study:
     assert base.controller is not None
     reference = _slowed_reference(reference_of(base), factor)
     torque = _slowed_signal(base.load.torque, factor)
-    changes: dict[str, Any] = {"cycle": factor * task.cycle}
-    changes["payload"] = tuple(
-        p.model_copy(update={"begin": factor * p.begin, "end": factor * p.end}) for p in task.payload
-    )
-    changes["process"] = tuple(
-        p if p.times is None else p.model_copy(update={"times": tuple(factor * t for t in p.times)})
-        for p in task.process
-    )
     step = base.controller.sample_time
-    changes["cycle"] = step * math.ceil(changes["cycle"] / step * (1.0 - 1e-12))  # a whole number of them
+    changes = {
+        "cycle": step * math.ceil(factor * task.cycle / step * (1.0 - 1e-12)),  # a whole number of sample times
+        "payload": tuple(p.model_copy(update={"begin": factor * p.begin, "end": factor * p.end}) for p in task.payload),
+        "process": tuple(
+            p if p.times is None else p.model_copy(update={"times": tuple(factor * t for t in p.times)})
+            for p in task.process
+        ),
+    }
     new: AxisTask = task.model_copy(update=changes)
     scenario = base.model_copy(
         update={
