@@ -98,7 +98,7 @@ class Cursor {
         // By way of a signed number, which processors make of a floating-point one at once.
         const auto n = static_cast<std::uint64_t>(static_cast<std::int64_t>(h * p.per_first() + 0.5));
         Lanes x = load(from.x_), rate = load(from.rate());
-        const auto step = [&](int k) __attribute__((always_inline)) {
+        const auto step = [&](int k) ALWAYS_INLINE {
             p.step(k, x, rate, input_.weights());
             input_.advance(p.length(k), p.rotations(k));
         };

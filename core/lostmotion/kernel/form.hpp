@@ -247,7 +247,7 @@ class FormTable {
     template <class V = Vec>
     V at(int term, int g) const {
         V v;
-        __builtin_memcpy(&v, &block_[g / vec_width][term][g % vec_width], sizeof v);
+        std::memcpy(&v, &block_[g / vec_width][term][g % vec_width], sizeof v);
         return v;
     }
     template <bool magnitudes = false, class V = Vec>

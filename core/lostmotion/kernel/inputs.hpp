@@ -401,7 +401,7 @@ class InputState {
     // what has just been written number by number.
     [[gnu::always_inline]] void add_slopes(const InputState& from, double h) {
         constexpr int width = vec_width < n_inputs ? vec_width : n_inputs, whole = n_inputs / width * width;
-        const auto add = [&]<int n>(std::integral_constant<int, n>, int i) __attribute__((always_inline)) {
+        const auto add = [&]<int n>(std::integral_constant<int, n>, int i) ALWAYS_INLINE {
             (Pack<n>::load(&from.linear_[i]) + h * Pack<n>::load(&slope_[i])).store(&linear_[i]);
         };
         for (int i = 0; i < whole; i += width) add(std::integral_constant<int, width>{}, i);
@@ -417,13 +417,13 @@ class InputState {
             for (int q = 0; q < sines_end_[n - 1]; q += 2) out[basis_[q].input] += term(q);
         } else {
             int q = 0;
-            const auto add = [&](std::size_t i) __attribute__((always_inline)) {
+            const auto add = [&](std::size_t i) ALWAYS_INLINE {
                 double sum = begin[i];
                 for (; q < sines_end_[i]; q += 2) sum += term(q);
                 out[i] = sum;
             };
             [&]<std::size_t... i>(std::index_sequence<i...>)
-                __attribute__((always_inline)) { (add(i), ...); }(std::make_index_sequence<n_inputs>{});
+                ALWAYS_INLINE { (add(i), ...); }(std::make_index_sequence<n_inputs>{});
         }
     }
 

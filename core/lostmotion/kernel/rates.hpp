@@ -28,11 +28,11 @@ struct MatrixOf {
 
     [[gnu::always_inline]] Coupled at(int c) const { return load(column[c]); }
     [[gnu::always_inline]] Coupled operator*(const Coupled& v) const {
-        return sum_in_fours<n>([&](auto k) __attribute__((always_inline)) { return v.template spread<k>() * at(k); });
+        return sum_in_fours<n>([&](auto k) ALWAYS_INLINE { return v.template spread<k>() * at(k); });
     }
     // The same for a vector that is in memory.
     [[gnu::always_inline]] Coupled operator*(const Column& v) const {
-        return sum_in_fours<n>([&](auto k) __attribute__((always_inline)) { return v[k] * at(k); });
+        return sum_in_fours<n>([&](auto k) ALWAYS_INLINE { return v[k] * at(k); });
     }
     double operator()(int row, int col) const { return column[col][row]; }
     Coupled row(int r) const {

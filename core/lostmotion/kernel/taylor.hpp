@@ -134,7 +134,7 @@ struct IntegralOf {
             out[0] = (load(angle[0]) * rate).sum();
         } else {  // at once
             constexpr int last = D::angles - 1;
-            const auto of = [&](int j) __attribute__((always_inline)) { return load(angle[std::min(j, last)]) * rate; };
+            const auto of = [&](int j) ALWAYS_INLINE { return load(angle[std::min(j, last)]) * rate; };
             const Pack<4> change = sums(of(0), of(1), of(2), of(3));
             static_assert(D::angles <= 4);
             for (int j = 0; j < D::angles; ++j) out[j] = change[j];
@@ -246,25 +246,25 @@ class Taylor {
         out.angle_rate = rate.angle;
         out.angle_coefficient = rates_->angle_coefficient;
         out.angle_speed = rates_->angle_speed;
-        const auto recur = [&](auto forced) __attribute__((always_inline)) {
+        const auto recur = [&](auto forced) ALWAYS_INLINE {
             auto& v = out.coupled;
             v[0] = rate.coupled;
             v[1] = forced(rates_->rate * v[0], -2);
             v[2] = forced(squared_ * v[0], -1);
             for (int k = 0; k + 3 < terms; ++k) v[k + 3] = forced(cubed_ * v[k], k);
         };
-        const auto force = [&](Coupled x, int k, int i) __attribute__((always_inline)) {
+        const auto force = [&](Coupled x, int k, int i) ALWAYS_INLINE {
             const auto u = [&](int j) { return j < 1 ? 0.0 : out.input[static_cast<std::size_t>(j)][i]; };
             return x + input_[i].bring(u(k + 1), u(k + 2), u(k + 3));
         };
-        const auto free = [](Coupled x, int) __attribute__((always_inline)) { return x; };
+        const auto free = [](Coupled x, int) ALWAYS_INLINE { return x; };
         if constexpr (D::inputs == 2) {  // every case by itself, for the sake of speed
             if (varies[0] && varies[1])
-                recur([&](Coupled x, int k) __attribute__((always_inline)) { return force(force(x, k, 0), k, 1); });
+                recur([&](Coupled x, int k) ALWAYS_INLINE { return force(force(x, k, 0), k, 1); });
             else if (varies[0])
-                recur([&](Coupled x, int k) __attribute__((always_inline)) { return force(x, k, 0); });
+                recur([&](Coupled x, int k) ALWAYS_INLINE { return force(x, k, 0); });
             else if (varies[1])
-                recur([&](Coupled x, int k) __attribute__((always_inline)) { return force(x, k, 1); });
+                recur([&](Coupled x, int k) ALWAYS_INLINE { return force(x, k, 1); });
             else
                 recur(free);
         } else {
@@ -275,7 +275,7 @@ class Taylor {
             if (n == 0)
                 recur(free);
             else if (n == 1)
-                recur([&, i = varying[0]](Coupled x, int k) __attribute__((always_inline)) { return force(x, k, i); });
+                recur([&, i = varying[0]](Coupled x, int k) ALWAYS_INLINE { return force(x, k, i); });
             else
                 recur([&](Coupled x, int k) {
                     for (int j = 0; j < n; ++j) x = force(x, k, varying[j]);

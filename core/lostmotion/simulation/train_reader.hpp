@@ -128,7 +128,7 @@ class TrainReader {
     }
     static Vec signs(Vec v) {
         const Vec zero{}, one = zero + 1.0;
-        return (v > zero ? one : zero) - (v < zero ? one : zero);
+        return chosen(v > zero, one, chosen(v < zero, -one, zero));
     }
 
     // Of an input shaft at rest, the torque that its contact holds is shared by what is dry there as the capacities
