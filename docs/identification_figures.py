@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 import lostmotion as lm
 from lostmotion.identification.runs import run_log
 from lostmotion.reports import plots
+from lostmotion.reports.looks import MEASURED, SECOND
 from lostmotion.reports.panels import Curve, Panel
 
-MEASURED: dict[str, Any] = {"color": "0.45", "linewidth": 1.0}
-IDENTIFIED: dict[str, Any] = {"color": "#d9730d", "linestyle": "--", "linewidth": 1.2}
 EXAMPLE = Path(__file__).resolve().parent.parent / "examples" / "cycloidal"
 
 
@@ -31,7 +29,7 @@ def loops(name: str, result: lm.identification.IdentificationResult) -> list[Pan
             Curve(label, torque[part], np.degrees(x[part]) - middle, style)
             for label, x, style in (
                 ("measured, held out", log.measured["position"], MEASURED),
-                ("identified from other angles", run, IDENTIFIED),
+                ("identified from other angles", run, SECOND),
             )
         )
         panels.append(Panel(f"{name}, {what}", "torque [N·m]", "position [deg]", curves))

@@ -9,10 +9,9 @@ import numpy as np
 
 import lostmotion as lm
 from lostmotion.reports import plots
+from lostmotion.reports.looks import FIRST, SECOND
 from lostmotion.reports.panels import Curve, Panel
 
-DARK: dict[str, Any] = {"color": "#0b3c5d", "linewidth": 1.4}
-LIGHT: dict[str, Any] = {"color": "#d9730d", "linestyle": "--", "linewidth": 1.3}
 MRAD = 1e3
 
 
@@ -23,7 +22,7 @@ def _curves(data: Any, name: str, label: str, factor: float, style: dict[str, An
 def run(out: Path, scenario: lm.TrainScenario) -> None:
     """From the step on, with and without static friction."""
     without = scenario.replace(**{"shafts.table.breakaway_torque": None})
-    both = {"static friction 8 N·m": (scenario, DARK), "no more than in motion, 5 N·m": (without, LIGHT)}
+    both = {"static friction 8 N·m": (scenario, FIRST), "no more than in motion, 5 N·m": (without, SECOND)}
     results = {name: (lm.simulate(s, energy=False), style) for name, (s, style) in both.items()}
     errors = tuple(_curves(r, "servo_error", name, MRAD, style) for name, (r, style) in results.items())
     torques = tuple(_curves(r, "servo_torque", name, 1.0, style) for name, (r, style) in results.items())

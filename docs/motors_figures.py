@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from two_motors_figures import DARK, DOTS, LIGHT, save
+from two_motors_figures import save
 
 import lostmotion as lm
+from lostmotion.reports.looks import FAINT, FIRST, SECOND
 from lostmotion.reports.panels import Curve, Panel
 from lostmotion.sizing.thermal import TwoBodies, mean_square
 
@@ -42,8 +43,8 @@ def write(out: Path) -> None:
     steady = lm.sizing.temperatures(result, repeated=True)
     time = result["time"].values
     curves = (
-        Curve("phase, amplitude", time, current["current"].values, LIGHT),
-        Curve("rms", time, current["current_rms"].values, DARK),
+        Curve("phase, amplitude", time, current["current"].values, SECOND),
+        Curve("rms", time, current["current_rms"].values, FIRST),
     )
     motor = lm.simulation.scenario_of(result).motor
     bodies = TwoBodies.of(motor, 25.0)
@@ -53,13 +54,13 @@ def write(out: Path) -> None:
     winding, case = (T[:: len(time) - 1] for T in bodies.course(long, mean_square(torque), (25.0, 25.0)))
     ends = [float(steady[f"{name}_temperature"][-1]) for name in ("winding", "case")]
     warming = (
-        Curve("winding", hours, winding, DARK),
-        Curve("case", hours, case, LIGHT),
-        *(Curve("repeated for ever", [0.0, hours[-1]], [end, end], DOTS, None if k == 0 else "_") for k, end in enumerate(ends)),
+        Curve("winding", hours, winding, FIRST),
+        Curve("case", hours, case, SECOND),
+        *(Curve("repeated for ever", [0.0, hours[-1]], [end, end], FAINT, None if k == 0 else "_") for k, end in enumerate(ends)),
     )  # fmt: skip
     within = (
-        Curve("winding", time, steady["winding_temperature"].values, DARK),
-        Curve("case", time, steady["case_temperature"].values, LIGHT),
+        Curve("winding", time, steady["winding_temperature"].values, FIRST),
+        Curve("case", time, steady["case_temperature"].values, SECOND),
     )
     panels = [
         Panel("one cycle", "time [s]", "current [A]", curves),
@@ -74,18 +75,18 @@ def write_weakening(out: Path) -> None:
     result = lm.simulate(lm.load("field-weakening"))
     time, rpm = result["time"].values, 30.0 / np.pi
     speed = (
-        Curve("wanted", time, rpm * result["m_speed_reference"].values, DOTS),
-        Curve("motor", time, rpm * result["motor_speed"].values, DARK),
+        Curve("wanted", time, rpm * result["m_speed_reference"].values, FAINT),
+        Curve("motor", time, rpm * result["motor_speed"].values, FIRST),
     )
     currents = (
-        Curve("across the magnets, $i_q$", time, result["m_quadrature_current"].values, LIGHT),
-        Curve("along the magnets, $i_d$", time, result["m_direct_current"].values, DARK),
+        Curve("across the magnets, $i_q$", time, result["m_quadrature_current"].values, SECOND),
+        Curve("along the magnets, $i_d$", time, result["m_direct_current"].values, FIRST),
     )
     of_motor = lm.sizing.motor_current(result)
     limit = of_motor.attrs["voltage_limit"]
     voltage = (
-        Curve("motor", time, of_motor["voltage"].values, DARK),
-        Curve("largest", [time[0], time[-1]], [limit, limit], DOTS),
+        Curve("motor", time, of_motor["voltage"].values, FIRST),
+        Curve("largest", [time[0], time[-1]], [limit, limit], FAINT),
     )
     panels = [
         Panel("speed", "time [s]", "speed [rpm]", speed),

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 import lostmotion as lm
 from lostmotion.reports import plots
+from lostmotion.reports.looks import FIRST, SECOND
 from lostmotion.reports.panels import Curve, Panel
 
-DARK: dict[str, Any] = {"color": "#0b3c5d", "linewidth": 1.5}
-LIGHT: dict[str, Any] = {"color": "#d9730d", "linestyle": "--", "linewidth": 1.2}
 DEG = 180.0 / math.pi
 
 
@@ -27,8 +25,8 @@ def write(out: Path) -> None:
     labels = ("position [deg]", "speed [deg/s]", "acceleration [deg/s²]", "jerk [deg/s³]")
     panels = []
     for k, label in enumerate(labels):
-        curves = [Curve("jerk-limited", t, limited[k], DARK)]
+        curves = [Curve("jerk-limited", t, limited[k], FIRST)]
         if k < 3:  # the jerk of the other one is a pulse of no duration
-            curves.append(Curve("trapezoidal speed", t, plain[k], LIGHT))
+            curves.append(Curve("trapezoidal speed", t, plain[k], SECOND))
         panels.append(Panel("", "time [s]", label, tuple(curves)))
     plots.draw(panels, 2, (9.0, 5.0)).savefig(out / "references-move.png", dpi=100, metadata={"Software": None})

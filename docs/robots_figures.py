@@ -6,11 +6,11 @@ import importlib.util
 from pathlib import Path
 from typing import Any
 
-from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle, FancyArrow, Rectangle
 
 from lostmotion.reports import plots
-from lostmotion.reports.panels import LOOKS, Curve, Panel
+from lostmotion.reports.looks import INK, LOOKS, PALETTE
+from lostmotion.reports.panels import Curve, Panel
 
 EXAMPLE = Path(__file__).parent.parent / "examples" / "mujoco_arm.py"
 
@@ -25,13 +25,14 @@ def example() -> Any:
     return module
 
 
+@plots.in_our_looks
 def signs(out: Path) -> None:
     """A motor, a gearbox and a link, with every quantity and the direction in which it counts."""
-    figure = Figure(figsize=(9.0, 3.3))
+    figure = plots.Picture(figsize=(9.0, 3.3), layout="none")
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set(xlim=(0, 9), ylim=(0, 3.3), aspect="equal")
     axes.axis("off")
-    ink, accent = "0.15", "#0a5c9e"
+    ink, accent = INK, PALETTE["first"]
     for x, y, width, height, text in ((0.5, 1.25, 1.3, 0.9, "motor"), (3.3, 1.05, 1.5, 1.3, "gearbox\nratio $i$")):
         axes.add_patch(Rectangle((x, y), width, height, fill=False, edgecolor=ink, linewidth=1.4))
         axes.text(x + 0.5 * width, y + 0.5 * height, text, ha="center", va="center")

@@ -7,16 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 import lostmotion as lm
 from lostmotion.data_sheets.components import gearbox_table
 from lostmotion.reports import plots
+from lostmotion.reports.looks import FAINT, FIRST, INK, MUTED, PALETTE, SECOND
 from lostmotion.reports.panels import Curve, Panel
-
-DARK: dict[str, Any] = {"color": "#0b3c5d", "linewidth": 1.3}
-LIGHT: dict[str, Any] = {"color": "#d9730d", "linestyle": "--", "linewidth": 1.1}
-DOTS: dict[str, Any] = {"color": "0.4", "linestyle": ":", "linewidth": 1.2}
 
 WORM, RATIO, STIFFNESS, LOAD = 1e-4, 50.0, 1e4, 20.0  # kg m2, -, N m/rad, N m: those of `worm-lowering`
 ETAS = np.linspace(-0.95, -0.05, 13)
@@ -47,8 +43,8 @@ def histories(out: Path) -> None:
                 "time [s]",
                 "speed [rad/s]",
                 (
-                    Curve("worm", t, run["worm_speed"].values, DARK),
-                    Curve("drum times ratio", t, ratio * run["drum_speed"].values, LIGHT),
+                    Curve("worm", t, run["worm_speed"].values, FIRST),
+                    Curve("drum times ratio", t, ratio * run["drum_speed"].values, SECOND),
                 ),
                 y_range=(-125.0, 95.0),
             )
@@ -59,8 +55,8 @@ def histories(out: Path) -> None:
                 "time [s]",
                 "at the output [N·m]",
                 (
-                    Curve("mesh", t, run["worm_gear_output_torque"].values, DARK),
-                    Curve("load", t, run["drum_load_torque"].values, DOTS),
+                    Curve("mesh", t, run["worm_gear_output_torque"].values, FIRST),
+                    Curve("load", t, run["drum_load_torque"].values, FAINT),
                 ),
                 y_range=(-170.0, 250.0) if "chatter" in title else (-10.0, 70.0),
             )
@@ -84,9 +80,9 @@ def three_degrees(out: Path) -> None:
     t = run["time"].values
     locked = np.where(run["worm_contact"].values == 0.0, 0.0, np.nan)
     speeds = (
-        Curve("rotor", t, run["rotor_speed"].values, LIGHT),
-        Curve("worm", t, run["worm_speed"].values, DARK),
-        Curve("worm locked", t, locked, {"color": "0.0", "linewidth": 4.0, "solid_capstyle": "butt"}),
+        Curve("rotor", t, run["rotor_speed"].values, SECOND),
+        Curve("worm", t, run["worm_speed"].values, FIRST),
+        Curve("worm locked", t, locked, {"color": INK, "linewidth": 4.0, "solid_capstyle": "butt"}),
     )
     drawn = [
         Panel("speeds", "time [s]", "speed [rad/s]", speeds),
@@ -95,8 +91,8 @@ def three_degrees(out: Path) -> None:
             "time [s]",
             "torque [N·m]",
             (
-                Curve("coupling", t, run["coupling_output_torque"].values, LIGHT),
-                Curve("worm gear, input", t, run["worm_gear_input_torque"].values, DARK),
+                Curve("coupling", t, run["coupling_output_torque"].values, SECOND),
+                Curve("worm gear, input", t, run["worm_gear_input_torque"].values, FIRST),
             ),
         ),
     ]
@@ -167,23 +163,24 @@ def growth(eta_b: float, ratio: float, stiffness: float) -> tuple[float, float]:
     return theory, float(np.polyfit(run["time"].values[100:], np.log(off[100:]), 1)[0])
 
 
+@plots.in_our_looks
 def chatter_map(out: Path) -> None:
     """Chatter over backward efficiency and inertia ratio, and its rate over the stiffness."""
     points = map_points()
-    figure = Figure(figsize=(10.5, 4.4), dpi=100, layout="constrained")
+    figure = plots.Picture(figsize=(10.5, 4.8))
     left, right = figure.subplots(1, 2)
     for does, marker, label in (
-        (True, {"marker": "o", "color": "#0b3c5d"}, "chatters in the run"),
-        (False, {"marker": "o", "facecolors": "none", "edgecolors": "0.35"}, "smooth in the run"),
+        (True, {"marker": "o", "color": PALETTE["first"]}, "chatters in the run"),
+        (False, {"marker": "o", "facecolors": "none", "edgecolors": MUTED}, "smooth in the run"),
     ):
         x, y = zip(*((e, r) for e, r, _, d in points if d is does), strict=True)
         left.scatter(x, y, s=26, label=label, **marker)
     eta = np.linspace(-1.0, -0.03, 300)
-    left.plot(eta, -1.0 / eta, color="black", linewidth=1.3, label=r"paradox of rigid friction, $1/|\eta_b|$")
+    left.plot(eta, -1.0 / eta, color=INK, linewidth=1.3, label=r"paradox of rigid friction, $1/|\eta_b|$")
     left.plot(
         ETAS,
         [boundary(float(e)) for e in ETAS],
-        color="#d9730d",
+        color=PALETTE["second"],
         linestyle="--",
         linewidth=1.6,
         label="verdict, with oil and mesh damping",
@@ -195,19 +192,19 @@ def chatter_map(out: Path) -> None:
         ylim=(0.6, 55.0),
         title=r"$\zeta$ = 0.05 in the mesh, $b = 0.1\, J_1\sqrt{k/J_2}$ at the worm",
     )
-    figure.legend(*left.get_legend_handles_labels(), loc="outside lower left", ncols=2, fontsize=8, frameon=False)
+    figure.legend(*left.get_legend_handles_labels(), loc="outside lower left", ncols=2)
     stiffnesses = np.geomspace(1e3, 1e5, 7)
     for (eta_b, ratio), line in zip(((-0.2, 8.0), (-0.6, 3.0), (-0.6, 10.0)), ("-", "--", ":"), strict=True):
         rates = [growth(eta_b, ratio, float(k)) for k in stiffnesses]
         right.plot(
             stiffnesses,
             [r for r, _ in rates],
-            color="black",
+            color=INK,
             linestyle=line,
             linewidth=1.2,
             label=rf"$\eta_b$ = {eta_b:g}, $J_2/(J_1 i^2)$ = {ratio:g}",
         )
-        right.plot(stiffnesses, [r for _, r in rates], "o", color="#0b3c5d", markersize=4.5)
+        right.plot(stiffnesses, [r for _, r in rates], "o", color=PALETTE["first"], markersize=4.5)
     right.set(
         xlabel="stiffness of the mesh $k$ [N·m/rad]",
         ylabel=r"growth of a disturbance $\lambda$ [1/s]",
@@ -215,17 +212,14 @@ def chatter_map(out: Path) -> None:
         yscale="log",
         title="without damping: closed form (lines), runs (points)",
     )
-    right.legend(fontsize=8, frameon=False)
+    right.legend()
     right.set_yticks([20, 50, 100, 200, 400])
     right.yaxis.set_minor_formatter("")
     right.yaxis.set_major_formatter("{x:g}")
     left.yaxis.set_major_formatter("{x:g}")
     left.set_yticks([1, 2, 5, 10, 20, 50])
     left.yaxis.set_minor_formatter("")
-    for axes in (left, right):
-        axes.grid(color="0.9", linewidth=0.7)
-        axes.set_axisbelow(True)
-    figure.savefig(out / "self-locking-map.png", metadata={"Software": None})
+    figure.savefig(out / "self-locking-map.png", dpi=100, metadata={"Software": None})
 
 
 def boundary(eta_b: float) -> float:

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 import lostmotion as lm
 from lostmotion.reports import plots
+from lostmotion.reports.looks import FIRST, SECOND, THIRD
 from lostmotion.reports.panels import Curve, Panel
 from lostmotion.units.practical import ARCMIN
 
-DARK: dict[str, Any] = {"color": "#0b3c5d", "linewidth": 1.4}
-LIGHT: dict[str, Any] = {"color": "#d9730d", "linestyle": "--", "linewidth": 1.3}
-GREEN: dict[str, Any] = {"color": "#7fae3f", "linestyle": "-.", "linewidth": 1.3}
 # As docs/servo.md gives them: all at the motor.
 KNOWN = {
     "controller.feedforward.inertia": "2.62 kg*cm^2",
@@ -42,7 +39,7 @@ def axes() -> dict[str, lm.Scenario]:
 def errors(out: Path, scenarios: dict[str, lm.Scenario]) -> None:
     """Following error over the run, before and after."""
     curves = []
-    for (name, scenario), style in zip(list(scenarios.items())[:3], (GREEN, LIGHT, DARK), strict=True):
+    for (name, scenario), style in zip(list(scenarios.items())[:3], (THIRD, SECOND, FIRST), strict=True):
         run = lm.simulate(scenario, energy=False)
         t = run["time"].to_numpy()
         error = scenario.controller.reference.at(t)[0] - run["load_angle"].to_numpy()  # type: ignore[union-attr]
@@ -54,7 +51,7 @@ def errors(out: Path, scenarios: dict[str, lm.Scenario]) -> None:
 def loops(out: Path, scenario: lm.Scenario) -> None:
     """The open speed loop in each regime."""
     rows = [row for row in lm.commission(scenario).loops if row.loop == "speed"]
-    styles = (GREEN, DARK, LIGHT)
+    styles = (THIRD, FIRST, SECOND)
     gains = tuple(Curve(r.regime, r.frequency, np.abs(r.open_loop), s) for r, s in zip(rows, styles, strict=True))
     phases = tuple(
         Curve(r.regime, r.frequency, np.degrees(np.unwrap(np.angle(r.open_loop))), s)
@@ -77,8 +74,8 @@ def hunting(out: Path, scenario: lm.Scenario) -> None:
     motor = (ratio * (run["load_angle"] + run["twist"])).to_numpy()[late]
     middle = float(np.mean(load))
     curves = (
-        Curve("motor angle / ratio", t, ARCMIN * (motor / ratio - middle), LIGHT),
-        Curve("load", t, ARCMIN * (load - middle), DARK),
+        Curve("motor angle / ratio", t, ARCMIN * (motor / ratio - middle), SECOND),
+        Curve("load", t, ARCMIN * (load - middle), FIRST),
     )
     _save(
         out, "servo-hunting", [Panel("at rest, gap of 3 arcmin", "time [s]", "angle [arcmin]", curves)], 1, (8.0, 3.2)

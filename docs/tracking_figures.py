@@ -9,22 +9,19 @@ import numpy as np
 
 import lostmotion as lm
 from lostmotion.reports import plots
+from lostmotion.reports.looks import FAINT, FIRST, SECOND, THIRD
 from lostmotion.reports.panels import Curve, Panel
 
-DARK: dict[str, Any] = {"color": "#0b3c5d", "linewidth": 1.4}
-LIGHT: dict[str, Any] = {"color": "#d9730d", "linestyle": "--", "linewidth": 1.3}
-GREEN: dict[str, Any] = {"color": "#7fae3f", "linestyle": "-.", "linewidth": 1.3}
-GREY: dict[str, Any] = {"color": "#808080", "linestyle": ":", "linewidth": 1.3}
 FREQUENCY = 0.25
 PEAK_SPEEDS = np.geomspace(0.002, 2.0, 13)
 # Of each controller what its inverse model knows.
 MODELS: dict[str, tuple[dict[str, Any] | None, dict[str, Any]]] = {
-    "no feedforward of torque": (None, GREY),
-    "constant efficiency of 0.9": ({"efficiency": 0.9}, LIGHT),
-    "loss map": ({}, DARK),
+    "no feedforward of torque": (None, FAINT),
+    "constant efficiency of 0.9": ({"efficiency": 0.9}, SECOND),
+    "loss map": ({}, FIRST),
     "0.6 of the losses, adapting": (
         {"loss_factor": 0.6, "loss_adaptation": {"rate": 500.0}, "min_speed": 0.05},
-        GREEN,
+        THIRD,
     ),
 }
 
@@ -73,7 +70,7 @@ def over_amplitude(out: Path) -> None:
 
 def fly_by(out: Path) -> None:
     """The shipped scenarios."""
-    names = {"tracking-constant-efficiency": LIGHT, "tracking-loss-map": DARK, "tracking-adaptive": GREEN}
+    names = {"tracking-constant-efficiency": SECOND, "tracking-loss-map": FIRST, "tracking-adaptive": THIRD}
     errors, factors = [], []
     for name, style in names.items():
         scenario = lm.load(name)
@@ -97,9 +94,9 @@ def by_camera(out: Path) -> None:
     known = lm.load("tracking-loss-map")
     late = {"controller.tracker.prediction": False}
     ways = {
-        "target known": (known, GREY),
-        "camera, predicted": (shipped, DARK),
-        "camera, not predicted": (shipped.replace(**late), LIGHT),
+        "target known": (known, FAINT),
+        "camera, predicted": (shipped, FIRST),
+        "camera, not predicted": (shipped.replace(**late), SECOND),
     }
     errors = []
     for label, (scenario, style) in ways.items():
@@ -107,7 +104,7 @@ def by_camera(out: Path) -> None:
         errors.append(Curve(label, t[t > SETTLED], 1e3 * error[t > SETTLED], style))
     latencies = np.array([0.0, 0.02, 0.04, 0.06, 0.08, 0.1])
     over = []
-    for label, changes, style in (("predicted", {}, DARK), ("not predicted", late, LIGHT)):
+    for label, changes, style in (("predicted", {}, FIRST), ("not predicted", late, SECOND)):
         rms = [_rms(shipped.replace(**changes, **{"controller.camera.latency": x})) for x in latencies.tolist()]
         over.append(Curve(label, 1e3 * latencies, 1e3 * np.array(rms), style))
     panels = [

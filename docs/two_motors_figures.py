@@ -12,14 +12,9 @@ import numpy as np
 
 import lostmotion as lm
 from lostmotion.reports import plots
+from lostmotion.reports.looks import FAINT, FIRST, POINTS, SECOND, THIRD
 from lostmotion.reports.panels import Curve, Panel
 from lostmotion.studies.table import read_table
-
-DARK: dict[str, Any] = {"color": "#0b3c5d", "linewidth": 1.4}
-LIGHT: dict[str, Any] = {"color": "#d9730d", "linestyle": "--", "linewidth": 1.3}
-THIRD: dict[str, Any] = {"color": "#7fae3f", "linestyle": "-.", "linewidth": 1.3}
-DOTS: dict[str, Any] = {"color": "0.4", "linestyle": ":", "linewidth": 1.2}
-POINTS: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": 4.5, "color": "0.0", "markerfacecolor": "none"}
 
 BASE = lm.load("two-motors-one-ring")
 GEAR = BASE.gears["first_gear"]
@@ -74,14 +69,14 @@ def lost_motion(out: Path) -> None:
     angle = np.clip(torque, -corner, corner) / (2.0 * STIFFNESS)
     angle += (torque - np.clip(torque, -corner, corner)) / STIFFNESS
     curves = (
-        Curve("without bias", -loose["ring_load_torque"].values, loose["ring_angle"].values / ARCMIN, LIGHT),
-        Curve("bias 0.4 N·m", -tight["ring_load_torque"].values, tight["ring_angle"].values / ARCMIN, DARK),
+        Curve("without bias", -loose["ring_load_torque"].values, loose["ring_angle"].values / ARCMIN, SECOND),
+        Curve("bias 0.4 N·m", -tight["ring_load_torque"].values, tight["ring_angle"].values / ARCMIN, FIRST),
         Curve("closed form", torque[::25], angle[::25] / ARCMIN, POINTS),
     )
     load = -tight["ring_load_torque"].values
     gears = (
-        Curve("first gear", load, tight["first_gear_output_torque"].values, DARK),
-        Curve("second gear", load, tight["second_gear_output_torque"].values, LIGHT),
+        Curve("first gear", load, tight["first_gear_output_torque"].values, FIRST),
+        Curve("second gear", load, tight["second_gear_output_torque"].values, SECOND),
     )
     save(
         [
@@ -152,7 +147,7 @@ def found(torque: float, losses: tuple[float, float], sudden: bool) -> tuple[flo
 def bias_needed(out: Path) -> None:
     """Study points on the lines of the closed forms."""
     torques = np.linspace(0.05, 0.5, 6)
-    looks = (DARK, LIGHT, THIRD)
+    looks = (FIRST, SECOND, THIRD)
     cases = {
         "slowly, no losses": ((1.0, 1.0), False),
         f"slowly, η_f = {LOSSY[0]}": (LOSSY, False),
@@ -170,7 +165,7 @@ def bias_needed(out: Path) -> None:
     line = np.array([needed(t, 1.0, True) for t in (0.0, 0.3)])
     points = np.array([found(t, (1.0, 1.0), True) for t in torques[:3]])
     curves += [
-        Curve("at once, no losses", line[:, 1], line[:, 0], DOTS),
+        Curve("at once, no losses", line[:, 1], line[:, 0], FAINT),
         Curve("studies", points[:, 1], points[:, 0], POINTS),
     ]
     save(
@@ -208,7 +203,7 @@ def opening(out: Path) -> None:
     step = 0.2
     enough = 2.0 * needed(step, 1.0)[0]  # of a sudden torque
     curves, marks = [], []
-    for share, look in ((0.3, THIRD), (0.7, LIGHT), (1.1, DARK)):
+    for share, look in ((0.3, THIRD), (0.7, SECOND), (1.1, FIRST)):
         run = lm.simulate(after_step(share * enough, step))
         curves.append(
             Curve(f"{share:g} of it", 1e3 * run["time"].values, run["second_gear_output_torque"].values, look)
@@ -220,7 +215,7 @@ def opening(out: Path) -> None:
     instants = [lm.switchings_of(lm.simulate(after_step(s * enough, step)))["instant"].values[0] for s in shares]
     fine = np.linspace(0.0, 1.0, 201)
     drawn = (
-        Curve("closed form", fine, 1e3 * np.arccos(1.0 - 2.0 * fine) / OMEGA, DARK),
+        Curve("closed form", fine, 1e3 * np.arccos(1.0 - 2.0 * fine) / OMEGA, FIRST),
         Curve("runs", shares, 1e3 * np.array(instants), POINTS),
     )
     save(
@@ -268,11 +263,11 @@ def cost(out: Path) -> None:
     fine = np.linspace(0.0, 0.5, 101)
     mesh = RATIO * forward * fine * (1.0 + share)
     gears = (
-        Curve("closed form", fine, ((1.0 / forward - 1.0) + (1.0 - backward)) * mesh * speed, DARK),
+        Curve("closed form", fine, ((1.0 / forward - 1.0) + (1.0 - backward)) * mesh * speed, FIRST),
         Curve("runs", biases, lost, POINTS),
     )
     motors = (
-        Curve("closed form", fine, 2.0 * (fine**2 + (share * fine + FRICTION) ** 2), DARK),
+        Curve("closed form", fine, 2.0 * (fine**2 + (share * fine + FRICTION) ** 2), FIRST),
         Curve("runs", biases, heat, POINTS),
     )
     label = "bias [N·m]"
@@ -314,9 +309,9 @@ def preload(out: Path) -> None:
         lost = sum(energy[f"{name}_gear: mesh"] for name in NAMES)
         heat = sum(float((run[f"{name}_motor_torque"] ** 2).mean()) for name in NAMES)
         curves = (
-            Curve("first gear", t, run["first_gear_output_torque"].values, DARK),
-            Curve("second gear", t, run["second_gear_output_torque"].values, LIGHT),
-            Curve("100 × speed of the ring", t, 100.0 * run["ring_speed"].values, DOTS),
+            Curve("first gear", t, run["first_gear_output_torque"].values, FIRST),
+            Curve("second gear", t, run["second_gear_output_torque"].values, SECOND),
+            Curve("100 × speed of the ring", t, 100.0 * run["ring_speed"].values, FAINT),
         )
         panels.append(
             Panel(

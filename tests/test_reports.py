@@ -10,12 +10,15 @@ import pytest
 from typer.testing import CliRunner
 
 import lostmotion as lm
+from conftest import ROOT
 from html_pages import Page, charts
 from lostmotion.cli import app
 from lostmotion.reports import page as pages
+from lostmotion.reports.contours import contours
+from lostmotion.reports.looks import LOOKS, STYLES, look
 from lostmotion.reports.packed import packed
 from lostmotion.reports.page import Headline, Report, Table, render
-from lostmotion.reports.panels import PALETTE, STEPS, Bars, Contacts, Curve, Flows, Group, Mark, Matrix, Panel, look
+from lostmotion.reports.panels import Bars, Contacts, Curve, Flows, Ground, Group, Mark, Matrix, Panel
 from lostmotion.reports.pictures import endings
 from lostmotion.reports.run import run_report
 from lostmotion.reports.servo import servo_report, write_servo
@@ -102,11 +105,53 @@ def test_without_its_script_a_page_has_tables_and_figures_and_names_the_remedy(
     assert "<td" in page
 
 
-def test_the_colours_of_pictures_and_pages_are_the_same() -> None:
-    sheet = (Path(pages.__file__).parent / "style.css").read_text()
-    light = dict(re.findall(r"--(\w+): (#\w+);", sheet.partition('[data-theme="dark"]')[0]))
-    assert {name: light[name] for name in PALETTE} == PALETTE
-    assert [light[f"step{k}"] for k in range(len(STEPS))] == list(STEPS)
+def test_all_colours_of_figures_are_those_of_the_style_sheet() -> None:
+    """No module draws in a colour of its own: neither a hexadecimal one nor a grey."""
+    modules = [*(ROOT / "src" / "lostmotion").rglob("*.py"), *(ROOT / "docs").glob("*.py")]
+    own = re.compile(
+        r'["\'](?:#[0-9a-fA-F]{3,8}|(?:color|colour)=["\']0?\.\d+)["\']|"colou?r": "0?\.\d+"|color="(?:0?\.\d|black|grey)'
+    )
+    found = [
+        f"{m.name}: {n}" for m in modules for n, line in enumerate(m.read_text().splitlines(), 1) if own.search(line)
+    ]
+    assert not found
+    drawn = [m.name for m in modules if re.search(r"(?<!\w)Figure\(figsize", m.read_text())]
+    assert not drawn, "plots.Picture has the looks"
+
+
+def test_curves_differ_in_grey() -> None:
+    """Two curves with the same line style would need luminances that are far apart; no two of a panel have the same."""
+    assert len({str(style["linestyle"]) for style in LOOKS}) == len(LOOKS)
+    assert len({str(style["linestyle"]) for style in STYLES.values()}) == len(STYLES)
+
+
+def test_contours_lie_where_the_quantity_has_their_value() -> None:
+    """x*y on logarithmic axes is linear after taking logarithms of it: contours of log(x*y) are straight and exact there."""
+    x, y = np.geomspace(1.0, 100.0, 7), np.geomspace(2.0, 50.0, 5)
+    values = np.log10(x[None, :] * y[:, None])
+    found = contours(x, y, values, log_x=True, log_y=True)
+    assert len(found) >= 4
+    for contour in found:
+        there = np.isfinite(contour.x)
+        assert there.sum() >= 4
+        np.testing.assert_allclose(np.log10(contour.x * contour.y)[there], float(contour.text), atol=1e-12)
+        assert np.log10(contour.label[0] * contour.label[1]) == pytest.approx(float(contour.text), abs=1e-12)
+    assert contours(x, y, np.ones((5, 7)), log_x=True, log_y=True) == []
+
+
+def test_a_map_has_labelled_contours_and_a_numbered_front_its_key() -> None:
+    x, y = np.linspace(0.0, 1.0, 5), np.linspace(0.0, 2.0, 4)
+    ground = Panel("map", "x [-]", "y [-]", (), ground=Ground(x, y, x[None, :] + y[:, None], "z [-]"))
+    front = Curve("front", x, x, look(1) | {"marker": "o"}, names=tuple("abcde"), numbered=True)
+    page = render(report(ground, Panel("front", "x [-]", "y [-]", (front,))))
+    assert not Page(page).faults
+    texts = re.findall(r'class="tick contour"[^>]*>([^<]+)<', page)
+    assert {"0.5", "1", "1.5", "2"} <= set(texts)
+    shown, second = charts(page)
+    assert [c["text"] for c in shown["contours"]] == ["0.5", "1", "1.5", "2", "2.5"]
+    assert second["lines"][0]["numbered"] is True
+    assert '<ol class="key"><li>a</li><li>b</li>' in page
+    assert len(re.findall(r'class="mark-text [^>]*>(\d)<', page)) == 5
 
 
 def test_a_long_curve_keeps_its_extremes() -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from typer.testing import CliRunner
 
 import lostmotion as lm
@@ -220,15 +221,22 @@ def test_best_takes_a_direction(selection: tuple[lm.studies.Study, Path]):
         best_lines(directory, "gearbox")
 
 
-def test_the_names_of_the_pareto_front_stand_within_the_axes(selection: tuple[lm.studies.Study, Path]):
+def test_the_points_of_the_pareto_front_are_numbered_within_the_axes_and_named_below(
+    selection: tuple[lm.studies.Study, Path],
+):
     study, directory = selection
     table = read_table(directory)
     ranked = candidates(table, study)
     assert study.select is not None
-    figure = pareto_figure(table, ranked, pareto_front(ranked, study.select), study.select)
-    figure.canvas.draw()
+    front = pareto_front(ranked, study.select)
+    figure = pareto_figure(table, ranked, front, study.select)
+    FigureCanvasAgg(figure).draw()
     (axes,) = figure.axes
-    assert len(axes.texts) >= 3
+    assert [text.get_text() for text in axes.texts] == [str(k) for k in range(1, len(front) + 1)]
+    (key,) = (text for text in figure.texts if "\n" in text.get_text())
+    assert figure.bbox.contains(*key.get_window_extent().max)
+    in_order = sorted(front, key=lambda c: c.values[axes.get_xlabel().split()[0]])
+    assert key.get_text().split("\n") == [f"{k}  {c.name}" for k, c in enumerate(in_order, 1)]
     for text in axes.texts:
         assert axes.bbox.padded(1).contains(*text.get_window_extent().min), text.get_text()
         assert axes.bbox.padded(1).contains(*text.get_window_extent().max), text.get_text()

@@ -16,7 +16,7 @@ import lostmotion as lm
 from conftest import ROOT
 from lostmotion.data_sheets.records import parse_sheets
 from lostmotion.simulation.scenario_files import gearbox_from_record
-from lostmotion.studies.units import unit_of_key
+from lostmotion.simulation.units_of_keys import unit_of_key
 from lostmotion.units.conversion import si_factor, to_si
 from lostmotion.units.grammar import PREFIXED, angle_of, plain, read_unit, symbols, written
 from lostmotion.units.table import PREFIXES, UNITS, dimension_of, factor_of

@@ -10,7 +10,8 @@ from lostmotion.data_sheets.records import find
 from lostmotion.paper import AMPLITUDES, MODELS, paper_scenario
 from lostmotion.paper.runs import stuck_intervals
 from lostmotion.reports import plots
-from lostmotion.reports.panels import STYLES, Curve, Panel
+from lostmotion.reports.looks import STYLES
+from lostmotion.reports.panels import Curve, Panel
 from lostmotion.reports.rig import panels
 from lostmotion.reports.study_selection import pareto_figure
 from lostmotion.studies.selection import candidates, pareto_front

@@ -78,9 +78,10 @@ export class LinesChart {
 
   private chart(): Chart {
     const { x, y, marks, spans, level } = this.data;
+    const contours = this.data.contours?.map((c) => ({ ...c, x: this.arrays[c.x]!, y: this.arrays[c.y]! }));
     const axis = { ...y, range: y.range && this.seen === this.whole ? y.range : this.height() };
     const shade = this.ground && { value: this.ground };
-    return { x: { ...x, range: this.seen }, y: axis, lines: this.lines, marks, spans, level, shade };
+    return { x: { ...x, range: this.seen }, y: axis, lines: this.lines, marks, spans, level, shade, contours };
   }
 
   /** All of x, with little room beside it. */

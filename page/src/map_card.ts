@@ -52,13 +52,7 @@ export class MapCard {
     if (!found) {
       const [place, reading] = [h("div", { class: "plot" }), h("output", {})];
       const title = several ? `Loss map: ${words(name)}` : "Loss map";
-      const entry = h(
-        "span",
-        { class: "entry" },
-        "loss coefficient here ",
-        reading,
-        "; higher where it is shaded more",
-      );
+      const entry = h("span", { class: "entry" }, "loss coefficient here ", reading, "; the darker, the higher");
       this.root.append(h("figure", {}, h("figcaption", {}, h("b", {}, title), entry), place));
       found = { plot: new Plot(place, `${title}: the working point over speed and load`), reading };
       this.plots.set(name, found);

@@ -14,6 +14,8 @@ export interface LineData {
   points?: number;
   /** of the points */
   names?: string[];
+  /** the points are numbered, as the key of the chart has them */
+  numbered?: boolean;
 }
 export interface AxisData {
   label: string;
@@ -31,6 +33,8 @@ export interface LinesData {
   marks: { x: number; y: number; to?: number; text: string; colour: string }[];
   level?: number;
   ground?: { x: number; y: number; values: number };
+  /** segments of two points with NaN behind each, and the point at which the value is written */
+  contours?: { text: string; x: number; y: number; label: [number, number] }[];
 }
 export interface ContactsData {
   kind: "contacts";

@@ -20,6 +20,16 @@ export interface Line {
   faint?: boolean;
   /** radius of a dot at each point; with width 0 there are dots alone */
   points?: number;
+  /** each point has its number beside it, from 1 on */
+  numbered?: boolean;
+}
+
+/** Points at which the ground has one value. */
+export interface Contour {
+  text: string;
+  x: Float64Array;
+  y: Float64Array;
+  label: [number, number];
 }
 
 export interface Axis {
@@ -46,6 +56,8 @@ export interface Chart {
   lines: Line[];
   /** a ground that is the darker, the higher the value there */
   shade?: { value: (x: number, y: number) => number };
+  /** of that ground */
+  contours?: Contour[];
   /** intervals of x that are set apart */
   spans?: [number, number][];
   marks?: Mark[];
@@ -155,6 +167,7 @@ export class Plot {
     c.rect(MARGIN.left, MARGIN.top, this.width - MARGIN.left - MARGIN.right, this.height - MARGIN.top - MARGIN.bottom);
     c.clip();
     if (level !== undefined) this.across(c, level, colour("edge"));
+    this.contours(c, colour);
     for (const line of lines) {
       c.strokeStyle = c.fillStyle = colour(line.colour);
       c.globalAlpha = line.faint ? 0.5 : 1;
@@ -165,7 +178,12 @@ export class Plot {
     }
     c.globalAlpha = 1;
     c.setLineDash([]);
-    this.name(c, marks, colour);
+    const numbers = lines
+      .filter((line) => line.numbered)
+      .flatMap(({ x, y, colour: ink }) =>
+        Array.from(x, (value, k): Mark => ({ x: value, y: y[k]!, text: `${k + 1}`, colour: ink })),
+      );
+    this.name(c, [...marks, ...numbers], colour);
     c.restore();
     if (this.marked) this.mark(...this.marked);
   }
@@ -185,7 +203,7 @@ export class Plot {
     const image = new ImageData(columns, rows);
     values.forEach((v, k) => {
       const share = high > low ? (v - low) / (high - low) : 0;
-      if (!Number.isNaN(v)) image.data.set([red, green, blue, Math.round(255 * (0.03 + 0.4 * share))], 4 * k);
+      if (!Number.isNaN(v)) image.data.set([red, green, blue, Math.round(255 * (0.08 + 0.42 * share))], 4 * k);
     });
     const cells = document.createElement("canvas");
     [cells.width, cells.height] = CELLS;
@@ -221,6 +239,43 @@ export class Plot {
       }
     }
     c.stroke();
+  }
+
+  /** Lines of one value with that value, where these do not cover each other. */
+  private contours(c: CanvasRenderingContext2D, colour: (name: string) => string): void {
+    const written: [number, number][] = [];
+    c.setLineDash([]);
+    c.textAlign = "center";
+    c.textBaseline = "middle";
+    for (const { text, x, y, label } of this.chart!.contours ?? []) {
+      c.strokeStyle = colour("edge");
+      c.lineWidth = 1;
+      c.beginPath();
+      for (let k = 0; k + 1 < x.length; k += 3) {
+        c.moveTo(...this.place(x[k]!, y[k]!));
+        c.lineTo(...this.place(x[k + 1]!, y[k + 1]!));
+      }
+      c.stroke();
+      const [left, top] = this.place(...label);
+      if (written.some(([a, b]) => Math.abs(left - a) < 34 && Math.abs(top - b) < 13)) continue;
+      this.halo(c, text, left, top, colour);
+      written.push([left, top]);
+    }
+  }
+
+  /** A text that is read over lines. */
+  private halo(
+    c: CanvasRenderingContext2D,
+    text: string,
+    left: number,
+    top: number,
+    colour: (name: string) => string,
+  ): void {
+    c.strokeStyle = colour("surface");
+    c.lineWidth = 3;
+    c.strokeText(text, left, top);
+    c.fillStyle = colour("text");
+    c.fillText(text, left, top);
   }
 
   private dots(c: CanvasRenderingContext2D, { x, y }: Line, radius: number): void {
@@ -272,11 +327,7 @@ export class Plot {
         written.every(([a, b, other]) => begin > b + 4 || begin + wide < a - 4 || Math.abs(other - at) > 13),
       );
       if (line === undefined || text === "") continue;
-      c.strokeStyle = colour("surface"); // so that it is read over lines
-      c.lineWidth = 3;
-      c.strokeText(text, begin, line);
-      c.fillStyle = colour("text");
-      c.fillText(text, begin, line);
+      this.halo(c, text, begin, line, colour);
       written.push([begin, begin + wide, line]);
     }
   }

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..model.losses import LossMap
+from ..reports.looks import FAINT, LEVEL, STYLES, step
 from ..reports.pages import panels_csv, plain, table_csv
-from ..reports.panels import COMMAND_STYLE, STYLES, Chart, Curve, Drawing, Ground, Panel, scientific, step
+from ..reports.panels import Chart, Curve, Drawing, Ground, Panel, scientific
 from ..response.crossovers import THREE_DECIBELS
 from ..response.linear import rigid_constants
 from .drive import AMPLITUDES, MODELS, paper_scenario
@@ -58,9 +59,23 @@ def _pairs(
         for model in models:
             run = results.runs[model, amplitude]
             curves.append(Curve(model, x(run), y(run), STYLES[model]))
-        title = f"{what}, " if what else ""
         shaded = stuck_intervals(results.runs["2-DOF-NL", amplitude]) if x_label == "time [s]" else ()
-        yield Panel(f"{title}$E_{{CA}}$ = {value:g}", x_label, y_label, tuple(curves), shaded=shaded, **options)
+        yield Panel(_titled(what, value), x_label, y_label, tuple(curves), shaded=shaded, **options)
+
+
+def _titled(what: str, amplitude: float) -> str:
+    """Title of a panel with the amplitude of its command."""
+    return f"{what}, amplitude {amplitude:g}" if what else f"amplitude {amplitude:g}"
+
+
+def _differences(panels: Iterable[Panel], label: str) -> Iterator[Panel]:
+    """Differences of the other models from 2-DOF-L."""
+    for panel in panels:
+        curves = {c.label: c for c in panel.curves if c.label in MODELS}
+        linear = curves.pop("2-DOF-L")
+        others = tuple(Curve(c.label, c.x, c.y - linear.y, c.style) for c in curves.values())
+        amplitude = panel.title.rpartition(" ")[2]
+        yield replace(panel, title=_titled("difference from 2-DOF-L", float(amplitude)), y_label=label, curves=others)
 
 
 SCHEMATICS = FigureSpec(
@@ -73,14 +88,15 @@ SCHEMATICS = FigureSpec(
 LOSS_MAP = FigureSpec(
     "05",
     "Loss coefficient over speed and load",
-    "Left, over speed and load; right, as curves. The loss does not vanish at zero load, so no constant efficiency describes it.",
+    "Left, contours over speed and load; right, curves over speed. The loss does not vanish at zero load, so no constant "
+    "efficiency describes it.",
+    size=(10.0, 4.2),
 )
 
 
 LOOP_STYLES: tuple[dict[str, Any], ...] = (*(STYLES[name] for name in ("2-DOF-NL", "2-DOF-L", "1-DOF-L")),)
 
 CLOSED_FORM: dict[str, Any] = {**STYLES["1-DOF-L"], "linestyle": (0, (1, 1)), "linewidth": 2.2}
-LEVEL: dict[str, Any] = {"color": "0.45", "linestyle": "-", "linewidth": 0.8}
 
 # What the panels show over time or over the twist; each normalised by the rated value of the paper's drive.
 
@@ -99,19 +115,23 @@ def _relative_load(r: xarray.Dataset) -> Any:
 def _command_and_torque(results: Results, **options: Any) -> tuple[Panel, ...]:
     M_DR = _rated_values()[0]
     panels = []
-    torques = _pairs(results, lambda r: r["motor_torque"].values / M_DR, "[-]", **options)
+    torques = list(_pairs(results, lambda r: r["motor_torque"].values / M_DR, "command, motor torque [-]", **options))
     for amplitude, panel in zip(AMPLITUDES, torques, strict=True):
         run = results.runs["2-DOF-NL", amplitude]
-        command = Curve("$E_C$", run["time"].values, run["command"].values, COMMAND_STYLE)
-        torque = tuple(Curve(f"$m_D$, {c.label}", c.x, c.y, c.style) for c in panel.curves)
-        panels.append(replace(panel, y_label="$E_C$, $m_D$ [-]", curves=(command, *torque)))
-    return tuple(panels)
+        command = Curve("command", run["time"].values, run["command"].values, FAINT)
+        panels.append(replace(panel, curves=(command, *panel.curves)))
+    return (*panels, *_differences(torques, "motor torque [-]"))
 
 
 def _speed_and_load(results: Results, **options: Any) -> tuple[Panel, ...]:
-    speed = _pairs(results, lambda r: r["load_speed"].values, "load speed ω [rad/s]", what="speed", **options)
-    torque = _pairs(results, _relative_load, "relative output torque $t_2$ [-]", what="torque", **options)
-    return (*speed, *torque)
+    speed = list(_pairs(results, lambda r: r["load_speed"].values, "load speed [rad/s]", what="speed", **options))
+    torque = list(_pairs(results, _relative_load, "output torque [-]", what="torque", **options))
+    return (
+        *speed,
+        *_differences(speed, "load speed [rad/s]"),
+        *torque,
+        *_differences(torque, "output torque [-]"),
+    )
 
 
 def figure_specs(results: Results, facts: Facts) -> list[FigureSpec]:
@@ -145,8 +165,8 @@ def _stiffness_spec(results: Results) -> FigureSpec:
         (
             Panel(
                 "torque",
-                "twist Δφ$_2$ [mrad]",
-                "output torque $T_2$ [N·m]",
+                "twist [mrad]",
+                "output torque [N·m]",
                 (
                     Curve("2-DOF-L", 1e3 * within, linear * within, STYLES["2-DOF-L"]),
                     Curve("2-DOF-NL", 1e3 * twist, torque, STYLES["2-DOF-NL"]),
@@ -155,8 +175,8 @@ def _stiffness_spec(results: Results) -> FigureSpec:
             ),
             Panel(
                 "stiffness",
-                "twist Δφ$_2$ [mrad]",
-                "$k_2$ / $k_{2max}$ [-]",
+                "twist [mrad]",
+                "stiffness / largest stiffness [-]",
                 (
                     Curve("2-DOF-L", 1e3 * within, np.full(2, linear / slopes[-1]), STYLES["2-DOF-L"]),
                     Curve("2-DOF-NL", 5e2 * (twist[1:] + twist[:-1]), chords / slopes[-1], STYLES["2-DOF-NL"]),
@@ -172,10 +192,10 @@ def _stiffness_spec(results: Results) -> FigureSpec:
 def _hysteresis_spec(results: Results) -> FigureSpec:
     rated = _rated_values()[1]
     curves = tuple(
-        Curve(f"±{100.0 * loop.amplitude / rated:.0f} % of $T_{{2R}}$", 1e3 * loop.twist, loop.torque / rated, style)
+        Curve(f"±{100.0 * loop.amplitude / rated:.0f} % of rated torque", 1e3 * loop.twist, loop.torque / rated, style)
         for loop, style in zip(results.loops, LOOP_STYLES, strict=True)
     )
-    axes = ("twist Δφ$_2$ [mrad]", "$t_2$ [-]")
+    axes = ("twist [mrad]", "output torque [-]")
     return FigureSpec(
         "08",
         "Hysteresis loop",
@@ -191,9 +211,10 @@ def _torque_specs(results: Results) -> Iterator[FigureSpec]:
     yield FigureSpec(
         "09",
         "Command and motor torque",
-        "Command E_C and relative motor torque m_D from rest, 1 Hz, for both amplitudes and all three models.",
+        "Command E_C and relative motor torque m_D from rest, 1 Hz, for both amplitudes and all three models. Below, the "
+        "difference of the torques from that of 2-DOF-L.",
         _command_and_torque(results),
-        size=(10.0, 3.6),
+        size=(10.0, 6.4),
     )
     yield FigureSpec(
         "10",
@@ -201,7 +222,7 @@ def _torque_specs(results: Results) -> Iterator[FigureSpec]:
         "A reversal of figure 9 enlarged. While the motor shaft of 2-DOF-NL is stuck, there is no back e.m.f., so its torque is "
         "in proportion to the command; the kink at the end of a shaded interval is the break-away.",
         _command_and_torque(results, x_range=(1.4, 1.7)),
-        size=(10.0, 3.6),
+        size=(10.0, 6.4),
     )
 
 
@@ -214,9 +235,10 @@ def _motion_specs(results: Results, facts: Facts) -> Iterator[FigureSpec]:
     yield FigureSpec(
         "11",
         "Load speed and output torque",
-        f"Speed of the load and relative torque on it. At the small amplitude the motor shaft of 2-DOF-NL is stuck for "
+        f"Speed of the load and relative torque on it, and the differences from 2-DOF-L. At the small amplitude the motor shaft of 2-DOF-NL is stuck for "
         f"{100.0 * facts.stuck[case]:.0f} % of the time (shaded). Its load is at rest {load}.",
         _speed_and_load(results),
+        size=(10.0, 11.0),
     )
     zone = paper_scenario("2-DOF-NL", "large").gearbox.stiffness.pieces()[0][0]  # type: ignore[union-attr]
     run = results.runs[case]
@@ -228,6 +250,7 @@ def _motion_specs(results: Results, facts: Facts) -> Iterator[FigureSpec]:
         f"A reversal of figure 11 enlarged. At the small amplitude the load of 2-DOF-NL swings on while the motor shaft is stuck. "
         f"The twist is at most {1e3 * largest:.2f} mrad, {where} the segment of low stiffness, which ends at {1e3 * zone:g} mrad.",
         _speed_and_load(results, x_range=(1.4, 1.7)),
+        size=(10.0, 11.0),
     )
 
 
@@ -244,7 +267,7 @@ def _gearbox_specs(results: Results) -> Iterator[FigureSpec]:
             _pairs(
                 results,
                 lambda r: r["loss_coefficient"].values,
-                "loss coefficient $m_{2B}$ [-]",
+                "loss coefficient [-]",
                 models=("2-DOF-NL",),
                 y_range=(0.0, None),
             )
@@ -254,19 +277,31 @@ def _gearbox_specs(results: Results) -> Iterator[FigureSpec]:
     yield FigureSpec(
         "14",
         "Normalised hysteresis loop",
-        "Relative torque over twist / 3 mrad, the twist at about rated torque. The segment of low stiffness is in the middle. The "
-        "two branches are apart by the hysteresis that the last turning points set.",
-        tuple(
-            _pairs(
-                results,
-                _relative_load,
-                "$t_2$ [-]",
-                x=lambda r: r["twist"].values / rated_twist,
-                x_label="twist / 3 mrad [-]",
-                models=("2-DOF-L", "2-DOF-NL"),
-            )
-        ),
-        size=(10.0, 4.0),
+        "Above, relative torque over twist / 3 mrad, the twist at about rated torque. Below, the same less the torque of the "
+        "torsion curve: what remains is the hysteresis that the last turning points set. It is a loop also at the small amplitude.",
+        (*_loops(results, rated_twist), *_loops(results, rated_twist, spring)),
+        size=(10.0, 7.4),
+    )
+
+
+def _loops(results: Results, rated_twist: float, spring: Any = None) -> Iterator[Panel]:
+    """Torque over twist, or that part of it which is not the spring's."""
+    rated = _rated_values()[1]
+
+    def torque(r: xarray.Dataset) -> Any:
+        if spring is None:
+            return _relative_load(r)
+        return _relative_load(r) - np.array([spring.torque(d) for d in r["twist"].values]) / rated
+
+    label = "output torque [-]" if spring is None else "hysteresis [-]"
+    yield from _pairs(
+        results,
+        torque,
+        label,
+        x=lambda r: r["twist"].values / rated_twist,
+        x_label="twist / 3 mrad [-]",
+        models=("2-DOF-L", "2-DOF-NL") if spring is None else ("2-DOF-NL",),
+        what="" if spring is None else "hysteresis",
     )
 
 
@@ -275,8 +310,8 @@ def _power_specs(results: Results, facts: Facts) -> Iterator[FigureSpec]:
     yield FigureSpec(
         "15",
         "Normalised motor power",
-        "p = m_D w_M / w_DR.",
-        tuple(_pairs(results, lambda r: r["motor_power"].values / (M_DR * omega_DR), "motor power p [-]")),
+        "p = m_D ω_M/ω_DR.",
+        tuple(_pairs(results, lambda r: r["motor_power"].values / (M_DR * omega_DR), "motor power [-]")),
         size=(10.0, 3.4),
     )
     yield FigureSpec(
@@ -289,7 +324,7 @@ def _power_specs(results: Results, facts: Facts) -> Iterator[FigureSpec]:
             _pairs(
                 results,
                 lambda r: r["efficiency"].values,
-                "efficiency η [-]",
+                "efficiency [-]",
                 models=("2-DOF-L", "2-DOF-NL"),
                 y_range=(-0.03, 1.2),
             )
@@ -308,14 +343,21 @@ def _response_specs(results: Results) -> Iterator[FigureSpec]:
         "to 2-DOF-NL the gearbox. The line at -3 dB is the bandwidth criterion of the closed form. "
         f"{len(FREQUENCIES)} frequencies; each first harmonic comes from a motion whose states repeat within "
         f"{scientific(worst)} of their magnitude from one period to the next.",
-        tuple(_response_panels(results, "magnitude g [dB]", _decibels, (-75.0, 5.0), level=-_decibels(THREE_DECIBELS))),
+        tuple(
+            _response_panels(results, "magnitude [dB]", _decibels, (-75.0, 5.0), ("-3 dB", -_decibels(THREE_DECIBELS)))
+        ),
         size=(10.0, 4.6),
     )
     yield FigureSpec(
         "18",
         "Frequency response, phase",
-        "Phase of the first harmonic of the load speed, of the same models.",
-        tuple(_response_panels(results, "phase φ [°]", lambda v: np.degrees(np.unwrap(np.angle(v))), (-260.0, 10.0))),
+        "Phase of the first harmonic of the load speed, of the same models. The line at -45° marks the phase "
+        "of a first-order lag at its -3 dB frequency. The models with a spring fall further behind above their resonance.",
+        tuple(
+            _response_panels(
+                results, "phase [deg]", lambda v: np.degrees(np.unwrap(np.angle(v))), (-260.0, 10.0), ("-45°", -45.0)
+            )
+        ),
         size=(10.0, 4.6),
     )
 
@@ -330,8 +372,7 @@ def _response_panels(
     label: str,
     of: Callable[[Any], Any],
     y_range: tuple[float, float],
-    *,
-    level: float | None = None,
+    level: tuple[str, float],
 ) -> Iterator[Panel]:
     """The models at each amplitude, with the cutoff that the paper prints."""
     rigid = paper_scenario("1-DOF-L", "large")
@@ -339,15 +380,16 @@ def _response_panels(
     closed = closed_form.response(FREQUENCIES, ratio)
     normal = ratio / closed_form.rated_speed
     ends = FREQUENCIES[[0, -1]]
-    levels = [] if level is None else [Curve("-3 dB", ends, np.full(2, level), LEVEL)]
-    printed = Curve("2.6 Hz, printed", np.full(2, 2.6), np.array(y_range), COMMAND_STYLE)
+    across = Curve(level[0], ends, np.full(2, level[1]), LEVEL)
+    printed = Curve("2.6 Hz, printed", np.full(2, 2.6), np.array(y_range), FAINT)
     for amplitude, value in AMPLITUDES.items():
         curves = [Curve("1-DOF-L, closed form", FREQUENCIES, of(closed * normal), CLOSED_FORM)]
         for model in MODELS:
             response = results.load_response(model, amplitude) * normal
             curves.append(Curve(model, FREQUENCIES, of(response), STYLES[model]))
-        title = f"$E_{{CA}}$ = {value:g}"
-        yield Panel(title, "frequency [Hz]", label, (*curves, *levels, printed), y_range=y_range, log_x=True)
+        yield Panel(
+            _titled("", value), "frequency [Hz]", label, (*curves, across, printed), y_range=y_range, log_x=True
+        )
 
 
 def _stand_in_table() -> tuple[Any, Any, Any]:
@@ -365,9 +407,8 @@ def draw(spec: FigureSpec) -> Figure:
     note = " ".join([SHADED] * shaded + [STAND_IN] * spec.stand_in)
     if spec.number == SCHEMATICS.number:
         return schematics.draw()
-    if spec.number == LOSS_MAP.number:
-        return plots.loss_map(*_stand_in_table(), note=note)
-    return plots.draw(spec.panels, spec.columns, spec.size, note=note)
+    panels = _loss_panels() if spec.number == LOSS_MAP.number else spec.panels
+    return plots.draw(panels, spec.columns, spec.size, note=note)
 
 
 def charts_of(spec: FigureSpec) -> tuple[Chart, ...]:
@@ -375,17 +416,23 @@ def charts_of(spec: FigureSpec) -> tuple[Chart, ...]:
     if spec.number == SCHEMATICS.number:
         return tuple(Drawing(sketch.title, sketch.svg(), sketch.width > 12.0) for sketch in sketches())
     if spec.number == LOSS_MAP.number:
-        speeds, loads, values = _stand_in_table()
-        curves = tuple(
-            Curve(f"µ = {load:g}", speeds, row, step(k, len(loads)) | {"marker": "o", "markersize": 4})
-            for k, (load, row) in enumerate(zip(loads, values, strict=True))
-        )
-        labels = ("relative speed v [-]", "relative load µ [-]", "loss coefficient m_2B [-]")
-        ground = Ground(speeds, loads, values, "m_2B")
-        return Panel("Over speed and load", *labels[:2], (), ground=ground), Panel(
-            "As curves", labels[0], labels[2], curves
-        )
+        return _loss_panels()
     return tuple(map(_plainly, spec.panels))
+
+
+def _loss_panels() -> tuple[Panel, Panel]:
+    """The loss coefficient as contours and as curves."""
+    speeds, loads, values = _stand_in_table()
+    curves = tuple(
+        Curve(f"load {load:g}", speeds, row, step(k, len(loads)) | {"marker": "o", "markersize": 4})
+        for k, (load, row) in enumerate(zip(loads, values, strict=True))
+    )
+    labels = ("relative speed [-]", "relative load [-]", "loss coefficient [-]")
+    ground = Ground(speeds, loads, values, "loss coefficient [-]")
+    return (
+        Panel("Contours", *labels[:2], (), ground=ground),
+        Panel("Curves", labels[0], labels[2], curves, y_range=(0.0, 1.06 * float(values.max()))),
+    )
 
 
 def _plainly(panel: Panel) -> Panel:

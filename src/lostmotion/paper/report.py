@@ -64,4 +64,6 @@ def _verdict(facts: Facts) -> Headline:
 
 
 def _powers(text: str) -> str:
-    return re.sub(r"10\^(-?\d+)", r"10<sup>\1</sup>", text)
+    """Powers of ten and the lower parts of symbols as HTML."""
+    text = re.sub(r"10\^(-?\d+)", r"10<sup>\1</sup>", text)
+    return re.sub(r"\b([A-Za-zω])_(\w+)", r"\1<sub>\2</sub>", text)

@@ -12,8 +12,7 @@ from .sketch import Sketch
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FILL = "#e8eef3"
-GEAR = "#f7e4d2"
+FILL, GEAR = "metal", "gear"  # colours of the style sheet
 SHAFT = 0.0  # height of the shafts
 
 
@@ -155,9 +154,9 @@ def _rig(s: Sketch) -> None:
     """Steady speed, torques measured on both sides."""
     _shaft(s, 1.1, 10.9)
     _box(s, 1.1, "motor\n$n_1$", size=(1.8, 1.8))
-    _box(s, 3.5, "$T_1$, $\\omega_1$", size=(1.5, 1.0), fill="white")
+    _box(s, 3.5, "$T_1$, $\\omega_1$", size=(1.5, 1.0), fill="surface")
     _box(s, 6.0, "gearbox\n$i_C$", size=(2.0, 1.9), fill=GEAR)
-    _box(s, 8.5, "$T_2$, $\\omega_2$", size=(1.5, 1.0), fill="white")
+    _box(s, 8.5, "$T_2$, $\\omega_2$", size=(1.5, 1.0), fill="surface")
     _box(s, 10.9, "brake", size=(1.8, 1.8))
     text = "$\\eta = T_2/(i_C\\,T_1)$,  $m_{2B} = (i_C\\,T_1 - T_2)/T_{2R}$"
     s.text(6.0, -1.7, text)

@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+from ..reports.looks import COLOURS, INK, SMALLEST
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-INK = "#1c1c1c"
 SCALE = 40.0  # pixels of a unit
 SYMBOLS = {"eta": "η", "varphi": "φ", "omega": "ω", "Delta": "Δ", "dot": "", ",": " "}
 Point = tuple[float, float]
@@ -25,7 +26,7 @@ class Sketch:
     width: float
     half_height: float
     boxes: list[tuple[float, float, float, float, str]] = field(default_factory=list)
-    """left, lower, width, height, colour"""
+    """left, lower, width, height, name of a colour of the style sheet"""
     lines: list[tuple[list[Point], float]] = field(default_factory=list)
     arrows: list[tuple[Point, Point]] = field(default_factory=list)
     texts: list[tuple[Point, str]] = field(default_factory=list)
@@ -45,16 +46,16 @@ class Sketch:
 
         axes.set(xlim=(0.0, self.width), ylim=(-self.half_height, self.half_height), aspect="equal")
         axes.set_axis_off()
-        axes.set_title(self.title, loc="left", fontsize=9.5)
+        axes.set_title(self.title, loc="left")
         for left, lower, width, height, fill in self.boxes:
-            box: Any = {"facecolor": fill, "edgecolor": INK, "linewidth": 1.0, "zorder": 2}
+            box: Any = {"facecolor": COLOURS[fill], "edgecolor": INK, "linewidth": 1.0, "zorder": 2}
             axes.add_patch(Rectangle((left, lower), width, height, **box))
         for points, linewidth in self.lines:
             axes.plot(*zip(*points, strict=True), color=INK, zorder=1, linewidth=linewidth)
         for begin, end in self.arrows:
             axes.annotate("", end, begin, arrowprops={"arrowstyle": "-|>", "color": INK, "linewidth": 1.0})
         for (x, y), text in self.texts:
-            axes.text(x, y, text, ha="center", va="center", fontsize=8, zorder=3)
+            axes.text(x, y, text, ha="center", va="center", fontsize=SMALLEST, zorder=3)
 
     def svg(self) -> str:
         """Sketch as SVG, in the colours of the page."""
@@ -64,10 +65,10 @@ class Sketch:
             parts.append(f'<path fill="none" stroke="var(--text)" stroke-width="{1.1 * linewidth:.1f}" d="M{path}"/>')
         for begin, end in self.arrows:
             parts.append(self._arrow(self._place(begin), self._place(end)))
-        for left, lower, width, height, _ in self.boxes:
+        for left, lower, width, height, fill in self.boxes:
             a, b = self._place((left, lower + height))
             box = f'x="{a:.1f}" y="{b:.1f}" width="{SCALE * width:.1f}" height="{SCALE * height:.1f}"'
-            parts.append(f'<rect {box} fill="var(--metal)" stroke="var(--edge)"/>')
+            parts.append(f'<rect {box} fill="var(--{fill})" stroke="var(--edge)"/>')
         parts += [self._text(point, text) for point, text in self.texts]
         size = f"{SCALE * self.width:g} {2.0 * SCALE * self.half_height:g}"
         return f'<svg role="img" aria-label="{escape(self.title)}" viewBox="0 0 {size}">{"".join(parts)}</svg>'

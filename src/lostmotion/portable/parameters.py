@@ -15,7 +15,7 @@ from ..errors import InputError
 from ..inputs.quantities import Limit
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
-from ..studies.units import limit_in, unit_for
+from ..simulation.units_of_keys import limit_in, unit_for
 
 AnyScenario = Scenario | TrainScenario
 Numbers = Callable[[AnyScenario], np.ndarray]

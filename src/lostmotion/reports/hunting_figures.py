@@ -5,15 +5,19 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from ..errors import InputError
 from ..units.practical import charted
+from . import plots
+from .contours import contours
+from .looks import INK, MUTED, SMALLEST, map_colours
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.figure import Figure
 
 
+@plots.in_our_looks
 def map_figure(found: xarray.Dataset) -> Figure:
     """Amplitude and frequency of a hunting map over its two keys; white where there is no limit cycle, hatched where it is
     unstable.
@@ -26,7 +30,7 @@ def map_figure(found: xarray.Dataset) -> Figure:
     dims = found["amplitude"].dims
     if len(dims) != 2:
         raise InputError("this map has one key, and the figure shows two; draw its variables amplitude and frequency")
-    figure = Figure(figsize=(10.0, 4.0), layout="constrained")
+    figure = plots.Picture(figsize=(10.0, 4.0))
     x, y = found[dims[1]], found[dims[0]]
     cycles = np.isfinite(found["frequency"].values)
     amplitude, factor = _amplitude(found)
@@ -34,14 +38,18 @@ def map_figure(found: xarray.Dataset) -> Figure:
     for axes, (name, label) in zip(figure.subplots(1, 2, sharey=True), labels.items(), strict=True):
         values = found[name].values * (factor if name == "amplitude" else 1.0)
         shown: Any = np.ma.masked_array(values, ~cycles)
-        mesh = axes.pcolormesh(x.values, y.values, shown, cmap="cividis", shading="nearest", rasterized=True)
+        mesh = axes.pcolormesh(x.values, y.values, shown, cmap=map_colours(), shading="nearest", rasterized=True)
         unstable = np.where(cycles & ~found["stable"].values, 1.0, np.nan)
         if np.isfinite(unstable).any():
             axes.contourf(x.values, y.values, unstable, levels=[0.5, 1.5], hatches=["///"], alpha=0.0)
+        plots.draw_contours(axes, contours(x.values, y.values, shown.filled(np.nan), log_x=False, log_y=False))
+        axes.contour(x.values, y.values, cycles.astype(float), levels=[0.5], colors=INK, linewidths=1.0)
+        axes.grid(visible=False)
         figure.colorbar(mesh, ax=axes)
         axes.set_title(label)
         axes.set_xlabel(_label(x))
     figure.axes[0].set_ylabel(_label(y))
+    figure.supxlabel("White: no limit cycle. Hatched: an unstable one.", fontsize=SMALLEST, color=MUTED)
     return figure
 
 
@@ -55,5 +63,7 @@ def _amplitude(found: xarray.Dataset) -> tuple[str, float]:
 
 
 def _label(key: xarray.DataArray) -> str:
-    """The last two words of a dotted key."""
-    return ".".join(str(key.attrs["long_name"]).split(".")[-2:])
+    """The last two words of a dotted key in plain text, with its unit."""
+    words = " ".join(str(key.attrs["long_name"]).split(".")[-2:]).replace("_", " ")
+    unit = str(key.attrs.get("units", "")).replace("*", "·")
+    return words if unit in ("", "1") else f"{words} [{unit}]"

@@ -18,11 +18,11 @@ from ..model.gear import Gear
 from ..model.losses import LossMap, MeshEfficiency, WormMesh, efficiency_map
 from ..simulation.train_scenario import TrainScenario
 from ..units.conversion import si_factor
+from .looks import FAINT, MEASURED, PALETTE, look
 from .page import Headline, Prose, Report, Table
 from .pages import table_csv, write_report, write_text
-from .panels import FAINT, PALETTE, Curve, Group, Matrix, Panel, look
+from .panels import Curve, Group, Matrix, Panel
 
-MEASURED: dict[str, Any] = {"color": "0.45", "linestyle": "-", "linewidth": 1.3}
 CLOUD: dict[str, Any] = {"color": PALETTE["first"], "linestyle": "none", "marker": "o", "markersize": 1.6, "alpha": 0.4}
 FIRST = 4  # overlays before the tables
 PER_FIGURE = 24  # overlays

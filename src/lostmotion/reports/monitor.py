@@ -11,9 +11,10 @@ import numpy as np
 from ..identification.monitor import RESIDUAL, MonitorResult, Watched
 from ..identification.parameters import in_unit
 from ..units.conversion import si_factor
+from .looks import FAINT, PALETTE
 from .page import Headline, Prose, Report, Table
 from .pages import table_csv, write_report
-from .panels import FAINT, PALETTE, Curve, Group, Mark, Panel
+from .panels import Curve, Group, Mark, Panel
 
 VALUES: dict[str, Any] = {"color": PALETTE["first"], "linestyle": "none", "marker": "o", "markersize": 3.0}
 ENDS: dict[str, Any] = {"color": PALETTE["first"], "linestyle": "-", "linewidth": 0.7, "alpha": 0.6}

@@ -7,8 +7,10 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from matplotlib.colors import LinearSegmentedColormap
 
-from .panels import PALETTE, Bars, Chart, Contacts, Flows, Histogram, Matrix
+from .looks import COLOURS, INK, PALETTE, SMALLEST
+from .panels import Bars, Chart, Contacts, Flows, Histogram, Matrix
 
 FIRST, SECOND = PALETTE["first"], PALETTE["second"]
 
@@ -34,10 +36,10 @@ def _bars(axes: Any, chart: Bars) -> None:
         label = chart.series[n] if chart.series else None
         axes.barh(y + (0.5 * (count - 1) - n) * 0.4, values, 0.8 / count, color=colour, label=label)
     axes.set_yticks(y, order)
-    axes.axvline(0.0 if chart.limit is None else chart.limit, color="0.3", linewidth=0.8)
+    axes.axvline(0.0 if chart.limit is None else chart.limit, color=INK, linewidth=0.8)
     axes.set(xlabel=chart.label, xlim=chart.x_range)
     if chart.series:
-        axes.legend(fontsize=8)
+        axes.legend()
 
 
 def _histogram(axes: Any, chart: Histogram) -> None:
@@ -52,12 +54,17 @@ def _matrix(axes: Any, chart: Matrix) -> None:
     """The number in each cell gives the sign in grey too."""
     n = len(chart.names)
     axes.grid(visible=False)
-    image = axes.imshow(chart.values, cmap="RdBu_r", vmin=-1.0, vmax=1.0)
-    axes.set_xticks(range(n), chart.names, rotation=45, ha="right", rotation_mode="anchor", fontsize=8)
-    axes.set_yticks(range(n), chart.names, fontsize=8)
+    image = axes.imshow(
+        chart.values,
+        cmap=LinearSegmentedColormap.from_list("signs", [FIRST, COLOURS["surface"], SECOND]),
+        vmin=-1.0,
+        vmax=1.0,
+    )
+    axes.set_xticks(range(n), chart.names, rotation=45, ha="right", rotation_mode="anchor")
+    axes.set_yticks(range(n), chart.names)
     for i, j in np.ndindex(n, n):
-        ink = "white" if abs(chart.values[i, j]) > 0.6 else "black"
-        axes.text(j, i, f"{chart.values[i, j]:+.2f}", ha="center", va="center", fontsize=6.5, color=ink)
+        ink = COLOURS["surface"] if abs(chart.values[i, j]) > 0.6 else INK
+        axes.text(j, i, f"{chart.values[i, j]:+.2f}", ha="center", va="center", fontsize=SMALLEST, color=ink)
     axes.figure.colorbar(image, ax=axes, shrink=0.8)
 
 
@@ -69,8 +76,8 @@ def _contacts(axes: Any, chart: Contacts) -> None:
         edges = np.concatenate([[0], np.flatnonzero(np.diff(m)) + 1, [len(m)]])
         for mode, (low, high) in {0: (-0.35, 0.7), 1: (0.0, 0.35), -1: (-0.35, 0.35)}.items():
             spans = [(time[a], time[b] - time[a]) for a, b in pairwise(edges.tolist()) if m[a] == mode]
-            axes.broken_barh(spans, (low - k, high), facecolor="#39424e" if mode == 0 else "#b8c6d4")
-    axes.set_yticks([-k for k in range(len(chart.modes))], list(chart.modes), fontsize=8)
+            axes.broken_barh(spans, (low - k, high), facecolor=COLOURS["slips" if mode else "stuck"])
+    axes.set_yticks([-k for k in range(len(chart.modes))], list(chart.modes))
     axes.set(xlabel="time [s]")
 
 

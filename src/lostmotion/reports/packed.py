@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from .panels import PALETTE, STEPS, Chart, Contacts, Curve, Flows, Mark, Panel
+from .looks import INK, PALETTE, STEPS
+from .panels import Chart, Contacts, Curve, Flows, Mark, Panel
 from .thinning import thinned
 
-COLOURS = {hexadecimal: name for name, hexadecimal in PALETTE.items()} | {
-    hexadecimal: f"step{k}" for k, hexadecimal in enumerate(STEPS[:-1])
-}
+NAMES = {colour: name for name, colour in PALETTE.items()} | {c: f"step{k}" for k, c in enumerate(STEPS[:-1])}
+NAMES |= {INK: "text"}
 DASHES: Mapping[str, list[float]] = {"-": [], "--": [7, 3], "-.": [7, 3, 2, 3], ":": [2, 3]}
 
 
@@ -25,8 +25,8 @@ def dashes(line: Any) -> list[float]:
 
 
 def colour_name(style: Mapping[str, Any]) -> str:
-    """The name of a colour in the style sheet; shades of grey are muted."""
-    return COLOURS.get(str(style["color"]), "muted")
+    """The name of a colour in the style sheet; others are muted."""
+    return NAMES.get(str(style["color"]), "muted")
 
 
 class Packed:
@@ -95,6 +95,9 @@ def _panel(panel: Panel, pack: Packed) -> dict[str, Any]:
         values = np.asarray(ground.values, float)
         grid = {"x": pack.add(ground.x), "y": pack.add(ground.y), "values": pack.add(values.ravel())}
         out["ground"] = grid
+        out["contours"] = [
+            {"text": c.text, "x": pack.add(c.x), "y": pack.add(c.y), "label": list(c.label)} for c in panel.contours()
+        ]
     return out
 
 
@@ -113,7 +116,7 @@ def _curve(curve: Curve, pack: Packed, max_points: int) -> dict[str, Any]:
     }
     if style.get("marker"):
         out["points"] = 0.5 * style.get("markersize", 5.0)
-    return out | ({"names": curve.names} if curve.names else {})
+    return out | ({"names": curve.names} if curve.names else {}) | ({"numbered": True} if curve.numbered else {})
 
 
 def _mark(mark: Mark) -> dict[str, Any]:

@@ -186,7 +186,16 @@ def _card(chart: Chart, charts: list[Chart], *, still: bool) -> str:
     if isinstance(chart, Panel):
         kind += " still"  # until the script takes over
     figure = "chart wide" if isinstance(chart, Drawing) and chart.wide else "chart"
-    return f'<figure class="{figure}"><figcaption>{caption}</figcaption><div class="{kind}"{place}>{svg}</div></figure>'
+    shown_chart = f'<div class="{kind}"{place}>{svg}</div>{_key(chart)}'
+    return f'<figure class="{figure}"><figcaption>{caption}</figcaption>{shown_chart}</figure>'
+
+
+def _key(chart: Chart) -> str:
+    """The names of numbered points."""
+    if not isinstance(chart, Panel):
+        return ""
+    lists = ["".join(f"<li>{escape(name)}</li>" for name in curve.names) for curve in chart.curves if curve.numbered]
+    return "".join(f'<ol class="key">{items}</ol>' for items in lists)
 
 
 def _legend(chart: Chart) -> str:
@@ -221,7 +230,7 @@ def scale_of(ground: Ground) -> str:
     values = ground.values[np.isfinite(ground.values)]
     if len(values) == 0:
         return "no values"
-    return f"{ground.label}: {values.min():.3g} to {values.max():.3g}, higher where it is shaded more"
+    return f"{ground.label}: {values.min():.3g} to {values.max():.3g}, the darker, the higher"
 
 
 def _matrix(chart: Matrix) -> str:

@@ -7,35 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-COMMAND_STYLE: dict[str, Any] = {"color": "0.45", "linestyle": ":", "linewidth": 1.3}
-
-# The colours of reports by their names in style.css, where each has a dark one too.
-PALETTE = {"first": "#0a5c9e", "second": "#e0701a", "third": "#1a7f5a", "fourth": "#8a3d8f"}
-STEPS = ("#14324f", "#16557a", "#16778f", "#1d8f7c", "#4f9a4a", "#8a9a26", "#bd8f1a", "#e0701a")
-"""colours of an ordered series: step0, step1, ..."""
-# Line styles and widths differ, so that curves differ in grey too.
-LOOKS: tuple[dict[str, Any], ...] = tuple(
-    {"color": colour, "linestyle": line, "linewidth": width}
-    for colour, line, width in zip(PALETTE.values(), ("-", "--", "-.", ":"), (1.6, 1.9, 1.7, 1.9), strict=True)
-)
-# The models of the paper.
-STYLES: dict[str, dict[str, Any]] = {
-    "2-DOF-NL": {"color": PALETTE["first"], "linestyle": "-", "linewidth": 1.7},
-    "2-DOF-L": {"color": PALETTE["second"], "linestyle": "--", "linewidth": 1.3},
-    "1-DOF-L": {"color": PALETTE["third"], "linestyle": "-.", "linewidth": 1.3},
-}
-FAINT = COMMAND_STYLE
-DOTS: dict[str, Any] = {"color": PALETTE["second"], "linestyle": "none", "marker": "o", "markersize": 7}
-
-
-def look(k: int) -> dict[str, Any]:
-    """Style of the k-th curve of a panel."""
-    return LOOKS[k % len(LOOKS)]
-
-
-def step(k: int, count: int) -> dict[str, Any]:
-    """Style of the k-th curve of an ordered series."""
-    return {"color": STEPS[round((len(STEPS) - 1) * k / max(1, count - 1))], "linestyle": "-", "linewidth": 1.5}
+from .contours import Contour, contours
 
 
 def scientific(value: float) -> str:
@@ -56,6 +28,7 @@ class Curve:
     style: Mapping[str, Any]
     legend: str | None = None  # in the figure, if not the label; "_": none
     names: tuple[str, ...] = ()  # of the points, shown on demand
+    numbered: bool = False  # the points have numbers, and a key lists their names
 
     @property
     def shown(self) -> str:
@@ -102,6 +75,12 @@ class Panel:
     ground: Ground | None = None
     x_names: tuple[str, ...] = ()  # of the values 0, 1, 2, ... of x
     max_points: int = 4_000  # of a curve on a page; longer ones as the extremes of their neighbours
+
+    def contours(self) -> list[Contour]:
+        """Contours of the map."""
+        if (g := self.ground) is None:
+            return []
+        return contours(g.x, g.y, g.values, log_x=self.log_x, log_y=self.log_y, degrees="[deg" in g.label)
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,12 @@ from typing import TYPE_CHECKING, Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import MaxNLocator
 
 from . import other_plots as others
+from .contours import Contour
+from .looks import COLOURS, INK, MATPLOTLIB, MUTED, SMALLEST, map_colours
 from .panels import Chart, Curve, Ground, Group, Panel
 from .run_charts import figure_charts, run_charts
 from .thinning import thinned
@@ -18,27 +22,11 @@ from .thinning import thinned
 if TYPE_CHECKING:
     import xarray
 
-LOOKS: Any = {
-    "figure.constrained_layout.use": True,
-    "figure.dpi": 110,
-    "savefig.dpi": 150,
-    "font.size": 9.5,
-    "axes.grid": True,
-    "grid.color": "0.9",
-    "grid.linewidth": 0.7,
-    "axes.axisbelow": True,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "legend.frameon": False,
-    "svg.hashsalt": "lostmotion",
-    "svg.fonttype": "path",
-}
-
-
-MAX_NAMES = 12  # of the points of a line
+HALO = (withStroke(linewidth=2.0, foreground=COLOURS["surface"]),)  # so that text is read over lines
+KEY_LINE = 0.18  # height of a line of a key [inch]
 
 # Decorates what makes or draws figures; the looks of the user's figures stay as they are.
-in_our_looks = mpl.rc_context(LOOKS)
+in_our_looks = mpl.rc_context(MATPLOTLIB)
 
 
 class Picture(Figure):
@@ -62,28 +50,33 @@ class Picture(Figure):
 def draw(charts: Iterable[Chart], columns: int, size: tuple[float, float], note: str = "") -> Figure:
     """Charts in rows of `columns`, `size` [inch] in all; `note` stands below."""
     charts = list(charts)
-    figure = Picture(figsize=size)
+    names = sum(len(c.names) for chart in charts if isinstance(chart, Panel) for c in chart.curves if c.numbered)
+    figure = Picture(figsize=(size[0], size[1] + KEY_LINE * names))
     rows = -(-len(charts) // columns)
-    for k, chart in enumerate(charts):
-        axes = figure.add_subplot(rows, columns, k + 1)
+    every = [figure.add_subplot(rows, columns, k + 1) for k in range(len(charts))]
+    for axes, chart in zip(every, charts, strict=True):
         if isinstance(chart, Panel):
             _panel(axes, chart)
         else:
             others.draw(axes, chart)
         axes.set_title(chart.title)
-        axes.title.set_fontsize(10)
-    labels = [[c.shown for c in chart.curves] if isinstance(chart, Panel) else [] for chart in charts]
-    if len(labels[0]) > 1 and all(names == labels[0] for names in labels):
-        columns = len(labels[0]) if len(labels[0]) <= 4 else 3
-        handles = figure.axes[0].get_legend_handles_labels()
-        figure.legend(*handles, loc="outside upper center", ncols=columns, fontsize=8.5)
-    else:
-        for axes, names in zip(figure.axes, labels, strict=False):
-            if len(names) > 1:
-                axes.legend(fontsize=8, loc="best")
+    _legends(figure, every)
     if note:
-        figure.supxlabel(note, fontsize=8, color="0.35")
+        figure.supxlabel(note, fontsize=SMALLEST, color=MUTED)
     return figure
+
+
+def _legends(figure: Figure, every: list[Any]) -> None:
+    """One legend above the figure where the curves of all panels are among those of one; else one in each panel."""
+    entries = [dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True)) for axes in every]
+    longest = max(entries, key=len)
+    if len(every) > 1 and len(longest) > 1 and all(labels.keys() <= longest.keys() for labels in entries):
+        columns = len(longest) if len(longest) <= 4 else 3
+        figure.legend(list(longest.values()), list(longest), loc="outside upper center", ncols=columns)
+        return
+    for axes, labels in zip(every, entries, strict=True):
+        if len(labels) > 1:
+            axes.legend(loc="best")
 
 
 def draw_group(group: Group) -> Figure:
@@ -95,26 +88,28 @@ def draw_group(group: Group) -> Figure:
 
 def _panel(axes: Any, panel: Panel) -> None:
     for low, high in panel.shaded:
-        axes.axvspan(low, high, color="0.88", linewidth=0)
+        axes.axvspan(low, high, color=COLOURS["grid"], linewidth=0)
     if (ground := panel.ground) is not None:
-        _contours(axes, ground)
+        _contours(axes, panel, ground)
     if panel.level is not None:
-        axes.axhline(panel.level, color="0.45", linestyle="--", linewidth=0.9)
+        axes.axhline(panel.level, color=MUTED, linestyle="--", linewidth=0.9)
     for curve in panel.curves:
         axes.plot(*thinned(curve.x, curve.y), label=curve.shown, **curve.style)
-        if curve.names and curve.style.get("linestyle") != "none":
-            _names(axes, curve)
+        if curve.numbered:
+            _numbers(axes, curve)
     for mark in panel.marks:
         axes.plot([mark.x, mark.x], [mark.y, mark.y if mark.to is None else mark.to], color=mark.style["color"])
         axes.plot([mark.x], [mark.y], ".", color=mark.style["color"])
-        axes.annotate(mark.text, (mark.x, mark.y), (4, 4), textcoords="offset points", fontsize=7)
+        axes.annotate(mark.text, (mark.x, mark.y), (4, 4), textcoords="offset points", fontsize=SMALLEST)
     if panel.log_x:
         axes.set_xscale("log")
     if panel.log_y and (panel.ground or any(np.any(np.asarray(curve.y) > 0.0) for curve in panel.curves)):
         axes.set_yscale("log")
     axes.set(xlabel=panel.x_label, ylabel=panel.y_label)
+    if "[deg" in panel.y_label and not panel.log_y:
+        axes.yaxis.set_major_locator(MaxNLocator(steps=[1, 1.5, 3, 4.5, 9, 10]))
     if panel.x_names:
-        axes.set_xticks(range(len(panel.x_names)), panel.x_names, rotation=45, ha="right", fontsize=7)
+        axes.set_xticks(range(len(panel.x_names)), panel.x_names, rotation=45, ha="right", fontsize=SMALLEST)
     if panel.x_range is not None:
         axes.set_xlim(*panel.x_range)
     if panel.y_range is not None:
@@ -123,23 +118,46 @@ def _panel(axes: Any, panel: Panel) -> None:
         axes.set_ylim(*_range_within(panel.curves, panel.x_range))
 
 
-def _names(axes: Any, curve: Curve) -> None:
-    """The first points of a line with their names, and room for that of the last."""
-    for name, *point in zip(curve.names[:MAX_NAMES], curve.x, curve.y, strict=False):
-        axes.annotate(name, point, textcoords="offset points", xytext=(4, 4), fontsize=6)
-    low, high = axes.get_xlim()
-    axes.set_xlim(low, high + 0.25 * (high - low))
+def _numbers(axes: Any, curve: Curve) -> None:
+    """The points with their numbers, and a key of their names."""
+    for k, point in enumerate(zip(curve.x, curve.y, strict=True), 1):
+        beside = (4, 5) if k % 2 else (4, -13)  # neighbours do not cover each other
+        text = axes.annotate(str(k), point, textcoords="offset points", xytext=beside, fontsize=SMALLEST, zorder=5)
+        text.set_path_effects(HALO)
+    axes.margins(0.1)  # room for them
+    names = "\n".join(f"{k}  {name}" for k, name in enumerate(curve.names, 1))
+    axes.figure.supxlabel(names, x=0.02, ha="left", fontsize=SMALLEST)
 
 
-def _contours(axes: Any, ground: Ground) -> None:
+def _contours(axes: Any, panel: Panel, ground: Ground) -> None:
     shown = np.ma.masked_invalid(ground.values)
     axes.grid(visible=False)
     if shown.count() == 0 or float(np.ptp(shown.compressed())) == 0.0:
-        axes.text(0.5, 0.5, "nothing to show", transform=axes.transAxes, ha="center", color="0.35")
+        axes.text(0.5, 0.5, "no values, or all are the same", transform=axes.transAxes, ha="center", color=MUTED)
         return
-    filled = axes.contourf(ground.x, ground.y, shown, levels=14, cmap="cividis")
-    axes.figure.colorbar(filled, ax=axes, label=ground.label)
-    axes.contour(ground.x, ground.y, shown, levels=14, colors="0.15", linewidths=0.4)
+    if shown.count() == shown.size:
+        mesh = axes.pcolormesh(ground.x, ground.y, shown, cmap=map_colours(), shading="gouraud")
+    else:
+        sides = (_edges(ground.x, logarithmic=panel.log_x), _edges(ground.y, logarithmic=panel.log_y))
+        mesh = axes.pcolormesh(*sides, shown, cmap=map_colours())
+    mesh.set_rasterized(True)
+    axes.figure.colorbar(mesh, ax=axes, label=ground.label)
+    draw_contours(axes, panel.contours())
+
+
+def draw_contours(axes: Any, lines: Iterable[Contour]) -> None:
+    """Contours with their values."""
+    for contour in lines:
+        axes.plot(contour.x, contour.y, color=INK, linewidth=0.6)
+        text = axes.annotate(contour.text, contour.label, ha="center", va="center", fontsize=SMALLEST)
+        text.set_path_effects(HALO)
+
+
+def _edges(middles: Any, *, logarithmic: bool) -> Any:
+    """Limits of cells about their middles, the outermost at the ends."""
+    m = np.log(middles) if logarithmic else np.asarray(middles, float)
+    edges = np.concatenate([m[:1], 0.5 * (m[1:] + m[:-1]), m[-1:]])
+    return np.exp(edges) if logarithmic else edges
 
 
 def _range_within(curves: Iterable[Curve], x_range: tuple[float, float]) -> tuple[float, float]:
@@ -171,25 +189,3 @@ def overview(result: xarray.Dataset, figure: str | None = None) -> Figure:
     if result.attrs.get("title"):
         drawn.suptitle(result.attrs["title"])
     return drawn
-
-
-@in_our_looks
-def loss_map(speeds: Any, loads: Any, values: Any, note: str = "") -> Figure:
-    """Figure 5: the loss coefficient as a surface and as curves. values[load, speed], driving side only."""
-    figure = Picture(figsize=(10.0, 4.2))
-    surface: Any = figure.add_subplot(1, 2, 1, projection="3d")
-    v, mu = np.meshgrid(speeds, loads)
-    surface.plot_surface(v, mu, values, cmap="cividis", edgecolor="0.25", linewidth=0.4, alpha=0.95)
-    surface.set(xlabel="relative speed v [-]", ylabel="relative load µ [-]", zlabel="$m_{2B}$ [-]")
-    surface.tick_params(labelsize=7.5, pad=0)
-    surface.view_init(elev=24, azim=-125)
-    surface.set_box_aspect(None, zoom=0.88)
-    curves = figure.add_subplot(1, 2, 2)
-    shades = mpl.colormaps["cividis"](np.linspace(0.0, 0.85, len(loads)))
-    for row, load, colour in zip(values, loads, shades, strict=True):
-        curves.plot(speeds, row, color=colour, marker="o", markersize=3, label=f"µ = {load:g}")
-    curves.set(xlabel="relative speed v [-]", ylabel="loss coefficient $m_{2B}$ [-]", ylim=(0.0, None))
-    curves.legend(fontsize=8, ncols=2)
-    if note:
-        figure.supxlabel(note, fontsize=8, color="0.35")
-    return figure

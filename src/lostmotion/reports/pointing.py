@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from ..pointing.budget import Errors, PointingBudget, PointingError
+from .looks import look
 from .page import Headline, Prose, Report, Table
 from .pages import table_csv, write_report
-from .panels import Bars, Curve, Group, Panel, look
+from .panels import Bars, Curve, Group, Panel
 
 NUMBERS = ("rms", "peak", "probable", "mean", "measured, rms")
 

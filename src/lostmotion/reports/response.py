@@ -14,9 +14,10 @@ from ..atomic_writer import write_bytes
 from ..response.crossovers import characteristics
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
+from .looks import step
 from .page import Headline, Prose, Report, Table
 from .pages import table_csv, write_report
-from .panels import Curve, Ground, Group, Panel, step
+from .panels import Curve, Ground, Group, Panel
 
 if TYPE_CHECKING:
     import xarray
@@ -79,10 +80,12 @@ def bode(responses: Mapping[str, xarray.Dataset], output: str) -> list[Panel]:
             phase.append(Curve(label, f, np.degrees(np.unwrap(np.angle(values))), style, legend))
     source, of_source = first.attrs["source"], unit_of_source(first)
     unit = str(first["unit"].sel(output=output).item()).replace("*", "·")
-    title = f"{output.replace('_', ' ')} / {source.replace('_', ' ')} by amplitude [{of_source}]"
+    of_gain = unit if of_source == "-" else f"{unit} / {of_source}"
+    by = f"by amplitude of the {source.replace('_', ' ')}" + ("" if of_source == "-" else f" [{of_source}]")
+    title = f"{output.replace('_', ' ').capitalize()}, {by}"
     return [
-        Panel(title, "frequency [Hz]", f"gain [{unit} / {of_source}]", tuple(gain), log_x=True, log_y=True),
-        Panel("phase", "frequency [Hz]", "phase [degrees]", tuple(phase), log_x=True),
+        Panel(title, "frequency [Hz]", f"gain [{of_gain}]", tuple(gain), log_x=True, log_y=True),
+        Panel("Phase", "frequency [Hz]", "phase [degrees]", tuple(phase), log_x=True),
     ]
 
 
@@ -105,13 +108,13 @@ def maps(response: xarray.Dataset, output: str) -> list[Panel]:
 
     return [
         panel(
-            f"gain of {output.replace('_', ' ')}, down to {MAP_DEPTH:g} dB below the largest",
+            f"Gain of {output.replace('_', ' ')}, down to {MAP_DEPTH:g} dB below the largest",
             "[dB]",
             np.where(shown, gain, np.nan),
         ),
-        panel("phase", "[degrees]", np.where(shown, phase, np.nan)),
-        panel("mean efficiency", "[-]", response["efficiency"].values),
-        panel("total harmonic distortion", "[%]", harmonics),
+        panel("Phase", "[degrees]", np.where(shown, phase, np.nan)),
+        panel("Mean efficiency", "[-]", response["efficiency"].values),
+        panel("Total harmonic distortion", "[%]", harmonics),
     ]
 
 

@@ -14,9 +14,10 @@ from ..test_rig.comparison import Comparison
 from ..test_rig.measurement import RigReport
 from ..test_rig.rig import LOST_MOTION_LOAD
 from ..units.practical import RPM, practical
+from .looks import DOTS, step
 from .page import Headline, Prose, Report, Table
 from .pages import table_csv, write_report
-from .panels import DOTS, Curve, Group, Panel, step
+from .panels import Curve, Group, Panel
 from .sheet_rows import rows_of, rows_of_part
 
 MEASURED = (

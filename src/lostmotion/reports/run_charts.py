@@ -18,7 +18,8 @@ from ..simulation.scenario import Scenario
 from ..simulation.train_parts import parts_of
 from ..simulation.train_scenario import TrainScenario
 from ..units.practical import charted
-from .panels import FAINT, Chart, Contacts, Curve, Flows, Ground, Panel, look
+from .looks import FAINT, look
+from .panels import Chart, Contacts, Curve, Flows, Ground, Panel
 
 if TYPE_CHECKING:
     import xarray

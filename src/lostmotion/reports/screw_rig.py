@@ -11,9 +11,10 @@ from ..data_sheets.linear_sheets import ScrewSheet
 from ..test_rig.rig import LOST_MOTION_LOAD
 from ..test_rig.screw_measurement import RATED, ScrewReport
 from ..units.practical import RPM
+from .looks import DOTS, step
 from .page import Headline, Report
 from .pages import table_csv, write_report
-from .panels import DOTS, Curve, Group, Panel, step
+from .panels import Curve, Group, Panel
 from .rig import compared_rows, largest_difference, rig_parts
 
 MEASURED = (

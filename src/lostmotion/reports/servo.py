@@ -12,9 +12,10 @@ import numpy as np
 from ..servo.commission import LoopSheet, ServoReport, decibels
 from ..servo.motion import LimitCycle, StepResponse
 from ..units.practical import charted
+from .looks import FAINT, look
 from .page import Headline, Prose, Report, Table
 from .pages import table_csv, write_report
-from .panels import FAINT, Curve, Group, Mark, Panel, look
+from .panels import Curve, Group, Mark, Panel
 
 DEGREES = 180.0 / math.pi
 LEAD = 2.0  # [deg] of a phase that is drawn as 0

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from .contours import ticks
 from .packed import colour_name, dashes
 from .panels import Bars, Chart, Contacts, Curve, Drawing, Ground, Histogram, Panel
 from .thinning import simplified, thinned
@@ -21,6 +22,7 @@ CONSTANT = 1e-9  # relative differences up to which are rounding
 NAMES = 8  # along an axis
 DOTS = 600  # of a cloud
 SHADES = 16  # of a map
+APART = (34.0, 13.0)  # width and height of a value at a contour
 SEEN = 0.3  # from a line between others, in units of the picture
 Scale = Callable[[Any], Any]
 
@@ -47,19 +49,6 @@ def swatch(curve: Curve) -> str:
     dot = f'<circle cx="13" cy="4" r="3" fill="var(--{name})"/>' if style.get("marker") else ""
     shown = "" if style.get("linestyle") == "none" else line
     return f'<span class="swatch" aria-hidden="true"><svg viewBox="0 0 26 8">{shown}{dot}</svg></span>'
-
-
-def ticks(low: float, high: float, count: float, degrees: bool = False) -> list[float]:
-    """Round values within an interval, about so many of them; of angles in degrees, parts and multiples of a right angle."""
-    span = high - low
-    if not (span > 0.0 and math.isfinite(span)):
-        return [low]
-    power = 10.0 ** math.floor(math.log10(span / count))
-    steps = (15.0, 30.0, 45.0, 90.0, 180.0, 360.0, 720.0) if degrees and span > 12 * count else ()
-    width = next(f for f in (*steps, *(g * power for g in (1, 2, 5, 10))) if f >= 0.75 * span / count)
-    return [
-        float(f"{k * width:.12g}") for k in range(math.ceil(low / width - 1e-9), math.floor(high / width + 1e-9) + 1)
-    ]
 
 
 def _logarithmic_ticks(low: float, high: float) -> list[float]:
@@ -129,7 +118,7 @@ def _panel(panel: Panel) -> str:
     to_x = _scale(x, LEFT, WIDTH - RIGHT, panel.log_x)
     to_y = _scale(y, HEIGHT - BOTTOM, TOP, log_y)
     parts = [_frame(panel, x, y, to_x, to_y, log_y)]
-    parts += [] if ground is None else [_ground(ground, to_x, to_y)]
+    parts += [] if ground is None else [_ground(ground, to_x, to_y), _contours(panel, to_x, to_y)]
     for low, high in panel.shaded:
         a, b = (float(np.clip(to_x(v), LEFT, WIDTH - RIGHT)) for v in (low, high))
         parts.append(
@@ -152,7 +141,18 @@ def _panel(panel: Panel) -> str:
                 f'<path d="M{a:.1f} {b:.1f}V{float(to_y(mark.to)):.1f}" stroke="var(--{colour})" stroke-width="2"/>'
             )
         parts.append(f'<circle cx="{a:.1f}" cy="{b:.1f}" r="3.5" fill="var(--{colour})"/>')
+        parts.append(_beside(a, b, mark.text))
+    for curve in (c for c in panel.curves if c.numbered):
+        places = zip(to_x(np.asarray(curve.x, float)).tolist(), to_y(np.asarray(curve.y, float)).tolist(), strict=True)
+        parts += [_beside(a, b, str(k)) for k, (a, b) in enumerate(places, 1)]
     return _svg(panel.title, HEIGHT, parts)
+
+
+def _beside(x: float, y: float, text: str) -> str:
+    """A text beside a point, within the picture."""
+    right = x + 8.0 + 6.2 * len(text) < WIDTH - RIGHT
+    place = f'class="mark-text {"start" if right else "end"}" x="{x + (6.0 if right else -6.0):.1f}"'
+    return f'<text {place} y="{y - 6.0:.1f}">{escape(text)}</text>' if text else ""
 
 
 def _ground(ground: Ground, to_x: Scale, to_y: Scale) -> str:
@@ -168,10 +168,23 @@ def _ground(ground: Ground, to_x: Scale, to_y: Scale) -> str:
         for a, b in pairwise(ends):
             box = f"M{across[a]:.1f} {along[j]:.1f}H{across[b]:.1f}V{along[j + 1]:.1f}H{across[a]:.1f}z"
             cells.setdefault(row[a], []).append(box)
-    shades = {level: 0.03 + 0.4 * level / SHADES for level in cells if level >= 0}
+    shades = {level: 0.08 + 0.42 * level / SHADES for level in cells if level >= 0}
     return "".join(
         f'<path fill="var(--text)" fill-opacity="{s:.3f}" d="{"".join(cells[n])}"/>' for n, s in shades.items()
     )
+
+
+def _contours(panel: Panel, to_x: Scale, to_y: Scale) -> str:
+    """Contours of a map with their values, where these do not cover each other."""
+    lines, texts, written = [], [], list[tuple[float, float]]()
+    for contour in panel.contours():
+        points = np.column_stack([to_x(contour.x), to_y(contour.y)]).reshape(-1, 3, 2)[:, :2].tolist()
+        lines += [f"M{a:.1f} {b:.1f}L{c:.1f} {d:.1f}" for (a, b), (c, d) in points]
+        x, y = float(to_x(contour.label[0])), float(to_y(contour.label[1]))
+        if all(abs(x - a) > APART[0] or abs(y - b) > APART[1] for a, b in written):
+            texts.append(f'<text class="tick contour" x="{x:.1f}" y="{y + 4:.1f}">{contour.text}</text>')
+            written.append((x, y))
+    return f'<path class="contour" d="{"".join(lines)}"/>{"".join(texts)}'
 
 
 def _edges(middles: np.ndarray) -> list[float]:

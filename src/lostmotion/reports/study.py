@@ -13,9 +13,10 @@ from ..studies.engine import study_of
 from ..studies.study import Study
 from ..studies.table import labelled, read_table
 from ..studies.vary import Vary
+from .looks import PALETTE
 from .page import Headline, Prose, Report, Table
 from .pages import table_csv, write_report
-from .panels import PALETTE, Bars, Curve, Group, Histogram, Panel
+from .panels import Bars, Curve, Group, Histogram, Panel
 from .study_selection import show_selection
 
 if TYPE_CHECKING:

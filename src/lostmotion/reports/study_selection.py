@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,15 +14,16 @@ from ..studies.select import TASK_SHARES, USE, Selection
 from ..studies.selection import NOT_RUN, Candidate, Price, candidates, pareto_front, prices
 from ..studies.study import Study
 from ..studies.table import labelled
+from .looks import OTHERS, PALETTE, look
 from .page import Headline, Table
 from .pages import table_csv
-from .panels import PALETTE, Curve, Group, Panel, look
+from .panels import Curve, Group, Panel
 
 if TYPE_CHECKING:
     import pyarrow as pa
     from matplotlib.figure import Figure
 
-PARETO = "Point at a candidate to read its name and values."
+PARETO = "Each point is a candidate; point at it to read its name and values. The list below names the numbered ones."
 NEAREST = 5  # candidates that do not fit, for which a slower cycle is sought
 MAX_LINES = 10  # lines of each list that are printed; selection.csv has all
 MAX_ROWS = 25  # of a table on the page
@@ -108,19 +109,22 @@ def _ranking_tables(table: pa.Table, ranked: list[Candidate], front: list[Candid
     fitting = [c for c in ranked if c.fits][:MAX_ROWS]
     if not fitting:
         return []
-    on_front = {c.run for c in front}
+    numbers = {c.run: str(k) for k, c in enumerate(_in_order(front, select), 1)}
     titles = [f"{labelled(table, column)}, {direction}" for column, direction in select.objectives.items()]
     rows = [
         [
             c.name,
             *(f"{v:.5g}" for v in c.values.values()),
-            "yes" if c.run in on_front else "",
+            numbers.get(c.run, ""),
             c.tightest,
             c.not_judged,
         ]
         for c in fitting
     ]
-    note = f"The best {MAX_ROWS}; all are in `selection.csv`." if sum(c.fits for c in ranked) > MAX_ROWS else ""
+    note = "A number in the column Pareto front is that in the chart; a blank cell means that another candidate is better in all."
+    note = note if len(select.objectives) > 1 else ""
+    if (count := sum(c.fits for c in ranked)) > MAX_ROWS:
+        note = f"The best {MAX_ROWS} of {count}; all are in `selection.csv`. {note}".strip()
     header = ("candidate", *titles, "Pareto front", "most used limit", "not judged")
     return [Table("Candidates that fit", header, rows, note)]
 
@@ -165,14 +169,21 @@ def pareto_panel(table: pa.Table, ranked: list[Candidate], front: list[Candidate
 
     fits, fails = ([c for c in ranked if c.fits is wanted] for wanted in (True, False))
     curves = (
-        curve(
-            "does not fit", fails, {"color": "0.6", "linestyle": "none", "marker": "x", "markersize": 4, "alpha": 0.6}
-        ),
+        curve("does not fit", fails, OTHERS),
         curve("fits", fits, {"color": PALETTE["first"], "linestyle": "none", "marker": "o", "markersize": 5}),
-        curve("Pareto front", sorted(front, key=lambda c: c.values[x]), look(1) | {"marker": "o", "markersize": 6}),
+        replace(
+            curve("Pareto front", _in_order(front, select), look(1) | {"marker": "o", "markersize": 6}),
+            numbered=len(front) <= MAX_ROWS,
+        ),
     )
     label = [f"{labelled(table, name)}, {select.objectives[name]}" for name in (x, y)]
     return Panel("Objectives of all candidates", label[0], label[1], tuple(c for c in curves if len(c.x)))
+
+
+def _in_order(front: list[Candidate], select: Selection) -> list[Candidate]:
+    """The Pareto front along its first objective, in which its points have their numbers."""
+    first = next(iter(select.objectives))
+    return sorted(front, key=lambda c: c.values[first])
 
 
 def pareto_figure(table: pa.Table, ranked: list[Candidate], front: list[Candidate], select: Selection) -> Figure:

@@ -20,6 +20,7 @@ from ..response.shooting import floquet_multipliers, is_stable, motion_of
 from ..response.standstill import Verdict
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario, in_long_form
+from ..simulation.units_of_keys import unit_for
 from ..worker_threads import thread_pool
 from .motion import PART, at_rest, without_backlash, without_friction
 from .regimes import axis_of
@@ -280,8 +281,14 @@ def hunting_map(
         ("reason", {"long_name": "reason for a missing limit cycle"}),
     ]
     data = {name: (names, column, attrs) for (name, attrs), column in zip(about, columns, strict=True)}
-    coords = {n: (n, values, {"long_name": key}) for n, (key, values) in zip(names, keys.items(), strict=True)}
+    coords = {n: (n, values, _named(train, key)) for n, (key, values) in zip(names, keys.items(), strict=True)}
     return xr.Dataset(data, coords=coords, attrs={"variable": of})
+
+
+def _named(train: TrainScenario, key: str) -> dict[str, str]:
+    """Attributes of the values of a key."""
+    unit = unit_for(train, key)
+    return {"long_name": key} | ({} if unit is None else {"units": unit or "1"})
 
 
 def _point(train: TrainScenario, variable: str) -> tuple[float, float, bool, str, str]:

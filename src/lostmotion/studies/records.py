@@ -17,7 +17,7 @@ from ..inputs.validation import listed, shown
 from ..simulation.scenario import Scenario
 from ..simulation.scenario_files import scenario_from
 from ..simulation.train_scenario import TrainScenario
-from .units import in_si
+from ..simulation.units_of_keys import in_si
 
 # Of keys that take the name of a record: the part that the record describes, and what kind of record it is.
 _RECORD_KEYS = {

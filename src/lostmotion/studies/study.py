@@ -13,6 +13,7 @@ from ..inputs.quantities import Whole
 from ..inputs.validation import listed
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario, is_train
+from ..simulation.units_of_keys import unit_in, unit_of_key
 from ..sizing.stages import stage_of, together
 from .axis import FEWEST, AxisTask, axis_scenario
 from .axis_columns import COLUMNS as AXIS_COLUMNS
@@ -21,7 +22,6 @@ from .design import unit_cube
 from .expressions import Expression, read_expression
 from .records import is_condition, kind_of_record, name_key, names_a_record, owner_of, with_records
 from .select import SHARES, TASK_SHARES, USE, Selection, check_bounds
-from .units import unit_in, unit_of_key
 from .vary import Vary, base_value, check_key, check_spelling, scaled
 from .vocabulary import Vocabulary, vocabulary_of
 

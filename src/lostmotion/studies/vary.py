@@ -20,8 +20,8 @@ from ..reproducible import exp, log
 from ..simulation.keys import list_index
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
+from ..simulation.units_of_keys import in_si, unit_in, unit_of_key
 from .records import check_names, is_condition, kind_of_record, names_that_fit, record_keys
-from .units import in_si, unit_in, unit_of_key
 
 MAX_LEVELS = 1_000_000  # of one parameter
 TAKING_NAMES = ("gearbox", "motor", *(f"{table}.NAME.{key}" for table, (key, _) in RECORDS.items()))

@@ -1,4 +1,4 @@
-"""Units of what a study varies: those of the keys of a scenario, in the short or the long form."""
+"""Units of the keys of a scenario, in the short or the long form."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import Any
 from ..inputs.quantities import Limit
 from ..inputs.schema import follow, unit_in_schema
 from ..inputs.validation import shown
-from ..simulation.linear_units import unit_of_slides
-from ..simulation.scenario import Scenario, json_schema
-from ..simulation.train_scenario import TrainScenario, train_schema
 from ..units.conversion import to_si
 from ..units.scalars import is_number, objection
+from .linear_units import unit_of_slides
+from .scenario import Scenario, json_schema
+from .train_scenario import TrainScenario, train_schema
 
 
 def unit_of_key(key: str) -> str | None:
