@@ -181,6 +181,13 @@ class TrainDescription : public model::TrainDescription {
         return run_;
     }
     std::string check() const { return run()->error(); }
+    // Shafts whose speeds follow from the balance of torques.
+    std::vector<std::string> massless_shafts() const {
+        std::vector<std::string> names;
+        for (const int s : model::Places(train).massless)
+            names.push_back(train.shafts[static_cast<std::size_t>(s)].name);
+        return names;
+    }
     std::string check_start(const std::vector<double>& speeds) const { return model::check_start(train, speeds); }
     // The train must have passed the check.
     std::vector<ChannelRow> channels() const { return channel_rows(run()->channels()); }
@@ -400,6 +407,7 @@ inline void bind_train(nb::module_& m) {
             [](TrainDescription& t, bool v) { t.train.short_form = v; },
             "Whether results have the names of a drive: `twist`, not `gearbox_twist`.")
         .def("kernel", [](const TrainDescription& t) { return t.run()->kernel(); })
+        .def("massless_shafts", &TrainDescription::massless_shafts)
         .def("check_start", &TrainDescription::check_start, "speeds"_a)
         .def("channels", &TrainDescription::channels, nb::sig("def channels(self) -> list[tuple[str, str, str, str]]"),
              "Name, symbol, unit, meaning.")

@@ -299,7 +299,7 @@ TOPICS = {
     "Linear axes": ("ball-screw-", "rack-", "vertical-"),
     "Limit cycles": ("hunting-",),
     "Tracking and pointing": ("tracking-", "direction-finder"),
-    "Drive trains": ("belt-", "two-motors-", "two-link-", "given-motion"),
+    "Drive trains": ("belt-", "bevel-", "two-motors-", "two-link-", "given-motion"),
 }
 
 

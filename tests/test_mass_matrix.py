@@ -274,6 +274,10 @@ def test_a_cart_and_its_pendulum_take_units_by_domain() -> None:
             "mass_matrices.m: .*smallest eigenvalue is -1;",
         ),
         ({"m": {"shafts": ["shoulder", "elbow"], "matrix": [[1.0, 1.0], [1.0, 1.0]]}}, "not positive definite"),
+        (
+            {"m": {"shafts": ["shoulder", "elbow"], "matrix": [[1.0, 0.0], [0.0, 0.0]]}},
+            "mass_matrices.m: has no inertia of shaft 'elbow' on its diagonal; give one, or leave that shaft out",
+        ),
         ({"m": {"shafts": ["shoulder", "elbow"], "matrix": [[1.0, 0.5], [0.4, 1.0]]}}, "not symmetric: .* 0.5 and 0.4"),
         ({"m": {"shafts": ["shoulder", "elbow"], "matrix": [[1.0, 0.5]]}}, "give its matrix 2 rows of 2 numbers"),
         ({"m": {"shafts": ["shoulder", "shoulder"], "matrix": [[1.0, 0.5], [0.5, 1.0]]}}, "'shoulder' twice"),

@@ -108,8 +108,8 @@ TEST_CASE("what is wrong with a train is said in one line with the names of its 
               t.shafts[2].inertia = 0.0;
               t.gears[1].law.compliance = Gearbox::torsion_curve;
           }) ==
-          "shaft 'table' has no inertia and no rigid gear ties its speed to shafts that have one; give it an "
-          "inertia, or that of a motor or gear on it");
+          "shaft 'table' has no inertia, and no damping acts on it in all states of its gears; give it an inertia "
+          "(0.0009 kg*m^2 is harmless beside its neighbours), or mesh damping to a gear without backlash");
     CHECK(with([](Train& t) { t.shafts[2].inertia = 0.0; }) == "");
     CHECK(with(loop(5.0)) ==
           "gear 'bypass' closes a loop of rigid gears with another ratio: nothing could turn; give it "

@@ -51,9 +51,12 @@ LinearRegime linearize(const model::Assembly& a, const std::vector<TrainChannel>
             return total;
         }
         const model::ShaftPlace& input = a.places().shafts[static_cast<std::size_t>(gear.input)];
-        const double way = gear.has_dry_losses()        ? p.key.modes[static_cast<std::size_t>(input.contact)]
-                           : p.now.x[input.speed] < 0.0 ? -1.0
-                                                        : 1.0;
+        const double speed = input.massless == model::nowhere
+                                 ? p.now.x[input.speed]
+                                 : value(r.massless[static_cast<std::size_t>(input.massless)].form);
+        const double way = gear.has_dry_losses() ? p.key.modes[static_cast<std::size_t>(input.contact)]
+                           : speed < 0.0         ? -1.0
+                                                 : 1.0;
         return row(gear.sense() * way / rated * (gear.law.ratio * r.input_torque[k] - r.output_torque[k]));
     };
     LinearRegime out;
@@ -70,6 +73,7 @@ LinearRegime linearize(const model::Assembly& a, const std::vector<TrainChannel>
     for (const Channel& c : channels) {
         const auto k = static_cast<std::size_t>(c.index);
         if (c.kind == Channel::state) add(c, model::Row::unit(static_cast<int>(first(k))));
+        if (c.kind == Channel::massless_speed) add(c, r.massless[k].form);
         if (c.kind == Channel::motor_torque) add(c, r.motor_torque[k]);
         if (c.kind == Channel::output_torque) add(c, r.output_torque[k]);
         if (c.kind == Channel::input_torque || c.kind == Channel::loss_coefficient) {

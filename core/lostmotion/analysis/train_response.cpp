@@ -9,7 +9,11 @@ PowerChannels power_channels(const model::Assembly& a, const std::vector<TrainCh
         while (channels[k].kind != kind || channels[k].index != index) ++k;
         return static_cast<int>(k);
     };
-    const auto speed = [&](int shaft) { return channel(TrainChannel::state, a.places().shafts[shaft].speed); };
+    const auto speed = [&](int shaft) {
+        const model::ShaftPlace& p = a.places().shafts[shaft];
+        return p.massless == model::nowhere ? channel(TrainChannel::state, p.speed)
+                                            : channel(TrainChannel::massless_speed, p.massless);
+    };
     PowerChannels out;
     for (std::size_t m = 0; m < t.motors.size(); ++m)
         out.motors.push_back({channel(TrainChannel::motor_torque, static_cast<int>(m)), speed(t.motors[m].shaft)});

@@ -105,6 +105,12 @@ struct LockedTorque {
     }
 };
 
+// The speed of a shaft without inertia, which follows from the balance of its torques: w as a form of all else.
+struct MasslessSpeed {
+    int speed = -1;  // the state that the form takes the place of
+    Row form;
+};
+
 struct Regime {
     Key key;
     std::vector<Row> rate;  // of each state
@@ -115,6 +121,7 @@ struct Regime {
     std::vector<Row> gear_hysteresis;  // H of each gear [N m]
     std::vector<Row> contact_torque;   // what each contact takes [N m]
     std::vector<Row> drive_torque;     // of each given motion: what it turns its shaft with [N m]
+    std::vector<MasslessSpeed> massless;
     std::array<bool, max_contacts> at_rest{};  // contacts whose speeds this regime keeps at zero
     Ties ties;
     std::vector<Driver<Row>> drivers;
@@ -124,6 +131,15 @@ struct Regime {
     double driving_way = 0.0;
     bool solvable = true;  // false: the reactions have no unique solution (jamming)
     bool in_data = true;   // false: a loss map is used outside its data
+
+    // Puts the speeds of shafts without inertia into a form.
+    void put_massless_speeds(Row& f) const {
+        for (const MasslessSpeed& m : massless)
+            if (const double share = f.c[m.speed]; share != 0.0) {
+                f.c[m.speed] = 0.0;
+                f += share * m.form;
+            }
+    }
 };
 
 }  // namespace lostmotion::model

@@ -18,6 +18,7 @@ struct ShaftPlace {
     int speed = nowhere, angle = nowhere;  // states; the angle only if something depends on it
     int contact = nowhere, load = nowhere;
     int given_speed = nowhere, given_acceleration = nowhere;  // inputs, where the motion is given
+    int massless = nowhere;                                   // number of the shaft among those without inertia
     int friction_piece = nowhere;                             // branch
     double inertia = 0.0, viscous_friction = 0.0;             // with the rotors and gears on it
     double motor_friction = 0.0;                              // [N m], of the bearings of the motors on it

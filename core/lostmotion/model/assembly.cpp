@@ -14,12 +14,17 @@ Regime Assembly::build(const Key& key) const {
     for (const int s : places().driven) r.drive_torque.push_back(equations_.drive_torque(s, motion[s]));
     std::vector<Row*> forms;
     for (std::vector<Row>* rows :
-         {&r.output_torque, &r.input_torque, &r.gear_hysteresis, &r.contact_torque, &r.drive_torque})
+         {&r.motor_torque, &r.output_torque, &r.input_torque, &r.gear_hysteresis, &r.contact_torque, &r.drive_torque})
         for (Row& f : *rows) forms.push_back(&f);
-    r.solvable = Statics(places(), key, r.ties, motion).solve(forms);
+    Statics statics(places(), key, r.ties, motion);
+    r.solvable = statics.solve(forms);
+    r.massless = statics.massless();
     equations_.set_rates(key, motion, r);
     equations_.add_coupled_inertias(r);
     RegimeGuards(equations_, *this, r).add_all();
+    for (Guard& g : r.guards) r.put_massless_speeds(g.form);
+    for (LockedTorque<Row>& l : r.locked)
+        for (Row* f : {&l.low, &l.high, &l.needs, &l.friction}) r.put_massless_speeds(*f);
     return r;
 }
 

@@ -1,13 +1,15 @@
 #include "check.hpp"
 
+#include "assembly.hpp"
 #include "eigenvalue.hpp"
+#include "names.hpp"
 
 namespace lostmotion::model {
 
 std::string TrainCheck::operator()() const {
-    for (const auto check :
-         {&TrainCheck::shafts_exist, &TrainCheck::mass_matrices, &TrainCheck::controllers, &TrainCheck::elements,
-          &TrainCheck::inertias, &TrainCheck::rigid_loops, &TrainCheck::turned, &TrainCheck::sizes})
+    for (const auto check : {&TrainCheck::shafts_exist, &TrainCheck::mass_matrices, &TrainCheck::controllers,
+                             &TrainCheck::elements, &TrainCheck::inertias, &TrainCheck::rigid_loops,
+                             &TrainCheck::turned, &TrainCheck::sizes, &TrainCheck::massless})
         if (std::string error = (this->*check)(); !error.empty()) return error;
     return {};
 }
@@ -174,6 +176,10 @@ std::string TrainCheck::mass_matrices() const {
                 if (!(std::fabs(M[a][b] - M[b][a]) <= rounding * std::sqrt(std::fabs(M[a][a] * M[b][b]))))
                     return name + " is not symmetric: between " + shaft(m.shafts[b]) + " and " + shaft(m.shafts[a]) +
                            " it has " + number(M[b][a]) + " and " + number(M[a][b]) + "; give both the same value";
+        for (std::size_t a = 0; a < n; ++a)
+            if (M[a][a] == 0.0)
+                return name + " has no inertia of " + shaft(m.shafts[a]) +
+                       " on its diagonal; give one, or leave that shaft out of the matrix";
         bool positive = true;
         auto scaled = M;  // to ones on the diagonal, so that units do not matter
         for (std::size_t a = 0; a < n; ++a) {
@@ -189,24 +195,72 @@ std::string TrainCheck::mass_matrices() const {
 
 std::string TrainCheck::inertias() const {
     const Places places(train_);
-    // While all dry contacts slip: are those without at rest if all that have one are?
-    const int shafts = static_cast<int>(train_.shafts.size());
-    std::vector<ContactPlace> held;
-    for (int s = 0; s < shafts; ++s) {
+    for (std::size_t s = 0; s < train_.shafts.size(); ++s)
         if (!(places.shafts[s].inertia >= 0.0))
-            return shaft(s) + " has a negative inertia; give it none or a positive one";
-        if (places.shafts[s].inertia > 0.0 || train_.shafts[s].given_motion)
-            held.push_back({ContactPlace::shaft, s, s});
-    }
-    for (const ContactPlace& c : places.contacts)
-        if (c.bilateral) held.push_back(c);
-    const Ties ties = tie(held, shafts, std::vector<std::int8_t>(held.size()).data());
-    for (int s = 0; s < shafts; ++s)
-        if (!ties.at_rest[s])
-            return shaft(s) +
-                   " has no inertia and no rigid gear ties its speed to shafts that have one; give it an "
-                   "inertia, or that of a motor or gear on it";
+            return shaft(static_cast<int>(s)) + " has a negative inertia; give it none or a positive one";
     return {};
+}
+
+// The speed of a shaft without inertia follows from dampers: nothing dry may depend on it, and one damper at least has
+// to act in all states of the gears.
+std::string TrainCheck::massless() const {
+    const Assembly a(train_);
+    const Places& places = a.places();
+    if (places.massless.empty()) return {};
+    const auto remedy = [&](int s) {
+        return "; give it an inertia (" + harmless_inertia(s) + " is harmless beside its neighbours)";
+    };
+    std::vector<std::int8_t> rigid(places.contacts.size(), 1);
+    for (std::size_t c = 0; c < places.contacts.size(); ++c)
+        if (places.contacts[c].bilateral) rigid[c] = 0;
+    const Ties tied = places.ties(rigid.data());
+    for (std::size_t c = 0; c < places.contacts.size(); ++c) {
+        std::array<double, max_shafts> per;
+        const unsigned moves = rigid[c] == 0 ? 0 : tied_speed(places.contacts[c], tied, per);
+        for (const int s : places.massless)
+            if (moves >> s & 1)
+                return shaft(s) + " has no inertia, and " + contact_name(a, static_cast<int>(c)) +
+                       " is a dry contact at it" + remedy(s) + ", or leave the contact out";
+    }
+    for (const LinearController& k : train_.controllers)
+        for (const LinearController::Signal& y : k.signals)
+            if (y.kind == LinearController::Signal::speed &&
+                places.shafts[static_cast<std::size_t>(y.shaft)].massless != nowhere)
+                return shaft(y.shaft) + " has no inertia, and a controller takes its speed" + remedy(y.shaft);
+    // In the gaps of all gears, while all that is dry slips.
+    Key open;
+    for (std::size_t c = 0; c < places.contacts.size(); ++c)
+        if (rigid[c] != 0) open.modes[c] = places.contacts[c].one_way ? -1 : 1;
+    if (a.build(open).solvable) return {};
+    int found = places.massless.front();
+    for (const int s : places.massless) {
+        Train damped = train_;
+        damped.shafts[static_cast<std::size_t>(s)].viscous_friction += 1.0;
+        if (!Assembly(std::move(damped)).build(open).solvable) continue;
+        found = s;
+        break;
+    }
+    return shaft(found) + " has no inertia, and no damping acts on it in all states of its gears" + remedy(found) +
+           ", or mesh damping to a gear without backlash";
+}
+
+// A ten-thousandth of the least inertia next to a shaft, as the shaft feels it: they swing at a hundred times the
+// frequency of their neighbour.
+std::string TrainCheck::harmless_inertia(int s) const {
+    const Places places(train_);
+    double least = 0.0, most = 0.0;
+    for (const ShaftPlace& p : places.shafts) most = std::fmax(most, p.inertia);
+    for (const Gear& g : train_.gears) {
+        const double i = g.law.ratio,
+                     J = g.input == s    ? places.shafts[static_cast<std::size_t>(g.output)].inertia / (i * i)
+                         : g.output == s ? places.shafts[static_cast<std::size_t>(g.input)].inertia * i * i
+                                         : 0.0;
+        if (J > 0.0 && (least == 0.0 || J < least)) least = J;
+    }
+    char text[48];
+    std::snprintf(text, sizeof text, "%.1g %s", 1e-4 * (least > 0.0 ? least : most),
+                  is_slide(train_, s) ? "kg" : "kg*m^2");
+    return text;
 }
 
 std::string TrainCheck::rigid_loops() const {
@@ -308,7 +362,10 @@ std::string check_start(const Train& train, const std::vector<double>& speed) {
         return one(a) + " and " + one(b);
     };
     constexpr double rounding = 1e-12;  // of speeds that were converted from other units
+    const Places places(train);
+    const auto follows = [&](int s) { return places.shafts[static_cast<std::size_t>(s)].massless != nowhere; };
     for (const Gear& g : train.gears) {
+        if (follows(g.input) || follows(g.output) || (g.housing != nowhere && follows(g.housing))) continue;
         const double in = speed[static_cast<std::size_t>(g.input)] / g.law.ratio,
                      out = speed[static_cast<std::size_t>(g.output)],
                      housing =

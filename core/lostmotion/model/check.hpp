@@ -39,6 +39,10 @@ class TrainCheck {
     std::string mass_matrices() const;
     std::string inertias() const;
 
+    // Shafts without inertia that no rigid gear ties to others.
+    std::string massless() const;
+    std::string harmless_inertia(int shaft) const;
+
     // Rigid gears alone: a loop either locks the train or leaves its torques undetermined.
     std::string rigid_loops() const;
 

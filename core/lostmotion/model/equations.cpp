@@ -214,7 +214,7 @@ void Equations::set_rates(const Key& key, const std::vector<Row>& acceleration, 
                                : motor.torque_rate<Row>(terms, forms_.controller_command(p.controller, key));
     }
     for (std::size_t s = 0; s < train_.shafts.size(); ++s) {
-        if (r.ties.at_rest[s]) continue;
+        if (r.ties.at_rest[s] || places_.shafts[s].massless != nowhere) continue;
         Row& rate = r.rate[places_.shafts[s].speed];
         if (!r.ties.follows(static_cast<int>(s)))
             rate = acceleration[s];
@@ -237,6 +237,7 @@ void Equations::set_rates(const Key& key, const std::vector<Row>& acceleration, 
         const int s = places_.last_shaft[a];
         if (!r.ties.at_rest[s]) r.rate[layout_.coupled + a] = terms_.state(places_.shafts[s].speed);
     }
+    for (Row& rate : r.rate) r.put_massless_speeds(rate);
 }
 
 }  // namespace lostmotion::model

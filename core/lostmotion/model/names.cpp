@@ -72,6 +72,7 @@ std::vector<bool> moved_states(const Assembly& a) {
     for (std::size_t m = 0; m < a.train().motors.size(); ++m)
         if (const int k = a.places().motors[m].torque; k != nowhere)
             moves[static_cast<std::size_t>(k)] = a.train().motors[m].law.has_torque_state();
+    for (const int s : a.places().massless) moves[static_cast<std::size_t>(a.places().shafts[s].speed)] = false;
     for (std::size_t g = 0; g < a.train().gears.size(); ++g)
         if (const int k = a.places().gears[g].twist; k != nowhere)
             moves[static_cast<std::size_t>(k)] = !a.train().gears[g].rigid();

@@ -39,6 +39,7 @@ Places::Places(const Train& train, bool with_remainders)
     }
     place_states(train);
     place_contacts(train);
+    find_massless();
     place_inputs(train);
     for (const auto& e : acting)
         if (with_remainders && e->is_smooth()) e->remainder = layout.inputs++;
@@ -121,6 +122,30 @@ void Places::place_contacts(const Train& train) {
         contacts.push_back(coupling_place(*couplings[k], static_cast<int>(k)));
     }
     layout.contacts = static_cast<int>(contacts.size());
+}
+
+bool Places::moves_no_inertia(int shaft, const Ties& t) const {
+    for (std::size_t s = 0; s < shafts.size(); ++s) {
+        const bool given = std::find(driven.begin(), driven.end(), static_cast<int>(s)) != driven.end();
+        if ((t.free[s] >> shaft & 1) != 0 && (given || shafts[s].inertia > 0.0)) return false;
+    }
+    return true;
+}
+
+void Places::find_massless() {
+    std::vector<std::int8_t> rigid(contacts.size(), 1);
+    std::vector<double> inertia;
+    for (std::size_t c = 0; c < contacts.size(); ++c)
+        if (contacts[c].bilateral) rigid[c] = 0;
+    for (const ShaftPlace& s : shafts) inertia.push_back(s.inertia);
+    const Ties tied = ties(rigid.data(), inertia.data());
+    for (std::size_t s = 0; s < shafts.size(); ++s) {
+        bool follows = false;
+        tied.each_share(static_cast<int>(s), [&](int k, double) { follows = follows || moves_no_inertia(k, tied); });
+        if (!follows) continue;
+        shafts[s].massless = static_cast<int>(massless.size());
+        massless.push_back(static_cast<int>(s));
+    }
 }
 
 void Places::place_inputs(const Train& train) {

@@ -58,6 +58,8 @@ struct Places {
     std::vector<int> last_shaft;  // of each part of the train, whose angle is kept
     std::vector<int> driven;      // shafts whose motion is given
     std::vector<CoupledInertia> coupled_inertias;
+    // Shafts without inertia that no rigid gear ties to others alone: their speeds follow from the balance of torques.
+    std::vector<int> massless;
 
     // with_remainders: what piecewise-linear laws leave of smooth ones enters as further inputs.
     explicit Places(const Train& train, bool with_remainders = false);
@@ -65,8 +67,12 @@ struct Places {
     Ties ties(const std::int8_t* modes, const double* inertia = nullptr, bool given_speeds_follow = false) const {
         unsigned given = 0;
         for (const int s : driven) given |= 1u << s;
-        return tie(contacts, static_cast<int>(shafts.size()), modes, inertia, {given, given_speeds_follow});
+        unsigned first = 0;
+        for (const int s : massless) first |= 1u << s;
+        return tie(contacts, static_cast<int>(shafts.size()), modes, inertia, {given, given_speeds_follow, first});
     }
+    // Does nothing that moves with a free shaft have an inertia?
+    bool moves_no_inertia(int shaft, const Ties& t) const;
 
     // Calls use(shaft, inertia) for each entry of a row of the mass matrix that is not zero off the diagonal.
     template <class Use>
@@ -96,6 +102,7 @@ struct Places {
 
     void place_states(const Train& train);
     void place_contacts(const Train& train);
+    void find_massless();
     void place_inputs(const Train& train);
     void place_memory_and_branches(const Train& train);
 };

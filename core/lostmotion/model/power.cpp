@@ -82,7 +82,11 @@ std::vector<NumberedPower> power_flows(const Assembly& a, const Regime& r) {
     std::vector<NumberedPower> flows;
     int k = 0;
     each_flow(a, [&](PowerFlow::Kind, const std::string&, const char*, auto&& power) {
-        if (auto p = power(r)) flows.push_back({k, *std::move(p)});
+        if (auto p = power(r)) {
+            r.put_massless_speeds(p->torque);
+            r.put_massless_speeds(p->speed);
+            flows.push_back({k, *std::move(p)});
+        }
         ++k;
     });
     return flows;

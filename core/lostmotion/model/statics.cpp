@@ -195,14 +195,28 @@ bool Statics::moves_freely(const std::vector<int>& of, const std::vector<Row>& r
     return true;
 }
 
+void Statics::follow(Row& f, const Ties& heavy) const {
+    for (const int s : places_.massless) {
+        const int speed = places_.shafts[s].speed;
+        if ((heavy.free[s] >> s & 1) != 0 || f.c[speed] == 0.0) continue;
+        const double share = std::exchange(f.c[speed], 0.0);
+        heavy.each_share(s, [&](int k, double of) { f.c[places_.shafts[k].speed] += share * of; });
+    }
+}
+
 bool Statics::solve_balances(const std::vector<int>& of, const std::vector<Row*>& forms) {
     const int shafts = static_cast<int>(motion_.size());
     const Ties heavy = places_.ties(key_.modes.data(), inertia_.data());
+    const auto is_free = [&](int s) { return (heavy.free[s] >> s & 1) != 0; };
     std::vector<int> unknowns;
     for (const int c : of) unknowns.push_back(unknown(c));
+    for (const int s : places_.massless)
+        if (is_free(s) && places_.moves_no_inertia(s, heavy)) unknowns.push_back(places_.shafts[s].speed);
+    const std::size_t in_forms = unknowns.size();
     for (int s = 0; s < shafts; ++s)
-        if (heavy.free[s] >> s & 1) unknowns.push_back(max_columns + s);
+        if (is_free(s) && !places_.moves_no_inertia(s, heavy)) unknowns.push_back(max_columns + s);
     if (unknowns.size() != motion_.size()) return false;
+    for (Row& f : motion_) follow(f, heavy);
     std::vector<Balance> rows(motion_.size());
     for (int s = 0; s < shafts; ++s) {
         if (is_given(static_cast<std::size_t>(s))) motion_[s] = acceleration_of(static_cast<std::size_t>(s));
@@ -214,11 +228,20 @@ bool Statics::solve_balances(const std::vector<int>& of, const std::vector<Row*>
     const bool free = balances_move_freely(of, heavy);
     const auto take = [](auto& f, double factor, const Balance& row) { subtract(f, factor, row, false); };
     if (!eliminate(rows, unknowns, rows.size(), take)) return false;
-    for (Row* f : forms) substitute(*f, rows, unknowns, of.size(), take);
+    const auto put = [&](Row& f) {
+        follow(f, heavy);
+        substitute(f, rows, unknowns, in_forms, take);
+    };
+    for (Row* f : forms) put(*f);
+    for (const int s : places_.massless) {
+        massless_.push_back({places_.shafts[s].speed, Row::unit(places_.shafts[s].speed)});
+        put(massless_.back().form);
+    }
     for (int s = 0; s < shafts; ++s) {
         motion_[s] = Row{};
         heavy.each_share(s, [&](int k, double share) {
             const auto at = std::find(unknowns.begin(), unknowns.end(), max_columns + k) - unknowns.begin();
+            if (at == static_cast<std::ptrdiff_t>(unknowns.size())) return;  // it moves no inertia
             for (int j = 0; j < layout_.terms; ++j) motion_[s].c[j] -= share * rows[at].c[j];
         });
     }
@@ -237,6 +260,10 @@ bool Statics::balances_move_freely(const std::vector<int>& of, const Ties& heavy
             const bool given = is_given(static_cast<std::size_t>(s));
             for (const int k : in) {
                 if ((heavy.free[k] >> k & 1) == 0) continue;
+                if (places_.moves_no_inertia(k, heavy)) {
+                    with[row].push_back(-motion_[s].c[places_.shafts[k].speed]);
+                    continue;
+                }
                 double sum = 0.0;
                 each_inertia(static_cast<std::size_t>(s), [&](int t, double J) {
                     if ((heavy.free[t] >> k & 1) != 0) sum += J * heavy.share[t][k];

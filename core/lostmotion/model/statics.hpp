@@ -16,7 +16,8 @@ std::array<int, max_shafts> parts(const Places& places, const Key& key);
 // of each rigidly tied part have inertias of like size, reactions come first: C J^-1 (F + B lambda) = 0, C being the
 // speeds of the contacts by those of the shafts. A light shaft makes terms 1/J of that which cancel. Then all is solved
 // at once, without a division by an inertia: the balances J S a = F + B lambda of all shafts, S being their speeds by
-// those that stay free, the heaviest.
+// those that stay free, the heaviest. Of a free shaft that moves no inertia the unknown is the speed itself, which F
+// depends on by dampers.
 class Statics {
  public:
     // motion: of each shaft, the net torque; it becomes the acceleration. That of a shaft whose motion is given is an
@@ -25,6 +26,8 @@ class Statics {
 
     // Eliminates the reactions from the motion and the forms. False if they have no unique solution.
     bool solve(const std::vector<Row*>& forms);
+    // Speeds of shafts without inertia, once it is solved.
+    const std::vector<MasslessSpeed>& massless() const { return massless_; }
 
  private:
     std::vector<int> stuck() const;
@@ -53,6 +56,8 @@ class Statics {
         return Row::unit(layout_.first_input + places_.shafts[shaft].given_acceleration);
     }
     int unknown(int contact) const { return layout_.terms + contact; }
+    // Puts the speeds of shafts without inertia that follow others into a form.
+    void follow(Row& f, const Ties& heavy) const;
 
     const Places& places_;
     const std::vector<ContactPlace>& contacts_;
@@ -62,6 +67,7 @@ class Statics {
     std::vector<Row>& motion_;
     std::vector<double> inertia_, pivot_;      // of each shaft: the diagonals of J and of D
     std::vector<std::vector<double>> factor_;  // L, where J is not diagonal
+    std::vector<MasslessSpeed> massless_;
 };
 
 }  // namespace lostmotion::model

@@ -44,6 +44,7 @@ bool stop_contact(const ContactPlace& c, int shafts, Ties& t, const double* iner
     unsigned may_follow = moves & ~given.shafts;
     if (may_follow == 0 && given.follow) may_follow = moves;
     if (may_follow == 0) return false;
+    if ((may_follow & given.massless) != 0) may_follow &= given.massless;
     const int last =
         inertia != nullptr ? lightest(may_follow, speed, shafts, t, inertia) : std::bit_width(may_follow) - 1;
     for (int s = 0; s < shafts; ++s) {

@@ -22,6 +22,7 @@ inline constexpr double loop_rounding = 1e-12;
 struct GivenShafts {
     unsigned shafts = 0;
     bool follow = false;
+    unsigned massless = 0;  // shafts without inertia, as bits: they follow others first
 };
 
 // The speed of a contact in terms of those that are free, as bits of them; what cancels to within rounding is none.

@@ -94,10 +94,13 @@ std::vector<TrainChannel> train_channels(const model::Assembly& a) {
         out.push_back({C::input, shaft.given_acceleration, name + "_acceleration",
                        model::is_slide(t, p.driven[k]) ? "m/s^2" : "rad/s^2", "given acceleration"});
     }
-    for (std::size_t k = 0; k < t.shafts.size(); ++k)
-        out.push_back({C::state, p.shafts[k].speed, t.shafts[k].name + "_speed",
+    for (std::size_t k = 0; k < t.shafts.size(); ++k) {
+        const int massless = p.shafts[k].massless;
+        out.push_back({massless == model::nowhere ? C::state : C::massless_speed,
+                       massless == model::nowhere ? p.shafts[k].speed : massless, t.shafts[k].name + "_speed",
                        model::speed_unit(t, static_cast<int>(k)),
                        model::is_slide(t, static_cast<int>(k)) ? "speed of the slide" : "speed of the shaft"});
+    }
     const auto add_angle = [&](int state, std::size_t k) {
         const int shaft = static_cast<int>(k);
         out.push_back(

@@ -22,6 +22,7 @@ struct TrainChannel {
         input_torque,
         contact_torque,
         drive_torque,
+        massless_speed,
         loss_coefficient,
         contact_mode,
         shaft_sign,  // of the speed: what shows how a contact slips that the train does not have
@@ -29,7 +30,7 @@ struct TrainChannel {
         output,
         error
     } kind;
-    int index;  // of the input, state, motor, gear, contact, given motion, shaft or controller
+    int index;  // of the input, state, motor, gear, contact, given motion, shaft without inertia, shaft or controller
     std::string name, unit, meaning, symbol = {};
 };
 
@@ -91,6 +92,7 @@ class TrainReader {
             case TrainChannel::output: form(row(model_.assembly.controller_command(c.index, regime_.key))); return;
             case TrainChannel::error: form(row(model_.assembly.controller_error(c.index))); return;
             case TrainChannel::drive_torque: form(row(regime_.rows.drive_torque[index])); return;
+            case TrainChannel::massless_speed: form(row(regime_.rows.massless[index].form)); return;
             case TrainChannel::contact_torque: form(regime_.contact_torque[index]); return;
             case TrainChannel::shaft_sign: each([&](int k) { return signs(speed(c.index, at, k)); }); return;
             case TrainChannel::twist_sign: each([&](int k) { return signs(twist_rate(index, at, k)); }); return;
@@ -120,6 +122,8 @@ class TrainReader {
     }
     template <class Instants>
     Vec speed(int shaft, const Instants& at, int k) const {
+        if (const int massless = place(shaft).massless; massless != model::nowhere)
+            return evaluate(row(regime_.rows.massless[static_cast<std::size_t>(massless)].form), at, k);
         return load(&at.x[static_cast<std::size_t>(place(shaft).speed)][k]);
     }
     template <class Instants>

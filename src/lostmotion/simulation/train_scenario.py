@@ -143,6 +143,7 @@ class TrainScenario(LinearElements):
         self._check_controllers()
         check_on_reference(self.initial, self.axes(), ("angles", "speeds", "positions", "slide_speeds"))
         core = self.core()
+        self._check_massless(core.massless_shafts())
         if self.continuous() and (problem := core.check()):
             raise InputError(problem)
         check_names(train, core, self.axes(), self)
@@ -202,6 +203,23 @@ class TrainScenario(LinearElements):
                     f"keys shafts.{name}.speed, initial.speeds.{name}: both say how fast the shaft turns at t = 0; leave the "
                     "initial speed out"
                 )
+
+    def _check_massless(self, massless: Collection[str]) -> None:
+        for key in ("speeds", "slide_speeds"):
+            for name in getattr(self.initial, key):
+                if name in massless:
+                    raise InputError(
+                        f"key initial.{key}.{name}: {name} has no inertia, and its speed follows from the torques on it; leave "
+                        "it out, or give an inertia"
+                    )
+        train = self.train()
+        for motor, controller in self.axes().items():
+            encoders = [e.shaft for e in (controller.encoder, controller.position_encoder) if e is not None]
+            for name in {train.motors[motor].shaft, self.controlled(motor), *filter(None, encoders)}:
+                if name in massless:
+                    raise InputError(
+                        f"key controllers.{motor}: measures or turns {name}, which has no inertia; give it one"
+                    )
 
     def _check_controllers(self) -> None:
         motors = self.train().motors
