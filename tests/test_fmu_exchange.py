@@ -49,11 +49,7 @@ def cvode(monkeypatch: Any) -> None:
 
 def signals(scenario: Any, names: list[str]) -> np.ndarray:
     """Inputs over time as FMPy takes them: breakpoints, jumps as two rows, sines sampled every 0.1 ms."""
-    given = (
-        scenario.signals()
-        if isinstance(scenario, lm.TrainScenario)
-        else {"command": scenario.command, "load_torque": scenario.load.torque}
-    )
+    given = scenario.signals()
     end = scenario.simulation.duration
     ends = sorted({0.0, end} | {b[0] for n in names for b in given[n].breakpoint_list() if 0.0 < b[0] < end})
     dense = any(given[n].sine_list() for n in names)
@@ -238,7 +234,7 @@ def test_directional_derivatives_of_what_a_contact_at_rest_shares(name: str, tmp
         scenario = scenario.replace(**{"command": 6.0, "load.torque": 10.0})
     lm.export_fmu(scenario, tmp_path / "x.fmu")
     model = Model(tmp_path / "x.fmu", tmp_path / "open")
-    drive = isinstance(scenario, lm.Scenario)
+    drive = not isinstance(scenario, lm.TrainScenario)
     outputs = ["input_torque", "loss_coefficient"] if drive else ["worm_gear_input_torque", "worm_contact_torque"]
     contact = "input_contact" if drive else "worm_contact"
     references = [model.reference[o] for o in outputs]

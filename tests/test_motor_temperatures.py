@@ -204,7 +204,7 @@ def test_synchronous_records_follow_from_their_sheets() -> None:
     [
         (lambda r: lm.sizing.temperatures(lm.simulate(run(0.1, thermal_time_constant_motor=None))), r"lacks motor\.limits\.thermal_time_constant_motor; data"),
         (lambda r: lm.sizing.temperatures(lm.simulate(run(0.1, resistance=None))), r"lacks motor\.limits\.resistance, motor\.limits\.torque_constant"),
-        (lambda r: lm.sizing.temperatures(r, "m1"), "motor 'm1': this drive has one motor"),
+        (lambda r: lm.sizing.temperatures(r, "m1"), "motor 'm1': the one motor is motor; leave its name out"),
         (lambda r: lm.sizing.temperatures(r, ambient="3 V"), "ambient"),
         (lambda r: lm.sizing.temperatures(r, repeated=True, winding=30.0), "has no beginning; leave winding and case out"),
         (lambda r: lm.sizing.temperatures(lm.simulate(run(3.0, duration=2.0)), repeated=True), "no end to its heat"),

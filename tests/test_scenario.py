@@ -16,6 +16,23 @@ from lostmotion.simulation.scenario import json_schema
 def test_scenarios_load_and_survive_json(path: Path) -> None:
     scenario = lm.load(path)
     assert lm.Scenario.from_json(scenario.to_json()) == scenario
+    assert lm.Scenario(**scenario.model_dump()) == scenario
+    assert type(lm.Scenario.model_validate(scenario.model_dump())) is type(scenario)
+
+
+@pytest.mark.parametrize("path", ALL_SCENARIOS, ids=lambda p: p.stem)
+def test_names_of_variables_are_those_of_the_core(path: Path) -> None:
+    """In both forms: what the train calls its variables is what the solver samples."""
+    scenario = lm.load(path)
+    train, core = scenario.named_train(), scenario.core()
+    named = {name for name, *_ in core.channels()}
+    assert {train.speed_of(shaft) for shaft in train.shafts} <= named
+    assert {train.motor_torque_of(motor) for motor in train.motors} <= named
+    for gear in train.gears:
+        assert {train.output_torque_of(gear), train.input_torque_of(gear)} <= named
+    assert set(core.input_names()) <= set(scenario.signals())
+    assert {train.command_of(motor) for motor in train.motors} <= named | set(scenario.signals())
+    assert set(scenario.input_keys()) >= {train.load_torque_of(shaft) for shaft in train.shafts}
 
 
 def test_units_are_converted_to_si(small: Path) -> None:
@@ -168,7 +185,7 @@ def test_a_chirp_departs_from_its_sine_by_no_more_than_stated() -> None:
 
 def test_schema_describes_every_key_and_is_printed() -> None:
     schema = json_schema()
-    assert set(lm.Scenario.model_fields) < set(schema["properties"])
+    assert set(lm.simulation.DriveScenario.model_fields) < set(schema["properties"])
     assert json.loads(json.dumps(schema)) == schema
 
 

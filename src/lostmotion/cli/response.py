@@ -14,7 +14,6 @@ from .terminal import busy, progress
 
 if TYPE_CHECKING:
     from ..simulation.scenario import Scenario
-    from ..simulation.train_scenario import TrainScenario
 
 
 def response(
@@ -105,7 +104,7 @@ def response(
         print('response.nc is left out: it needs h5netcdf; install it: pip install "lostmotion[netcdf]"')
 
 
-def _known(loaded: Mapping[str, Scenario | TrainScenario], source: str | None, variable: str | None) -> tuple[str, str]:
+def _known(loaded: Mapping[str, Scenario], source: str | None, variable: str | None) -> tuple[str, str]:
     """The unit of the input, and the name of the variable, which all of the scenarios must have."""
     from ..errors import InputError
     from ..response.plant import plant_or_loop

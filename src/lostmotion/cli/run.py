@@ -14,7 +14,6 @@ from .terminal import busy, simulating
 if TYPE_CHECKING:
     from ..simulation.results import RunArrays
     from ..simulation.scenario import Scenario
-    from ..simulation.train_scenario import TrainScenario
 
 PICTURES = (".png", ".svg", ".pdf")
 
@@ -136,7 +135,7 @@ def _draw(plot: Path, result: RunArrays, figure: str | None) -> None:
     print(f"Figure written to {plot}")
 
 
-def _print_spectrum(scenario: Scenario | TrainScenario) -> None:
+def _print_spectrum(scenario: Scenario) -> None:
     from ..response.spectrum import spectrum
 
     with busy("Spectrum"):

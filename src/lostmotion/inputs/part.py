@@ -113,7 +113,8 @@ class Part(BaseModel):
     @classmethod
     def _subject(cls) -> str:
         """Name of the part in messages: the torsion curve."""
-        return "the " + " ".join(re.findall("[A-Z][a-z]*", cls.__name__.split("[")[0])).lower()
+        name = cls.model_config.get("title") or cls.__name__.split("[")[0]
+        return "the " + " ".join(re.findall("[A-Z][a-z]*", name)).lower()
 
 
 @cache  # it takes longer than all the rest of a refusal

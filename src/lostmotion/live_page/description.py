@@ -12,18 +12,18 @@ from ..model.signals import Signal
 from ..model.torsion import TorsionCurve
 from ..portable.descriptions import described
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario, need_free_motion
+from ..simulation.train_scenario import need_free_motion
 from ..units.practical import ARCMIN
 from ..version import __version__
 from . import sliders
-from .drawn import axis_figures, drawn_drive, drawn_train
+from .drawn import axis_figures, drawn
 from .loops import loop_views
 from .references import reference_sliders, reference_view
 
 USUAL_BACKLASH = 12.0 / ARCMIN  # to where the slider goes where there is none
 
 
-def describe(scenario: Scenario | TrainScenario, name: str) -> dict[str, Any]:
+def describe(scenario: Scenario, name: str) -> dict[str, Any]:
     """The scenario as page/src/description.ts describes it.
 
     Parameters
@@ -52,13 +52,12 @@ def describe(scenario: Scenario | TrainScenario, name: str) -> dict[str, Any]:
         "changed_inputs": [],
         "changed_references": [],
     }
-    drawn = drawn_drive(scenario) if isinstance(scenario, Scenario) else drawn_train(scenario)
     return {
         "name": name,
         "title": scenario.title,
         "version": __version__,
         "core": core,
-        **drawn,
+        **drawn(scenario),
         "open_loop": not (scenario.axes() or scenario.continuous()),
         "loops": [view for motor in scenario.axes() for view in loop_views(scenario, motor)],
         "figures": [
@@ -80,7 +79,7 @@ def _packed(numbers: np.ndarray) -> str:
     return base64.b64encode(numbers.astype("<f8").tobytes()).decode()
 
 
-def _closed_gap(scenario: Scenario | TrainScenario) -> str | None:
+def _closed_gap(scenario: Scenario) -> str | None:
     """The key of the backlash of the one gear whose torsion curve has none."""
     curves = {key: g.stiffness for key, g in scenario.gears_by_key().items() if isinstance(g.stiffness, TorsionCurve)}
     closed = [
@@ -91,18 +90,10 @@ def _closed_gap(scenario: Scenario | TrainScenario) -> str | None:
     return closed[0] if len(closed) == 1 else None
 
 
-def _inputs(scenario: Scenario | TrainScenario) -> list[tuple[str, Signal[Any]]]:
+def _inputs(scenario: Scenario) -> list[tuple[str, Signal[Any]]]:
     """Inputs, in the order of the core, by its table in the scenario file; references of controllers, which the page does not
     change, without."""
-    if isinstance(scenario, Scenario):
-        return [("command", scenario.command), ("load.torque", scenario.load.torque)]
-    signals = scenario.signals()
-    keys = {f"{name}_command": f"command.{name}" for name in scenario.commanded()}
-    train = scenario.train()
-    keys |= {
-        train.load_torque_of(name): f"slides.{name}.force" if train.is_slide(name) else f"shafts.{name}.torque"
-        for name in train.shafts
-    }
+    signals, keys = scenario.signals(), scenario.input_keys()
     names = scenario.core().input_names()
     return [(keys[name], signals[name]) if name in keys and name in signals else ("", Signal()) for name in names]
 
@@ -119,9 +110,7 @@ def _signal(signal: Signal[Any], duration: float) -> dict[str, Any]:
     }
 
 
-def _sliders(
-    scenario: Scenario | TrainScenario, values: list[tuple[str, float]], closed: str | None
-) -> list[sliders.Slider]:
+def _sliders(scenario: Scenario, values: list[tuple[str, float]], closed: str | None) -> list[sliders.Slider]:
     usual: dict[str, float] = {}
     views: dict[str, sliders.Place] = {}
     for k, key in enumerate(scenario.gears_by_key()):
@@ -140,11 +129,10 @@ def _sliders(
     ]
 
 
-def _signal_sliders(scenario: Scenario | TrainScenario) -> Iterator[sliders.Slider]:
-    if isinstance(scenario, TrainScenario):
-        turned = {f"command.{name}" for name in scenario.controllers}
-    else:
-        turned = set() if scenario.controller is None else {"command"}
+def _signal_sliders(scenario: Scenario) -> Iterator[sliders.Slider]:
+    keys, train = scenario.input_keys(), scenario.named_train()
+    turned = {keys[train.command_of(motor)] for motor in (*scenario.axes(), *scenario.continuous())}
+    shafts = {keys[train.load_torque_of(shaft)]: shaft for shaft in train.shafts}
     duration = scenario.simulation.duration
     for number, (key, signal) in enumerate(_inputs(scenario)):
         if not key or key in turned:
@@ -154,15 +142,15 @@ def _signal_sliders(scenario: Scenario | TrainScenario) -> Iterator[sliders.Slid
             group = f"Command of {name.replace('_', ' ')}" if name and len(_inputs(scenario)) > 2 else "Command"
             yield from sliders.of_signal(signal, key, group, "1", {"input": number}, 1.1, duration)
         else:
-            shaft = "load" if isinstance(scenario, Scenario) else key.split(".")[1]
-            slides = key.startswith("slides")
+            shaft = shafts[key]
+            slides = train.is_slide(shaft)
             word, unit = ("Load force", "N") if slides else ("Load torque", "N*m")
             group = word if shaft == "load" else f"{word} on {shaft.replace('_', ' ')}"
             most = _torque_at(scenario, shaft)
             yield from sliders.of_signal(signal, key, group, unit, {"input": number}, most, duration)
 
 
-def _reference_sliders(scenario: Scenario | TrainScenario) -> Iterator[sliders.Slider]:
+def _reference_sliders(scenario: Scenario) -> Iterator[sliders.Slider]:
     several = len(scenario.axes()) > 1
     for number, (motor, controller) in enumerate(scenario.axes().items()):
         table = scenario.controller_key(motor)
@@ -172,10 +160,8 @@ def _reference_sliders(scenario: Scenario | TrainScenario) -> Iterator[sliders.S
         yield from reference_sliders(controller, f"{table}.reference", group, number, duration, sliding)
 
 
-def _torque_at(scenario: Scenario | TrainScenario, shaft: str) -> float:
+def _torque_at(scenario: Scenario, shaft: str) -> float:
     """Typical torque of a shaft [N·m]: the rated torque of the gear or the motor that drives it, else 1."""
-    if isinstance(scenario, Scenario):
-        return scenario.gearbox.rated_output_torque if shaft == "load" else scenario.motor.rated_torque or 1.0
     train = scenario.train()
     for gear in train.gears.values():
         if gear.output == shaft:
@@ -183,9 +169,9 @@ def _torque_at(scenario: Scenario | TrainScenario, shaft: str) -> float:
     return next((m.rated_torque for m in train.motors.values() if m.shaft == shaft and m.rated_torque), 1.0)
 
 
-def _usual_friction(scenario: Scenario | TrainScenario, key: str) -> float:
+def _usual_friction(scenario: Scenario, key: str) -> float:
     """To where the slider of a friction torque goes that is 0 [N·m]."""
     table, *names = key.split(".")
-    if table == "motors" and isinstance(scenario, TrainScenario):
-        return 0.2 * _torque_at(scenario, scenario.motors[names[0]].shaft)
+    if table == "motors":
+        return 0.2 * _torque_at(scenario, scenario.train().motors[names[0]].shaft)
     return 0.05 * _torque_at(scenario, names[0] if table in ("shafts", "slides") else table)

@@ -8,69 +8,23 @@ from ..control.controller import Controller
 from ..model.losses import LossMap
 from ..model.torsion import Rigid, TorsionCurve
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario
 
 
-def drawn_drive(scenario: Scenario) -> dict[str, Any]:
-    """Drawing of a scenario in the short form."""
-    rigid = isinstance(scenario.gearbox.stiffness, Rigid)
-    contacts = [
-        ("motor", "input_contact"),
-        *([] if rigid else [("gearbox twist", "twist_contact")]),
-        ("load", "load_contact"),
-    ]
-    shafts = [
-        {
-            "name": "motor",
-            "speed": "motor_speed",
-            "angle": None,
-            "contact": "input_contact",
-            "motor": True,
-            "slide": False,
-        },
-        {
-            "name": "load",
-            "speed": "load_speed",
-            "angle": "load_angle",
-            "contact": "load_contact",
-            "motor": False,
-            "slide": False,
-        },
-    ]
-    variables = {"twist": None if rigid else "twist", "output_torque": "output_torque"}
-    motor = {"name": "motor", "shaft": "motor", "torque": "motor_torque", "command": "command"}
-    return {
-        "shafts": shafts,
-        "gears": [
-            {
-                "name": "gearbox",
-                "input": "motor",
-                "output": "load",
-                "fixed": True,
-                **variables,
-                **_laws(scenario.gearbox),
-            }
-        ],
-        "motors": [motor],
-        "contacts": [{"label": label, "variable": variable, "slide": False} for label, variable in contacts],
-    }
-
-
-def drawn_train(scenario: TrainScenario) -> dict[str, Any]:
-    """Drawing of a scenario in the long form."""
+def drawn(scenario: Scenario) -> dict[str, Any]:
+    """Drawing of a scenario."""
     names = [name for name, *_ in scenario.core().channels()]
 
     def known(name: str) -> str | None:
         return name if name in names else None
 
-    train = scenario.train()
+    train = scenario.named_train()
     with_motor = {m.shaft for m in train.motors.values()}
     shafts = [
         {
             "name": n,
-            "speed": f"{n}_speed",
+            "speed": train.speed_of(n),
             "angle": known(train.angle_of(n)),
-            "contact": known(f"{n}_contact"),
+            "contact": known(train.contact_of(n)),
             "motor": n in with_motor,
             "slide": train.is_slide(n),
         }
@@ -89,19 +43,23 @@ def drawn_train(scenario: TrainScenario) -> dict[str, Any]:
         for n, g in train.gears.items()
     ]
     motors = [
-        {"name": n, "shaft": m.shaft, "torque": train.motor_torque_of(n), "command": known(f"{n}_command")}
+        {"name": n, "shaft": m.shaft, "torque": train.motor_torque_of(n), "command": known(train.command_of(n))}
         for n, m in train.motors.items()
     ]
-    contacts = [name for name in names if name.endswith("_contact")]
-    sliding = {f"{n}_contact" for n in train.shafts if train.is_slide(n)}
-    sliding |= {f"{train.twist_of(n)}_contact" for n, g in train.gears.items() if train.is_slide(g.output)}
+    twists = {f"{train.twist_of(n)}_contact": n for n in train.gears}
+    rigid = {contact for contact, n in twists.items() if isinstance(train.gears[n].stiffness, Rigid)}
+    labels = {train.contact_of(n): n for n in train.shafts} | {c: f"{n} twist" for c, n in twists.items()}
+    sliding = {train.contact_of(n) for n in train.shafts if train.is_slide(n)}
+    sliding |= {contact for contact, n in twists.items() if train.is_slide(train.gears[n].output)}
+    labels |= {contact: contact.removesuffix("_contact") for contact in sliding}
     return {
         "shafts": shafts,
         "gears": gears,
         "motors": motors,
         "contacts": [
-            {"label": c.removesuffix("_contact").replace("_", " "), "variable": c, "slide": c in sliding}
-            for c in contacts
+            {"label": labels.get(c, c.removesuffix("_contact")).replace("_", " "), "variable": c, "slide": c in sliding}
+            for c in names
+            if c.endswith("_contact") and c not in rigid
         ],
     }
 

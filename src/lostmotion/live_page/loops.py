@@ -9,10 +9,9 @@ from ..errors import InputError
 from ..servo.commission import LoopSheet, loop_sheet
 from ..servo.regimes import axis_of, regimes
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario
 
 
-def loop_views(scenario: Scenario | TrainScenario, motor: str) -> list[dict[str, Any]]:
+def loop_views(scenario: Scenario, motor: str) -> list[dict[str, Any]]:
     """Each loop of one controller in each regime, as page/src/description.ts describes it; none where they have no response."""
     try:
         axis = axis_of(scenario, motor)

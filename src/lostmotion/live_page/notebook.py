@@ -10,7 +10,6 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario
 from .page import page, write_page
 
 HEIGHTS = (200, 10_000)
@@ -44,7 +43,7 @@ class LivePage:
     """
 
     @checked
-    def __init__(self, scenario: Scenario | TrainScenario, height: Count) -> None:
+    def __init__(self, scenario: Scenario, height: Count) -> None:
         if not HEIGHTS[0] <= height <= HEIGHTS[1]:
             raise InputError(f"height: {height} pixels must lie between {HEIGHTS[0]} and {HEIGHTS[1]}")
         self._scenario = scenario
@@ -69,7 +68,7 @@ class LivePage:
         return dict(self._widget.values)
 
     @property
-    def scenario(self) -> Scenario | TrainScenario:
+    def scenario(self) -> Scenario:
         """The scenario with the values of the sliders.
 
         Raises
@@ -121,12 +120,12 @@ def _widget(page: str, height: int) -> Any:
 
 
 @checked
-def live(scenario: Scenario | TrainScenario, *, height: Count = 900) -> LivePage:
+def live(scenario: Scenario, *, height: Count = 900) -> LivePage:
     """Show a drive in the notebook as a page that simulates it in the browser.
 
     Parameters
     ----------
-    scenario : Scenario or TrainScenario
+    scenario : Scenario
         The drive and its inputs, with or without controllers.
     height : int
         Height of the page in the notebook, in pixels.

@@ -13,7 +13,6 @@ from ..errors import InputError
 from ..portable.checkout import made_here
 from ..portable.descriptions import kernel_of
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario
 from .description import describe
 
 # `make page` puts all beside this file, and the wheel carries them.
@@ -21,12 +20,12 @@ TEMPLATE = Path(__file__).with_name("page.html")
 CORES = Path(__file__).parent
 
 
-def core_of(scenario: Scenario | TrainScenario) -> Path:
+def core_of(scenario: Scenario) -> Path:
     """The core with the kernel that a scenario takes, so that a page holds no other."""
     return CORES / f"{kernel_of(scenario)}.wasm.gz"
 
 
-def page(scenario: Scenario | TrainScenario, name: str = "drive") -> str:
+def page(scenario: Scenario, name: str = "drive") -> str:
     """The page as HTML; nothing in it refers to anything outside.
 
     Parameters
@@ -61,7 +60,7 @@ def page(scenario: Scenario | TrainScenario, name: str = "drive") -> str:
     return text
 
 
-def write_page(path: Path, scenario: Scenario | TrainScenario) -> None:
+def write_page(path: Path, scenario: Scenario) -> None:
     """Writes the page of a scenario, whole or not at all.
 
     Raises

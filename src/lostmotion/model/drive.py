@@ -17,6 +17,31 @@ from .torsion import Rigid
 from .train import DriveTrain
 
 
+class NamedDrive(DriveTrain):
+    """The train of a drive, with the names that variables of a drive have."""
+
+    def contact_of(self, shaft: str) -> str:
+        return "input_contact" if shaft == "motor" else f"{shaft}_contact"
+
+    def command_of(self, name: str) -> str:  # noqa: ARG002
+        return "command"
+
+    def load_torque_of(self, shaft: str) -> str:  # noqa: ARG002
+        return "load_torque"
+
+    def twist_of(self, gear: str) -> str:  # noqa: ARG002
+        return "twist"
+
+    def capacity_of(self, gear: str) -> str:  # noqa: ARG002
+        return "hysteresis_capacity"
+
+    def output_torque_of(self, gear: str) -> str:  # noqa: ARG002
+        return "output_torque"
+
+    def input_torque_of(self, gear: str) -> str:  # noqa: ARG002
+        return "input_torque"
+
+
 class Drive(Part):
     """Motor, gearbox and load.
 
@@ -55,6 +80,11 @@ class Drive(Part):
             motors={"motor": ShaftMotor(shaft="motor", **values)},
             gears={"gearbox": Gear.of(self.gearbox, input="motor", output="load")},
         )
+
+    def named_train(self) -> NamedDrive:
+        """The same train, with the names that variables of a drive have."""
+        train = self.train()
+        return NamedDrive.model_construct(**{name: getattr(train, name) for name in DriveTrain.model_fields})
 
     def core(self, law: MotorLaw | None = None) -> _core.Train:
         """The solver's train, its motor as a current loop may make it; the last ones are kept for equal parts."""

@@ -132,6 +132,18 @@ class DriveTrain(TrainElements):
         """NAME_angle of a shaft, NAME_position of a slide."""
         return f"{shaft}_position" if self.is_slide(shaft) else f"{shaft}_angle"
 
+    def speed_of(self, shaft: str) -> str:
+        """NAME_speed."""
+        return f"{shaft}_speed"
+
+    def contact_of(self, shaft: str) -> str:
+        """NAME_contact of the friction on a shaft."""
+        return f"{shaft}_contact"
+
+    def command_of(self, name: str) -> str:
+        """NAME_command of a motor, a brake or a clutch."""
+        return f"{name}_command"
+
     def load_torque_of(self, shaft: str) -> str:
         """NAME_load_torque of a shaft, NAME_load_force of a slide."""
         return f"{shaft}_load_{self.torque_word(shaft)}"
@@ -143,6 +155,10 @@ class DriveTrain(TrainElements):
     def twist_of(self, gear: str) -> str:
         """NAME_twist of a gear, NAME_deflection of what moves a slide."""
         return f"{gear}_deflection" if self.is_slide(self.gears[gear].output) else f"{gear}_twist"
+
+    def capacity_of(self, gear: str) -> str:
+        """NAME_hysteresis_capacity of a gear."""
+        return f"{gear}_hysteresis_capacity"
 
     def output_torque_of(self, gear: str) -> str:
         """NAME_output_torque of a gear, NAME_output_force of what moves a slide."""

@@ -22,7 +22,7 @@ from ..model.load import Load
 from ..model.motor import Motor
 from ..model.train import DriveTrain
 from ..simulation.joint_trains import Driven, JointDrive, JointTrains, joint_drive
-from ..simulation.scenario import LoadTable, Scenario, SimulationTable
+from ..simulation.scenario import DriveScenario, LoadTable, SimulationTable
 from ..simulation.shipped import shipped_scenarios
 from ..simulation.sources import load_drive
 from .joints import joint_id
@@ -388,9 +388,9 @@ def drive_of_joint(joint: str, given: Any, controller: Controller | None) -> Dri
     """
     if isinstance(given, str | Path):
         given = _named(joint, str(given))
-    if isinstance(given, Scenario) and given.controller is None:
+    if isinstance(given, DriveScenario) and given.controller is None:
         given = given.drive()
-    if not isinstance(given, Drive | Scenario | DriveTrain):
+    if not isinstance(given, Drive | DriveScenario | DriveTrain):
         raise InputError(
             f"joint {joint!r}: {shown(given)} is no drive; give a Drive, a DriveTrain, a scenario, or the name of a gearbox of the catalogue"
         )
@@ -400,7 +400,7 @@ def drive_of_joint(joint: str, given: Any, controller: Controller | None) -> Dri
         raise InputError(
             f"joint {joint!r}: controllers are for drives; give a Drive, or a scenario with its controller"
         )
-    return Scenario(
+    return DriveScenario(
         motor=given.motor,
         gearbox=given.gearbox,
         load=LoadTable(**given.load.model_dump()),
@@ -409,7 +409,7 @@ def drive_of_joint(joint: str, given: Any, controller: Controller | None) -> Dri
     )
 
 
-def _named(joint: str, name: str) -> Drive | Scenario:
+def _named(joint: str, name: str) -> Drive | DriveScenario:
     """Shipped scenario or scenario file by its name; for a gearbox of the catalogue a drive with an ideal torque source."""
     if name.endswith(".toml") or name in shipped_scenarios():
         return load_drive(name)

@@ -19,7 +19,7 @@ from ..model.losses import ConstantEfficiency
 from ..model.motor import Motor
 from ..model.torsion import Rigid
 from ..simulation.joint_trains import joint_drive
-from ..simulation.scenario import Scenario
+from ..simulation.scenario import DriveScenario, drive_of
 from ..simulation.stepping import Simulation
 from .joints import joint_id
 
@@ -71,7 +71,7 @@ class Reduction:
 
 @checked
 def reduce(
-    drive: Drive | Scenario,
+    drive: Drive | DriveScenario,
     amplitude: Angle,
     frequency: Frequency,
     load_torque: Torque = 0.0,
@@ -114,8 +114,7 @@ def reduce(
     for name, value in (("amplitude", amplitude), ("frequency", frequency)):
         if not value > 0.0:
             raise InputError(f"{name}: {shown(value)} must be positive")
-    if isinstance(drive, Scenario):
-        drive = drive.drive()
+    drive = drive_of(drive)
     columns, target = _along_sines(drive, amplitude, frequency, load_torque)
     if load_torque == 0.0:
         # Without a load torque only the product of gear and motor torque counts: the gear is its ratio.

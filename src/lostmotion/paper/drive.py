@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from ..errors import InputError
 from ..response.linear import RigidConstants, rigid_constants
-from ..simulation.scenario import Scenario
+from ..simulation.scenario import DriveScenario
 from ..simulation.sources import load_drive
 
 MODELS = ("1-DOF-L", "2-DOF-L", "2-DOF-NL")
@@ -24,7 +24,7 @@ PRINTED_TIME_CONSTANT = 0.2334  # T_RC [s]
 DOES_NOT = "the printed value does not follow from the printed"
 
 
-def paper_scenario(model: str, amplitude: str) -> Scenario:
+def paper_scenario(model: str, amplitude: str) -> DriveScenario:
     """One of the paper's runs.
 
     Parameters

@@ -59,7 +59,7 @@ Errors = Mapping[str, PointingError]
 class PointingBudget:
     """Pointing errors of axes with their causes."""
 
-    scenario: Scenario | TrainScenario
+    scenario: Scenario
     after: float
     """[s], what is before does not count"""
     after_line: str
@@ -102,7 +102,7 @@ class PointingBudget:
 
 @checked
 def pointing_budget(
-    scenario: Scenario | TrainScenario,
+    scenario: Scenario,
     *,
     after: float | str | None = None,
     view: Mapping[str, float | str] | None = None,
@@ -118,7 +118,7 @@ def pointing_budget(
 
     Parameters
     ----------
-    scenario : Scenario or TrainScenario
+    scenario : Scenario
         One axis or several (`[controllers.MOTOR]`), each with a reference of the position.
     after : float or str, optional
         Time [s] from which errors count. Default: the end of the start-up transient. To find it, the same run is made from another
@@ -262,7 +262,7 @@ def _cases(scenario: TrainScenario, *, robustness: bool = True) -> dict[Case, Se
     return cases
 
 
-def runs_of(scenario: Scenario | TrainScenario) -> int:
+def runs_of(scenario: Scenario) -> int:
     """Number of runs of a budget, without those that find the end of the start-up transient."""
     return len(_cases(in_long_form(scenario)))
 

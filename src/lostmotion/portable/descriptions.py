@@ -12,22 +12,21 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..simulation.core_runs import core_case
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario
 from .parameters import Parameter, parameters_of
 
 
-def kernel_of(scenario: Scenario | TrainScenario) -> str:
+def kernel_of(scenario: Scenario) -> str:
     """The kernel of the core that a scenario takes: ``"drive"``, or the narrowest that holds its train."""
     return scenario.core().kernel()
 
 
 @checked
-def description(scenario: Scenario | TrainScenario, *, parameters: bool = True) -> np.ndarray:
+def description(scenario: Scenario, *, parameters: bool = True) -> np.ndarray:
     """Return a scenario as the numbers that `lm_scenario_read` of the C interface takes.
 
     Parameters
     ----------
-    scenario : Scenario or TrainScenario
+    scenario : Scenario
         The scenario with its signals, controllers and references, its state at t = 0, duration and sample interval.
     parameters : bool
         Whether the numbers also state how they follow from the values of the scenario, so that these can be changed without
@@ -52,7 +51,7 @@ def description(scenario: Scenario | TrainScenario, *, parameters: bool = True) 
     return described(scenario)[0] if parameters else written(scenario, ())
 
 
-def described(scenario: Scenario | TrainScenario) -> tuple[np.ndarray, list[tuple[str, float]]]:
+def described(scenario: Scenario) -> tuple[np.ndarray, list[tuple[str, float]]]:
     """The description with its parameters, and their keys and values.
 
     Raises
@@ -63,12 +62,12 @@ def described(scenario: Scenario | TrainScenario) -> tuple[np.ndarray, list[tupl
     return written(scenario, found), [(p.key, p.value) for p in found]
 
 
-def written(scenario: Scenario | TrainScenario, parameters: Sequence[Parameter]) -> np.ndarray:
+def written(scenario: Scenario, parameters: Sequence[Parameter]) -> np.ndarray:
     """The description with these parameters."""
     return np.array(_core.write_description(numbers_of(scenario).tolist(), [p.core() for p in parameters]))
 
 
-def numbers_of(scenario: Scenario | TrainScenario) -> np.ndarray:
+def numbers_of(scenario: Scenario) -> np.ndarray:
     """The numbers of a scenario alone.
 
     Raises

@@ -22,8 +22,7 @@ from ..model.signals import Signal
 from ..reproducible import sin, total
 from ..simulation.results import variables_of
 from ..simulation.run import run
-from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario
+from ..simulation.scenario import DriveScenario, Scenario
 from ..simulation.train_variables import axis_variables
 from . import fmi2, fmi3
 from .checkout import made_here
@@ -59,7 +58,7 @@ GUARDS = {"drive": 16, "narrow": 32, "middle": 64, "wide": 64}
 
 @checked
 def export_fmu(
-    scenario: Scenario | TrainScenario,
+    scenario: Scenario,
     path: str | Path,
     *,
     fmi: Count = 2,
@@ -75,7 +74,7 @@ def export_fmu(
 
     Parameters
     ----------
-    scenario : Scenario or TrainScenario
+    scenario : Scenario
         The drive. Each input follows its signal in the scenario until the importer sets that input.
     path : str or Path
         File to write, with the extension ``.fmu``.
@@ -166,7 +165,7 @@ def _libraries(directory: Any, places: Mapping[str, str], kernel: str) -> dict[s
     return found
 
 
-def _check_references(scenario: Scenario | TrainScenario) -> None:
+def _check_references(scenario: Scenario) -> None:
     """Whether the references of sampled controllers can be inputs."""
     for motor, controller in scenario.axes().items():
         if controller.position is not None and controller.position.reference_delay > 0.0:
@@ -176,10 +175,10 @@ def _check_references(scenario: Scenario | TrainScenario) -> None:
             )
 
 
-def _of_signals(scenario: Scenario | TrainScenario, key: str, references: bool) -> bool:
+def _of_signals(scenario: Scenario, key: str, references: bool) -> bool:
     """Whether a key is that of a signal, which in an FMU the importer gives."""
     parts = key.split(".")
-    if isinstance(scenario, Scenario):
+    if isinstance(scenario, DriveScenario):
         given = references and parts[:2] == ["controller", "reference"]
         return given or parts[0] == "command" or parts[:2] == ["load", "torque"]
     of_shaft = (parts[0], *parts[2:3]) in (("shafts", "torque"), ("shafts", "speed"), ("slides", "force"))
@@ -194,7 +193,7 @@ def _of_signals(scenario: Scenario | TrainScenario, key: str, references: bool) 
     )
 
 
-def _reference(scenario: Scenario | TrainScenario, prefix: str, kind: str) -> tuple[str, str]:
+def _reference(scenario: Scenario, prefix: str, kind: str) -> tuple[str, str]:
     """Unit and meaning of what a controller is to follow, as of the core."""
     motor, position = scenario.sliding().get(prefix, (False, False))
     found = {
@@ -206,9 +205,7 @@ def _reference(scenario: Scenario | TrainScenario, prefix: str, kind: str) -> tu
     return unit, f"{what} that {'is to act' if kind == 'torque' else 'the controller is to follow'}"
 
 
-def _model(
-    scenario: Scenario | TrainScenario, parameters: tuple[Parameter, ...], guid: str, references_given: bool
-) -> Model:
+def _model(scenario: Scenario, parameters: tuple[Parameter, ...], guid: str, references_given: bool) -> Model:
     """Content of modelDescription.xml."""
     core, signals, axes = scenario.core(), scenario.signals(), scenario.by_prefix()
     shown = {v.name for v in axis_variables(axes)}
@@ -273,12 +270,12 @@ def _fine(state: Declared) -> Declared:
     return replace(state, size=state.size / 100.0)
 
 
-def _start_of(scenario: Scenario | TrainScenario, state: str) -> float:
+def _start_of(scenario: Scenario, state: str) -> float:
     """A state at t = 0; those of controllers begin at 0."""
     return float(scenario.start().get(state, 0.0))
 
 
-def _sizes(scenario: Scenario | TrainScenario) -> tuple[dict[str, float], list[str]]:
+def _sizes(scenario: Scenario) -> tuple[dict[str, float], list[str]]:
     """The largest magnitudes of the variables in a run of the scenario, and its states; nothing if it has none."""
     try:
         result = run(scenario, energy=False)

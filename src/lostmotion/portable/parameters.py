@@ -14,11 +14,9 @@ import numpy as np
 from ..errors import InputError
 from ..inputs.quantities import Limit
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario
 from ..simulation.units_of_keys import limit_in, unit_for
 
-AnyScenario = Scenario | TrainScenario
-Numbers = Callable[[AnyScenario], np.ndarray]
+Numbers = Callable[[Scenario], np.ndarray]
 
 ROUNDING = 1e-12
 """relative, of a number that follows from a value"""
@@ -70,7 +68,7 @@ class Parameters:
     """keys of the others, and why they cannot be changed"""
 
 
-def parameters_of(scenario: AnyScenario, numbers: Numbers) -> Parameters:
+def parameters_of(scenario: Scenario, numbers: Numbers) -> Parameters:
     """The values of a scenario that can be changed in its numbers.
 
     Parameters
@@ -110,7 +108,7 @@ def values_of(node: Any, key: str = "") -> Iterator[tuple[str, float]]:
         yield key, node
 
 
-def _changed(scenario: AnyScenario, changes: Mapping[str, float], numbers: Numbers) -> np.ndarray | None:
+def _changed(scenario: Scenario, changes: Mapping[str, float], numbers: Numbers) -> np.ndarray | None:
     """The numbers with other values; None where these cannot be used."""
     try:
         return numbers(scenario.replace(**changes))
@@ -118,7 +116,7 @@ def _changed(scenario: AnyScenario, changes: Mapping[str, float], numbers: Numbe
         return None
 
 
-def _law(scenario: AnyScenario, key: str, value: float, base: np.ndarray, numbers: Numbers) -> tuple[Effect, ...] | str:
+def _law(scenario: Scenario, key: str, value: float, base: np.ndarray, numbers: Numbers) -> tuple[Effect, ...] | str:
     """The numbers that follow from a value, or why there is no law; nothing if none follows."""
     unit = abs(value) or 1.0
     for step, sign in itertools.product(STEPS, (1.0, -1.0)):
@@ -166,7 +164,7 @@ def _effect(place: int, value: float, here: float, seen: Sequence[tuple[float, f
 
 
 def _together(
-    scenario: AnyScenario, found: list[Parameter], refused: dict[str, str], base: np.ndarray, numbers: Numbers
+    scenario: Scenario, found: list[Parameter], refused: dict[str, str], base: np.ndarray, numbers: Numbers
 ) -> Parameters:
     """Leaves out parameters whose common effect on a number is not what the laws say."""
     by_place = defaultdict(list)

@@ -12,7 +12,6 @@ from ..inputs.validation import shown
 from ..response.harmonic import of_output
 from ..simulation.results import energy_of, scenario_of, whole
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario
 from .run import summary
 
 if TYPE_CHECKING:
@@ -87,7 +86,7 @@ class ResultAccessor:
         return summary(whole(self._dataset))
 
     @property
-    def scenario(self) -> Scenario | TrainScenario:
+    def scenario(self) -> Scenario:
         """The scenario that the run came from."""
         return scenario_of(self._dataset)
 

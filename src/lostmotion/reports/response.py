@@ -13,7 +13,6 @@ import numpy as np
 from ..atomic_writer import write_bytes
 from ..response.crossovers import characteristics
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario
 from .looks import step
 from .page import Headline, Prose, Report, Table
 from .pages import table_csv, write_report
@@ -181,7 +180,7 @@ def _verdict(response: xarray.Dataset, found: xarray.Dataset) -> Headline:
 
 
 def response_report(
-    responses: Mapping[str, xarray.Dataset], scenario: Scenario | TrainScenario, output: str
+    responses: Mapping[str, xarray.Dataset], scenario: Scenario, output: str
 ) -> tuple[Report, xarray.Dataset]:
     """The page of the first response, overlaid with the others, and its characteristics by amplitude."""
     name, response = next(iter(responses.items()))
@@ -214,7 +213,7 @@ def response_report(
 def write_response(
     directory: Path,
     responses: Mapping[str, xarray.Dataset],
-    scenario: Scenario | TrainScenario,
+    scenario: Scenario,
     output: str,
     pictures: Sequence[str] = (),
 ) -> tuple[Path, xarray.Dataset]:

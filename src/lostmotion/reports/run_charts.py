@@ -14,7 +14,7 @@ from ..live_page.drawn import axis_figures
 from ..model.losses import LossMap
 from ..model.train import DriveTrain
 from ..simulation.results import energy_of, is_train_result, scenario_of
-from ..simulation.scenario import Scenario
+from ..simulation.scenario import DriveScenario
 from ..simulation.train_parts import parts_of
 from ..simulation.train_scenario import TrainScenario
 from ..units.practical import charted
@@ -145,7 +145,7 @@ def _ratio(result: xarray.Dataset) -> float:
     if "gear_ratio" in result.attrs:
         return float(result.attrs["gear_ratio"])
     scenario = scenario_of(result)
-    assert isinstance(scenario, Scenario)
+    assert isinstance(scenario, DriveScenario)
     return scenario.gearbox.ratio
 
 
@@ -242,31 +242,17 @@ def ratios_to(train: DriveTrain, last: str) -> dict[str, float]:
 def gear_charts(result: xarray.Dataset) -> list[Panel]:
     """Torque over twist of each gear, and the operating point over its loss map."""
     scenario = scenario_of(result)
-    gears: list[tuple[str, Any, str, str, str]]
-    slides: set[str] = set()
-    if isinstance(scenario, Scenario):
-        gears = [("gearbox", scenario.gearbox, "twist", "output_torque", "motor_speed")]
-    else:
-        train = scenario.train()
-        slides = {name for name, gear in train.gears.items() if train.is_slide(gear.output)}
-        gears = [
-            (name, gear, train.twist_of(name), train.output_torque_of(name), f"{gear.input}_speed")
-            for name, gear in train.gears.items()
-        ]
+    train = scenario.named_train()
     found = []
-    for name, gear, twist, torque, speed in gears:
+    for name, gear in train.gears.items():
+        twist, torque, speed = train.twist_of(name), train.output_torque_of(name), train.speed_of(gear.input)
         if gear.stiffness.kind != "rigid" and twist in result and torque in result:
-            linear = name in slides
+            linear = train.is_slide(gear.output)
             loop = Curve(name, (1e6 if linear else 1e3) * result[twist].values, result[torque].values, look(0))
             title = f"{'Deflection' if linear else 'Torsion'} and hysteresis of {name}"
             labels = ("deflection [µm]", "output force [N]") if linear else ("twist [mrad]", "output torque [N·m]")
             found.append(Panel(title, *labels, (loop,)))
-        if (
-            isinstance(gear.losses, LossMap)
-            and getattr(gear, "housing", None) is None
-            and speed in result
-            and torque in result
-        ):
+        if isinstance(gear.losses, LossMap) and gear.housing is None and speed in result and torque in result:
             found.append(_working(name, gear, result[speed].values, result[torque].values))
     return found
 

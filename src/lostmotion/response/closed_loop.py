@@ -22,7 +22,6 @@ from ..control.controller import Controller
 from ..control.references import PositionReference
 from ..simulation.scenario import Scenario
 from ..simulation.stepping import Simulation
-from ..simulation.train_scenario import TrainScenario
 from .plant import AnyReference, Plant
 from .windows import Window
 
@@ -152,7 +151,7 @@ def mean_of(reference: AnyReference) -> float:
     return reference.mean + (reference.start if isinstance(reference, PositionReference) else 0.0)
 
 
-def under_sine(plant: Plant, source: str, amplitude: float, frequency: float) -> Scenario | TrainScenario:
+def under_sine(plant: Plant, source: str, amplitude: float, frequency: float) -> Scenario:
     """The scenario with references that are constant but for the source, which is a sine."""
     scenario = plant.closed
     assert scenario is not None

@@ -13,7 +13,6 @@ from .. import _core
 from ..control.law import Law
 from ..model.train import DriveTrain
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario
 from ..simulation.train_variables import signals_of
 from ..worker_threads import thread_pool
 from .closed_loop import AxisSignal, ClosedLoop, Motion, Search, mean_of
@@ -29,7 +28,7 @@ def windows_for(plant: Plant, frequencies: Sequence[float]) -> list[Window]:
     return list({w.frequency: w for w in reversed(found)}.values())[::-1]
 
 
-def frame_of(scenario: Scenario | TrainScenario) -> tuple[float, int]:
+def frame_of(scenario: Scenario) -> tuple[float, int]:
     """Base tick [s], and after how many of them the sample times of all controllers and their delays repeat."""
     base = min(c.sample_time for c in scenario.axes().values())
     frame = 1
@@ -42,7 +41,7 @@ def frame_of(scenario: Scenario | TrainScenario) -> tuple[float, int]:
     return base, frame
 
 
-def axis_signals(scenario: Scenario | TrainScenario) -> Iterator[AxisSignal]:
+def axis_signals(scenario: Scenario) -> Iterator[AxisSignal]:
     """The variables of the controllers; of windings those that repeat, behind all that the controllers remember."""
 
     def titled(name: str, motor: str) -> str:
@@ -149,12 +148,8 @@ def _powers(plant: Plant, samples: np.ndarray) -> dict[str, float]:
     """Mean powers of the samples [W]: of all motors, out of the last gears, lost in all gears."""
     values = dict(zip(plant.channels, samples, strict=False))
     scenario = plant.closed
-    if isinstance(scenario, Scenario):
-        motors = [("motor_torque", "motor_speed")]
-        gears = [(("input_torque", "motor_speed"), ("output_torque", "load_speed"), True)]
-    else:
-        assert scenario is not None
-        motors, gears = _of_train(scenario.train())
+    assert scenario is not None
+    motors, gears = _of_train(scenario.named_train())
 
     def power(torque: str, speed: str) -> float:
         return float(np.mean(values[torque] * values[speed]))

@@ -12,8 +12,7 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Frequency, Number, Torque
 from ..model.drive import Drive
 from ..simulation.explanation import smallest_commands
-from ..simulation.scenario import Scenario, drive_of
-from ..simulation.train_scenario import TrainScenario
+from ..simulation.scenario import DriveScenario, Scenario, drive_of
 from .harmonic import of_output
 from .plant import plant_of
 from .shooting import MAX_PERIODS, reason_of, respond
@@ -25,16 +24,14 @@ THREE_DECIBELS = math.sqrt(2.0)  # the bandwidth ends where the gain has fallen 
 
 
 @checked
-def characteristics(
-    response: xarray.Dataset, drive: Drive | Scenario | TrainScenario, output: str | None = None
-) -> xarray.Dataset:
+def characteristics(response: xarray.Dataset, drive: Drive | Scenario, output: str | None = None) -> xarray.Dataset:
     """Return bandwidth and phase crossover over amplitude, with the dead zone of the drive.
 
     Parameters
     ----------
     response : xarray.Dataset
         Result of `frequency_response`.
-    drive : Drive, Scenario or TrainScenario
+    drive : Drive or Scenario
         The drive, or its scenario.
     output : str, optional
         The result variable. Default: the load's speed, in a train that of its last shaft.
@@ -66,7 +63,7 @@ def characteristics(
     bandwidth = [three_decibels_down(frequencies, np.abs(curve)) for curve in values]
     crossover = [_falls_through(frequencies, np.degrees(np.unwrap(np.angle(curve))), -180.0) for curve in values]
     dead_zone = {}
-    if isinstance(drive, Drive) or (isinstance(drive, Scenario) and drive.controller is None):
+    if isinstance(drive, Drive | DriveScenario) and getattr(drive, "controller", None) is None:
         forward, backward = smallest_commands(drive_of(drive))
         dead_zone = {"dead_zone_forward": forward, "dead_zone_backward": backward}
     return xr.Dataset(
@@ -97,7 +94,7 @@ def _falls_through(frequencies: np.ndarray, y: np.ndarray, level: float) -> floa
 
 @checked
 def bandwidth(
-    drive: Drive | Scenario | TrainScenario,
+    drive: Drive | Scenario,
     amplitude: Number,
     *,
     output: str | None = None,
@@ -114,7 +111,7 @@ def bandwidth(
 
     Parameters
     ----------
-    drive : Drive, Scenario or TrainScenario
+    drive : Drive or Scenario
         A drive, or a scenario. A scenario provides the drive or train and the constant parts of its inputs.
     amplitude : float
         Amplitude of the command, E_CA [-], or of another input.

@@ -15,7 +15,6 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Count, Number, Torque, arguments
 from ..model.drive import Drive
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario
 from .closed_response import respond_closed, windows_for
 from .linear import python_control
 from .plant import Plant, known_output, plant_or_loop
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
 
 @checked
 def frequency_response(
-    drive: Drive | Scenario | TrainScenario,
+    drive: Drive | Scenario,
     frequencies: Sequence[float] | float,
     amplitudes: Sequence[float] | float,
     *,
@@ -55,7 +54,7 @@ def frequency_response(
 
     Parameters
     ----------
-    drive : Drive, Scenario or TrainScenario
+    drive : Drive or Scenario
         A drive, or a scenario. A scenario provides the drive or train, the controllers and the constant parts of the inputs.
     frequencies : float or sequence of float
         Frequencies [Hz].

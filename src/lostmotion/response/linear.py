@@ -19,10 +19,10 @@ from ..model.losses import ConstantEfficiency
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
 from ..simulation.core_runs import core_case
-from ..simulation.scenario import Initial, Scenario, capacities_of, drive_of, state_of
+from ..simulation.scenario import DriveScenario, Initial, Scenario, capacities_of, drive_of, state_of
 from ..simulation.stepping import Simulation
 from ..simulation.train_parts import NO_CONTACT
-from ..simulation.train_scenario import TrainInitial, TrainScenario, loaded_train, need_free_motion, need_open_loop
+from ..simulation.train_scenario import TrainInitial, loaded_train, need_free_motion, need_open_loop
 from ..simulation.train_state import start_values
 from ..simulation.train_variables import angle_through, angles_through_gears, train_variables
 from ..simulation.variables import CONTACTS, STATES, VARIABLES
@@ -153,7 +153,7 @@ def _pairs(values: np.ndarray) -> list[tuple[float, float]]:
 
 @checked
 def linearize(
-    drive: Drive | Scenario | DriveTrain | TrainScenario | Simulation,
+    drive: Drive | Scenario | DriveTrain | Simulation,
     state: Initial | TrainInitial | None = None,
     *,
     time: Time | None = None,
@@ -171,7 +171,7 @@ def linearize(
 
     Parameters
     ----------
-    drive : Drive, Scenario, DriveTrain, TrainScenario or Simulation
+    drive : Drive, Scenario, DriveTrain or Simulation
         A drive or a train, a scenario with one, or a simulation in its present state.
     state : Initial or TrainInitial, optional
         The operating point in SI, such as ``Initial(motor_speed=100.0, load_speed=1.1, twist=2e-3)``, ``Initial()`` for rest, or
@@ -217,7 +217,7 @@ def linearize(
     if time is not None:
         _refuse(given, "at a time of a run, state and inputs are its own")
         return _model_of_run(drive, time)
-    if isinstance(drive, DriveTrain | TrainScenario):
+    if not isinstance(drive, Drive | DriveScenario):
         names = ("command", "load_torque", *rates)
         _refuse({name: given[name] for name in names}, "a train takes its inputs by name, in inputs and input_rates")
         return _model_of_train(drive, state, inputs or {}, input_rates or {})
@@ -261,7 +261,7 @@ def _model_now(simulation: Simulation) -> LinearModel:
 
 
 def _model_of_run(what: Any, time: float) -> LinearModel:
-    if not isinstance(what, Scenario | TrainScenario):
+    if not isinstance(what, Scenario):
         raise InputError("time: a drive alone has no run; give a scenario, or a state")
     if not 0.0 <= time <= what.simulation.duration:
         raise InputError(f"time {time} s must lie between 0 and the duration, {what.simulation.duration} s")
@@ -272,7 +272,7 @@ def _model_of_run(what: Any, time: float) -> LinearModel:
 
 
 def _model_of_train(
-    what: DriveTrain | TrainScenario,
+    what: Any,  # a train, or a scenario in the long form
     state: Initial | TrainInitial | None,
     inputs: Mapping[str, float],
     rates: Mapping[str, float],
@@ -302,7 +302,7 @@ def _model_of_train(
         )
         for name in names
     ]
-    start = what.start(state) if isinstance(what, TrainScenario) else start_values(train, state)
+    start = start_values(train, state) if what is train else what.start(state)
     return _model(train, core, *_core.linearize_at(core, ramps, start, dict(state.hysteresis_capacities), 0.0))
 
 
@@ -444,13 +444,13 @@ class RigidConstants:
 
 @checked
 def rigid_constants(
-    drive: Drive | Scenario, *, motor_time_constant: Time | None = None, time_constant: Time | None = None
+    drive: Drive | DriveScenario, *, motor_time_constant: Time | None = None, time_constant: Time | None = None
 ) -> RigidConstants:
     """Return the constants of (8) to (11) of a rigid drive.
 
     Parameters
     ----------
-    drive : Drive or Scenario
+    drive : Drive or DriveScenario
         A drive with a DC motor and a constant efficiency.
     motor_time_constant, time_constant : float, optional
         Time constants [s] that replace computed ones.

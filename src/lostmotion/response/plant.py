@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,12 +13,11 @@ from ..control.references import PositionReference, SpeedReference, TorqueRefere
 from ..errors import InputError
 from ..inputs.validation import listed, shown
 from ..model.drive import Drive
-from ..model.signals import CommandSignal, Signal, TorqueSignal
-from ..simulation.results import add_angles, add_efficiency
-from ..simulation.scenario import Initial, Scenario, mean_inputs
-from ..simulation.train_scenario import TrainInitial, TrainScenario, need_free_motion, need_open_loop
-from ..simulation.train_variables import axis_variables, train_variables
-from ..simulation.variables import CHANNELS, STATES, VARIABLES, Variable
+from ..model.signals import Signal
+from ..simulation.scenario import Scenario, of_drive
+from ..simulation.train_scenario import need_free_motion, need_open_loop
+from ..simulation.train_variables import axis_variables
+from ..simulation.variables import Variable
 
 AnyReference = PositionReference | SpeedReference | TorqueReference
 UNITS = {"position": "rad", "speed": "rad/s", "torque": "N*m"}
@@ -53,7 +51,7 @@ class Plant:
     floors: Mapping[str, float]
     """rated magnitudes of the variables by which motions are compared"""
     attributes: Mapping[str, float]
-    closed: Scenario | TrainScenario | None = None
+    closed: Scenario | None = None
     """the scenario, if it has controllers"""
 
     references: Mapping[str, AnyReference] = field(default_factory=dict)
@@ -100,7 +98,7 @@ class Plant:
         given = {"command": command, "load_torque": load_torque}
         wanted = {name: mean for name, mean in given.items() if mean is not None}
         for name in wanted:
-            if name not in self.signals and isinstance(self.closed, Scenario):
+            if name not in self.signals and self.closed is not None:
                 raise InputError(
                     f"mean_{name}: a controller turns the motor; the constant part of its reference is that of the scenario"
                 )
@@ -120,17 +118,17 @@ class Plant:
         ]
 
 
-def plant_of(what: Drive | Scenario | TrainScenario) -> Plant:
+def plant_of(what: Drive | Scenario) -> Plant:
     """The plant of a drive without inputs, or of a scenario with its own commands."""
-    if isinstance(what, Scenario | TrainScenario):
+    if isinstance(what, Scenario):
         need_open_loop(what, "response")
     return _plant_of(what)
 
 
-def plant_or_loop(what: Drive | Scenario | TrainScenario) -> Plant:
+def plant_or_loop(what: Drive | Scenario) -> Plant:
     """The same, or of a scenario with controllers what these and the plant are together."""
     plant = _plant_of(what)
-    if not isinstance(what, Scenario | TrainScenario) or not what.axes():
+    if not isinstance(what, Scenario) or not what.axes():
         return plant
     axes = what.axes()
     references = {f"{what.prefix(motor)}reference": c.reference for motor, c in axes.items()}
@@ -156,76 +154,45 @@ def plant_or_loop(what: Drive | Scenario | TrainScenario) -> Plant:
     )
 
 
-def _plant_of(what: Drive | Scenario | TrainScenario) -> Plant:
-    if isinstance(what, TrainScenario):
-        return _plant_of_train(what)
-    scenario = what if isinstance(what, Scenario) else None
-    drive = what if isinstance(what, Drive) else what.drive()
-    command, load_torque = mean_inputs(what)
-    g = drive.gearbox
-    speed, torque = g.rated_input_speed, g.rated_output_torque
-    return Plant(
-        core=drive.core(),
-        signals={
-            "command": scenario.command if scenario else CommandSignal(mean=command),
-            "load_torque": scenario.load.torque if scenario else TorqueSignal(mean=load_torque),
-        },
-        source="command",
-        start=_start_of_drive(scenario.initial if scenario else Initial()),
-        rest={},
-        start_of=_start_of_drive,
-        channels=tuple(v.name for v in CHANNELS),
-        variables=VARIABLES,
-        derive=lambda data, _: add_efficiency(data, g.ratio),
-        output="load_speed",
-        angle="load_angle",
-        floors={"motor_speed": speed, "load_speed": speed / abs(g.ratio), "output_torque": torque, "twist": 0.0},
-        attributes={"gear_ratio": g.ratio},
-    )
-
-
-def _start_of_drive(initial: Initial) -> dict[str, float]:
-    return {name: getattr(initial, name) for name in (*STATES, "hysteresis_capacity")}
-
-
-def _plant_of_train(scenario: TrainScenario) -> Plant:
+def _plant_of(what: Drive | Scenario) -> Plant:
+    # The times of a drive alone are not used.
+    scenario = what if isinstance(what, Scenario) else of_drive(what, duration=1.0, sample_interval=1.0)
     need_free_motion(scenario, "response")
-    train = scenario.train()
+    train = scenario.named_train()
     core = scenario.core(sampled=False)
     signals = scenario.signals()
-    variables = train_variables(train, core)
     last = list(train.shafts)[-1]
     source = None
     if len(train.motors) == 1:
         motor = next(iter(train.motors))
-        source = f"{motor}_reference" if motor in scenario.continuous() else f"{motor}_command"
+        source = f"{motor}_reference" if motor in scenario.continuous() else train.command_of(motor)
 
-    def start_of(initial: TrainInitial) -> dict[str, float]:
-        capacities = initial.hysteresis_capacities.items()
-        return scenario.start(initial) | {f"{name}_hysteresis_capacity": h for name, h in capacities}
+    def start_of(initial: Any) -> dict[str, float]:
+        capacities = scenario.capacities(initial).items()
+        return scenario.start(initial) | {train.capacity_of(name): h for name, h in capacities}
 
-    floors = {f"{name}_speed": 0.0 for name in train.shafts}
+    floors = {train.speed_of(name): 0.0 for name in train.shafts}
     for name, gear in train.gears.items():
         floors |= {train.output_torque_of(name): gear.rated_output_torque or 0.0, train.twist_of(name): 0.0}
         if gear.rated_input_speed is not None:
             floors |= {
-                f"{gear.input}_speed": gear.rated_input_speed,
-                f"{gear.output}_speed": gear.rated_input_speed / abs(gear.ratio),
+                train.speed_of(gear.input): gear.rated_input_speed,
+                train.speed_of(gear.output): gear.rated_input_speed / abs(gear.ratio),
             }
     return Plant(
         core=core,
         signals={name: signals[name] for name in core.input_names()},
         source=source,
         start=start_of(scenario.initial),
-        rest=start_of(TrainInitial(angles=scenario.initial.of_all("angles"), twists=scenario.initial.of_all("twists"))),
+        rest=start_of(scenario.initial.at_rest()),
         start_of=start_of,
         channels=tuple(name for name, *_ in core.channels()),
-        variables=variables,
-        derive=partial(add_angles, train),
-        output=f"{last}_speed",
+        variables=scenario.variables(),
+        derive=scenario.derive,
+        output=train.speed_of(last),
         angle=train.angle_of(last),
         floors=floors,
-        attributes={},
+        attributes=scenario.attributes(),
     )
 
 

@@ -15,7 +15,7 @@ from ..inputs.quantities import Count, Number, Torque
 from ..model.drive import Drive
 from ..model.signals import CommandSignal, Signal, TorqueSignal
 from ..simulation.scenario import Initial, Scenario
-from ..simulation.train_scenario import TrainInitial, TrainScenario
+from ..simulation.train_scenario import TrainInitial
 from .plant import Plant, plant_of
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ def _period(signals: Iterable[Signal[Any]]) -> float:
 
 @checked
 def periodic_motion(
-    drive: Drive | Scenario | TrainScenario,
+    drive: Drive | Scenario,
     command: CommandSignal | Number | None = None,
     load_torque: TorqueSignal | Torque | None = None,
     *,
@@ -118,7 +118,7 @@ def periodic_motion(
 
     Parameters
     ----------
-    drive : Drive, Scenario or TrainScenario
+    drive : Drive or Scenario
         The drive or the scenario.
     command, load_torque : CommandSignal, TorqueSignal or float, optional
         E_C [-] and M_Z [N·m] of a drive: constants, or signals of mean and sines with a common period. Default: those of the
@@ -229,7 +229,7 @@ def is_stable(multipliers: np.ndarray) -> bool:
 
 @checked
 def periodic_motions(
-    drive: Drive | Scenario | TrainScenario,
+    drive: Drive | Scenario,
     command: CommandSignal | Number | None = None,
     load_torque: TorqueSignal | Torque | None = None,
     *,

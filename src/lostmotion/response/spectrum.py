@@ -98,7 +98,7 @@ class Spectrum:
 
 @checked
 def spectrum(
-    scenario: Scenario | TrainScenario,
+    scenario: Scenario,
     *,
     against: str | None = None,
     motor: str | None = None,

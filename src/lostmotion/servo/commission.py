@@ -13,7 +13,6 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Angle
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario
 from ..units.practical import practical
 from .margins import Bandwidth, Instability, Margins, bandwidth_of, frequencies, instability, margins
 from .motion import (
@@ -90,7 +89,7 @@ class Stiffness:
 class ServoReport:
     """The report of one axis."""
 
-    scenario: Scenario | TrainScenario
+    scenario: Scenario
     motor: str
     regimes: Mapping[str, str]
     """meaning by name"""
@@ -208,7 +207,7 @@ class ServoReport:
 
 @checked
 def commission(
-    scenario: Scenario | TrainScenario,
+    scenario: Scenario,
     *,
     motor: str | None = None,
     window: Angle | None = None,
@@ -225,7 +224,7 @@ def commission(
 
     Parameters
     ----------
-    scenario : Scenario or TrainScenario
+    scenario : Scenario
         A scenario with a controller.
     motor : str, optional
         Name of the motor whose controller is examined. Default: the only one.
@@ -287,7 +286,7 @@ def commission(
     )
 
 
-def work(scenario: Scenario | TrainScenario, motor: str | None = None) -> int:
+def work(scenario: Scenario, motor: str | None = None) -> int:
     """Number of progress reports of `commission`."""
     return len(axis_of(scenario, motor).loops) + 2
 

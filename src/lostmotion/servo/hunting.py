@@ -77,7 +77,7 @@ class Hunting:
 
 
 @checked
-def limit_cycle(scenario: Scenario | TrainScenario, *, motor: str | None = None, causes: bool = True) -> Hunting:
+def limit_cycle(scenario: Scenario, *, motor: str | None = None, causes: bool = True) -> Hunting:
     """Find the limit cycle that a loop reaches from the initial state of its scenario.
 
     With continuous controllers, or without any, a run leads to its neighbourhood. Newton's method then finds state and period to
@@ -86,7 +86,7 @@ def limit_cycle(scenario: Scenario | TrainScenario, *, motor: str | None = None,
 
     Parameters
     ----------
-    scenario : Scenario or TrainScenario
+    scenario : Scenario
         Its inputs must come to rest. Its duration is that of the shortest run; longer ones follow if it does not suffice.
     motor : str, optional
         Name of the motor whose sampled controller is examined. Default: the only one.
@@ -204,7 +204,7 @@ def _sampled(train: TrainScenario, motor: str | None, *, causes: bool) -> Huntin
 
 @checked
 def hunting_map(
-    scenario: Scenario | TrainScenario,
+    scenario: Scenario,
     grid: Mapping[str, Any],
     *,
     variable: str | None = None,
@@ -215,7 +215,7 @@ def hunting_map(
 
     Parameters
     ----------
-    scenario : Scenario or TrainScenario
+    scenario : Scenario
         As in `limit_cycle`.
     grid : mapping of str to array_like
         One or two dotted keys with their values, such as ``{"controllers.servo.position.gain": np.linspace(1, 10, 40),

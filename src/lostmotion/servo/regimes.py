@@ -102,7 +102,7 @@ class Axis:
         return min(found, key=lambda name: found[name]) if found else None
 
 
-def axis_of(scenario: Scenario | TrainScenario, motor: str | None = None) -> Axis:
+def axis_of(scenario: Scenario, motor: str | None = None) -> Axis:
     """The axis of a scenario.
 
     Parameters

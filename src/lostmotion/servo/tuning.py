@@ -31,7 +31,6 @@ from ..simulation.axis_form import file_schema
 from ..simulation.keys import parse_override
 from ..simulation.linear_units import unit_of_slides
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario
 from .data import frictions, inertias, lag_sum, two_inertias
 from .margins import STABLE, bandwidth_of, frequencies, margins
 from .motion import with_controller
@@ -63,7 +62,7 @@ class Tuning:
     rule: str
     why: str
     """data of the gains, in one line"""
-    scenario: Scenario | TrainScenario
+    scenario: Scenario
     gain: float
     """K_p of the speed loop, torque of the motor per speed of the motor [N·m·s/rad]"""
     integral_gain: float
@@ -190,7 +189,7 @@ def _aligned(rows: list[tuple[str, str, str]]) -> list[str]:
     return [f"{what:<30} {value:<24} {where}" for what, value, where in rows]
 
 
-def drive_units(scenario: Scenario | TrainScenario, motor: str | None = None) -> list[str]:
+def drive_units(scenario: Scenario, motor: str | None = None) -> list[str]:
     """The gains of an axis as manufacturers of drives write them, as lines."""
     axis = axis_of(scenario, motor)
     speed, position = axis.controller.speed, axis.controller.position
@@ -206,7 +205,7 @@ def drive_units(scenario: Scenario | TrainScenario, motor: str | None = None) ->
 
 @checked
 def tune(
-    scenario: Scenario | TrainScenario,
+    scenario: Scenario,
     *,
     rule: str = "identical_damping",
     damping: Number = 0.7,
@@ -220,7 +219,7 @@ def tune(
 
     Parameters
     ----------
-    scenario : Scenario or TrainScenario
+    scenario : Scenario
         A scenario with a controller. Its loops, sample times, filters and encoders count; its gains do not.
     rule : str
         ``"identical_damping"``, ``"identical_radius"`` or ``"identical_real_part"``: poles of two inertias and the spring between them.
@@ -508,7 +507,7 @@ def _torque_constant(axis: Axis) -> float | None:
 
 
 def _tuning(
-    scenario: Scenario | TrainScenario,
+    scenario: Scenario,
     axis: Axis,
     rule: str,
     why: str,
@@ -519,13 +518,8 @@ def _tuning(
     if feedforward:
         axis = with_controller(axis, **_known(axis))
     controller = axis.controller.model_copy(update=_fields(axis, gains, K_v))
-    changed: Scenario | TrainScenario
-    if isinstance(scenario, TrainScenario):
-        where, before = f"controllers.{axis.motor}", dict(scenario.axes())[axis.motor]
-        changed = scenario.model_copy(update={"controllers": {**scenario.controllers, axis.motor: controller}})
-    else:
-        where, before = "controller", dict(scenario.axes())[axis.motor]
-        changed = scenario.model_copy(update={"controller": controller})
+    changed = scenario.with_axes({axis.motor: controller})
+    where, before = scenario.controller_key(axis.motor), scenario.axes()[axis.motor]
     differences = dict(_differences(before.model_dump(), controller.model_dump(), where))
     constant = _torque_constant(axis)
     slides = axis.train.is_slide(axis.motor_shaft)

@@ -3,6 +3,7 @@ from .explanation import Explanation as Explanation
 from .explanation import MotorState as MotorState
 from .results import RunArrays as RunArrays
 from .results import scenario_of as scenario_of
+from .scenario import DriveScenario as DriveScenario
 from .stepping import SimulationState as SimulationState
 from .train_scenario import ShaftTable as ShaftTable
 from .train_scenario import SlideTable as SlideTable

@@ -11,19 +11,19 @@ from ..inputs.kept import kept
 from ..worker_threads import thread_pool
 from .scenario import Scenario
 from .train_parts import SIDE_BY_SIDE, control_of_part, joined_results, parts_of
-from .train_scenario import TrainScenario
+from .train_scenario import TrainScenario, in_long_form
 
 Case = tuple[_core.Train, Sequence[_core.Signal], Mapping[str, float], Mapping[str, float]]
 """train, inputs, state and hysteresis capacities by name"""
 
 
-def core_case(scenario: Scenario | TrainScenario) -> Case:
+def core_case(scenario: Scenario) -> Case:
     """Initial part of every run of the core."""
     return scenario.core(), *_around(scenario)
 
 
 @kept
-def _around(scenario: Scenario | TrainScenario) -> tuple[list[_core.Signal], dict[str, float], dict[str, float]]:
+def _around(scenario: Scenario) -> tuple[list[_core.Signal], dict[str, float], dict[str, float]]:
     signals = scenario.signals()
     inputs = [signals[name].core() for name in scenario.core().input_names()]
     return inputs, scenario.start(), scenario.capacities()
@@ -35,9 +35,7 @@ def core_run(case: Case, options: tuple[Any, ...], control: Bound = OPEN_LOOP) -
     return _core.run(core, inputs, start, capacities, *(*options, control))
 
 
-def core_result(
-    scenario: Scenario | TrainScenario, options: tuple[Any, ...], control: Bound
-) -> tuple[_core.Train, dict[str, Any]]:
+def core_result(scenario: Scenario, options: tuple[Any, ...], control: Bound) -> tuple[_core.Train, dict[str, Any]]:
     """The solver's train, and what the solver gave for it. Parts that nothing joins are solved apart; under controllers side by
     side, unless one of these is a function in Python.
 
@@ -47,22 +45,21 @@ def core_result(
         Duration [s], sample interval [s], samples, whether to keep the energy ledger, relative tolerance (0: exact), and how
         many switchings are kept.
     """
-    parts = parts_of(scenario) if isinstance(scenario, TrainScenario) else []
-    if len(parts) <= 1:
+    parts = parts_of(scenario)
+    if len(parts) == 1:
         case = core_case(scenario)
         return case[0], core_run(case, options, control)
+    whole = in_long_form(scenario)
 
     def solved(part: TrainScenario) -> dict[str, Any]:
         core, result = core_result(part, options, control_of_part(control, whole, part))
         names = {"channels": [name for name, *_ in core.channels()], "contacts": core.contact_names()}
         return result | names
 
-    assert isinstance(scenario, TrainScenario)
-    whole = scenario
     if not control[1] or any(c.law for c in scenario.axes().values()) or options[0] > SIDE_BY_SIDE * control[0]:
         results = list(map(solved, parts))
     else:
         with thread_pool(len(parts) - 1) as beside:
             others = [beside.submit(solved, part) for part in parts[1:]]
             results = [solved(parts[0]), *(other.result() for other in others)]
-    return scenario.core(), joined_results(scenario, parts, results, options[-1])
+    return scenario.core(), joined_results(whole, parts, results, options[-1])

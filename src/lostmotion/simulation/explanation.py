@@ -18,7 +18,7 @@ from ..units.practical import charted
 from .core_runs import core_case
 from .scenario import Scenario
 from .stepping import Simulation
-from .train_scenario import TrainScenario, need_open_loop
+from .train_scenario import need_open_loop
 
 
 @dataclass(frozen=True)
@@ -156,12 +156,12 @@ class Explanation:
 
 
 @checked
-def explain(what: Scenario | Simulation | TrainScenario, time: Time | None = None) -> Explanation:
+def explain(what: Scenario | Simulation, time: Time | None = None) -> Explanation:
     """Report the state of the contacts of a drive or a train at one instant.
 
     Parameters
     ----------
-    what : Scenario, TrainScenario or Simulation
+    what : Scenario or Simulation
         A scenario, which is run to `time`, or a simulation in its present state.
     time : float, optional
         Instant [s], for a scenario.

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple
 from .core_runs import core_result
 from .run import MAX_SWITCHINGS
 from .scenario import Scenario
-from .train_scenario import TrainScenario
 from .windings import oriented
 
 SHARES = tuple(math.ldexp(1.0, -3 * k) for k in range(6, 1, -1))  # of a stretch, that are tried one after the other
@@ -29,7 +28,7 @@ class Forecast(NamedTuple):
     """in that time"""
 
 
-def forecast(scenario: Scenario | TrainScenario, tolerance: float = 0.0) -> Forecast:
+def forecast(scenario: Scenario, tolerance: float = 0.0) -> Forecast:
     """Estimate the length of a run. That takes a fiftieth of its time, or some tenths of a second.
 
     Parameters
@@ -72,7 +71,7 @@ def forecast(scenario: Scenario | TrainScenario, tolerance: float = 0.0) -> Fore
     return Forecast(runs * seconds, part, switchings)
 
 
-def _changes(scenario: Scenario | TrainScenario) -> list[float]:
+def _changes(scenario: Scenario) -> list[float]:
     """Begin and end of a run, and between them the instants that begin long stretches without a change of inputs."""
     end = scenario.simulation.duration
     found = {point[0] for signal in scenario.signals().values() for point in signal.breakpoint_list()}

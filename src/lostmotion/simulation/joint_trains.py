@@ -13,13 +13,13 @@ from ..errors import InputError
 from ..model.drive import Drive
 from ..model.load import Load
 from ..model.train import DriveTrain
-from .scenario import Initial, Scenario
+from .scenario import DriveScenario, Initial
 from .stepping import Simulation, SimulationState
 from .train_scenario import TrainInitial
 
 ROWS = {name: k for k, name in enumerate(_core.joint_rows())}
 
-Driven = Drive | Scenario | DriveTrain
+Driven = Drive | DriveScenario | DriveTrain
 
 
 @dataclass
@@ -89,7 +89,7 @@ def joint_drive(name: str, drive: Driven, inertia: float, step: float) -> JointD
     InputError
         It is not clear which shaft the joint is.
     """
-    if isinstance(drive, Scenario):
+    if isinstance(drive, DriveScenario):
         changed: Driven = drive.replace(**{"load.inertia": inertia})
     elif isinstance(drive, Drive):
         load = drive.load
@@ -110,7 +110,7 @@ def joint_drive(name: str, drive: Driven, inertia: float, step: float) -> JointD
         train, shaft = changed.train(), "load"
         simulation = Simulation(changed, step=step)
     names = simulation._core_train.input_names()
-    controlled = isinstance(changed, Scenario) and changed.controller is not None
+    controlled = getattr(changed, "controller", None) is not None
     command, scale = None, 1.0
     if not controlled:
         if len(train.motors) != 1:

@@ -10,13 +10,12 @@ import numpy as np
 
 from .core_runs import core_result
 from .scenario import Scenario
-from .train_scenario import TrainScenario
 
 MOST_RESIDUAL = 1e-6  # of the energy turned over, by which the balance of an accurate run fails at most
 ROUNDING = 2.0**-46  # share of a stored energy: 64 units in the last place
 
 
-def ledger_of(scenario: Scenario | TrainScenario) -> dict[str, float]:
+def ledger_of(scenario: Scenario) -> dict[str, float]:
     """The ledger of a run of the exact solver [J]."""
     table = scenario.simulation
     options = (table.duration, table.sample_interval, table.samples, True, 0.0, 0)

@@ -8,19 +8,18 @@ import numpy as np
 
 from .results import RunArrays
 from .scenario import Scenario
-from .train_scenario import TrainScenario
 
 NAME = "pointing_error"
 
 
-def pointing_names(scenario: Scenario | TrainScenario) -> Iterator[tuple[str, str]]:
+def pointing_names(scenario: Scenario) -> Iterator[tuple[str, str]]:
     """Motor and name of the error, for each axis that follows a position."""
     for motor, controller in scenario.axes().items():
         if controller.reference.kind == "position":
             yield motor, f"{scenario.prefix(motor)}{NAME}"
 
 
-def pointing_errors(scenario: Scenario | TrainScenario, result: RunArrays) -> dict[str, np.ndarray]:
+def pointing_errors(scenario: Scenario, result: RunArrays) -> dict[str, np.ndarray]:
     """The reference less the true angle of its shaft [rad] over time, by name; with a camera the reference is where the target is."""
     found = {}
     for motor, name in pointing_names(scenario):
@@ -29,9 +28,10 @@ def pointing_errors(scenario: Scenario | TrainScenario, result: RunArrays) -> di
     return found
 
 
-def _angle(scenario: Scenario | TrainScenario, result: RunArrays, shaft: str | None) -> np.ndarray:
-    if isinstance(scenario, TrainScenario):
-        train = scenario.train()
-        return result[train.angle_of(shaft or list(train.shafts)[-1])]
-    angle = result["load_angle"]
-    return angle if shaft != "motor" else np.asarray(scenario.gearbox.ratio * (angle + result["twist"]))
+def _angle(scenario: Scenario, result: RunArrays, shaft: str | None) -> np.ndarray:
+    train = scenario.named_train()
+    name = train.angle_of(shaft or list(train.shafts)[-1])
+    if name in result:
+        return result[name]
+    (gear,) = train.gears.values()  # of a drive, whose results have no angle of the motor
+    return np.asarray(gear.ratio * (result["load_angle"] + result["twist"]))

@@ -11,19 +11,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import _core
-from ..control.controller import Controller
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.kept import kept
-from ..model.torsion import Rigid
-from ..model.train import DriveTrain
 from ..version import __version__
 from .ledger import largest_stored, ledger_of, with_energy
-from .scenario import Scenario
+from .scenario import Scenario, is_train
 from .switchings import ATTRIBUTE as SWITCHINGS
 from .switchings import CONTACTS_OF_TRAIN, columns_of, packed
-from .train_scenario import TrainScenario, is_train
-from .train_variables import angle_through, angles_through_gears, axis_variables, named_signals, train_variables
+from .train_variables import axis_variables, named_signals
 from .variables import VARIABLES, Variable
 from .windings import set_torques
 
@@ -73,7 +69,7 @@ class RunArrays:
     time: np.ndarray
     values: Mapping[str, np.ndarray]
     attrs: Mapping[str, Any]
-    scenario: Scenario | TrainScenario
+    scenario: Scenario
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self.time if name == "time" else self.values[name]
@@ -131,14 +127,14 @@ def _made_again(*fields: Any) -> RunArrays:
 
 
 def raw_result(
-    scenario: Scenario | TrainScenario, core: _core.Train, result: dict[str, Any], solver: str, *, ledger: bool
+    scenario: Scenario, core: _core.Train, result: dict[str, Any], solver: str, *, ledger: bool
 ) -> RunArrays:
     """Result of the solver with all its parts."""
     time = _time(scenario)
     data = dict(zip(_channels(scenario), result["values"], strict=True))
     data |= named_signals(scenario.by_prefix(), result["control"])
     set_torques(scenario, data)
-    add_derived(scenario, data, time)
+    scenario.derive(data, time)
     attributes = {
         "title": scenario.title,
         "scenario": scenario.to_json(),
@@ -168,19 +164,19 @@ def raw_result(
 
 
 @kept
-def _frame(scenario: Scenario | TrainScenario) -> xarray.Dataset:
+def _frame(scenario: Scenario) -> xarray.Dataset:
     """The dataset of its runs without their samples and attributes: to put these in takes a tenth of the time of making one."""
     nothing = np.broadcast_to(np.nan, scenario.simulation.samples)
     variables = variables_of(scenario)
     return labelled(_time(scenario), dict.fromkeys((v.name for v in variables), nothing), {}, variables)
 
 
-def _time(scenario: Scenario | TrainScenario) -> np.ndarray:
+def _time(scenario: Scenario) -> np.ndarray:
     return np.arange(scenario.simulation.samples) * scenario.simulation.sample_interval
 
 
 @kept
-def _channels(scenario: Scenario | TrainScenario) -> tuple[str, ...]:
+def _channels(scenario: Scenario) -> tuple[str, ...]:
     """Names of what the solver samples."""
     return tuple(name for name, *_ in scenario.core().channels())
 
@@ -209,62 +205,19 @@ def is_train_result(result: xarray.Dataset | RunArrays) -> bool:
 
 
 @kept
-def variables_of(scenario: Scenario | TrainScenario) -> tuple[Variable, ...]:
+def variables_of(scenario: Scenario) -> tuple[Variable, ...]:
     """The variables that a result of this scenario may have."""
-    own = VARIABLES if isinstance(scenario, Scenario) else train_variables(scenario.train(), scenario.core())
-    return (*own, *axis_variables(scenario.by_prefix(), scenario.sliding()))
+    return (*scenario.variables(), *axis_variables(scenario.by_prefix(), scenario.sliding()))
 
 
 def recorded_variables(attributes: Mapping[str, Any]) -> tuple[Variable, ...]:
     """The variables that a result with these attributes may have."""
     tables = json.loads(attributes.get("scenario", "{}"))
-    if is_train(tables):
-        return variables_of(TrainScenario(**tables))
-    controller = tables.get("controller")
-    axes = {} if controller is None else {"": Controller(**controller)}
-    return (*VARIABLES, *axis_variables(axes))
-
-
-def add_derived(scenario: Scenario | TrainScenario, data: dict[str, Any], time: Any) -> None:
-    """Adds the variables that follow from those of the solver."""
-    if isinstance(scenario, Scenario):
-        add_efficiency(data, scenario.gearbox.ratio)
-    else:
-        add_angles(scenario.train(), data, time)
-
-
-def add_efficiency(data: dict[str, Any], ratio: Any) -> None:
-    """Adds the variables of a drive that follow from those of the solver."""
-    data["efficiency"] = gear_efficiency(data, ratio)
-    data["motor_power"] = data["motor_torque"] * data["motor_speed"]
-
-
-def add_angles(train: DriveTrain, data: dict[str, Any], time: Any) -> None:
-    """Adds what the solver does not integrate: twists of rigid gears, and the angles that follow through the gears."""
-    for name, gear in train.gears.items():
-        if isinstance(gear.stiffness, Rigid):
-            data.setdefault(train.twist_of(name), np.zeros_like(time))
-    known = [name for name in train.shafts if train.angle_of(name) in data]
-    for shaft, source, name, forward in angles_through_gears(train, known):
-        angle, twist = data[train.angle_of(source)], data[train.twist_of(name)]
-        data[train.angle_of(shaft)] = angle_through(train.gears[name], angle, twist, forward=forward)
-
-
-def gear_efficiency(data: dict[str, Any], ratio: Any) -> Any:
-    """Useful torque / torque fed in [-], by the direction of the load; NaN where the input shaft is at rest.
-
-    Driving (T_2 has the sign of w_M i) it is T_2/(i T_1), overrunning i T_1/T_2; 0 where both sides feed the losses.
-    """
-    way = np.sign(data["motor_speed"])
-    driving = data["output_torque"] * way * np.copysign(1.0, ratio)
-    fed_in = np.abs(ratio) * data["input_torque"] * way
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        eta = np.where(driving >= 0.0, driving / fed_in, np.where(fed_in < 0.0, fed_in / driving, 0.0))
-    return np.where(data["motor_speed"] == 0.0, np.nan, eta)
+    return variables_of(Scenario(**tables)) if tables else VARIABLES
 
 
 @checked
-def scenario_of(dataset: xarray.Dataset) -> Scenario | TrainScenario:
+def scenario_of(dataset: xarray.Dataset) -> Scenario:
     """Return the scenario that a result came from.
 
     Parameters
@@ -274,7 +227,7 @@ def scenario_of(dataset: xarray.Dataset) -> Scenario | TrainScenario:
 
     Returns
     -------
-    Scenario or TrainScenario
+    Scenario
         The scenario; it can be run again.
 
     Raises
@@ -294,7 +247,7 @@ def scenario_of(dataset: xarray.Dataset) -> Scenario | TrainScenario:
             "this dataset carries no scenario; give a result of simulate or open_result, attributes included"
         )
     text = dataset.attrs["scenario"]
-    return TrainScenario.from_json(text) if is_train(json.loads(text)) else Scenario.from_json(text)
+    return Scenario.from_json(text)
 
 
 @checked

@@ -19,10 +19,9 @@ from ..worker_threads import thread_pool
 from .core_runs import core_result
 from .ledger import warned
 from .results import RunArrays, raw_result, variables_of
-from .scenario import Initial, LoadTable, Scenario, SimulationTable
+from .scenario import Initial, Scenario, of_drive
 from .sensitivities import run_sensitivities
 from .train_parts import SIDE_BY_SIDE
-from .train_scenario import TrainScenario
 from .windings import ATTRIBUTE as ERROR_BOUND
 from .windings import coarser, error_bound, oriented, too_slow
 
@@ -37,12 +36,12 @@ TOLERANCES = (1e-15, 1e-3)  # beyond rounding, and beyond what finds the switchi
 
 MAX_SWITCHINGS = 100_000  # kept with a result; beyond it they are only counted
 ALWAYS_FREE = 4_000_000  # bytes, for which the system is not asked
-BYTES_PER_SAMPLE = 170  # of a result while it is made, measured
+BYTES_PER_VALUE = 16  # of a result while it is made
 
 
 @overload
 def simulate(
-    scenario_or_drive: Scenario | TrainScenario | Drive,
+    scenario_or_drive: Scenario | Drive,
     *,
     command: CommandSignal | float | None = None,
     load_torque: TorqueSignal | float | None = None,
@@ -58,7 +57,7 @@ def simulate(
 ) -> xarray.Dataset: ...
 @overload
 def simulate(
-    scenario_or_drive: Scenario | TrainScenario | Drive,
+    scenario_or_drive: Scenario | Drive,
     *,
     command: CommandSignal | float | None = None,
     load_torque: TorqueSignal | float | None = None,
@@ -73,7 +72,7 @@ def simulate(
 ) -> RunArrays: ...
 @checked
 def simulate(
-    scenario_or_drive: Scenario | TrainScenario | Drive,
+    scenario_or_drive: Scenario | Drive,
     *,
     command: CommandSignal | float | None = None,
     load_torque: TorqueSignal | float | None = None,
@@ -91,7 +90,7 @@ def simulate(
 
     Parameters
     ----------
-    scenario_or_drive : Scenario, TrainScenario or Drive
+    scenario_or_drive : Scenario or Drive
         A scenario, whose values the other arguments replace, or a drive alone. The inputs of a drive train are those of its
         scenario (`TrainScenario.replace` changes them); only duration and sample_interval can be given here.
     command : CommandSignal or float, optional
@@ -141,17 +140,9 @@ def simulate(
     '0.02915 rad/s'
     """
     changes: dict[str, Any] = {"command": command, "load_torque": load_torque, "initial": initial}
-    times: dict[str, Any] = {"duration": duration, "sample_interval": sample_interval}
-    scenario: Scenario | TrainScenario
-    if isinstance(scenario_or_drive, TrainScenario):
-        if given := [name for name, value in changes.items() if value is not None]:
-            raise InputError(
-                f"{given[0]}: a drive train has several; give them in its scenario, such as scenario.replace(**{{'command.NAME': 0.5}})"
-            )
-        new = {f"simulation.{name}": value for name, value in times.items() if value is not None}
-        scenario = scenario_or_drive.replace(**new) if new else scenario_or_drive
-    else:
-        scenario = as_scenario(scenario_or_drive, **changes, **times)
+    changes |= {"duration": duration, "sample_interval": sample_interval}
+    one = scenario_or_drive
+    scenario: Scenario = of_drive(one, **changes) if isinstance(one, Drive) else one.with_inputs(**changes)
     if output not in ("dataset", "arrays"):
         raise InputError(f'output {output!r} is not known; it must be "dataset" or "arrays"')
     if sensitivities is not None and output == "arrays":
@@ -172,7 +163,7 @@ def simulate(
 
 
 def run(
-    scenario: Scenario | TrainScenario,
+    scenario: Scenario,
     *,
     solver: SolverName = "exact",
     relative_tolerance: float | None = None,
@@ -192,8 +183,7 @@ def run(
     if not low <= tolerance <= high:
         raise InputError(f"relative_tolerance {tolerance:g} must lie between {low:g} and {high:g}")
     table = scenario.simulation
-    of_drive = isinstance(scenario, Scenario)
-    check_memory(table.samples, BYTES_PER_SAMPLE if of_drive else 16 * len(variables_of(scenario)))
+    check_memory(table.samples, BYTES_PER_VALUE * len(variables_of(scenario)))
     how = "exact" if exact else f"dormand-prince, relative tolerance {tolerance:g}"
     options: tuple[Any, ...] = (
         table.duration,
@@ -222,13 +212,13 @@ def run(
     return _warned(scenario, replace(result, attrs={**result.attrs, ERROR_BOUND: bound}))
 
 
-def _warned(scenario: Scenario | TrainScenario, result: RunArrays) -> RunArrays:
+def _warned(scenario: Scenario, result: RunArrays) -> RunArrays:
     """With what is to be said of the sampling of its currents."""
     text = too_slow(scenario, result.values)
     return replace(result, attrs=warned(result.attrs, text)) if text else result
 
 
-def whole_run(scenario: Scenario | TrainScenario, options: tuple[Any, ...], how: str, control: Bound) -> RunArrays:
+def whole_run(scenario: Scenario, options: tuple[Any, ...], how: str, control: Bound) -> RunArrays:
     """One run of the core. Parts of a train that nothing joins are solved apart; under controllers side by side, unless one of
     these is a function in Python.
 
@@ -242,7 +232,7 @@ def whole_run(scenario: Scenario | TrainScenario, options: tuple[Any, ...], how:
     return raw_result(scenario, core, result, how, ledger=options[3])
 
 
-def check_memory(samples: int, width: int = BYTES_PER_SAMPLE) -> None:
+def check_memory(samples: int, width: int) -> None:
     """Refuse a run whose samples, `width` bytes each, do not fit into the memory that is free.
 
     Raises
@@ -271,42 +261,3 @@ def free_memory() -> int | None:
         return os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, OSError, ValueError):
         return None
-
-
-def as_scenario(
-    scenario_or_drive: Scenario | Drive,
-    *,
-    command: CommandSignal | float | None = None,
-    load_torque: TorqueSignal | float | None = None,
-    duration: float | None = None,
-    sample_interval: float | None = None,
-    initial: Initial | None = None,
-) -> Scenario:
-    """A scenario with the given changes, or a drive with its surroundings."""
-    changes: dict[str, Any] = {}
-    if isinstance(scenario_or_drive, Drive):
-        drive = scenario_or_drive
-        if duration is None or sample_interval is None:
-            raise InputError("a drive alone needs duration and sample_interval [s]")
-        changes = {"motor": drive.motor, "gearbox": drive.gearbox, "load": LoadTable(**drive.load.model_dump())}
-    elif all(v is None for v in (command, load_torque, duration, sample_interval, initial)):
-        return scenario_or_drive
-    else:
-        s = scenario_or_drive
-        changes = {name: getattr(s, name) for name in Scenario.model_fields}
-        duration = s.simulation.duration if duration is None else duration
-        sample_interval = s.simulation.sample_interval if sample_interval is None else sample_interval
-    changes["simulation"] = SimulationTable(duration=duration, sample_interval=sample_interval)
-    if command is not None:
-        changes["command"] = _signal(command, CommandSignal)
-    if load_torque is not None:
-        load = changes["load"]
-        torque = _signal(load_torque, TorqueSignal)
-        changes["load"] = LoadTable(**{**{n: getattr(load, n) for n in LoadTable.model_fields}, "torque": torque})
-    if initial is not None:
-        changes["initial"] = initial
-    return Scenario(**changes)
-
-
-def _signal(value: Any, kind: Any) -> Any:
-    return kind(mean=value) if isinstance(value, int | float) else value

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Self
+from contextlib import suppress
+from importlib import import_module
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
-from pydantic import model_validator
+from pydantic import ConfigDict, model_validator
 
 from .. import _core
 from ..control.axis import NO_LAWS, Bound, check_torques, core_control, driven
@@ -19,16 +22,19 @@ from ..inputs.part import Part
 from ..inputs.quantities import Angle, NotNegative, Positive, Speed, Switch, Time, Torque
 from ..model.drive import Drive
 from ..model.gearbox import Gearbox, Transmission
+from ..model.linear_train import LinearElements
 from ..model.load import Load
 from ..model.motor import Motor
+from ..model.shaft import Shaft
 from ..model.signals import CommandSignal, Signal, TorqueSignal
 from ..model.task import Task
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
 from .keys import set_values
-from .variables import STATES
+from .variables import STATES, VARIABLES, Variable, add_efficiency
 
 MAX_SAMPLES = 100_000_000
+LONG_TABLES = ("shafts", "slides", *LinearElements.model_fields)  # of which one makes a scenario one in the long form
 
 # In the JSON Schema of files, beside what a scenario has.
 BASE = {"type": "string", "description": "scenario file that this one changes"}
@@ -61,6 +67,10 @@ class Initial(Part):
     """h, which the last turning point before t = 0 left behind"""
     on_reference: Switch = False
     """angle and speeds are those of the controller's reference at t = 0"""
+
+    def at_rest(self) -> Initial:
+        """The same without motion and twist."""
+        return Initial()
 
 
 def state_of(initial: Initial) -> dict[str, float]:
@@ -111,7 +121,10 @@ class SimulationTable(Part):
 
 
 class Scenario(Part):
-    """A drive with its inputs, controller, task and the duration of its run.
+    """Drive or drive train, what acts on it and what is wanted of it, in the short form or in the long form.
+
+    A scenario in the short form (`DriveScenario`) has the tables ``motor``, ``gearbox`` and ``load``; one in the long form
+    (`TrainScenario`) has shafts and what joins them. The constructor, `model_validate` and `from_json` read either form.
 
     Examples
     --------
@@ -119,6 +132,207 @@ class Scenario(Part):
     >>> lm.load("paper-2dof-nl-small").replace(**{"load.inertia": "3 kg*m^2"}).load.inertia
     3.0
     """
+
+    if TYPE_CHECKING:
+        title: str
+        initial: Any
+        simulation: SimulationTable
+
+    # The classes of both forms: whether it is the long one.
+    forms: ClassVar[dict[bool, type[Any]]] = {}
+
+    def __new__(cls, /, *_: Any, **tables: Any) -> Self:
+        return super().__new__(cls._form(tables))
+
+    @classmethod
+    def _form(cls, tables: Any) -> type[Self]:
+        if cls is not Scenario:
+            return cls
+        long = isinstance(tables, Mapping) and is_train(tables)
+        if long not in cls.forms:
+            import_module(".train_scenario", __package__)  # which imports this module
+        return cls.forms[long]
+
+    @classmethod
+    def model_validate(cls, obj: Any, **options: Any) -> Self:
+        """Make the scenario from its tables, as the constructor does."""
+        if cls is Scenario and not isinstance(obj, Scenario):
+            return cls._form(obj).model_validate(obj, **options)
+        return super().model_validate(obj, **options)
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """Make the scenario from JSON that `to_json` returned."""
+        tables = None
+        if cls is Scenario:
+            with suppress(TypeError, ValueError, RecursionError):  # which reading it as a form reports
+                tables = json.loads(text)
+        return cls._form(tables).model_validate_json(text)
+
+    def train(self) -> DriveTrain:
+        """The drive train without its surroundings."""
+        raise NotImplementedError
+
+    def named_train(self) -> DriveTrain:
+        """The same, with the names that variables have in results of this scenario."""
+        raise NotImplementedError
+
+    def long(self) -> Scenario:
+        """The scenario in the long form."""
+        raise NotImplementedError
+
+    def variables(self) -> tuple[Variable, ...]:
+        """The variables that a result has, without those of controllers."""
+        raise NotImplementedError
+
+    def derive(self, data: dict[str, Any], time: Any) -> None:
+        """Add the variables that follow from those of the solver."""
+        raise NotImplementedError
+
+    def attributes(self) -> dict[str, float]:
+        """Attributes of what is computed of it, beside those of a run."""
+        return {}
+
+    def ambient_temperature(self) -> float:
+        """Temperature [°C] of the task."""
+        raise NotImplementedError
+
+    def with_inputs(self, **changes: Any) -> Self:
+        """The same scenario with the inputs and times that `simulate` is given; None leaves a value as it is."""
+        given = {name: value for name, value in changes.items() if value is not None}
+        return self._with_inputs(given) if given else self
+
+    def _with_inputs(self, given: Mapping[str, Any]) -> Self:
+        raise NotImplementedError
+
+    def with_gears(self, gears: Mapping[str, Any]) -> Self:
+        """The same scenario with other gears, by their keys."""
+        raise NotImplementedError
+
+    def input_keys(self) -> dict[str, str]:
+        """Keys of the signals of its inputs, by their names."""
+        raise NotImplementedError
+
+    def gear_key(self, name: str) -> str:
+        """Key of the table of a gear."""
+        raise NotImplementedError
+
+    def motor_key(self, name: str) -> str:
+        """Key of the table of a motor."""
+        raise NotImplementedError
+
+    def core(self, *, sampled: bool = True) -> _core.Train:
+        """The solver's train, its motors as current loops make them.
+
+        Parameters
+        ----------
+        sampled
+            Also those of sampled controllers.
+        """
+        raise NotImplementedError
+
+    def axes(self) -> dict[str, Controller]:
+        """The sampled controllers by the names of their motors."""
+        raise NotImplementedError
+
+    def continuous(self) -> dict[str, ContinuousController]:
+        """The continuous controllers by the names of their motors."""
+        raise NotImplementedError
+
+    def with_axes(self, axes: Mapping[str, Controller]) -> Self:
+        """The same scenario with other sampled controllers, by the names of their motors; the others stay."""
+        raise NotImplementedError
+
+    def without_controllers(self) -> Self:
+        """The same scenario with the motors of its controllers turned by commands of 0."""
+        raise NotImplementedError
+
+    def prefix(self, motor: str) -> str:
+        """Prefix of the names of the variables of a motor's controller."""
+        raise NotImplementedError
+
+    def controller_key(self, motor: str) -> str:
+        """Key of the table of a motor's controller."""
+        raise NotImplementedError
+
+    def input_key(self, name: str) -> str:
+        """Key of the signal or reference that an input of the core stands for."""
+        raise NotImplementedError
+
+    def sliding(self) -> dict[str, tuple[bool, bool]]:
+        """Whether the motor of a controller moves a slide, and whether its position is that of one, by the prefix of its variables."""
+        raise NotImplementedError
+
+    def given(self) -> list[str]:
+        """Names of the shafts whose motion is given."""
+        raise NotImplementedError
+
+    def note(self) -> str:
+        """Notes of the sheets of gears and motors."""
+        raise NotImplementedError
+
+    def signals(self) -> dict[str, Signal[Any]]:
+        """All that acts on the train, by the name of its result variable."""
+        raise NotImplementedError
+
+    def begin(self) -> Any:
+        """State at t = 0, with what the references say of it."""
+        raise NotImplementedError
+
+    def start(self, initial: Any = None) -> dict[str, float]:
+        """State at t = 0 by the names of its variables.
+
+        Parameters
+        ----------
+        initial
+            In place of that of the scenario.
+        """
+        raise NotImplementedError
+
+    def capacities(self, initial: Any = None) -> dict[str, float]:
+        """Hysteresis capacities at t = 0 [N·m] by gear."""
+        raise NotImplementedError
+
+    def replace(self, **changes: Any) -> Self:
+        """The same scenario with changes by dotted key, such as ``**{"load.inertia": 0.1}``, checked anew."""
+        raise NotImplementedError
+
+    def gears_by_key(self) -> dict[str, Transmission]:
+        """The gears by the keys of their tables."""
+        return {self.gear_key(name): gear for name, gear in self.train().gears.items()}
+
+    def by_prefix(self) -> dict[str, Controller]:
+        """The sampled controllers, by what the names of their variables begin with."""
+        return {self.prefix(name): c for name, c in self.axes().items()}
+
+    def control(self, laws: Mapping[str, Law] = NO_LAWS) -> Bound:
+        """The solver's controllers, kept if there are no laws: change copies of them alone (`control.axis.own`)."""
+        return self._bound(laws) if laws else self._control()
+
+    @kept
+    def _control(self) -> Bound:
+        return self._bound(NO_LAWS)
+
+    def _bound(self, laws: Mapping[str, Law]) -> Bound:
+        return core_control(self.train(), self.axes(), self.controller_key("{}") + ".", laws)
+
+    @kept
+    def to_json(self) -> str:
+        """All values in SI, as JSON that `from_json` reads."""
+        return self.model_dump_json(exclude_none=True)
+
+
+class DriveScenario(Scenario):
+    """A scenario in the short form: a drive with its inputs, controller, task and the duration of its run.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> lm.load("paper-2dof-nl-small").replace(**{"load.inertia": "3 kg*m^2"}).load.inertia
+    3.0
+    """
+
+    model_config = ConfigDict(title="Scenario")
 
     title: str = ""
     command: CommandSignal = CommandSignal()
@@ -167,47 +381,57 @@ class Scenario(Part):
         return self
 
     def axes(self) -> dict[str, Controller]:
-        """The controller by the name of its motor, if there is one."""
         return {} if self.controller is None else {"motor": self.controller}
 
-    def by_prefix(self) -> dict[str, Controller]:
-        """The controller, by what the names of its variables begin with."""
-        return {} if self.controller is None else {"": self.controller}
-
     def prefix(self, motor: str) -> str:  # noqa: ARG002
-        """Prefix of the names of the variables of a motor's controller."""
         return ""
 
     def controller_key(self, motor: str) -> str:  # noqa: ARG002
-        """Key of the table of a motor's controller."""
         return "controller"
 
-    def with_axes(self, axes: Mapping[str, Controller]) -> Scenario:
-        """The same scenario with other sampled controllers, by the names of their motors."""
+    def with_axes(self, axes: Mapping[str, Controller]) -> DriveScenario:
         return self.model_copy(update={"controller": axes["motor"]})
 
-    def without_controllers(self) -> Scenario:
-        """The same scenario with its motor turned by a command of 0."""
+    def without_controllers(self) -> DriveScenario:
         return self.replace(controller=None)
 
     def given(self) -> list[str]:
-        """Names of the shafts whose motion is given: none."""
         return []
 
     def input_key(self, name: str) -> str:
-        """Key of the signal or reference that an input of the core stands for."""
         return {"load_torque": "load.torque", "reference": "controller.reference"}.get(name, name)
 
+    def gear_key(self, name: str) -> str:
+        return name
+
     def gears_by_key(self) -> dict[str, Transmission]:
-        """The gear by the key of its table."""
         return {"gearbox": self.gearbox}
 
+    def motor_key(self, name: str) -> str:
+        return name
+
+    def with_gears(self, gears: Mapping[str, Any]) -> DriveScenario:
+        return self.model_copy(update=dict(gears))
+
+    def input_keys(self) -> dict[str, str]:
+        return {"command": "command", "load_torque": "load.torque"}
+
+    def attributes(self) -> dict[str, float]:
+        return {"gear_ratio": self.gearbox.ratio}
+
+    def ambient_temperature(self) -> float:
+        return self.task.ambient_temperature
+
+    def variables(self) -> tuple[Variable, ...]:
+        return VARIABLES
+
+    def derive(self, data: dict[str, Any], time: Any) -> None:  # noqa: ARG002
+        add_efficiency(data, self.gearbox.ratio)
+
     def sliding(self) -> dict[str, tuple[bool, bool]]:
-        """Controllers that move slides: none."""
         return {}
 
     def note(self) -> str:
-        """Notes of the sheets of gearbox and motor."""
         return " ".join(filter(None, [self.gearbox.note, self.motor.note]))
 
     def continuous(self) -> dict[str, ContinuousController]:
@@ -215,17 +439,9 @@ class Scenario(Part):
         return {}
 
     def start(self, initial: Initial | None = None) -> dict[str, float]:
-        """State at t = 0 by the names of its variables.
-
-        Parameters
-        ----------
-        initial
-            In place of that of the scenario.
-        """
         return state_of(self.begin() if initial is None else initial)
 
     def capacities(self, initial: Initial | None = None) -> dict[str, float]:
-        """Hysteresis capacities at t = 0 [N·m] by gear."""
         return capacities_of(initial or self.initial)
 
     def signals(self) -> dict[str, Signal[Any]]:
@@ -234,7 +450,6 @@ class Scenario(Part):
 
     @kept
     def begin(self) -> Initial:
-        """State at t = 0, with what the reference says of it."""
         if not self.initial.on_reference or self.controller is None:
             return self.initial
         angle, speed = (float(value) for value in self.controller.reference.at(0.0)[:2])
@@ -243,22 +458,7 @@ class Scenario(Part):
         found = {"load_angle": angle, "load_speed": speed, "motor_speed": speed * self.gearbox.ratio}
         return self.initial.model_copy(update=found)
 
-    def control(self, laws: Mapping[str, Law] = NO_LAWS) -> Bound:
-        """The solver's controllers, kept if there are no laws: change copies of them alone (`control.axis.own`)."""
-        return core_control(self.train(), self.axes(), "controller.", laws) if laws else self._control()
-
-    @kept
-    def _control(self) -> Bound:
-        return core_control(self.train(), self.axes(), "controller.")
-
     def core(self, *, sampled: bool = True) -> _core.Train:
-        """The solver's train, its motor as the current loop makes it.
-
-        Parameters
-        ----------
-        sampled
-            Whether with that of a sampled controller.
-        """
         return self._own_core() if sampled else self.drive().core()
 
     @kept_while_used
@@ -271,6 +471,37 @@ class Scenario(Part):
         return self.drive().train()
 
     @kept
+    def named_train(self) -> DriveTrain:
+        return self.drive().named_train()
+
+    def long(self) -> Scenario:
+        """The scenario in the long form: shafts `motor` and `load`, gear `gearbox`, motor `motor`."""
+        train, start = self.train(), self.initial
+        load = {key: getattr(train.shafts["load"], key) for key in Shaft.model_fields}
+        initial: dict[str, Any] = {
+            "speeds": {} if start.on_reference else {"motor": start.motor_speed, "load": start.load_speed},
+            "angles": {} if start.on_reference else {"load": start.load_angle},
+            "twists": {"gearbox": start.twist} if start.twist else {},
+            "motor_torques": {"motor": start.motor_torque} if start.motor_torque else {},
+            "hysteresis_capacities": {"gearbox": start.hysteresis_capacity} if start.hysteresis_capacity else {},
+            "on_reference": start.on_reference,
+        }
+        tables: dict[str, Any] = {
+            "title": self.title,
+            "shafts": {"motor": {}, "load": {**load, "torque": self.load.torque}},
+            "motors": train.motors,
+            "gears": train.gears,
+            "command": {} if self.controller is not None else {"motor": self.command},
+            "controllers": self.axes(),
+            "initial": initial,
+            "simulation": self.simulation,
+        }
+        return Scenario(**tables)
+
+    def _with_inputs(self, given: Mapping[str, Any]) -> DriveScenario:
+        return with_surroundings(dict(self), **given)
+
+    @kept
     def drive(self) -> Drive:
         """The drive without its surroundings."""
         load = Load(**{name: getattr(self.load, name) for name in Load.model_fields})
@@ -280,41 +511,58 @@ class Scenario(Part):
         title = f"{self.title!r}, " if self.title else ""
         return f"Scenario({title}{self.drive()!r}, {self.simulation.duration:.4g} s, {self.simulation.samples} samples)"
 
-    def replace(self, **changes: Any) -> Scenario:
-        """The same scenario with changes by dotted key, such as ``**{"command.amplitude": 0.1}``, checked anew."""
+    def replace(self, **changes: Any) -> DriveScenario:
         data = self.model_dump()
         set_values(data, changes.items())
         use_records(data)
-        return Scenario(**data)
-
-    @kept
-    def to_json(self) -> str:
-        """All values in SI, as JSON that `from_json` reads."""
-        return self.model_dump_json(exclude_none=True)
-
-    @classmethod
-    def from_json(cls, text: str) -> Scenario:
-        return cls.model_validate_json(text)
+        return DriveScenario(**data)
 
     @classmethod
     def _described_by(cls) -> dict[str, Any]:
         return json_schema()
 
 
-def drive_of(what: Scenario | Drive) -> Drive:
+Scenario.forms[False] = DriveScenario
+
+
+def is_train(tables: Mapping[str, Any]) -> bool:
+    """Whether the tables of a scenario are in the long form."""
+    return any(table in tables for table in LONG_TABLES)
+
+
+def with_surroundings(tables: Mapping[str, Any], **given: Any) -> DriveScenario:
+    """The scenario of such tables with the inputs and times that `simulate` is given."""
+    changes = dict(tables)
+    if times := {key: given[key] for key in SimulationTable.model_fields if key in given}:
+        changes["simulation"] = SimulationTable(**dict(changes.get("simulation", ())) | times)
+    if "command" in given:
+        changes["command"] = _signal(given["command"], CommandSignal)
+    if "load_torque" in given:
+        changes["load"] = LoadTable(**dict(changes["load"]) | {"torque": _signal(given["load_torque"], TorqueSignal)})
+    if "initial" in given:
+        changes["initial"] = given["initial"]
+    return DriveScenario(**changes)
+
+
+def of_drive(drive: Drive, **changes: Any) -> DriveScenario:
+    """The scenario of a drive alone, with the inputs and times that `simulate` is given."""
+    if changes.get("duration") is None or changes.get("sample_interval") is None:
+        raise InputError("a drive alone needs duration and sample_interval [s]")
+    given = {name: value for name, value in changes.items() if value is not None}
+    load = LoadTable(**dict(drive.load))
+    return with_surroundings({"motor": drive.motor, "gearbox": drive.gearbox, "load": load}, **given)
+
+
+def _signal(value: Any, kind: Any) -> Any:
+    return kind(mean=value) if isinstance(value, int | float) else value
+
+
+def drive_of(what: DriveScenario | Drive) -> Drive:
     """The drive of a scenario, or a drive as it is."""
     return what if isinstance(what, Drive) else what.drive()
 
 
-def mean_inputs(
-    what: Scenario | Drive, command: float | None = None, load_torque: float | None = None
-) -> tuple[float, float]:
-    """Constant parts of E_C [-] and M_Z [N·m]: as given, else those of the scenario, else 0."""
-    known = (what.command.mean, what.load.torque.mean) if isinstance(what, Scenario) else (0.0, 0.0)
-    return known[0] if command is None else command, known[1] if load_torque is None else load_torque
-
-
-def from_tables(tables: Mapping[str, Any]) -> Scenario:
+def from_tables(tables: Mapping[str, Any]) -> DriveScenario:
     """The scenario of such tables.
 
     Raises
@@ -324,12 +572,12 @@ def from_tables(tables: Mapping[str, Any]) -> Scenario:
     """
     data = dict(tables)
     use_records(data)
-    return Scenario(**data)
+    return DriveScenario(**data)
 
 
 def json_schema() -> dict[str, Any]:
     """JSON Schema of scenario files, for editors."""
-    schema = Scenario.model_json_schema()
+    schema = DriveScenario.model_json_schema()
     schema["properties"]["base"] = BASE
     schema["required"] = []  # with a base, none
     for table in ("gearbox", "motor"):

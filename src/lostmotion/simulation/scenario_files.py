@@ -20,10 +20,10 @@ from ..model.gearbox import Gearbox
 from ..model.linear import ScrewData
 from .axis_form import axis_from_tables, file_schema, is_axis
 from .keys import parse_override, set_values
-from .scenario import Scenario, from_tables
+from .scenario import Scenario, from_tables, is_train
 from .series_files import read_series
 from .shipped import shipped_scenarios
-from .train_scenario import TrainScenario, in_long_form, is_train, train_from_tables
+from .train_scenario import TrainScenario, in_long_form, train_from_tables
 
 MAX_BASES = 100  # files that are each the base of the one before
 MOTOR = "motor"  # its name in the long form of a drive
@@ -70,7 +70,7 @@ def find_base(base: str, path: Path) -> Path:
     return found
 
 
-def load(path: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> Scenario | TrainScenario:
+def load(path: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> Scenario:
     """Read a scenario file.
 
     Parameters
@@ -90,7 +90,7 @@ def load(path: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) ->
     return changed(read_tables(path, overrides), path)
 
 
-def changed(tables: dict[str, Any], path: Path) -> Scenario | TrainScenario:
+def changed(tables: dict[str, Any], path: Path) -> Scenario:
     """The scenario of the tables of a file, in the short or the long form. The file's name stands in messages.
 
     Raises
@@ -104,7 +104,7 @@ def changed(tables: dict[str, Any], path: Path) -> Scenario | TrainScenario:
         raise InputError(f"{path}: {error}") from None
 
 
-def scenario_from(tables: Mapping[str, Any]) -> Scenario | TrainScenario:
+def scenario_from(tables: Mapping[str, Any]) -> Scenario:
     """The scenario of such tables. A drive in the short form with a continuous controller is a drive train, since the states of the
     controller are states of the train.
 
@@ -288,7 +288,7 @@ def _merge(base: dict[str, Any], changes: dict[str, Any], where: tuple[str, ...]
     return merged
 
 
-def scenario_text(scenario: Scenario | TrainScenario, comment: str) -> str:
+def scenario_text(scenario: Scenario, comment: str) -> str:
     """A scenario as a TOML file that `load` reads."""
     return toml_text(without_empty(scenario.model_dump(exclude_none=True)), comment)
 

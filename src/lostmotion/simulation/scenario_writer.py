@@ -21,14 +21,13 @@ from .scenario import Scenario
 from .scenario_files import find_base, find_scenario, scenario_text
 from .scenario_files import load as load_file
 from .shipped import shipped_scenarios
-from .train_scenario import TrainScenario
 
 MARK = "# Tuned"
 """begins each line of the comment above a changed file, which the next change replaces"""
 
 
 def write_changed(
-    target: Path, scenario: Scenario | TrainScenario, source: str | Path, changes: Mapping[str, Any], notes: list[str]
+    target: Path, scenario: Scenario, source: str | Path, changes: Mapping[str, Any], notes: list[str]
 ) -> None:
     """Write a scenario that differs from that of a file by some values.
 

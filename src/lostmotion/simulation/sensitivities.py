@@ -19,9 +19,8 @@ from ..errors import InputError
 from ..inputs.validation import shown
 from .core_runs import core_case
 from .keys import list_index
-from .results import add_derived
 from .scenario import Scenario
-from .train_scenario import TrainScenario, need_free_motion
+from .train_scenario import need_free_motion
 from .train_variables import named_signals
 from .variables import CONTACTS
 
@@ -37,8 +36,6 @@ ONE_SIDED = ((1, 4.0), (2, -3.0), (3, 4 / 3), (4, -1 / 4))
 SUFFIX = "_sensitivity"
 ENDS_AT, ENDS_BY = "sensitivities_end_at", "sensitivities_end_by"
 
-AnyScenario = Scenario | TrainScenario
-
 
 @dataclass(frozen=True)
 class Neighbour:
@@ -48,10 +45,10 @@ class Neighbour:
     """offset of the value [SI unit]"""
     weight: float
     """df/dp = sum of weight (f - f at the value itself)"""
-    scenario: AnyScenario
+    scenario: Scenario
 
 
-def value_at(scenario: AnyScenario, key: str) -> float:
+def value_at(scenario: Scenario, key: str) -> float:
     """The number under a dotted key; 0 where a start or a command is left out.
 
     Raises
@@ -78,7 +75,7 @@ def value_at(scenario: AnyScenario, key: str) -> float:
     return float(node)
 
 
-def neighbours(scenario: AnyScenario, key: str) -> list[Neighbour]:
+def neighbours(scenario: Scenario, key: str) -> list[Neighbour]:
     """Scenarios beside a value: on both sides of it or, at an end of its range, on one.
 
     Raises
@@ -99,7 +96,7 @@ def neighbours(scenario: AnyScenario, key: str) -> list[Neighbour]:
     raise InputError(f"sensitivities: {key}: cannot be varied about its value {value:g}: {problem}")
 
 
-def _is_signal(scenario: AnyScenario, key: str) -> bool:
+def _is_signal(scenario: Scenario, key: str) -> bool:
     node: Any = scenario.model_dump()
     for part in key.split("."):
         node = node.get(part) if isinstance(node, Mapping) else None
@@ -109,7 +106,7 @@ def _is_signal(scenario: AnyScenario, key: str) -> bool:
 _INPUT = re.compile(r"(command|(load|shafts\.[^.]+)\.torque)(\..*)?")
 
 
-def core_variation(scenario: AnyScenario, key: str, beside: Sequence[Neighbour]) -> tuple[str, list[Any]]:
+def core_variation(scenario: Scenario, key: str, beside: Sequence[Neighbour]) -> tuple[str, list[Any]]:
     """A parameter as the core takes it: of its neighbours what may differ from the scenario itself."""
     of_start, of_inputs = key.startswith("initial."), _INPUT.fullmatch(key) is not None
     out = []
@@ -122,7 +119,7 @@ def core_variation(scenario: AnyScenario, key: str, beside: Sequence[Neighbour])
     return key, out
 
 
-def sensitive_case(scenario: AnyScenario, variations: Sequence[Any], control: Bound) -> tuple[Any, ...]:
+def sensitive_case(scenario: Scenario, variations: Sequence[Any], control: Bound) -> tuple[Any, ...]:
     """A run as the core takes it."""
     core, inputs, start, capacities = core_case(scenario)
     table = scenario.simulation
@@ -220,7 +217,7 @@ def run_cases(
     return out
 
 
-def run_sensitivities(scenario: AnyScenario, keys: Sequence[str]) -> Sensitivities:
+def run_sensitivities(scenario: Scenario, keys: Sequence[str]) -> Sensitivities:
     """The derivatives of all result variables of a run with respect to values of its scenario.
 
     Raises
@@ -248,13 +245,13 @@ def run_sensitivities(scenario: AnyScenario, keys: Sequence[str]) -> Sensitiviti
     return Sensitivities(tuple(keys), derivatives, found.ends_at, found.ends_by)
 
 
-def _of_signals(scenario: AnyScenario, signals: np.ndarray) -> dict[str, np.ndarray]:
+def _of_signals(scenario: Scenario, signals: np.ndarray) -> dict[str, np.ndarray]:
     rows = [named_signals(scenario.by_prefix(), of_parameter) for of_parameter in signals]
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
 def _add_derived(
-    scenario: AnyScenario,
+    scenario: Scenario,
     data: dict[str, np.ndarray],
     derivatives: dict[str, np.ndarray],
     beside: Sequence[Sequence[Neighbour]],
@@ -271,8 +268,8 @@ def _add_derived(
                 derivatives[name][p] += n.weight * (there[name] - values)
 
 
-def _derived(scenario: AnyScenario, data: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+def _derived(scenario: Scenario, data: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Derived variables alone."""
     out = dict(data)
-    add_derived(scenario, out, next(iter(data.values())))
+    scenario.derive(out, next(iter(data.values())))
     return {name: v for name, v in out.items() if name not in data}

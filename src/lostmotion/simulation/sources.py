@@ -11,13 +11,12 @@ from ..errors import InputError
 from ..inputs.arguments import ScenarioName, checked
 from . import scenario_files
 from .result_files import FORMATS, open_result
-from .scenario import Scenario
+from .scenario import DriveScenario, Scenario
 from .scenario_files import changed, override
-from .train_scenario import TrainScenario
 
 
 @checked
-def load(source: ScenarioName | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> Scenario | TrainScenario:
+def load(source: ScenarioName | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> Scenario:
     """Return the scenario of a file, of a shipped example, or of a saved result.
 
     Parameters
@@ -30,8 +29,8 @@ def load(source: ScenarioName | Path, overrides: Mapping[str, Any] | Iterable[st
 
     Returns
     -------
-    Scenario or TrainScenario
-        A `Scenario` for the short form (tables `[motor] [gearbox] [load]`), a `TrainScenario` for the long form
+    Scenario
+        A `DriveScenario` for the short form (tables `[motor] [gearbox] [load]`), a `TrainScenario` for the long form
         (`[shafts.NAME]` and so on).
 
     Raises
@@ -60,7 +59,7 @@ def load(source: ScenarioName | Path, overrides: Mapping[str, Any] | Iterable[st
     return changed(tables, path)
 
 
-def load_drive(source: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> Scenario:
+def load_drive(source: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> DriveScenario:
     """Load a scenario as `load` does, if only the short form is allowed.
 
     Raises
@@ -69,8 +68,8 @@ def load_drive(source: str | Path, overrides: Mapping[str, Any] | Iterable[str] 
         Also if the scenario is in the long form.
     """
     scenario = load(source, overrides)
-    if isinstance(scenario, TrainScenario):
-        raise InputError(
-            f"{source}: is a drive train ([shafts]), which can be run; this takes a drive of [motor], [gearbox] and [load]"
-        )
-    return scenario
+    if isinstance(scenario, DriveScenario):
+        return scenario
+    raise InputError(
+        f"{source}: is a drive train ([shafts]), which can be run; this takes a drive of [motor], [gearbox] and [load]"
+    )

@@ -27,7 +27,7 @@ from ..model.mass_matrix import MassMatrix
 from ..model.synchronous_motor import PhaseValues
 from ..model.train import DriveTrain
 from .given_motion import course_to, motion_given
-from .scenario import Initial, Scenario, capacities_of, drive_of, state_of
+from .scenario import DriveScenario, Initial, Scenario, capacities_of, drive_of, state_of
 from .step_bound import StepBound
 from .train_scenario import TrainInitial, TrainScenario, given_train
 from .train_state import start_values
@@ -115,7 +115,7 @@ class Simulation:
     @checked
     def __init__(
         self,
-        drive: Drive | Scenario | DriveTrain | TrainScenario,
+        drive: Drive | Scenario | DriveTrain,
         *,
         step: Time = 1e-3,
         initial: Initial | TrainInitial | None = None,
@@ -136,7 +136,7 @@ class Simulation:
         self._stepping = False
         if not MIN_INTERVAL <= step <= MAX_INTERVAL:
             raise InputError(f"step {step} s must lie between {MIN_INTERVAL:g} s and {MAX_INTERVAL:g} s")
-        scenario = drive if isinstance(drive, Scenario | TrainScenario) else None
+        scenario = drive if isinstance(drive, Scenario) else None
         self._scenario = scenario
         self._controllers = dict(scenario.axes()) if scenario is not None else {}
         laws = as_laws(law, self._controllers)
@@ -224,7 +224,7 @@ class Simulation:
         self._input_places = {name: k for k, name in enumerate(names) if name not in controlled and k not in motions}
         self._required = [name for name in self._input_places if not name.endswith("load_torque")]
 
-    def _add_signals(self, scenario: Scenario | TrainScenario | None) -> None:
+    def _add_signals(self, scenario: Scenario | None) -> None:
         """Add the signals of controllers, and the torque of a winding in place of the straight line that drives the mechanics."""
         if scenario is None or not self._controllers:
             return
@@ -636,7 +636,7 @@ class Simulation:
 
 
 def _parts(
-    what: Drive | Scenario | DriveTrain | TrainScenario, loaded: Sequence[str] | None, given: Sequence[str] | None
+    what: Drive | Scenario | DriveTrain, loaded: Sequence[str] | None, given: Sequence[str] | None
 ) -> tuple[Drive | DriveTrain, DriveTrain, _core.Train, tuple[str, ...], tuple[str, ...], Initial | TrainInitial]:
     """Parts of a simulation: its subject, the same as a train, the solver's train, the shafts that a load torque may act on, those whose motion is
     given, and the start."""
@@ -645,11 +645,12 @@ def _parts(
         if isinstance(what, DriveTrain):
             return train, train, train.core(shafts, given=moved), tuple(shafts), tuple(moved), TrainInitial()
         return train, train, what.core(loaded=shafts, given=moved), tuple(shafts), tuple(moved), what.begin()
+    assert isinstance(what, Drive | DriveScenario)
     if loaded is not None:
         raise InputError("loaded: is for trains; a drive has one load torque, on its load")
     if given is not None:
         raise InputError("given: is for trains; give drive.train() for a drive whose motor or load has a given motion")
-    start = what.begin() if isinstance(what, Scenario) else Initial()
+    start = what.begin() if isinstance(what, DriveScenario) else Initial()
     return drive_of(what), what.train(), what.core(), (), (), start
 
 

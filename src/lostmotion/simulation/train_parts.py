@@ -12,7 +12,8 @@ from ..inputs.kept import kept
 from ..inputs.named import Named
 from ..model.linear_train import LinearElements
 from ..model.train import COUPLINGS
-from .train_scenario import TrainInitial, TrainScenario
+from .scenario import Scenario
+from .train_scenario import TrainInitial, TrainScenario, in_long_form
 
 INSTANT, LEADING = 0, 2  # of a switching: the column of its instant, and how many come before those of contacts
 NO_CONTACT = 2.0
@@ -21,16 +22,16 @@ SUMS = ("residual", "stored_change", "turned_over")  # of the ledger, over all e
 
 
 @kept
-def parts_of(scenario: TrainScenario) -> list[TrainScenario]:
+def parts_of(scenario: Scenario) -> list[Any]:
     """The trains that a scenario consists of, in the order of their first shafts; most often itself alone.
 
     Shafts belong together that a gear, its housing, a clutch, a freewheel, a damper, a mass matrix, or a controller joins.
     """
     groups = _groups(scenario)
-    return [scenario] if len(groups) == 1 else [_part(scenario, shafts) for shafts in groups]
+    return [scenario] if len(groups) == 1 else [_part(in_long_form(scenario), shafts) for shafts in groups]
 
 
-def _groups(scenario: TrainScenario) -> list[list[str]]:
+def _groups(scenario: Scenario) -> list[list[str]]:
     shafts = scenario.train().shafts
     group = {shaft: {shaft} for shaft in shafts}
     for joined in _joined(scenario):
@@ -44,7 +45,7 @@ def _groups(scenario: TrainScenario) -> list[list[str]]:
     return found
 
 
-def _joined(scenario: TrainScenario) -> Iterator[list[str]]:
+def _joined(scenario: Scenario) -> Iterator[list[str]]:
     """Shafts that something joins."""
     train = scenario.train()
     for table in ("gears", *COUPLINGS):
@@ -52,7 +53,8 @@ def _joined(scenario: TrainScenario) -> Iterator[list[str]]:
             yield [element.input, element.output, *filter(None, [getattr(element, "housing", None)])]
     yield from ([one, other] for one, other, _ in train.inertia_couplings())
     last = list(train.shafts)[-1]
-    for name, controller in scenario.controllers.items():
+    controllers: dict[str, Any] = {**scenario.axes(), **scenario.continuous()}
+    for name, controller in controllers.items():
         shafts = [train.motors[name].shaft, controller.shaft or last]
         encoders = [getattr(controller, key, None) for key in ("encoder", "position_encoder")]
         yield shafts + [encoder.shaft for encoder in encoders if encoder is not None and encoder.shaft is not None]

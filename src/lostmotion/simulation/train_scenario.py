@@ -5,15 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Collection, Mapping, Sequence
 from functools import cache, lru_cache
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self, cast
 
 from pydantic import Field, model_validator
 
 from .. import _core
-from ..control.axis import NO_LAWS, Bound, check_torques, core_control, motor_laws, turns
+from ..control.axis import check_torques, motor_laws, turns
 from ..control.continuous import ContinuousController
 from ..control.controller import AnyController, Controller
-from ..control.law import Law
 from ..data_sheets.train_components import CONDITIONS, RECORDS, use_train_records
 from ..errors import InputError
 from ..inputs.kept import kept, kept_while_used
@@ -21,19 +20,20 @@ from ..inputs.named import Named, nothing
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, Force, Length, LinearSpeed, NotNegative, Number, Speed, Switch, Torque
 from ..inputs.validation import did_you_mean, shown
-from ..model.gearbox import Transmission
 from ..model.linear import Slide
 from ..model.linear_train import LinearElements
 from ..model.motor import MotorLaw
 from ..model.shaft import Shaft
 from ..model.signals import CommandSignal, ForceSignal, Signal, SpeedSignal, TorqueSignal
+from ..model.task import Task
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain, Elements
 from .keys import set_values
 from .linear_units import in_si
 from .scenario import BASE, RECORD_NAME, Scenario, SimulationTable, check_on_reference
 from .train_state import angles_at_start, start_values
-from .train_variables import check_names
+from .train_variables import add_angles, check_names, train_variables
+from .variables import Variable
 
 
 class ShaftTable(Shaft):
@@ -87,6 +87,10 @@ class TrainInitial(Part):
     on_reference: Switch = False
     """angles of the shafts of controllers, and the speeds of all that turns with them, are those of their references at t = 0"""
 
+    def at_rest(self) -> TrainInitial:
+        """The same without motion, with its angles and twists."""
+        return TrainInitial(angles=self.of_all("angles"), twists=self.of_all("twists"))
+
     def of_all(self, key: str) -> dict[str, float]:
         """The values of a key with those of slides or what moves them."""
         return {**getattr(self, key), **getattr(self, LINEAR_INITIAL[key])}
@@ -101,8 +105,8 @@ LINEAR_INITIAL = {
 }
 
 
-class TrainScenario(LinearElements):
-    """A drive train with its inputs, controllers, task and the duration of its run.
+class TrainScenario(Scenario, LinearElements):
+    """A scenario in the long form: a drive train with its inputs, controllers, task and the duration of its run.
 
     Examples
     --------
@@ -113,7 +117,7 @@ class TrainScenario(LinearElements):
 
     # Why it is refused where another object is wanted, and what to use.
     refused_as: ClassVar[Mapping[str, str]] = {
-        "Scenario": "is a drive train, and this is defined for one motor, one gearbox and one load; give a scenario with [motor], "
+        "DriveScenario": "is a drive train, and this is defined for one motor, one gearbox and one load; give a scenario with [motor], "
         "[gearbox] and [load], or take simulate, check_drive or self_locking of the train",
         "Gearbox": 'is a drive train, and the test rig measures one gear; give one, such as scenario.gears["NAME"]',
     }
@@ -234,20 +238,12 @@ class TrainScenario(LinearElements):
         check_torques(self.axes(), self.initial.motor_torques, "initial.motor_torques.{}")
 
     def axes(self) -> dict[str, Controller]:
-        """The sampled controllers by the names of their motors."""
         return {name: c for name, c in self.controllers.items() if isinstance(c, Controller)}
 
     def continuous(self) -> dict[str, ContinuousController]:
-        """The continuous controllers by the names of their motors."""
         return {name: c for name, c in self.controllers.items() if isinstance(c, ContinuousController)}
 
-    def by_prefix(self) -> dict[str, Controller]:
-        """The sampled controllers, by what the names of their variables begin with."""
-        return {self.prefix(name): c for name, c in self.axes().items()}
-
     def sliding(self) -> dict[str, tuple[bool, bool]]:
-        """For each controller, by the prefix of its variables: whether its motor moves a slide, and whether its
-        position is that of one."""
         train = self.train()
         return {
             self.prefix(name): (train.is_slide(train.motors[name].shaft), train.is_slide(self.controlled(name)))
@@ -267,31 +263,25 @@ class TrainScenario(LinearElements):
         return self.train().commanded()
 
     def note(self) -> str:
-        """Notes of the sheets of gears and motors."""
         notes = {name: part.note for name, part in self.train().gears.items()}
         notes |= {name: part.note for name, part in self.motors.items()}
         notes |= {name: part.note for name, part in self.linear_motors.items()}
         return " ".join(f"{name}: {note}" for name, note in notes.items() if note)
 
     def prefix(self, motor: str) -> str:
-        """Prefix of the names of the variables of a motor's controller."""
         return f"{motor}_"
 
     def controller_key(self, motor: str) -> str:
-        """Key of the table of a motor's controller."""
         return f"controllers.{motor}"
 
     def with_axes(self, axes: Mapping[str, Controller]) -> TrainScenario:
-        """The same scenario with other sampled controllers, by the names of their motors."""
-        return self.model_copy(update={"controllers": dict(axes)})
+        return self.model_copy(update={"controllers": {**self.controllers, **axes}})
 
     def without_controllers(self) -> TrainScenario:
-        """The same scenario with the motors of its controllers turned by commands of 0."""
         commands = {name: CommandSignal() for name in self.controllers}
         return self.replace(controllers={}, command={**self.command, **commands})
 
     def input_key(self, name: str) -> str:
-        """Key of the signal or reference that an input of the core stands for."""
         if name.endswith("_load_force"):
             slide = name.removesuffix("_load_force")
             inclined = self.slides[slide].weight(1.0) != 0.0
@@ -306,22 +296,50 @@ class TrainScenario(LinearElements):
                 return key.format(name.removesuffix(suffix))
         return f"command.{name.removesuffix('_command')}"
 
-    def gears_by_key(self) -> dict[str, Transmission]:
-        """The gears by the keys of their tables."""
-        return {f"{self.kind_of(name)}s.{name}": gear for name, gear in self.train().gears.items()}
+    def gear_key(self, name: str) -> str:
+        return f"{self.kind_of(name)}s.{name}"
+
+    def motor_key(self, name: str) -> str:
+        return f"{'linear_motors' if name in self.linear_motors else 'motors'}.{name}"
+
+    def with_gears(self, gears: Mapping[str, Any]) -> TrainScenario:
+        others = {key.removeprefix("gears."): gear for key, gear in gears.items()}
+        return self.model_copy(update={"gears": {**self.gears, **others}})
+
+    def input_keys(self) -> dict[str, str]:
+        keys = {f"{name}_command": f"command.{name}" for name in self.commanded()}
+        train = self.train()
+        return keys | {
+            train.load_torque_of(name): f"slides.{name}.force" if train.is_slide(name) else f"shafts.{name}.torque"
+            for name in train.shafts
+        }
+
+    def ambient_temperature(self) -> float:
+        return Task().ambient_temperature
+
+    def variables(self) -> tuple[Variable, ...]:
+        return train_variables(self.train(), self.core())
+
+    def derive(self, data: dict[str, Any], time: Any) -> None:
+        add_angles(self.train(), data, time)
+
+    def named_train(self) -> DriveTrain:
+        return self.train()
+
+    def long(self) -> TrainScenario:
+        return self
+
+    def _with_inputs(self, given: Mapping[str, Any]) -> TrainScenario:
+        if others := [name for name in given if name not in SimulationTable.model_fields]:
+            raise InputError(
+                f"{others[0]}: a drive train has several; give them in its scenario, such as scenario.replace(**{{'command.NAME': 0.5}})"
+            )
+        return self.replace(**{f"simulation.{name}": value for name, value in given.items()})
 
     def capacities(self, initial: TrainInitial | None = None) -> dict[str, float]:
         """Hysteresis capacities at t = 0 [N·m] by gear; what is not among them is 0."""
         given = (initial or self.initial).of_all("hysteresis_capacities")
         return {name: h for name, h in given.items() if h}
-
-    def control(self, laws: Mapping[str, Law] = NO_LAWS) -> Bound:
-        """The solver's controllers, kept if there are no laws: change copies of them alone (`control.axis.own`)."""
-        return core_control(self.train(), self.axes(), laws=laws) if laws else self._control()
-
-    @kept
-    def _control(self) -> Bound:
-        return core_control(self.train(), self.axes())
 
     def core(
         self,
@@ -363,13 +381,6 @@ class TrainScenario(LinearElements):
         return _core_train(self.train(), tuple(shafts), tuple(moved), tuple(laws.items()), tuple(continuous.items()))
 
     def start(self, initial: TrainInitial | None = None) -> dict[str, float]:
-        """State at t = 0 by the names of its variables; what is left out is 0.
-
-        Parameters
-        ----------
-        initial
-            In place of that of the scenario.
-        """
         train = self.train()
         initial = self.begin() if initial is None else initial
         values = start_values(train, initial)
@@ -392,7 +403,6 @@ class TrainScenario(LinearElements):
 
     @kept
     def begin(self) -> TrainInitial:
-        """State at t = 0, with what the references say of it."""
         speeds = self._given_speeds()
         if not self.initial.on_reference:
             if not speeds:
@@ -430,7 +440,6 @@ class TrainScenario(LinearElements):
 
     @kept
     def train(self) -> DriveTrain:
-        """The drive train without its surroundings."""
         return DriveTrain(shafts=self.plain_shafts(), **self.elements())
 
     def own_shafts(self) -> dict[str, Shaft]:
@@ -460,7 +469,6 @@ class TrainScenario(LinearElements):
         return found
 
     def given(self) -> list[str]:
-        """Names of the shafts whose motion is given."""
         return [name for name, shaft in self.shafts.items() if shaft.speed is not None]
 
     def signals(self) -> dict[str, Signal[Any]]:
@@ -487,24 +495,17 @@ class TrainScenario(LinearElements):
         return f"TrainScenario({title}{self.train()!r}, {time})"
 
     def replace(self, **changes: Any) -> TrainScenario:
-        """The same scenario with changes by dotted key, such as ``**{"gears.belt.ratio": 3}``, checked anew."""
         data = self.model_dump()
         set_values(data, changes.items())
         use_train_records(data)
         return TrainScenario(**data)
 
-    @kept
-    def to_json(self) -> str:
-        """All values in SI, as JSON that `from_json` reads."""
-        return self.model_dump_json(exclude_none=True)
-
-    @classmethod
-    def from_json(cls, text: str) -> TrainScenario:
-        return cls.model_validate_json(text)
-
     @classmethod
     def _described_by(cls) -> dict[str, Any]:
         return train_schema()
+
+
+Scenario.forms[True] = TrainScenario
 
 
 @lru_cache(maxsize=16)  # each keeps the regimes of its runs, a few megabytes
@@ -562,7 +563,7 @@ def given_train(
     return train, shafts, moved
 
 
-def need_open_loop(scenario: Scenario | TrainScenario, function: str) -> None:
+def need_open_loop(scenario: Scenario, function: str) -> None:
     """Refuses a scenario with controllers, for what follows given commands alone.
 
     Raises
@@ -579,7 +580,7 @@ def need_open_loop(scenario: Scenario | TrainScenario, function: str) -> None:
         )
 
 
-def need_free_motion(scenario: Scenario | TrainScenario, function: str) -> None:
+def need_free_motion(scenario: Scenario, function: str) -> None:
     """Refuses a train in which the motion of a shaft is given, for what torques alone are to move.
 
     Raises
@@ -591,11 +592,6 @@ def need_free_motion(scenario: Scenario | TrainScenario, function: str) -> None:
             f"{function}: key shafts.{given[0]}.speed gives the motion of a shaft, and this takes a train that torques alone "
             "move; leave the speed out"
         )
-
-
-def is_train(tables: Mapping[str, Any]) -> bool:
-    """Whether the tables of a scenario are in the long form."""
-    return any(table in tables for table in ("shafts", "slides", *LinearElements.model_fields))
 
 
 def train_from_tables(tables: Mapping[str, Any]) -> TrainScenario:
@@ -645,28 +641,6 @@ def _make_train_schema() -> dict[str, Any]:
     return schema
 
 
-def in_long_form(scenario: Scenario | TrainScenario) -> TrainScenario:
+def in_long_form(scenario: Scenario) -> TrainScenario:
     """The scenario in the long form; from the short form: shafts `motor` and `load`, gear `gearbox`, motor `motor`."""
-    if isinstance(scenario, TrainScenario):
-        return scenario
-    train = scenario.drive().train()
-    start = scenario.initial
-    load = {key: getattr(train.shafts["load"], key) for key in Shaft.model_fields}
-    initial = TrainInitial(
-        speeds={} if start.on_reference else {"motor": start.motor_speed, "load": start.load_speed},
-        angles={} if start.on_reference else {"load": start.load_angle},
-        twists={"gearbox": start.twist} if start.twist else {},
-        motor_torques={"motor": start.motor_torque} if start.motor_torque else {},
-        hysteresis_capacities={"gearbox": start.hysteresis_capacity} if start.hysteresis_capacity else {},
-        on_reference=start.on_reference,
-    )
-    return TrainScenario(
-        title=scenario.title,
-        shafts={"motor": ShaftTable(), "load": ShaftTable(**load, torque=scenario.load.torque)},
-        motors=train.motors,
-        gears=train.gears,
-        command={} if scenario.controller is not None else {"motor": scenario.command},
-        controllers=dict(scenario.axes()),
-        initial=initial,
-        simulation=scenario.simulation,
-    )
+    return cast("TrainScenario", scenario.long())

@@ -12,6 +12,7 @@ from ..control.controller import Controller
 from ..errors import InputError
 from ..model.gear import Gear
 from ..model.linear_train import LinearElements
+from ..model.torsion import Rigid
 from ..model.train import DriveTrain
 from .variables import Variable
 
@@ -143,6 +144,17 @@ def angle_through(gear: Gear, angle: Any, twist: Any, *, forward: bool) -> Any:
     error = gear.transmission_error
     e = 0.0 if error is None else np.vectorize(error.core())(angle)
     return angle / gear.ratio - twist - e
+
+
+def add_angles(train: DriveTrain, data: dict[str, Any], time: Any) -> None:
+    """Adds what the solver does not integrate: twists of rigid gears, and the angles that follow through the gears."""
+    for name, gear in train.gears.items():
+        if isinstance(gear.stiffness, Rigid):
+            data.setdefault(train.twist_of(name), np.zeros_like(time))
+    known = [name for name in train.shafts if train.angle_of(name) in data]
+    for shaft, source, name, forward in angles_through_gears(train, known):
+        angle, twist = data[train.angle_of(source)], data[train.twist_of(name)]
+        data[train.angle_of(shaft)] = angle_through(train.gears[name], angle, twist, forward=forward)
 
 
 def check_names(

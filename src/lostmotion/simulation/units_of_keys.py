@@ -12,7 +12,7 @@ from ..inputs.validation import shown
 from ..units.conversion import to_si
 from ..units.scalars import is_number, objection
 from .linear_units import unit_of_slides
-from .scenario import Scenario, json_schema
+from .scenario import DriveScenario, Scenario, json_schema
 from .train_scenario import TrainScenario, train_schema
 
 
@@ -21,16 +21,16 @@ def unit_of_key(key: str) -> str | None:
 
     A key of both forms (`command.frequency`, where a motor has that name) is taken as that of the short one.
     """
-    of_drive = unit_in(Scenario, key)
+    of_drive = unit_in(DriveScenario, key)
     return unit_in(TrainScenario, key) if of_drive is None else of_drive
 
 
-def unit_in(form: type[Scenario | TrainScenario], key: str) -> str | None:
+def unit_in(form: type[Scenario], key: str) -> str | None:
     """The same, of a key of the short or of the long form."""
     return _unit(key, train_schema if form is TrainScenario else json_schema)
 
 
-def unit_for(scenario: Scenario | TrainScenario, key: str) -> str | None:
+def unit_for(scenario: Scenario, key: str) -> str | None:
     """SI unit of a dotted key of a scenario, where its controllers move slides in units of translation."""
     unit = unit_in(type(scenario), key)
     if not unit or not key.startswith("controllers."):
@@ -38,7 +38,7 @@ def unit_for(scenario: Scenario | TrainScenario, key: str) -> str | None:
     return unit_of_slides(scenario.model_dump(), key, unit)
 
 
-def limit_in(form: type[Scenario | TrainScenario], key: str) -> Limit:
+def limit_in(form: type[Scenario], key: str) -> Limit:
     """The range that a value of the short or of the long form may have, whatever the others are."""
     nodes = _nodes(key, train_schema if form is TrainScenario else json_schema)
     numbers = [node for node in nodes if node.get("type") == "number"]

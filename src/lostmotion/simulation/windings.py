@@ -12,7 +12,6 @@ import numpy as np
 from ..control.axis import Bound, own
 from ..model.synchronous_motor import PhaseValues
 from .scenario import Scenario
-from .train_scenario import TrainScenario
 
 ATTRIBUTE = "error_bound"
 UNITS = {"current": "A", "torque": "N*m", "speed": "rad/s"}
@@ -20,7 +19,7 @@ FEWEST = 10  # samples of the currents in an electrical revolution, by the rule 
 AGREEMENT = 1e-10  # relative, to which the passes and rounding hold currents and speeds
 
 
-def oriented(scenario: Scenario | TrainScenario) -> Iterator[tuple[str, str, PhaseValues]]:
+def oriented(scenario: Scenario) -> Iterator[tuple[str, str, PhaseValues]]:
     """Prefixes of the variables and of the speed of each motor under field-oriented control, and its winding."""
     for name, controller in scenario.axes().items():
         if controller.current.kind != "field_oriented":
@@ -31,7 +30,7 @@ def oriented(scenario: Scenario | TrainScenario) -> Iterator[tuple[str, str, Pha
         yield prefix, shaft, motor.winding.phase_values()
 
 
-def set_torques(scenario: Scenario | TrainScenario, data: dict[str, np.ndarray]) -> None:
+def set_torques(scenario: Scenario, data: dict[str, np.ndarray]) -> None:
     """Puts the torque that belongs to the currents in place of the straight lines that the mechanics were driven by."""
     for prefix, _, phase in oriented(scenario):
         data[f"{prefix or 'motor_'}torque"] = phase.torque(
@@ -48,9 +47,7 @@ def coarser(control: Bound) -> Bound:
     return tick, axes
 
 
-def error_bound(
-    scenario: Scenario | TrainScenario, fine: Mapping[str, Any], coarse: Mapping[str, Any]
-) -> dict[str, float]:
+def error_bound(scenario: Scenario, fine: Mapping[str, Any], coarse: Mapping[str, Any]) -> dict[str, float]:
     """By how much the variables of the motors may be wrong, from a run with one exchange in each tick and one with two.
 
     The error of the second is a sixteenth of the difference where nothing switches, a quarter where the torque jumps; the
@@ -61,7 +58,7 @@ def error_bound(
     return bounds_of(names, {name: float(np.max(np.abs(fine[name]))) for name in names}, apart)
 
 
-def bounded(scenario: Scenario | TrainScenario) -> dict[str, str]:
+def bounded(scenario: Scenario) -> dict[str, str]:
     """The variables that have a bound, each with the one whose largest value its rounding goes with as well."""
     names: dict[str, str] = {}
     for prefix, shaft, _ in oriented(scenario):
@@ -75,22 +72,20 @@ def bounds_of(names: Mapping[str, str], largest: Mapping[str, float], apart: Map
     return {name: apart[name] + AGREEMENT * max(largest[name], largest[other]) for name, other in names.items()}
 
 
-def bound_names(scenario: Scenario | TrainScenario) -> Iterator[tuple[str, str, str]]:
+def bound_names(scenario: Scenario) -> Iterator[tuple[str, str, str]]:
     """Names of the bounds as values of a run, with the variable that each belongs to and its unit."""
     for name in bounded(scenario):
         unit = next(unit for end, unit in UNITS.items() if name.endswith(end))
         yield f"{name}_{ATTRIBUTE}", name, unit
 
 
-def bound_values(
-    scenario: Scenario | TrainScenario, attributes: Mapping[str, Any], samples: int
-) -> dict[str, np.ndarray]:
+def bound_values(scenario: Scenario, attributes: Mapping[str, Any], samples: int) -> dict[str, np.ndarray]:
     """The same of a run with these attributes, the same at each of its samples."""
     bounds = json.loads(attributes.get(ATTRIBUTE, "{}"))
     return {title: np.full(samples, bounds[name]) for title, name, _ in bound_names(scenario)}
 
 
-def too_slow(scenario: Scenario | TrainScenario, values: Mapping[str, Any]) -> str:
+def too_slow(scenario: Scenario, values: Mapping[str, Any]) -> str:
     """Currents whose sample time is too long for the speed of their rotor in a run; empty if all is well."""
     found = []
     for prefix, shaft, phase in oriented(scenario):

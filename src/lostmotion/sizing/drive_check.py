@@ -9,9 +9,9 @@ import numpy as np
 
 from ..inputs.arguments import checked
 from ..simulation.results import RunArrays
-from ..simulation.run import as_scenario, run
-from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario
+from ..simulation.run import run
+from ..simulation.scenario import DriveScenario, Scenario
+from ..simulation.train_scenario import in_long_form
 from .duty_cycle import MIN_REST, STANDSTILL, DutyCycle, duty_cycle
 from .finding import Finding, Findings
 from .gearbox_check import input_speeds, loads, locks, loss_map, lost_motion
@@ -27,7 +27,7 @@ MEANS = ("average_output_torque", "average_input_speed", "motor_torque", "windin
 
 
 @checked
-def check_drive(scenario: Scenario | TrainScenario) -> Findings:
+def check_drive(scenario: Scenario) -> Findings:
     """Check a drive or a drive train against its limits and its task.
 
     The scenario is run. Loads, speeds, voltage, current and heat are those of that run, over the duty cycle of `task.cycle`, or with
@@ -36,7 +36,7 @@ def check_drive(scenario: Scenario | TrainScenario) -> Findings:
 
     Parameters
     ----------
-    scenario : Scenario or TrainScenario
+    scenario : Scenario
         The drive and its motion.
 
     Returns
@@ -62,9 +62,9 @@ def check_drive(scenario: Scenario | TrainScenario) -> Findings:
     return Findings([*findings, *_over_estimates(scenario, findings)])
 
 
-def _findings(scenario: Scenario | TrainScenario) -> list[Finding]:
-    if isinstance(scenario, TrainScenario):
-        return list(check_train(scenario))
+def _findings(scenario: Scenario) -> list[Finding]:
+    if not isinstance(scenario, DriveScenario):
+        return list(check_train(in_long_form(scenario)))
     result = _finely_sampled(scenario)
     cycle = duty_cycle(result, scenario.task.cycle)
     g, m, task = scenario.gearbox, scenario.motor, scenario.task
@@ -91,7 +91,7 @@ def _findings(scenario: Scenario | TrainScenario) -> list[Finding]:
     return [_with_sinking(f, result, cycle) if f.rule in MEANS else f for f in findings]
 
 
-def _over_estimates(scenario: Scenario | TrainScenario, findings: list[Finding]) -> list[Finding]:
+def _over_estimates(scenario: Scenario, findings: list[Finding]) -> list[Finding]:
     """Verdicts that hold over the whole range of estimated losses; nothing if none are estimated."""
     ends = [_known_losses(scenario, end) for end in (0, 1)]
     if scenario in ends:
@@ -114,15 +114,11 @@ def _over_estimates(scenario: Scenario | TrainScenario, findings: list[Finding])
     ]
 
 
-def _known_losses(scenario: Scenario | TrainScenario, end: int) -> Scenario | TrainScenario:
+def _known_losses(scenario: Scenario, end: int) -> Scenario:
     """With the losses at one end of the range of each estimate."""
-    parts = {"": scenario.gearbox} if isinstance(scenario, Scenario) else scenario.gears
-    known = {name: p.with_losses(p.loss_range[end]) for name, p in parts.items() if p.loss_range is not None}
-    if not known:
-        return scenario
-    return scenario.model_copy(
-        update={"gearbox": known[""]} if isinstance(scenario, Scenario) else {"gears": {**parts, **known}}
-    )
+    parts = scenario.gears_by_key()
+    known = {key: p.with_losses(p.loss_range[end]) for key, p in parts.items() if p.loss_range is not None}
+    return scenario.with_gears(known) if known else scenario
 
 
 def _with_sinking(finding: Finding, result: RunArrays, cycle: DutyCycle) -> Finding:
@@ -155,15 +151,15 @@ def _sinking(result: RunArrays) -> tuple[float, float]:
     return float(lasting.sum()), float(lasting[last:].sum())
 
 
-def _finely_sampled(scenario: Scenario) -> RunArrays:
+def _finely_sampled(scenario: DriveScenario) -> RunArrays:
     """The run with samples so close that no peak is missed; of a very long one only the beginning, since long ones end in rest."""
     table = scenario.simulation
     fastest = max((f for _, f, _ in resonances(scenario)), default=0.0)
     fine = min(table.sample_interval, table.duration / SAMPLES[0], 1.0 / (POINTS * fastest) if fastest else math.inf)
     if table.duration <= fine * SAMPLES[1]:
-        return run(as_scenario(scenario, sample_interval=fine), energy=False)
-    begin = run(as_scenario(scenario, duration=fine * SAMPLES[1], sample_interval=fine), energy=False)
-    whole = run(as_scenario(scenario, sample_interval=table.duration / SAMPLES[1]), energy=False)
+        return run(scenario.with_inputs(sample_interval=fine), energy=False)
+    begin = run(scenario.with_inputs(duration=fine * SAMPLES[1], sample_interval=fine), energy=False)
+    whole = run(scenario.with_inputs(sample_interval=table.duration / SAMPLES[1]), energy=False)
     rest = whole.time > begin.time[-1]
     values = {name: np.concatenate([begin[name], whole[name][rest]]) for name in whole.values}
     return replace(whole, time=np.concatenate([begin.time, whole.time[rest]]), values=values)

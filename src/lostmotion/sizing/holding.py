@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 from ..model.signals import Ramp, TorqueSignal
-from ..simulation.run import as_scenario, run
-from ..simulation.scenario import Initial, Scenario
+from ..simulation.run import run
+from ..simulation.scenario import DriveScenario, Initial
 
 MAX_DURATION = 1000.0  # [s]
 SAMPLES = 2000
@@ -39,7 +39,7 @@ class Holding:
         return self.from_rest == 0.0 and self.from_motion == 0.0
 
 
-def holding(scenario: Scenario, load_torque: float, speed: float) -> Holding:
+def holding(scenario: DriveScenario, load_torque: float, speed: float) -> Holding:
     """Determine the motion of a drive with command 0 under a constant load torque.
 
     Parameters
@@ -66,12 +66,11 @@ def holding(scenario: Scenario, load_torque: float, speed: float) -> Holding:
     return Holding(load_torque, from_rest, from_motion, begin)
 
 
-def _lasting_speed(scenario: Scenario, load_torque: TorqueSignal, start: Initial) -> float:
+def _lasting_speed(scenario: DriveScenario, load_torque: TorqueSignal, start: Initial) -> float:
     """Load speed [rad/s] that remains; 0 if the motor comes to rest, infinite if it does not settle."""
     duration = 4.0 * RAMP
     while True:
-        one = as_scenario(
-            scenario,
+        one = scenario.with_inputs(
             command=0.0,
             load_torque=load_torque,
             duration=duration,

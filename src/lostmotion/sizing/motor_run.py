@@ -14,9 +14,7 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Temperature
 from ..inputs.validation import did_you_mean
 from ..model.motor import Motor
-from ..model.task import Task
 from ..simulation.results import RunArrays, scenario_of
-from ..simulation.train_scenario import TrainScenario
 from .motor_check import command_of_run
 from .thermal import COPPER, mean_square, need_two_bodies, rms
 
@@ -172,8 +170,7 @@ def temperatures(
     if m.winding is not None and (oriented := oriented_amplitudes(result, where)) is not None:
         heating = m.winding.phase_values().torque_constant * oriented[0]  # with all of the current across the magnets
     if ambient is None:
-        scenario = scenario_of(result)
-        ambient = (Task() if isinstance(scenario, TrainScenario) else scenario.task).ambient_temperature
+        ambient = scenario_of(result).ambient_temperature()
     bodies = need_two_bodies(m, ambient, 0.0 if constant_resistance else COPPER, where)
     time = result["time"].values
     if len(time) < 2:
@@ -224,19 +221,18 @@ def _dataset(
 def _motor_of(result: xarray.Dataset, name: str | None) -> tuple[Motor, str, list[np.ndarray]]:
     """The motor, its table, and its command, torque [N·m] and speed [rad/s] over the run."""
     scenario = scenario_of(result)
-    if not isinstance(scenario, TrainScenario):
-        if name is not None:
-            raise InputError(f"motor {name!r}: this drive has one motor; leave its name out")
-        return scenario.motor, "motor", _read(result, "command", "motor_torque", "motor_speed")
-    motors = scenario.motors
+    train = scenario.named_train()
+    motors = {motor: m for motor, m in train.motors.items() if not train.is_slide(m.shaft)}
     if name is None and len(motors) == 1:
         name = next(iter(motors))
     if name is None or name not in motors:
-        listed = f"the motors are {', '.join(motors)}" if motors else "this train has none"
+        one = f"the one motor is {next(iter(motors), '')}; leave its name out"
+        listed = one if len(motors) == 1 else f"the motors are {', '.join(motors) or 'none'}"
         hint = listed if name is None else did_you_mean(name, motors, listed)
         raise InputError(f"motor {name!r}: {hint}" if name is not None else f"motor is missing; {hint}")
     m = motors[name]
-    return m, f"motors.{name}", _read(result, f"{name}_command", f"{name}_torque", f"{m.shaft}_speed")
+    names = (train.command_of(name), train.motor_torque_of(name), train.speed_of(m.shaft))
+    return m, scenario.motor_key(name), _read(result, *names)
 
 
 def _read(result: xarray.Dataset, *names: str) -> list[np.ndarray]:

@@ -32,7 +32,7 @@ from ..model.motor import Motor
 from ..model.signals import Samples, TimeFunction, TorqueSignal
 from ..model.task import Task
 from ..servo.data import lag_sum, secant
-from ..simulation.scenario import Initial, LoadTable, Scenario, SimulationTable
+from ..simulation.scenario import DriveScenario, Initial, LoadTable, SimulationTable
 from ..sizing.finding import SOURCES
 from ..sizing.motion_check import INERTIA_RATIO
 from ..sizing.required_motion import duty_torque, required_motion
@@ -154,7 +154,7 @@ class AxisTask(Task, Duty):
         asked = {column: getattr(self, key) for key, column in REQUIREMENTS.items()}
         return {column: Bound(max=value) for column, value in asked.items() if value is not None}
 
-    def check(self, scenario: Scenario) -> None:
+    def check(self, scenario: DriveScenario) -> None:
         """Sees that the motion of a scenario can be repeated, and that it has what the task asks for.
 
         Raises
@@ -174,7 +174,7 @@ class AxisTask(Task, Duty):
                 )
 
 
-def reference_of(scenario: Scenario) -> PositionReference:
+def reference_of(scenario: DriveScenario) -> PositionReference:
     """The positions that the axis follows.
 
     Raises
@@ -259,7 +259,7 @@ def repeated_torque(torque: TorqueSignal, cycle: float, count: int) -> TorqueSig
     return torque.model_copy(update={"samples": _tiled(torque.samples, cycle, count, 0.0, "load.torque")})
 
 
-def load_torque_of(base: Scenario, task: AxisTask) -> TorqueSignal:
+def load_torque_of(base: DriveScenario, task: AxisTask) -> TorqueSignal:
     """The load torque of one cycle: that of the base, with what the duty of the task adds along the reference."""
     if not task.anything:
         return base.load.torque
@@ -275,7 +275,7 @@ def _duty_torque(
     return TorqueSignal(samples=Samples(times=tuple(times.tolist()), values=tuple(torques.tolist())))
 
 
-def axis_scenario(base: Scenario, motor: Motor, gearbox: Gearbox, task: AxisTask, count: int) -> Scenario:
+def axis_scenario(base: DriveScenario, motor: Motor, gearbox: Gearbox, task: AxisTask, count: int) -> DriveScenario:
     """The base with a motor, a gearbox and gains by rule for them, over so many cycles, from rest where the reference begins.
 
     Raises
@@ -298,7 +298,7 @@ def axis_scenario(base: Scenario, motor: Motor, gearbox: Gearbox, task: AxisTask
     )
 
 
-def tuned(base: Scenario, motor: Motor, g: Gearbox) -> Controller:
+def tuned(base: DriveScenario, motor: Motor, g: Gearbox) -> Controller:
     """The controller of the base with gains by rule for a motor, a gearbox and its load, and with the torque of their inertia fed
     forward."""
     controller = base.controller

@@ -9,7 +9,7 @@ import numpy as np
 from ..model.motor import Motor
 from ..simulation.linear_units import of_slides
 from ..simulation.results import RunArrays
-from ..simulation.scenario import Scenario
+from ..simulation.scenario import DriveScenario
 from ..sizing.duty_cycle import DutyCycle
 from ..sizing.motor_check import rms_rise
 from ..sizing.thermal import TwoBodies
@@ -112,7 +112,7 @@ def temperatures_of(motor: Motor, time: np.ndarray, square: np.ndarray, ambient:
     return math.nan if rise is None else ambient + rise, math.nan
 
 
-def row_of(scenario: Scenario, task: AxisTask, result: RunArrays, count: int) -> dict[str, float]:
+def row_of(scenario: DriveScenario, task: AxisTask, result: RunArrays, count: int) -> dict[str, float]:
     """The columns of one run."""
     here = last_cycle(result, count)
     time = result.time[here]
@@ -152,7 +152,9 @@ def row_of(scenario: Scenario, task: AxisTask, result: RunArrays, count: int) ->
     }
 
 
-def _at_rest(scenario: Scenario, task: AxisTask, time: np.ndarray, error: np.ndarray, count: int) -> dict[str, float]:
+def _at_rest(
+    scenario: DriveScenario, task: AxisTask, time: np.ndarray, error: np.ndarray, count: int
+) -> dict[str, float]:
     """Settling time and reversal error, from the rests after the moves of the last cycle."""
     reference = reference_of(scenario)
     window = task.settling_window

@@ -14,7 +14,7 @@ from ..model.gearbox import Gearbox
 from ..model.motor import Motor
 from ..simulation.results import RunArrays
 from ..simulation.run import run
-from ..simulation.scenario import Scenario
+from ..simulation.scenario import DriveScenario
 from ..sizing.axis_rules import (
     amplifier_current,
     derated,
@@ -78,8 +78,8 @@ class Axes:
         return found
 
     @property
-    def _base(self) -> Scenario:
-        assert isinstance(self.study.scenario, Scenario)
+    def _base(self) -> DriveScenario:
+        assert isinstance(self.study.scenario, DriveScenario)
         return self.study.scenario
 
     def _once(self, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
@@ -204,7 +204,7 @@ class Axes:
         found = self._after_run(row, scenario, result, count, columns["winding_temperature"])
         return columns_of(found, CHECKS) | columns, int(result.attrs["switching_count"])
 
-    def until_it_repeats(self, row: np.ndarray) -> tuple[Scenario, RunArrays, int]:
+    def until_it_repeats(self, row: np.ndarray) -> tuple[DriveScenario, RunArrays, int]:
         """Runs twice as many cycles again and again, until the last two agree, or there are as many as the task permits."""
         count = FEWEST
         while True:
@@ -215,7 +215,7 @@ class Axes:
             count = min(2 * count, self.task.max_cycles)
 
     def _after_run(
-        self, row: np.ndarray, scenario: Scenario, result: RunArrays, count: int, winding: float
+        self, row: np.ndarray, scenario: DriveScenario, result: RunArrays, count: int, winding: float
     ) -> list[Finding]:
         """The same rules, of the cycle that was run, and the temperature of its winding [°C]; those that only the required motion
         has are of that."""

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable, Mapping
 
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario
 from ..sizing.drive_check import check_drive
 from ..sizing.finding import SOURCES, Finding
 from .select import SHARES, TASK_SHARES, USE
@@ -19,7 +18,7 @@ TASK_COLUMNS: dict[str, float | str] = {f"{USE}{rule}": math.nan for rule in TAS
 """the same of tasks"""
 
 
-def check_columns(scenario: Scenario | TrainScenario) -> dict[str, float | str]:
+def check_columns(scenario: Scenario) -> dict[str, float | str]:
     """The columns of one run.
 
     Raises

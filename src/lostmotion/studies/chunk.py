@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from ..simulation.results import installed_version
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario
 from .axis_rows import run_axes
 from .columns import tabulate, units_of
 from .file import from_json
@@ -95,6 +94,6 @@ def as_parquet(text: str, tables: list[pa.Table]) -> bytes:
     return out.getvalue()
 
 
-def scenario_of_run(study: Study, run: int) -> Scenario | TrainScenario:
+def scenario_of_run(study: Study, run: int) -> Scenario:
     """The scenario of one run, by its number."""
     return study.scenario_at(study.parameters(run, run + 1)[0])

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..response.crossovers import bandwidth
-from ..simulation.results import add_efficiency
-from ..simulation.scenario import Scenario
-from ..simulation.variables import CHANNEL_NAMES
+from ..simulation.scenario import DriveScenario
+from ..simulation.variables import CHANNEL_NAMES, add_efficiency
 from ..worker_threads import thread_pool
 from .records import kind_of_record
 from .runs import Runs
@@ -60,7 +59,7 @@ def units_of(study: Study) -> dict[str, str]:
 
 def _with_derived(study: Study, runs: Runs) -> dict[str, np.ndarray]:
     wanted = needed(study)
-    if not isinstance(study.scenario, Scenario) or not wanted & DERIVED:
+    if not isinstance(study.scenario, DriveScenario) or not wanted & DERIVED:
         return runs.samples
     samples = study.scenario.simulation.samples
     whole = runs.samples | {c: runs.samples.get(c, np.zeros((len(runs.errors), samples))) for c in CHANNEL_NAMES}
@@ -99,11 +98,11 @@ def _names(study: Study, data: dict[str, np.ndarray], runs: Runs, threads: int) 
 def _ideal_speeds(study: Study, runs: Runs) -> np.ndarray:
     """Load speed [rad/s] at command 1 of a rigid drive without inertia, friction and load, for each run."""
 
-    def of(scenario: Scenario) -> float:
+    def of(scenario: DriveScenario) -> float:
         return scenario.motor.unloaded_speed / scenario.gearbox.ratio
 
     base = study.scenario
-    assert isinstance(base, Scenario)
+    assert isinstance(base, DriveScenario)
     keys = {key for v in study.vary for key in v.all_keys}
     if not any(key.startswith("motor") or key == "gearbox.ratio" or kind_of_record(key) for key in keys):
         return np.full(len(runs.errors), of(base))

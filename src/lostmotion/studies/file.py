@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from ..errors import InputError
 from ..inputs.arguments import checked
@@ -14,7 +14,6 @@ from ..simulation.result_files import FORMATS
 from ..simulation.scenario import Scenario
 from ..simulation.scenario_files import find_base, read_tables
 from ..simulation.sources import load
-from ..simulation.train_scenario import TrainScenario, is_train
 from .records import kind_of_record
 from .study import Study
 
@@ -59,7 +58,7 @@ def load_study(path: str | Path) -> Study:
     for entry in data.get("vary", []) if isinstance(data.get("vary"), list) else []:
         find_sheets(entry, path.parent)
     try:
-        return Study(scenario=scenario, written=written, **data)
+        return Study(scenario=cast("Any", scenario), written=written, **data)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
@@ -79,7 +78,7 @@ def from_json(text: str) -> Study:
     """The study that `to_json` wrote."""
     data = json.loads(text)
     base = data["scenario"]
-    data["scenario"] = TrainScenario(**base) if is_train(base) else Scenario(**base)
+    data["scenario"] = Scenario(**base)
     return Study(**data)
 
 

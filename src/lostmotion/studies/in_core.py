@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..model.torsion import Rigid
 from ..simulation.core_runs import core_case
 from ..simulation.results import ENERGY
-from ..simulation.scenario import Scenario
+from ..simulation.scenario import DriveScenario
 from .functions import REDUCTIONS
 from .runs import Runs, spread
 from .study import Study
@@ -29,7 +29,7 @@ def _fields() -> dict[str, int]:
 def core_can(study: Study) -> bool:
     """Whether all that varies is a plain number of the core, and the runs are all that is wanted."""
     s = study.scenario
-    if checks_drives(study) or not isinstance(s, Scenario) or s.controller is not None:
+    if checks_drives(study) or not isinstance(s, DriveScenario) or s.controller is not None:
         return False
     rigid = isinstance(s.gearbox.stiffness, Rigid)
     for v in study.vary:
@@ -58,7 +58,7 @@ def core_can(study: Study) -> bool:
 def run_in_core(study: Study, parameters: np.ndarray, threads: int) -> Runs:
     """All runs in one call, the GIL released."""
     s = study.scenario
-    assert isinstance(s, Scenario)
+    assert isinstance(s, DriveScenario)
     sampled, reduced = channels(study), reductions(study)
     keys = [(key, v, k) for k, v in enumerate(study.vary) for key in v.all_keys]
     values = np.empty((len(parameters), len(keys)))

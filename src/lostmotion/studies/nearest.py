@@ -10,7 +10,7 @@ import numpy as np
 
 from ..control.references import PositionReference
 from ..errors import InputError
-from ..simulation.scenario import Scenario
+from ..simulation.scenario import DriveScenario
 from .axis import AxisTask, reference_of
 from .axis_rows import NO_DATA, Axes
 from .selection import Candidate
@@ -78,7 +78,7 @@ def slowed(study: Study, factor: float) -> Study:
     """
     task, base = study.axis, study.scenario
     assert task is not None
-    assert isinstance(base, Scenario)
+    assert isinstance(base, DriveScenario)
     assert base.controller is not None
     reference = _slowed_reference(reference_of(base), factor)
     torque = _slowed_signal(base.load.torque, factor)
@@ -182,7 +182,7 @@ def _said(study: Study, slower: Study, row: np.ndarray, factor: float) -> str:
     assert before is not None
     assert after is not None
     assert study.select is not None
-    assert isinstance(study.scenario, Scenario)
+    assert isinstance(study.scenario, DriveScenario)
     moves = reference_of(study.scenario).intervals()
     longest = max((b - a for a, b in moves), default=0.0)
     what = f"its longest move {factor * longest:.4g} s instead of {longest:.4g} s" if longest else ""

@@ -14,9 +14,8 @@ from ..data_sheets.train_components import CONDITIONS, RECORD_KINDS, RECORDS, wi
 from ..errors import InputError
 from ..inputs.schema import unit_in_schema
 from ..inputs.validation import listed, shown
-from ..simulation.scenario import Scenario
+from ..simulation.scenario import DriveScenario, Scenario
 from ..simulation.scenario_files import scenario_from
-from ..simulation.train_scenario import TrainScenario
 from ..simulation.units_of_keys import in_si
 
 # Of keys that take the name of a record: the part that the record describes, and what kind of record it is.
@@ -54,9 +53,9 @@ def owner_of(key: str) -> str:
     return str(next(group for group in found.groups() if group not in (None, ".from")))
 
 
-def record_keys(scenario: Scenario | TrainScenario) -> Iterator[str]:
+def record_keys(scenario: Scenario) -> Iterator[str]:
     """The keys of a scenario that take names of records, and the conditions of their use."""
-    if isinstance(scenario, Scenario):
+    if isinstance(scenario, DriveScenario):
         yield from ("gearbox", "motor", *(f"gearbox.{name}" for name in Conditions.model_fields))
         return
     for table, (key, _) in RECORDS.items():
@@ -153,7 +152,7 @@ def check_names(table: str, names: Any) -> None:
         find(name, table)
 
 
-def with_records(written: Mapping[str, Any], changes: Mapping[str, Any]) -> Scenario | TrainScenario:
+def with_records(written: Mapping[str, Any], changes: Mapping[str, Any]) -> Scenario:
     """The scenario of tables in which records, and the conditions of their use, are others.
 
     What the tables give beside the name of a record holds for every record; of a part without such a name the record takes

@@ -10,9 +10,8 @@ from .. import _core
 from ..errors import InputError
 from ..simulation.core_runs import core_case
 from ..simulation.pointing_error import pointing_errors
-from ..simulation.results import add_derived
 from ..simulation.run import run
-from ..simulation.scenario import Scenario
+from ..simulation.scenario import DriveScenario
 from ..simulation.train_parts import parts_of
 from ..simulation.train_scenario import TrainScenario
 from ..simulation.windings import bound_values
@@ -26,7 +25,7 @@ from .wanted import asks_for, channels, checks_drives, needed, reductions
 
 def run_each(study: Study, parameters: np.ndarray, threads: int) -> Runs:
     """Each as a run of its own, several at a time: drives, what has controllers, and trains of several parts."""
-    drives = isinstance(study.scenario, Scenario)
+    drives = isinstance(study.scenario, DriveScenario)
     n, samples = len(parameters), study.scenario.simulation.samples
     sampled = channels(study) if drives else sorted(needed(study))
     energy, checked = asks_for(study, "energy"), checks_drives(study)
@@ -39,7 +38,7 @@ def run_each(study: Study, parameters: np.ndarray, threads: int) -> Runs:
         checks={name: [empty] * n for name, empty in COLUMNS.items()} if checked else {},
         switchings=np.zeros(n),
         errors=[""] * n,
-        ratio=np.full(n, study.scenario.gearbox.ratio if isinstance(study.scenario, Scenario) else np.nan),
+        ratio=np.full(n, study.scenario.gearbox.ratio if isinstance(study.scenario, DriveScenario) else np.nan),
     )
 
     def make(k: int) -> None:
@@ -61,7 +60,7 @@ def run_each(study: Study, parameters: np.ndarray, threads: int) -> Runs:
         for name, value in checks.items():
             runs.checks[name][k] = value
         runs.switchings[k] = result.attrs["switching_count"]
-        if isinstance(scenario, Scenario):
+        if isinstance(scenario, DriveScenario):
             runs.ratio[k] = scenario.gearbox.ratio
 
     if threads == 1:
@@ -152,7 +151,7 @@ def _samples(
         if errors[k]:
             continue
         data = {name: values[place] for name, values in made.items()}
-        add_derived(scenario, data, time)
+        scenario.derive(data, time)
         for name in wanted:
             out[name][k] = data[name]
     return out

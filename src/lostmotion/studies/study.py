@@ -11,8 +11,8 @@ from pydantic import Field, PrivateAttr, model_validator
 from ..inputs.part import Part
 from ..inputs.quantities import Whole
 from ..inputs.validation import listed
-from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario, is_train
+from ..simulation.scenario import DriveScenario, Scenario
+from ..simulation.train_scenario import TrainScenario
 from ..simulation.units_of_keys import unit_in, unit_of_key
 from ..sizing.stages import stage_of, together
 from .axis import FEWEST, AxisTask, axis_scenario
@@ -46,7 +46,7 @@ class Study(Part):
     """Many runs of one scenario, of a drive or of a drive train."""
 
     title: str = ""
-    scenario: Scenario | TrainScenario
+    scenario: DriveScenario | TrainScenario
     """the base, with all values"""
     written: dict[str, Any] = Field(default={})
     """the base as its file has it, with the names of records; empty if made in Python"""
@@ -64,7 +64,7 @@ class Study(Part):
     axis: AxisTask | None = None
     """each run is a cycle of this task, under gains by rule; it keeps the columns of `axis_columns.COLUMNS`"""
 
-    _bases: dict[tuple[Any, ...], Scenario | TrainScenario] = PrivateAttr(default_factory=dict)
+    _bases: dict[tuple[Any, ...], Scenario] = PrivateAttr(default_factory=dict)
     _vocabulary: Vocabulary | None = PrivateAttr(default=None)
     _kept: dict[Any, Any] = PrivateAttr(default_factory=dict)
 
@@ -73,9 +73,9 @@ class Study(Part):
     def _read_scenario(cls, data: Any) -> Any:
         base = data.get("scenario") if isinstance(data, dict) else None
         if isinstance(base, dict):
-            base = (TrainScenario if is_train(base) else Scenario).model_validate(base)
+            base = Scenario.model_validate(base)
             data = data | {"scenario": base}
-        if isinstance(base, Scenario | TrainScenario):
+        if isinstance(base, Scenario):
             check_spelling(base, data.get("vary"))
         return data
 
@@ -103,7 +103,7 @@ class Study(Part):
     def _check_axis(self, task: AxisTask) -> None:
         if self.keep or self.trajectories is not None:
             raise ValueError("has keep or trajectories, but a task keeps columns of its own; leave them out")
-        if not isinstance(self.scenario, Scenario):
+        if not isinstance(self.scenario, DriveScenario):
             raise ValueError("is the task of a drive train, but only a drive can be selected; write the short form")
         for key in (key for v in self.vary for key in v.all_keys):
             if key.split(".", maxsplit=1)[0] not in ("gearbox", "motor") and not self._is_stage(key):
@@ -155,7 +155,7 @@ class Study(Part):
             raise ValueError(f"{expression.text!r} reads a sample that a run of {table.samples} does not have")
         if any(not 0.0 <= t <= table.duration for t in expression.instants):
             raise ValueError(f"{expression.text!r} reads an instant outside the {table.duration} s of a run")
-        if "ideal_speed" not in expression.names or not isinstance(self.scenario, Scenario):
+        if "ideal_speed" not in expression.names or not isinstance(self.scenario, DriveScenario):
             return
         motor_varies = any(kind_of_record(key) == "motor" for v in self.vary for key in v.all_keys)
         if self.scenario.motor.kind == "torque_source" and not motor_varies:
@@ -193,7 +193,7 @@ class Study(Part):
             if isinstance(scenario, TrainScenario) and unit_in(TrainScenario, key) != unit_of_key(key):
                 raise ValueError(f"varies {key}, which is a key of the short form, too; rename that element")
 
-    def _with_first_records(self) -> Scenario | TrainScenario:
+    def _with_first_records(self) -> Scenario:
         """The base with the first of the varied records that can be run."""
         named = {v.all_keys[0]: v.names for v in self.vary if v.names is not None and not self._is_stage(v.all_keys[0])}
         for names in itertools.islice(itertools.product(*named.values()), 1000):
@@ -225,7 +225,7 @@ class Study(Part):
             self._vocabulary = vocabulary_of(self.scenario)
         return self._vocabulary
 
-    def scenario_at(self, row: np.ndarray) -> Scenario | TrainScenario:
+    def scenario_at(self, row: np.ndarray) -> Scenario:
         """The scenario of one run, by its row of `parameters`; of a task under gains by rule.
 
         Raises
@@ -235,7 +235,7 @@ class Study(Part):
         """
         return self.scenario_with(dict(enumerate(row))) if self.axis is None else self.axis_at(row, FEWEST)
 
-    def axis_at(self, row: np.ndarray, cycles: int) -> Scenario:
+    def axis_at(self, row: np.ndarray, cycles: int) -> DriveScenario:
         """The scenario of one pair of a task over so many cycles.
 
         Raises
@@ -245,7 +245,7 @@ class Study(Part):
         """
         motor, gearbox = self.part("motor", row), self.part("gearbox", row)
         assert self.axis is not None
-        assert isinstance(self.scenario, Scenario)
+        assert isinstance(self.scenario, DriveScenario)
         if self.axis.linear is not None:
             gearbox = together(gearbox, self.part("stage", row))
         return axis_scenario(self.scenario, motor, gearbox, self.axis, cycles)
@@ -274,7 +274,7 @@ class Study(Part):
                 self.kept[key] = self.axis.fed(found) if kind == "motor" and self.axis is not None else found
         return self.kept[key]
 
-    def scenario_with(self, numbers: Mapping[int, float]) -> Scenario | TrainScenario:
+    def scenario_with(self, numbers: Mapping[int, float]) -> Scenario:
         """The base with some of the parameters, by their places in `vary`.
 
         Raises
@@ -293,10 +293,10 @@ class Study(Part):
         }
         return base.replace(**changes) if changes else base
 
-    def drive_at(self, row: np.ndarray) -> Scenario:
+    def drive_at(self, row: np.ndarray) -> DriveScenario:
         """The same, of a study of a drive."""
         found = self.scenario_at(row)
-        assert isinstance(found, Scenario)
+        assert isinstance(found, DriveScenario)
         return found
 
     def train_at(self, row: np.ndarray) -> TrainScenario:
@@ -305,7 +305,7 @@ class Study(Part):
         assert isinstance(found, TrainScenario)
         return found
 
-    def _with_records(self, records: dict[str, Any]) -> Scenario | TrainScenario:
+    def _with_records(self, records: dict[str, Any]) -> Scenario:
         """The base with other records; the last ones are kept, since other parameters may vary beside them."""
         key = tuple(sorted(records.items()))
         found = self._bases.get(key)

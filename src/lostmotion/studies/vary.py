@@ -19,7 +19,6 @@ from ..model.signals import Signal
 from ..reproducible import exp, log
 from ..simulation.keys import list_index
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario
 from ..simulation.units_of_keys import in_si, unit_in, unit_of_key
 from .records import check_names, is_condition, kind_of_record, names_that_fit, record_keys
 
@@ -169,7 +168,7 @@ def _with_names(data: Mapping[str, Any], table: str) -> dict[str, Any]:
     return out
 
 
-def base_value(scenario: Scenario | TrainScenario, key: str) -> Any:
+def base_value(scenario: Scenario, key: str) -> Any:
     """Value of a scenario at a dotted key.
 
     Raises
@@ -196,7 +195,7 @@ def base_value(scenario: Scenario | TrainScenario, key: str) -> Any:
     return node
 
 
-def _may_be_left_out(scenario: Scenario | TrainScenario, key: str) -> bool:
+def _may_be_left_out(scenario: Scenario, key: str) -> bool:
     """Whether a value at the start, or a command, is 0 where a train does not give it, and may be given."""
     if not re.fullmatch(r"initial\.[^.]+\.[^.]+|command\.[^.]+", key):
         return False
@@ -207,7 +206,7 @@ def _may_be_left_out(scenario: Scenario | TrainScenario, key: str) -> bool:
     return True
 
 
-def near_key(scenario: Scenario | TrainScenario, key: str) -> str:
+def near_key(scenario: Scenario, key: str) -> str:
     """The key of a scenario of the same name in the same table or within it, or that was misspelt as this one; empty if none is."""
     known = [*_keys(scenario.model_dump(), ""), *record_keys(scenario)]
     first, dot, _ = key.partition(".")
@@ -223,7 +222,7 @@ def _keys(table: Mapping[str, Any], before: str) -> Iterator[str]:
             yield from _keys(value, f"{before}{name}.")
 
 
-def check_spelling(scenario: Scenario | TrainScenario, entries: Any) -> None:
+def check_spelling(scenario: Scenario, entries: Any) -> None:
     """Sees, before the units of their values are asked for, that the keys of a study are known.
 
     Raises
@@ -242,7 +241,7 @@ def check_spelling(scenario: Scenario | TrainScenario, entries: Any) -> None:
                 base_value(scenario, key)
 
 
-def check_key(scenario: Scenario | TrainScenario, key: str, *, relative: bool) -> None:
+def check_key(scenario: Scenario, key: str, *, relative: bool) -> None:
     """Sees that a number, or with `relative` a factor, can take the place of what a scenario has under a key.
 
     Raises

@@ -7,8 +7,7 @@ from typing import NamedTuple
 
 from ..simulation.pointing_error import pointing_names
 from ..simulation.results import ENERGY
-from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario
+from ..simulation.scenario import DriveScenario, Scenario
 from ..simulation.train_variables import axis_variables, train_variables
 from ..simulation.variables import CHANNEL_NAMES, VARIABLES
 from ..simulation.windings import bound_names
@@ -38,7 +37,7 @@ OF_DRIVES = Vocabulary(
 )
 
 
-def _controlled(scenario: Scenario | TrainScenario) -> Iterator[tuple[str, str]]:
+def _controlled(scenario: Scenario) -> Iterator[tuple[str, str]]:
     """Names that controllers add: their signals, the pointing errors of the axes, and the error bounds of windings."""
     for variable in axis_variables(scenario.by_prefix(), scenario.sliding()):
         yield variable.name, variable.unit
@@ -49,12 +48,12 @@ def _controlled(scenario: Scenario | TrainScenario) -> Iterator[tuple[str, str]]
         yield name, unit
 
 
-def vocabulary_of(scenario: Scenario | TrainScenario) -> Vocabulary:
+def vocabulary_of(scenario: Scenario) -> Vocabulary:
     """Names that expressions may use for a run of this scenario.
 
     An entry of a train's ledger, such as ``first_gear: mesh``, is called ``first_gear_mesh``.
     """
-    if isinstance(scenario, Scenario):
+    if isinstance(scenario, DriveScenario):
         if scenario.controller is None:
             return OF_DRIVES
         return OF_DRIVES._replace(variables=(*OF_DRIVES.variables, *_controlled(scenario)))

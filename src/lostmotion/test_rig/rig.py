@@ -24,8 +24,8 @@ from ..model.motor import Motor
 from ..model.signals import CommandSignal, Samples, TorqueSignal
 from ..model.torsion import Rigid
 from ..simulation.results import RunArrays
-from ..simulation.run import as_scenario, run
-from ..simulation.scenario import Initial
+from ..simulation.run import run
+from ..simulation.scenario import Initial, of_drive
 from ..simulation.switchings import names_in, unpacked
 from .loop import Loop
 
@@ -98,7 +98,7 @@ class TestRig:
 
     @staticmethod
     def _run(drive: Drive, **surroundings: Any) -> RunArrays:
-        return run(as_scenario(drive, **surroundings), energy=False)
+        return run(of_drive(drive, **surroundings), energy=False)
 
     def _flywheel(self) -> Drive:
         # So large that its speed does not sink notably under the torque of a large gear of low ratio either.
