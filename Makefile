@@ -60,10 +60,11 @@ c-library: $(VENV)/built
 	$(BUILD) --target lostmotion_c
 	mkdir -p build/c && cp $(TREE)/liblostmotion.* build/c/
 	@echo 'cc -I$(abspath bindings/c) PROGRAM.c -L$(abspath build/c) -llostmotion -lm'
-# The library of FMUs for this platform. `lostmotion fmu` calls this when it first needs it.
+# The library of FMUs for this platform, and their sources. `lostmotion fmu` calls this when it first needs it.
 fmu-library: $(VENV)/built
 	$(BUILD) --target lostmotion_fmu
 	mkdir -p $(PACKAGE)/fmu_libraries && cp -r $(TREE)/fmu/* $(PACKAGE)/fmu_libraries/
+	$(BIN)/python bindings/fmu/sources.py $(PACKAGE)/fmu_libraries/sources
 
 # The same library as WebAssembly, and as the libraries of FMUs for all platforms, by the Zig compiler.
 .PHONY: wasm fmu
@@ -71,6 +72,7 @@ wasm: $(VENV)/portable
 	$(BIN)/python bindings/c/build.py wasm build/wasm/lostmotion.wasm
 fmu: $(VENV)/portable
 	$(BIN)/python bindings/c/build.py fmu src/lostmotion/fmu_libraries
+	$(BIN)/python bindings/fmu/sources.py src/lostmotion/fmu_libraries/sources
 
 # Those libraries, as far as this machine can run them: QEMU and Wine, if they are installed.
 .PHONY: test-fmu

@@ -229,6 +229,7 @@ def main() -> None:
         if not built.exists():
             sys.exit(f"{built.relative_to(ROOT)} is missing: make page")
     fmu(LIBRARIES)
+    subprocess.run([sys.executable, HERE / "fmu" / "sources.py", LIBRARIES / "sources"], check=True)
     base = pure()
     given.to.mkdir(parents=True, exist_ok=True)
     for platform in given.platforms:

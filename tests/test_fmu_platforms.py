@@ -89,7 +89,8 @@ def test_other_platforms_give_the_bits_of_python(platform: str, tmp_path: Path, 
         open_at = tmp_path / name
         with zipfile.ZipFile(path) as archive:
             archive.extractall(open_at)
-        library = open_at / "binaries" / exporting.PLATFORMS[2][platform]
+        place, extension = exporting.PLATFORMS[2][platform]
+        library = open_at / "binaries" / place / f"lostmotion.{extension}"
         drive = "Z:" if "windows" in platform else ""
         done = subprocess.run(
             [

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstdio>
 #include <map>
 #include <memory>
 #include <string>
@@ -332,13 +331,8 @@ class Instance {
         return 0;
     }
     std::string read() {
-        std::vector<double> numbers;
-        std::FILE* file = std::fopen(path_.c_str(), "rb");
-        if (file == nullptr) return path_ + " cannot be read";
-        double buffer[512];
-        while (const std::size_t n = std::fread(buffer, sizeof(double), 512, file))
-            numbers.insert(numbers.end(), buffer, buffer + n);
-        std::fclose(file);
+        const std::vector<double> numbers = numbers_of_file(path_);
+        if (numbers.empty()) return path_ + " cannot be read";
         char wrong[500];
         std::unique_ptr<lm_scenario, Free> found(lm_scenario_read(numbers.data(), numbers.size(), wrong, sizeof wrong));
         if (!found) return path_ + ": " + wrong;

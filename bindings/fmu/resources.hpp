@@ -1,9 +1,11 @@
 // The resources of an FMU: where they are and what is in them.
 #pragma once
 
+#include <cstddef>
 #include <cstdio>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace lostmotion::fmu {
 
@@ -33,14 +35,30 @@ inline std::string path_of_uri(std::string_view uri) {
     return path;
 }
 
-inline std::string text_of_file(const std::string& path) {
-    std::string text;
+#ifdef LOSTMOTION_EMBEDDED
+// In the sources of an FMU, resources.cpp has them: a target of a real-time system has no files.
+extern const std::vector<double> embedded_scenario;
+extern const std::string embedded_names;
+
+inline std::string text_of_file(const std::string&) { return embedded_names; }
+inline std::vector<double> numbers_of_file(const std::string&) { return embedded_scenario; }
+#else
+// The numbers or characters of a file; nothing if it cannot be read.
+template <class Content>
+Content content_of_file(const std::string& path) {
+    Content content;
     if (std::FILE* file = std::fopen(path.c_str(), "rb"); file != nullptr) {
-        char buffer[256];
-        while (const std::size_t n = std::fread(buffer, 1, sizeof buffer, file)) text.append(buffer, n);
+        typename Content::value_type buffer[512];
+        while (const std::size_t n = std::fread(buffer, sizeof buffer[0], 512, file))
+            content.insert(content.end(), buffer, buffer + n);
         std::fclose(file);
     }
-    return text;
+    return content;
 }
+inline std::string text_of_file(const std::string& path) { return content_of_file<std::string>(path); }
+inline std::vector<double> numbers_of_file(const std::string& path) {
+    return content_of_file<std::vector<double>>(path);
+}
+#endif
 
 }  // namespace lostmotion::fmu

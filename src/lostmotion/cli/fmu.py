@@ -31,6 +31,10 @@ def fmu(
             help="The references of sampled controllers are inputs, which replace those of the scenario.",
         ),
     ] = False,
+    source: Annotated[
+        bool,
+        typer.Option("--source", help="With the C++ sources too, for tools and targets that compile FMUs themselves."),
+    ] = False,
     libraries: Annotated[
         Path | None,
         typer.Option(
@@ -45,6 +49,7 @@ def fmu(
     \b
     lostmotion fmu drive.toml -o drive.fmu
     lostmotion fmu position-axis -o axis.fmu --fmi 3 --set load.inertia="3 kg*m^2"
+    lostmotion fmu position-axis -o axis.fmu --source
     """
     from ..errors import InputError
     from ..portable.fmu import export_fmu
@@ -61,6 +66,7 @@ def fmu(
             fmi=fmi,
             controllers=controllers,
             references=references,
+            source=source,
             libraries=libraries,
         )
     print(f"{output}")

@@ -21,6 +21,7 @@ from .fmu_model import (
     parameter_range,
     rate_unit,
 )
+from .fmu_sources import SOURCES
 
 _STATE = {"canGetAndSetFMUstate": "true", "canSerializeFMUstate": "true", "providesDirectionalDerivative": "true"}
 
@@ -36,7 +37,7 @@ def model_description(model: Model) -> bytes:
         variableNamingConvention="flat",
         numberOfEventIndicators=str(model.indicators if model.states else 0),
     )
-    both = {"modelIdentifier": "lostmotion", "canNotUseMemoryManagementFunctions": "true"} | _STATE
+    both = {"modelIdentifier": model.identifier, "canNotUseMemoryManagementFunctions": "true"} | _STATE
     if model.states:
         ET.SubElement(root, "ModelExchange", both)
     ET.SubElement(
@@ -44,6 +45,10 @@ def model_description(model: Model) -> bytes:
         "CoSimulation",
         both | {"canHandleVariableCommunicationStepSize": "true", "canInterpolateInputs": "true"},
     )
+    for kind in root if model.has_sources else ():
+        sources = ET.SubElement(kind, "SourceFiles")
+        for name in SOURCES:
+            ET.SubElement(sources, "File", name=name)
     add_units(root, model, input_rates=False)
     add_log_categories(root)
     add_default_experiment(root, model)

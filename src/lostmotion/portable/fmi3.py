@@ -36,7 +36,7 @@ def model_description(model: Model) -> bytes:
         variableNamingConvention="flat",
     )
     both = {
-        "modelIdentifier": "lostmotion",
+        "modelIdentifier": model.identifier,
         "canGetAndSetFMUState": "true",
         "canSerializeFMUState": "true",
         "providesDirectionalDerivatives": "true",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import zipfile
 from collections.abc import Mapping
 from dataclasses import replace
@@ -28,26 +29,27 @@ from . import fmi2, fmi3
 from .checkout import made_here
 from .descriptions import kernel_of, numbers_of, written
 from .fmu_model import Declared, Model, page
+from .fmu_sources import source_files
 from .parameters import Parameter, parameters_of
 
-# Directories of the libraries in an FMU, by the names that the builds have here.
+# Directories and extensions of the libraries in an FMU, by the names that the builds have here.
 # FMI 2.0 leaves those beside x86-64 to the tools; these are the names of FMI 3.0.
 _OTHERS = {
-    "aarch64-linux": "aarch64-linux/lostmotion.so",
-    "aarch64-windows": "aarch64-windows/lostmotion.dll",
-    "aarch64-darwin": "aarch64-darwin/lostmotion.dylib",
+    "aarch64-linux": ("aarch64-linux", "so"),
+    "aarch64-windows": ("aarch64-windows", "dll"),
+    "aarch64-darwin": ("aarch64-darwin", "dylib"),
 }
-PLATFORMS: Mapping[int, Mapping[str, str]] = {
+PLATFORMS: Mapping[int, Mapping[str, tuple[str, str]]] = {
     2: {
-        "x86_64-linux": "linux64/lostmotion.so",
-        "x86_64-windows": "win64/lostmotion.dll",
-        "x86_64-darwin": "darwin64/lostmotion.dylib",
+        "x86_64-linux": ("linux64", "so"),
+        "x86_64-windows": ("win64", "dll"),
+        "x86_64-darwin": ("darwin64", "dylib"),
         **_OTHERS,
     },
     3: {
-        "x86_64-linux": "x86_64-linux/lostmotion.so",
-        "x86_64-windows": "x86_64-windows/lostmotion.dll",
-        "x86_64-darwin": "x86_64-darwin/lostmotion.dylib",
+        "x86_64-linux": ("x86_64-linux", "so"),
+        "x86_64-windows": ("x86_64-windows", "dll"),
+        "x86_64-darwin": ("x86_64-darwin", "dylib"),
         **_OTHERS,
     },
 }
@@ -64,6 +66,7 @@ def export_fmu(
     fmi: Count = 2,
     controllers: bool = True,
     references: bool = False,
+    source: bool = False,
     libraries: str | Path | None = None,
 ) -> dict[str, str]:
     """Write a scenario as an FMU for Co-Simulation and Model Exchange. No compiler is needed.
@@ -84,6 +87,9 @@ def export_fmu(
         Whether to include the controllers. Without them the commands of their motors are inputs.
     references : bool
         Whether the references of sampled controllers are inputs, too, named ``reference`` or ``<motor>_reference``.
+    source : bool
+        Whether to include the C++ sources, too, for tools and targets that compile FMUs themselves. The model identifier is then the
+        name of the file.
     libraries : str or Path, optional
         Directory with the libraries of the platforms, as ``make fmu`` builds them. Default: those of this installation.
 
@@ -123,13 +129,19 @@ def export_fmu(
         _check_references(scenario)
     if libraries is None:
         made_here("fmu-library", LIBRARIES.glob("*/all.*"), "the library of FMUs for this platform")
-    directory = LIBRARIES if libraries is None else Path(libraries)
-    binaries = _libraries(directory, PLATFORMS[fmi], kernel_of(scenario))
+    directory, kernel = LIBRARIES if libraries is None else Path(libraries), kernel_of(scenario)
+    identifier = re.sub(r"\W", "_", f"_{path.stem}" if path.stem[:1].isdigit() else path.stem, flags=re.ASCII)
+    identifier = identifier if source else "lostmotion"
+    binaries = _libraries(directory, PLATFORMS[fmi], kernel, identifier)
     parameters = tuple(
         p for p in parameters_of(scenario, numbers_of).parameters if not _of_signals(scenario, p.key, references)
     )
-    resource = written(scenario, parameters).astype("<f8").tobytes()
+    description = written(scenario, parameters)
+    resource = description.astype("<f8").tobytes()
     model = _model(scenario, parameters, hashlib.sha256(resource).hexdigest()[:32], references)
+    model = replace(model, identifier=identifier, has_sources=source)
+    content = source_files(directory / "sources", fmi, kernel, identifier, description, model.names()) if source else ()
+    sources = dict(content)
     icon = (files("lostmotion") / "portable" / "icon.png").read_bytes()
 
     def write(to: Path) -> None:
@@ -145,19 +157,20 @@ def export_fmu(
                 archive.writestr("terminalsAndIcons/icon.png", icon)
             for name, content in binaries.items():
                 archive.writestr(f"binaries/{name}", content)
+            for name, text in sources.items():
+                archive.writestr(f"sources/{name}", text)
 
     write_whole(path, write)
     return {v.name: scenario.input_key(v.name) for v in model.inputs}
 
 
-def _libraries(directory: Any, places: Mapping[str, str], kernel: str) -> dict[str, bytes]:
+def _libraries(directory: Any, places: Mapping[str, tuple[str, str]], kernel: str, identifier: str) -> dict[str, bytes]:
     """The libraries that there are, by their places in an FMU: with its kernel alone, or as installed from source with all."""
     found = {}
-    for platform, place in places.items():
-        extension = place.rpartition(".")[2]
+    for platform, (place, extension) in places.items():
         files_of = (directory / platform / f"{name}.{extension}" for name in (kernel, "all"))
         if (library := next((file for file in files_of if file.is_file()), None)) is not None:
-            found[place] = library.read_bytes()
+            found[f"{place}/{identifier}.{extension}"] = library.read_bytes()
     if not found:
         raise InputError(
             f"{directory}: has no library of an FMU; install a wheel, or build it in a checkout by `make fmu-library`"

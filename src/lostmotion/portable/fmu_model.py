@@ -103,6 +103,9 @@ class Model:
     references_given: bool
     """whether the references of sampled controllers are inputs"""
     note: str
+    identifier: str = "lostmotion"
+    """model identifier"""
+    has_sources: bool = False
 
     def names(self) -> str:
         """Names of the variables by value reference, for the library: bindings/fmu/variables.hpp."""

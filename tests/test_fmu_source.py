@@ -1,0 +1,117 @@
+"""FMUs with sources: they compile by the standards alone, and give the bits of the libraries in the FMU."""
+
+import shutil
+import subprocess
+import sys
+import zipfile
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+
+import lostmotion as lm
+from lostmotion.portable.fmu_sources import SOURCES
+
+fmpy: Any = pytest.importorskip("fmpy", reason="FMPy is missing: .venv/bin/pip install --group dev")
+COMPILER = shutil.which("g++") or shutil.which("c++")
+CMAKE = shutil.which("cmake") or shutil.which("cmake", path=str(Path(sys.executable).parent))
+STRICT = ("-std=c++20", "-O1", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fvisibility=hidden", "-fPIC")
+
+
+def exported(name: str, to: Path, fmi: int = 2) -> Path:
+    """The directory of an FMU with sources, axis.fmu beside it."""
+    lm.export_fmu(lm.load(name), to / "axis.fmu", fmi=fmi, source=True)
+    with zipfile.ZipFile(to / "axis.fmu") as archive:
+        archive.extractall(to / "axis")
+    return to / "axis"
+
+
+def compiled(sources: Path, to: Path, definitions: Sequence[str]) -> list[Path]:
+    """Objects of the sources, without the extensions of GCC; its warnings are errors."""
+    made = {Path(name).with_suffix(".o").name: sources / name for name in SOURCES}
+    flags = [*STRICT, *(f"-D{d}" for d in definitions)]
+
+    def compile_one(item: tuple[str, Path]) -> str:
+        command = [str(COMPILER), *flags, "-c", str(item[1]), "-o", str(to / item[0])]
+        return subprocess.run(command, check=False, stderr=subprocess.PIPE, text=True).stderr
+
+    with ThreadPoolExecutor(2) as pool:
+        assert "".join(pool.map(compile_one, made.items())) == ""
+    return [to / name for name in made]
+
+
+def results(fmu: Path) -> Any:
+    """A run by Co-Simulation."""
+    return fmpy.simulate_fmu(str(fmu), stop_time=0.5, output_interval=1e-3, fmi_type="CoSimulation")
+
+
+@pytest.mark.skipif(COMPILER is None, reason="there is no C++ compiler")
+def test_plain_sources_give_the_bits_of_the_library(tmp_path: Path) -> None:
+    directory = exported("position-axis", tmp_path)
+    wanted = results(tmp_path / "axis.fmu")
+    definitions = ["LOSTMOTION_PLAIN_VECTORS", "FMI2_OVERRIDE_FUNCTION_PREFIX"]
+    objects = compiled(directory / "sources", tmp_path, definitions)
+    library = next((directory / "binaries").rglob("axis.*"))
+    before = library.read_bytes()
+    subprocess.run([str(COMPILER), "-shared", *map(str, objects), "-o", str(library)], check=True)
+    assert library.read_bytes() != before
+    shutil.rmtree(directory / "resources")  # the sources contain them
+    found = results(directory)
+    assert found.dtype.names == wanted.dtype.names
+    assert len(found) == 501
+    assert float(np.ptp(found["load_angle"])) > 0.01
+    for name in found.dtype.names:
+        assert found[name].tobytes() == wanted[name].tobytes(), name
+
+
+@pytest.mark.skipif(CMAKE is None or COMPILER is None, reason="there is no CMake, or no C++ compiler")
+@pytest.mark.slow
+def test_cmake_builds_the_sources_of_a_train_in_fmi_3(tmp_path: Path) -> None:
+    directory = exported("ball-screw-axis", tmp_path, fmi=3)
+    wanted = results(tmp_path / "axis.fmu")
+    for command in (
+        [str(CMAKE), "-S", directory / "sources", "-B", tmp_path / "build", "-DCMAKE_CXX_FLAGS=-Wall -Wextra -Werror"],
+        [str(CMAKE), "--build", tmp_path / "build"],
+    ):
+        subprocess.run(list(map(str, command)), check=True, capture_output=True)
+    library = next((directory / "binaries").rglob("axis.*"))
+    shutil.copy(next((tmp_path / "build").glob("axis.*o*")), library)
+    found = results(directory)
+    for name in found.dtype.names:
+        assert found[name].tobytes() == wanted[name].tobytes(), name
+
+
+@pytest.mark.skipif(COMPILER is None or shutil.which("nm") is None, reason="there is no C++ compiler, or no nm")
+@pytest.mark.slow
+def test_two_fmus_in_one_program_share_no_names(tmp_path: Path) -> None:
+    """A program that links FMUs statically needs other names for the functions of each."""
+    directory = exported("paper-2dof-nl-small", tmp_path)
+    names = []
+    for made in compiled(directory / "sources", tmp_path, []):
+        listed = subprocess.run(["nm", "-g", "--defined-only", made], check=True, capture_output=True, text=True)
+        names += [line.split()[-1] for line in listed.stdout.splitlines() if line.split()[-2] not in "VWu"]
+    assert "axis_fmi2DoStep" in names
+    assert "axis_lm_advance" in names
+    assert [name for name in names if "axis_" not in name] == []
+
+
+def test_the_description_lists_the_sources(tmp_path: Path) -> None:
+    for fmi, listed in ((2, "modelDescription.xml"), (3, "sources/buildDescription.xml")):
+        directory = exported("paper-2dof-nl-small", tmp_path, fmi)
+        root = ET.parse(directory / listed).getroot()
+        assert [e.get("name") for e in root.iter("SourceFile" if fmi == 3 else "File")][:4] == list(SOURCES)
+        description = fmpy.read_model_description(str(tmp_path / "axis.fmu"), validate=True)
+        assert description.coSimulation.modelIdentifier == "axis"
+
+
+def test_without_sources_there_is_one_clear_line(tmp_path: Path) -> None:
+    source = next((Path(lm.__file__).parent / "fmu_libraries").glob("*/all.*"))
+    to = tmp_path / source.parent.name
+    to.mkdir()
+    shutil.copy(source, to)
+    with pytest.raises(lm.InputError, match="has no sources of an FMU; run `make fmu-library`"):
+        lm.export_fmu(lm.load("paper-2dof-nl-small"), tmp_path / "a.fmu", source=True, libraries=tmp_path)
