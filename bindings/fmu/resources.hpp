@@ -57,7 +57,7 @@ Content content_of_file(const std::string& path) {
 }
 inline std::string text_of_file(const std::string& path) { return content_of_file<std::string>(path); }
 inline std::vector<double> numbers_of_file(const std::string& path) {
-    return content_of_file<std::vector<double>>(path);
+    return content_of_file<std::vector<double> >(path);
 }
 #endif
 
