@@ -23,7 +23,7 @@ from ..model.signals import Signal
 from ..reproducible import sin, total
 from ..simulation.results import variables_of
 from ..simulation.run import run
-from ..simulation.scenario import DriveScenario, Scenario
+from ..simulation.scenario import Scenario
 from ..simulation.train_variables import axis_variables
 from . import fmi2, fmi3
 from .checkout import made_here
@@ -191,19 +191,12 @@ def _check_references(scenario: Scenario) -> None:
 def _of_signals(scenario: Scenario, key: str, references: bool) -> bool:
     """Whether a key is that of a signal, which in an FMU the importer gives."""
     parts = key.split(".")
-    if isinstance(scenario, DriveScenario):
-        given = references and parts[:2] == ["controller", "reference"]
-        return given or parts[0] == "command" or parts[:2] == ["load", "torque"]
-    of_shaft = (parts[0], *parts[2:3]) in (("shafts", "torque"), ("shafts", "speed"), ("slides", "force"))
     # Of the command of a brake or a clutch: what the importer gives acts at once.
     delay = parts[0] in ("brakes", "clutches") and parts[-1] in ("engagement_delay", "release_delay")
-    of_controller = parts[0] == "controllers" and parts[2] == "reference"
-    return (
-        parts[0] == "command"
-        or of_shaft
-        or delay
-        or (of_controller and (references or parts[1] in scenario.continuous()))
-    )
+    followed = [*(scenario.axes() if references else ()), *scenario.continuous()]
+    signals = {f"{scenario.controller_key(motor)}.reference" for motor in followed}
+    signals |= {*scenario.input_keys().values(), *(f"shafts.{name}.speed" for name in scenario.given())}
+    return delay or any(key == signal or key.startswith(f"{signal}.") for signal in signals)
 
 
 def _reference(scenario: Scenario, prefix: str, kind: str) -> tuple[str, str]:

@@ -120,15 +120,16 @@ class Plant:
 
 def plant_of(what: Drive | Scenario) -> Plant:
     """The plant of a drive without inputs, or of a scenario with its own commands."""
-    if isinstance(what, Scenario):
-        need_open_loop(what, "response")
-    return _plant_of(what)
+    scenario = _scenario_of(what)
+    need_open_loop(scenario, "response")
+    return _plant_of(scenario)
 
 
-def plant_or_loop(what: Drive | Scenario) -> Plant:
+def plant_or_loop(drive: Drive | Scenario) -> Plant:
     """The same, or of a scenario with controllers what these and the plant are together."""
+    what = _scenario_of(drive)
     plant = _plant_of(what)
-    if not isinstance(what, Scenario) or not what.axes():
+    if not what.axes():
         return plant
     axes = what.axes()
     references = {f"{what.prefix(motor)}reference": c.reference for motor, c in axes.items()}
@@ -154,9 +155,12 @@ def plant_or_loop(what: Drive | Scenario) -> Plant:
     )
 
 
-def _plant_of(what: Drive | Scenario) -> Plant:
-    # The times of a drive alone are not used.
-    scenario = what if isinstance(what, Scenario) else of_drive(what, duration=1.0, sample_interval=1.0)
+def _scenario_of(what: Drive | Scenario) -> Scenario:
+    """A scenario, or that of a drive without inputs, whose times are not used."""
+    return what if isinstance(what, Scenario) else of_drive(what, duration=1.0, sample_interval=1.0)
+
+
+def _plant_of(scenario: Scenario) -> Plant:
     need_free_motion(scenario, "response")
     train = scenario.named_train()
     core = scenario.core(sampled=False)

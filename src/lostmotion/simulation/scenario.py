@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from importlib import import_module
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
@@ -207,6 +207,10 @@ class Scenario(Part):
 
     def with_gears(self, gears: Mapping[str, Any]) -> Self:
         """The same scenario with other gears, by their keys."""
+        raise NotImplementedError
+
+    def record_keys(self) -> Iterator[str]:
+        """Keys that take names of records, and the conditions of their use."""
         raise NotImplementedError
 
     def input_keys(self) -> dict[str, str]:
@@ -413,6 +417,9 @@ class DriveScenario(Scenario):
     def with_gears(self, gears: Mapping[str, Any]) -> DriveScenario:
         return self.model_copy(update=dict(gears))
 
+    def record_keys(self) -> Iterator[str]:
+        yield from ("gearbox", "motor", *(f"gearbox.{name}" for name in Conditions.model_fields))
+
     def input_keys(self) -> dict[str, str]:
         return {"command": "command", "load_torque": "load.torque"}
 
@@ -560,6 +567,21 @@ def _signal(value: Any, kind: Any) -> Any:
 def drive_of(what: DriveScenario | Drive) -> Drive:
     """The drive of a scenario, or a drive as it is."""
     return what if isinstance(what, Drive) else what.drive()
+
+
+def short_form(scenario: Scenario, function: str) -> DriveScenario:
+    """The scenario, for what is defined for one motor, one gearbox and one load.
+
+    Raises
+    ------
+    InputError
+        It is in the long form.
+    """
+    if isinstance(scenario, DriveScenario):
+        return scenario
+    raise InputError(
+        f"{function}: is a drive train ([shafts]), which can be run; this takes a drive of [motor], [gearbox] and [load]"
+    )
 
 
 def from_tables(tables: Mapping[str, Any]) -> DriveScenario:

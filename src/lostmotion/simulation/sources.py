@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..inputs.arguments import ScenarioName, checked
 from . import scenario_files
 from .result_files import FORMATS, open_result
-from .scenario import DriveScenario, Scenario
+from .scenario import DriveScenario, Scenario, short_form
 from .scenario_files import changed, override
 
 
@@ -67,9 +67,4 @@ def load_drive(source: str | Path, overrides: Mapping[str, Any] | Iterable[str] 
     InputError
         Also if the scenario is in the long form.
     """
-    scenario = load(source, overrides)
-    if isinstance(scenario, DriveScenario):
-        return scenario
-    raise InputError(
-        f"{source}: is a drive train ([shafts]), which can be run; this takes a drive of [motor], [gearbox] and [load]"
-    )
+    return short_form(load(source, overrides), str(source))

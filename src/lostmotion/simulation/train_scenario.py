@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import cache, lru_cache
 from typing import Annotated, Any, ClassVar, Self, cast
 
@@ -305,6 +305,12 @@ class TrainScenario(Scenario, LinearElements):
     def with_gears(self, gears: Mapping[str, Any]) -> TrainScenario:
         others = {key.removeprefix("gears."): gear for key, gear in gears.items()}
         return self.model_copy(update={"gears": {**self.gears, **others}})
+
+    def record_keys(self) -> Iterator[str]:
+        for table, (key, _) in RECORDS.items():
+            beside = CONDITIONS[table].model_fields if table in CONDITIONS else ()
+            for name in getattr(self, table):
+                yield from (f"{table}.{name}.{key}" for key in (key, *beside))
 
     def input_keys(self) -> dict[str, str]:
         keys = {f"{name}_command": f"command.{name}" for name in self.commanded()}

@@ -79,8 +79,7 @@ class Axes:
 
     @property
     def _base(self) -> DriveScenario:
-        assert isinstance(self.study.scenario, DriveScenario)
-        return self.study.scenario
+        return self.study.drive
 
     def _once(self, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
         """Value that is made at most once; an error is kept as such."""

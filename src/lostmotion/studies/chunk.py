@@ -15,7 +15,7 @@ from .in_core import core_can, run_in_core
 from .row_by_row import run_each, run_trains, together
 from .runs import Runs
 from .study import Study
-from .wanted import DERIVED, channels, needed, reductions
+from .wanted import SOURCES, channels, needed, reductions
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -54,7 +54,7 @@ def _arrays(study: Study) -> int:
         return 0 if reductions(study) else len(channels(study))
     if core_can(study) and reductions(study):
         return 0
-    return len(study.vocabulary.channels) if wanted & DERIVED else len(wanted)
+    return len(study.vocabulary.channels) if wanted & SOURCES.keys() else len(wanted)
 
 
 @lru_cache(maxsize=8)

@@ -16,7 +16,7 @@ from .records import kind_of_record
 from .runs import Runs
 from .select import TASK_SHARES, USE
 from .study import Study
-from .wanted import DERIVED, asks_for, needed, used
+from .wanted import asks_for, needed, used
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -59,7 +59,7 @@ def units_of(study: Study) -> dict[str, str]:
 
 def _with_derived(study: Study, runs: Runs) -> dict[str, np.ndarray]:
     wanted = needed(study)
-    if not isinstance(study.scenario, DriveScenario) or not wanted & DERIVED:
+    if wanted <= runs.samples.keys():
         return runs.samples
     samples = study.scenario.simulation.samples
     whole = runs.samples | {c: runs.samples.get(c, np.zeros((len(runs.errors), samples))) for c in CHANNEL_NAMES}
@@ -101,8 +101,7 @@ def _ideal_speeds(study: Study, runs: Runs) -> np.ndarray:
     def of(scenario: DriveScenario) -> float:
         return scenario.motor.unloaded_speed / scenario.gearbox.ratio
 
-    base = study.scenario
-    assert isinstance(base, DriveScenario)
+    base = study.drive
     keys = {key for v in study.vary for key in v.all_keys}
     if not any(key.startswith("motor") or key == "gearbox.ratio" or kind_of_record(key) for key in keys):
         return np.full(len(runs.errors), of(base))

@@ -57,8 +57,7 @@ def core_can(study: Study) -> bool:
 
 def run_in_core(study: Study, parameters: np.ndarray, threads: int) -> Runs:
     """All runs in one call, the GIL released."""
-    s = study.scenario
-    assert isinstance(s, DriveScenario)
+    s = study.drive
     sampled, reduced = channels(study), reductions(study)
     keys = [(key, v, k) for k, v in enumerate(study.vary) for key in v.all_keys]
     values = np.empty((len(parameters), len(keys)))

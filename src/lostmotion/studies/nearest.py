@@ -10,7 +10,6 @@ import numpy as np
 
 from ..control.references import PositionReference
 from ..errors import InputError
-from ..simulation.scenario import DriveScenario
 from .axis import AxisTask, reference_of
 from .axis_rows import NO_DATA, Axes
 from .selection import Candidate
@@ -76,9 +75,8 @@ def slowed(study: Study, factor: float) -> Study:
     InputError
         The motion has parts that cannot be stretched, such as a target in space.
     """
-    task, base = study.axis, study.scenario
+    task, base = study.axis, study.drive
     assert task is not None
-    assert isinstance(base, DriveScenario)
     assert base.controller is not None
     reference = _slowed_reference(reference_of(base), factor)
     torque = _slowed_signal(base.load.torque, factor)
@@ -182,8 +180,7 @@ def _said(study: Study, slower: Study, row: np.ndarray, factor: float) -> str:
     assert before is not None
     assert after is not None
     assert study.select is not None
-    assert isinstance(study.scenario, DriveScenario)
-    moves = reference_of(study.scenario).intervals()
+    moves = reference_of(study.drive).intervals()
     longest = max((b - a for a, b in moves), default=0.0)
     what = f"its longest move {factor * longest:.4g} s instead of {longest:.4g} s" if longest else ""
     times = f"the cycle takes {after.cycle:.4g} s instead of {before.cycle:.4g} s{', ' if what else ''}{what}"

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from fnmatch import fnmatchcase
 from typing import Any
 
-from ..data_sheets.components import Conditions
 from ..data_sheets.records import KINDS, called, catalogue, find
 from ..data_sheets.sheet import in_current_words
 from ..data_sheets.train_components import CONDITIONS, RECORD_KINDS, RECORDS, without_record
 from ..errors import InputError
 from ..inputs.schema import unit_in_schema
 from ..inputs.validation import listed, shown
-from ..simulation.scenario import DriveScenario, Scenario
+from ..simulation.scenario import Scenario
 from ..simulation.scenario_files import scenario_from
 from ..simulation.units_of_keys import in_si
 
@@ -51,17 +50,6 @@ def owner_of(key: str) -> str:
     found = next((m for p in (*_RECORD_KEYS.values(), _CONDITION) if (m := p.fullmatch(key))), None)
     assert found is not None, key
     return str(next(group for group in found.groups() if group not in (None, ".from")))
-
-
-def record_keys(scenario: Scenario) -> Iterator[str]:
-    """The keys of a scenario that take names of records, and the conditions of their use."""
-    if isinstance(scenario, DriveScenario):
-        yield from ("gearbox", "motor", *(f"gearbox.{name}" for name in Conditions.model_fields))
-        return
-    for table, (key, _) in RECORDS.items():
-        beside = CONDITIONS[table].model_fields if table in CONDITIONS else ()
-        for name in getattr(scenario, table):
-            yield from (f"{table}.{name}.{key}" for key in (key, *beside))
 
 
 def name_key(part: str) -> str:

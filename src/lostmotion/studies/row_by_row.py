@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..simulation.core_runs import core_case
 from ..simulation.pointing_error import pointing_errors
 from ..simulation.run import run
-from ..simulation.scenario import DriveScenario
+from ..simulation.scenario import Scenario
 from ..simulation.train_parts import parts_of
 from ..simulation.train_scenario import TrainScenario
 from ..simulation.windings import bound_values
@@ -25,9 +25,8 @@ from .wanted import asks_for, channels, checks_drives, needed, reductions
 
 def run_each(study: Study, parameters: np.ndarray, threads: int) -> Runs:
     """Each as a run of its own, several at a time: drives, what has controllers, and trains of several parts."""
-    drives = isinstance(study.scenario, DriveScenario)
     n, samples = len(parameters), study.scenario.simulation.samples
-    sampled = channels(study) if drives else sorted(needed(study))
+    sampled = sorted(needed(study))
     energy, checked = asks_for(study, "energy"), checks_drives(study)
     entries = study.vocabulary.energies if energy else ()
     runs = Runs(
@@ -38,7 +37,6 @@ def run_each(study: Study, parameters: np.ndarray, threads: int) -> Runs:
         checks={name: [empty] * n for name, empty in COLUMNS.items()} if checked else {},
         switchings=np.zeros(n),
         errors=[""] * n,
-        ratio=np.full(n, study.scenario.gearbox.ratio if isinstance(study.scenario, DriveScenario) else np.nan),
     )
 
     def make(k: int) -> None:
@@ -60,8 +58,6 @@ def run_each(study: Study, parameters: np.ndarray, threads: int) -> Runs:
         for name, value in checks.items():
             runs.checks[name][k] = value
         runs.switchings[k] = result.attrs["switching_count"]
-        if isinstance(scenario, DriveScenario):
-            runs.ratio[k] = scenario.gearbox.ratio
 
     if threads == 1:
         for k in range(n):
@@ -83,11 +79,11 @@ def run_trains(study: Study, parameters: np.ndarray, threads: int) -> Runs:
     n, table = len(parameters), study.scenario.simulation
     sampled, reduced = channels(study), reductions(study)
     entries = study.vocabulary.energies if asks_for(study, "energy") else ()
-    trains: dict[int, TrainScenario] = {}
+    trains: dict[int, Scenario] = {}
     errors = [""] * n
     for k, row in enumerate(parameters):
         try:
-            trains[k] = study.train_at(row)
+            trains[k] = study.scenario_at(row)
         except InputError as error:
             errors[k] = str(error)
     where = np.array(list(trains), dtype=int)
@@ -116,11 +112,10 @@ def run_trains(study: Study, parameters: np.ndarray, threads: int) -> Runs:
         checks=checks,
         switchings=np.nan_to_num(spread(switchings, where, n)),
         errors=errors,
-        ratio=np.full(n, np.nan),
     )
 
 
-def _checks_of(trains: dict[int, TrainScenario], errors: list[str]) -> dict[str, list[float | str]]:
+def _checks_of(trains: dict[int, Scenario], errors: list[str]) -> dict[str, list[float | str]]:
     """The drive check of each run; where there is none, the run's error says why."""
     checks = {name: [empty] * len(errors) for name, empty in COLUMNS.items()}
     for k, scenario in trains.items():
@@ -137,7 +132,7 @@ def _checks_of(trains: dict[int, TrainScenario], errors: list[str]) -> dict[str,
 
 
 def _samples(
-    study: Study, trains: dict[int, TrainScenario], made: dict[str, np.ndarray], errors: list[str]
+    study: Study, trains: dict[int, Scenario], made: dict[str, np.ndarray], errors: list[str]
 ) -> dict[str, np.ndarray]:
     """The needed variables (runs x samples), what follows from the channels included."""
     wanted = sorted(needed(study))

@@ -9,7 +9,7 @@ import numpy as np
 
 class Runs(SimpleNamespace):
     """Results of a chunk: parameters (runs x parameters), samples (variable -> runs x samples), what the core has made of them instead
-    (column -> runs), energy (entry -> runs), columns of the drive check, switchings, errors; of drives the ratio (runs)."""
+    (column -> runs), energy (entry -> runs), columns of the drive check, switchings, errors; of drives that the core varies, the ratio (runs)."""
 
     parameters: np.ndarray
     samples: dict[str, np.ndarray]

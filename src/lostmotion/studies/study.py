@@ -8,10 +8,11 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
+from ..errors import InputError
 from ..inputs.part import Part
 from ..inputs.quantities import Whole
 from ..inputs.validation import listed
-from ..simulation.scenario import DriveScenario, Scenario
+from ..simulation.scenario import DriveScenario, Scenario, short_form
 from ..simulation.train_scenario import TrainScenario
 from ..simulation.units_of_keys import unit_in, unit_of_key
 from ..sizing.stages import stage_of, together
@@ -103,12 +104,16 @@ class Study(Part):
     def _check_axis(self, task: AxisTask) -> None:
         if self.keep or self.trajectories is not None:
             raise ValueError("has keep or trajectories, but a task keeps columns of its own; leave them out")
-        if not isinstance(self.scenario, DriveScenario):
-            raise ValueError("is the task of a drive train, but only a drive can be selected; write the short form")
+        try:
+            drive = self.drive
+        except InputError:
+            raise ValueError(
+                "is the task of a drive train, but only a drive can be selected; write the short form"
+            ) from None
         for key in (key for v in self.vary for key in v.all_keys):
             if key.split(".", maxsplit=1)[0] not in ("gearbox", "motor") and not self._is_stage(key):
                 raise ValueError(f"varies {key}, but of a task motor, gearbox and stage vary; change it in the task")
-        task.check(self.scenario)
+        task.check(drive)
 
     def _is_stage(self, key: str) -> bool:
         """Whether it is the key of the last stage of a linear task."""
@@ -155,10 +160,10 @@ class Study(Part):
             raise ValueError(f"{expression.text!r} reads a sample that a run of {table.samples} does not have")
         if any(not 0.0 <= t <= table.duration for t in expression.instants):
             raise ValueError(f"{expression.text!r} reads an instant outside the {table.duration} s of a run")
-        if "ideal_speed" not in expression.names or not isinstance(self.scenario, DriveScenario):
+        if "ideal_speed" not in expression.names:  # which expressions of trains do not know
             return
         motor_varies = any(kind_of_record(key) == "motor" for v in self.vary for key in v.all_keys)
-        if self.scenario.motor.kind == "torque_source" and not motor_varies:
+        if self.drive.motor.kind == "torque_source" and not motor_varies:
             raise ValueError(
                 "ideal_speed needs a motor of kind dc or synchronous; a torque source has no speed of its own"
             )
@@ -190,7 +195,7 @@ class Study(Part):
                         "out; name a record there, or vary that too"
                     )
             check_key(scenario, key, relative=relative)
-            if isinstance(scenario, TrainScenario) and unit_in(TrainScenario, key) != unit_of_key(key):
+            if unit_in(type(scenario), key) != unit_of_key(key):
                 raise ValueError(f"varies {key}, which is a key of the short form, too; rename that element")
 
     def _with_first_records(self) -> Scenario:
@@ -219,6 +224,11 @@ class Study(Part):
         return self.written or self.scenario.model_dump()
 
     @property
+    def drive(self) -> DriveScenario:
+        """The base of a task, or of a study of a drive."""
+        return short_form(self.scenario, "study")
+
+    @property
     def vocabulary(self) -> Vocabulary:
         """Names that its expressions may use."""
         if self._vocabulary is None:
@@ -245,10 +255,9 @@ class Study(Part):
         """
         motor, gearbox = self.part("motor", row), self.part("gearbox", row)
         assert self.axis is not None
-        assert isinstance(self.scenario, DriveScenario)
         if self.axis.linear is not None:
             gearbox = together(gearbox, self.part("stage", row))
-        return axis_scenario(self.scenario, motor, gearbox, self.axis, cycles)
+        return axis_scenario(self.drive, motor, gearbox, self.axis, cycles)
 
     def part_key(self, kind: str, row: np.ndarray) -> tuple[Any, ...]:
         """Column of a row that determines its ``"gearbox"`` or its ``"motor"``."""
@@ -295,15 +304,7 @@ class Study(Part):
 
     def drive_at(self, row: np.ndarray) -> DriveScenario:
         """The same, of a study of a drive."""
-        found = self.scenario_at(row)
-        assert isinstance(found, DriveScenario)
-        return found
-
-    def train_at(self, row: np.ndarray) -> TrainScenario:
-        """The same, of a study of a drive train."""
-        found = self.scenario_at(row)
-        assert isinstance(found, TrainScenario)
-        return found
+        return short_form(self.scenario_at(row), "study")
 
     def _with_records(self, records: dict[str, Any]) -> Scenario:
         """The base with other records; the last ones are kept, since other parameters may vary beside them."""

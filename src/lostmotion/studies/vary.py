@@ -20,7 +20,7 @@ from ..reproducible import exp, log
 from ..simulation.keys import list_index
 from ..simulation.scenario import Scenario
 from ..simulation.units_of_keys import in_si, unit_in, unit_of_key
-from .records import check_names, is_condition, kind_of_record, names_that_fit, record_keys
+from .records import check_names, is_condition, kind_of_record, names_that_fit
 
 MAX_LEVELS = 1_000_000  # of one parameter
 TAKING_NAMES = ("gearbox", "motor", *(f"{table}.NAME.{key}" for table, (key, _) in RECORDS.items()))
@@ -208,7 +208,7 @@ def _may_be_left_out(scenario: Scenario, key: str) -> bool:
 
 def near_key(scenario: Scenario, key: str) -> str:
     """The key of a scenario of the same name in the same table or within it, or that was misspelt as this one; empty if none is."""
-    known = [*_keys(scenario.model_dump(), ""), *record_keys(scenario)]
+    known = [*_keys(scenario.model_dump(), ""), *scenario.record_keys()]
     first, dot, _ = key.partition(".")
     table = nearest(first, {k.split(".")[0] for k in known}) if dot else None  # left out, it may be any
     same = [k for k in known if k.rpartition(".")[2] == key.rpartition(".")[2] and table in (None, k.split(".")[0])]

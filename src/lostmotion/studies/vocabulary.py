@@ -8,11 +8,12 @@ from typing import NamedTuple
 from ..simulation.pointing_error import pointing_names
 from ..simulation.results import ENERGY
 from ..simulation.scenario import DriveScenario, Scenario
-from ..simulation.train_variables import axis_variables, train_variables
+from ..simulation.train_variables import axis_variables
 from ..simulation.variables import CHANNEL_NAMES, VARIABLES
 from ..simulation.windings import bound_names
 
-OF_THE_RUN = ("energy", "time", "ideal_speed", "bandwidth")
+OF_TRAINS = ("energy", "time")
+OF_THE_RUN = (*OF_TRAINS, "ideal_speed", "bandwidth")
 """further names: the ledger; the instants; the load speed of a rigid drive without inertia, friction and load under the same
 command; the bandwidth [Hz] of the load speed, a function of the command's amplitude (left out: the run's own)"""
 
@@ -53,16 +54,10 @@ def vocabulary_of(scenario: Scenario) -> Vocabulary:
 
     An entry of a train's ledger, such as ``first_gear: mesh``, is called ``first_gear_mesh``.
     """
-    if isinstance(scenario, DriveScenario):
-        if scenario.controller is None:
-            return OF_DRIVES
-        return OF_DRIVES._replace(variables=(*OF_DRIVES.variables, *_controlled(scenario)))
-    core = scenario.core()
-    variables = train_variables(scenario.train(), core)
-    entries = core.ledger_names()
+    variables = scenario.variables()
     return Vocabulary(
         (*((v.name, v.unit) for v in variables), *_controlled(scenario)),
         tuple(v.name for v in variables if not v.derived),
-        tuple((entry.replace(": ", "_").replace(" ", "_"), entry) for entry in entries),
-        ("energy", "time"),
+        tuple((entry.replace(": ", "_").replace(" ", "_"), entry) for entry in scenario.core().ledger_names()),
+        OF_THE_RUN if isinstance(scenario, DriveScenario) else OF_TRAINS,
     )

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from ..simulation.train_scenario import TrainScenario
-from ..simulation.variables import VARIABLES
 from .study import Study
 
-DERIVED = frozenset(v.name for v in VARIABLES if v.derived)
 SOURCES = {
     "efficiency": ("output_torque", "input_torque", "motor_speed"),
     "motor_power": ("motor_torque", "motor_speed"),
@@ -40,11 +37,10 @@ def reductions(study: Study) -> dict[str, tuple[str, str]]:
 def channels(study: Study) -> list[str]:
     """The channels of the core that the needed variables are made of."""
     wanted = needed(study)
-    if not isinstance(study.scenario, TrainScenario):
-        return sorted({channel for name in wanted for channel in SOURCES.get(name, (name,))})
     given = study.vocabulary.channels
-    if wanted <= set(given):
-        return sorted(wanted)
+    found = {channel for name in wanted for channel in SOURCES.get(name, (name,))}
+    if found <= set(given):
+        return sorted(found)
     # Angles that follow do so through the gears, from angle to angle.
     return [name for name in given if name in wanted or name.endswith(("_angle", "_twist"))]
 
