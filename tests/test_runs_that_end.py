@@ -192,3 +192,34 @@ def test_an_interruption_ends_any_run_within_a_second(name: str) -> None:
     with interrupted_after(1.0), pytest.raises(AlarmError):
         LONG[name]()
     assert time.perf_counter() - begin < 2.0
+
+
+@pytest.mark.parametrize("inertia", [0.0, 1e-10, 1e-18, 1e-20, 1e-30])
+@pytest.mark.parametrize("brake", [0.0, 1.0])
+def test_a_shaft_of_almost_no_inertia_costs_no_steps(inertia: float, brake: float) -> None:
+    """Sun and carrier at a ratio of 2.5, three more shafts behind them, one of them light: 20 N·m on the inertia of them all."""
+    scenario = lm.TrainScenario(
+        shafts={
+            "sun": {"inertia": 1.0},
+            "ring": {"inertia": 1.0},
+            "carrier": {"inertia": 10.0},
+            "light": {"inertia": inertia},
+            "tail": {"inertia": 3.0},
+        },
+        motors={"m": {"shaft": "sun", "kind": "torque_source", "rotor_inertia": 0.0}},
+        gears={
+            "p": {"input": "sun", "output": "carrier", "housing": "ring", "ratio": 2.5},
+            "g": {"input": "carrier", "output": "light", "ratio": 3.0},
+            "h": {"input": "light", "output": "tail", "ratio": -0.5},
+        },
+        brakes={"b": {"shaft": "ring", "torque": 1000.0}, "s": {"shaft": "tail", "torque": 1.0}},
+        command={"m": 20.0, "b": 1.0, "s": brake},
+        simulation={"duration": 1.0, "sample_interval": 0.5},
+    )
+    result = lm.simulate(scenario)
+    # The tail turns at -2/3 of the carrier, against its brake.
+    on_sun = 1.0 + (10.0 + inertia / 3.0**2 + 3.0 * (2.0 / 3.0) ** 2) / 2.5**2
+    torque = 20.0 - brake * (2.0 / 3.0) / 2.5
+    assert float(result["sun_speed"][-1]) == pytest.approx(torque / on_sun, rel=1e-13)
+    assert result.attrs["steps"] < 100
+    assert abs(lm.energy_of(result)["residual"]) < 1e-10

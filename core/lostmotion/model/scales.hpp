@@ -55,6 +55,11 @@ void rated_scale(const Assembly& a, State& s) {
     for (std::size_t k = 0; k < train.controllers.size(); ++k) controller_scale(a, static_cast<int>(k), 1.0, s);
 }
 
+// Least inertia [kg m^2] of the input of a rigid gear in the size of an angle behind it. The size is arbitrary there,
+// as no rate depends on an angle, but the norm is at least its inverse: a shaft of almost no inertia shortens all
+// steps.
+inline constexpr double least_inertia = 1e-10;
+
 // Sizes in which the coupling of the equations is balanced: all shafts and twists with like energy, from the first
 // motor on. They serve to measure rates by a matrix norm, nothing else. angle: of the parts of the train.
 template <class State>
@@ -81,7 +86,7 @@ void balanced_scale(const Assembly& a, State& s, int first_angle) {
         double twist;
         if (gear.rigid()) {
             out = in / i;
-            twist = out * J;
+            twist = out * std::fmax(J, least_inertia);
         } else {
             const double k = gear.law.curve.max_slope();
             twist = in / i / std::sqrt(k / (i * i * J));
