@@ -207,6 +207,28 @@ def test_an_integrator_at_a_limit_below_the_break_away_is_at_rest() -> None:
     assert found.verdict == "at rest"
 
 
+@pytest.mark.parametrize("speed", [1e-2, 1e-4, 1e-6])
+def test_a_load_that_drifts_through_its_gap_is_not_at_rest(speed: float) -> None:
+    """All contacts are stuck and no controller moves, but the load flies on without friction until it meets a flank."""
+    axis = one_inertia(
+        friction=0.05,
+        breakaway=0.05,
+        height=0.001,
+        position={"gain": 10.0},
+        speed={"gain": 0.02},
+        encoder={"ideal": True, "shaft": "rotor"},
+        duration=10.0,
+    )
+    data = geared(axis, 0.5, 0.0).model_dump(exclude_none=True)
+    del data["controllers"]["m"]["position_encoder"]
+    data["shafts"]["load"]["viscous_friction"] = 0.0
+    scenario = lm.TrainScenario(**data | {"initial": {"speeds": {"load": speed}}})
+    assert float(lm.simulate(scenario)["load_angle"][-1]) == pytest.approx(10.0 * speed, rel=1e-9)
+    found = at_rest(axis_of(scenario), 100.0)
+    assert found.verdict != "at rest"
+    assert found.amplitude > 0.0
+
+
 def test_an_unstable_loop_is_named_with_its_frequency() -> None:
     """A rigid drive under a proportional speed loop with one sample time of delay: the limit is 2 (sqrt 2 - 1) J/T, at f_s/8."""
     T, J = 125e-6, 1e-4

@@ -96,6 +96,7 @@ class Watch:
         self.tick, ticks = frame_of(scenario) if sampled else (0.0, 0)
         self.frame = self.tick * ticks
         self._running = list(running_slots(self.simulation._control))
+        self._speeds = tuple(f"{name}_speed" for name in (*scenario.shafts, *scenario.slides))
         self._skipped = 0.0
         self.times = np.zeros(0)
         self.rows = np.zeros((0, len(self.names)))
@@ -167,9 +168,10 @@ class Watch:
         return np.array([*x, *memory, *np.delete(control[1:], self._running)]), tuple(key)
 
     def _look(self) -> _Look | None:
-        """The state now; None where a contact slips."""
+        """The state now; None where a contact slips, or a shaft without friction moves, which may reach a flank of its gap."""
         contacts = explain(self.simulation).contacts
-        creep = max((abs(c.speed) for c in contacts if c.mode != 0), default=0.0)
+        speeds = [abs(c.speed) for c in contacts if c.mode != 0]
+        creep = max((*speeds, *np.abs(self.simulation[self._speeds])))
         if creep > CREEP * self.magnitude.max(initial=0.0):
             return None
         stuck = [c for c in contacts if c.mode == 0 and math.isfinite(c.capacity_forward)]
