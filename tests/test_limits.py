@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -172,6 +172,43 @@ def test_an_observer_of_the_speed_stays_right_at_the_voltage_limit(kind: str) ->
     error = (run["m_measured_speed"] - run["rotor_speed"]).to_numpy()
     assert float(run["m_torque"].to_numpy()[-1]) < 0.1 * line.stall
     assert np.abs(error).max() < 0.5
+
+
+@pytest.mark.parametrize("within", ["speed", "torque", "voltage"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_integrator_of_a_position_winds_up_on_random_axes(kind: str, within: str) -> None:
+    """Sample times over a range of 32, time constants over one of 80, both ways: the speed reference turns around with the reference."""
+    rng = np.random.default_rng(100 + 10 * KINDS.index(kind) + len(within))
+    for n in range(10):
+        line, T, tau, turn, _ = random_axis(rng, kind, "position")
+        line = replace(line, most=0.3 * line.stall if within == "torque" else math.inf)
+        at, way = round(turn / T), 1.0 if n % 2 else -1.0
+        scenario = axis(line, kind, "position", T, tau, at * T, (at + 20) * T, way)
+        if within == "speed":
+            scenario["controllers"]["m"]["position"]["speed_limit"] = 0.2 * line.no_load
+        run = lm.simulate(lm.TrainScenario(**scenario), energy=False)
+        reference = way * run["m_speed_reference"].to_numpy()
+        assert reference[at - 1] > 0.0, (n, line, T, tau)
+        assert reference[at + 2] < 0.0, (n, line, T, tau)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_observers_stay_right_at_limits_on_random_axes(kind: str) -> None:
+    """Up and back at the limit: the torque of the observer is late by samples and time constants, and by nothing else.
+
+    With the torque of the reference the speed of such an observer would err by 2 zeta (M* - M)/(J w_o), 70 of the larger
+    of the two times under the torque of standstill.
+    """
+    rng = np.random.default_rng(200 + KINDS.index(kind))
+    for n in range(20):
+        line, T, tau, turn, end = random_axis(rng, kind, "torque")
+        line = replace(line, most=line.stall)
+        scenario = axis(line, kind, "speed", T, tau, turn, end, 1.0 if n % 2 else -1.0)
+        observer = {"kind": "observer", "bandwidth": 0.02 / max(T, tau), "inertia": line.inertia}
+        scenario["controllers"]["m"]["speed"]["estimate"] = observer
+        run = lm.simulate(lm.TrainScenario(**scenario), energy=False)
+        error = np.abs(run["m_measured_speed"] - run["rotor_speed"]).to_numpy().max()
+        assert error * line.inertia / line.stall < lag(T, tau), (n, line, T, tau)
 
 
 def test_what_an_inverse_model_adapts_does_not_wind_up_at_a_limit() -> None:
