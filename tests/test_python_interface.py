@@ -241,7 +241,7 @@ def test_several_variables_come_as_an_array_and_a_wrong_name_is_told() -> None:
     pair = simulation["load_speed", "efficiency"]
     assert pair.tolist() == [simulation["load_speed"], simulation["efficiency"]]
     assert simulation[["load_speed", "efficiency"]].tolist() == pair.tolist()
-    with pytest.raises(lm.InputError, match='"load_sped" is no variable; the variables are command, '):
+    with pytest.raises(lm.InputError, match='"load_sped" is no variable; did you mean load_speed\\?'):
         simulation["load_sped"]
 
 

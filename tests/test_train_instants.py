@@ -175,7 +175,7 @@ REFUSED = [
     (lambda s: s.advance(1e-3, motor_command=math.nan), "motor_command: nan must be a finite number"),
     (lambda s: s.advance(0.0, motor_command=0.0), "interval 0.0 s must lie between"),
     (lambda s: s.advance("x", motor_command=0.0), 'interval: "x" is not one number with one unit'),
-    (lambda s: s["rotor_sped"], '"rotor_sped" is no variable; the variables are motor_command, '),
+    (lambda s: s["rotor_sped"], '"rotor_sped" is no variable; did you mean rotor_speed?'),
     (lambda s: s.reset(lm.Initial()), "initial: is the state of a drive; that of a train is a TrainInitial"),
     (lambda s: s.reset(lm.TrainInitial(speeds={"x": 1.0})), "key initial.speeds.x: is no shaft of this train"),
     (lambda s: setattr(s, "state", lm.Simulation(BELT).state), "is the state of another drive"),

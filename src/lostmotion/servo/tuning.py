@@ -26,7 +26,7 @@ from ..errors import InputError, need
 from ..inputs.arguments import ScenarioName, checked
 from ..inputs.quantities import Angle, Number
 from ..inputs.schema import follow, unit_in_schema
-from ..inputs.validation import shown
+from ..inputs.validation import did_you_mean, shown
 from ..simulation.axis_form import file_schema
 from ..simulation.keys import parse_override
 from ..simulation.linear_units import unit_of_slides
@@ -260,7 +260,8 @@ def tune(
     '0.01991 N·m/(rad/s)'
     """
     if rule not in RULES:
-        raise InputError(f"rule: {shown(rule)} is not known; take one of {', '.join(RULES)}")
+        hint = did_you_mean(str(rule), RULES, f"take one of {', '.join(RULES)}")
+        raise InputError(f"rule: {shown(rule)} is not known; {hint}")
     if goal not in GOALS:
         raise InputError(f"goal: {shown(goal)} is not known; take {' or '.join(GOALS)}")
     if not damping > 0.0:

@@ -20,7 +20,7 @@ from ..control.law import as_laws
 from ..errors import InputError
 from ..inputs.arguments import checked, misfit
 from ..inputs.quantities import Time, argument
-from ..inputs.validation import did_you_mean, listed, shown
+from ..inputs.validation import did_you_mean, shown
 from ..model.couplings import FULL_COMMAND
 from ..model.drive import Drive
 from ..model.mass_matrix import MassMatrix
@@ -566,8 +566,9 @@ class Simulation:
                 return self._core.control_signals()[self._signals[name]]
             return values[channel] if channel is not None else self._derived[name](values)
         except (KeyError, TypeError):  # unknown, or nothing that could be a name
-            known = listed(v.name for v in self._variables)
-            raise InputError(f"{shown(name)} is no variable; the variables are {known}") from None
+            names = [v.name for v in self._variables]
+            hint = did_you_mean(str(name), names, f"the variables are {', '.join(names)}")
+            raise InputError(f"{shown(name)} is no variable; {hint}") from None
 
     def read(self) -> dict[str, float]:
         """All result variables (SI), by name."""
