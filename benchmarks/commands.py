@@ -26,10 +26,10 @@ COMMANDS = (
     ("run position-axis --plot run.png", 3),
     ("drive check catalogue-robot-joint", 5),
     ("rig schaeffler-rt1-h-20-100", 2),
-    ("response paper-2dof-nl-small", 2),
+    ("response paper-2dof-nl-small -o response", 2),
     ("servo position-axis", 1),
     ("track direction-finder", 1),
-    ("reproduce", 1),
+    ("reproduce -o out", 1),
 )
 # Processor time of the outermost imports, printed behind all else.
 IMPORTS = """

@@ -233,6 +233,7 @@ SLOW = DATASETS | NETCDF | FIGURES | {"pint", "scipy", "control", "SALib", "dist
         ("rig", "schaeffler-rt1-h-20-100"),
         ("drive", "check", "catalogue-robot-joint"),
         ("response", SMALL),
+        ("reproduce", "-o", "out"),
         ("reproduce",),
     ],
     ids=" ".join,
@@ -278,7 +279,11 @@ def test_a_study_imports_no_slow_library_before_it_computes(tmp_path: Path, desi
     (tmp_path / "s.toml").write_text(STUDY.format(design=design))
     script = STOPS_AT_THE_FIRST_COMPUTATION.replace('m.partition(".")[0]', "m")
     done = subprocess.run(
-        [sys.executable, "-c", script, "study", "s.toml"], cwd=tmp_path, capture_output=True, text=True, check=True
+        [sys.executable, "-c", script, "study", "s.toml", "-o", "s"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
     )
     word, _, *modules = done.stdout.split()
     assert word == "computes"
@@ -290,9 +295,9 @@ def test_the_engine_of_sobol_points_is_imported_behind_all_checks_and_the_progre
     (tmp_path / "bad.toml").write_text(STUDY.format(design="sobol").replace("runs = 8", "runs = -8"))
     script = SAYS_WHEN_IT_IMPORTS + STOPS_AT_THE_FIRST_COMPUTATION
     call = [sys.executable, "-c", script, "study"]
-    done = subprocess.run([*call, "s.toml"], cwd=tmp_path, capture_output=True, text=True, check=True)
+    done = subprocess.run([*call, "s.toml", "-o", "s"], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "imports, progress shown: True"
-    done = subprocess.run([*call, "bad.toml"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = subprocess.run([*call, "bad.toml", "-o", "bad"], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert "key runs: -8 must be at least 1" in done.stderr
     assert done.stdout == ""

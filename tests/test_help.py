@@ -1,6 +1,7 @@
 """The examples of `--help`: each command has one that runs from a checkout, leaves only what it names, and prints at most a screen."""
 
 import inspect
+import re
 import shlex
 from pathlib import Path
 from typing import Any
@@ -65,3 +66,41 @@ def test_the_help_of_a_command_has_an_example_that_runs(
     if name not in (("schema",), ("scenarios",), ("catalogue",)):  # lists, whose length is that of their subject
         assert len(done.stdout.splitlines()) <= SCREEN
     assert "-0.0 " not in done.stdout
+
+
+UNASKED = [
+    ("response", "paper-2dof-nl-small", "--amplitudes", "0.025,1", "--frequencies", "1,2,3"),
+    ("rig", "schaeffler-rt1-h-20-100"),
+    ("run", "paper-2dof-nl-small"),
+    ("drive", "check", "catalogue-robot-joint"),
+    ("reproduce",),
+    ("monitor", str(ROOT / "examples" / "cycloidal" / "baseline.toml")),
+]
+
+
+@pytest.mark.parametrize("call", UNASKED, ids=lambda call: call[0])
+def test_a_command_writes_only_what_it_is_asked_for_and_names_the_next_one(
+    call: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, list(call))
+    assert done.exit_code == 0, done.output
+    assert list(tmp_path.iterdir()) == []
+    lines = done.stdout.splitlines()
+    assert len(lines) <= SCREEN
+    assert "lostmotion " in lines[-1]
+    assert not re.search(r"[-+]?\d(\.\d+)?e-1[2-9]", done.stdout), "rounding is printed as 0"
+
+
+@pytest.mark.parametrize(
+    "call", [("study", "examples/tolerance.toml"), ("select", "examples/select-axis.toml")], ids=" ".join
+)
+def test_commands_that_resume_need_the_directory_of_their_runs(
+    call: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, list(call))
+    assert done.exit_code == 1
+    assert f"name the directory of the runs, as in `-o {Path(call[1]).stem}`" in str(done.exception)
+    assert {path.name for path in tmp_path.iterdir()} == {"examples"}

@@ -99,9 +99,13 @@ def test_a_response_leaves_out_only_the_file_that_it_cannot_write(tmp_path: Path
     [
         (("run", "paper-2dof-nl-small", "-o", "a.nc"), "h5netcdf", "netcdf"),
         (("run", "paper-2dof-nl-small", "-o", "a.parquet"), "pyarrow", "study"),
-        (("reproduce",), "jinja2", "report"),
-        (("study", str(ROOT / "examples" / "tolerance.toml")), "pyarrow", "study"),
-        (("study", str(ROOT / "examples" / "tolerance.toml"), "--scheduler", "tcp://a:1"), "distributed", "cluster"),
+        (("reproduce", "-o", "out"), "jinja2", "report"),
+        (("study", str(ROOT / "examples" / "tolerance.toml"), "-o", "t"), "pyarrow", "study"),
+        (
+            ("study", str(ROOT / "examples" / "tolerance.toml"), "-o", "t", "--scheduler", "tcp://a:1"),
+            "distributed",
+            "cluster",
+        ),
     ],
     ids=lambda v: " ".join(v[:2]) if isinstance(v, tuple) else None,
 )

@@ -218,7 +218,7 @@ def test_the_command_writes_its_sheet(tmp_path: Path) -> None:
     done = CliRunner().invoke(app, ["track", "tracking-loss-map", "-o", str(tmp_path / "sheet"), *changes])
     assert done.exit_code == 0, done.output
     assert "without hysteresis" in done.output
-    assert "rms [mrad]" in done.output
+    assert "rms [µrad]" in done.output
     assert "in view 100 %" in done.output
     made = {p.name for p in (tmp_path / "sheet").iterdir()}
     assert made == {"track.html", "budget.csv", "contributions.csv", "errors.csv", "speed.csv", "robustness.csv"}

@@ -405,7 +405,10 @@ def test_the_command_writes_table_and_front(tmp_path: Path):
     command = [sys.executable, "-m", "lostmotion", "select", "task.toml", "-o", "rows"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
     assert "of 2 fit" in done.stdout
-    assert {p.name for p in (tmp_path / "rows-figures").iterdir()} >= {"study.html", "selection.csv", "limits.csv"}
+    shown = [*command[:3], "study", "show", "rows", "-o", "page"]
+    subprocess.run(shown, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert {p.name for p in (tmp_path / "page").iterdir()} >= {"study.html", "selection.csv", "limits.csv"}
+    assert {p.name for p in tmp_path.iterdir()} == {"task.toml", "rows", "page"}
     missing = subprocess.run([*command[:4], "none.toml"], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert missing.returncode == 1
     assert missing.stderr.startswith("lostmotion: none.toml: there is no such file")

@@ -654,10 +654,19 @@ def test_show_and_best_from_the_command_line(tmp_path: Path):
     out = tmp_path / "t"
     done = CliRunner().invoke(app, ["study", str(ROOT / "examples" / "tolerance.toml"), "-o", str(out)])
     assert done.exit_code == 0, done.output
-    shown = CliRunner().invoke(app, ["study", "show", str(out), "--best", "stuck_share", "--figures", "png"])
+    assert "stuck_share" in done.output and "std. dev." in done.output  # the summary
+    assert f"lostmotion study show {out} -o t-report" in done.output.replace("\n", "")
+    assert {p.name for p in tmp_path.iterdir()} == {"t"}
+    within = CliRunner().invoke(app, ["study", "show", str(out), "-o", str(out / "page")])
+    assert within.exit_code == 1
+    assert isinstance(within.exception, lm.InputError)
+    assert "is within the directory of the runs" in str(within.exception)
+    shown = CliRunner().invoke(
+        app, ["study", "show", str(out), "--best", "stuck_share", "-o", str(tmp_path / "page"), "--figures", "png"]
+    )
     assert shown.exit_code == 0, shown.output
     assert "256 of 256 runs, 0 failed" in shown.output
-    assert {p.name for p in (tmp_path / "t-figures").iterdir()} >= {
+    assert {p.name for p in (tmp_path / "page").iterdir()} >= {
         "study.html",
         "statistics.csv",
         "distributions.png",
@@ -667,7 +676,7 @@ def test_show_and_best_from_the_command_line(tmp_path: Path):
     import pandas as pd
 
     table = read_table(out)
-    page = (tmp_path / "t-figures" / "study.html").read_text()
+    page = (tmp_path / "page" / "study.html").read_text()
     assert not Page(page).faults
     first = next(chart for chart in charts(page) if chart["title"] == "stuck_share over motor.friction_torque")
     assert np.array_equal(first["lines"][0]["x"], table["motor.friction_torque"].to_numpy())

@@ -71,7 +71,9 @@ def test_a_slow_study_shows_progress_within_a_chunk(tmp_path: Path):
 
 def test_the_command_line_shows_the_selection(selection: tuple[lm.studies.Study, Path]):
     _, directory = selection
-    done = CliRunner().invoke(app, ["study", "show", str(directory), "--best", "energy:largest"])
+    done = CliRunner().invoke(
+        app, ["study", "show", str(directory), "--best", "energy:largest", "-o", str(directory.with_name("page"))]
+    )
     assert done.exit_code == 0, done.output
     for text in (
         "Selection: ",
@@ -82,7 +84,7 @@ def test_the_command_line_shows_the_selection(selection: tuple[lm.studies.Study,
         "Largest energy [J]",
     ):
         assert text in done.output
-    figures = directory.with_name("rows-figures")
+    figures = directory.with_name("page")
     assert {"study.html", "selection.csv", "limits.csv"} <= {p.name for p in figures.iterdir()}
     assert {p.suffix for p in directory.iterdir()} == {".parquet", ".json", ".txt"}
     with (figures / "selection.csv").open() as file:

@@ -138,7 +138,7 @@ def test_a_constant_load_torque_varies_in_its_own_unit(tmp_path: Path):
 def test_runs_that_fail_are_counted_on_the_command_line(tmp_path: Path):
     path = write(tmp_path, '[[vary]]\nkey = "gearbox.temperature"\nvalues = ["20 degC", "40 degC"]')
     done = subprocess.run(
-        [sys.executable, "-m", "lostmotion", "study", str(path)],
+        [sys.executable, "-m", "lostmotion", "study", str(path), "-o", path.stem],
         cwd=tmp_path, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 1

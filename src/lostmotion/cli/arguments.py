@@ -71,6 +71,12 @@ Overrides = Annotated[
         help='Change a value, e.g. --set command.amplitude=0.1 or "load.inertia=1 kg*m^2".',
     ),
 ]
+ReportOption = Annotated[
+    Path | None,
+    typer.Option(
+        "-o", "--output", metavar="DIR", help="Directory of the report, made if missing; else none is written."
+    ),
+]
 FiguresOption = Annotated[
     str | None,
     typer.Option(

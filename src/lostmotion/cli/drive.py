@@ -21,7 +21,8 @@ def check(
 ) -> None:
     """Torques, speeds, voltage, current, heat, inertia ratio, resonance, dead zone, lost motion, holding and self-locking.
 
-    Of a drive train: torques, speeds, voltage, current, heat and self-locking, of each gear and motor. Each point names its rule and the source of the rule. The table [task] of the scenario gives the duty cycle and requirements.
+    The check of a drive train covers torques, speeds, voltage, current, heat and self-locking of each gear and motor. Warnings and the
+    page name the source of each rule. The table [task] of the scenario gives the duty cycle and requirements.
 
     \b
     lostmotion drive check drive.toml --set task.cycle="2 s"
@@ -42,10 +43,12 @@ def check(
         raise InputError(f"{scenario}: {error}") from None
     print(loaded.title or scenario)
     for finding in findings:
-        print(f"  {finding}")
+        print(f"  {finding if finding.verdict == 'warning' else finding.in_short}")
     print(counted(findings))
     if report is not None:
         from ..reports.page import write_page
 
         write_page(report, check_report(Path(scenario).stem, findings, loaded.title))
         print(f"The page is at {report}")
+    else:
+        print(f"All rules with their sources on a page: lostmotion drive check {scenario} --report check.html")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .arguments import FiguresOption
-from .targets import try_directory, writing
+from .targets import need_directory, try_directory, writing
 from .terminal import busy, fail
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def identify(
             "-o",
             "--output",
             metavar="PATH",
-            help="Directory, made if missing (identified); with `new` the file (DIR/identify.toml).",
+            help="Directory of the results, made if missing; else none is written. With `new` the file (DIR/identify.toml).",
         ),
     ] = None,
     rig: Annotated[
@@ -53,9 +53,9 @@ def identify(
 ) -> None:
     """Identify a drive from measured logs: values with intervals, and unidentifiable parameters.
 
-    Writes identified.toml (the rig with the values that were found, a scenario), identified.html (one page), errors.csv (of each
-    log), parameters.csv and, with the key record, gearbox.toml (a data sheet). What was dropped of logs is listed. An interrupted command
-    keeps the models that it has fitted in identify-progress.json, and continues with the next one.
+    Prints values, intervals and dropped parts of logs. With -o, writes identified.toml (the rig with the identified values, a
+    scenario), identified.html (one page), errors.csv (of each log), parameters.csv and, with the key record, gearbox.toml (a data
+    sheet). An interrupted command with -o keeps its fitted models in identify-progress.json, and continues with the next one.
 
     `new` looks at the logs in DIR and writes a first identification file: channels, units, sample times, and what is in doubt about
     them. A file that exists is never overwritten.
@@ -73,12 +73,13 @@ def identify(
     from ..reports.pictures import endings
 
     pictures = endings(figures)
-    output = output or Path("identified")
-    try_directory(output)
+    need_directory(figures, output)
+    if output is not None:
+        try_directory(output)
     from ..identification.identify import identify as run
 
-    kept = output / PROGRESS
-    if kept.is_file():
+    kept = None if output is None else output / PROGRESS
+    if kept is not None and kept.is_file():
         print(f"Continuing with the models that {kept} keeps", file=sys.stderr)
     try:
         with busy("Identifying") as tell:
@@ -88,13 +89,16 @@ def identify(
 
             result = run(file, profiles=profiles, progress=notify, resume=kept)
     except KeyboardInterrupt:
-        if not kept.is_file():
+        if kept is None or not kept.is_file():
             raise
         fail(
             f"interrupted; {kept} keeps the models that were fitted, and the same command continues with the next", 130
         )
     _print_summary(result)
     sys.stdout.flush()
+    if output is None:
+        print(f"The scenario and all charts: lostmotion identify {file} -o identified")
+        return
     with writing(output), busy("Writing"):
         from ..reports.identification import write_identification
 

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from .arguments import FiguresOption
-from .targets import try_directory, writing
+from .arguments import FiguresOption, ReportOption
+from .targets import need_directory, try_directory, writing
 from .terminal import busy
 
 
@@ -18,17 +18,15 @@ def monitor(
     ],
     logs: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="[LOGS]...", help="Log files or directories; left out, those of the file."),
+        typer.Argument(metavar="[LOGS]...", help="Log files or directories; default: the logs of the file."),
     ] = None,
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Directory, made if missing.")] = Path(
-        "monitored"
-    ),
+    output: ReportOption = None,
     figures: FiguresOption = None,
 ) -> None:
     """Follow backlash, friction, stiffness and losses of a drive over its life, from ordinary operation logs.
 
-    Writes monitor.html (one page), values.csv (each log) and watched.csv (trends, changes, limits). Exit code 1 if a value has
-    changed or is beyond its limit.
+    Prints the findings; with -o, writes monitor.html (one page), values.csv (each log) and watched.csv (trends, changes, limits).
+    Exit code 1 if a value has changed or is beyond its limit.
 
     \b
     lostmotion monitor joint.toml logs/2026-*.csv -o joint-7
@@ -37,7 +35,9 @@ def monitor(
     from ..reports.pictures import endings
 
     pictures = endings(figures)
-    try_directory(output)
+    need_directory(figures, output)
+    if output is not None:
+        try_directory(output)
     from ..identification.monitor import monitor as run
 
     with busy("Monitoring") as tell:
@@ -48,10 +48,13 @@ def monitor(
     if unused:
         first = next(iter(unused))
         print(f"  {len(unused)} logs are not used, listed on the page; {first}: {unused[first]}")
-    with writing(output), busy("Writing"):
-        from ..reports.monitor import write_monitor
+    if output is None:
+        print(f"All trends on a page: lostmotion monitor {' '.join(map(str, (file, *(logs or ())[:3])))} -o monitored")
+    else:
+        with writing(output), busy("Writing"):
+            from ..reports.monitor import write_monitor
 
-        page = write_monitor(output, file.stem, result, pictures)
-    print(f"The page is at {page}")
+            page = write_monitor(output, file.stem, result, pictures)
+        print(f"The page is at {page}")
     if result.alarms:
         raise typer.Exit(1)

@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
-
-import typer
-
-from .arguments import FiguresOption
-from .targets import try_directory, writing
+from .arguments import FiguresOption, ReportOption
+from .targets import need_directory, try_directory, writing
 from .terminal import progress
 
 
 def reproduce(
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Directory, made if missing.")] = Path(
-        "out"
-    ),
+    output: ReportOption = None,
     figures: FiguresOption = None,
 ) -> None:
     """Reproduce the paper "Simplified dynamic model of the transmission": figures, data and a report.
 
-    Writes report.html, a single self-contained page, the data of its figures as CSV, and the constants as constants.csv. `--figures png,svg` draws each figure, too.
+    Prints the main results. With -o, writes report.html (a single self-contained page), the data of its figures as CSV, and the
+    constants as constants.csv.
 
     \b
     lostmotion reproduce -o out
@@ -29,6 +23,10 @@ def reproduce(
     from ..reports.pictures import endings
 
     pictures = endings(figures)
+    need_directory(figures, output)
+    if output is None:
+        _print_results()
+        return
     try_directory(output)
     need("jinja2", "The report", "report")
     from ..paper.reproduce import WORK
@@ -37,3 +35,16 @@ def reproduce(
     with writing(output), progress(WORK, "Reproducing") as step:
         report = work(output, step, pictures)
     print(f"The report is at {report}")
+
+
+def _print_results() -> None:
+    """The verdict of the report, without its figures."""
+    from ..paper.facts import facts
+    from ..paper.report import TITLE, verdict_of
+    from ..paper.runs import WORK, compute
+
+    with progress(WORK, "Reproducing") as step:
+        found = facts(compute(step))
+    print(TITLE)
+    print(*(f"  {line}" for line in verdict_of(found).lines), sep="\n")
+    print("All figures on a page: lostmotion reproduce -o out")

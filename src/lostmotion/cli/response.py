@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .arguments import FiguresOption, Overrides, SourceArgument, number
-from .targets import try_directory, writing
+from .arguments import FiguresOption, Overrides, ReportOption, SourceArgument, number
+from .targets import need_directory, try_directory, writing
 from .terminal import busy, progress
 
 if TYPE_CHECKING:
@@ -35,8 +35,8 @@ def response(
         typer.Option(
             "--input",
             metavar="NAME",
-            help="What is a sine: command, with a controller reference, or load_torque; of a train <motor>_command, <motor>_reference, "
-            "<shaft>_load_torque ... Left out, command or reference of the only motor.",
+            help="Input that is a sine: command, reference (with a controller) or load_torque; in a train <motor>_command, <motor>_reference, "
+            "<shaft>_load_torque ... Default: command or reference of the only motor.",
         ),
     ] = None,
     variable: Annotated[
@@ -44,8 +44,8 @@ def response(
         typer.Option(
             "--variable",
             metavar="NAME",
-            help="Which variable's response to draw; left out, load_speed, of a train the speed of its last shaft, with a controller what "
-            "its outermost loop measures.",
+            help="Variable of the response. Default: load_speed, in a train the speed of its last shaft, with a controller the measured "
+            "value of its outermost loop.",
         ),
     ] = None,
     refine: Annotated[
@@ -57,15 +57,14 @@ def response(
         typer.Option("--compare", metavar="OTHER", help="Overlay the drive or train of another scenario."),
     ] = None,
     overrides: Overrides = None,
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Directory, made if missing.")] = Path(
-        "response"
-    ),
+    output: ReportOption = None,
     figures: FiguresOption = None,
 ) -> None:
     """Frequency response over amplitude: each point from a periodic motion, on all cores.
 
-    Of the scenario the drive or train, its controllers and the constant parts of the inputs are taken. Writes response.html (gain and phase over frequency, maps of gain, phase, efficiency and distortion over
-    amplitude and frequency), and all numbers (bode.csv, response.csv, characteristics.csv, and response.nc where NetCDF is installed).
+    The scenario gives the drive or train, its controllers and the constant parts of the inputs. Prints bandwidth and dead zone. With
+    -o, writes response.html (gain and phase, maps of gain, phase, efficiency and distortion over amplitude and frequency) and all
+    numbers (bode.csv, response.csv, characteristics.csv, and response.nc where NetCDF is installed).
 
     \b
     lostmotion response paper-2dof-nl-small --amplitudes 0.025,1 --frequencies 1..30:12 -o bode
@@ -75,6 +74,7 @@ def response(
     from ..simulation.sources import load
 
     pictures = endings(figures)
+    need_directory(figures, output)
     name = Path(scenario).stem
     loaded = {name: load(scenario, overrides or ())} | {Path(other).stem: load(other) for other in compare or ()}
     unit, variable = _known(loaded, source, variable)
@@ -83,22 +83,30 @@ def response(
 
     wanted = parse_grid(amplitudes, "amplitudes", unit)
     grid = parse_grid(frequencies, "frequencies", "Hz")
-    try_directory(output)
+    if output is not None:
+        try_directory(output)
     responses = {}
     with progress(len(loaded) * len(wanted) * len(grid), "Response") as step:
         for title, s in loaded.items():
             responses[title] = frequency_response(s, grid, wanted, source=source, refine=refine, progress=step)
     first = loaded[name]
-    with writing(output), busy("Writing"):
-        from ..reports.response import amplitude_lines, motion_lines, write_response
+    from ..reports.response import amplitude_lines, motion_lines
+    from ..response.crossovers import characteristics
 
-        page, found = write_response(output, responses, first, variable, pictures)
+    found = characteristics(responses[name], first, variable)
     print(first.title or name)
     lines = motion_lines(responses[name])
     more = max(0, sum(line.startswith("not found") for line in lines) - 3)
     print(*(f"  {line}" for line in (*amplitude_lines(found), *lines[: len(lines) - more])), sep="\n")
     if more:
         print(f"  {more} more reasons are in response.csv")
+    if output is None:
+        print(f"All charts on a page: lostmotion response {scenario} -o response")
+        return
+    with writing(output), busy("Writing"):
+        from ..reports.response import write_response
+
+        page = write_response(output, responses, first, variable, pictures)
     print(f"The page is at {page}")
     if not (output / "response.nc").exists():
         print('response.nc is left out: it needs h5netcdf; install it: pip install "lostmotion[netcdf]"')

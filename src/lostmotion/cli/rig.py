@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..errors import InputError
-from .arguments import FiguresOption, complete_on_rig
+from .arguments import FiguresOption, ReportOption, complete_on_rig
 from .targets import need_directory, try_directory, writing
 from .terminal import busy, progress
 
@@ -29,12 +29,7 @@ def rig(
             autocompletion=complete_on_rig,
         ),
     ],
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o", "--output", metavar="DIR", help="Directory of the report, made if missing; else none is written."
-        ),
-    ] = None,
+    output: ReportOption = None,
     overrides: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help='Change or add a value, e.g. --set temperature="40 degC".'),
@@ -174,9 +169,11 @@ def _ripple(text: str) -> TorqueHarmonic:
 
 
 def _print_comparisons(comparisons: Sequence[Comparison]) -> None:
+    from ..reports.rig import percent
+
     if comparisons:
-        print(f"  {'':<44} {'sheet':>10} {'rig':>10} {'rig/sheet - 1':>14}")
+        print(f"  {'':<44} {'sheet':>10} {'rig':>10} {'difference':>12}")
     for c in comparisons:
         unit = "" if c.unit == "1" else f" [{c.unit}]"
         remark = f"  ({c.remark})" if c.remark else ""
-        print(f"  {c.quantity + unit:<44} {c.catalogue:>10.5g} {c.rig:>10.5g} {c.difference:>+14.1e}{remark}")
+        print(f"  {c.quantity + unit:<44} {c.catalogue:>10.5g} {c.rig:>10.5g} {percent(c.difference):>12}{remark}")

@@ -30,7 +30,7 @@ def run(
     figure: Annotated[
         str | None,
         typer.Option(
-            "--figure", metavar="NAME", help="What --plot shows: motion, losses, contacts or energy; all of it."
+            "--figure", metavar="NAME", help="Part that --plot shows: motion, losses, contacts or energy. Default: all."
         ),
     ] = None,
     spectrum: Annotated[

@@ -29,7 +29,7 @@ def servo(
     ] = None,
     motor: Annotated[
         str | None,
-        typer.Option("--motor", metavar="NAME", help="Whose controller; may be left out where there is one."),
+        typer.Option("--motor", metavar="NAME", help="Motor whose controller is examined. Default: the only one."),
     ] = None,
     window: Annotated[
         str | None,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .arguments import FiguresOption, count
-from .targets import try_directory, writing
+from .targets import need_directory, try_directory, writing
 from .terminal import busy, fail, progress
 from .workers import workers
 
@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
 
 OutputOption = Annotated[
-    Path | None, typer.Option("-o", "--output", metavar="DIR", help="Directory; by default the file's name.")
+    Path | None,
+    typer.Option("-o", "--output", metavar="DIR", help="Directory of the runs, made if missing; required."),
 ]
 ThreadsOption = Annotated[
     int | None, typer.Option("--threads", metavar="N", parser=count, help="In the core; all cores by default.")
@@ -53,12 +54,13 @@ def study(
 ) -> None:
     """Many runs: vary parameters, store selected results, resume after an interruption.
 
-    Writes a directory of Parquet files, one row a run, that pandas, DuckDB and polars open directly. If runs failed, their rows
-    say why, all others are there, and the exit code is 1.
+    The directory given by -o holds Parquet files, one row a run, that pandas, DuckDB and polars open directly. Prints a summary.
+    Failed runs have their reasons in the column error, and the exit code is 1. `show` prints the summary of a directory; with -o,
+    it writes study.html (one page) and its tables into another one.
 
     \b
     lostmotion study examples/tolerance.toml -o tolerance
-    lostmotion study show tolerance --best peak_load_speed
+    lostmotion study show tolerance --best peak_load_speed -o report
     lostmotion study resume tolerance --repair
     """
     from ..errors import InputError
@@ -66,7 +68,7 @@ def study(
     if what in ("show", "resume") and shown is None:
         raise InputError(f"study {what}: name the directory of a study, as in `lostmotion study {what} DIR`")
     if what == "show" and shown is not None:
-        _show(shown, best, figures)
+        _show(shown, best, output, figures)
         return
     if what == "resume" and shown is not None:
         from ..studies.engine import restore_note, study_of
@@ -82,9 +84,18 @@ def study(
     from ..studies.file import load_study
 
     loaded = load_study(what)
-    directory = output or Path(Path(what).stem)
+    directory = runs_directory(output, f"study {what}", what)
     compute(loaded, directory, threads, processes, scheduler, "Runs", repair=repair)
     print_outcome(directory, loaded.total)
+
+
+def runs_directory(output: Path | None, command: str, file: str) -> Path:
+    """The directory of the runs, which must be given, since an interrupted command resumes there."""
+    from ..errors import InputError
+
+    if output is None:
+        raise InputError(f"{command}: name the directory of the runs, as in `-o {Path(file).stem}`")
+    return output
 
 
 def compute(
@@ -113,22 +124,33 @@ def compute(
             fail(f"interrupted; what is in {directory} stays, and the same command resumes it", 130)
 
 
-def _show(directory: Path, best: str | None, figures: str | None) -> None:
+def _show(directory: Path, best: str | None, output: Path | None, figures: str | None) -> None:
     from ..reports.pictures import endings
-    from ..reports.study import best_lines, show
+    from ..reports.study import best_lines, summary_lines, write_study
 
     pictures = endings(figures)
+    need_directory(figures, output)
+    if output is not None:
+        try_directory(output)
     found = best_lines(directory, best) if best is not None else []
-    with busy("Writing"):
-        lines = show(directory, pictures)
-    print("\n".join([*lines, *found]))
+    print("\n".join([*summary_lines(directory), *found]))
+    if output is None:
+        print(f"All charts on a page: lostmotion study show {directory} -o {directory.resolve().name}-report")
+        return
+    with writing(output), busy("Writing"):
+        page = write_study(directory, output, pictures)
+    print(f"The page is at {page}")
 
 
 def print_outcome(directory: Path, total: int) -> None:
-    """Print the directory of the runs, and the failed ones."""
+    """Print the summary, the directory of the runs, and the failed ones."""
+    from ..reports.study import summary_lines
     from ..studies.table import failures
 
-    print(f"{total} runs are in {directory}; `lostmotion study show {directory}` shows them")
+    print("\n".join(summary_lines(directory)))
+    print(
+        f"{total} runs are in {directory}; all charts on a page: lostmotion study show {directory} -o {directory.resolve().name}-report"
+    )
     failed = failures(directory)
     if failed:
         fail(f"{len(failed)} of {total} runs failed, such as: {failed[0]}; the column `error` has all reasons")

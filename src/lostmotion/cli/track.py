@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .arguments import FiguresOption, Overrides, SourceArgument, number
+from .arguments import FiguresOption, Overrides, ReportOption, SourceArgument, number
 from .targets import need_directory, try_directory, writing
 from .terminal import busy, console, progress
 
@@ -18,12 +18,7 @@ if TYPE_CHECKING:
 
 def track(
     scenario: SourceArgument,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o", "--output", metavar="DIR", help="Directory of the report, made if missing; else none is written."
-        ),
-    ] = None,
+    output: ReportOption = None,
     after: Annotated[
         float | None,
         typer.Option(
@@ -38,7 +33,7 @@ def track(
         typer.Option(
             "--view",
             metavar="MOTOR=ANGLE",
-            help='Whole angle of view of an axis, e.g. "motor=6.65 deg"; left out, that of its camera.',
+            help='Whole angle of view of an axis, e.g. "motor=6.65 deg"; default: the angle of view of its camera.',
         ),
     ] = None,
     overrides: Overrides = None,
@@ -83,6 +78,9 @@ def track(
     print(f"The report is at {page}")
 
 
+ROWS = 24  # of the table in a terminal; a longer one is without the runs of one cause alone, which are on the page
+
+
 def _print_summary(title: str, budget: PointingBudget) -> None:
     from rich.table import Table
     from rich.text import Text
@@ -93,8 +91,10 @@ def _print_summary(title: str, budget: PointingBudget) -> None:
     table = Table(box=None, pad_edge=False)
     for k, name in enumerate(header(budget)):
         table.add_column(Text(name), justify="left" if k < 2 else "right")
-    for row in budget_rows(budget):
-        table.add_row(*map(Text, row))
+    rows = budget_rows(budget)
+    for row in rows:
+        if len(rows) <= ROWS or not row[1].endswith(" alone"):
+            table.add_row(*map(Text, row))
     console(sys.stdout, 160).print(table)
     print(f"  {budget.after_line}")
     if budget.view is not None:

@@ -27,7 +27,7 @@ class Encoder(EncoderFields):
     """
 
     shaft: str | None = None
-    """shaft with the encoder; left out, that of the motor"""
+    """shaft with the encoder; default: the motor's shaft"""
     delay: Annotated[Whole, Field(ge=0, le=1000)] = 0
     """sample times from the reading until the controller has it"""
 

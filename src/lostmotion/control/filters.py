@@ -43,7 +43,7 @@ class Notch(Part):
     width: Annotated[Number, Positive] = 0.5
     """D_n, damping of the poles"""
     pole_frequency: Annotated[Frequency, Positive] | None = None
-    """left out, that of the zeros"""
+    """default: the value of the zeros"""
 
     def continuous(self) -> tuple[list[float], list[float]]:
         """Numerator and denominator in s/w_z, the highest power first."""
@@ -63,7 +63,7 @@ class TransferFunction(Part):
     """coefficients of z, the highest power first"""
     denominator: tuple[Number, ...] = Field(min_length=1, max_length=MAX_ORDER + 1)
     sample_time: Annotated[Time, Positive] | None = None
-    """sample time for which it was made; left out, that of its loop"""
+    """sample time for which it was made; default: the sample time of its loop"""
 
     @model_validator(mode="after")
     def _can_be_computed(self) -> Self:

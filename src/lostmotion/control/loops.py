@@ -22,7 +22,7 @@ class PositionLoop(PositionLoopFields):
     """``speed = sat(gain e + integral + feedforward * rate of the reference)``, in terms of the reference's shaft."""
 
     sample_time: Annotated[Time, Positive] | None = None
-    """left out, that of the controller"""
+    """default: the value of the controller"""
 
     @model_validator(mode="after")
     def _dead_zone_has_a_use(self) -> Self:
@@ -67,7 +67,7 @@ class SpeedLoop(SpeedLoopFields):
     reference_filters: tuple[Filter, ...] = ()
     torque_filters: tuple[Filter, ...] = ()
     sample_time: Annotated[Time, Positive] | None = None
-    """left out, that of the controller"""
+    """default: the value of the controller"""
 
     @model_validator(mode="after")
     def _one_integral(self) -> Self:
@@ -106,7 +106,7 @@ class SampledCurrent(Part):
     """A sampled PI controller of the voltage, its zero on the pole of the winding, so that the loop is g/(z (z - 1))."""
 
     sample_time: Annotated[Time, Positive] | None = None
-    """left out, that of the controller"""
+    """default: the value of the controller"""
 
 
 class CurrentLoop(CurrentLoopFields, SampledCurrent):

@@ -141,13 +141,13 @@ class Move(Part):
 
     to: Angle
     speed: Annotated[Speed, Positive] | None = None
-    """limit; left out, that of all moves"""
+    """limit; default: the value for all moves"""
     acceleration: Annotated[Acceleration, Positive] | None = None
-    """limit, also while it slows down; left out, that of all moves"""
+    """limit, also while it slows down; default: the value for all moves"""
     jerk: Annotated[Jerk, Positive] | None = None
-    """limit; left out, that of all moves"""
+    """limit; default: the value for all moves"""
     dwell: Annotated[Time, NotNegative] | None = None
-    """rest after the move; left out, that of all moves"""
+    """rest after the move; default: the value for all moves"""
 
 
 class PositionReference(Reference[Angle]):

@@ -26,7 +26,7 @@ class Conditions(Part):
     """Under which conditions a record is used: keys of `[gearbox]` beside `from`."""
 
     temperature: Temperature | None = None
-    """temperature of the lubricant; left out, that of the data"""
+    """temperature of the lubricant; default: the temperature of the data"""
     added_backlash: Annotated[Angle, NotNegative] = 0.0
     """wear"""
     loss_factor: Annotated[Number, Positive] = 1.0

@@ -19,7 +19,7 @@ class ScrewConditions(Part):
     """Under which conditions the record of a screw is used: keys of `[screws.NAME]` beside `from`."""
 
     nut_preload: Annotated[Force, Positive] | None = None
-    """preload of the nut; stiffness and drag of the record are scaled to it. Left out, that of the record"""
+    """preload of the nut; stiffness and drag of the record are scaled to it. Default: the preload of the record"""
 
 
 def linear_table(kind: str, reference: str, changes: Mapping[str, Any], where: str) -> dict[str, Any]:

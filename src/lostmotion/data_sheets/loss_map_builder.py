@@ -54,7 +54,7 @@ def build_loss_map(
     sheet : GearboxSheet
         The data sheet.
     temperature : float, optional
-        Temperature of the lubricant [°C]. Default: that of the data. It changes the loss without load, by the given curves if the
+        Temperature of the lubricant [°C]. Default: the temperature of the data. It changes the loss without load, by the given curves if the
         sheet has them at several temperatures, else by the viscosity of its lubricant.
     loss_factor : float
         Factor of all losses, for wear.

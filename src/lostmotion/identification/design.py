@@ -45,7 +45,7 @@ def design_experiment(
     plans : sequence of Log
         Candidate experiments: time, header and inputs of each, as in a log. Measured channels may be missing.
     deviation : mapping of str to float, optional
-        Standard deviations of the measured channels by name, SI. Default: those of the residuals of the fit.
+        Standard deviations of the measured channels by name, SI. Default: the deviations of the residuals of the fit.
 
     Returns
     -------

@@ -60,7 +60,7 @@ class IdentificationResult:
     inputs: list[str] = field(default_factory=list, kw_only=True)
     """course of inputs between samples, if the task leaves it open, with the reason"""
     misfits: list[Misfit] = field(default_factory=list, kw_only=True)
-    """channels whose residuals are no noise, or far above the stated deviation"""
+    """channels whose residuals are structured, or far above the stated deviation"""
     conditions: list[ConditionError] = field(default_factory=list, kw_only=True)
     """errors of the logs of each condition of ``fit.leave_out``, with and without them in the fit"""
     odd: list[OddLog] = field(default_factory=list, kw_only=True)
@@ -129,7 +129,7 @@ class IdentificationResult:
         """The answer as text."""
         lines = [
             *self.warnings(),
-            f"{self.rungs[self.chosen].name}: the rung that is taken",
+            f"chosen model: {self.rungs[self.chosen].name}",
             *(f"  {text}" for text in [*self.failures(), *self.passed_over()]),
         ]
         for name, p in self.task.parameters.items():

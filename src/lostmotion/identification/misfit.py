@@ -63,7 +63,7 @@ class Misfit:
             )
         if self.structured:
             found.append(
-                f"residuals are no noise (correlation of neighbours {self.correlation:.2f}, {self.runs} runs of one sign "
+                f"residuals are structured (correlation of neighbours {self.correlation:.2f}, {self.runs} runs of one sign "
                 f"instead of {self.expected:.0f})" + (f" and have a shape over {self.shape}" if self.shapes else "")
             )
         wider = "; the intervals are widened by what such errors can hide" if self.large else ""

@@ -73,15 +73,15 @@ class Watched:
     unit: str
     """in which values are shown"""
     logs: tuple[int, ...]
-    """numbers of the logs that tell it"""
+    """numbers of the logs that determine it"""
     change: Change | None
-    """None if too few logs of the baseline tell it"""
+    """None if too few baseline logs determine it"""
     begins: int | None
     """number of the log at which the change most likely began"""
     level: Interval | None
     """95 % interval of the present value, SI"""
     before: float
-    """mean of the baseline, SI; NaN if too few logs of the baseline tell it"""
+    """mean of the baseline, SI; NaN if too few baseline logs determine it"""
     now: float
     """mean of the last logs, SI"""
     beyond: bool | None
@@ -175,7 +175,7 @@ def monitor(
     source : str or Path
         The identification file (TOML). Its table ``monitor`` names the watched values.
     logs : sequence of str or Path
-        Files, patterns or directories, relative to the working directory. Default: those of ``logs.files``.
+        Files, patterns or directories, relative to the working directory. Default: the files of ``logs.files``.
     progress : callable, optional
         Called with the name of each log, its number and the number of logs.
 
@@ -194,7 +194,7 @@ def monitor(
     >>> import lostmotion as lm
     >>> result = lm.monitor("examples/cycloidal/baseline.toml")
     >>> result.watched["friction"].text
-    'friction: not decided; 3 of the 3 logs of the baseline tell it, 5 are needed'
+    'friction: not decided; 3 of the 3 baseline logs determine it, 5 are needed'
     """
     task, directory = load_identification(source)
     if logs:
@@ -428,7 +428,7 @@ def _watched(task: Identification, estimates: list[LogEstimate], free: list[str]
 
 
 class _Series:
-    """Estimates of one value over the logs that tell it."""
+    """Estimates of one value over the logs that determine it."""
 
     def __init__(
         self,
@@ -481,7 +481,7 @@ class _Series:
         change = self.change(watch.direction, rate)
         if change is None:
             many = min(self.task.monitor.baseline, len(self.estimates))
-            text = f"{name}: not decided; {self.count} of the {many} logs of the baseline tell it, {FEWEST} are needed"
+            text = f"{name}: not decided; {self.count} of the {many} baseline logs determine it, {FEWEST} are needed"
             return Watched(name, p.unit, tuple(self.logs), None, None, None, math.nan, math.nan, None, text)
         before, now, half = self.levels(change)
         level = Interval(now - half, now + half, "logs")
@@ -510,7 +510,7 @@ class _Series:
         """With the sentence on the residuals."""
         change = self.change("up", rate)
         if change is None:
-            text = f"{RESIDUAL}: not decided; {self.count} logs of the baseline can be used, {FEWEST} are needed"
+            text = f"{RESIDUAL}: not decided; {self.count} baseline logs can be used, {FEWEST} are needed"
             return Watched(RESIDUAL, "", tuple(self.logs), None, None, None, math.nan, math.nan, None, text)
         before, now, half = (float(x) for x in self.levels(change))
         level = Interval(math.exp(now - half), math.exp(now + half), "logs")

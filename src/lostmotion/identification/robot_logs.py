@@ -63,7 +63,7 @@ def read_mcap_log(path: Path, *, time: str = "") -> Log:
     Parameters
     ----------
     time
-        The topic of the times; left out, that of the first message. ``TOPIC.header.stamp`` takes the stamps in its messages
+        The topic of the times; default: the topic of the first message. ``TOPIC.header.stamp`` takes the stamps in its messages
         in place of their publish times.
 
     Raises

@@ -83,7 +83,7 @@ def regressed(
     except InputError as problem:
         return point, Regression(why_not=str(problem))
     if not report.found:
-        none = "no parameter that is free on the lowest rung enters the torques linearly, within its bounds and without a prior"
+        none = "no free parameter of the first model enters the torques linearly, within its bounds and without a prior"
         report = Regression(
             why_not="the runs of the values given are nearer to the logs" if solved else refusal or none
         )

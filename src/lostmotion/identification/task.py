@@ -60,7 +60,7 @@ class InputChannel(Part):
     default: Number | None = None
     """value in logs that lack the channel; left out, such logs are refused"""
     unit: str = ""
-    """unit of the channel; left out, that of its file, else SI"""
+    """unit of the channel; default: the unit in its file, else SI"""
     scale: FormulaText = 1.0
     """factor on it"""
     offset: FormulaText = 0.0
@@ -86,7 +86,7 @@ class MeasuredChannel(Part):
     variable: str
     """result variable of the rig"""
     unit: str = ""
-    """unit of the channel; left out, that of its file, else SI"""
+    """unit of the channel; default: the unit in its file, else SI"""
     scale: FormulaText = 1.0
     offset: FormulaText = 0.0
     """SI"""
@@ -141,7 +141,7 @@ class FitOptions(Part):
     """lengths of windows, rising: the logs are fitted in windows of the first, each run of which begins at the angle and the speed
     measured there, then of the next, and at last whole"""
     sample_interval: Annotated[Time, Positive] | None = None
-    """sample interval of the runs behind a channel with a filter; left out, that of the log, at most 2 ms"""
+    """sample interval of the runs behind a channel with a filter; default: the interval of the log, at most 2 ms"""
 
     @model_validator(mode="after")
     def _horizon_grows(self) -> Self:

@@ -336,14 +336,14 @@ class ScrewData(LinearDrive):
     core_diameter: Annotated[Length, Positive] | None = None
     """core diameter of the screw's thread root"""
     elastic_modulus: Annotated[Pressure, Positive] | None = None
-    """left out, that of steel, 206 GPa"""
+    """default: steel, 206 GPa"""
     support: Literal["one end", "both ends"] | None = None
     """at which the screw is fixed axially: stiffness E A/L (left out, this), or 4 E A/L"""
     diameter: Annotated[Length, Positive] | None = None
     """diameter of the screw: with length, in place of inertia"""
     length: Annotated[Length, Positive] | None = None
     density: Annotated[Density, Positive] | None = None
-    """left out, that of steel, 7850 kg/m^3"""
+    """default: steel, 7850 kg/m^3"""
 
     @model_validator(mode="after")
     def _is_a_screw(self) -> Self:

@@ -140,7 +140,7 @@ class Davenport(WindOnArea):
     surface_drag: Annotated[Number, Limit(gt=0.0, le=0.1)] = 0.005
     """K = u*^2/V_10^2; 0.005 open country, 0.015 suburbs, 0.05 cities"""
     speed_at_10_m: Annotated[LinearSpeed, Positive] | None = None
-    """V_10; left out, that at the load"""
+    """V_10; default: the value at the load"""
 
     def gusts(self, frequency: np.ndarray) -> np.ndarray:
         V = self.speed if self.speed_at_10_m is None else self.speed_at_10_m

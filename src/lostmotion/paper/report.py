@@ -46,10 +46,10 @@ def render(specs: list[FigureSpec], table: list[Constant], facts: Facts, *, live
         live=live,
     )
     lead = "A DC motor turns a load through a gearbox; three models of the gearbox are compared at two amplitudes."
-    return document(TITLE, lead, f"{verdict(_verdict(facts))}\n{glance}\n{body}", charts)
+    return document(TITLE, lead, f"{verdict(verdict_of(facts))}\n{glance}\n{body}", charts)
 
 
-def _verdict(facts: Facts) -> Headline:
+def verdict_of(facts: Facts) -> Headline:
     """Agreement and disagreement of the three models."""
     stuck = {model: f"{100.0 * facts.stuck[model, 'small']:.0f} %" for model in MODELS}
     traditional = " and ".join(f"{stuck[model]} ({model})" for model in MODELS if model != "2-DOF-NL")

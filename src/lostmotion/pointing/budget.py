@@ -125,7 +125,7 @@ def pointing_budget(
         start: on the reference or, if the scenario begins on it, at rest there. Errors count after twice the time in which both
         agree to a tenth of the rms error, or as far as they do in the second half.
     view : mapping of str to float or str, optional
-        Full angle of view [rad] of each axis, by the name of its motor. Default: that of the cameras.
+        Full angle of view [rad] of each axis, by the name of its motor. Default: the angles of view of the cameras.
     robustness : bool
         Whether to run other temperatures, target speeds, wear, and wrong losses in the controller, too.
     progress : callable, optional

@@ -91,7 +91,7 @@ def export_fmu(
         Whether to include the C++ sources, too, for tools and targets that compile FMUs themselves. The model identifier is then the
         name of the file.
     libraries : str or Path, optional
-        Directory with the libraries of the platforms, as ``make fmu`` builds them. Default: those of this installation.
+        Directory with the libraries of the platforms, as ``make fmu`` builds them. Default: the libraries of this installation.
 
     Returns
     -------

@@ -8,6 +8,7 @@ from ..sizing.finding import Finding
 from .page import Headline, Report, Table
 from .panels import Bars, Group
 
+FINDINGS = "“ok” means within the limit, “not judged” that the limit or a datum is not given. A blank remark means that there is none."
 MARKS = {"ok": "ok", "warning": "WARNING", "unknown": "not judged"}
 
 
@@ -27,7 +28,7 @@ def _verdict(findings: Sequence[Finding]) -> Headline:
         most = max(used, key=lambda f: f.use or 0.0)
         lines.append(f"The most used limit is {most.what}: {100.0 * (most.use or 0.0):.3g} %.")
     unknown = [f.what for f in findings if f.verdict == "unknown"]
-    lines += [f"Not judged: {', '.join(unknown)}."] if unknown else []
+    lines += [f"Not judged: {'; '.join(unknown)}."] if unknown else []
     return Headline("bad" if warnings else "open" if unknown else "good", tuple(lines[:3]))
 
 
@@ -44,5 +45,5 @@ def check_report(name: str, findings: Sequence[Finding], title: str = "") -> Rep
         lead=f"Drive check of `{name}`: loads, speeds, heat, resonance and holding against the limits.",
         verdict=_verdict(findings),
         main=Group("limits", "", "", (bars,) if used else (), 1),
-        parts=(Table("Findings", header, rows, marked=marked),),
+        parts=(Table("Findings", header, rows, FINDINGS, marked=marked),),
     )

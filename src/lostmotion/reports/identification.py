@@ -89,7 +89,7 @@ def identification_report(name: str, result: IdentificationResult, *, all_logs: 
     notes = [[log, line] for log, lines in result.notes.items() for line in lines]
     lists = {
         "Unidentifiable parameters": [*(u.text for u in result.undetermined), *result.at_bounds, *result.differences()],
-        "Inputs between samples, and start values": [*result.inputs, *result.starts()],
+        "Interpolated inputs and start values": [*result.inputs, *result.starts()],
         "Models without a result": [*result.failures(), *result.passed_over()],
     }
     return Report(
@@ -114,7 +114,7 @@ def identification_report(name: str, result: IdentificationResult, *, all_logs: 
                 "Errors of each log",
                 HEADER,
                 error_rows(result),
-                "Fit is 1 - RMSE/standard deviation of the measured values.",
+                "MAE: mean absolute error. RMSE: root mean square error. Fit: 1 - RMSE/standard deviation of the measured values.",
             ),
             *([Table("Logs that are left out", ("log", "reason"), left_out)] if left_out else []),
             *([Table("Notes on the logs", ("log", "note"), notes)] if notes else []),
@@ -124,8 +124,8 @@ def identification_report(name: str, result: IdentificationResult, *, all_logs: 
 
 
 INTERVALS = (
-    "Values and 95 % intervals. Those of the bootstrap come from drawing blocks of half a second of the residuals anew, and of five logs or more whole logs. "
-    "Where residuals have a structure, the interval contains the value of the model next to the one that is taken, and is marked."
+    "Values and 95 % intervals. The bootstrap draws blocks of half a second of the residuals, and with five or more logs whole logs. "
+    "If residuals are structured, the interval also contains the value of the neighbouring model, and is marked. A blank unit means a plain number."
 )
 
 
@@ -178,12 +178,12 @@ def parameter_rows(result: IdentificationResult) -> list[list[str]]:
     for name, p in result.task.parameters.items():
         value, interval = result.values[name], result.intervals.get(name)
         ends = (
-            ["", "", p.unit, "given"]
+            ["", "", p.unit.replace("*", "·"), "given"]
             if interval is None
             else [
                 p.shown(interval.low),
                 p.shown(interval.high),
-                p.unit,
+                p.unit.replace("*", "·"),
                 "; ".join(filter(None, (interval.method, interval.flag))),
             ]
         )
@@ -227,13 +227,13 @@ def _groups(result: IdentificationResult, chosen: Mapping[str, str]) -> list[Gro
     overlays = [
         panel for log in logs for panel in _overlays(result, log, chosen.get(log.name, ""), table[log.name], count)
     ]
-    caption = "What was measured, and the run of the identified rig."
+    caption = "Measured signals, and the run of the identified rig."
     if chosen:
         caption += f" Drawn are the worst, median and best of {len(result.logs)} logs."
     found = [Group("overlays", "Logs", caption, tuple(overlays[:FIRST]))]
     if panels := _clouds(result, table, variables):
         logs_shown = f"{len(table)} of {len(result.logs)} logs" if len(table) < len(result.logs) else "all logs"
-        text = f"Measured less computed, {logs_shown}: a shape here is missing in the model."
+        text = f"Measured less computed, {logs_shown}: a pattern here is an effect that the model lacks."
         found.append(Group("residuals", "Residuals", text, tuple(panels)))
     if result.fit.free:
         found.append(_correlation_group(result))
@@ -248,8 +248,8 @@ def _groups(result: IdentificationResult, chosen: Mapping[str, str]) -> list[Gro
 
 
 LAWS = (
-    "Of the identified rig. What it adds to a shaft's viscous friction, such as the back-e.m.f. of a motor, is included, but for a phase without it: the curve of a "
-    "phase with the motor off is the friction alone."
+    "Laws of the identified rig. The friction of a shaft includes what acts like viscous friction, such as the back-e.m.f. of a motor. In a phase with the "
+    "motor off it does not."
 )
 
 
@@ -258,7 +258,7 @@ def _variables(result: IdentificationResult) -> dict[str, str]:
     assert result.rig is not None
     units = result.rig.units
     names = [*shape_variables(result.rig).values(), *(name for name in units if name.endswith("_twist"))]
-    return {name: f"{name} [{units[name]}]" for name in names}
+    return {name: f"{name} [{units[name].replace('*', '·')}]" for name in names}
 
 
 def _overlays(
@@ -292,7 +292,7 @@ def _overlays(
 def _labelled(result: IdentificationResult, channel: str) -> str:
     """A channel with its unit."""
     unit = result.unit(channel)
-    return f"{channel} [{unit}]" if unit else channel
+    return f"{channel} [{unit.replace('*', '·')}]" if unit else channel
 
 
 def _clouds(
@@ -332,9 +332,7 @@ def _correlation_group(result: IdentificationResult) -> Group:
     names, C = correlations(result)
     pairs = sorted(((i, j) for i in range(len(names)) for j in range(i)), key=lambda ij: -abs(C[ij]))[:PAIRS]
     words = "; ".join(f"{names[i]} and {names[j]} {C[i, j]:+.2f}" for i, j in pairs)
-    caption = (
-        "Of the errors of the parameters, from the logs alone: near +1 or -1 two of them can hardly be told apart."
-    )
+    caption = "Correlations of the errors of the parameters, from the logs alone. Two parameters near +1 or -1 are hard to separate."
     text = f"{caption} Strongest: {words}." if words else caption
     return Group("correlation", "Correlations", text, (Matrix("correlation [-]", tuple(names), C),), 1)
 

@@ -1,4 +1,4 @@
-"""The page of a monitor: trends with intervals, the evidence of changes, and what each log could tell."""
+"""The page of a monitor: trends with intervals, the evidence of changes, and the values that each log determines."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from .page import Headline, Prose, Report, Table
 from .pages import table_csv, write_report
 from .panels import Curve, Group, Mark, Panel
 
-VALUES: dict[str, Any] = {"color": PALETTE["first"], "linestyle": "none", "marker": "o", "markersize": 3.0}
+VALUES: dict[str, Any] = {"color": PALETTE["first"], "linestyle": "none", "marker": "o", "markersize": 5.0}
 ENDS: dict[str, Any] = {"color": PALETTE["first"], "linestyle": "-", "linewidth": 0.7, "alpha": 0.6}
 LIMIT: dict[str, Any] = {"color": PALETTE["second"], "linestyle": "--", "linewidth": 1.5}
 EVIDENCE: dict[str, Any] = {"color": PALETTE["first"], "linestyle": "-", "linewidth": 1.6}
 LEAST = 1e-4  # evidence, below which it is not drawn
-LOGS = ("log", "place", "residual", "tells", "why it is not used")
+LOGS = ("log", "order", "residual", "determined values", "reason for leaving it out")
 WATCHED = ("value", "baseline", "now", "from", "to", "unit", "change", "limit")
 
 
@@ -46,9 +46,7 @@ def monitor_report(name: str, result: MonitorResult) -> Report:
     """The page of a monitor."""
     watched = list(result.watched.values())
     marked = frozenset(k for k, w in enumerate(watched) if w.alarm)
-    rows = [
-        [e.log, f"{e.at:g}", f"{e.residual:.3g}", ", ".join(sorted(e.told)) or "nothing", e.why] for e in result.logs
-    ]
+    rows = [[e.log, f"{e.at:g}", f"{e.residual:.3g}", ", ".join(sorted(e.told)) or "none", e.why] for e in result.logs]
     unused = frozenset(k for k, e in enumerate(result.logs) if e.why)
     left_out = [list(pair) for pair in result.left_out.items()]
     return Report(
@@ -57,7 +55,7 @@ def monitor_report(name: str, result: MonitorResult) -> Report:
         verdict=_verdict(result),
         main=Group("trends", "Trends", TRENDS, tuple(_trend(result, w) for w in watched)),
         parts=(
-            Table("Watched values", WATCHED, [_row(result, w) for w in watched], "", marked),
+            Table("Watched values", WATCHED, [_row(result, w) for w in watched], BLANK, marked),
             Prose("Findings", [w.text for w in watched], listed=True),
             Group(
                 "evidence",
@@ -65,20 +63,21 @@ def monitor_report(name: str, result: MonitorResult) -> Report:
                 EVIDENCES,
                 tuple(_evidence(result, w) for w in watched if w.change is not None),
             ),
-            Table("What each log tells", LOGS, rows, TELLS, unused),
+            Table("Logs", LOGS, rows, TELLS, unused),
             *([Table("Logs that are left out", ("log", "reason"), left_out)] if left_out else []),
         ),
     )
 
 
+BLANK = "A blank cell means that too few logs of the baseline determine the value, or that it has no unit."
 TRENDS = "Estimate of each log with its 95 % interval. Dashed: limits. The marked log is the one at which a change most likely began."
 EVIDENCES = (
     "Bayes factor of a change, averaged over its beginning, its size and its shape. An alarm is evidence above the line with two logs "
     "in a row; the line is the reciprocal of the permitted probability of a false alarm."
 )
 TELLS = (
-    "A log tells a value if its own interval is narrower than half of the value; others take no part in its trend. "
-    "Residuals are in those of the baseline."
+    "A log determines a value if the interval from this log alone is narrower than half of the value. Other logs are left out of its trend. "
+    "Residuals are relative to those of the baseline. A blank reason means that the log is used."
 )
 
 
@@ -90,7 +89,8 @@ def _verdict(result: MonitorResult) -> Headline:
         more = f" {len(alarms) - 2} more below." if len(alarms) > 2 else ""
         return Headline("bad", tuple(f"{w.text}.{more if k == 1 else ''}" for k, w in enumerate(alarms[:2])))
     if undecided:
-        return Headline("open", tuple(f"{w.text}." for w in undecided[:3]))
+        names = ", ".join(w.name for w in undecided)
+        return Headline("open", (f"Not decided: {names}.", f"{undecided[0].text}.", "All findings are listed below."))
     return Headline("good", ("No watched value has changed, and none is beyond its limits.",))
 
 
@@ -101,13 +101,14 @@ def _row(result: MonitorResult, w: Watched) -> list[str]:
     def shown(value: float) -> str:
         return f"{value:.4g}" if p is None else p.shown(value)
 
+    unit = w.unit.replace("*", "·")
     if w.level is None or w.change is None:
-        return [w.name, "", "", "", "", w.unit, "not decided", "not decided"]
+        return [w.name, "", "", "", "", unit, "not decided", "not decided"]
     change = "none" if w.begins is None else f"since {result.logs[w.begins].log}"
     limit = {True: "beyond", False: "within", None: "not decided"}[w.beyond]
     if p is None or w.name not in result.task.monitor.watch or not _limits(result, w):
         limit = "none given"
-    return [w.name, shown(w.before), shown(w.now), shown(w.level.low), shown(w.level.high), w.unit, change, limit]
+    return [w.name, shown(w.before), shown(w.now), shown(w.level.low), shown(w.level.high), unit, change, limit]
 
 
 def _values(result: MonitorResult) -> list[list[str]]:
@@ -152,7 +153,7 @@ def _trend(result: MonitorResult, w: Watched) -> Panel:
             Curve("low", at, low, ENDS, "_"),
             Curve("high", at, high, ENDS, "95 %"),
         ]
-        label = f"{w.name} [{w.unit or '-'}]"
+        label = f"{w.name} [{w.unit.replace('*', '·') or '-'}]"
     ends = np.array([at.min(), at.max()]) if len(at) else np.zeros(0)
     curves += [Curve(f"limit {x:g}", ends, np.full(len(ends), x), LIMIT) for x in _limits(result, w)]
     marks: tuple[Mark, ...] = ()

@@ -101,8 +101,13 @@ def render(report: Report) -> str:
 def verdict(found: Headline) -> str:
     """Headline of a report as HTML."""
     state = {"good": "Verdict", "bad": "Verdict: not in order", "open": "Verdict, with reservations"}[found.state]
-    lines = "".join(f"<p>{_text(line)}</p>\n" for line in found.lines)
+    lines = "".join(f"<p>{_text(_sentence(line))}</p>\n" for line in found.lines)
     return f'<section class="verdict {found.state}"><h2>{state}</h2>\n{lines}</section>'
+
+
+def _sentence(text: str) -> str:
+    """Text with a capital at its begin; a name with underscores stays as it is."""
+    return text if isinstance(text, Html) or "_" in text.partition(" ")[0] else f"{text[:1].upper()}{text[1:]}"
 
 
 def document(title: str, lead: str, body: str, charts: Sequence[Chart]) -> str:
@@ -179,7 +184,8 @@ def _card(chart: Chart, charts: list[Chart], *, still: bool) -> str:
     number, svg = len(charts), svg_of(chart) if shown else ""
     charts.append(chart)
     if isinstance(chart, Flows):
-        rows = [[name.replace("_", " "), f"{value:.5g}"] for name, value in chart.energies.items() if value]
+        apart = ("residual", "turned_over")
+        rows = [[n.replace("_", " "), f"{v:.4g}"] for n, v in chart.energies.items() if v and n not in apart]
         svg = _table(Table("", ("energy", "[J]"), rows))
     kind = {Panel: "plot", Contacts: "strip", Flows: "energy"}.get(type(chart), "plot still")
     place = "" if isinstance(chart, Bars | Histogram | Drawing) else f' data-chart="{number}"'

@@ -15,11 +15,12 @@ from .pages import table_csv, write_report
 from .panels import Bars, Curve, Group, Panel
 
 NUMBERS = ("rms", "peak", "probable", "mean", "measured, rms")
+ROUNDING = 1e-12  # [rad], below which an error is rounding
 
 
 def header(budget: PointingBudget) -> list[str]:
     """Header of the table; with pixels if there are any."""
-    units = [f"{name} [mrad]" for name in NUMBERS]
+    units = [f"{name} [{_unit(budget)[1]}]" for name in NUMBERS]
     return ["axis", "run", *units, *(["rms [px]", "peak [px]"] if budget.pixels else [])]
 
 
@@ -34,30 +35,36 @@ def budget_rows(budget: PointingBudget) -> list[list[str]]:
 
 def _numbers(budget: PointingBudget, axis: str, found: Errors) -> list[str]:
     e = found[axis]
-    numbers = [f"{1e3 * value:.4g}" for value in (e.rms, e.peak, e.probable, e.mean, e.measured_rms)]
+    factor, _ = _unit(budget)
+    every = (e.rms, e.peak, e.probable, e.mean, e.measured_rms)
+    numbers = [f"{factor * value:.4g}" if abs(value) > ROUNDING else "0" for value in every]
     if budget.pixels:
         pixel = budget.pixels.get(axis)
         numbers += [f"{value / pixel:.3g}" if pixel else "" for value in (e.rms, e.peak)]
     return numbers
 
 
-CONTRIBUTIONS = ("axis", "taken away", "mean square falls by [µrad²]", "share [%]", "rms that is left [mrad]")
+def contribution_header(budget: PointingBudget) -> tuple[str, ...]:
+    """Header of the contributions."""
+    return ("axis", "cause", "mean square falls by [µrad²]", "share [%]", f"remaining rms [{_unit(budget)[1]}]")
 
 
 def contribution_rows(budget: PointingBudget) -> list[list[str]]:
     """Contribution of each cause as all causes are removed one after another; the sum is their total."""
     rows = []
+    factor, _ = _unit(budget)
     for axis, whole in budget.whole.items():
         total = whole.rms**2 - budget.ideal[axis].rms ** 2
         for name, part in budget.contributions(axis).items():
             left = budget.successive[name][axis].rms
-            rows.append([axis, name, *_share(part, whole), f"{1e3 * left:.4g}"])
-        rows.append([axis, "all of these", *_share(total, whole), f"{1e3 * budget.ideal[axis].rms:.4g}"])
+            rows.append([axis, name, *_share(part, whole), f"{factor * left:.4g}"])
+        rows.append([axis, "all causes", *_share(total, whole), f"{factor * budget.ideal[axis].rms:.4g}"])
     return rows
 
 
 def _share(part: float, whole: PointingError) -> list[str]:
-    return [f"{1e12 * part:.4g}", f"{100.0 * part / whole.rms**2:.3g}" if whole.rms > 0.0 else ""]
+    share = f"{100.0 * part / whole.rms**2 + 0.0:.2f}" if whole.rms > 0.0 else ""
+    return [f"{1e12 * part:.3g}", "0.00" if share == "-0.00" else share]
 
 
 def view_line(budget: PointingBudget) -> str:
@@ -179,22 +186,26 @@ def _verdict(budget: PointingBudget) -> Headline:
     return Headline("good" if seen else "open", (*lines, last))
 
 
+BUDGET = (
+    "Each row is a run: “without” removes one cause, “alone” keeps only that one, “none of these” removes all. The rows below "
+    "change one thing: the place of the encoders, the losses that the controller assumes, the temperature, the wear."
+)
 CONTRIBUTED = (
-    "All causes are taken away one after another, in this order. The decreases of the mean square error from line to line add up to the decrease with all causes "
-    "away. A negative contribution is a cause that hides another one. Another order gives other contributions."
+    "The causes are removed one after another, in this order. The mean square error falls by these contributions, which add up to that of all causes. "
+    "A negative contribution belongs to a cause that hides another one. Another order gives other contributions."
 )
 
 
 def _computed(budget: PointingBudget) -> Prose:
     return Prose(
-        "What is computed",
+        "Method",
         (
             f"Each line is an exact simulation of the whole run; {budget.after_line}. The probable error is 0.6745 standard deviations; “measured” is the error of the "
-            "measured direction, px are pixels.",
-            "One cause alone makes another error than what the axis gains without it, since the axis is not linear; both are shown. The measured direction is where the "
-            "tracker of a camera expects the target, and without a camera what the encoder says of the load.",
-            "A controller with an inverse model knows the drive as it is in each run, but for temperature and losses in the controller. Temperatures count from that of "
-            "the data: friction and losses by exp(-0.015/K), copper of DC motors by 0.39 %/K, their magnets by -0.2 %/K.",
+            "measured direction; px stands for pixels. A blank cell means that the axis has no camera.",
+            "The axis is not linear: the error by one cause alone differs from the gain by removing it, so both are listed. With a camera, the measured direction is the "
+            "one in which its tracker expects the target. Without a camera, it is the encoder's value.",
+            "A controller with an inverse model has the parameters of the drive in each run, except in the runs with other temperatures or other losses in the controller. "
+            "Changes of temperature are relative to the data: friction and losses by exp(-0.015/K), copper of DC motors by 0.39 %/K, their magnets by -0.2 %/K.",
         ),
     )
 
@@ -211,17 +222,17 @@ def pointing_report(name: str, budget: PointingBudget) -> Report:
     )
     rows, parts = budget_rows(budget), contribution_rows(budget)
     as_it_is = frozenset(k for k, row in enumerate(rows) if row[1] == "as it is")
-    more: list[Table | Group | Prose] = [Table("Budget", header(budget), rows, chosen=as_it_is)]
+    more: list[Table | Group | Prose] = [Table("Budget", header(budget), rows, BUDGET, chosen=as_it_is)]
     if parts:
-        more += [_bars(budget), Table("Contributions", CONTRIBUTIONS, parts)]
+        more += [_bars(budget), Table("Contributions", contribution_header(budget), parts)]
     if speed:
         more.append(Group("speed", "Error over target speed", "", tuple(speed), min(2, len(speed))))
     if robustness:
-        caption = "Error with losses that the controller assumes wrongly, at other temperatures, and with wear."
+        caption = "Error with wrong losses in the controller, at other temperatures, and with wear."
         more.append(Group("robustness", "Robustness", caption, tuple(robustness), 3))
     return Report(
         title=budget.scenario.title or name,
-        lead=f"Pointing report of the axes of `{name}`: how far they miss the direction that they follow, and the causes.",
+        lead=f"Pointing report of the axes of `{name}`: errors against the direction that they follow, and their causes.",
         verdict=_verdict(budget),
         main=main,
         parts=(*more, _computed(budget)),
@@ -238,6 +249,6 @@ def write_pointing(directory: Path, name: str, budget: PointingBudget, pictures:
     """
     tables = {
         "budget.csv": table_csv(header(budget), budget_rows(budget)),
-        "contributions.csv": table_csv(CONTRIBUTIONS, contribution_rows(budget)),
+        "contributions.csv": table_csv(contribution_header(budget), contribution_rows(budget)),
     }
     return write_report(directory, "track.html", pointing_report(name, budget), tables, pictures)

@@ -21,7 +21,7 @@ from .panels import Curve, Ground, Group, Panel
 if TYPE_CHECKING:
     import xarray
 
-BLANK = "A blank cell means that the curve does not come there within the frequencies."
+BLANK = "A blank cell means that the curve does not reach this level within the frequencies."
 
 
 def for_file(response: xarray.Dataset) -> xarray.Dataset:
@@ -144,7 +144,11 @@ def motion_lines(result: xarray.Dataset) -> list[str]:
     reasons = [r for r in result["reason"].values.ravel() if r]
     repeating = (result["reason"] == "") & ~(result["spread"] > 0.0 if "spread" in result else False)
     worst = float(result["residual"].where(repeating).max())
-    within = f", repeating within {worst:.1e} of their magnitude" if repeating.any() else ""
+    within = (
+        f", repeating {'to rounding' if worst < 1e-11 else f'within {worst:.1e} of their magnitude'}"
+        if repeating.any()
+        else ""
+    )
     lines = [f"{result['reason'].size - len(reasons)} of {result['reason'].size} motions found{within}"]
     lines += _closed_loop_lines(result) if "spread" in result else []
     return lines + [f"not found at {reasons.count(r)} point(s): {r}" for r in dict.fromkeys(reasons)]
@@ -216,13 +220,13 @@ def write_response(
     scenario: Scenario,
     output: str,
     pictures: Sequence[str] = (),
-) -> tuple[Path, xarray.Dataset]:
+) -> Path:
     """``response.html`` and tables in a directory, made if missing; on request pictures with these endings.
 
     Returns
     -------
-    (Path, xarray.Dataset)
-        Of the page; the characteristics by amplitude.
+    Path
+        Of the page.
     """
     response = next(iter(responses.values()))
     report, found = response_report(responses, scenario, output)
@@ -235,4 +239,4 @@ def write_response(
     page = write_report(directory, "response.html", report, tables, pictures)
     if find_spec("h5netcdf") is not None:
         write_bytes(directory / "response.nc", bytes(for_file(response).to_netcdf(engine="h5netcdf")))
-    return page, found
+    return page

@@ -151,7 +151,7 @@ def largest_difference(comparisons: Sequence[Comparison]) -> str:
         return "There is no data sheet to compare with."
     worst = max(comparisons, key=lambda c: abs(c.difference))
     counted = f"{len(comparisons)} quantities of the data sheet are measured"
-    return f"{counted}; the largest difference is {_percent(worst.difference)} ({worst.quantity})."
+    return f"{counted}; the largest difference is {percent(worst.difference)} ({worst.quantity})."
 
 
 def _verdict(report: RigReport) -> Headline:
@@ -171,8 +171,10 @@ def _verdict(report: RigReport) -> Headline:
     return Headline("open" if differs or not report.comparisons else "good", tuple(lines))
 
 
-def _percent(share: float) -> str:
-    return f"{round(100.0 * share, 1) + 0.0:+.1f} %"  # no -0.0
+def percent(share: float) -> str:
+    """A difference as text; one that is rounding is 0 %."""
+    rounded = round(100.0 * share, 1)
+    return f"{rounded:+.1f} %" if rounded else "0 %"
 
 
 def comparison_table(comparisons: Sequence[Comparison]) -> list[Table | Group | Prose]:
@@ -184,7 +186,7 @@ def comparison_table(comparisons: Sequence[Comparison]) -> list[Table | Group | 
             c.quantity,
             f"{c.catalogue:.5g}",
             f"{c.rig:.5g}",
-            _percent(c.difference),
+            percent(c.difference),
             "" if c.unit == "1" else c.unit,
             c.remark,
         ]
@@ -192,7 +194,8 @@ def comparison_table(comparisons: Sequence[Comparison]) -> list[Table | Group | 
     ]
     marked = frozenset(k for k, c in enumerate(comparisons) if c.remark)
     head = ("quantity", "catalogue", "rig", "difference", "unit", "remark")
-    return [Table("Catalogue and rig", head, rows, marked=marked)]
+    note = "A blank cell means a plain number, or no remark."
+    return [Table("Catalogue and rig", head, rows, note, marked=marked)]
 
 
 def sheet_parts(
@@ -209,7 +212,7 @@ def sheet_parts(
         sources = [f"{s.status} ({', '.join(s.data)}): {s.text}" for s in sheet.sources]
         parts += [Prose("Sources", sources)] if sources else []
         gaps = [[gap.datum, gap.where] for gap in sheet.gaps]
-        parts += [Table("What the sheet lacks", ("datum", "where to read it"), gaps)] if gaps else []
+        parts += [Table("Missing data", ("datum", "source to look in"), gaps)] if gaps else []
     return parts
 
 
@@ -221,12 +224,12 @@ def rig_parts(
     how: Sequence[str],
     own: Sequence[tuple[str, str, str]] = (),
 ) -> tuple[Table | Group | Prose, ...]:
-    """The tables below the charts: comparison, notes, further measurements, the data sheet, and how it was measured."""
+    """The tables below the charts: comparison, notes, further measurements, the data sheet, and the method."""
     parts = comparison_table(comparisons)
     told = [sheet.note] if sheet is not None and sheet.note else []
     if notes := [*told, *notes]:
         parts.append(Prose("", notes, noted=True))
-    return (*parts, *sheet_parts(sheet, measured, own), Prose("How it was measured", how))
+    return (*parts, *sheet_parts(sheet, measured, own), Prose("Method", how))
 
 
 def compared_rows(comparisons: Sequence[Comparison]) -> str:

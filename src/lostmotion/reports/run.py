@@ -35,8 +35,8 @@ def summary(result: xarray.Dataset | RunArrays) -> str:
     lines = [
         visible(result.attrs["title"]) or "(no title)",
         f"  {last('time'):g} s, {result.attrs['switching_count']} events, solver {result.attrs['solver']}",
-        f"  at the end: motor {last('motor_speed'):.6g} rad/s, load {last('load_speed'):.6g} rad/s "
-        f"at {last('load_angle'):.6g} rad, twist {1e3 * last('twist'):.4g} mrad",
+        f"  at the end: motor {last('motor_speed'):.4g} rad/s, load {last('load_speed'):.4g} rad/s "
+        f"at {last('load_angle'):.4g} rad, twist {1e3 * last('twist'):.4g} mrad",
         f"  peak: motor torque {peak('motor_torque'):.4g} N·m, output torque "
         f"{peak('output_torque'):.4g} N·m, load speed {peak('load_speed'):.4g} rad/s",
         f"  input shaft stuck for {100.0 * stuck:.1f} % of the samples",
@@ -199,7 +199,7 @@ def _motion_lines(result: xarray.Dataset) -> list[str]:
             of = f"{axis.replace('_', ' ')} " if axis else ""
             errors[axis] = f"{of}{quantity} peak {peak}, rms {rms}"
     stuck = [
-        f"{name.removesuffix('_contact').replace('_', ' ')} {100.0 * float(np.mean(result[name].values == 0)):.3g} %"
+        f"{name.removesuffix('_contact').replace('_', ' ')} {100.0 * float(np.mean(result[name].values == 0)):.0f} %"
         for name in map(str, result)
         if name.endswith("_contact")
     ]
@@ -220,5 +220,14 @@ def _variables(result: xarray.Dataset) -> Table:
         if len(known):
             numbers = (float(values[-1]), float(known.min()), float(known.max()), float(np.sqrt(np.mean(known**2))))
             unit = str(result[name].attrs.get("units", "")).replace("*", "·")
-            rows.append([name, *(f"{v:.6g}" for v in numbers), "" if unit == "1" else unit])
-    return Table("Variables", ("variable", "at the end", "least", "largest", "rms", "unit"), rows)
+            size = max(map(abs, numbers[1:3]))
+            rows.append([name, *(_digits(v, size) for v in numbers), "" if unit == "1" else unit])
+    note = "A blank value means that the variable is not defined at the end; a blank unit, that it is a plain number."
+    return Table("Variables", ("variable", "at the end", "least", "largest", "rms", "unit"), rows, note)
+
+
+def _digits(value: float, size: float) -> str:
+    """A value with sensible digits: blank if it is none, 0 if it is rounding beside the size of its variable."""
+    if not np.isfinite(value):
+        return ""
+    return f"{value:.5g}" if abs(value) > 1e-12 * size else "0"

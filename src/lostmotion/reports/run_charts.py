@@ -135,7 +135,7 @@ def _drive(result: xarray.Dataset) -> Iterator[Chart]:
     yield panel("Motor torque", "motor torque [N·m]", curve("motor_torque", look(0)))
     speed = curve("motor_speed", look(1), 1.0 / ratio, "motor speed / ratio")
     yield panel("Speed", "speed at the load [rad/s]", speed, curve("load_speed", look(0)))
-    torque = curve("input_torque", look(1), ratio, "input torque x ratio")
+    torque = curve("input_torque", look(1), ratio, "input torque × ratio")
     yield panel("Torque", "torque [N·m]", torque, curve("output_torque", look(0)), curve("load_torque", FAINT))
     yield panel("Twist", "twist [mrad]", curve("twist", look(0), 1e3))
     yield _contacts(result, {name: label for name, label in CONTACTS.items() if name in result})

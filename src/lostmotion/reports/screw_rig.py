@@ -38,13 +38,14 @@ def panels(report: ScrewReport, sheet: ScrewSheet | None) -> list[Panel]:
         Curve("with the drag, the screw drives", force, whole, step(3, 4)),
     ]
     running = [Curve("rig", RPM * speeds, drag, step(0, 4))]
+    top = 1.2 * max(float(np.max(drag)), 0.0 if sheet is None else sheet.drag_torque) or 1.0
     if sheet is not None and sheet.efficiency is not None:
         efficiency.append(Curve("catalogue", force[-1:], np.array([sheet.efficiency]), DOTS))
     if sheet is not None and sheet.drag_torque > 0.0:
         running.append(Curve("catalogue", np.array([RPM * RATED]), np.array([sheet.drag_torque]), DOTS))
     found = [
         Panel("efficiency over load", "axial force [N]", "efficiency [-]", tuple(efficiency), y_range=(0.0, 1.0)),
-        Panel("drag torque", "speed of the screw [rpm]", "on the screw [N·m]", tuple(running)),
+        Panel("drag torque", "speed of the screw [rpm]", "on the screw [N·m]", tuple(running), y_range=(0.0, top)),
     ]
     if report.first_loading is None:
         return found

@@ -22,6 +22,7 @@ from .study_selection import show_selection
 if TYPE_CHECKING:
     import pyarrow as pa
 
+BLANK = "Over all runs. A blank cell means that no run has a value."
 MAX_POINTS = 5000  # of a scatter
 POINTS: dict[str, Any] = {
     "color": PALETTE["first"],
@@ -30,12 +31,6 @@ POINTS: dict[str, Any] = {
     "markersize": 2.5,
     "alpha": 0.5,
 }
-
-
-def figures_of(directory: Path) -> Path:
-    """Directory of the page: not among the data, all of which readers of Parquet directories try to read."""
-    whole = directory.resolve()
-    return whole.with_name(f"{whole.name}-figures")
 
 
 def statistics(table: pa.Table, study: Study) -> list[list[Any]]:
@@ -120,7 +115,7 @@ def best_lines(directory: Path, text: str) -> list[str]:
 
 
 def _short(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, int | float) else str(value)
+    return f"{value:.5g}" if isinstance(value, int | float) else str(value)
 
 
 def best_runs(table: pa.Table, name: str, count: int = 10, *, largest: bool = False) -> pa.Table:
@@ -137,9 +132,14 @@ def best_runs(table: pa.Table, name: str, count: int = 10, *, largest: bool = Fa
 # --- charts ---
 
 
+def _label(table: pa.Table, column: str) -> str:
+    """A column with its unit, as charts print it."""
+    return labelled(table, column).replace("*", "·")
+
+
 def distributions(table: pa.Table, study: Study) -> Group:
     """A histogram of each kept value."""
-    charts = [Histogram(name, labelled(table, name), x) for name in study.keep if len(x := _finite(table, name))]
+    charts = [Histogram(name, _label(table, name), x) for name in study.keep if len(x := _finite(table, name))]
     return Group("distributions", "Distributions", "", tuple(charts))
 
 
@@ -164,8 +164,8 @@ def scatter(table: pa.Table, study: Study, max_columns: int = 6) -> Group:
             places = [v.names.index(value) for value in x] if v.names is not None else x
             curve = Curve("runs", np.asarray(places, float), some[name].to_numpy(), POINTS)
             names = v.names if v.names is not None else ()
-            label = labelled(table, v.title)
-            charts.append(Panel(f"{name} over {v.title}", label, labelled(table, name), (curve,), x_names=tuple(names)))
+            across, along = (_label(table, column) for column in (v.title, name))
+            charts.append(Panel(f"{name} over {v.title}", across, along, (curve,), x_names=tuple(names)))
     return Group("scatter", "Values over parameters", "", tuple(charts), min(3, len(vary)))
 
 
@@ -175,7 +175,7 @@ def scatter(table: pa.Table, study: Study, max_columns: int = 6) -> Group:
 def _failures(table: pa.Table) -> list[str]:
     """The reasons of runs that failed, the first five."""
     failed = [e for e in table["error"].to_pylist() if e]
-    return [f"{failed.count(e)} x {e}" for e in list(dict.fromkeys(failed))[:5]]
+    return [f"{failed.count(e)} × {e}" for e in list(dict.fromkeys(failed))[:5]]
 
 
 def _counted(table: pa.Table, study: Study) -> str:
@@ -183,46 +183,57 @@ def _counted(table: pa.Table, study: Study) -> str:
     return f"{table.num_rows} of {study.total} runs, {failed} failed"
 
 
-def _task_page(study: Study, table: pa.Table, name: str) -> tuple[Report, list[str], dict[str, str]]:
+def _task_page(study: Study, table: pa.Table, name: str) -> tuple[Report, dict[str, str]]:
     """Page of a task: its ranking alone, since the varied values are names."""
     shown = show_selection(table, study)
     main, *parts = shown.parts if isinstance(shown.parts[0], Group) else (Group("none", "", "", ()), *shown.parts)
     assert isinstance(main, Group)
     lead = f"Selection of motor and gearbox for the task `{name}`: {_counted(table, study)}."
-    report = Report(study.title or name, lead, shown.verdict, main, tuple(parts))
-    return report, [study.title, *shown.lines], shown.tables
+    return Report(study.title or name, lead, shown.verdict, main, tuple(parts)), shown.tables
 
 
-def _study_page(study: Study, table: pa.Table, name: str) -> tuple[Report, list[str], dict[str, str]]:
+STATISTICS = ("mean", "std. dev.", "min", "5 %", "50 %", "95 %", "max")
+
+
+def _study_lines(study: Study, table: pa.Table, name: str) -> list[str]:
+    """Statistics, failures, Sobol indices and selection as text."""
     rows = statistics(table, study)
-    header = ["", "mean", "std. dev.", "min", "5 %", "50 %", "95 %", "max"]
-    failures = _failures(table)
-    lines = [study.title or name, f"  {_counted(table, study)}", *(f"    {line}" for line in failures)]
+    lines = [study.title or name, f"  {_counted(table, study)}", *(f"    {line}" for line in _failures(table))]
     width = max(len(r[0]) for r in rows) + 2
-    lines.append("  " + header[0].ljust(width) + "".join(h.rjust(12) for h in header[1:]))
-    lines += ["  " + r[0].ljust(width) + "".join(f"{x:12.5g}" for x in r[1:]) for r in rows]
+    lines.append("  " + " " * width + "".join(h.rjust(12) for h in STATISTICS))
+    lines += ["  " + r[0].ljust(width) + "".join(_short(x).rjust(12) for x in r[1:]) for r in rows]
+    for kept, by_parameter in _whole_indices(table, study).items():
+        shares = ", ".join(f"{p} {s1:.3f} ({st:.3f})" for p, (s1, st) in by_parameter.items())
+        lines.append(f"  Sobol indices of {kept}, first order (total): {shares}")
+    return lines if study.select is None else [*lines, *show_selection(table, study).lines]
+
+
+def _whole_indices(table: pa.Table, study: Study) -> dict[str, dict[str, tuple[float, float]]]:
+    """Sobol indices of a study whose design is for them, if all of its runs are there."""
+    whole = study.design == "saltelli" and table.num_rows == study.total and not _failures(table)
+    return sobol_indices(table, study) if whole else {}
+
+
+def _study_page(study: Study, table: pa.Table, name: str) -> tuple[Report, dict[str, str]]:
+    rows, failures = statistics(table, study), _failures(table)
     shown = [[row[0], *("" if np.isnan(x) else f"{x:.5g}" for x in row[1:])] for row in rows]
-    parts: list[Any] = [Table("Statistics", ("value", *header[1:]), shown)]
+    parts: list[Any] = [Table("Statistics", ("value", *STATISTICS), shown, BLANK)]
     ranks = influence(table, study) if _with_order(study) else {}
     if ranks:
         parts.append(bars("tornado", "Influence of the parameters", ranks, "rank correlation [-]"))
-    if study.design == "saltelli" and table.num_rows == study.total and not failures:
-        indices = sobol_indices(table, study)
+    if indices := _whole_indices(table, study):
         parts.append(bars("sobol", "Sobol indices", indices, "Sobol index [-]", ("first order", "total")))
-        for kept, by_parameter in indices.items():
-            shares = ", ".join(f"{p} {s1:.3f} ({st:.3f})" for p, (s1, st) in by_parameter.items())
-            lines.append(f"  Sobol indices of {kept}, first order (total): {shares}")
     parts.append(scatter(table, study))
-    tables = {"statistics.csv": table_csv(["value", *header[1:]], rows)}
+    tables = {"statistics.csv": table_csv(["value", *STATISTICS], rows)}
     verdict = _verdict(table, study, ranks)
     if study.select is not None:
         selected = show_selection(table, study)
-        lines, tables, verdict = [*lines, *selected.lines], tables | selected.tables, selected.verdict
+        tables, verdict = tables | selected.tables, selected.verdict
         parts = [*selected.parts, *parts]
     if failures:
         parts.append(Prose("Runs that failed", failures, listed=True))
     lead = f"Study `{name}`: {_counted(table, study)}."
-    return Report(study.title or name, lead, verdict, distributions(table, study), tuple(parts)), lines, tables
+    return Report(study.title or name, lead, verdict, distributions(table, study), tuple(parts)), tables
 
 
 def _verdict(table: pa.Table, study: Study, ranks: dict[str, dict[str, float]]) -> Headline:
@@ -243,17 +254,43 @@ def _verdict(table: pa.Table, study: Study, ranks: dict[str, dict[str, float]]) 
     return Headline("good" if whole else "open", (f"{_counted(table, study)}.", *lines))
 
 
-def study_report(directory: Path) -> tuple[Report, list[str], dict[str, str]]:
-    """The page of a study in a directory, the lines to print, and its tables as CSV by their names."""
+def study_report(directory: Path) -> tuple[Report, dict[str, str]]:
+    """The page of a study in a directory, and its tables as CSV by their names."""
     study, table = study_of(directory), read_table(directory)
     make = _study_page if study.axis is None else _task_page
     return make(study, table, directory.resolve().name)
 
 
-def show(directory: Path, pictures: Sequence[str] = ()) -> list[str]:
-    """Writes study.html and tables into a directory beside that of the data, on request pictures; returns what to print."""
+def summary_lines(directory: Path) -> list[str]:
+    """The lines to print of a study in a directory.
+
+    Raises
+    ------
+    InputError
+        A library that studies need is not installed, or the directory holds no study.
+    """
     need("pyarrow", "Showing a study", "study")
-    need("scipy", "Showing a study", "study")
-    report, lines, tables = study_report(directory)
-    page = write_report(figures_of(directory), "study.html", report, tables, pictures)
-    return [*lines, f"The page is at {page}; tables are beside it"]
+    study, table = study_of(directory), read_table(directory)
+    if study.axis is not None:
+        return [study.title, *show_selection(table, study).lines]
+    return _study_lines(study, table, directory.resolve().name)
+
+
+def write_study(directory: Path, target: Path, pictures: Sequence[str] = ()) -> Path:
+    """Write ``study.html`` and tables of a study into another directory, made if missing; on request pictures.
+
+    Returns
+    -------
+    Path
+        Of the page.
+
+    Raises
+    ------
+    InputError
+        The target is the directory of the study, all files of which readers of Parquet try to read.
+    """
+    need("scipy", "The page of a study", "study")
+    if target.resolve().is_relative_to(directory.resolve()):
+        raise InputError(f"{target}: is within the directory of the runs; name another one with -o")
+    report, tables = study_report(directory)
+    return write_report(target, "study.html", report, tables, pictures)

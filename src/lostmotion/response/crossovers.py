@@ -120,7 +120,7 @@ def bandwidth(
     source : str, optional
         The input, as in `frequency_response`. Default: the command of the only motor.
     mean_command, mean_load_torque : float, optional
-        Constant parts of E_C [-] and M_Z [N·m] of a drive. Default: those of the scenario, or 0.
+        Constant parts of E_C [-] and M_Z [N·m] of a drive. Default: the values in the scenario, or 0.
     lowest, highest : float
         Range of frequencies [Hz].
 

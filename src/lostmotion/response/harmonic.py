@@ -65,7 +65,7 @@ def frequency_response(
         ``"<motor>_command"``, ``"<motor>_reference"``, ``"<shaft>_load_torque"`` and so on. The others are constant. Default: command or
         reference of the only motor.
     mean_command, mean_load_torque : float, optional
-        Constant parts of E_C [-] and M_Z [N·m] of a drive. Default: those of the scenario, or 0.
+        Constant parts of E_C [-] and M_Z [N·m] of a drive. Default: the values in the scenario, or 0.
     harmonics : int
         Number of harmonics to keep.
     refine : float, optional
@@ -312,7 +312,7 @@ def _of_each_point(r: dict[str, Any], found: np.ndarray) -> tuple[dict[str, np.n
 
 
 def of_output(response: xarray.Dataset, output: str | None = None) -> xarray.DataArray:
-    """The response of one output over amplitude and frequency; left out, that of the load's speed.
+    """The response of one output over amplitude and frequency; default: the load's speed.
 
     Raises
     ------

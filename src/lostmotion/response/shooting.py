@@ -121,12 +121,12 @@ def periodic_motion(
     drive : Drive or Scenario
         The drive or the scenario.
     command, load_torque : CommandSignal, TorqueSignal or float, optional
-        E_C [-] and M_Z [N·m] of a drive: constants, or signals of mean and sines with a common period. Default: those of the
+        E_C [-] and M_Z [N·m] of a drive: constants, or signals of mean and sines with a common period. Default: the values in the
         scenario, or 0. The inputs of a train are those of its scenario.
     multiple : int
         Number of periods of the inputs after which the motion repeats (sub-harmonics).
     start : Initial or TrainInitial, optional
-        Initial state. Default: that of the scenario, or rest. Coexisting motions are reached from different ones.
+        Initial state. Default: the state in the scenario, or rest. Coexisting motions are reached from different ones.
     max_periods : int
         Largest number of periods to follow.
 

@@ -43,7 +43,7 @@ STEADY = (
 )
 CONFIRMED = 3.0  # times as long a watch confirms a swing
 NOISE = 2e-9 * math.pi  # [rad], a billionth of a turn: what a shaft at rest may move by rounding
-NOTHING_MOVES = "the state is an equilibrium, as no number of drive and controllers moves"
+NOTHING_MOVES = "the state is an equilibrium: no state of drive and controllers changes"
 
 
 @dataclass(frozen=True)

@@ -170,7 +170,7 @@ class ServoReport:
         if twist > 0.5 * left:
             where = "the motor" if self.following.encoder == "motor" else f"the shaft {self.following.encoder}"
             return f"{text}, as an encoder on {where} does not see {_shown(twist, self.following.unit, 3)} of static twist under load"
-        return f"{text}, which the loop sees and has not yet removed; raise its gains, or allow more time"
+        return f"{text}, which the loop measures and is still removing; raise its gains, or allow more time"
 
     def _place(self, position: float) -> str:
         return f"{math.degrees(position):.5g} deg" if self.load_unit == "rad" else f"{1e3 * position:.5g} mm"
@@ -195,7 +195,7 @@ class ServoReport:
         """Behaviour of the axis at rest, in one line."""
         cycle = self.limit_cycle
         if cycle is None:
-            return "not looked at: there is no position loop that could hold a place"
+            return "not examined: the axis has no position loop"
         whole = cycle.whole
         if not whole.cycles:
             return f"{'no limit cycle' if whole.verdict == 'at rest' else whole.verdict}: {whole.described()}"

@@ -94,9 +94,9 @@ def simulate(
         A scenario, whose values the other arguments replace, or a drive alone. The inputs of a drive train are those of its
         scenario (`TrainScenario.replace` changes them); only duration and sample_interval can be given here.
     command : CommandSignal or float, optional
-        E_C [-]. Default: that of the scenario; 0 for a drive alone.
+        E_C [-]. Default: the value in the scenario; 0 for a drive alone.
     load_torque : TorqueSignal or float, optional
-        M_Z [N·m]. Default: that of the scenario; 0 for a drive alone.
+        M_Z [N·m]. Default: the value in the scenario; 0 for a drive alone.
     duration, sample_interval : float, optional
         Times [s], required for a drive alone. They set the instants of the result and do not affect the motion.
     initial : Initial, optional

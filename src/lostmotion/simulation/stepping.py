@@ -274,7 +274,7 @@ class Simulation:
         Parameters
         ----------
         initial
-            A new state at t = 0; left out, that of the last start.
+            A new state at t = 0; default: the state of the last start.
 
         Raises
         ------

@@ -544,9 +544,9 @@ def given_train(
     Parameters
     ----------
     loaded
-        These; left out, those of the scenario, of a train alone all.
+        Default: as in the scenario; all for a train alone.
     given
-        These; left out, those of the scenario, of a train alone none.
+        Default: as in the scenario; none for a train alone.
 
     Raises
     ------

@@ -168,7 +168,7 @@ def check_names(
     Parameters
     ----------
     written
-        The elements as they were written, for messages; left out, those of the train.
+        The elements as they were written, for messages; default: the elements of the train.
 
     Raises
     ------

@@ -73,10 +73,15 @@ class Finding:
         """Source of the rule."""
         return SOURCES[self.rule]
 
-    def __str__(self) -> str:
+    @property
+    def in_short(self) -> str:
+        """Verdict, value and remark in one line, without the source of the rule."""
         mark = {"ok": "ok     ", "warning": "WARNING", "unknown": "?      "}[self.verdict]
         remark = f" ({self.remark})" if self.remark else ""
-        return f"{mark}  {self.what}: {self.value}{remark} [{self.source}]"
+        return f"{mark}  {self.what}: {self.value}{remark}"
+
+    def __str__(self) -> str:
+        return f"{self.in_short} [{self.source}]"
 
 
 class Findings(tuple[Finding, ...]):

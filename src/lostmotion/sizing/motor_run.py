@@ -138,7 +138,7 @@ def temperatures(
     motor : str, optional
         Name of one of several motors of a drive train.
     ambient : float, optional
-        Ambient temperature [°C]. Default: that of the task, or 25 °C.
+        Ambient temperature [°C]. Default: the temperature in the task, or 25 °C.
     winding, case : float, optional
         Temperatures [°C] at the beginning. Default: the ambient one.
     repeated : bool
