@@ -90,7 +90,14 @@ def _verdict(result: MonitorResult) -> Headline:
         return Headline("bad", tuple(f"{w.text}.{more if k == 1 else ''}" for k, w in enumerate(alarms[:2])))
     if undecided:
         names = ", ".join(w.name for w in undecided)
-        return Headline("open", (f"Not decided: {names}.", f"{undecided[0].text}.", "All findings are listed below."))
+        return Headline(
+            "open",
+            (
+                f"Not decided: {names}.",
+                f"An example of the reasons: {undecided[0].text}.",
+                "All findings are listed below.",
+            ),
+        )
     return Headline("good", ("No watched value has changed, and none is beyond its limits.",))
 
 
