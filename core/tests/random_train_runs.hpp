@@ -3,6 +3,8 @@
 #pragma once
 
 #include <cstdio>
+#include <initializer_list>
+#include <limits>
 
 #include "random_trains.hpp"
 #include "recorded.hpp"
@@ -10,14 +12,16 @@
 
 namespace lostmotion::model {
 
-// The largest difference of a state, in units of its largest value.
-inline double difference(const Recorded& p, const Recorded& q, double sign = 1.0) {
+// The largest difference of a state before an instant, in units of its largest value.
+inline double difference(const Recorded& p, const Recorded& q, double sign = 1.0,
+                         double before = std::numeric_limits<double>::infinity()) {
     double worst = 0.0;
     for (std::size_t c = 0; c < p.run.channels().size(); ++c) {
         if (p.run.channels()[c].kind != TrainChannel::state) continue;
         double size = 1e-6, most = 0.0;
         for (std::size_t k = 0; k < p.samples; ++k) {
             size = std::max(size, std::fabs(p.out[c * p.samples + k]));
+            if (!(p.interval * static_cast<double>(k) < before)) continue;
             most = std::max(most, std::fabs(p.out[c * p.samples + k] - sign * q.out[c * p.samples + k]));
         }
         worst = std::max(worst, most / size);
@@ -216,10 +220,64 @@ inline bool part_at_grazing(const Recorded& p, const Recorded& q) {
     return grazes(a) || grazes(b);
 }
 
+// The first instant at which only one of two runs switches; infinite if there is none.
+inline double parting(const Recorded& p, const Recorded& q) {
+    const auto &a = p.report.switchings, &b = q.report.switchings;
+    std::size_t k = 0;
+    while (k < std::min(a.size(), b.size()) && std::fabs(a[k].time - b[k].time) < 1e-6) ++k;
+    constexpr double never = std::numeric_limits<double>::infinity();
+    return std::min(k < a.size() ? a[k].time : never, k < b.size() ? b[k].time : never);
+}
+
+// Do runs by smaller and smaller tolerances follow a run for longer and longer, each until then to within 1e-6? A
+// speed that dies out never reaches zero: the adaptive solver turns it by its error, later with a smaller one.
+inline bool follow_for_longer(const Recorded& exact, std::initializer_list<const Recorded*> finer) {
+    double until = 0.0;
+    for (const Recorded* run : finer) {
+        const double parts = parting(exact, *run);
+        if (!run->done() || !(parts > until + 1e-6) || difference(exact, *run, 1.0, parts) > 1e-6) return false;
+        until = parts;
+    }
+    return true;
+}
+
+// The same train with inertias, frictions and inputs that differ by up to `size` of their values.
+inline RandomRun nearby(const RandomRun& r, RandomTrains& random, double size) {
+    RandomRun other = r;
+    const auto factor = [&] { return 1.0 + size * random.uniform(-1.0, 1.0); };
+    for (Shaft& s : other.train.shafts) {
+        s.inertia *= factor();
+        const double friction = factor();
+        s.friction.torque *= friction;
+        s.friction.breakaway_torque *= friction;
+    }
+    for (Signal& u : other.inputs) {
+        const double scale = factor();
+        for (Breakpoint& b : u.breakpoints) b = {b.time, scale * b.value, scale * b.slope};
+        for (Sine& w : u.sines) w.amplitude *= scale;
+    }
+    return other;
+}
+
+// Is a motion one that the exact solver finds of a train nearby? At an event that rounding decides, such as a speed
+// that touches zero, two motions begin. A motion that is an error of either solver is none of them.
+inline bool is_branch(const RandomRun& r, const Control& control, double duration, const Recorded& motion) {
+    RandomTrains random(1);
+    for (const double size : {1e-12, 1e-11, 1e-10, 1e-9, 5e-9})
+        for (int n = 0; n < 20; ++n) {
+            const RandomRun other = nearby(r, random, size);
+            const Recorded exact(other.train, other.inputs, duration, duration / 50.0, 0.0, {}, {}, control);
+            if (exact.done() && difference(exact, motion) < 1e-5) return true;
+        }
+    return false;
+}
+
 // Exact against adaptive solver. Two tolerances of the adaptive one tell how well it knows the motion: a run counts if
-// it agrees with itself. Where it does not, or has taken the same steps with both, smaller ones tell.
+// it agrees with itself. Where it does not, or has taken the same steps with both, smaller ones tell. Where these part
+// from each other or from the exact run at an event that rounding decides, the exact solver has to find each of the
+// motions in trains nearby (`forked`), or all of them follow it for longer with each smaller tolerance (`outlasted`).
 struct SolverTally {
-    int compared = 0, undecided = 0, jammed = 0, wrong = 0;
+    int compared = 0, forked = 0, outlasted = 0, undecided = 0, jammed = 0, wrong = 0;
     double worst = 0.0;
 
     int failed() const { return wrong + jammed; }
@@ -245,6 +303,19 @@ inline void compare_solvers(const RandomRun& r, const Control& control, double d
         own = finer.done() && finest.done() ? difference(finer, finest) : 1.0;
         gap = finest.done() ? difference(exact, finest) : 1.0;
         if (gap > 1e-6 && (!same_instants(finer, finest) || part_at_grazing(exact, finest))) own = 1.0;
+        if (own > 1e-5 && gap > 1e-6 && finest.done()) {
+            if (follow_for_longer(exact, {&fine, &finer, &finest})) {
+                ++tally.outlasted;
+                return;
+            }
+            const bool both =
+                is_branch(r, control, duration, finest) &&
+                (!finer.done() || difference(finer, finest) < 1e-5 || is_branch(r, control, duration, finer));
+            if (both) {
+                ++tally.forked;
+                return;
+            }
+        }
     }
     if (own > 1e-5 && gap > 1e-6) {
         ++tally.undecided;

@@ -30,15 +30,16 @@ struct Recorded {
     TrainReport report;
     std::vector<double> out, signals;  // of channels, and of the axes
     std::size_t samples;
+    double interval;  // [s], of the samples
 
-    Recorded(const Train& train, const std::vector<Signal>& inputs, double duration, double interval,
+    Recorded(const Train& train, const std::vector<Signal>& inputs, double duration, double interval_of_samples,
              double tolerance = 0.0, std::span<const double> start = {}, std::span<const double> memory = {},
              const Control& control = {})
-        : run(named(train)) {
+        : run(named(train)), interval(interval_of_samples) {
         TrainOptions options;
         options.duration = duration;
-        options.sample_interval = interval;
-        samples = options.samples = static_cast<std::size_t>(duration / interval * (1.0 + 1e-12)) + 1;
+        options.sample_interval = interval_of_samples;
+        samples = options.samples = static_cast<std::size_t>(duration / interval_of_samples * (1.0 + 1e-12)) + 1;
         options.tolerance = tolerance;
         out.resize(run.channels().size() * samples);
         options.control = control;
