@@ -23,3 +23,21 @@ def test_two_shafts_and_a_compliant_gear_vibrate_freely() -> None:
     speed_b = k * d0 / (J_2 * omega) * np.sin(omega * t)
     assert run["b_speed"].values == pytest.approx(speed_b, abs=1e-9 * float(abs(speed_b).max()))
     assert run["a_speed"].values == pytest.approx(-J_2 / (J_1 * i) * speed_b, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("ratio", [-4.0, 1.0, 5.0])
+def test_the_ledger_of_a_free_vibration_has_nothing_that_is_turned_over(ratio: float) -> None:
+    """An angular frequency of sqrt(k (1/(J_1 i^2) + 1/J_2)); motion and ledger to rounding."""
+    J_1, J_2, k = 1e-3, 5.0, 2000.0
+    scenario = lm.TrainScenario(
+        shafts={"a": {"inertia": J_1}, "b": {"inertia": J_2}},
+        gears={"g": {"input": "a", "output": "b", "ratio": ratio, "stiffness": {"kind": "linear", "stiffness": k}}},
+        initial={"twists": {"g": 1e-3}},
+        simulation={"duration": 1.0, "sample_interval": 0.01},
+    )
+    result = lm.simulate(scenario)
+    frequency = math.sqrt(k * (1.0 / (J_1 * ratio**2) + 1.0 / J_2))
+    wanted = 1e-3 * np.cos(frequency * result["time"].to_numpy())
+    assert np.abs(result["g_twist"].to_numpy() - wanted).max() < 1e-12 * 1e-3 * frequency
+    assert abs(lm.energy_of(result)["residual"]) < 1e-12 * k * 1e-3**2
+    assert result.attrs.get("energy_residual", 0.0) < 1e-12

@@ -49,7 +49,8 @@ def with_energy(attributes: Mapping[str, Any], energy: Mapping[str, float], stor
         stuck under load, and do not indicate an error.
     """
     residual = abs(energy["residual"])
-    share = residual / energy["turned_over"] if residual > ROUNDING * stored else 0.0
+    turned_over = energy["turned_over"] or stored  # drives that vibrate freely take and give nothing
+    share = residual / turned_over if turned_over > 0.0 and residual > ROUNDING * stored else 0.0
     found = {**attributes, "energy": json.dumps(energy), "energy_residual": share}
     if share <= MOST_RESIDUAL:
         return found
