@@ -202,7 +202,7 @@ $(VENV)/tools: pyproject.toml
 	@echo 'Installing libraries into $(VENV): about half a minute.'
 	$(BIN)/pip install -q --upgrade "pip>=25.1"
 	$(BIN)/pip install -q --group build
-	$(BIN)/pip install -q --no-build-isolation --config-settings=wheel.cmake=false --editable ".[report]"
+	$(BIN)/pip install -q --no-build-isolation --config-settings=wheel.cmake=false --editable ".[report,control]"
 	mkdir -p build
 	touch $@
 $(VENV)/built: $(VENV)/tools $(SOURCES)

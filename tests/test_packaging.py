@@ -3,10 +3,12 @@
 import ast
 import json
 import re
+import shlex
 import shutil
 import subprocess
 import sys
 import tomllib
+from collections.abc import Collection
 from pathlib import Path
 
 import pytest
@@ -59,11 +61,16 @@ def test_extras_and_metadata() -> None:
 # --- missing libraries ---
 
 OPTIONAL = ("scipy", "pyarrow", "h5netcdf", "h5py", "jinja2", "control", "SALib", "distributed", "dask")
-WITHOUT = f"import sys; sys.modules.update(dict.fromkeys({OPTIONAL!r}));"
 
 
-def without_extras(*call: str, cwd: Path) -> subprocess.CompletedProcess[str]:
-    script = f"{WITHOUT} from lostmotion.cli import main; main()"
+def without(libraries: Collection[str]) -> str:
+    """Statements after which these libraries cannot be imported."""
+    return f"import sys; sys.modules.update(dict.fromkeys({list(libraries)!r}));"
+
+
+def without_extras(*call: str, cwd: Path, but: Collection[str] = ()) -> subprocess.CompletedProcess[str]:
+    """A command in a process where the optional libraries cannot be imported, but for some."""
+    script = f"{without([name for name in OPTIONAL if name not in but])} from lostmotion.cli import main; main()"
     return subprocess.run([sys.executable, "-c", script, *call], cwd=cwd, capture_output=True, text=True, check=False)
 
 
@@ -82,6 +89,22 @@ def without_extras(*call: str, cwd: Path) -> subprocess.CompletedProcess[str]:
 def test_the_core_installation_runs_checks_and_draws(tmp_path: Path, call: tuple[str, ...]) -> None:
     done = without_extras(*call, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
+
+
+MAKEFILE = (ROOT / "Makefile").read_text()
+NEXT = re.findall(r"echo '(?:Next:| {5}) \$\(BIN\)/lostmotion ([^']+)'", MAKEFILE)
+
+
+@pytest.mark.parametrize("command", NEXT)
+def test_the_commands_that_make_demo_names_need_only_what_it_installs(tmp_path: Path, command: str) -> None:
+    installed = re.findall(r'--editable "\.\[([\w,]+)\]"', MAKEFILE)[0].split(",")
+    libraries = {re.match(r"[\w-]+", text)[0] for extra in installed for text in EXTRAS[extra]}  # type: ignore[index]
+    done = without_extras(*shlex.split(command), cwd=tmp_path, but=libraries)
+    assert done.returncode == 0, done.stderr
+
+
+def test_make_demo_names_commands() -> None:
+    assert [command.split()[0] for command in NEXT] == ["run", "rig", "servo"]
 
 
 def test_a_response_leaves_out_only_the_file_that_it_cannot_write(tmp_path: Path) -> None:
@@ -130,7 +153,7 @@ def test_a_missing_library_ends_in_one_line_that_says_what_to_install(
     ],
 )
 def test_in_python_too(what: str, library: str) -> None:
-    script = f"{WITHOUT} import lostmotion as lm; s = lm.load('paper-2dof-nl-small')\ntry: {what}\n"
+    script = f"{without(OPTIONAL)} import lostmotion as lm; s = lm.load('paper-2dof-nl-small')\ntry: {what}\n"
     script += "except lm.MissingLibraryError as error: print(error)"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.strip().endswith(f'needs {library}; install it: pip install "lostmotion[control]"')

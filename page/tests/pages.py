@@ -13,21 +13,9 @@ import numpy as np
 
 import lostmotion as lm
 from lostmotion.live_page.page import write_page
+from lostmotion.reports.looks import DOTS, look
 from lostmotion.reports.page import Headline, Prose, Report, Table, render
-from lostmotion.reports.panels import (
-    DOTS,
-    Bars,
-    Contacts,
-    Curve,
-    Flows,
-    Ground,
-    Group,
-    Histogram,
-    Mark,
-    Matrix,
-    Panel,
-    look,
-)
+from lostmotion.reports.panels import Bars, Contacts, Curve, Flows, Ground, Group, Histogram, Mark, Matrix, Panel
 from lostmotion.reports.servo import servo_report
 
 # Page -> scenario, and what the test changes on it by its address.
