@@ -1,6 +1,7 @@
 """Bad input ends in one line that names the file, the key and the remedy, and in exit code 1; nothing is left behind."""
 
 import math
+import pickle
 import re
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import lostmotion as lm
+from conftest import ROOT
 from lostmotion.inputs.validation import listed, nearest
 from lostmotion.simulation.scenario import Scenario
 from lostmotion.studies.expressions import Expression
@@ -684,3 +686,33 @@ def test_damaged_result_files_are_refused(tmp_path: Path) -> None:
             lm.open_result(tmp_path / name)
     with pytest.raises(lm.InputError, match="no such file"):
         lm.open_result(tmp_path / "none.csv")
+
+
+def test_an_error_carries_keys_and_reasons_as_data(tmp_path: Path) -> None:
+    """What a caller needs is no part of a sentence: keys, reasons, file and the number of problems that are not told."""
+    with pytest.raises(lm.InputError) as one:
+        lm.Load(inertia=-1.0)
+    assert [(p.keys, p.reason) for p in one.value.problems] == [(("inertia",), "-1.0 must be greater than 0")]
+    again = pickle.loads(pickle.dumps(one.value))
+    assert (str(again), again.problems) == (str(one.value), one.value.problems)
+    assert str(again.inside("load")) == "key load.inertia: -1.0 must be greater than 0"
+    with pytest.raises(lm.InputError) as several:
+        lm.Motor(kind="dc", rotor_inertia=-1.0, friction_torque=-2.0)
+    keys = {key for problem in several.value.problems for key in problem.keys}
+    assert {"rotor_inertia", "friction_torque"} <= keys
+    assert str(several.value) == "; ".join(problem.sentence() for problem in several.value.problems)
+    # In the short form a continuous controller has the key that its file has, wherever in the train it is refused.
+    path = tmp_path / "short.toml"
+    path.write_text(
+        'base = "paper-2dof-nl-small"\n[controller]\nkind = "continuous"\nlimit = 1.0\nshaft = "lod"\n'
+        'reference = { kind = "position", mean = 0.1 }\nposition = { gain = 2.0 }\n'
+    )
+    with pytest.raises(lm.InputError, match=r'key controller\.shaft: "lod" is no shaft; did you mean load\?'):
+        lm.load(path)
+
+
+def test_no_layer_takes_a_message_apart() -> None:
+    """Text of an error is passed on as it is: nothing is replaced in it, cut off or looked for."""
+    apart = re.compile(r"str\((error|problem|refused)\)\.(replace|removeprefix|removesuffix|partition|startswith)")
+    found = {p.name: apart.findall(p.read_text()) for p in (ROOT / "src" / "lostmotion").rglob("*.py")}
+    assert {name for name, hits in found.items() if hits} == set()

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from importlib.util import find_spec
+from typing import NamedTuple
 from unicodedata import category
 
 
@@ -21,8 +23,36 @@ def visible(text: str, kept: str = "") -> str:
     )
 
 
+class Problem(NamedTuple):
+    """Fault of a value, or of several."""
+
+    keys: tuple[str, ...]
+    """dotted keys of these; none where it concerns all that was given"""
+    reason: str
+    """the value, what is wrong with it, and the remedy"""
+
+    def sentence(self) -> str:
+        """Keys and reason as messages have them."""
+        if not self.keys:
+            return self.reason
+        return f"{'key' if len(self.keys) == 1 else 'keys'} {', '.join(self.keys)}: {self.reason}"
+
+
 class InputError(ValueError):
     """Input that cannot be used. Its text is one line: the file, the key, the value and the remedy.
+
+    Parameters
+    ----------
+    text : str
+        What is wrong, or the reason alone where keys are given.
+    keys : tuple of str
+        Dotted keys of the values.
+    where : str
+        File, log or function that the text begins with.
+    problems : sequence of Problem, optional
+        All that is wrong, in place of text and keys.
+    more : int
+        Problems that are not among them.
 
     Examples
     --------
@@ -34,8 +64,33 @@ class InputError(ValueError):
     key inertia: -1.0 must be greater than 0
     """
 
-    def __init__(self, text: str = "") -> None:
-        super().__init__(visible(str(text)))
+    def __init__(
+        self,
+        text: str = "",
+        *,
+        keys: tuple[str, ...] = (),
+        where: str = "",
+        problems: Sequence[Problem] | None = None,
+        more: int = 0,
+    ) -> None:
+        self.where, self.more = where, more
+        self.problems = (Problem(keys, str(text)),) if problems is None else tuple(problems)
+        said = "; ".join(problem.sentence() for problem in self.problems) + (f"; and {more} more" if more else "")
+        super().__init__(visible(f"{where}: {said}" if where else said))
+
+    @property
+    def reason(self) -> str:
+        """The text without `where`."""
+        return visible(str(InputError(problems=self.problems, more=self.more))) if self.where else str(self)
+
+    def inside(self, table: str) -> InputError:
+        """The same error of values within a table."""
+        return self.with_keys(lambda key: f"{table}.{key}")
+
+    def with_keys(self, change: Callable[[str], str]) -> InputError:
+        """The same error of values that have other keys."""
+        problems = [Problem(tuple(map(change, p.keys)), p.reason) for p in self.problems]
+        return InputError(where=self.where, problems=problems, more=self.more)
 
 
 class ArgumentError(InputError, TypeError):

@@ -288,20 +288,22 @@ class ContinuousController(Part):
             key = "voltage_limit" if motor.kind == "dc" else "dc_voltage"
             remedy = 'make it a motor of kind "torque_source"' if motor.kind == "synchronous" else f"leave {key} out"
             raise InputError(
-                f'current.kind: "{current.kind}" does not keep to the {key} of the motor; take "voltage" or a sampled controller, or {remedy}'
+                f'"{current.kind}" does not keep to the {key} of the motor; take "voltage" or a sampled controller, or {remedy}',
+                keys=("current.kind",),
             )
         if math.isinf(limit):
             if self.anti_windup_time is not None:
-                raise InputError("anti_windup_time: nothing limits the output; give a limit, or leave it out")
+                raise InputError("nothing limits the output; give a limit, or leave it out", keys=("anti_windup_time",))
             return
         pid = self.position or self.speed
         if pid is not None and pid.gains[0] == 0.0 < pid.gains[1] and self.anti_windup_time is None:
             raise InputError(
-                "anti_windup_time: is missing; an integrator behind a limit needs it where there is no gain"
+                "is missing; an integrator behind a limit needs it where there is no gain", keys=("anti_windup_time",)
             )
         if self.state_space is not None and self.state_space.winds_up():
             raise InputError(
-                "state_space: has an integrator behind a limit, which would wind up; give back_calculation (zeros let it wind up)"
+                "has an integrator behind a limit, which would wind up; give back_calculation (zeros let it wind up)",
+                keys=("state_space",),
             )
 
     def add_to(self, core: _core.Train, train: DriveTrain, name: str) -> None:
@@ -315,7 +317,7 @@ class ContinuousController(Part):
         shaft = list(train.shafts)[-1] if self.shaft is None else self.shaft
         if shaft not in train.shafts:
             meant = did_you_mean(shaft, train.shafts, f"the shafts are {', '.join(train.shafts)}")
-            raise InputError(f"shaft: {shown(shaft)} is no shaft; {meant}")
+            raise InputError(f"{shown(shaft)} is no shaft; {meant}", keys=("shaft",))
         motor = train.motors[name]
         limit = self.output_limit(motor)
         self._check_limits(motor, limit)

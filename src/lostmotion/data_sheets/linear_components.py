@@ -98,8 +98,9 @@ def _at_preload(record: ScrewSheet, preload: Any, values: Mapping[str, Any], whe
         assert force is not None
         if record.nut_preload is None or record.nut_stiffness is None:
             raise InputError(
-                f"key nut_preload: scales the stiffness that a record has at another preload, and {record.name} has none; "
-                "leave it out, and give nut_stiffness"
+                f"scales the stiffness that a record has at another preload, and {record.name} has none; leave it out, and give "
+                "nut_stiffness",
+                keys=("nut_preload",),
             )
         share = force / record.nut_preload
         found = {"drag_torque": record.drag_torque * share}
@@ -109,5 +110,5 @@ def _at_preload(record: ScrewSheet, preload: Any, values: Mapping[str, Any], whe
         if not record.drag_torque and (both := screw.efficiencies()) is not None:
             found["drag_torque"] = (1.0 / both[0] - both[1]) * force / screw.ratio()
     except InputError as error:
-        raise InputError(str(error).replace("key ", f"key {where}.", 1)) from None
+        raise error.inside(where) from None
     return found

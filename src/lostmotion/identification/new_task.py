@@ -123,7 +123,7 @@ def first_task(
         try:
             logs.append((path, read_log(path)))
         except InputError as problem:
-            refused.append(str(problem).replace(f"{directory}{os.sep}", ""))
+            refused.append(str(problem))
     if not logs:
         raise InputError(f"{directory}: none of its {len(paths)} logs can be read; the first: {refused[0]}")
     seen = _channels([log for _, log in logs])
@@ -207,7 +207,7 @@ def _doubts(
         try:
             found: Iterable[str] = screened(log, own, acting).notes
         except InputError as problem:
-            found = [str(problem).removeprefix(f"{log.name}: ")]
+            found = [problem.reason]
         for note in found:
             notes.setdefault(note, []).append(path.name)
     doubts = [f"{names[0]}{f' and {len(names) - 1} more' if len(names) > 1 else ''}: {n}" for n, names in notes.items()]

@@ -116,7 +116,7 @@ def run_log(rig: Rig, log: Prepared, values: Values, rung: int, extra: tuple[str
 
 
 def _refused(problem: InputError, names: Mapping[str, Any]) -> Exception:
-    text = str(problem).removeprefix("sensitivities: ")
+    text = problem.reason
     for name in sorted(names, key=len, reverse=True):
         if text.startswith((f"{name}: ", f"beside the value of {name} ", f"beside the value of {name}:")):
             return NoDerivativeError(name, text)

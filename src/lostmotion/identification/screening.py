@@ -48,7 +48,7 @@ def screened(log: Log, measured: Iterable[str], inputs: Iterable[str], stated: d
     for name in (*measured, *inputs):
         log.values(name)
     if len(log.time) < 10:
-        raise InputError(f"{log.name}: has {len(log.time)} samples; 10 at least are needed, leave the file out")
+        raise InputError(f"has {len(log.time)} samples; 10 at least are needed, leave the file out", where=log.name)
     log = _in_seconds(_rising(log))
     log = _numbers(log, measured, inputs)
     for name in measured:
@@ -70,7 +70,7 @@ def _rising(log: Log) -> Log:
     if not finite.all():
         log = log.only(finite, f"dropped {np.sum(~finite)} samples without a time")
     if len(log.time) < 10:
-        raise InputError(f"{log.name}: has times in {len(log.time)} samples only; 10 at least are needed")
+        raise InputError(f"has times in {len(log.time)} samples only; 10 at least are needed", where=log.name)
     step = np.diff(log.time)
     back = step < 0.0
     if back.any():
@@ -78,8 +78,9 @@ def _rising(log: Log) -> Log:
         kept = log.time >= highest
         if np.mean(kept) < 0.9:
             raise InputError(
-                f"{log.name}: its time goes back at sample {int(np.argmax(back)) + 1} ({log.time[int(np.argmax(back)) + 1]:.6g} s) and "
-                f"{np.mean(~kept):.0%} of the samples lie before earlier ones; sort or split the file"
+                f"its time goes back at sample {int(np.argmax(back)) + 1} ({log.time[int(np.argmax(back)) + 1]:.6g} s) and "
+                f"{np.mean(~kept):.0%} of the samples lie before earlier ones; sort or split the file",
+                where=log.name,
             )
         log = log.only(
             kept,
@@ -88,7 +89,7 @@ def _rising(log: Log) -> Log:
     same = np.diff(log.time) == 0.0
     share = float(np.mean(same))
     if share == 1.0:
-        raise InputError(f"{log.name}: all samples have the time {log.time[0]:.6g} s; the clock stood still")
+        raise InputError(f"all samples have the time {log.time[0]:.6g} s; the clock stood still", where=log.name)
     if share >= CLOCK:
         return _spread(log)
     if same.any():
@@ -107,8 +108,9 @@ def _in_seconds(log: Log) -> Log:
     """The log, with a note or an error where its times are hardly in seconds."""
     if log.duration > LONGEST or log.interval > LONG:
         raise InputError(
-            f"{log.name}: its times go from {log.time[0]:.6g} to {log.time[-1]:.6g} s in steps of {log.interval:.4g} s; "
-            f"times are read in s: give their unit, or split the file where the clock jumps"
+            f"its times go from {log.time[0]:.6g} to {log.time[-1]:.6g} s in steps of {log.interval:.4g} s; "
+            f"times are read in s: give their unit, or split the file where the clock jumps",
+            where=log.name,
         )
     if log.interval >= 1.0:
         return log.noted(f"its samples are {log.interval:.4g} s apart; times are read in s")
@@ -139,11 +141,13 @@ def _numbers(log: Log, measured: list[str], inputs: list[str]) -> Log:
         bad = ~(np.abs(log.values(name)) < HUGE)
         if bad.all():
             raise InputError(
-                f"{log.name}: channel {name} has no number in any sample; leave the file out, or name another channel"
+                f"channel {name} has no number in any sample; leave the file out, or name another channel",
+                where=log.name,
             )
         if np.mean(bad) > 0.5:
             raise InputError(
-                f"{log.name}: channel {name} has no number in {np.mean(bad):.0%} of the samples; leave the file out"
+                f"channel {name} has no number in {np.mean(bad):.0%} of the samples; leave the file out",
+                where=log.name,
             )
         if bad.any():
             log = _without(

@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..units.scalars import plain
 from .display import abridged
 from .docstrings import docstring_of
-from .validation import describe, shown
+from .validation import refusal, shown
 
 
 class Part(BaseModel):
@@ -103,7 +103,7 @@ class Part(BaseModel):
                 f"{cls._subject()} is nested too deeply; write it with fewer levels of tables and lists"
             ) from None
         except ValidationError as error:
-            raise InputError(describe(error, _description(cls), cls._subject(), given)) from None
+            raise refusal(error, _description(cls), cls._subject(), given) from None
 
     @classmethod
     def _described_by(cls) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from decimal import Decimal
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
-from ..errors import InputError
+from ..errors import InputError, Problem
 from ..units.scalars import scalar
 from .schema import follow, keys_within
 
@@ -29,8 +29,8 @@ WORD_CUTOFF = 0.7  # likeness of two words of which one is taken for the other, 
 JOINED_CUTOFF = 0.92  # of two names, where words run together or fall apart
 
 
-def describe(error: ValidationError, schema: Mapping[str, Any], subject: str, given: Any = None) -> str:
-    """One line for a failed validation. Names all keys that are missing, and no key that follows from a misspelt one.
+def refusal(error: ValidationError, schema: Mapping[str, Any], subject: str, given: Any = None) -> InputError:
+    """The error of a failed validation. Names all keys that are missing, and no key that follows from a misspelt one.
 
     Parameters
     ----------
@@ -54,18 +54,16 @@ def describe(error: ValidationError, schema: Mapping[str, Any], subject: str, gi
         meant = {(*p.keys[:-1], p.near()) for p in misspelt[:MAX_NEAR]}
         missing = [p for p in missing if p.keys not in meant]
     others = [p for p in problems if p.kind not in ("extra_forbidden", "missing")]
-    texts = [p.sentence(subject) for p in misspelt[:MAX_PROBLEMS]]
+    said = [p.problem(subject) for p in misspelt[:MAX_PROBLEMS]]
     if missing:
-        names = [shortened(p.name) for p in missing]
-        texts.append(
-            f"key {names[0]}: is missing; add it" if len(names) == 1 else f"keys {listed(names)}: are missing; add them"
-        )
-    texts += [p.sentence(subject) for p in others[:MAX_PROBLEMS]]
+        names = tuple(shortened(p.name) for p in missing)
+        told = names if len(", ".join(names)) <= MAX_LISTED else (listed(names),)
+        said.append(Problem(told, "is missing; add it" if len(names) == 1 else "are missing; add them"))
+    said += [p.problem(subject) for p in others[:MAX_PROBLEMS]]
     total = len(misspelt) + bool(missing) + len(others) + max(0, len(found) - MAX_READ)
-    fitting = [k for k in range(1, MAX_PROBLEMS + 1) if k == 1 or len("; ".join(texts[:k])) <= MAX_LINE]
-    said = texts[: fitting[-1]]
-    more = f"; and {total - len(said)} more" if total > len(said) else ""
-    return "; ".join(said) + more
+    fitting = [k for k in range(1, MAX_PROBLEMS + 1) if k == 1 or len(str(InputError(problems=said[:k]))) <= MAX_LINE]
+    said = said[: fitting[-1]]
+    return InputError(problems=said, more=max(0, total - len(said)))
 
 
 def unknown_key(key: str, known: Iterable[str], inner: Iterable[str] = ()) -> str:
@@ -208,11 +206,13 @@ class _Problem:
         table = [str(key) for key in self.keys[:-1]]
         return [".".join((*table, *path)) for path in keys_within(self.schema, self.nodes)]
 
-    def sentence(self, subject: str) -> str:
-        text = self._text()
-        if not self.keys:
-            return text if isinstance(self.context.get("error"), InputError) else f"{subject} {text}"
-        return f"key {shortened(self.name)}: {text}"
+    def problem(self, subject: str) -> Problem:
+        text, refused = self._text(), self.context.get("error")
+        if self.keys:
+            return Problem((shortened(self.name),), text)
+        if not isinstance(refused, InputError):
+            return Problem((), f"{subject} {text}")
+        return refused.problems[0] if [p.sentence() for p in refused.problems] == [text] else Problem((), text)
 
     def _text(self) -> str:
         if self.kind == "extra_forbidden":

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -55,6 +55,8 @@ class AngleCurve(Part):
 
 class PeriodicTorque:
     """Base of the torques on a shaft over its angle."""
+
+    table_of_core: ClassVar[str] = "angle_torques"
 
     def core(self) -> _core.PeriodicCurve:
         raise NotImplementedError

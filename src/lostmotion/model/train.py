@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Collection, Iterator, Mapping
-from typing import Annotated, Self, TypeVar
+from typing import Annotated, Any, Self, TypeVar, get_args
 
 from pydantic import AfterValidator, Field, model_validator
 
@@ -24,12 +24,6 @@ V = TypeVar("V")
 
 Elements = Annotated[dict[str, V], AfterValidator(Named)]
 """by name, in the order of the equations"""
-
-# What acts on one shaft: tables, and what the core calls them (core/lostmotion/model/train.hpp).
-ON_SHAFTS = {"brakes": "brakes", "gravity": "angle_torques", "angle_torques": "angle_torques", "springs": "springs"}
-
-# What joins two shafts and is no gear: tables, by the names that the core has for them.
-COUPLINGS = ("clutches", "freewheels", "dampers")
 
 # What the core calls an element (core/lostmotion/model/check.hpp), and the tables that it may stand in.
 TABLES = {
@@ -82,6 +76,23 @@ class TrainElements(Part):
                 for key in ("shaft", "input", "output", "housing"):
                     if getattr(element, key, None) is not None:
                         yield f"{table}.{name}.{key}", getattr(element, key)
+
+
+def _tables_of(*keys: str, without: type[Part]) -> Iterator[tuple[str, type[Part]]]:
+    """Tables of the elements that have these keys, and their parts; of several kinds the first."""
+    for table, field in TrainElements.model_fields.items():
+        part: Any = get_args(field.annotation)[1]
+        while not hasattr(part, "model_fields"):
+            part = get_args(part)[0]
+        if set(keys) <= part.model_fields.keys() and not issubclass(part, without):
+            yield table, part
+
+
+# What acts on one shaft: tables, and what the core calls them (core/lostmotion/model/train.hpp).
+ON_SHAFTS = {table: getattr(part, "table_of_core", table) for table, part in _tables_of("shaft", without=ShaftMotor)}
+
+# What joins two shafts and is no gear: tables, by the names that the core has for them.
+COUPLINGS = tuple(table for table, _ in _tables_of("input", "output", without=Gear))
 
 
 class DriveTrain(TrainElements):

@@ -132,7 +132,10 @@ def scenario_from(tables: Mapping[str, Any]) -> Scenario:
     try:
         return TrainScenario(**{**dict(drive), "command": {}, "controllers": {MOTOR: controller}})
     except InputError as error:
-        raise InputError(str(error).replace(f"controllers.{MOTOR}", "controller")) from None
+        long = f"controllers.{MOTOR}"
+        raise error.with_keys(
+            lambda key: f"controller{key.removeprefix(long)}" if key.startswith(long) else key
+        ) from None
 
 
 def read_tables(path: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> dict[str, Any]:

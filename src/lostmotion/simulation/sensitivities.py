@@ -70,7 +70,8 @@ def value_at(scenario: Scenario, key: str) -> float:
     if isinstance(node, bool) or not isinstance(node, int | float):
         has = "has nothing of that name" if node is None else f"has {shown(node)} there"
         raise InputError(
-            f"sensitivities: {key}: the scenario {has}, and a derivative needs a number; give its key and a value"
+            f"{key}: the scenario {has}, and a derivative needs a number; give its key and a value",
+            where="sensitivities",
         )
     return float(node)
 
@@ -93,7 +94,7 @@ def neighbours(scenario: Scenario, key: str) -> list[Neighbour]:
             return [Neighbour(k * h, weight / h, scenario.replace(**{name: value + k * h})) for k, weight in stencil]
         except InputError as error:
             problem = problem or error
-    raise InputError(f"sensitivities: {key}: cannot be varied about its value {value:g}: {problem}")
+    raise InputError(f"{key}: cannot be varied about its value {value:g}: {problem}", where="sensitivities")
 
 
 def _is_signal(scenario: Scenario, key: str) -> bool:
@@ -212,7 +213,7 @@ def run_cases(
     out = []
     for row in _core.run_sensitive_trains(list(cases), list(channels), signals, threads):
         if row[0]:
-            raise InputError(f"sensitivities: {row[0]}")
+            raise InputError(row[0], where="sensitivities")
         out.append(CoreDerivatives(*row[1:]))
     return out
 
@@ -230,7 +231,9 @@ def run_sensitivities(scenario: Scenario, keys: Sequence[str]) -> Sensitivities:
     need_free_motion(scenario, "sensitivities")
     keys = list(keys)
     if not keys or len(set(keys)) < len(keys):
-        raise InputError(f"sensitivities: {shown(keys)}; give keys of the scenario, such as load.inertia, each once")
+        raise InputError(
+            f"{shown(keys)}; give keys of the scenario, such as load.inertia, each once", where="sensitivities"
+        )
     beside = {key: neighbours(scenario, key) for key in keys}
     variations = [core_variation(scenario, key, beside[key]) for key in keys]
     channels = channels_of(scenario.core())

@@ -527,7 +527,7 @@ def _core_train(
         try:
             controller.add_to(core, train, name)
         except InputError as problem:
-            raise InputError(f"key controllers.{name}.{problem}") from None
+            raise problem.inside(f"controllers.{name}") from None
     return core
 
 
