@@ -1,4 +1,5 @@
 // Thin binding: the core as a Python module.
+#include "batches.hpp"
 #include "descriptions.hpp"
 #include "elementary.hpp"
 #include "joint_trains.hpp"
@@ -20,6 +21,7 @@ NB_MODULE(CORE_MODULE, m) {
     bind_instants(m);
     bind_stepping(m);
     bind_joint_trains(m);
+    bind_batches(m);
     bind_responses(m);
     bind_descriptions(m);
 }

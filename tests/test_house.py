@@ -83,7 +83,7 @@ CORE_LAYERS = [
     {"elements"},
     {"model"},
     {"simulation"},
-    {"analysis"},
+    {"analysis", "batch"},
     {"scenario"},
 ]
 

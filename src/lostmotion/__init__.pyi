@@ -48,6 +48,7 @@ from .response.shooting import periodic_motion as periodic_motion
 from .response.spectrum import spectrum as spectrum
 from .servo.commission import commission as commission
 from .servo.tuning import tune as tune
+from .simulation.batches import SimulationBatch as SimulationBatch
 from .simulation.explanation import explain as explain
 from .simulation.result_files import open_result as open_result
 from .simulation.result_files import save as save

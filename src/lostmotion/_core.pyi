@@ -306,6 +306,43 @@ class JointTrains:
     @property
     def unsettled(self) -> int: ...
 
+class BatchSnapshot:
+    pass
+
+class DriveBatch:
+    def __init__(self, bases: Sequence[Train], base: Sequence[int], keys: Sequence[str], curve_breaks: int, values: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], model_of: Sequence[int], step: float) -> None: ...
+
+    @staticmethod
+    def error(train: Train) -> str:
+        """What keeps a train from being stepped in a batch, or nothing."""
+
+    def step(self, command: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], load_torque: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], threads: int) -> None: ...
+
+    def reset(self, which: Annotated[NDArray[numpy.bool_], dict(shape=(None,), order='C', device='cpu', writable=False)] | None, start: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)] | None) -> None: ...
+
+    @property
+    def states(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None))]:
+        """The values of all drives, by state; each step writes them anew."""
+
+    def output_torque(self) -> NDArray[numpy.float64]: ...
+
+    def motor_torque(self) -> NDArray[numpy.float64]: ...
+
+    def input_contact(self) -> NDArray[numpy.float64]: ...
+
+    def twist_contact(self) -> NDArray[numpy.float64]: ...
+
+    def snapshot(self) -> BatchSnapshot: ...
+
+    def restore(self, snapshot: BatchSnapshot) -> None: ...
+
+    @property
+    def counts(self) -> tuple[int, int, int, int]: ...
+
+    @property
+    def memory(self) -> int:
+        """Bytes of states, tables and parameters."""
+
 def respond(train: Train, points: Sequence[tuple[Sequence[Signal], float, Mapping[str, float]]], samples: int, harmonics: int, max_periods: int, tolerance: float, keep_table: bool, limit_cycle: bool, threads: int, progress: Callable[[int], None] | None = None) -> dict[str, Any]: ...
 
 def describe(title: str, train: Train, inputs: Sequence[Signal], start: Mapping[str, float], hysteresis_capacities: Mapping[str, float], duration: float, interval: float, control: tuple[float, Sequence[tuple[Axis, int, int, int, int]]]) -> list[float]: ...

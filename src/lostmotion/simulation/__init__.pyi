@@ -1,3 +1,4 @@
+from .batches import BatchState as BatchState
 from .explanation import ContactState as ContactState
 from .explanation import Explanation as Explanation
 from .explanation import MotorState as MotorState

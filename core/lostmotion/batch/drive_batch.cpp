@@ -1,0 +1,334 @@
+#include "drive_batch.hpp"
+
+#include <algorithm>
+
+#include "../model/short_form.hpp"
+#include "../simulation/train_status.hpp"
+#include "walk.hpp"
+
+namespace lostmotion::batch {
+
+namespace {
+
+constexpr std::size_t most_solvers = 64;  // that a thread keeps
+constexpr std::size_t at_a_time = 64;     // drives that a thread takes
+constexpr std::size_t ahead = 4;          // drives whose tables are fetched
+
+}  // namespace
+
+model::Train Models::train(std::size_t m) const {
+    model::Train t = bases[static_cast<std::size_t>(base[m])];
+    const double* values = row(m);
+    for (const std::string& key : keys) *model::find_parameter(t, key) = *values++;
+    if (curve_breaks >= 0) {
+        const double *slopes = values + curve_breaks, *end = slopes + curve_breaks + 1;
+        t.gears[0].law.curve = TorsionCurve({values, slopes}, {slopes, end});
+    }
+    return t;
+}
+
+double Models::number(std::size_t m, const char* key, double of_base) const {
+    const auto at = std::ranges::find(keys, key);
+    return at == keys.end() ? of_base : row(m)[at - keys.begin()];
+}
+
+// What a thread keeps: general solvers of some models.
+struct DriveBatch::Worker {
+    struct Kept {
+        std::size_t model;
+        long used;
+        std::unique_ptr<TrainSimulation> simulation;
+    };
+    std::vector<Kept> solvers;
+    long clock = 0;
+    Counts counts;
+    Failure failure;
+
+    TrainSimulation& solver(const Models& models, std::size_t model, double step) {
+        ++clock;
+        for (Kept& k : solvers)
+            if (k.model == model) {
+                k.used = clock;
+                return *k.simulation;
+            }
+        if (solvers.size() == most_solvers) solvers.erase(std::ranges::min_element(solvers, {}, &Kept::used));
+        solvers.push_back({model, clock, std::make_unique<TrainSimulation>(models.train(model), step)});
+        return *solvers.back().simulation;
+    }
+};
+
+// Threads that wait for work.
+struct DriveBatch::Team {
+    using Task = std::function<void(std::size_t)>;  // of the number of the thread
+
+    explicit Team(std::size_t threads) {
+        for (std::size_t k = 1; k < threads; ++k)
+            members.emplace_back([this, k](const std::stop_token& stop) {
+                long seen = 0;
+                while (true) {
+                    std::unique_lock lock(mutex);
+                    begin.wait(lock, [&] { return round != seen || stop.stop_requested(); });
+                    if (stop.stop_requested()) return;
+                    seen = round;
+                    lock.unlock();
+                    (*task)(k);
+                    lock.lock();
+                    if (--working == 0) done.notify_one();
+                }
+            });
+    }
+    ~Team() {
+        for (std::jthread& m : members) m.request_stop();
+        const std::lock_guard lock(mutex);
+        begin.notify_all();
+    }
+    void run(const Task& work) {
+        {
+            const std::lock_guard lock(mutex);
+            task = &work;
+            working = members.size();
+            ++round;
+        }
+        begin.notify_all();
+        work(0);
+        std::unique_lock lock(mutex);
+        done.wait(lock, [&] { return working == 0; });
+    }
+
+    std::mutex mutex;
+    std::condition_variable begin, done;
+    const Task* task = nullptr;
+    std::size_t working = 0;
+    long round = 0;
+    std::vector<std::jthread> members;
+};
+
+std::string DriveBatch::error(const model::Train& train) {
+    const TrainRun run(train);
+    if (!run.error().empty()) return run.error();
+    if (!train.short_form || !model::fits<D>(train, run.assembly().layout()) ||
+        run.assembly().layout().branches > Label::max_branches)
+        return "is more than a motor, a gearbox with torsion curve and losses, and a load with plain friction";
+    return "";
+}
+
+DriveBatch::DriveBatch(Models models, std::vector<int> model_of, double step)
+    : models_(std::move(models)),
+      model_of_(std::move(model_of)),
+      step_(step),
+      drives_(model_of_.size()),
+      inputs_(model_of_.size()),
+      states_(model_of_.size() * D::states),
+      tables_(models_.size()) {}
+
+DriveBatch::~DriveBatch() {
+    team_.reset();
+    for (std::atomic<RegimeTable*>& first : tables_)
+        for (RegimeTable* t = first; t != nullptr;) RegimeTable::Free{}(std::exchange(t, t->next));
+}
+
+RegimeTable* DriveBatch::find(std::size_t model, const Label& label) const {
+    RegimeTable* t = tables_[model].load(std::memory_order_acquire);
+    while (t != nullptr && !(t->label == label)) t = t->next;
+    return t;
+}
+
+// Two threads may make the same table, with the same numbers; the first one stays.
+RegimeTable* DriveBatch::table(std::size_t model, const Label& label, Worker& worker) {
+    if (RegimeTable* known = find(model, label)) return known;
+    RegimeTable::Owned made = tabulate(worker.solver(models_, model, step_).assembly(), label, step_);
+    const std::lock_guard lock(adding_);
+    if (RegimeTable* known = find(model, label)) return known;
+    made->next = tables_[model].load(std::memory_order_relaxed);
+    tables_[model].store(made.get(), std::memory_order_release);
+    return made.release();
+}
+
+Failure DriveBatch::step(const Input& command, const Input& load_torque, unsigned threads) {
+    const std::size_t n = drives_.size();
+    const std::size_t tasks = (n + at_a_time - 1) / at_a_time;
+    const std::size_t wanted = std::max<std::size_t>(1, std::min<std::size_t>(threads, tasks));
+    while (workers_.size() < wanted) workers_.push_back(std::make_unique<Worker>());
+    if (wanted == 1) {
+        step_range(0, n, command, load_torque, *workers_[0]);
+    } else {
+        if (!team_ || team_->members.size() + 1 != wanted) {
+            team_.reset();
+            team_ = std::make_unique<Team>(wanted);
+        }
+        std::atomic<std::size_t> next{0};
+        team_->run([&](std::size_t who) {
+            for (std::size_t t = next++; t < tasks; t = next++)
+                step_range(t * at_a_time, std::min(n, (t + 1) * at_a_time), command, load_torque, *workers_[who]);
+        });
+    }
+    Failure first;
+    for (const auto& w : workers_) {
+        counts_ += std::exchange(w->counts, {});
+        Failure failure = std::exchange(w->failure, {});
+        if (!failure.text.empty() && (first.text.empty() || failure.drive < first.drive)) first = std::move(failure);
+    }
+    return first;
+}
+
+void DriveBatch::step_range(std::size_t begin, std::size_t end, const Input& command, const Input& load_torque,
+                            Worker& worker) {
+    struct Known final : Regimes {
+        Known(DriveBatch& batch, Worker& worker) : batch_(batch), worker_(worker) {}
+        RegimeTable* at(const Label& label) override { return batch_.table(model, label, worker_); }
+        void locate_losses(Label& label, const RegimeDetails& of, double T_2, double speed) const override {
+            const Models& all = batch_.models_;
+            const model::Gear& gear = all.bases[static_cast<std::size_t>(all.base[model])].gears[0];
+            const int s = label.modes[static_cast<std::size_t>(of.input_contact)];
+            const double rated = gear.efficiencies
+                                     ? 1.0
+                                     : all.number(model, "gearbox.rated_output_torque", gear.law.rated_output_torque),
+                         mu = gear.sense() * T_2 / rated,
+                         v = std::fabs(speed) /
+                             all.number(model, "gearbox.rated_input_speed", gear.law.rated_input_speed);
+            label.branch[static_cast<std::size_t>(of.cell)] =
+                static_cast<std::int16_t>(s == 0 ? gear.load_interval(mu) : gear.loss_cell(s * mu, v));
+            label.branch[static_cast<std::size_t>(of.cell_back)] =
+                static_cast<std::int16_t>(s == 0 ? gear.load_interval(-mu) : 0);
+        }
+        std::size_t model = 0;
+
+     private:
+        DriveBatch& batch_;
+        Worker& worker_;
+    } known(*this, worker);
+    const double h = step_;
+    const std::size_t n = drives_.size();
+    double* out = states_.data();
+    for (std::size_t k = begin; k < end; ++k) {
+        DriveState& d = drives_[k];
+        const Inputs u{command[k], load_torque[k]};
+        const RegimeTable* r = d.regime;
+        if (k + ahead < end && drives_[k + ahead].regime != nullptr) drives_[k + ahead].regime->prefetch();
+        ++worker.counts.steps;
+        bool done = false;
+        if (r != nullptr && r->plain) [[likely]] {
+            const Four x = Four::load(d.x.data());
+            const Four rate = r->rate.of_state(x) + r->rate.constant(d.memory, u);
+            const Four to = x + r->G * rate, size = absolute(rate);
+            bool clear = true;
+            for (int b = 0; b < r->n_blocks; ++b) {
+                const GuardBlock& g = r->guards(b);
+                const Four constant = g.form.constant(d.memory, u);
+                const Four first = constant + g.form.of_state(x), last = constant + g.form.of_state(to);
+                const Four apart = sum_in_fours<D::coupled>([&](auto j) __attribute__((always_inline)) {
+                    return size.template spread<j>() * load<D>(g.departure[j]);
+                });
+                clear = clear && above(least_of(first, last), apart) == 15u;
+            }
+            if (clear) [[likely]] {
+                const double angle = d.x[D::coupled] +
+                                     r->angle_coefficient * (h * d.x[static_cast<std::size_t>(r->angle_speed)]) +
+                                     (load<D>(r->angle) * rate).sum();
+                to.store(d.x.data());
+                d.x[D::coupled] = angle;
+                done = true;
+            } else {
+                known.model = static_cast<std::size_t>(model_of_[k]);
+                Walk walk(known, d, u);
+                if (walk.over(h)) {
+                    walk.store(d);
+                    ++worker.counts.walked;
+                    worker.counts.switchings += walk.switchings();
+                    done = true;
+                }
+            }
+        }
+        if (!done && !solve(k, u, worker)) continue;
+        inputs_[k] = u;
+        for (std::size_t s = 0; s < D::states; ++s) out[s * n + k] = d.x[s];
+    }
+}
+
+// By the general solver. False: the motion cannot go on.
+bool DriveBatch::solve(std::size_t k, const Inputs& u, Worker& worker) {
+    ++worker.counts.general;
+    DriveState& d = drives_[k];
+    const auto model = static_cast<std::size_t>(model_of_[k]);
+    TrainSimulation& simulation = worker.solver(models_, model, step_);
+    return simulation.with([&]<class S>(S& s) {
+        if constexpr (std::is_same_v<S, TrainSimulationIn<D>>) {
+            typename S::Snapshot from;
+            std::ranges::copy(d.x, from.x.begin());
+            from.memory = d.memory;
+            if (d.regime != nullptr) {
+                from.started = true;
+                from.key = d.regime->label.key();
+                from.course.input = inputs_[k];
+            } else {
+                const model::Assembly& a = simulation.assembly();
+                const model::GearPlace& gear = a.places().gears[0];
+                const int locked = gear.contact == model::nowhere
+                                       ? model::nowhere
+                                       : a.places().contacts[static_cast<std::size_t>(gear.contact)].locked;
+                if (locked != model::nowhere && gear.twist != model::nowhere)
+                    from.memory[static_cast<std::size_t>(locked)] =
+                        a.train().gears[0].law.curve.torque(d.x[static_cast<std::size_t>(gear.twist)]);
+            }
+            s.restore(from);
+            const Status status = s.advance(step_, u, u);
+            if (status != Status::done) {
+                if (worker.failure.text.empty() || k < worker.failure.drive)
+                    worker.failure = {k, train_status_text(simulation.assembly(), status, s.time(), s.stopped_at(),
+                                                           s.too_many_guards())};
+                return false;
+            }
+            const auto& to = s.snapshot();
+            std::ranges::copy(to.x, d.x.begin());
+            d.memory = to.memory;
+            d.regime = table(model, Label::of(to.key), worker);
+            return true;
+        }
+        return false;
+    });
+}
+
+void DriveBatch::reset(const bool* which, const double* start) {
+    for (std::size_t k = 0; k < drives_.size(); ++k) {
+        if (which != nullptr && !which[k]) continue;
+        drives_[k] = {};
+        if (start != nullptr) std::copy_n(start + k * D::states, D::states, drives_[k].x.begin());
+        inputs_[k] = {};
+        show(k);
+    }
+}
+
+void DriveBatch::restore(const Snapshot& s) {
+    drives_ = s.drives;
+    inputs_ = s.inputs;
+    for (std::size_t k = 0; k < drives_.size(); ++k) show(k);
+}
+
+void DriveBatch::read(double* out, model::PackedForm<D> RegimeDetails::* form) const {
+    for (std::size_t k = 0; k < drives_.size(); ++k) {
+        const DriveState& d = drives_[k];
+        StateOf<D> x;
+        std::ranges::copy(d.x, x.begin());
+        out[k] =
+            d.regime == nullptr ? 0.0 : lostmotion::evaluate<D>((*d.regime->details).*form, x, d.memory, inputs_[k]);
+    }
+}
+
+void DriveBatch::read_contact(std::int8_t* out, std::int8_t RegimeDetails::* contact) const {
+    for (std::size_t k = 0; k < drives_.size(); ++k) {
+        const RegimeTable* r = drives_[k].regime;
+        const int number = r == nullptr ? -1 : (*r->details).*contact;
+        out[k] = number < 0 ? 0 : r->label.modes[static_cast<std::size_t>(number)];
+    }
+}
+
+std::size_t DriveBatch::memory() const {
+    std::size_t bytes =
+        drives_.size() * (sizeof(DriveState) + sizeof(Inputs) + sizeof(int) + D::states * sizeof(double));
+    bytes += models_.size() * (models_.width() * sizeof(double) + sizeof(int) + sizeof(tables_[0]));
+    for (const auto& first : tables_)
+        for (const RegimeTable* t = first; t != nullptr; t = t->next) bytes += t->size();
+    return bytes;
+}
+
+}  // namespace lostmotion::batch

@@ -1,0 +1,342 @@
+"""Many drives at once, each with its own parameters: for robot learning and domain randomisation."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from .. import _core
+from ..errors import InputError
+from ..inputs.arguments import checked
+from ..inputs.quantities import Count, Time
+from ..inputs.validation import did_you_mean, listed, shown
+from ..model.drive import Drive
+from ..model.torsion import Rigid, TorsionCurve
+from .stepping import MAX_INTERVAL, MIN_INTERVAL
+from .variables import STATES
+
+BACKLASH = "gearbox.stiffness.backlash"
+KEYS = (
+    *(
+        key
+        for key in _core.batch_fields()
+        if key.startswith(("motor.", "gearbox.", "load."))
+        and not key.startswith("load.torque.")
+        and key != "gearbox.stiffness.slopes"
+    ),
+    BACKLASH,
+)
+"""what may differ from drive to drive, by its key in a scenario file"""
+_READERS = ("motor_torque", "output_torque", "input_contact", "twist_contact")
+
+
+@dataclass(frozen=True)
+class BatchState:
+    """State of all drives of a batch, as `SimulationBatch.snapshot` returns it."""
+
+    time: np.ndarray
+    """time [s] of each drive since its reset"""
+    core: Any = field(repr=False)
+
+
+class SimulationBatch:
+    """Many drives that are advanced together, step by step.
+
+    Parameters
+    ----------
+    drives
+        A drive for all, or one drive for each. Trains, and drives with mesh damping in a gear with backlash, are for `Simulation`.
+    step
+        Step [s]; commands and load torques are constant over it.
+    count
+        Number of drives, if `drives` is one drive.
+    vary
+        Parameters that differ from drive to drive, by their keys in a scenario file, such as ``load.inertia`` or
+        ``gearbox.stiffness.backlash``: an array in SI units with a value for each drive, or a function
+        ``f(generator, count)`` that draws them.
+    seed
+        Seed of the generator that these functions get.
+    threads
+        Number of threads; default that of the processors. Results do not depend on it.
+
+    Raises
+    ------
+    InputError
+        A drive cannot be stepped in a batch, a key is unknown or a value is out of range.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> scenario = lm.load("paper-2dof-nl-small")
+    >>> drive = lm.Drive(motor=scenario.motor, gearbox=scenario.gearbox, load=lm.Load(inertia=1))
+    >>> batch = lm.SimulationBatch(
+    ...     drive, step="1 ms", count=100, seed=1,
+    ...     vary={"load.inertia": lambda generator, n: generator.uniform(0.5, 2.0, n)},
+    ... )
+    >>> for _ in range(100):
+    ...     batch.step(command=0.1)
+    >>> batch["load_angle"].shape
+    (100,)
+
+    Notes
+    -----
+    Each step is exact, whatever its length: `switchings` within it are located to rounding. A drive does not know of the
+    others, so its results do not depend on their number, on their order or on `threads`, to the last bit.
+    """
+
+    @checked
+    def __init__(
+        self,
+        drives: Drive | Sequence[Drive],
+        step: Time,
+        *,
+        count: Count | None = None,
+        vary: Mapping[str, Any] | None = None,
+        seed: int = 0,
+        threads: Count | None = None,
+    ) -> None:
+        if not MIN_INTERVAL <= step <= MAX_INTERVAL:
+            raise InputError(f"step {step} s must lie between {MIN_INTERVAL:g} s and {MAX_INTERVAL:g} s")
+        self._step = step
+        self._threads = threads or os.cpu_count() or 1
+        if isinstance(drives, Drive):
+            one, several = drives, None
+        elif not drives:
+            raise InputError("drives: there is none; give a Drive, or a list of them")
+        else:
+            one, several = drives[0], list(drives)
+        if several is not None and (count is not None or vary):
+            raise InputError("count and vary: are for one drive; in a list each drive has its own parameters")
+        own = _Own([], np.zeros((1, 0)), -1)
+        if several is None:
+            self._count = _count_of(count, vary or {})
+            own = _own_parameters(one, vary or {}, self._count, np.random.default_rng(seed))
+            bases, models = [one], np.zeros(self._count, dtype=int)
+            values = own.values
+            if own.keys or own.breaks >= 0:
+                values, models = np.unique(own.values, axis=0, return_inverse=True)
+            base = [0] * len(values)
+        else:
+            self._count = len(several)
+            numbers: dict[Drive, int] = {}
+            models = np.array([numbers.setdefault(drive, len(numbers)) for drive in several])
+            bases, base, values = list(numbers), list(range(len(numbers))), np.zeros((len(numbers), 0))
+        cores = [drive.core() for drive in bases]
+        for core in cores:
+            if problem := _core.DriveBatch.error(core):
+                raise InputError(f"drives: one {problem}; use lm.Simulation for it")
+        places = models.reshape(-1).tolist()
+        self._core = _core.DriveBatch(cores, base, own.keys, own.breaks, np.ascontiguousarray(values), places, step)
+        self._rigid = any(isinstance(drive.gearbox.stiffness, Rigid) for drive in bases)
+        self._time = np.zeros(self._count)
+        self._states = dict(zip(STATES, self._core.states, strict=True))
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __repr__(self) -> str:
+        return f"SimulationBatch({self._count} drives, step {self._step:g} s)"
+
+    @property
+    def time(self) -> np.ndarray:
+        """Time [s] of each drive since its reset."""
+        return self._time.copy()
+
+    @property
+    def memory(self) -> int:
+        """Memory [bytes] of the states, parameters and tables of all drives, as far as the motion has met their regimes."""
+        return int(self._core.memory)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Numbers of steps of drives since the beginning, by name.
+
+        ``steps``: all; ``with_events``: those that were searched for switchings; ``switchings``: those found there;
+        ``general``: steps made by the solver of `Simulation`, as of a drive whose contacts have still to be found.
+        """
+        return dict(zip(("steps", "with_events", "general", "switchings"), self._core.counts, strict=True))
+
+    @checked
+    def step(self, command: Any, load_torque: Any = 0.0) -> None:
+        """Advance all drives by one step.
+
+        Parameters
+        ----------
+        command
+            Command of the motor, as of `simulate`: share of the rated voltage, or of a torque source of its rated torque; a number, or an
+            array with a number for each drive.
+        load_torque
+            Torque [N·m] that the load takes, in the same way.
+
+        Raises
+        ------
+        InputError
+            An argument has another shape, or is not finite.
+        SolverError
+            The motion of a drive has no continuation. That drive stays where it was; all others are advanced.
+        """
+        inputs = _numbers("command", command, self._count), _numbers("load_torque", load_torque, self._count)
+        self._core.step(*inputs, self._threads)
+        self._time += self._step
+
+    @checked
+    def reset(self, which: Any = None, initial: Mapping[str, Any] | None = None) -> None:
+        """Take drives back to t = 0.
+
+        Parameters
+        ----------
+        which
+            Array of Booleans with the drives that are meant; default all.
+        initial
+            States at t = 0 by name, each a number or an array with one for each drive; those left out are 0. The names are ``motor_torque``, ``motor_speed``,
+            ``load_speed``, ``twist`` and ``load_angle``, in SI units.
+
+        Raises
+        ------
+        InputError
+            A name is unknown, an array has another shape, or a rigid gearbox is to have a speed or a twist.
+        """
+        mask = None
+        if which is not None:
+            mask = np.asarray(which)
+            if mask.dtype != bool or mask.shape != (self._count,):
+                raise InputError(
+                    f"which: {shown(which)} must be an array of {self._count} Booleans, one for each drive"
+                )
+            mask = np.ascontiguousarray(mask)
+        start = None
+        if initial:
+            start = np.zeros((self._count, len(STATES)))
+            for name, value in initial.items():
+                if name not in STATES:
+                    known = f"the states are {listed(STATES)}"
+                    raise InputError(f"initial.{name}: is no state; {did_you_mean(name, STATES, known)}")
+                start[:, STATES.index(name)] = _numbers(f"initial.{name}", value, self._count)
+                if self._rigid and name != "load_angle" and start[:, STATES.index(name)].any():
+                    raise InputError(
+                        f"initial.{name}: a rigid gearbox begins at rest in a batch; give load_angle alone"
+                    )
+        self._core.reset(mask, start)
+        self._time[slice(None) if mask is None else mask] = 0.0
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Values of a variable (SI), one for each drive.
+
+        The states ``motor_speed``, ``load_speed``, ``twist`` and ``load_angle`` are the memory that each step writes anew; it
+        exports DLPack, so that ``torch.from_dlpack(batch["twist"])`` copies nothing. Copy it to keep it. ``motor_torque``,
+        ``output_torque``, ``input_contact`` and ``twist_contact`` are new arrays.
+        """
+        if name in _READERS:
+            return getattr(self._core, name)()  # type: ignore[no-any-return]
+        if name in self._states:
+            return self._states[name]  # type: ignore[no-any-return]
+        known = listed(dict.fromkeys((*STATES, *_READERS)))
+        raise InputError(f"{shown(name)} is no variable of a batch; the variables are {known}")
+
+    def snapshot(self) -> BatchState:
+        """State of all drives, contacts and hysteresis included; `restore` returns to it."""
+        return BatchState(self._time.copy(), self._core.snapshot())
+
+    @checked
+    def restore(self, state: BatchState) -> None:
+        """Return to the state of a snapshot of this batch.
+
+        Raises
+        ------
+        InputError
+            The snapshot is that of another batch.
+        """
+        try:
+            self._core.restore(state.core)
+        except TypeError:
+            raise InputError("state: is the snapshot of another batch; give one of this batch") from None
+        self._time[:] = state.time
+
+
+@dataclass(frozen=True)
+class _Own:
+    """Parameters of their own, one row for each drive: by key, then the breaks and the slopes of the torsion curve."""
+
+    keys: list[str]
+    values: np.ndarray
+    breaks: int
+    """breaks of each torsion curve; -1: it does not vary"""
+
+
+def _count_of(count: int | None, vary: Mapping[str, Any]) -> int:
+    """Number of drives, from the arrays if it is not given."""
+    sizes = {key: np.shape(value)[0] for key, value in vary.items() if not callable(value) and np.ndim(value) == 1}
+    if count is None and not sizes:
+        raise InputError("count: give the number of drives, or an array in vary")
+    if count is None:
+        count = next(iter(sizes.values()))
+    for key, size in sizes.items():
+        if size != count:
+            raise InputError(f"vary.{key}: has {size} values for {count} drives; give one for each drive")
+    return count
+
+
+def _own_parameters(drive: Drive, vary: Mapping[str, Any], count: int, generator: np.random.Generator) -> _Own:
+    """The values of what varies, checked."""
+    columns = {}
+    for key, value in vary.items():
+        if key not in KEYS:
+            known = f"such as {listed(KEYS[:3])}"
+            raise InputError(f"vary.{key}: cannot vary in a batch; {did_you_mean(key, KEYS, known)}")
+        if key.startswith("motor.") and drive.motor.kind == "synchronous":
+            raise InputError(
+                f"vary.{key}: the numbers of a synchronous motor follow from one another; give a list of drives"
+            )
+        column = value(generator, count) if callable(value) else value
+        columns[key] = np.broadcast_to(_numbers(f"vary.{key}", column, count), (count,))
+    for pick in (np.min, np.max):
+        _changed(drive, {key: float(pick(column)) for key, column in columns.items()})
+    own = [column for key, column in columns.items() if key != BACKLASH]
+    breaks = -1
+    if BACKLASH in columns:
+        curve = drive.gearbox.stiffness
+        assert isinstance(curve, TorsionCurve)
+        if columns[BACKLASH].min() <= 0.0:
+            raise InputError(f"vary.{BACKLASH}: {columns[BACKLASH].min():g} rad must be above 0, for each drive")
+        half = 0.5 * columns[BACKLASH]
+        own += [half, *(half + b for b in curve.breaks), *(np.full(count, s) for s in (0.0, *curve.slopes))]
+        breaks = 1 + len(curve.breaks)
+    table = np.column_stack(own) if own else np.zeros((1, 0))
+    return _Own([key for key in columns if key != BACKLASH], table, breaks)
+
+
+def _changed(drive: Drive, values: Mapping[str, float]) -> Drive:
+    """The drive with other numbers.
+
+    Raises
+    ------
+    InputError
+        The drive does not have one of them, or its value is out of range.
+    """
+    parts = drive.model_dump()
+    for key, value in values.items():
+        *path, name = key.split(".")
+        table: Any = parts
+        for part in path:
+            table = (table or {}).get(part)
+        if not isinstance(table, dict) or table.get(name) is None:
+            raise InputError(f"vary.{key}: this drive has no such number; give it in the drive first")
+        table[name] = value
+    return Drive(**parts)
+
+
+def _numbers(name: str, value: Any, count: int) -> np.ndarray:
+    """One number, or one for each drive, as the core takes them."""
+    try:
+        numbers = np.ascontiguousarray(value, dtype=float).reshape(-1) if np.ndim(value) < 2 else None
+    except (TypeError, ValueError):
+        numbers = None
+    if numbers is None or len(numbers) not in (1, count) or np.iscomplexobj(value):
+        raise InputError(f"{name}: {shown(value)} must be a number, or an array of {count} numbers, one for each drive")
+    if not np.isfinite(numbers).all():
+        raise InputError(f"{name}: has numbers that are not finite; give finite ones")
+    return numbers

@@ -1,0 +1,291 @@
+"""Many drives at once: against the solver that steps one drive, a closed form, and independence of order and threads."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import lostmotion as lm
+from lostmotion.simulation.variables import STATES
+
+STEP = 1e-3
+
+
+def random_drive(generator: np.random.Generator) -> lm.Drive:
+    """A drive with a random structure and random parameters."""
+
+    def between(low: float, high: float) -> float:
+        return float(generator.uniform(low, high))
+
+    def likely(share: float) -> bool:
+        return bool(generator.random() < share)
+
+    published = lm.load("paper-2dof-nl-small")
+    losses = published.gearbox.losses if likely(0.3) else lm.model.ConstantEfficiency(efficiency=between(0.6, 1.0))
+    slopes, breaks = (2e3, 2e4, 3e4), (0.6e-3, 3e-3)
+    pieces = int(generator.integers(1, 4))
+    hysteresis = lm.model.Hysteresis(efficiency=between(0.8, 0.99)) if likely(0.3) else None
+    backlash = 0.0 if hysteresis is not None else between(0.3e-3, 3e-3)
+    stiffness = lm.model.TorsionCurve(slopes=slopes[:pieces], breaks=breaks[: pieces - 1], backlash=backlash)
+    common = {"rotor_inertia": between(5e-6, 3e-5), "friction_torque": between(0.0, 0.03) if likely(0.8) else 0.0}
+    if likely(0.5):
+        motor = lm.Motor(kind="torque_source", rated_torque=0.521, **common)
+    else:
+        motor = lm.Motor(
+            rated_torque=0.521,
+            rated_speed=345.6,
+            electrical_time_constant=between(1e-4, 2e-3) if likely(0.8) else 0.0,
+            armature_voltage_constant=3.1169,
+            **common,
+        )
+    gearbox = lm.Gearbox(
+        ratio=90.0 if likely(0.7) else -50.0,
+        inertia=67e-7,
+        stiffness=stiffness,
+        losses=losses,
+        hysteresis=hysteresis,
+        rated_input_speed=380.0,
+        rated_output_torque=51.6,
+    )
+    friction = between(0.1, 2.0) if likely(0.3) else 0.0
+    load = lm.Load(inertia=between(0.2, 3.0), viscous_friction=between(0.0, 5.0), friction_torque=friction)
+    return lm.Drive(motor=motor, gearbox=gearbox, load=load)
+
+
+def random_commands(generator: np.random.Generator, steps: int, count: int) -> np.ndarray:
+    t = np.arange(steps)[:, None] * STEP
+    frequency, amplitude, phase = (generator.uniform(a, b, count) for a, b in ((1, 6), (0.05, 0.6), (0, 6)))
+    return amplitude * np.sin(2 * np.pi * frequency * t + phase) + generator.normal(0.0, 0.02, (steps, count))
+
+
+def run(batch: lm.SimulationBatch, commands: np.ndarray, loads: np.ndarray | None = None) -> np.ndarray:
+    """States after each step: steps x states x drives."""
+    out = np.empty((len(commands), len(STATES), len(batch)))
+    for k, command in enumerate(commands):
+        batch.step(command, 0.0 if loads is None else loads[k])
+        out[k] = [batch[name] for name in STATES]
+    return out
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_batch_moves_as_its_drives_alone(seed: int) -> None:
+    generator = np.random.default_rng(seed)
+    drives = [random_drive(generator) for _ in range(24)]
+    commands = random_commands(generator, 400, len(drives))
+    loads = generator.uniform(-3.0, 3.0, (400, len(drives)))
+    batch = lm.SimulationBatch(drives, STEP)
+    states = run(batch, commands, loads)
+    assert batch.counts["switchings"] > 20 * len(drives)
+    for k, drive in enumerate(drives):
+        alone = lm.Simulation(drive, step=STEP)
+        alone.reset()
+        for n in range(400):
+            alone.advance(STEP, command=float(commands[n, k]), load_torque=float(loads[n, k]))
+            if n % 40 == 39:
+                for name in ("motor_speed", "load_speed", "twist", "load_angle"):
+                    # Rounding grows where flanks bounce; the figures of the benchmark are smaller by far.
+                    scale = {"motor_speed": 1e-5, "load_speed": 1e-6, "twist": 1e-9, "load_angle": 1e-8}[name]
+                    assert states[n, STATES.index(name), k] == pytest.approx(alone[name], abs=scale, rel=0.0)
+        # Between two modes an event at the end of a step may fall on either side of it.
+        assert batch["output_torque"][k] == pytest.approx(alone["output_torque"], abs=1e-4)
+        assert batch["motor_torque"][k] == pytest.approx(alone["motor_torque"], abs=1e-6)
+
+
+def simple_drive(**load: float) -> lm.Drive:
+    return lm.Drive(
+        motor=lm.Motor(kind="torque_source", rotor_inertia=1e-4, friction_torque=0.02),
+        gearbox=lm.Gearbox(
+            ratio=50,
+            stiffness=lm.model.TorsionCurve(slopes=[1e4], backlash=2e-3),
+            losses=lm.model.ConstantEfficiency(efficiency=0.8),
+            rated_input_speed=400.0,
+            rated_output_torque=50.0,
+        ),
+        load=lm.Load(**({"inertia": 1.0} | load)),
+    )
+
+
+def test_a_rotor_crosses_the_gap_in_the_time_of_a_free_flight() -> None:
+    # 1 mrad at the output are 50 mrad of the rotor; under M - T = J a that takes sqrt(2 phi J/(M - T)).
+    torque = 0.1
+    flight = np.sqrt(2 * 0.05 * 1e-4 / (torque - 0.02))
+    step = 1e-3
+    batch = lm.SimulationBatch(simple_drive(), step, count=1)
+    steps = int(flight / step)
+    for _ in range(steps):
+        batch.step(torque)
+    assert batch["twist"][0] == pytest.approx(0.5 * (torque - 0.02) / 1e-4 / 50 * (steps * step) ** 2, rel=1e-13)
+    assert batch["output_torque"][0] == 0.0
+    batch.step(torque)
+    assert batch["output_torque"][0] > 0.0
+
+
+def test_a_stuck_drive_stays_to_the_last_bit() -> None:
+    batch = lm.SimulationBatch(simple_drive(), STEP, count=3)
+    for _ in range(1000):
+        batch.step([0.0199, 0.0, -0.0199])
+    assert all(np.all(batch[name] == 0.0) for name in ("motor_speed", "load_speed", "twist", "load_angle"))
+    assert np.all(batch["input_contact"] == 0.0)
+    batch.step([0.0201, 0.0, -0.0201])
+    assert batch["input_contact"].tolist() == [1.0, 0.0, -1.0]
+
+
+def test_a_command_limit_is_kept() -> None:
+    motor = lm.Motor(
+        rotor_inertia=1e-5,
+        rated_torque=0.5,
+        rated_speed=300.0,
+        electrical_time_constant=1e-3,
+        armature_voltage_constant=3.0,
+        rated_voltage=24.0,
+        voltage_limit=12.0,
+    )
+    drive = simple_drive().model_copy(update={"motor": motor})
+    batch = lm.SimulationBatch([drive, drive], STEP)
+    for k in range(300):
+        batch.step([0.9, 0.5] if k % 100 < 50 else [-0.7, -0.5])
+        limited, at_limit = batch["motor_speed"]
+        assert limited == pytest.approx(at_limit, rel=1e-10, abs=1e-10)
+
+
+@pytest.mark.parametrize("threads", [2, 3])
+def test_neither_threads_nor_order_change_a_bit(threads: int) -> None:
+    generator = np.random.default_rng(5)
+    drives = [random_drive(generator) for _ in range(20)] * 10
+    commands = random_commands(generator, 150, len(drives))
+    one = run(lm.SimulationBatch(drives, STEP, threads=1), commands)
+    assert np.array_equal(run(lm.SimulationBatch(drives, STEP, threads=threads), commands), one)
+    order = generator.permutation(len(drives))
+    shuffled = lm.SimulationBatch([drives[k] for k in order], STEP, threads=threads)
+    assert np.array_equal(run(shuffled, commands[:, order]), one[:, :, order])
+    alone = lm.SimulationBatch(drives[7], STEP, count=1)
+    assert np.array_equal(run(alone, commands[:, 7:8]), one[:, :, 7:8])
+
+
+def test_a_snapshot_brings_back_every_bit() -> None:
+    generator = np.random.default_rng(6)
+    drives = [random_drive(generator) for _ in range(30)]
+    commands = random_commands(generator, 200, len(drives))
+    batch = lm.SimulationBatch(drives, STEP)
+    run(batch, commands[:100])
+    before = batch.snapshot()
+    first = run(batch, commands[100:])
+    batch.restore(before)
+    assert batch.time == pytest.approx(0.1)
+    assert np.array_equal(run(batch, commands[100:]), first)
+    with pytest.raises(lm.InputError, match="another batch"):
+        lm.SimulationBatch(drives, STEP).restore(before)
+
+
+def test_reset_takes_back_those_that_are_meant() -> None:
+    generator = np.random.default_rng(7)
+    drives = [random_drive(generator) for _ in range(12)]
+    commands = random_commands(generator, 100, len(drives))
+    batch = lm.SimulationBatch(drives, STEP)
+    first = run(batch, commands)
+    which = np.arange(12) % 3 == 0
+    batch.reset(which)
+    assert np.array_equal(batch.time, np.where(which, 0.0, batch.time.max()))
+    assert np.array_equal(batch["load_angle"], np.where(which, 0.0, first[-1, STATES.index("load_angle")]))
+    again = run(batch, commands)
+    assert np.array_equal(again[:, :, which], first[:, :, which])
+    batch.reset(initial={"load_angle": 0.3, "motor_speed": np.full(12, 2.0)})
+    assert np.all(batch["load_angle"] == 0.3)
+    alone = lm.Simulation(drives[0], step=STEP, initial=lm.Initial(load_angle=0.3, motor_speed=2.0))
+    batch.step(0.1)
+    alone.advance(STEP, command=0.1)
+    assert batch["motor_speed"][0] == pytest.approx(alone["motor_speed"], rel=1e-12)
+
+
+def test_what_varies_is_what_a_list_of_drives_has() -> None:
+    gaps, inertias = np.array([1e-3, 2e-3, 1e-3]), np.array([0.5, 1.0, 0.5])
+    varied = lm.SimulationBatch(
+        simple_drive(), STEP, vary={"gearbox.stiffness.backlash": gaps, "load.inertia": inertias}
+    )
+    drives = []
+    for gap, inertia in zip(gaps, inertias, strict=True):
+        one = simple_drive(inertia=inertia)
+        stiffness = lm.model.TorsionCurve(slopes=[1e4], backlash=gap)
+        drives.append(one.model_copy(update={"gearbox": one.gearbox.model_copy(update={"stiffness": stiffness})}))
+    commands = random_commands(np.random.default_rng(8), 300, 3)
+    assert np.array_equal(run(varied, commands), run(lm.SimulationBatch(drives, STEP), commands))
+
+
+def test_a_seed_draws_the_same_drives() -> None:
+    def batch(seed: int) -> lm.SimulationBatch:
+        return lm.SimulationBatch(
+            simple_drive(), STEP, count=5, seed=seed, vary={"load.inertia": lambda g, n: g.uniform(0.5, 2.0, n)}
+        )
+
+    commands = np.full((50, 5), 0.2)
+    first = run(batch(1), commands)
+    assert np.array_equal(run(batch(1), commands), first)
+    assert len(np.unique(first[-1, STATES.index("load_angle")])) == 5
+    assert not np.array_equal(run(batch(2), commands), first)
+
+
+def test_outputs_are_not_copied() -> None:
+    batch = lm.SimulationBatch(simple_drive(), STEP, count=4)
+    angle = batch["load_angle"]
+    for _ in range(100):
+        batch.step(0.3)
+    assert np.shares_memory(angle, batch["load_angle"])
+    assert np.all(angle > 0.0)
+    assert np.shares_memory(np.from_dlpack(angle), angle)
+
+
+def test_equal_drives_share_their_tables() -> None:
+    one = lm.SimulationBatch(simple_drive(), STEP, count=1)
+    many = lm.SimulationBatch(simple_drive(), STEP, vary={"load.inertia": np.ones(1000)})
+    for batch in (one, many):
+        for k in range(200):
+            batch.step(0.2 if k < 100 else -0.2)
+    assert many.memory / 1000 < 200
+    assert one.memory > 1000
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda d: lm.SimulationBatch(d, STEP), "count: give the number of drives"),
+        (lambda d: lm.SimulationBatch([], STEP), "drives: there is none"),
+        (lambda d: lm.SimulationBatch(d, 0.0, count=2), "step 0.0 s must lie between"),
+        (lambda d: lm.SimulationBatch(d, STEP, count=2, vary={"load.inertia": [1, 2, 3]}), "3 values for 2 drives"),
+        (lambda d: lm.SimulationBatch(d, STEP, vary={"load.inertja": np.ones(2)}), "load.inertia"),
+        (lambda d: lm.SimulationBatch(d, STEP, vary={"load.inertia": np.array([1.0, -1.0])}), "inertia"),
+        (lambda d: lm.SimulationBatch(d, STEP, vary={"motor.rated_speed": np.ones(2)}), "has no such number"),
+        (lambda d: lm.SimulationBatch([d, d], STEP, count=2), "are for one drive"),
+        (lambda d: lm.SimulationBatch(d, STEP, count=2).step([1.0, 2.0, 3.0]), "command: .* an array of 2 numbers"),
+        (lambda d: lm.SimulationBatch(d, STEP, count=2).step([1.0, np.nan]), "command: has numbers that are not"),
+        (lambda d: lm.SimulationBatch(d, STEP, count=2)["angle"], "is no variable of a batch"),
+        (lambda d: lm.SimulationBatch(d, STEP, count=2).reset([1, 0]), "array of 2 Booleans"),
+        (lambda d: lm.SimulationBatch(d, STEP, count=2).reset(initial={"angle": 1.0}), "initial.angle: is no state"),
+    ],
+)
+def test_bad_use_ends_in_one_clear_line(make: object, message: str) -> None:
+    with pytest.raises(lm.InputError, match=message) as raised:
+        make(simple_drive())  # type: ignore[operator]
+    assert "\n" not in str(raised.value)
+    assert len(str(raised.value)) <= 200
+
+
+def test_gears_that_a_batch_does_not_step_are_refused() -> None:
+    one = simple_drive()
+    damped = one.model_copy(update={"gearbox": one.gearbox.model_copy(update={"mesh_damping": 5.0})})
+    with pytest.raises(lm.InputError, match=r"use lm\.Simulation"):
+        lm.SimulationBatch(damped, STEP, count=2)
+
+
+def test_a_drive_that_cannot_go_on_stays_and_is_named() -> None:
+    # A loss map ends far outside its data: a load torque that no gear carries.
+    drive = random_drive(np.random.default_rng(0)).model_copy(
+        update={"gearbox": lm.load("paper-2dof-nl-small").gearbox}
+    )
+    batch = lm.SimulationBatch([drive, drive, drive], STEP)
+    batch.step(0.0)
+    with pytest.raises(lm.SolverError, match="drive 1 of the batch"):
+        for _ in range(100):
+            batch.step(0.0, [0.0, 1e12, 0.0])
+    assert np.isfinite(batch["twist"]).all()
+    batch.reset(np.array([False, True, False]))
+    batch.step(0.1)
