@@ -120,7 +120,7 @@ def _rig_of_gearbox(
         torque = None if ripple is None else _ripple(ripple)
         with busy("Running the rig"):
             file = write_campaign(logs, part, title=title, ripple=torque)
-        print(f"The logs are in {logs / 'logs'}; lostmotion identify {file} finds the gearbox in them")
+        print(f"The logs are in {logs / 'logs'}; lostmotion identify {file} -o identified finds the gearbox in them")
         return
     from ..test_rig.measurement import WORK, measure
 
