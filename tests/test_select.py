@@ -377,7 +377,7 @@ def test_the_last_cycle_has_both_of_its_ends():
         ({"load": {"inertia": J, "torque": {"steps": [{"height": 1.0}]}}}, r"load.torque.steps: acts once"),
         ({"vary": [{"key": "load.inertia", "values": [1.0]}]}, "of a task motor and gearbox vary|lacks|motor"),
         ({"vary": [{"key": "gearbox", "values": ["schaefler-rt1-h-20-100"]}]}, "did you mean schaeffler"),
-        ({"select": {"objectives": {"price": "least"}}}, "'price' is no column of numbers"),
+        ({"select": {"objectives": {"beauty": "least"}}}, "'beauty' is no column of numbers"),
         ({"select": 3}, "key select"),
     ],
 )

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from functools import cache
+from functools import cache, lru_cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from ..errors import InputError
-from ..inputs.toml_files import read_toml
+from ..inputs.toml_files import is_in_file, read_toml
 from ..inputs.validation import names_like, shown, unknown_key
 from .gearbox_sheet import GearboxSheet
 from .linear_sheets import BeltSheet, LinearMotorSheet, RackSheet, ScrewSheet
@@ -145,8 +145,51 @@ def _tables(data: Mapping[str, Any], key: str, where: str) -> list[Mapping[str, 
     return entries
 
 
+def read_again(path: Path) -> tuple[Sheet, ...]:
+    """The records of a sheet file, read only once as long as it does not change.
+
+    Raises
+    ------
+    InputError
+        As `read_sheets`.
+    """
+    try:
+        status = path.stat()
+    except (OSError, ValueError):  # which reading says in one line
+        return tuple(read_sheets(path))
+    return _kept_sheets(path, status.st_mtime_ns, status.st_size)
+
+
+@lru_cache(maxsize=256)
+def _kept_sheets(path: Path, _modified: int, _size: int) -> tuple[Sheet, ...]:
+    return tuple(read_sheets(path))
+
+
+def _in_file(reference: str, table: str) -> Sheet:
+    """The record that a reference to a file means.
+
+    Raises
+    ------
+    InputError
+        The file has none, or several and no name chooses one.
+    """
+    file, _, name = reference.partition("#")
+    own = [r for r in read_again(Path(file)) if isinstance(r, KINDS[table])]
+    if name:
+        named = [r for r in own if r.name == name.lower()]
+        if len(named) == 1:
+            return named[0]
+        hint = names_like(name, [r.name for r in own], "read the file") if own else "it has none at all"
+        raise InputError(f"{file}: has {len(named) or 'no'} {table.replace('_', ' ')} {shown(name)}; {hint}")
+    if len(own) != 1:
+        found = f"{len(own)} of them" if own else "none"
+        remedy = f"choose one, such as {file}#{own[0].name}" if own else "name a file with one"
+        raise InputError(f"{file}: {called(table)} is wanted here, and this file has {found}; {remedy}")
+    return own[0]
+
+
 def find(reference: str, table: str) -> Sheet:
-    """The record of a name, or the only one of that kind in a file (``.toml``).
+    """The record of a name, or one of that kind in a file: the only one (``sheets.toml``), or that of a name (``sheets.toml#name``).
 
     Parameters
     ----------
@@ -161,15 +204,8 @@ def find(reference: str, table: str) -> Sheet:
     kind = KINDS[table]
     if not isinstance(reference, str):
         raise InputError(f"{table}: {shown(reference)} must be the name of a record, or of a file with one")
-    if reference.endswith(".toml"):
-        records = read_sheets(Path(reference))
-        own = [r for r in records if isinstance(r, kind)]
-        if len(own) != 1:
-            found = f"{len(own)} of them: {', '.join(r.name for r in own)}" if own else "none"
-            raise InputError(
-                f"{reference}: {called(table)} is wanted here, and this file has {found}; name a file with one"
-            )
-        return own[0]
+    if is_in_file(reference):
+        return _in_file(reference, table)
     record = _named(reference)
     if isinstance(record, kind):
         return record
@@ -190,8 +226,8 @@ def find_one_of(reference: str, tables: Sequence[str]) -> Sheet:
     InputError
         There is none.
     """
-    if reference.endswith(".toml"):
-        of_file = {table_of(record) for record in read_sheets(Path(reference))}
+    if is_in_file(reference):
+        of_file = {table_of(record) for record in read_again(Path(reference.partition("#")[0]))}
         return find(reference, next((table for table in tables if table in of_file), tables[0]))
     wanted = " or ".join(table.replace("_", " ") for table in tables)
     record = _named(reference)

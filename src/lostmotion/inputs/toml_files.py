@@ -17,6 +17,11 @@ MAX_LEVELS = 50  # of tables and lists within each other
 MAX_NAME = 200  # characters of the name of a file that is shown
 
 
+def is_in_file(reference: str) -> bool:
+    """Whether a reference is to a record in a file: ``sheets.toml``, or ``sheets.toml#name`` for one of several."""
+    return reference.partition("#")[0].endswith(".toml")
+
+
 def no_such_file(path: Path) -> InputError:
     """Says that there is no such file, and what may have been meant."""
     try:

@@ -15,6 +15,7 @@ from ..data_sheets.linear_sheets import BeltSheet, LinearMotorSheet, LinearSheet
 from ..data_sheets.motor_sheet import MotorSheet
 from ..data_sheets.records import KINDS, Sheet, catalogue, find, read_sheets, table_of
 from ..errors import InputError
+from ..inputs.toml_files import is_in_file
 from ..inputs.validation import names_like
 from ..units.conversion import si_value
 from ..units.practical import RPM
@@ -173,6 +174,13 @@ def _counts(records: list[Sheet]) -> str:
     return f"{len(records)} record{'s' if len(records) > 1 else ''}: {'; '.join(parts)}."
 
 
+def _table_in_file(reference: str) -> str:
+    """The table of the record that a reference to a file means, or of its first one."""
+    file, _, name = reference.partition("#")
+    records = read_sheets(Path(file))
+    return next((table_of(r) for r in records if r.name == name.lower()), table_of(records[0]))
+
+
 def record_text(name: str) -> str:
     """One record: data with the status of their source, sources, gaps.
 
@@ -182,10 +190,10 @@ def record_text(name: str) -> str:
         There is no such record.
     """
     kinds = {r.name: table_of(r) for r in catalogue()}
-    if not name.endswith(".toml") and name not in kinds:
+    if not is_in_file(name) and name not in kinds:
         hint = names_like(name, kinds, "`lostmotion catalogue` lists them")
         raise InputError(f"{name!r} is not in the catalogue; {hint}")
-    table = kinds.get(name) or table_of(read_sheets(Path(name))[0])
+    table = kinds.get(name) or _table_in_file(name)
     record = find(name, table)
     rows = rows_of(record)
     lines = [f"{record.name}: {table.replace('_', ' ')}, {record.manufacturer} {record.title}".strip(), ""]

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..studies.axis_rows import NO_DATA
+from ..studies.check import ESTIMATED
+from ..studies.choice import CHOICE
 from ..studies.nearest import Lacking, Miss, misses, not_judged
 from ..studies.select import TASK_SHARES, USE, Selection
 from ..studies.selection import NOT_RUN, Candidate, Price, candidates, pareto_front, prices
@@ -111,13 +113,18 @@ def _ranking_tables(table: pa.Table, ranked: list[Candidate], front: list[Candid
         return []
     numbers = {c.run: str(k) for k, c in enumerate(_in_order(front, select), 1)}
     titles = [f"{labelled(table, column)}, {direction}" for column, direction in select.objectives.items()]
+    beside = [name for name in CHOICE if name not in select.objectives and any(name in c.choice for c in fitting)]
+    titles += [_choice_title(name) for name in beside]
+    last = [ESTIMATED] if any(c.estimated for c in fitting) else []
     rows = [
         [
             c.name,
             *(f"{v:.5g}" for v in c.values.values()),
+            *(f"{c.choice[n] / CHOICE[n].shown[1]:.5g}" if n in c.choice else "" for n in beside),
             numbers.get(c.run, ""),
             c.tightest,
             c.not_judged,
+            *([c.estimated] if last else []),
         ]
         for c in fitting
     ]
@@ -125,8 +132,26 @@ def _ranking_tables(table: pa.Table, ranked: list[Candidate], front: list[Candid
     note = note if len(select.objectives) > 1 else ""
     if (count := sum(c.fits for c in ranked)) > MAX_ROWS:
         note = f"The best {MAX_ROWS} of {count}; all are in `selection.csv`. {note}".strip()
-    header = ("candidate", *titles, "Pareto front", "most used limit", "not judged")
+    header = ("candidate", *titles, "Pareto front", "most used limit", "not judged", *last)
     return [Table("Candidates that fit", header, rows, note)]
+
+
+def _estimated(candidate: Candidate) -> str:
+    text = candidate.estimated
+    return text if text.startswith("holds") else f"is {text}"
+
+
+def _why(candidate: Candidate) -> str:
+    return (
+        f"{candidate.why} (losses estimated, the verdict {_estimated(candidate)})"
+        if candidate.estimated
+        else candidate.why
+    )
+
+
+def _choice_title(column: str) -> str:
+    unit = CHOICE[column].shown[0]
+    return column.replace("_", " ") + (f" [{unit}]" if unit else "")
 
 
 def _costs_table(table: pa.Table, costs: list[Price], objective: str) -> Table:
@@ -155,7 +180,7 @@ def _misfit_tables(ranked: list[Candidate]) -> list[Table]:
         return []
     note = f"The first {MAX_ROWS} of {len(out)}; all are in `selection.csv`." if len(out) > MAX_ROWS else ""
     return [
-        Table("Why the others do not fit", ("candidate", "reason"), [[c.name, c.why] for c in out[:MAX_ROWS]], note)
+        Table("Why the others do not fit", ("candidate", "reason"), [[c.name, _why(c)] for c in out[:MAX_ROWS]], note)
     ]
 
 
@@ -202,9 +227,9 @@ def _selection_csv(table: pa.Table, study: Study, ranked: list[Candidate], front
     for rank, c in enumerate(ranked, 1):
         own = by_run[c.run]
         said = ["yes" if c.fits else "no", "yes" if c.run in on_front else "no"]
-        limits = [c.tightest, " ".join(c.violated), c.why, c.not_judged]
+        limits = [c.tightest, " ".join(c.violated), c.why, c.not_judged, c.estimated]
         rows.append([rank, c.run, *said, *limits, *(own[name] for name in names)])
-    header = ["rank", "run", "fits", "Pareto front", "tightest limit", "violated", "why", "not judged"]
+    header = ["rank", "run", "fits", "Pareto front", "tightest limit", "violated", "why", "not judged", ESTIMATED]
     return table_csv([*header, *(labelled(table, name) for name in names)], rows)
 
 
@@ -224,6 +249,7 @@ def _ranking(table: pa.Table, ranked: list[Candidate], front: list[Candidate], s
         notes = ["Pareto front"] if len(select.objectives) > 1 and c.run in on_front else []
         notes += [f"tightest: {c.tightest}"] if c.tightest else []
         notes += [f"not judged: {c.not_judged}"] if c.not_judged else []
+        notes += [f"losses estimated, the verdict {_estimated(c)}"] if c.estimated else []
         lines.append(f"  {c.name.ljust(width)}{values}" + (f"  ({'; '.join(notes)})" if notes else ""))
     if len(fitting) > MAX_LINES:
         lines.append(f"  and {len(fitting) - MAX_LINES} more, see selection.csv")
@@ -254,7 +280,11 @@ def _share(x: float) -> str:
 
 
 def _misses(near: list[Miss]) -> list[str]:
-    return ["Nearest misses:", *(f"  {miss.candidate.name}: {miss}" for miss in near)]
+    return ["Nearest misses:", *(f"  {miss.candidate.name}: {miss}{_of_estimate(miss)}" for miss in near)]
+
+
+def _of_estimate(miss: Miss) -> str:
+    return f" (losses estimated, the verdict {_estimated(miss.candidate)})" if miss.candidate.estimated else ""
 
 
 def _miss_tables(near: list[Miss]) -> list[Table]:
@@ -290,5 +320,5 @@ def _unknown_tables(groups: list[Lacking]) -> list[Table]:
 def _misfits(ranked: list[Candidate]) -> list[str]:
     out = [c for c in ranked if not c.fits and NO_DATA not in c.violated]
     lines = ["Why the others do not fit:"] if out else []
-    lines += [f"  {c.name}: {c.why}" for c in out[:MAX_LINES]]
+    lines += [f"  {c.name}: {_why(c)}" for c in out[:MAX_LINES]]
     return [*lines, f"  and {len(out) - MAX_LINES} more, see selection.csv"] if len(out) > MAX_LINES else lines

@@ -13,7 +13,7 @@ from ..data_sheets.linear_components import linear_table
 from ..data_sheets.train_components import RECORDS, without_record
 from ..errors import InputError
 from ..inputs.schema import follow, unit_in_schema
-from ..inputs.toml_files import RESULTS, no_such_file, read_toml
+from ..inputs.toml_files import RESULTS, is_in_file, no_such_file, read_toml
 from ..inputs.toml_text import toml_text, without_empty
 from ..inputs.validation import names_like, shortened, shown
 from ..model.gearbox import Gearbox
@@ -233,7 +233,7 @@ def _find_records(data: dict[str, Any], directory: Path) -> None:
             naming += [(element, key) for element in data[table].values()]
     for element, key in naming:
         record = element.get(key) if isinstance(element, dict) else None
-        if isinstance(element, dict) and isinstance(record, str) and record.endswith(".toml"):
+        if isinstance(element, dict) and isinstance(record, str) and is_in_file(record):
             element[key] = str(directory / record)
 
 

@@ -14,7 +14,7 @@ from tomlkit.items import InlineTable
 
 from ..atomic_writer import write_whole
 from ..errors import InputError
-from ..inputs.toml_files import RESULTS
+from ..inputs.toml_files import RESULTS, is_in_file
 from .axis_form import is_axis
 from .keys import list_index
 from .scenario import Scenario
@@ -154,6 +154,6 @@ def _names(table: Any, where: tuple[str, ...]) -> Iterator[tuple[Any, str]]:
             continue
         if not isinstance(value, str) or Path(value).is_absolute():
             continue
-        record = key in ("from", "gearbox", "motor") and value.endswith(".toml")
+        record = key in ("from", "gearbox", "motor") and is_in_file(value)
         if record or (key == "base" and not where) or (key == "file" and where[-1:] == ("samples",)):
             yield table, key

@@ -51,6 +51,10 @@ TASK_RULES = {
     "amplifier_current": "rms current over the cycle with the continuous current of the amplifier",
     "bus_voltage": "energy balance of the capacitors: HIWIN MM99TE07-1701, p. 118",
     "brake_resistor": "energy beyond the capacitors: HIWIN MM99TE07-1701, p. 118",
+    "mass": "total_mass in the data sheets of the parts",
+    "length": "overall_length in the data sheets of motor and gearbox, in line",
+    "price": "price in the data sheets of the parts",
+    "lead_time": "lead_time in the data sheets of the parts",
 }
 SOURCES = RULES | TASK_RULES
 

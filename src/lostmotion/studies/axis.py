@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from ..control.controller import Controller
-from ..control.loops import Feedforward
+from ..control.controller import AnyCurrent, Controller
+from ..control.loops import Feedforward, FirstOrderCurrent, SampledCurrent
 from ..control.references import Move, PositionReference
 from ..control.sample_times import whole_multiple
 from ..control.tuning import TwoInertias, suited
@@ -19,6 +19,7 @@ from ..inputs.quantities import (
     Force,
     Length,
     Limit,
+    Mass,
     NotNegative,
     Number,
     Positive,
@@ -60,6 +61,12 @@ class LinearAxis(Part):
     """sine of the slide's inclination"""
 
 
+class InnerLoop(Part):
+    """The current loop of a task, apart from its controller."""
+
+    current: AnyCurrent
+
+
 class AxisTask(Task, Duty):
     """Requirements of an axis, beside the motion of its reference."""
 
@@ -81,6 +88,14 @@ class AxisTask(Task, Duty):
     """above the sea; the continuous torque of the motor falls by 1 % to each 100 m above 1000 m"""
     life: Annotated[Time, Positive] | None = None
     """wanted L10h of gearbox and screw"""
+    max_mass: Annotated[Mass, Positive] | None = None
+    """largest mass of the parts that are records, by their total_mass"""
+    max_length: Annotated[Length, Positive] | None = None
+    """largest length of motor and gearbox in line, by the overall_length of their records"""
+    max_price: Annotated[Number, Positive] | None = None
+    """largest price of the parts that are records"""
+    max_lead_time: Annotated[Time, Positive] | None = None
+    """latest delivery of a part that is a record"""
     emergency_stop: Annotated[Acceleration, Positive] | None = None
     """at which the load is stopped from any speed of the cycle"""
     radial_force: Annotated[Force, NotNegative] | None = None
@@ -91,6 +106,8 @@ class AxisTask(Task, Duty):
     supply: Supply | None = None
     safety_factors: dict[str, Annotated[Number, Positive]] = Field(default={})
     """by rule"""
+    current: AnyCurrent | None = None
+    """current loop of `[controller]`; of a torque source a lag in its place"""
     linear: LinearAxis | None = None
     """tables `[slide]` and `[screw]`, `[rack]` or `[belt]`; all values of the load are then in units of translation"""
 
@@ -284,7 +301,7 @@ def axis_scenario(base: DriveScenario, motor: Motor, gearbox: Gearbox, task: Axi
         The parts do not fit together.
     """
     reference, cycle = reference_of(base), task.cycle
-    controller = tuned(base, motor, gearbox)
+    controller = tuned(base, motor, gearbox, task.current)
     torque = load_torque_of(base, task)
     return base.model_copy(
         update={
@@ -298,11 +315,24 @@ def axis_scenario(base: DriveScenario, motor: Motor, gearbox: Gearbox, task: Axi
     )
 
 
-def tuned(base: DriveScenario, motor: Motor, g: Gearbox) -> Controller:
+def current_loop(controller: Controller, wanted: AnyCurrent | None, motor: Motor) -> AnyCurrent:
+    """The current loop of a task for a motor: of a torque source, whose winding is not known, a lag as long as that of a sampled loop.
+
+    A closed loop g/(z (z - 1)) lags by T/g at low frequency, the delay of its output included.
+    """
+    found = controller.current if wanted is None else wanted
+    if motor.kind != "torque_source" or not isinstance(found, SampledCurrent):
+        return found
+    lag = (found.sample_time or controller.sample_time) / found.gain - controller.delay * controller.sample_time
+    return FirstOrderCurrent(kind="first_order", time_constant=max(lag, 0.5 * controller.sample_time))
+
+
+def tuned(base: DriveScenario, motor: Motor, g: Gearbox, current: AnyCurrent | None = None) -> Controller:
     """The controller of the base with gains by rule for a motor, a gearbox and its load, and with the torque of their inertia fed
-    forward."""
+    forward; `current` is its current loop if not that of the base."""
+    assert base.controller is not None
     controller = base.controller
-    assert controller is not None
+    controller = controller.model_copy(update={"current": current_loop(controller, current, motor)})
     assert controller.position is not None
     assert controller.speed is not None
     J_M, J_L = motor.rotor_inertia + g.inertia, base.load.inertia / g.ratio**2

@@ -36,9 +36,17 @@ COLUMNS = {
     "settling_time": ("s", "longest time after a move until the load stays in the window"),
     "energy": ("J", "electrical energy taken per cycle, by its mean in each sample time"),
     "energy_returned": ("J", "electrical energy given back per cycle, the same way"),
+    "mechanical_energy": (
+        "J",
+        "energy that the motor gives to its shaft per cycle, counted in each sample time: without its own heat",
+    ),
     "position_gain": ("1/s", "gain of the position loop"),
     "speed_gain": ("N*m*s/rad", "gain of the speed loop"),
     "integral_gain": ("N*m/rad", "integral gain of the speed loop"),
+    "mass": ("kg", "mass of the parts, by the total_mass of their records"),
+    "length": ("m", "length of motor and gearbox in line, by the overall_length of their records"),
+    "price": ("1", "price of the parts"),
+    "lead_time": ("s", "latest delivery of a part"),
     "cycles": ("1", "cycles run; the values are of the last"),
     "change": ("1", "relative difference of the last two cycles"),
 }
@@ -120,6 +128,8 @@ def row_of(scenario: DriveScenario, task: AxisTask, result: RunArrays, count: in
     e = Electrical.of(scenario, result, here)
     winding, case = temperatures_of(scenario.motor, time, e.heating_square, task.ambient_temperature)
     g, torque = scenario.gearbox, result["motor_torque"][here]
+    power = torque * result["motor_speed"][here]
+    given = 0.5 * (power[1:] + power[:-1]) * np.diff(time)
     controller = scenario.controller
     assert controller is not None
     assert controller.position is not None
@@ -144,6 +154,7 @@ def row_of(scenario: DriveScenario, task: AxisTask, result: RunArrays, count: in
         **_at_rest(scenario, task, time, error[here], count),
         "energy": float(np.maximum(e.energy, 0.0).sum()),
         "energy_returned": float(-np.minimum(e.energy, 0.0).sum()),
+        "mechanical_energy": float(np.maximum(given, 0.0).sum()),
         "position_gain": controller.position.gain,
         "speed_gain": controller.speed.gain,
         "integral_gain": controller.speed.k_i,

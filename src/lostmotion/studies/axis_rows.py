@@ -45,13 +45,18 @@ from ..sizing.stages import DIRECT, Stage, at_input, together
 from ..worker_threads import thread_pool
 from .axis import FEWEST, REPEATS, AxisTask, reference_of
 from .axis_columns import COLUMNS, change, duty_cycle_of, last_cycle, row_of
+from .check import ESTIMATED, columns_of
 from .check import TASK_COLUMNS as CHECKS
-from .check import columns_of
+from .choice import CHOICE, lacks, value_of
+from .choice import judged as judged_choice
 from .runs import Runs
 from .study import Study
 
 NO_DATA = "data"
 """stands among the violated rules of a pair whose record lacks what a run needs"""
+
+HOLDS = "holds from the least to the largest losses of its kind"
+"""verdict on a gearbox with estimated losses that none of them turns"""
 
 Row = dict[str, Any]
 
@@ -157,9 +162,43 @@ class Axes:
         assert not isinstance(gearbox, InputError)
         assert not isinstance(motor, InputError)
         demand, findings = gearbox
+        findings, lacking = self._chosen(row, findings)
+        if motor.copper_loss() is None and (of := self._electrical()) is not None:
+            lacking.append(
+                f"the sheet of the motor lacks its winding, which select for {of} needs; take mechanical_energy"
+            )
+        if lacking:
+            return InputError("; ".join(lacking))
         task, load = self.task, float(self.motion().inertia.max())
         found = check_motor(demand, motor, load, task.ambient_temperature, task.max_inertia_ratio)
         return self._under_task([*findings, *found, *self._supplied(demand, motor)], motor)
+
+    def choice(self, row: np.ndarray) -> dict[str, tuple[float, list[str]]]:
+        """Mass, length, price and lead time of a pair, each with the kinds of record that lack it."""
+        records = self.study.records(row)
+        return {column: value_of(column, records) for column in CHOICE}
+
+    def _chosen(self, row: np.ndarray, findings: list[Finding]) -> tuple[list[Finding], list[str]]:
+        """Findings with those of the limits of the choice, and what the records lack for limits and objectives."""
+        task, select = self.task, self.study.select
+        found, lacking = list(findings), []
+        named = () if select is None else select.named()
+        limits = {column: getattr(task, quantity.limit) for column, quantity in CHOICE.items()}
+        if not any(limit is not None for limit in limits.values()) and not set(named) & set(CHOICE):
+            return findings, []
+        for column, (value, kinds) in self.choice(row).items():
+            limit = limits[column]
+            if kinds and (limit is not None or column in named):
+                by = f"task.{CHOICE[column].limit}" if limit is not None else f"select for {column}"
+                lacking.append(lacks(column, kinds, by))
+            elif limit is not None and not math.isnan(value):
+                found.append(judged_choice(column, value, limit))
+        return found, lacking
+
+    def _electrical(self) -> str | None:
+        """A column of electrical energy that the task limits or ranks by."""
+        named = () if self.study.select is None else self.study.select.named()
+        return next((column for column in ("energy", "energy_returned") if column in named), None)
 
     def _supplied(self, demand: InputDemand, motor: Motor) -> list[Finding]:
         """The rules of supply and amplifier."""
@@ -188,7 +227,62 @@ class Axes:
         found = self.judged(row)
         if isinstance(found, InputError):
             return CHECKS | {"violated": NO_DATA, "why": str(found)}
-        return columns_of(found, CHECKS) if any(f.verdict == "warning" for f in found) else None
+        if not any(f.verdict == "warning" for f in found):
+            return None
+        return columns_of(found, CHECKS) | {column: value for column, (value, _) in self.choice(row).items()}
+
+    def verdict_at_ends(self, row: np.ndarray, own: tuple[str, ...]) -> str:
+        """Verdict over the range of estimated losses; empty where the losses are printed.
+
+        Parameters
+        ----------
+        own
+            Limits that the pair violates with the estimate itself.
+        """
+        gearbox = self._once(("part", self.study.part_key("gearbox", row)), lambda: self.study.part("gearbox", row))
+        if isinstance(gearbox, InputError) or gearbox.loss_range is None:
+            return ""
+        ends = [self._with_known_losses(row, factor).violated(row) for factor in gearbox.loss_range]
+        if all(set(end) == set(own) for end in ends):
+            return HOLDS
+        least, most = ("fits" if not end else f"violates {' '.join(end)}" for end in ends)
+        return f"not decided: {least} with the least losses of its kind, {most} with the largest"
+
+    def _with_known_losses(self, row: np.ndarray, factor: float) -> Axes:
+        """The task with a gearbox whose losses are known: so many times those of its estimate."""
+        key = self.study.part_key("gearbox", row)
+
+        def make() -> Axes:
+            study = self.study.model_copy()
+            kept = {k: v for k, v in self.study.kept.items() if k[0] in ("motor", "checked", "motion", "stage motion")}
+            linear = self.task.linear
+            kept |= {k: v for k, v in self.study.kept.items() if linear is not None and k[0] == linear.kind}
+            study._kept = kept | {key: self.study.part("gearbox", row).with_losses(factor)}
+            return Axes(study)
+
+        found = self._once(("known losses", key, factor), make)
+        assert isinstance(found, Axes)
+        return found
+
+    def violated(self, row: np.ndarray) -> tuple[str, ...]:
+        """All limits that a pair violates, of the rules and of the selection; it is run if the rules pass."""
+        refused = self.refused(row)
+        if refused is not None:
+            return tuple(str(refused["violated"]).split())
+        try:
+            return self.over(self.measured(row)[0])
+        except (RuntimeError, ValueError):
+            return ("run",)
+
+    def over(self, columns: Row) -> tuple[str, ...]:
+        """The limits that the columns of a run violate."""
+        select = self.study.select
+        found = [rule for rule in str(columns["violated"]).split() if rule]
+        for name, bound in {} if select is None else select.limits.items():
+            low, high = bound.in_unit({"1": "", "": None}.get(u := self.study.kept_units.get(name, ""), u))
+            if name in columns and not low <= float(columns[name]) <= high:
+                found.append(name)
+        return tuple(found)
 
     def measured(self, row: np.ndarray) -> tuple[Row, int]:
         """The columns of a pair that is run, and its switchings.
@@ -201,7 +295,8 @@ class Axes:
         scenario, result, count = self.until_it_repeats(row)
         columns = row_of(scenario, self.task, result, count)
         found = self._after_run(row, scenario, result, count, columns["winding_temperature"])
-        return columns_of(found, CHECKS) | columns, int(result.attrs["switching_count"])
+        chosen = {column: value for column, (value, _) in self.choice(row).items()}
+        return columns_of(found, CHECKS) | columns | chosen, int(result.attrs["switching_count"])
 
     def until_it_repeats(self, row: np.ndarray) -> tuple[DriveScenario, RunArrays, int]:
         """Runs twice as many cycles again and again, until the last two agree, or there are as many as the task permits."""
@@ -263,6 +358,10 @@ def run_axes(study: Study, parameters: np.ndarray, threads: int) -> Runs:
     with thread_pool(threads) as pool:
         for k, row in zip(waiting, pool.map(measure, waiting), strict=True):
             rows[k] = row
+        judged = [k for k, row in enumerate(rows) if row is not None and not errors[k] and row["violated"] != NO_DATA]
+        ends = pool.map(lambda k: axes.verdict_at_ends(parameters[k], axes.over(rows[k] or {})), judged)
+        for k, verdict in zip(judged, ends, strict=True):
+            rows[k] = {**(rows[k] or {}), ESTIMATED: verdict}
     whole = [row or {} for row in rows]
     return Runs(
         parameters=parameters,

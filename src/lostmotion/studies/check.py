@@ -14,7 +14,11 @@ TEXTS = ("violated", "why", "not judged")
 """rules that are violated, in words, and rules without a limit to compare with"""
 COLUMNS: dict[str, float | str] = {f"{USE}{rule}": math.nan for rule in SHARES} | dict.fromkeys(TEXTS, "")
 """each with what stands in the row of a run that has failed"""
-TASK_COLUMNS: dict[str, float | str] = {f"{USE}{rule}": math.nan for rule in TASK_SHARES} | dict.fromkeys(TEXTS, "")
+ESTIMATED = "estimated losses"
+"""column of tasks: verdict over the range of estimated losses"""
+TASK_COLUMNS: dict[str, float | str] = {f"{USE}{rule}": math.nan for rule in TASK_SHARES} | dict.fromkeys(
+    (*TEXTS, ESTIMATED), ""
+)
 """the same of tasks"""
 
 

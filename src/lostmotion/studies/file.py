@@ -14,7 +14,7 @@ from ..simulation.result_files import FORMATS
 from ..simulation.scenario import Scenario
 from ..simulation.scenario_files import find_base, read_tables
 from ..simulation.sources import load
-from .records import kind_of_record
+from .records import kind_of_record, names_of
 from .study import Study
 
 
@@ -55,23 +55,33 @@ def load_study(path: str | Path) -> Study:
     scenario = load(where, changes)
     written = {} if where.suffix in FORMATS else read_tables(where, changes)  # a result has all values written out
     written = long_form(written) if is_axis(written) else written
-    for entry in data.get("vary", []) if isinstance(data.get("vary"), list) else []:
-        find_sheets(entry, path.parent)
     try:
+        for entry in data.get("vary", []) if isinstance(data.get("vary"), list) else []:
+            find_sheets(entry, path.parent)
         return Study(scenario=cast("Any", scenario), written=written, **data)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
 
 
 def find_sheets(entry: Any, directory: Path) -> None:
-    """Files of data sheets (.toml) among the values are relative to the study file."""
+    """Files and directories of data sheets among the values are relative to the study file.
+
+    Raises
+    ------
+    InputError
+        One of them has no record of that kind.
+    """
     if not isinstance(entry, dict) or not isinstance(entry.get("key"), str):
         return
-    if kind_of_record(entry["key"]) and isinstance(entry.get("values"), list):
-        entry["values"] = [
-            str((directory / name).resolve()) if isinstance(name, str) and name.endswith(".toml") else name
-            for name in entry["values"]
-        ]
+    kind = kind_of_record(entry["key"])
+    if kind is None or not isinstance(entry.get("values"), list):
+        return
+    try:
+        entry["values"] = names_of(kind, entry["values"], directory.resolve())
+    except InputError:
+        raise
+    except ValueError as error:
+        raise InputError(f"vary: of {entry['key']}: {error}") from None
 
 
 def from_json(text: str) -> Study:

@@ -12,6 +12,7 @@ from ..control.references import PositionReference
 from ..errors import InputError
 from .axis import AxisTask, reference_of
 from .axis_rows import NO_DATA, Axes
+from .choice import CHOICE
 from .selection import Candidate
 from .study import Study
 
@@ -132,6 +133,8 @@ def _slowed_signal(signal: Any, factor: float) -> Any:
 
 def _tried(study: Study, miss: Miss) -> Miss:
     """With the least factor by which the cycle has to be longer, if there is one, and what rules and run say of it."""
+    if set(miss.lacks) & set(CHOICE):
+        return Miss(miss.candidate, miss.lacks, None, "a slower cycle does not change its parts")
     row = study.parameters(miss.candidate.run, miss.candidate.run + 1)[0]
     try:
         if miss.candidate.ran:
@@ -179,17 +182,12 @@ def _said(study: Study, slower: Study, row: np.ndarray, factor: float) -> str:
     before, after = study.axis, slower.axis
     assert before is not None
     assert after is not None
-    assert study.select is not None
     moves = reference_of(study.drive).intervals()
     longest = max((b - a for a, b in moves), default=0.0)
     what = f"its longest move {factor * longest:.4g} s instead of {longest:.4g} s" if longest else ""
     times = f"the cycle takes {after.cycle:.4g} s instead of {before.cycle:.4g} s{', ' if what else ''}{what}"
-    columns, _ = Axes(slower).measured(row)
-    over = [rule for rule in str(columns["violated"]).split() if rule]
-    for name, bound in study.select.limits.items():
-        low, high = bound.in_unit(study.kept_units.get(name))
-        if name in columns and not low <= float(columns[name]) <= high:
-            over.append(name)
+    axes = Axes(slower)
+    over = axes.over(axes.measured(row)[0])
     if over:
         return f"passes the rules if {times}; the run then violates {', '.join(over)}"
     return f"{FITS} {times}"

@@ -5,13 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from fnmatch import fnmatchcase
+from pathlib import Path
 from typing import Any
 
-from ..data_sheets.records import KINDS, called, catalogue, find
+from ..data_sheets.records import KINDS, called, catalogue, find, read_again
 from ..data_sheets.sheet import in_current_words
 from ..data_sheets.train_components import CONDITIONS, RECORD_KINDS, RECORDS, without_record
 from ..errors import InputError
 from ..inputs.schema import unit_in_schema
+from ..inputs.toml_files import is_in_file
 from ..inputs.validation import listed, shown
 from ..simulation.scenario import Scenario
 from ..simulation.scenario_files import scenario_from
@@ -122,6 +124,65 @@ def names_that_fit(table: str, wanted: Mapping[str, Any]) -> list[str]:
 
 def _is_text(key: str) -> bool:
     return key in ("name", "kind", "manufacturer", "profile")
+
+
+def names_of(table: str, given: Any, directory: Path = Path()) -> list[str]:
+    """The names of all records that a list gives: names, files and directories of data sheets, and filters of the catalogue.
+
+    Parameters
+    ----------
+    table
+        The kind of records, such as ``"gearbox"``.
+    given
+        One of these, or a list: the name of a record; a file (``.toml``) or a directory of such files, of which all records of the kind
+        are taken; a filter as `names_that_fit` takes it. What is named twice is taken once.
+    directory
+        Files and directories are relative to it.
+
+    Raises
+    ------
+    ValueError
+        There is no such file or record, or nothing fits.
+    """
+    found: list[str] = []
+    for one in given if isinstance(given, list | tuple) else [given]:
+        if isinstance(one, Mapping):
+            found += names_that_fit(table, one)
+        elif not isinstance(one, str):
+            raise ValueError(f"has the value {shown(one)}, which is no name of {called(table)}")
+        elif is_in_file(one):
+            file, _, name = one.partition("#")
+            path = str((directory / file).resolve()) if directory != Path() else file
+            found += [f"{path}#{name}"] if name else _of_file(table, path)
+        elif one.endswith("/") or (directory / one).is_dir():
+            found += _of_directory(table, directory / one)
+        else:
+            found.append(one)
+    return list(dict.fromkeys(found))
+
+
+def _of_file(table: str, path: str) -> list[str]:
+    """References to all records of a kind in a file; to an only one by the file alone."""
+    own = [record.name for record in read_again(Path(path)) if isinstance(record, KINDS[table])]
+    return [f"{path}#{name}" for name in own] if len(own) > 1 else [path]
+
+
+def _of_directory(table: str, directory: Path) -> list[str]:
+    """References to all records of a kind in the files of a directory."""
+    if not directory.is_dir():
+        raise ValueError(f"has {shown(str(directory))}, which is no directory; name one with data sheets (.toml)")
+    files = sorted(directory.resolve().glob("*.toml"))
+    holds = [file for file in files if any(isinstance(r, KINDS[table]) for r in read_again(file))]
+    if not holds:
+        raise ValueError(
+            f"has the directory {shown(str(directory))}, in which no data sheet (.toml) has {called(table)}"
+        )
+    return [name for file in holds for name in _of_file(table, str(file))]
+
+
+def shown_name(reference: str) -> str:
+    """A reference to a record in lists of results: of one in a file its own name."""
+    return reference.partition("#")[2] or reference
 
 
 def check_names(table: str, names: Any) -> None:

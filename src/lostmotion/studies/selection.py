@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..units.practical import practical
+from .check import ESTIMATED
+from .choice import CHOICE
+from .records import shown_name
 from .select import TASK_SHARES, USE, Selection
 from .study import Study
 from .table import unit_of
@@ -38,6 +41,10 @@ class Candidate:
     """the rule of the drive check whose limit is used most, and its share"""
     ran: bool = True
     """whether it was run: of a task, those that the rules refuse are not"""
+    estimated: str = ""
+    """verdict over the range of losses, if the gearbox of a task has estimated ones"""
+    choice: dict[str, float] = field(default_factory=dict)
+    """mass, length, price and lead time of the pair of a task, as far as they are known"""
     over: dict[str, float] = field(default_factory=dict)
     """by limit: by how much it is exceeded, as a share of it, where that is a number"""
 
@@ -93,14 +100,18 @@ def _candidate(
     row: dict[str, Any], study: Study, select: Selection, bounds: dict[str, tuple[float, float]]
 ) -> Candidate:
     values = {column: float(row[column]) for column in select.objectives}
-    shown = [row[v.title] if v.names is not None else f"{v.title} {row[v.title]:.6g}" for v in study.vary]
+    shown = [shown_name(row[v.title]) if v.names is not None else f"{v.title} {row[v.title]:.6g}" for v in study.vary]
     name = ", ".join(shown)
+    choice = {column: float(row[column]) for column in CHOICE if math.isfinite(row.get(column, math.nan))}
     if row["error"]:
         return Candidate(row["run"], name, (NOT_RUN,), row["error"], "", values)
     violated, why = row.get("violated", "").split(), [row["why"]] if row.get("why") else []
     over = {rule: use - 1.0 for rule in violated if math.isfinite(use := row.get(f"{USE}{rule}", math.nan))}
     if study.axis is not None and math.isnan(row["cycles"]):  # refused before any run
-        return Candidate(row["run"], name, tuple(violated), row["why"], row["not judged"], values, ran=False, over=over)
+        unjudged = row["not judged"]
+        return Candidate(
+            row["run"], name, tuple(violated), row["why"], unjudged, values, "", False, row[ESTIMATED], choice, over
+        )
     for column, (low, high) in bounds.items():
         if not low <= row[column] <= high:
             violated.append(column)
@@ -116,7 +127,19 @@ def _candidate(
     critical = max(uses, key=lambda rule: uses[rule], default="")
     tightest = f"{critical} {100.0 * uses[critical]:.0f} %" if critical else ""
     unjudged = row.get("not judged", "")
-    return Candidate(row["run"], name, tuple(violated), "; ".join(why), unjudged, values, tightest, over=over)
+    return Candidate(
+        row["run"],
+        name,
+        tuple(violated),
+        "; ".join(why),
+        unjudged,
+        values,
+        tightest,
+        True,
+        row.get(ESTIMATED, ""),
+        choice,
+        over,
+    )
 
 
 def _excess(column: str, value: float, low: float, high: float) -> dict[str, float]:

@@ -8,10 +8,12 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
+from ..data_sheets.records import Sheet, find
 from ..errors import InputError
 from ..inputs.part import Part
 from ..inputs.quantities import Whole
 from ..inputs.validation import listed
+from ..model.motor import Motor
 from ..simulation.scenario import DriveScenario, Scenario, short_form
 from ..simulation.train_scenario import TrainScenario
 from ..simulation.units_of_keys import unit_in, unit_of_key
@@ -19,6 +21,7 @@ from ..sizing.stages import stage_of, together
 from .axis import FEWEST, AxisTask, axis_scenario
 from .axis_columns import COLUMNS as AXIS_COLUMNS
 from .axis_columns import unit_of_column
+from .check import ESTIMATED
 from .design import unit_cube
 from .expressions import Expression, read_expression
 from .records import is_condition, kind_of_record, name_key, names_a_record, owner_of, with_records
@@ -32,7 +35,7 @@ MAX_RUNS = 100_000_000
 MAX_BASES = 100  # with other records, that are kept
 
 
-OWN_COLUMNS = ("run", "error", "switchings", "violated", "why", "not judged")
+OWN_COLUMNS = ("run", "error", "switchings", "violated", "why", "not judged", ESTIMATED)
 
 
 class Trajectories(Part):
@@ -280,8 +283,42 @@ class Study(Part):
                 self.kept[key] = stage_of(linear.kind, {"from": names[0], **linear.stage} if names else linear.stage)
             else:
                 found = getattr(self.scenario_with(dict(key[1:])), kind)
-                self.kept[key] = self.axis.fed(found) if kind == "motor" and self.axis is not None else found
+                self.kept[key] = self._under(self.axis, found) if kind == "motor" and self.axis is not None else found
         return self.kept[key]
+
+    def _under(self, task: AxisTask, motor: Motor) -> Motor:
+        """A motor as the supply of a task feeds it.
+
+        Raises
+        ------
+        InputError
+            The current loop of the task is not for this motor.
+        """
+        if task.current is not None and motor.kind != "torque_source":
+            values = {"motor": motor.model_dump(), "controller.current": task.current.model_dump()}
+            self.drive.replace(**values)
+        return task.fed(motor)
+
+    def records(self, row: np.ndarray) -> dict[str, Sheet]:
+        """Data sheets of the parts of a row of a task that are records, by their kinds.
+
+        Raises
+        ------
+        InputError
+            A file of them cannot be read.
+        """
+        assert self.axis is not None
+        linear = self.axis.linear
+        tables = {"motor": self.tables.get("motor", {}), "gearbox": self.tables.get("gearbox", {})}
+        if linear is not None:
+            tables[linear.kind] = linear.stage
+        found = {}
+        for kind, table in tables.items():
+            varied = [self.vary[k].value(number) for k, number in self.part_key(kind, row)[1:] if self.vary[k].names]
+            name = varied[0] if varied else table.get("from")
+            if name is not None:
+                found[kind] = find(str(name), kind)
+        return found
 
     def scenario_with(self, numbers: Mapping[int, float]) -> Scenario:
         """The base with some of the parameters, by their places in `vary`.

@@ -5,11 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from ..control.controller import AnyCurrent
+from ..data_sheets.records import find
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import argument
 from ..inputs.schema import follow, unit_in_schema
-from ..inputs.toml_files import read_toml
+from ..inputs.toml_files import is_in_file, read_toml
 from ..inputs.validation import shown, unknown_key
 from ..model.linear import Slide
 from ..model.signals import ForceSignal, TorqueSignal
@@ -19,14 +21,16 @@ from ..simulation.linear_units import in_si, of_slides
 from ..simulation.scenario import from_tables
 from ..simulation.train_scenario import train_schema
 from ..sizing.stages import DIRECT, STAGES, stage_of
-from .axis import AxisTask
+from .axis import AxisTask, InnerLoop
 from .file import find_sheets
 from .records import kind_of_record, names_that_fit
 from .select import Selection
 from .study import Study
 
-TABLES = ("title", "task", "load", "slide", *STAGES, "controller", "motor", "gearbox", "vary", "select")
+TABLES = ("title", "task", "load", "slide", *STAGES, "controller", "motor", "gearbox", "candidates", "vary", "select")
+CANDIDATES = ("gearbox", "motor", *STAGES)
 OBJECTIVES = {"energy": "least", "tracking_error_peak": "least"}
+OF_TORQUE_SOURCES = {"mechanical_energy": "least", "tracking_error_peak": "least"}  # whose windings are not known
 SLIDE_KEYS = ("mass", "viscous_friction", "friction_force", "inclination", "force")
 GAINS = {"position": {"gain": 1.0}, "speed": {"gain": 1.0}}  # which the rule replaces
 CONTROLLER = {"sample_time": 125e-6, "encoder": {"lines": 2048}, "current": {"kind": "pi"}}
@@ -38,7 +42,7 @@ def load_task(path: str | Path) -> Study:
     """Read a task file.
 
     Its tables are those of a scenario (`[load]`, `[controller]` with its reference but without gains, `[motor]` and `[gearbox]` with
-    keys beside a record), a table `[task]` (`AxisTask`), and those of a study: `[[vary]]` for motors and gearboxes, by default the
+    keys beside a record), a table `[task]` (`AxisTask`), and those of a study: `[candidates]` or `[[vary]]` for motors and gearboxes, by default the
     whole catalogue, and `[select]`.
 
     Parameters
@@ -80,6 +84,7 @@ def task_of(tables: dict[str, Any], directory: Path = Path()) -> Study:
     for key in tables:
         if key not in TABLES:
             raise InputError(f"key {key}: {unknown_key(key, TABLES)}")
+    tables = _relative(_with_candidates(tables), directory)
     linear = linear_axis(tables)
     for key in ("task", "load" if linear is None else "slide", "controller"):
         if not isinstance(tables.get(key), dict):
@@ -90,6 +95,9 @@ def task_of(tables: dict[str, Any], directory: Path = Path()) -> Study:
         given = tables["task"] | {"linear": linear}
     task = AxisTask(**given)
     controller = _controller(tables["controller"])
+    current, controller = _apart(controller)
+    if current is not None:
+        task = task.model_copy(update={"current": current})
     time = argument("controller.sample_time", controller["sample_time"], "s")
     written = {
         "title": tables.get("title", ""),
@@ -101,20 +109,13 @@ def task_of(tables: dict[str, Any], directory: Path = Path()) -> Study:
         "simulation": {"duration": task.cycle, "sample_interval": time},
     }
     vary = _vary(tables, directory)
-    if linear is not None and not written["gearbox"] and not _varied({"vary": vary}, "gearbox"):
-        written["gearbox"] = DIRECT.model_dump()
-    for entry in vary:
-        if (
-            isinstance(entry, dict)
-            and kind_of_record(str(entry.get("key"))) in ("gearbox", "motor")
-            and "from" not in written[entry["key"].split(".")[0]]
-        ):
-            _first(written, entry)
-    select = dict(tables.get("select", {})) if isinstance(tables.get("select", {}), dict) else tables["select"]
+    _with_parts(written, vary, linear=linear is not None)
+    select = tables.get("select", {})
     if not isinstance(select, dict):
         raise InputError(f"key select: {shown(select)} must be a table, such as [select]")
     limits = {name: bound.model_dump(exclude_none=True) for name, bound in task.limits().items()}
-    chosen = Selection(**{"objectives": OBJECTIVES} | select | {"limits": limits | select.get("limits", {})})
+    usual = OF_TORQUE_SOURCES if _torque_sources(written, vary) else OBJECTIVES
+    chosen = Selection(**{"objectives": usual} | select | {"limits": limits | select.get("limits", {})})
     return Study(
         title=written["title"],
         scenario=from_tables(written),
@@ -123,6 +124,82 @@ def task_of(tables: dict[str, Any], directory: Path = Path()) -> Study:
         axis=task,
         select=chosen,
     )
+
+
+def _with_parts(written: dict[str, Any], vary: list[Any], *, linear: bool) -> None:
+    """Puts parts into the base that the file leaves to the candidates: the first of them, or no gearbox for a linear axis."""
+    if linear and not written["gearbox"] and not _varied({"vary": vary}, "gearbox"):
+        written["gearbox"] = DIRECT.model_dump()
+    for entry in vary:
+        if (
+            isinstance(entry, dict)
+            and kind_of_record(str(entry.get("key"))) in ("gearbox", "motor")
+            and "from" not in written[entry["key"].split(".")[0]]
+        ):
+            _first(written, entry)
+
+
+def _with_candidates(tables: dict[str, Any]) -> dict[str, Any]:
+    """The tables with `[candidates]` written as `[[vary]]`.
+
+    Raises
+    ------
+    InputError
+        A key is none of a part, or varies twice.
+    """
+    if "candidates" not in tables:
+        return tables
+    given, vary = tables["candidates"], tables.get("vary", [])
+    if not isinstance(given, dict):
+        raise InputError(f"key candidates: {shown(given)} must be a table, such as [candidates]")
+    entries = list(vary) if isinstance(vary, list) else vary
+    for key, values in given.items():
+        if key not in CANDIDATES:
+            raise InputError(f"key candidates.{key}: {unknown_key(key, CANDIDATES)}")
+        if _varied(tables, key):
+            raise InputError(f"key candidates.{key}: is in [[vary]] too; keep one of them")
+        if isinstance(entries, list):
+            entries.append({"key": key, "values": list(values) if isinstance(values, list) else [values]})
+    return {key: value for key, value in tables.items() if key != "candidates"} | {"vary": entries}
+
+
+def _relative(tables: dict[str, Any], directory: Path) -> dict[str, Any]:
+    """The tables with files of records, which are relative to the task file, by their whole names."""
+    out = dict(tables)
+    for kind in CANDIDATES:
+        table = out.get(kind)
+        name = table.get("from") if isinstance(table, dict) else table
+        if isinstance(name, str) and is_in_file(name):
+            beside = table if isinstance(table, dict) else {}
+            out[kind] = {**beside, "from": str(directory.resolve() / name)}
+    return out
+
+
+def _torque_sources(written: dict[str, Any], vary: list[Any]) -> bool:
+    """Whether a candidate of the motor runs as a torque source, so that only its mechanical energy is known."""
+    from ..data_sheets.motor_sheet import TORQUE_SOURCE, MotorSheet
+
+    varied = [entry for entry in vary if isinstance(entry, dict) and str(entry.get("key")).split(".")[0] == "motor"]
+    names = [name for entry in varied if kind_of_record(str(entry["key"])) for name in _names(entry)]
+    if not varied:
+        given = written["motor"]
+        if "from" not in given:
+            return bool(given.get("kind") == "torque_source")
+        names = [given["from"]]
+    sheets = (find(name, "motor") for name in names)
+    return any(isinstance(sheet, MotorSheet) and sheet.level() == TORQUE_SOURCE for sheet in sheets)
+
+
+def _names(entry: dict[str, Any]) -> list[str]:
+    """The names of records of an entry of `[[vary]]`."""
+    kind = kind_of_record(str(entry["key"]))
+    assert kind is not None
+    try:
+        if "values" in entry:
+            return list(entry["values"])
+        return names_that_fit(kind, entry.get("catalogue", {}))
+    except ValueError as error:
+        raise InputError(f"vary: {error}") from None
 
 
 def linear_axis(tables: dict[str, Any]) -> dict[str, Any] | None:
@@ -234,6 +311,25 @@ def _controller(given: dict[str, Any]) -> dict[str, Any]:
     return out
 
 
+def _apart(controller: dict[str, Any]) -> tuple[AnyCurrent | None, dict[str, Any]]:
+    """The current loop of a controller, and the controller with an ideal one, which every motor of the task can have.
+
+    Raises
+    ------
+    InputError
+        The loop has a value that cannot be used.
+    """
+    if not isinstance(controller["current"], dict):
+        return None, controller  # which the scenario refuses
+    loop: Any = controller["current"]
+    try:
+        current = InnerLoop(current=loop).current
+    except InputError as error:
+        text = str(error)
+        raise InputError(text.replace("key ", "key controller.", 1) if text.startswith("key ") else text) from None
+    return current, controller | {"current": {"kind": "ideal"}}
+
+
 def _vary(tables: dict[str, Any], directory: Path) -> list[Any]:
     """Varied values: those of the file, else all records of parts that the file does not name or write out."""
     entries = tables.get("vary")
@@ -256,12 +352,7 @@ def _whole(tables: dict[str, Any], kind: str) -> bool:
 def _first(written: dict[str, Any], entry: dict[str, Any]) -> None:
     """Puts the first record that can be run into the base, so that there is one."""
     kind = entry["key"].split(".")[0]
-    names = entry.get("values")
-    if names is None:
-        try:
-            names = names_that_fit(kind, entry.get("catalogue", {}))
-        except ValueError as error:
-            raise InputError(f"vary: {error}") from None
+    names = _names(entry)
     problem: InputError | None = None
     for name in names:
         try:

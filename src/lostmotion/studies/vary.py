@@ -20,7 +20,7 @@ from ..reproducible import exp, log
 from ..simulation.keys import list_index
 from ..simulation.scenario import Scenario
 from ..simulation.units_of_keys import in_si, unit_in, unit_of_key
-from .records import check_names, is_condition, kind_of_record, names_that_fit
+from .records import check_names, is_condition, kind_of_record, names_of, names_that_fit
 
 MAX_LEVELS = 1_000_000  # of one parameter
 TAKING_NAMES = ("gearbox", "motor", *(f"{table}.NAME.{key}" for table, (key, _) in RECORDS.items()))
@@ -164,6 +164,8 @@ def _with_names(data: Mapping[str, Any], table: str) -> dict[str, Any]:
         if not isinstance(wanted, dict):
             raise ValueError(f'has catalogue = {shown(wanted)}; it must be a table, such as {{ kind = "strain_wave" }}')
         out["values"] = names_that_fit(table, wanted)
+    elif "values" in out:
+        out["values"] = names_of(table, out["values"])
     check_names(table, out.get("values") or ())
     return out
 
