@@ -256,7 +256,7 @@ def test_the_command_draws_the_response_of_a_train(tmp_path: Path) -> None:
     assert "6 of 6 motions found" in done.output
     assert (tmp_path / "bode.png").stat().st_size > 10_000
     assert (tmp_path / "maps.png").exists()
-    assert "joint speed" in (tmp_path / "bode.csv").read_text().replace("_", " ")
+    assert "Joint speed, by amplitude of the servo command" in (tmp_path / "bode.csv").read_text().replace("_", " ")
     bad = CliRunner().invoke(app, [*words, "--input", "motor_command"])
     assert bad.exit_code != 0
     assert isinstance(bad.exception, lm.InputError) or "--input motor_command" in bad.output
