@@ -215,7 +215,7 @@ def test_best_takes_a_direction(selection: tuple[lm.studies.Study, Path]):
     ):
         lines = best_lines(directory, text)
         assert lines[0] == f"{title} energy [J]:"
-        assert f"energy {first:.6g}" in lines[1]
+        assert f"energy {first:.5g}" in lines[1]
         assert study.vary[0].names[int(lines[1].split()[1].rstrip(","))] in lines[1]  # names are shown too
     with pytest.raises(lm.InputError, match="direction must be least or largest, as in energy:largest"):
         best_lines(directory, "energy:most")
