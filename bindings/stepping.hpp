@@ -1,7 +1,12 @@
 // Trains step by step.
 #pragma once
 
+#include <nanobind/stl/optional.h>
+
+#include <optional>
+
 #include "instants.hpp"
+#include "lostmotion/simulation/given_motion.hpp"
 #include "snapshots.hpp"
 
 namespace lostmotion::binding {
@@ -103,6 +108,20 @@ inline void bind_stepping(nb::module_& m) {
             },
             "Of each controller what axis_signals() and winding_signals() name, one controller after the other.")
         .def("time", [](const S& s) { return s.time(); });
+
+    nb::class_<MotionCourse>(m, "MotionCourse")
+        .def(
+            "__init__",
+            [](MotionCourse* self, std::optional<double> to_angle, double to_speed,
+               std::optional<double> to_acceleration, double angle, double speed, double acceleration,
+               double interval) {
+                new (self) MotionCourse({to_speed, to_angle, to_acceleration}, angle, speed, acceleration, interval);
+            },
+            "to_angle"_a.none(), "to_speed"_a, "to_acceleration"_a.none(), "angle"_a, "speed"_a, "acceleration"_a,
+            "interval"_a)
+        .def("times", [](const MotionCourse& c) { return Numbers(c.times().begin(), c.times().end()); })
+        .def("speed", &MotionCourse::speed, "time"_a)
+        .def("acceleration", &MotionCourse::acceleration, "time"_a);
 }
 
 }  // namespace lostmotion::binding

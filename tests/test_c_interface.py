@@ -1,6 +1,7 @@
 """The C interface: the same bits as Python, by way of its header alone."""
 
 import ctypes as c
+import math
 import re
 import shutil
 import subprocess
@@ -266,6 +267,64 @@ def test_clutches_freewheels_and_torques_over_an_angle_have_the_bits_of_python(l
     told, wanted = dict(zip(there.names(VARIABLES), there.read(), strict=True)), python.read()
     assert {name: told[name] for name in wanted} == pytest.approx(wanted, rel=0.0, abs=0.0, nan_ok=True)
     assert all(len(met) > 1 for met in modes.values())
+
+
+class Motion(c.Structure):
+    _fields_ = [
+        ("shaft", c.c_char_p),
+        ("position", c.c_double),
+        ("speed", c.c_double),
+        ("acceleration", c.c_double),
+    ]
+
+
+def test_a_given_motion_has_the_bits_of_python(library: c.CDLL) -> None:
+    """Angle, speed and acceleration, and two of them; the torque that they take is a variable."""
+    scenario = lm.TrainScenario(
+        shafts={
+            "crank": {"inertia": 0.02, "friction_torque": 0.5, "speed": 0.0},
+            "lever": {"inertia": 0.3, "friction_torque": 0.2},
+        },
+        gears={
+            "mesh": {
+                "input": "crank",
+                "output": "lever",
+                "ratio": 2.0,
+                "stiffness": {"kind": "curve", "backlash": 0.01, "slopes": [800.0]},
+            }
+        },
+        simulation={"duration": 1.0, "sample_interval": 0.02},
+    )
+    train = Train(library, scenario)
+    assert train.attempt("lm_give_motion", "crank") == OK
+    assert train.attempt("lm_give_motion", "nix") == INVALID
+    assert train.error() == "there is no shaft 'nix'"
+    python, there = lm.Simulation(scenario, step=0.02), train.simulation(0.02)
+    assert set(there.names(INPUTS)) == {"crank_given_speed", "crank_given_acceleration"}
+    none = doubles([0.0, 0.0])
+
+    def advance(*motions: Motion) -> int:
+        array = (Motion * max(1, len(motions)))(*motions)
+        step = c.c_double(0.02), none, none, array, c.c_size_t(len(motions))
+        return int(library.lm_advance_motion(there.handle, *step))
+
+    for k in range(1, 60):
+        t = 0.02 * k
+        end = {"angle": 3.0 * t**2, "speed": 6.0 * t, "acceleration": 6.0}
+        if k % 3:
+            del end[("angle", "acceleration")[k % 3 - 1]]
+        python.advance(0.02, motion={"crank": end})
+        given = Motion(b"crank", end.get("angle", math.nan), end["speed"], end.get("acceleration", math.nan))
+        assert advance(given) == OK, there.error()
+    told, wanted = dict(zip(there.names(VARIABLES), there.read(), strict=True)), python.read()
+    assert {name: told[name] for name in wanted} == wanted
+    assert wanted["crank_speed"] == pytest.approx(6.0 * t, rel=1e-13)
+    kept = list(there.state())
+    assert advance(Motion(b"lever", math.nan, 1.0, math.nan)) == INVALID
+    assert there.error() == "the motion of no shaft 'lever' is given; lm_give_motion gives it"
+    assert advance(Motion(b"crank", math.nan, math.nan, math.nan)) == INVALID
+    assert there.error() == "the motion of 'crank' is not finite, or has no speed"
+    assert list(there.state()) == kept
 
 
 def test_variables_have_the_units_and_meanings_of_python(library: c.CDLL, worm: Simulation) -> None:

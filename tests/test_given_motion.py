@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 import lostmotion as lm
@@ -138,13 +139,134 @@ def test_friction_takes_nothing_while_the_given_speed_is_zero() -> None:
     assert np.all(r.crank_speed.values[t > 1.4] == 0.0)
 
 
-def test_a_thousand_periods_drift_by_the_rounding_of_2000_instants() -> None:
-    s = scenario(simulation={"duration": 1000.0, "sample_interval": 0.9})
+@pytest.mark.parametrize("friction", [0.5, 0.0])
+def test_the_speed_is_its_signal_after_a_thousand_periods(friction: float) -> None:
+    """To the last bit; the angle is integrated, with the rounding of 1e3 steps of up to 6e-13 each."""
+    shafts = CASE["shafts"] | {"crank": CASE["shafts"]["crank"] | {"friction_torque": friction}}
+    r = lm.simulate(scenario(shafts=shafts, simulation={"duration": 1000.0, "sample_interval": 0.9}), energy=False)
+    t = r.time.values
+    W = 2.0 * math.pi
+    speed, angle = np.sin(W * np.fmod(t, 1.0)), (1.0 - np.cos(W * np.fmod(t, 1.0))) / W
+    assert np.allclose(r.crank_speed, speed, rtol=0.0, atol=3e-16)
+    assert np.allclose(r.crank_angle, angle, rtol=0.0, atol=1e-12 if friction else 1e-9)
+
+
+MOVES = {
+    "start": 0.5,
+    "begin": 0.1,
+    "moves": [{"to": 2.0}, {"to": -1.0, "jerk": 90.0}],
+    "speed": 4.0,
+    "acceleration": 20.0,
+    "dwell": 0.2,
+}
+
+
+def test_moves_drive_a_shaft_exactly() -> None:
+    """Angle, speed and acceleration are those of the reference; the load follows from scipy's integrator between its pieces."""
+    shafts = {"crank": {"inertia": 0.3, "friction_torque": 0.5, "motion": MOVES}, "load": {"inertia": 1.0}}
+    s = scenario(shafts=shafts, simulation={"duration": 3.0, "sample_interval": 0.01})
     r = lm.simulate(s)
     t = r.time.values
-    # Each of 2000 switchings is at an instant that is rounded to half of 1.1e-13 s, at 6.3 rad/s^2.
-    drift = 2000 * 1.2e-13 * 2.0 * math.pi
-    assert np.allclose(r.crank_speed, np.sin(2.0 * math.pi * np.fmod(t, 1.0)), rtol=0.0, atol=drift)
+    reference = s.shafts["crank"].motion
+    assert reference is not None
+    angle, speed, acceleration, _ = reference.at(t)
+    breaks = [piece[0] for piece in reference.pieces()]
+    inside = np.min(np.abs(t[:, None] - np.array(breaks)), axis=1) > 1e-9
+    assert np.allclose(r.crank_angle, angle, rtol=0.0, atol=2e-14)
+    assert np.allclose(r.crank_speed, speed, rtol=0.0, atol=4e-15)
+    assert np.allclose(r.crank_acceleration.values[inside], acceleration[inside], rtol=0.0, atol=1e-12)
+    x, begin = np.array([0.5, 0.0]), 0.0  # of the load, at rest and without twist
+    load = np.empty_like(t)
+    for end in [*breaks[1:], t[-1] + 1e-9]:
+        _, *given = reference.pieces()[max(k for k, b in enumerate(breaks) if b <= begin)]
+        at = (t >= begin) & (t < end)
+
+        def rates(time: float, y: np.ndarray, given: list[float] = given, begin: float = begin) -> list[float]:
+            h = time - begin
+            return [y[1], 100.0 * (given[0] + h * (given[1] + h * (given[2] / 2.0 + h * given[3] / 6.0)) - y[0])]
+
+        found = solve_ivp(rates, (begin, end), x, "DOP853", t_eval=[*t[at], end], rtol=1e-13, atol=1e-14)
+        load[at], x, begin = found.y[0][:-1], found.y[:, -1], end
+    assert np.allclose(r.load_angle, load, rtol=0.0, atol=1e-11)
+    torque = 0.3 * acceleration + 100.0 * (angle - load) + 0.5 * np.sign(speed)
+    moving = inside & (np.abs(speed) > 1e-9)
+    assert np.allclose(r.crank_drive_torque.values[moving], torque[moving], rtol=0.0, atol=2e-9)
+    ledger = lm.energy_of(r)
+    assert abs(ledger["residual"]) <= 1e-12 * ledger["turned_over"]
+
+
+def test_a_slide_of_given_motion_is_the_shaft_of_the_same_numbers() -> None:
+    """In mm, m/s and N; its force is the torque of the shaft to the bit."""
+    of_shafts = lm.simulate(scenario(shafts={"crank": {"inertia": 2.0, "motion": MOVES}}, gears={}))
+    moves = MOVES | {
+        "start": "500 mm",
+        "moves": [{"to": "2000 mm"}, {"to": "-1 m", "jerk": "90 m/s^3"}],
+        "speed": "4 m/s",
+        "acceleration": "20 m/s^2",
+    }
+    tables = {"shafts": {}, "gears": {}, "slides": {"table": {"mass": "2 kg", "motion": moves}}}
+    r = lm.simulate(scenario(**tables))
+    for name, other in (
+        ("table_position", "crank_angle"),
+        ("table_speed", "crank_speed"),
+        ("table_acceleration", "crank_acceleration"),
+        ("table_drive_force", "crank_drive_torque"),
+    ):
+        assert np.array_equal(r[name], of_shafts[other]), name
+    units = {name: r[name].attrs["units"] for name in map(str, r)}
+    assert units["table_drive_force"] == "N"
+    assert not any("rad" in unit or "N*m" in unit for unit in units.values())
+    speed = {"amplitude": "100 mm/s", "frequency": 1.0}
+    wave = lm.simulate(scenario(**tables | {"slides": {"table": {"mass": 2.0, "speed": speed}}}))
+    assert np.allclose(wave.table_speed, 0.1 * np.sin(2.0 * math.pi * wave.time), rtol=0.0, atol=1e-16)
+
+
+def test_the_force_at_a_slide_drives_its_screw() -> None:
+    """Rigid screw of lead p: force m a + (2 pi/p)^2 J a + friction, at constant acceleration."""
+    p = 0.01
+    s = lm.TrainScenario(
+        shafts={"screw": {"inertia": 1e-4}},
+        slides={"table": {"mass": 20.0, "friction_force": 30.0, "speed": {"ramps": [{"rise": 1.0, "duration": 0.5}]}}},
+        screws={"lead": {"input": "screw", "output": "table", "lead": p}},
+        simulation={"duration": 0.4, "sample_interval": 0.01},
+    )
+    force = lm.simulate(s).table_drive_force.values[1:]
+    assert np.allclose(force, (20.0 + 1e-4 * (2.0 * math.pi / p) ** 2) * 2.0 + 30.0, rtol=1e-14)
+
+
+def test_steps_move_a_slide_by_its_position() -> None:
+    table = {"mass": 3.0, "speed": 0.0}
+    simulation = lm.Simulation(scenario(shafts={}, gears={}, slides={"table": table}), step=0.1)
+    simulation.advance(0.1, motion={"table": {"position": "1 mm", "speed": 0.03, "acceleration": 0.6}})
+    assert simulation["table_position"] == pytest.approx(1e-3, abs=1e-17)
+    assert simulation["table_drive_force"] == pytest.approx(1.8, rel=1e-13)
+    with pytest.raises(lm.InputError, match=r"motion\.table\.angle: is not known"):
+        simulation.advance(0.1, motion={"table": {"angle": 1.0, "speed": 0.0}})
+
+
+@pytest.mark.parametrize(
+    ("crank", "initial", "says"),
+    [
+        (
+            {"steps": [{"height": 1.0, "time": 0.5}]},
+            {},
+            "key shafts.crank.motion: its position jumps at 0.5 s from 0 to 1 rad",
+        ),
+        (
+            {"ramps": [{"rise": 1.0, "duration": 0.5, "begin": 0.1}]},
+            {},
+            "key shafts.crank.motion: its speed jumps at 0.1 s from 0 to 2 rad/s",
+        ),
+        (MOVES, {"angles": {"crank": 1.0}}, "both say where the shaft is at t = 0"),
+        (MOVES, {"speeds": {"crank": 1.0}}, "both say how fast the shaft turns at t = 0"),
+    ],
+)
+def test_a_motion_that_no_torque_gives_is_refused(crank: Any, initial: Any, says: str) -> None:
+    with pytest.raises(lm.InputError) as caught:
+        scenario(shafts={"crank": {"inertia": 1.0, "motion": crank}, "load": {"inertia": 1.0}}, initial=initial)
+    assert says in str(caught.value)
+    with pytest.raises(lm.InputError, match="both give the motion"):
+        scenario(shafts={"crank": {"inertia": 1.0, "motion": MOVES, "speed": 1.0}, "load": {"inertia": 1.0}})
 
 
 def heavy(s: lm.TrainScenario, inertia: float = 1e12) -> lm.TrainScenario:

@@ -207,6 +207,10 @@ LM_API int lm_limit_mesh_damping(lm_train* train, const char* gear);
  * results have the names "<name>_position" and "<name>_load_force". The ratio of a screw of lead p that drives it is 2
  * pi/p. LM_INVALID: there is none of that name. */
 LM_API int lm_set_slide(lm_train* train, const char* shaft);
+/* The motion of a shaft or slide is given: "<name>_given_speed" and "<name>_given_acceleration" are inputs, and the
+ * torque that the motion takes is the variable "<name>_drive_torque", of a slide "<name>_drive_force". LM_INVALID:
+ * there is none of that name. */
+LM_API int lm_give_motion(lm_train* train, const char* shaft);
 /* The inertias of n shafts in place of their own, which are then 0: n x n numbers, row by row, symmetric and positive
  * definite. Between two shafts [kg m2], between two slides [kg], between one of each [kg m]. */
 LM_API int lm_add_mass_matrix(lm_train* train, const char* name, const char* const* shafts, size_t n,
@@ -266,7 +270,20 @@ LM_API int lm_reset(lm_simulation* simulation, const double* states, const doubl
 /* Advances by interval [s] with each input running in a straight line from its first to its second value. When it
  * fails, the state is left as it was. */
 LM_API int lm_advance(lm_simulation* simulation, double interval, const double* begin, const double* end);
-/* The same as lm_scenario_set_interrupt, for lm_advance and lm_run. */
+/* Of a shaft whose motion is given, at the end of a step; of a slide in m. NAN: position or acceleration is not given.
+ */
+typedef struct {
+    const char* shaft;
+    double position;     /* [rad] */
+    double speed;        /* [rad/s] */
+    double acceleration; /* [rad/s^2] */
+} lm_motion;
+/* The same as lm_advance, with the motions of all shafts whose motion is given, in the place of their inputs. From the
+ * present values on the acceleration runs in up to three straight lines, so that all that is given is met at the end
+ * and speeds do not jump. */
+LM_API int lm_advance_motion(lm_simulation* simulation, double interval, const double* begin, const double* end,
+                             const lm_motion* motions, size_t n);
+/* The same as lm_scenario_set_interrupt, for lm_advance, lm_advance_motion and lm_run. */
 LM_API void lm_set_interrupt(lm_simulation* simulation, int (*interrupted)(void*), void* context);
 LM_API double lm_time(const lm_simulation* simulation);
 /* What acts at t = 0, for what is read before the first step; later it changes nothing. */

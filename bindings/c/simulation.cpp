@@ -1,7 +1,10 @@
 // The C interface: step by step.
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "lostmotion/analysis/train_linear.hpp"
@@ -32,6 +35,34 @@ const lm::Variable* variable_of(const lm_simulation& s, lm_kind kind, std::size_
     const lm::Variables& v = s.simulation.variables();
     const int place = names == nullptr ? static_cast<int>(k) : v.place((*names)[k]);
     return place < 0 ? nullptr : &v.all()[static_cast<std::size_t>(place)];
+}
+
+constexpr std::string_view given_speed = "_given_speed";
+
+// The course of a shaft, or nothing and what is wrong.
+std::optional<lm::ScenarioSimulation::GivenCourse> read(const lm_motion& motion, const lm::ScenarioSimulation& s,
+                                                        std::string& wrong) {
+    const std::string name = motion.shaft == nullptr ? "" : motion.shaft;
+    const auto given = [](double value) { return std::isnan(value) ? std::nullopt : std::optional(value); };
+    const auto shaft = s.given_shaft(name);
+    if (!shaft) {
+        wrong = "the motion of no shaft '" + name + "' is given; lm_give_motion gives it";
+        return {};
+    }
+    const lm::MotionEnd to{motion.speed, given(motion.position), given(motion.acceleration)};
+    if (!std::isfinite(to.speed) || std::isinf(motion.position) || std::isinf(motion.acceleration)) {
+        wrong = "the motion of '" + name + "' is not finite, or has no speed";
+        return {};
+    }
+    if (to.angle && shaft->angle < 0) {
+        wrong = "the position of '" + name + "' follows from no variable; give its speed and acceleration alone";
+        return {};
+    }
+    return lm::ScenarioSimulation::GivenCourse{*shaft, to};
+}
+bool is_moved(const lm::ScenarioSimulation& s, const std::string& input,
+              const std::vector<lm::ScenarioSimulation::GivenCourse>& courses) {
+    return std::ranges::any_of(courses, [&](const auto& c) { return s.names().inputs[c.shaft.speed_input] == input; });
 }
 
 bool same_variables(const lm::Variables& a, const lm::Variables& b) {
@@ -116,13 +147,33 @@ int lm_reset(lm_simulation* simulation, const double* states, const double* capa
 }
 
 int lm_advance(lm_simulation* simulation, double interval, const double* begin, const double* end) {
-    const std::size_t n = simulation->simulation.names().inputs.size();
-    const double time = simulation->simulation.time();
+    return lm_advance_motion(simulation, interval, begin, end, nullptr, 0);
+}
+int lm_advance_motion(lm_simulation* simulation, double interval, const double* begin, const double* end,
+                      const lm_motion* motions, size_t n_motions) {
+    lm::ScenarioSimulation& s = simulation->simulation;
+    const std::size_t n = s.names().inputs.size();
+    const double time = s.time();
     if (!(std::isfinite(interval) && interval > 0.0 && time + interval > time))
         return simulation->failed("the interval must be > 0, finite and longer than the rounding of the time");
     if (n > 0 && !(finite(begin, n) && finite(end, n))) return simulation->failed("an input is missing or not finite");
-    simulation->simulation.with([&](auto& s) { s.set_interrupt(Asked::ask, &simulation->asked); });
-    return simulation->ended(simulation->simulation.advance(interval, {begin, n}, {end, n}));
+    std::vector<lm::ScenarioSimulation::GivenCourse> courses;
+    for (std::size_t k = 0; k < n_motions; ++k) {
+        std::string wrong;
+        if (auto course = read(motions[k], s, wrong))
+            courses.push_back(*course);
+        else
+            return simulation->failed(std::move(wrong));
+    }
+    if (n_motions > 0)
+        for (const std::string& input : s.names().inputs)
+            if (input.ends_with(given_speed) && !is_moved(s, input, courses))
+                return simulation->failed("the motion of '" + input.substr(0, input.size() - given_speed.size()) +
+                                          "' is missing");
+    s.with([&](auto& in) { in.set_interrupt(Asked::ask, &simulation->asked); });
+    const std::span<const double> first(begin, n), last(end, n);
+    return simulation->ended(courses.empty() ? s.advance(interval, first, last)
+                                             : s.advance(interval, first, last, courses));
 }
 void lm_set_interrupt(lm_simulation* simulation, int (*interrupted)(void*), void* context) {
     simulation->asked = {interrupted, context};

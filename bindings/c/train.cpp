@@ -200,6 +200,17 @@ int lm_set_slide(lm_train* train, const char* shaft) {
     });
 }
 
+int lm_give_motion(lm_train* train, const char* shaft) {
+    return train->attempt([&] {
+        for (lm::model::Shaft& s : train->description.train.shafts)
+            if (s.name == text(shaft)) {
+                s.given_motion = true;
+                return std::string{};
+            }
+        return "there is no shaft '" + text(shaft) + "'";
+    });
+}
+
 int lm_add_mass_matrix(lm_train* train, const char* name, const char* const* shafts, size_t n, const double* matrix) {
     return train->attempt([&] {
         std::string wrong = name_error(*train, name);

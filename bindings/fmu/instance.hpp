@@ -97,7 +97,8 @@ class Instance {
             value = time();
         } else if (const std::size_t* k = variables_.input(reference)) {
             if (const Ended e = place(); e != ok) return e;
-            value = given_[*k] ? inputs_[*k] : lm_played_input(simulation_.get(), *k);
+            if (!given_[*k]) return get_unset(*k, value);
+            value = inputs_[*k];
         } else if (const std::size_t* rate = variables_.input_rate(reference)) {
             value = rates_[*rate];
         } else if (is_parameter(reference)) {
@@ -183,7 +184,11 @@ class Instance {
         if (const Ended e = apply(); e != ok) return e;
         end_ = inputs_;
         for (std::size_t k = 0; k < end_.size(); ++k) end_[k] += rates_[k] * interval;
-        if (lm_advance(simulation_.get(), interval, inputs_.data(), end_.data()) != LM_OK) return failed();
+        const std::vector<lm_motion> motions = motions_over(interval);
+        lm_hold(simulation_.get(), inputs_.data());  // the first step begins with the acceleration of its inputs
+        if (lm_advance_motion(simulation_.get(), interval, inputs_.data(), end_.data(), motions.data(),
+                              motions.size()) != LM_OK)
+            return failed();
         committed_ = true;
         read_ = false;
         return ok;
@@ -342,7 +347,7 @@ class Instance {
         return {};
     }
     void begin() {
-        given_.assign(variables_.input_names.size(), 0);
+        given_.assign(variables_.input_names.size() + variables_.motions.size(), 0);
         start_states_.clear();
         make_simulation();
         inputs_.assign(given_.size(), 0.0);
@@ -399,10 +404,41 @@ class Instance {
         if (!is_running()) changed_ = true;
         return ok;
     }
-    // From now on an input is what the importer sets: the simulation goes on where it is, without the signal.
+    // An input that the importer has not set: of its signal, or the position that a shaft has.
+    Ended get_unset(std::size_t input, double& value) {
+        const Variables::Motion* motion = variables_.motion_of(input);
+        if (motion == nullptr || input != motion->position) {
+            value = lm_played_input(simulation_.get(), input);
+            return ok;
+        }
+        if (const Ended e = uncommitted([this] { return refresh(); }); e != ok) return e;
+        value = values_[motion->variable];
+        return ok;
+    }
+    // What is given for the end of a step, of the shafts whose position is an input: by the time derivatives of their
+    // inputs, or without these by speed and acceleration.
+    std::vector<lm_motion> motions_over(double interval) const {
+        std::vector<lm_motion> out;
+        for (const Variables::Motion& m : variables_.motions) {
+            if (!given_[m.position]) continue;
+            const double p = inputs_[m.position], v = inputs_[m.speed], a = inputs_[m.acceleration];
+            if (rates_[m.position] != 0.0 || rates_[m.speed] != 0.0 || rates_[m.acceleration] != 0.0)
+                out.push_back({m.shaft.c_str(), end_[m.position], end_[m.speed], end_[m.acceleration]});
+            else
+                out.push_back({m.shaft.c_str(), p + interval * (v + 0.5 * interval * a), v + interval * a, a});
+        }
+        return out;
+    }
+    // From now on an input is what the importer sets: the simulation goes on where it is, without the signal. Position,
+    // speed and acceleration of a shaft belong together: those that are not set yet stay what they are.
     Ended give(std::size_t input) {
         if (given_[input]) return ok;
         if (const Ended e = apply(); e != ok) return e;
+        if (const Variables::Motion* m = variables_.motion_of(input); m != nullptr) {
+            for (const std::size_t k : {m->position, m->speed, m->acceleration})
+                if (const Ended e = get_unset(k, inputs_[k]); e != ok) return e;
+            for (const std::size_t k : {m->position, m->speed, m->acceleration}) given_[k] = 1;
+        }
         given_[input] = 1;
         const std::vector<double> kept = numbers_of(simulation_.get());
         simulation_ = simulation_now();

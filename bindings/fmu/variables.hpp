@@ -35,10 +35,18 @@ struct Variables {
     std::vector<std::size_t> states;           // the same
     std::vector<double> nominals;              // of the states
     std::vector<std::string> input_names, output_names, state_names;
+    // A shaft whose position is an input as well, behind all others: numbers of its three inputs, and of its position
+    // among the variables.
+    struct Motion {
+        std::string shaft;
+        std::size_t position, speed, acceleration, variable;
+    };
+    std::vector<Motion> motions;
 
-    // Lines: the identifier, "references" if these are given, then "indicators N", "input NAME", "output NAME" or
-    // "state NAME N", where 10^N is its nominal value (an integer, since the decimal point depends on the locale), at
-    // last "checksum N" of all lines before. Returns what is wrong, or nothing.
+    // Lines: the identifier, "references" if these are given, then "indicators N", "input NAME", "motion SHAFT
+    // POSITION" with the variable of that name, "output NAME" or "state NAME N", where 10^N is its nominal value (an
+    // integer, since the decimal point depends on the locale), at last "checksum N" of all lines before. Returns what
+    // is wrong, or nothing.
     std::string read(const std::string& path) {
         std::string text = text_of_file(path);
         if (text.empty()) return path + " cannot be read";
@@ -65,6 +73,9 @@ struct Variables {
             const std::string kind = word(' ');
             if (kind == "input") {
                 input_names.push_back(word('\n'));
+            } else if (kind == "motion") {
+                motions.push_back({word(' '), 0, 0, 0, 0});
+                position_names.push_back(word('\n'));
             } else if (kind == "indicators") {
                 const std::string count = word('\n');
                 indicators = static_cast<std::size_t>(std::strtoul(count.c_str(), nullptr, 10));
@@ -98,7 +109,25 @@ struct Variables {
         };
         std::string wrong = places(input_names, LM_INPUTS, inputs);
         if (wrong.empty()) wrong = places(output_names, LM_VARIABLES, outputs);
+        std::vector<std::size_t> positions;
+        if (wrong.empty()) wrong = places(position_names, LM_VARIABLES, positions);
+        for (std::size_t k = 0; wrong.empty() && k < motions.size(); ++k) {
+            std::vector<std::size_t> two;
+            wrong =
+                places({motions[k].shaft + "_given_speed", motions[k].shaft + "_given_acceleration"}, LM_INPUTS, two);
+            if (!wrong.empty()) break;
+            const std::size_t position = lm_count(s, LM_INPUTS) + k;
+            motions[k] = {motions[k].shaft, position, two[0], two[1], positions[k]};
+            inputs.push_back(position);
+        }
         return wrong.empty() ? places(state_names, LM_STATES, states) : wrong;
+    }
+
+    // The motion that an input belongs to, or nullptr.
+    const Motion* motion_of(std::size_t input) const {
+        for (const Motion& m : motions)
+            if (input == m.position || input == m.speed || input == m.acceleration) return &m;
+        return nullptr;
     }
 
     // The place of a reference in a list that begins with `first`, or nullptr.
@@ -110,6 +139,9 @@ struct Variables {
     const std::size_t* output(unsigned r) const { return in(outputs, first_output, r); }
     const std::size_t* state(unsigned r) const { return in(states, first_state, r); }
     const std::size_t* derivative(unsigned r) const { return in(states, first_derivative, r); }
+
+ private:
+    std::vector<std::string> position_names;
 };
 
 }  // namespace lostmotion::fmu

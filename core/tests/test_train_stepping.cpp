@@ -5,6 +5,7 @@
 
 #include "drive_runs.hpp"
 #include "lostmotion/analysis/train_explain.hpp"
+#include "lostmotion/scenario/simulation.hpp"
 #include "lostmotion/simulation/train_stepping.hpp"
 #include "random_trains.hpp"
 
@@ -71,6 +72,42 @@ double smallest_command(const test::Drive& d, double T_2, double M_Z, int s) {
 }
 
 }  // namespace
+
+// The angle t^3, whose acceleration is one straight line, drives a load of 2 kg m2 through a spring: x'' = w^2 (t^3 -
+// x), so that x = t^3 - 6 t/w^2 + 6 sin(w t)/w^3; the torque of the drive is J 6 t + k (t^3 - x).
+TEST_CASE("a given motion is met at the end of each step, and its torque and what it drives have their closed forms") {
+    Train t;
+    t.shafts = {shaft(0.5), shaft(2.0)};
+    t.shafts[0].name = "crank";
+    t.shafts[1].name = "load";
+    t.shafts[0].given_motion = true;
+    t.gears = {spring(0, 1, 1.0, TorsionCurve({}, {200.0}))};
+    t.gears[0].name = "g";
+    ScenarioSimulation s(t, 0.1);
+    const auto crank = s.given_shaft("crank");
+    REQUIRE(crank);
+    CHECK(!s.given_shaft("load"));
+    const double w = 10.0;
+    const Values nothing(s.names().inputs.size());
+    for (int k = 1; k <= 20; ++k) {
+        const double at = 0.1 * k;
+        // All three, speed and angle, or speed and acceleration: what is left out follows.
+        MotionEnd to{3.0 * at * at, at * at * at, 6.0 * at};
+        if (k % 3 == 1) to.acceleration.reset();
+        if (k % 3 == 2) to.angle.reset();
+        REQUIRE(s.advance(0.1, nothing, nothing, std::vector{ScenarioSimulation::GivenCourse{*crank, to}}) ==
+                Status::done);
+        Values now(s.variables().size());
+        REQUIRE(s.read(now.data()) == Status::done);
+        const auto value = [&](const char* name) { return now[static_cast<std::size_t>(s.variables().place(name))]; };
+        const double x = at * at * at - 6.0 * at / (w * w) + 6.0 * std::sin(w * at) / (w * w * w);
+        CHECK(value("crank_speed") == doctest::Approx(3.0 * at * at).epsilon(1e-14));
+        CHECK(value("crank_acceleration") == doctest::Approx(6.0 * at).epsilon(1e-11));
+        CHECK(value("load_angle") == doctest::Approx(x).epsilon(1e-12));
+        CHECK(value("g_twist") + value("load_angle") == doctest::Approx(at * at * at).epsilon(1e-13));
+        CHECK(value("crank_drive_torque") == doctest::Approx(3.0 * at + 200.0 * (at * at * at - x)).epsilon(1e-10));
+    }
+}
 
 TEST_CASE("random trains stepped with intervals split at random follow the run in one go") {
     RandomTrains random(52);

@@ -61,12 +61,14 @@ class Cursor {
 
     void anchor(double time) {
         input_.follow(time);
+        set_given();
         rate_known_ = rate_known_ && carries_rate_;
     }
     // To a state of the same stretch that is known already.
     void move_to(double time, const State& x) {
         x_ = x;
         input_.follow(time);
+        set_given();
         rate_known_ = false;
     }
 
@@ -133,6 +135,7 @@ class Cursor {
         advance(left_of(to, step.length()));
         x_ = step(x_, input_);
         input_.follow(to);
+        set_given();
         rate_known_ = false;
     }
     [[gnu::noinline]] LongStep<D> long_step(double length) const { return {*propagator_, *constant_, input_, length}; }
@@ -156,6 +159,12 @@ class Cursor {
     }
 
  private:
+    // Given speeds are those of their signals, at an instant that the inputs were anchored to.
+    void set_given() {
+        if (const auto* given = propagator_->rates().given; given != nullptr) [[unlikely]]
+            for (const GivenState& g : *given)
+                x_[static_cast<std::size_t>(g.state)] = input_.given_at(g, input_.time());
+    }
     // What a length leaves of the way to an instant, of which the rounding of the clock may be most.
     double left_of(double to, double length) const {
         return static_cast<double>(DoubleDouble::sum(to, -input_.time()) + -length);

@@ -91,6 +91,17 @@ double next_breakpoint(const std::array<Signal, n>& signals, double t) {
     return next;
 }
 
+// A share in a speed that is given: of the input that tells it, and of the input that is its rate.
+struct GivenSpeed {
+    int speed, acceleration;
+    double share;
+};
+// A state that is a given speed, or follows given speeds alone.
+struct GivenState {
+    int state;
+    std::vector<GivenSpeed> shares;
+};
+
 // Sines by the number of their input.
 using InputSines = std::vector<std::pair<int, Sine>>;
 
@@ -285,6 +296,22 @@ class InputState {
             third += odd * turned_twice;
         }
         return {first, second, third};
+    }
+
+    // A given speed at an instant of the present stretch, from absolute time, so that no error accumulates. Between
+    // breakpoints it is the integral of its rate, which runs in a straight line; the sines of both belong together.
+    double given_at(const GivenSpeed& given, double t) const {
+        const Breakpoint &speed = *breakpoint_[given.speed], &rate = *breakpoint_[given.acceleration];
+        const double s = t - speed.time;
+        double value = rate.time == speed.time ? speed.value + s * (rate.value + 0.5 * s * rate.slope)
+                                               : speed.value + s * speed.slope;
+        for (const Sine& sine : (*signals_)[given.speed].sines) value += sine.at(t);
+        return given.share * value;
+    }
+    double given_at(const GivenState& given, double t) const {
+        double value = 0.0;
+        for (const GivenSpeed& g : given.shares) value += given_at(g, t);
+        return value;
     }
 
     // Sums of the magnitudes of the parts: what the rounding of the values is relative to.

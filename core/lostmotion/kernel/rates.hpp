@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "form.hpp"
+#include "inputs.hpp"
 
 namespace lostmotion {
 
@@ -85,6 +86,7 @@ struct LinearRatesOf {
     Column fixed{};                              // the constant: its column for 1 ...
     std::array<Column, D::memory> per_memory{};  // ... and those for the memory
     [[no_unique_address]] DependsOn<D> depends_on;
+    const std::vector<GivenState>* given = nullptr;  // states that are given speeds, if there are any
 
     LinearRatesOf() = default;
     // From the rates of all states.

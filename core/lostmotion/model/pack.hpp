@@ -103,10 +103,32 @@ struct PackedRegime {
     bool solvable = true, in_data = true;
     std::vector<Driver<PackedForm<D>>> drivers;
     std::vector<LockedTorque<PackedForm<D>>> locked;
+    std::vector<GivenState> given;
     int driving_input = -1;
     double driving_way = 0.0;
     bool complete = true;  // false: it has more guards than there is room for
 };
+
+// The speeds that are given, and those that follow these alone.
+inline std::vector<GivenState> given_states(const Regime& r, const Places& places) {
+    std::vector<GivenState> out;
+    if (places.driven.empty()) return out;
+    unsigned driven = 0;
+    for (const int s : places.driven) driven |= 1u << s;
+    for (int s = 0; s < static_cast<int>(places.shafts.size()); ++s) {
+        const bool follows = r.ties.follows(s) && (r.ties.free[s] & ~driven) == 0;
+        if (r.ties.at_rest[s] || !(follows || (driven >> s & 1) != 0)) continue;
+        GivenState& given = out.emplace_back(GivenState{places.shafts[s].speed, {}});
+        const auto add = [&](int k, double share) {
+            given.shares.push_back({places.shafts[k].given_speed, places.shafts[k].given_acceleration, share});
+        };
+        if (follows)
+            r.ties.each_share(s, add);
+        else
+            add(s, 1.0);
+    }
+    return out;
+}
 
 template <class D>
 PackedRegime<D> pack(const Regime& r, const Assembly& a) {
@@ -141,6 +163,7 @@ PackedRegime<D> pack(const Regime& r, const Assembly& a) {
         out.locked.push_back({l.contact, l.memory, l.has_low, l.has_high, l.on_held_shaft, pack<D>(l.low, n),
                               pack<D>(l.high, n), pack<D>(l.needs, n), pack<D>(l.friction, n), l.needs_torque});
     out.in_data = r.in_data;
+    out.given = given_states(r, a.places());
     return out;
 }
 

@@ -67,6 +67,51 @@ auto ScenarioSimulation::advance(double interval, std::span<const double> begin,
     });
 }
 
+std::optional<ScenarioSimulation::GivenShaft> ScenarioSimulation::given_shaft(const std::string& name) const {
+    const auto input = [&](const std::string& of) {
+        return static_cast<std::size_t>(std::ranges::find(names_.inputs, name + of) - names_.inputs.begin());
+    };
+    const std::size_t speed = input("_given_speed"), acceleration = input("_given_acceleration");
+    if (acceleration >= names_.inputs.size()) return {};
+    const int angle = variables_.place(name + "_angle");
+    return GivenShaft{speed, acceleration, angle >= 0 ? angle : variables_.place(name + "_position"),
+                      variables_.place(name + "_speed"), variables_.place(name + "_acceleration")};
+}
+
+auto ScenarioSimulation::advance(double interval, std::span<const double> begin, std::span<const double> end,
+                                 std::span<const GivenCourse> motions) -> Status {
+    std::vector<double> now(variables_.size());
+    if (const Status status = read(now.data()); status != Status::done) return status;
+    const auto value = [&now](int variable) { return variable < 0 ? 0.0 : now[static_cast<std::size_t>(variable)]; };
+    std::vector<MotionCourse> courses;
+    std::vector<double> times;
+    for (const GivenCourse& m : motions) {
+        courses.emplace_back(m.to, value(m.shaft.angle), value(m.shaft.speed), value(m.shaft.acceleration), interval);
+        times.insert(times.end(), courses.back().times().begin(), courses.back().times().end());
+    }
+    std::ranges::sort(times);
+    times.erase(std::unique(times.begin(), times.end()), times.end());
+    const auto inputs_at = [&](double t) {
+        std::vector<double> row(begin.begin(), begin.end());
+        for (std::size_t k = 0; k < row.size(); ++k) row[k] += (end[k] - begin[k]) * (t / interval);
+        for (std::size_t k = 0; k < motions.size(); ++k) {
+            row[motions[k].shaft.speed_input] = courses[k].speed(t);
+            row[motions[k].shaft.acceleration_input] = courses[k].acceleration(t);
+        }
+        return row;
+    };
+    return with([&](auto& s) {
+        const auto before = s.snapshot();
+        for (std::size_t k = 1; k < times.size(); ++k) {
+            const Status status = advance(times[k] - times[k - 1], inputs_at(times[k - 1]), inputs_at(times[k]));
+            if (status == Status::done) continue;
+            s.restore(before);
+            return status;
+        }
+        return Status::done;
+    });
+}
+
 void ScenarioSimulation::hold(std::span<const double> inputs) {
     with([&](auto& s) {
         if (s.snapshot().started) return;
@@ -180,7 +225,10 @@ bool ScenarioSimulation::set_state(const double* from) {
 
 double ScenarioSimulation::Played::line(double time) const {
     const Breakpoint& b = signal.breakpoints[segment];
-    return b.value + b.slope * (time - b.time);
+    const double s = time - b.time;
+    if (segment >= rate.breakpoints.size() || rate.breakpoints[segment].time != b.time) return b.value + b.slope * s;
+    const Breakpoint& r = rate.breakpoints[segment];
+    return b.value + s * (r.value + 0.5 * s * r.slope);
 }
 
 auto ScenarioSimulation::played_sines(const Scenario& scenario) -> InputSines {
@@ -218,10 +266,14 @@ void ScenarioSimulation::name_all(const Scenario& scenario) {
                                                   names_.states.begin()));
     for (const FreeInput& i : lostmotion::free_inputs(scenario)) {
         if (const std::size_t k = free_.size(); k < scenario.played.size() && scenario.played[k])
-            played_.push_back({k, scenario.inputs[i.number]});
+            played_.push_back({k, scenario.inputs[i.number], 0, no_rate()});
         free_.push_back(i.number);
         names_.inputs.push_back(i.name);
     }
+    for (const model::ShaftPlace& shaft : train_.assembly().places().shafts)
+        for (Played& p : played_)
+            if (shaft.given_speed == static_cast<int>(free_[p.input]))
+                p.rate = scenario.inputs[static_cast<std::size_t>(shaft.given_acceleration)];
     for (std::size_t a = 0; a < control_.axes.size() && scenario.references_given; ++a) {
         const std::size_t k = free_.size() + a;
         name_reference(scenario, control_.axes[a]);

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <type_traits>
@@ -14,6 +15,7 @@
 #include <variant>
 #include <vector>
 
+#include "../simulation/given_motion.hpp"
 #include "../simulation/hybrid.hpp"
 #include "../simulation/train_stepping.hpp"
 #include "variables.hpp"
@@ -88,6 +90,20 @@ class ScenarioSimulation {
     // Each input of names().inputs runs in a straight line from its first to its second value, or follows its signal,
     // at the breakpoints of which the interval is divided.
     Status advance(double interval, std::span<const double> begin, std::span<const double> end);
+    // A shaft whose motion is given: its inputs among the names, and its variables.
+    struct GivenShaft {
+        std::size_t speed_input, acceleration_input;
+        int angle, speed, acceleration;  // -1: there is no such variable
+    };
+    // Of a name; nothing if the motion of no such shaft is given.
+    std::optional<GivenShaft> given_shaft(const std::string& name) const;
+    struct GivenCourse {
+        GivenShaft shaft;
+        MotionEnd to;
+    };
+    // The same, with motions in place of their inputs, in parts in which all accelerations are straight lines.
+    Status advance(double interval, std::span<const double> begin, std::span<const double> end,
+                   std::span<const GivenCourse> motions);
     // What acts at t = 0, for what is read before the first step.
     void hold(std::span<const double> inputs);
 
@@ -135,6 +151,7 @@ class ScenarioSimulation {
         std::size_t input;  // by its number among the names
         Signal signal;
         std::size_t segment = 0;
+        Signal rate{};  // of a given speed, with the same breakpoints: its time derivative
 
         double line(double time) const;
     };
@@ -149,6 +166,7 @@ class ScenarioSimulation {
         for (Played& p : played_) p.segment = p.signal.segment(time + missed * time);
     }
     double next_breakpoint(double time) const;
+    static Signal no_rate() { return {{}, {}}; }
 
     static Scenario of_train(const model::Train& train);
     void name_all(const Scenario& scenario);

@@ -102,6 +102,7 @@ class SamplerOf : public Observer<System> {
                     instants_.set(k, load(p.cursor.x()), p.cursor.input().values());
                 }
             }
+            set_given(p, next, n);
             write(reader, next, n);
             next += static_cast<std::size_t>(n);
             if (next == p.end) return true;
@@ -109,6 +110,16 @@ class SamplerOf : public Observer<System> {
             if (level >= 0) p.cursor.move_to(instant(next - 1), stride_.x());
             p.cursor.advance(instant(next) - p.cursor.time());
         }
+    }
+
+    // Given speeds at n instants, as their signals have them.
+    void set_given(const Piece& p, std::size_t first, int n) {
+        const auto* given = p.entry->rates.given;
+        if (given == nullptr) return;
+        for (const GivenState& g : *given)
+            for (int k = 0; k < n; ++k)
+                instants_.x[static_cast<std::size_t>(g.state)][static_cast<std::size_t>(k)] =
+                    p.cursor.input().given_at(g, instant(first + static_cast<std::size_t>(k)));
     }
 
     // By one long step from sample to sample.

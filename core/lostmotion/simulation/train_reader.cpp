@@ -89,8 +89,9 @@ std::vector<TrainChannel> train_channels(const model::Assembly& a) {
     for (std::size_t k = 0; k < p.driven.size(); ++k) {
         const model::ShaftPlace& shaft = p.shafts[static_cast<std::size_t>(p.driven[k])];
         const std::string& name = t.shafts[static_cast<std::size_t>(p.driven[k])].name;
-        out.push_back({C::drive_torque, static_cast<int>(k), name + "_drive_torque", model::torque_unit(t, p.driven[k]),
-                       "torque that the given motion takes, in its direction"});
+        const std::string word = model::torque_word(t, p.driven[k]);
+        out.push_back({C::drive_torque, static_cast<int>(k), name + "_drive_" + word,
+                       model::torque_unit(t, p.driven[k]), word + " that the given motion takes, in its direction"});
         out.push_back({C::input, shaft.given_acceleration, name + "_acceleration",
                        model::is_slide(t, p.driven[k]) ? "m/s^2" : "rad/s^2", "given acceleration"});
     }

@@ -335,7 +335,11 @@ template <class System>
 Status ExactSolver<System>::change_regime(const Guard* fired, Observer& observer) {
     if (fired != nullptr) {
         std::swap(begin_, there_);
-        if (++crossings_ % 8 == 0) begin_->inputs().anchor(time_);
+        const auto* given = cache_.entry(key_).rates.given;
+        if (++crossings_ % 8 == 0 || given != nullptr) begin_->inputs().anchor(time_);
+        if (given != nullptr) [[unlikely]]
+            for (const GivenState& g : *given)
+                now_.x[static_cast<std::size_t>(g.state)] = begin_->input().given_at(g, time_);
     }
     const Key before = key_;
     const Status status = switch_regime(system_, cache_, begin_->inputs(), time_, fired, now_, key_, observer);

@@ -70,6 +70,7 @@ class RegimeCache {
                 regime = system.build(key);
             const Regime& r = regime;
             new (&rates) LinearRatesOf<D>(r.rate);
+            if constexpr (requires { r.given; }) rates.given = r.given.empty() ? nullptr : &r.given;
             guards = {};
             neighbour = {};
             speeds = {};

@@ -35,6 +35,14 @@ def fmu(
         bool,
         typer.Option("--source", help="With the C++ sources too, for tools and targets that compile FMUs themselves."),
     ] = False,
+    motion_inputs: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--motion-inputs",
+            metavar="SHAFT",
+            help="A shaft or slide whose position, speed and acceleration are inputs; its torque or force is an output. May be repeated.",
+        ),
+    ] = None,
     libraries: Annotated[
         Path | None,
         typer.Option(
@@ -50,6 +58,7 @@ def fmu(
     lostmotion fmu drive.toml -o drive.fmu
     lostmotion fmu position-axis -o axis.fmu --fmi 3 --set load.inertia="3 kg*m^2"
     lostmotion fmu position-axis -o axis.fmu --source
+    lostmotion fmu given-motion -o crank.fmu --motion-inputs crank
     """
     from ..errors import InputError
     from ..portable.fmu import export_fmu
@@ -67,6 +76,7 @@ def fmu(
             controllers=controllers,
             references=references,
             source=source,
+            motion_inputs=motion_inputs or (),
             libraries=libraries,
         )
     print(f"{output}")

@@ -14,5 +14,7 @@ from .inverse_model import InverseModel as InverseModel
 from .inverse_model import LoadObserver as LoadObserver
 from .law import Law as Law
 from .references import Move as Move
+from .references import SlideMove as SlideMove
+from .references import SlideReference as SlideReference
 from .references import SpeedReference as SpeedReference
 from .references import TorqueReference as TorqueReference

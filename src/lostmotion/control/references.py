@@ -10,7 +10,20 @@ from pydantic import Field, model_validator
 
 from ..errors import InputError
 from ..inputs.part import Part
-from ..inputs.quantities import Acceleration, Angle, Jerk, NotNegative, Positive, Speed, Time, Torque
+from ..inputs.quantities import (
+    Acceleration,
+    Angle,
+    Jerk,
+    Length,
+    LinearAcceleration,
+    LinearJerk,
+    LinearSpeed,
+    NotNegative,
+    Positive,
+    Speed,
+    Time,
+    Torque,
+)
 from ..inputs.validation import shown
 from ..model.signals import Breakpoint, Samples, TimeFunction, taylor
 from ..reproducible import cos, cubic_spline, sin
@@ -19,6 +32,17 @@ from .satellites import Satellite
 from .targets import Circle, FlyBy, Star, Track, Weave
 
 V = TypeVar("V")  # the value of the reference, with its unit
+S = TypeVar("S")  # its rate
+A = TypeVar("A")  # its second derivative
+J = TypeVar("J")  # its third derivative
+M = TypeVar("M")  # a move of it
+
+SpeedLimit = Annotated[Speed, Positive]
+AccelerationLimit = Annotated[Acceleration, Positive]
+JerkLimit = Annotated[Jerk, Positive]
+SlideSpeedLimit = Annotated[LinearSpeed, Positive]
+SlideAccelerationLimit = Annotated[LinearAcceleration, Positive]
+SlideJerkLimit = Annotated[LinearJerk, Positive]
 
 Target = Annotated[FlyBy | Weave | Circle | Track | Star | Satellite, Field(discriminator="path")]
 
@@ -133,54 +157,56 @@ def _table(reference: Reference[Any]) -> np.ndarray:
     return np.array(reference.pieces()).T
 
 
-class Move(Part):
+class LimitedMove(Part, Generic[V, S, A, J]):
     """From rest at one position to rest at another, in the shortest time that its limits permit.
 
     Without a limit of the jerk the speed is trapezoidal.
     """
 
-    to: Angle
-    speed: Annotated[Speed, Positive] | None = None
+    to: V
+    speed: S | None = None
     """limit; default: the value for all moves"""
-    acceleration: Annotated[Acceleration, Positive] | None = None
+    acceleration: A | None = None
     """limit, also while it slows down; default: the value for all moves"""
-    jerk: Annotated[Jerk, Positive] | None = None
+    jerk: J | None = None
     """limit; default: the value for all moves"""
     dwell: Annotated[Time, NotNegative] | None = None
     """rest after the move; default: the value for all moves"""
 
 
-class PositionReference(Reference[Angle]):
-    """A position [rad] over time: the sum of all that is given, or a list of moves.
+class Move(LimitedMove[Angle, SpeedLimit, AccelerationLimit, JerkLimit]):
+    """From rest at one position to rest at another, in the shortest time that its limits permit.
 
-    Examples
-    --------
-    >>> import lostmotion as lm
-    >>> reference = lm.PositionReference(moves=[{"to": "90 deg"}], speed="1 rad/s", acceleration="5 rad/s^2")
-    >>> [round(value, 3) for value in reference.at(0.1)]
-    [np.float64(0.025), np.float64(0.5), np.float64(5.0), np.float64(0.0)]
+    Without a limit of the jerk the speed is trapezoidal.
     """
 
+
+class SlideMove(LimitedMove[Length, SlideSpeedLimit, SlideAccelerationLimit, SlideJerkLimit]):
+    """From rest at one position of a slide to rest at another, in the shortest time that its limits permit.
+
+    Without a limit of the jerk the speed is trapezoidal.
+    """
+
+
+class MovesReference(Reference[V], Generic[V, S, A, J, M]):
+    """A position over time: the sum of all that is given, or a list of moves."""
+
     kind: Literal["position"] = "position"
-    start: Angle = 0.0
+    start: V = 0.0  # type: ignore[assignment]
     """position before the first move"""
     begin: Annotated[Time, NotNegative] = 0.0
     """position at the begin of the first move"""
-    speed: Annotated[Speed, Positive] | None = None
+    speed: S | None = None
     """limit of all moves that have none of their own"""
-    acceleration: Annotated[Acceleration, Positive] | None = None
+    acceleration: A | None = None
     """limit of all moves that have none of their own"""
-    jerk: Annotated[Jerk, Positive] | None = None
+    jerk: J | None = None
     """limit of all moves that have none of their own; without any, their speed is trapezoidal"""
     dwell: Annotated[Time, NotNegative] = 0.0
     """rest after each move that has none of its own"""
-    moves: tuple[Move, ...] = ()
-    target: Target | None = None
-    """the angle under which a target in space is seen"""
+    moves: tuple[M, ...] = ()
 
     def _check(self) -> None:
-        if self.target is not None and self.moves:
-            raise ValueError("has a target and moves; give one of them")
         limits = [key for key in ("speed", "acceleration", "jerk") if getattr(self, key) is not None]
         if self.steps and (limits or self.moves):
             raise ValueError(
@@ -193,11 +219,12 @@ class PositionReference(Reference[Angle]):
             return
         if self.mean != 0.0:
             raise ValueError(f"has mean = {self.mean:g} and moves between positions; give start in place of mean")
-        for k, move in enumerate(self.moves):
+        moves: tuple[Any, ...] = self.moves
+        for k, move in enumerate(moves):
             lacking = [key for key in ("speed", "acceleration") if self._of(move, key) is None]
             if lacking:
                 raise ValueError(f"lacks {lacking[0]} of moves[{k}]; give it there, or beside moves for all of them")
-        positions = [self.start, *(move.to for move in self.moves)]
+        positions = [self.start, *(move.to for move in moves)]
         for k, (begin, end) in enumerate(self.intervals()):
             resolved = math.ulp(end) <= SHORTEST * (end - begin) < math.inf
             if not resolved and positions[k] != positions[k + 1]:
@@ -205,16 +232,17 @@ class PositionReference(Reference[Angle]):
                     f"has moves[{k}] from {begin:g} s to {end:g} s, an interval that numbers cannot resolve; check its limits"
                 )
 
-    def _of(self, move: Move, key: str) -> Any:
+    def _of(self, move: Any, key: str) -> Any:
         """Limits of one move, or of all moves."""
         own = getattr(move, key)
         return getattr(self, key) if own is None else own
 
     def _segments(self) -> np.ndarray:
         """(time, position, speed, acceleration, jerk) at the beginning of each segment of each move."""
-        columns = ([self._of(move, key) for move in self.moves] for key in ("speed", "acceleration", "jerk", "dwell"))
+        moves: tuple[Any, ...] = self.moves
+        columns = ([self._of(move, key) for move in moves] for key in ("speed", "acceleration", "jerk", "dwell"))
         speed, acceleration, jerk, dwell = columns
-        ends = np.array([move.to for move in self.moves])
+        ends = np.array([move.to for move in moves])
         origins = np.array([self.start, *ends[:-1]])
         with np.errstate(over="ignore", invalid="ignore"):  # refused when the reference is made
             found = segments(ends - origins, speed, acceleration, [math.inf if j is None else j for j in jerk])
@@ -224,8 +252,6 @@ class PositionReference(Reference[Angle]):
         return found
 
     def _pieces(self) -> list[list[Breakpoint]]:
-        if self.target is not None:
-            return [*super()._pieces(), list(self.target.breakpoints())]
         if not self.moves:
             return super()._pieces()
         points = self._segments().T.reshape(-1, 5).tolist()
@@ -241,6 +267,43 @@ class PositionReference(Reference[Angle]):
         """From when on it is constant, but for its sines [s]; with moves, the end of the last dwell at least."""
         ends = [end + float(self._of(self.moves[-1], "dwell")) for _, end in self.intervals()[-1:]]
         return max([super().duration, *ends])
+
+
+class PositionReference(MovesReference[Angle, SpeedLimit, AccelerationLimit, JerkLimit, Move]):
+    """A position [rad] over time: the sum of all that is given, or a list of moves.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> reference = lm.PositionReference(moves=[{"to": "90 deg"}], speed="1 rad/s", acceleration="5 rad/s^2")
+    >>> [round(value, 3) for value in reference.at(0.1)]
+    [np.float64(0.025), np.float64(0.5), np.float64(5.0), np.float64(0.0)]
+    """
+
+    target: Target | None = None
+    """the angle under which a target in space is seen"""
+
+    def _check(self) -> None:
+        if self.target is not None and self.moves:
+            raise ValueError("has a target and moves; give one of them")
+        super()._check()
+
+    def _pieces(self) -> list[list[Breakpoint]]:
+        if self.target is not None:
+            return [*Reference._pieces(self), list(self.target.breakpoints())]
+        return super()._pieces()
+
+
+class SlideReference(MovesReference[Length, SlideSpeedLimit, SlideAccelerationLimit, SlideJerkLimit, SlideMove]):
+    """A position [m] of a slide over time: the sum of all that is given, or a list of moves.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> reference = lm.control.SlideReference(moves=[{"to": "100 mm"}], speed="0.5 m/s", acceleration="5 m/s^2")
+    >>> float(reference.at(1.0)[0])
+    0.1
+    """
 
 
 class SpeedReference(Reference[Speed]):

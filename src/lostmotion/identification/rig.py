@@ -239,12 +239,14 @@ class Rig:
             return start
         found = dict(start)
         for shaft, speed in speeds.items():
-            signal = built.scenario.shafts[shaft].speed
-            assert signal is not None
-            change = speed - signal.at_start()
+            change = speed - built.scenario.signals()[f"{shaft}_given_speed"].at_start()
             key = (shaft, built.ratios)
             if key not in self._with_given:
-                at = [built.scenario.replace(**{f"shafts.{shaft}.speed": {"mean": v}}).start() for v in (0.0, 1.0)]
+                table = built.scenario.given_key(shaft).rpartition(".")[0]
+                at = [
+                    built.scenario.replace(**{f"{table}.motion": None, f"{table}.speed": {"mean": v}}).start()
+                    for v in (0.0, 1.0)
+                ]
                 self._with_given[key] = {name: b - at[0][name] for name, b in at[1].items() if b != at[0][name]}
             for name, ratio in self._with_given[key].items():
                 found[name] += ratio * change

@@ -15,7 +15,19 @@ from pydantic import Field, model_validator
 
 from .. import _core
 from ..inputs.part import Part
-from ..inputs.quantities import Angle, Force, Frequency, NotNegative, Number, Positive, Speed, Time, Torque, Whole
+from ..inputs.quantities import (
+    Angle,
+    Force,
+    Frequency,
+    LinearSpeed,
+    NotNegative,
+    Number,
+    Positive,
+    Speed,
+    Time,
+    Torque,
+    Whole,
+)
 from ..reproducible import sin, total
 from ..units.scalars import is_number, scalar
 from .wind import AnyWind
@@ -218,6 +230,10 @@ class Signal(TimeFunction[V], Generic[V]):
                 )
         return self.model_copy(update={"steps": tuple(later)})
 
+    def at_start(self) -> float:
+        """Its value at t = 0."""
+        return total((a * sin(phase) for a, _, phase in self.sine_list()), self.breakpoint_list()[0][1])
+
     def upper_bound(self) -> float:
         """Upper bound of the signal: the largest value without the sines, plus the amplitudes of the sines."""
         lines = self.breakpoint_list()
@@ -297,8 +313,10 @@ class ForceSignal(Signal[Force]):
     """A force [N] over time: the sum of all that is given."""
 
 
-class SpeedSignal(Signal[Speed]):
-    """A speed [rad/s] over time: the sum of all that is given, without jumps."""
+class GivenSpeed(Signal[V], Generic[V]):
+    """A speed over time: the sum of all that is given, without jumps."""
+
+    unit: ClassVar[str] = "rad/s"
 
     @model_validator(mode="after")
     def _is_continuous(self) -> Self:
@@ -307,23 +325,29 @@ class SpeedSignal(Signal[Speed]):
             before = value + slope * (end - begin)
             if not math.isclose(before, after, rel_tol=1e-9, abs_tol=1e-9 * max(abs(v) for _, v, _ in lines)):
                 raise ValueError(
-                    f"jumps at {end:g} s from {before:.6g} to {after:.6g} rad/s, which takes an infinite acceleration; give ramps"
+                    f"jumps at {end:g} s from {before:.6g} to {after:.6g} {self.unit}, which takes an infinite acceleration; give ramps"
                 )
         return self
 
-    def at_start(self) -> float:
-        """Its value at t = 0."""
-        return total((a * sin(phase) for a, _, phase in self.sine_list()), self.breakpoint_list()[0][1])
-
     def acceleration(self) -> AccelerationSignal:
         """Its time derivative [rad/s²]."""
-        return AccelerationSignal(speed=self)
+        return AccelerationSignal(speed=self)  # type: ignore[arg-type]
+
+
+class SpeedSignal(GivenSpeed[Speed]):
+    """A speed [rad/s] over time: the sum of all that is given, without jumps."""
+
+
+class SlideSpeedSignal(GivenSpeed[LinearSpeed]):
+    """A speed [m/s] over time: the sum of all that is given, without jumps."""
+
+    unit: ClassVar[str] = "m/s"
 
 
 class AccelerationSignal(Signal[Number]):
-    """The time derivative [rad/s²] of a speed."""
+    """The time derivative of a speed."""
 
-    speed: SpeedSignal
+    speed: SpeedSignal | SlideSpeedSignal
 
     def sine_list(self) -> list[tuple[float, float, float]]:
         return [(2.0 * math.pi * f * a, f, phase + 0.5 * math.pi) for a, f, phase in self.speed.sine_list()]

@@ -6,7 +6,7 @@ import hashlib
 import json
 import re
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -19,11 +19,12 @@ from ..atomic_writer import write_whole
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count
-from ..model.signals import Signal
-from ..reproducible import sin, total
+from ..inputs.validation import did_you_mean, shown
+from ..model.train import DriveTrain
 from ..simulation.results import variables_of
 from ..simulation.run import run
 from ..simulation.scenario import Scenario
+from ..simulation.train_scenario import TrainScenario, in_long_form
 from ..simulation.train_variables import axis_variables
 from . import fmi2, fmi3
 from .checkout import made_here
@@ -67,6 +68,7 @@ def export_fmu(
     controllers: bool = True,
     references: bool = False,
     source: bool = False,
+    motion_inputs: Sequence[str] = (),
     libraries: str | Path | None = None,
 ) -> dict[str, str]:
     """Write a scenario as an FMU for Co-Simulation and Model Exchange. No compiler is needed.
@@ -90,6 +92,11 @@ def export_fmu(
     source : bool
         Whether to include the C++ sources, too, for tools and targets that compile FMUs themselves. The model identifier is then the
         name of the file.
+    motion_inputs : sequence of str
+        Shafts and slides whose position [rad, m], speed and acceleration are inputs: ``<shaft>_given_angle`` (of a slide
+        ``<slide>_given_position``), ``<shaft>_given_speed``, ``<shaft>_given_acceleration``. The torque that the motion takes
+        is the output ``<shaft>_drive_torque`` or ``<slide>_drive_force``. The FMU is then for Co-Simulation alone, and a drive
+        in the short form has the shafts ``motor`` and ``load``.
     libraries : str or Path, optional
         Directory with the libraries of the platforms, as ``make fmu`` builds them. Default: the libraries of this installation.
 
@@ -125,6 +132,8 @@ def export_fmu(
         )
     if not controllers:
         scenario = scenario.without_controllers()
+    if motion_inputs:
+        scenario = _with_given(in_long_form(scenario), motion_inputs)
     if references:
         _check_references(scenario)
     if libraries is None:
@@ -138,7 +147,7 @@ def export_fmu(
     )
     description = written(scenario, parameters)
     resource = description.astype("<f8").tobytes()
-    model = _model(scenario, parameters, hashlib.sha256(resource).hexdigest()[:32], references)
+    model = _model(scenario, parameters, hashlib.sha256(resource).hexdigest()[:32], references, motion_inputs)
     model = replace(model, identifier=identifier, has_sources=source)
     content = source_files(directory / "sources", fmi, kernel, identifier, description, model.names()) if source else ()
     sources = dict(content)
@@ -178,6 +187,24 @@ def _libraries(directory: Any, places: Mapping[str, tuple[str, str]], kernel: st
     return found
 
 
+def _with_given(scenario: TrainScenario, names: Sequence[str]) -> TrainScenario:
+    """The scenario with the motions of these shafts and slides given: where they are not, by their speed at t = 0."""
+    start, known = scenario.start(), {**scenario.shafts, **scenario.slides}
+    changes: dict[str, Any] = {}
+    for name in names:
+        if name not in known:
+            meant = did_you_mean(name, known, f"there are {', '.join(known)}")
+            raise InputError(f"motion_inputs: {shown(name)} is no shaft and no slide; {meant}")
+        if name in scenario.given():
+            continue
+        table = "slides" if name in scenario.slides else "shafts"
+        changes[f"{table}.{name}.speed"] = {"mean": start.get(f"{name}_speed", 0.0)}
+        for key in ("speeds", "slide_speeds"):
+            own = changes.get(f"initial.{key}", getattr(scenario.initial, key))
+            changes[f"initial.{key}"] = {shaft: speed for shaft, speed in own.items() if shaft != name}
+    return scenario.replace(**changes) if changes else scenario
+
+
 def _check_references(scenario: Scenario) -> None:
     """Whether the references of sampled controllers can be inputs."""
     for motor, controller in scenario.axes().items():
@@ -195,7 +222,7 @@ def _of_signals(scenario: Scenario, key: str, references: bool) -> bool:
     delay = parts[0] in ("brakes", "clutches") and parts[-1] in ("engagement_delay", "release_delay")
     followed = [*(scenario.axes() if references else ()), *scenario.continuous()]
     signals = {f"{scenario.controller_key(motor)}.reference" for motor in followed}
-    signals |= {*scenario.input_keys().values(), *(f"shafts.{name}.speed" for name in scenario.given())}
+    signals |= {*scenario.input_keys().values(), *(scenario.given_key(name) for name in scenario.given())}
     return delay or any(key == signal or key.startswith(f"{signal}.") for signal in signals)
 
 
@@ -211,7 +238,13 @@ def _reference(scenario: Scenario, prefix: str, kind: str) -> tuple[str, str]:
     return unit, f"{what} that {'is to act' if kind == 'torque' else 'the controller is to follow'}"
 
 
-def _model(scenario: Scenario, parameters: tuple[Parameter, ...], guid: str, references_given: bool) -> Model:
+def _model(
+    scenario: Scenario,
+    parameters: tuple[Parameter, ...],
+    guid: str,
+    references_given: bool,
+    motions: Sequence[str],
+) -> Model:
     """Content of modelDescription.xml."""
     core, signals, axes = scenario.core(), scenario.signals(), scenario.by_prefix()
     shown = {v.name for v in axis_variables(axes)}
@@ -222,8 +255,10 @@ def _model(scenario: Scenario, parameters: tuple[Parameter, ...], guid: str, ref
     # From tick to tick, or from one switching to the next. Where there is no contact, its variable follows a sign.
     held = controlled | shown | set(core.contact_names())
     by_name = {v.name: Declared(v.name, v.unit, v.meaning, sizes.get(v.name, 0.0), v.name in held) for v in variables}
+    train, start = scenario.train(), scenario.start()
     for shaft in scenario.given():
-        by_name |= {v.name: v for v in _given_motion(shaft)}
+        by_name |= {v.name: v for v in _given_motion(shaft, slide=train.is_slide(shaft))}
+    positions = _positions(train, motions, by_name)
     windings = any(c.current.kind == "field_oriented" for c in axes.values())
     given = {f"{prefix}reference": c for prefix, c in axes.items() if references_given}
     references = [
@@ -237,37 +272,56 @@ def _model(scenario: Scenario, parameters: tuple[Parameter, ...], guid: str, ref
         step=scenario.simulation.sample_interval,
         inputs=[
             replace(v, meaning=f"{v.meaning}; until it is set: {scenario.input_key(v.name)} of the scenario")
-            for v in (*(by_name[name] for name in inputs), *references)
+            for v in (
+                *(by_name[name] for name in inputs),
+                *references,
+                *(_given_position(shaft, slide=train.is_slide(shaft)) for shaft in positions),
+            )
         ],
         starts=[
-            *(_at_start(signals[name]) for name in inputs),
+            *(signals[name].at_start() for name in inputs),
             *(float(c.reference.at(0.0)[0]) for c in given.values()),
+            *(float(start.get(name, 0.0)) for name in positions.values()),
         ],
         # The quotient of two outputs is undefined while the drive stands, which no tool expects.
         outputs=[v for name, v in by_name.items() if name not in inputs and name != "efficiency"],
         states=[]
-        if windings
+        if windings or positions
         else [_fine(by_name.get(s) or Declared(s, "1", "state of a controller", 0.0)) for s in states],
-        state_starts=[] if windings else [_start_of(scenario, s) for s in states],
+        state_starts=[] if windings or positions else [_start_of(scenario, s) for s in states],
         indicators=GUARDS[core.kernel()],
         parameters=list(parameters),
         references_given=references_given,
+        positions=positions,
         note=scenario.note(),
     )
 
 
-def _given_motion(shaft: str) -> tuple[Declared, Declared]:
-    """The inputs that give the motion of a shaft."""
+def _positions(train: DriveTrain, shafts: Sequence[str], variables: Mapping[str, Declared]) -> dict[str, str]:
+    """The variables of the positions of these shafts."""
+    found = {shaft: train.angle_of(shaft) for shaft in shafts}
+    for shaft, name in found.items():
+        if name not in variables:
+            raise InputError(
+                f"motion_inputs: the angle of {shaft} is no variable of this train; give its motion as a speed of the scenario"
+            )
+    return found
+
+
+def _given_motion(shaft: str, *, slide: bool) -> tuple[Declared, Declared]:
+    """The inputs that give the motion of a shaft or a slide."""
+    kind, unit = ("slide", "m/s") if slide else ("shaft", "rad/s")
     return (
-        Declared(f"{shaft}_given_speed", "rad/s", "speed that the shaft has at the begin of a step", 0.0),
-        Declared(f"{shaft}_given_acceleration", "rad/s^2", "acceleration that the shaft has", 0.0),
+        Declared(f"{shaft}_given_speed", unit, f"speed that the {kind} has at the begin of a step", 0.0),
+        Declared(f"{shaft}_given_acceleration", f"{unit}^2", f"acceleration that the {kind} has", 0.0),
     )
 
 
-def _at_start(signal: Signal[Any]) -> float:
-    """Its value at t = 0."""
-    sines = total(amplitude * sin(phase) for amplitude, _, phase in signal.sine_list())
-    return float(signal.breakpoint_list()[0][1]) + sines
+def _given_position(shaft: str, *, slide: bool) -> Declared:
+    """The input that gives its position beside these."""
+    if slide:
+        return Declared(f"{shaft}_given_position", "m", "position that the slide has", 0.0)
+    return Declared(f"{shaft}_given_angle", "rad", "angle that the shaft has", 0.0)
 
 
 def _fine(state: Declared) -> Declared:

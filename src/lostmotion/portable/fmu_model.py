@@ -102,6 +102,8 @@ class Model:
     parameters: list[Parameter]
     references_given: bool
     """whether the references of sampled controllers are inputs"""
+    positions: Mapping[str, str]
+    """shafts whose position is an input, the last of these, with its variable"""
     note: str
     identifier: str = "lostmotion"
     """model identifier"""
@@ -110,7 +112,9 @@ class Model:
     def names(self) -> str:
         """Names of the variables by value reference, for the library: bindings/fmu/variables.hpp."""
         lines = [self.guid, *(["references"] if self.references_given else []), f"indicators {self.indicators}"]
-        lines += [f"input {v.name}" for v in self.inputs] + [f"output {v.name}" for v in self.outputs]
+        free = self.inputs[: len(self.inputs) - len(self.positions)]
+        lines += [f"input {v.name}" for v in free] + [f"motion {s} {v}" for s, v in self.positions.items()]
+        lines += [f"output {v.name}" for v in self.outputs]
         text = "\n".join([*lines, *(f"state {v.name} {v.decade}" for v in self.states)]) + "\n"
         return f"{text}checksum {zlib.crc32(text.encode())}\n"
 

@@ -268,7 +268,11 @@ class Scenario(Part):
         raise NotImplementedError
 
     def given(self) -> list[str]:
-        """Names of the shafts whose motion is given."""
+        """Names of the shafts and slides whose motion is given."""
+        raise NotImplementedError
+
+    def given_key(self, shaft: str) -> str:
+        """Dotted key that gives the motion of a shaft or a slide."""
         raise NotImplementedError
 
     def note(self) -> str:

@@ -26,7 +26,7 @@ from ..model.drive import Drive
 from ..model.mass_matrix import MassMatrix
 from ..model.synchronous_motor import PhaseValues
 from ..model.train import DriveTrain
-from .given_motion import course_to, motion_given
+from .given_motion import SLIDE_UNITS, UNITS, motion_given
 from .scenario import DriveScenario, Initial, Scenario, capacities_of, drive_of, state_of
 from .step_bound import StepBound
 from .train_scenario import TrainInitial, TrainScenario, given_train
@@ -383,9 +383,9 @@ class Simulation:
             straight line.
         motion
             By the name of each shaft whose motion is given a dictionary: its ``speed`` [rad/s] at the end of the interval, and if wanted its ``angle``
-            [rad] and ``acceleration`` [rad/s²] there. On the way from the present values the acceleration is constant; with more
+            [rad], of a slide its ``position`` [m], and ``acceleration`` [rad/s²] there. On the way from the present values the acceleration is constant; with more
             than a speed it runs in up to three straight lines, so that the end is met. The torque that this takes is the
-            variable ``<shaft>_drive_torque``.
+            variable ``<shaft>_drive_torque``, of a slide ``<slide>_drive_force``.
         mass_matrix
             By the name of a mass matrix of the train its rows [kg·m²] from now on, also in the steps that follow. The speeds stay
             as they are; what the change of the inertia does to the motion is to be given as load torques.
@@ -449,16 +449,22 @@ class Simulation:
             raise InputError(
                 f"motion.{missing[0]}: is missing; give at least its speed at the end of the interval [rad/s]"
             )
-        wanted = {name: motion_given(name, values) for name, values in motion.items()}
+        wanted = {
+            name: motion_given(name, values, SLIDE_UNITS if self._train.is_slide(name) else UNITS)
+            for name, values in motion.items()
+        }
         with self._turn:
             before = self.state
             values = self._idle().read()
             courses = {}
             for name, given in wanted.items():
-                angle = self._value(f"{name}_angle", values) if "angle" in given else 0.0
+                to_angle = given.get("position", given.get("angle"))
+                angle = 0.0 if to_angle is None else self._value(self._train.angle_of(name), values)
                 speed, acceleration = (self._value(f"{name}_{what}", values) for what in ("speed", "acceleration"))
-                courses[name] = course_to(given, angle, speed, acceleration, h)
-            times = sorted({t for course in courses.values() for t in course.times})
+                courses[name] = _core.MotionCourse(
+                    to_angle, given["speed"], given.get("acceleration"), angle, speed, acceleration, h
+                )
+            times = sorted({t for course in courses.values() for t in course.times()})
             try:
                 for t0, t1 in itertools.pairwise(times):
                     rows = []
@@ -466,7 +472,7 @@ class Simulation:
                         row = [a + (b - a) * (t / h) for a, b in zip(begin, end, strict=True)]
                         for name, course in courses.items():
                             speed, acceleration = self._motions[name]
-                            row[speed], row[acceleration] = course.speed_at(t), course.acceleration_at(t)
+                            row[speed], row[acceleration] = course.speed(t), course.acceleration(t)
                         rows.append(row)
                     self._step(t1 - t0, *rows)
             except (InputError, _core.SolverError):

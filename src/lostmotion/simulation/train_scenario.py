@@ -13,6 +13,7 @@ from .. import _core
 from ..control.axis import check_torques, motor_laws, turns
 from ..control.continuous import ContinuousController
 from ..control.controller import AnyController, Controller
+from ..control.references import PositionReference, SlideReference
 from ..data_sheets.train_components import CONDITIONS, RECORDS, use_train_records
 from ..errors import InputError
 from ..inputs.kept import kept, kept_while_used
@@ -24,10 +25,11 @@ from ..model.linear import Slide
 from ..model.linear_train import LinearElements
 from ..model.motor import MotorLaw
 from ..model.shaft import Shaft
-from ..model.signals import CommandSignal, ForceSignal, Signal, SpeedSignal, TorqueSignal
+from ..model.signals import CommandSignal, ForceSignal, Signal, SlideSpeedSignal, SpeedSignal, TorqueSignal
 from ..model.task import Task
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain, Elements
+from .given_motion import MotionDerivative, check_continuous
 from .keys import set_values
 from .linear_units import in_si
 from .scenario import BASE, RECORD_NAME, Scenario, SimulationTable, check_on_reference
@@ -44,6 +46,8 @@ class ShaftTable(Shaft):
     speed: SpeedSignal | None = None
     """speed that it has whatever acts on it; the torque that this takes is the variable ``NAME_drive_torque``; left out, it moves
     as the torques let it"""
+    motion: PositionReference | None = None
+    """angle that it has whatever acts on it, such as moves, in place of speed"""
 
 
 class SlideTable(Slide):
@@ -51,6 +55,11 @@ class SlideTable(Slide):
 
     force: ForceSignal | None = None
     """against its motion, beside its weight; left out, none can act on it unless it is inclined"""
+    speed: SlideSpeedSignal | None = None
+    """speed that it has whatever acts on it; the force that this takes is the variable ``NAME_drive_force``; left out, it moves
+    as the forces let it"""
+    motion: SlideReference | None = None
+    """position that it has whatever acts on it, such as moves, in place of speed"""
 
 
 class TrainInitial(Part):
@@ -202,11 +211,28 @@ class TrainScenario(Scenario, LinearElements):
 
     def _check_given(self) -> None:
         for name in self.given():
-            if name in self.initial.speeds:
+            key, shaft = self.given_key(name), self._tables()[name]
+            if shaft.speed is not None and shaft.motion is not None:
                 raise InputError(
-                    f"keys shafts.{name}.speed, initial.speeds.{name}: both say how fast the shaft turns at t = 0; leave the "
-                    "initial speed out"
+                    f"keys {key.removesuffix('.motion')}.speed, {key}: both give the motion; leave one out"
                 )
+            if name in self.initial.of_all("speeds"):
+                how = "moves" if name in self.slides else "turns"
+                raise InputError(
+                    f"keys {key}, {self.initial_key('speeds', name)}: both say how fast the {self._kind(name)} {how} at t = 0; "
+                    "leave the initial speed out"
+                )
+            if shaft.motion is None:
+                continue
+            if name in self.initial.of_all("angles"):
+                raise InputError(
+                    f"keys {key}, {self.initial_key('angles', name)}: both say where the {self._kind(name)} is at t = 0; leave "
+                    "the initial one out"
+                )
+            try:
+                check_continuous(shaft.motion, "m" if name in self.slides else "rad")
+            except ValueError as problem:
+                raise InputError(f"key {key}: {problem}") from None
 
     def _check_massless(self, massless: Collection[str]) -> None:
         for key in ("speeds", "slide_speeds"):
@@ -286,10 +312,11 @@ class TrainScenario(Scenario, LinearElements):
             slide = name.removesuffix("_load_force")
             inclined = self.slides[slide].weight(1.0) != 0.0
             return f"slides.{slide}.force" + (" and the weight" if inclined else "")
+        for suffix in ("_given_speed", "_given_acceleration", "_given_angle", "_given_position"):
+            if name.endswith(suffix):
+                return self.given_key(name.removesuffix(suffix))
         for suffix, key in (
             ("_load_torque", "shafts.{}.torque"),
-            ("_given_speed", "shafts.{}.speed"),
-            ("_given_acceleration", "shafts.{}.speed"),
             ("_reference", "controllers.{}.reference"),
         ):
             if name.endswith(suffix):
@@ -410,12 +437,15 @@ class TrainScenario(Scenario, LinearElements):
     @kept
     def begin(self) -> TrainInitial:
         speeds = self._given_speeds()
-        if not self.initial.on_reference:
-            if not speeds:
-                return self.initial
-            return self.initial.model_copy(update={"speeds": Named(self.initial.speeds | speeds)})
-        angles: dict[str, float] = {}
+        angles = {name: float(s.motion.at(0.0)[0]) for name, s in self._tables().items() if s.motion is not None}
         train = self.train()
+        if not self.initial.on_reference:
+            given: dict[str, Any] = {}
+            for key, values in (("angles", angles), ("speeds", speeds)):
+                for name, value in values.items():
+                    own = LINEAR_INITIAL[key] if train.is_slide(name) else key
+                    given.setdefault(own, dict(getattr(self.initial, own)))[name] = value
+            return self.initial.model_copy(update={key: Named(values) for key, values in given.items()})
         for controller in self.axes().values():
             if controller.reference.kind == "position":
                 shaft = controller.shaft or list(train.shafts)[-1]
@@ -429,11 +459,11 @@ class TrainScenario(Scenario, LinearElements):
         return self.initial.model_copy(update=found)
 
     def _given_speeds(self) -> dict[str, float]:
-        """Speeds at t = 0 [rad/s] of the shafts whose motion is given, and of those that rigid gears tie to them."""
+        """Speeds at t = 0 [rad/s, m/s] of the shafts and slides whose motion is given, and of those that rigid gears tie to them."""
         rigid = [
             (g.input, g.output, g.ratio) for g in self.train().fixed_gears().values() if isinstance(g.stiffness, Rigid)
         ]
-        speeds = {name: shaft.speed.at_start() for name, shaft in self.shafts.items() if shaft.speed is not None}
+        speeds = {name: speed.at_start() for name, (speed, _) in self._motions().items()}
         waiting = list(speeds)
         while waiting:
             shaft = waiting.pop()
@@ -475,7 +505,30 @@ class TrainScenario(Scenario, LinearElements):
         return found
 
     def given(self) -> list[str]:
-        return [name for name, shaft in self.shafts.items() if shaft.speed is not None]
+        return [name for name, s in self._tables().items() if s.speed is not None or s.motion is not None]
+
+    def given_key(self, shaft: str) -> str:
+        key = "speed" if self._tables()[shaft].motion is None else "motion"
+        return f"{'slides' if shaft in self.slides else 'shafts'}.{shaft}.{key}"
+
+    def _tables(self) -> dict[str, ShaftTable | SlideTable]:
+        return {**self.shafts, **self.slides}
+
+    def _kind(self, shaft: str) -> str:
+        return "slide" if shaft in self.slides else "shaft"
+
+    def _motions(self) -> dict[str, tuple[Signal[Any], Signal[Any]]]:
+        """Speed and acceleration of the shafts and slides whose motion is given."""
+        found: dict[str, tuple[Signal[Any], Signal[Any]]] = {}
+        for name, s in self._tables().items():
+            if s.motion is not None:
+                found[name] = (
+                    MotionDerivative(reference=s.motion, order=1),
+                    MotionDerivative(reference=s.motion, order=2),
+                )
+            elif s.speed is not None:
+                found[name] = s.speed, s.speed.acceleration()
+        return found
 
     def signals(self) -> dict[str, Signal[Any]]:
         """All that acts on the train, after delays of brakes and clutches, by the name of its result variable."""
@@ -484,9 +537,8 @@ class TrainScenario(Scenario, LinearElements):
         torques = {self.train().load_torque_of(name): load for name, load in self.loads().items()}
         references = {name: s for motor, c in controllers.items() for name, s in c.signals(motor).items()}
         motions: dict[str, Signal[Any]] = {}
-        for name, s in self.shafts.items():
-            if s.speed is not None:
-                motions |= {f"{name}_given_speed": s.speed, f"{name}_given_acceleration": s.speed.acceleration()}
+        for name, (speed, acceleration) in self._motions().items():
+            motions |= {f"{name}_given_speed": speed, f"{name}_given_acceleration": acceleration}
         return {**commands, **torques, **motions, **references}
 
     def _acting(self, name: str) -> CommandSignal:
@@ -595,8 +647,8 @@ def need_free_motion(scenario: Scenario, function: str) -> None:
     """
     if given := scenario.given():
         raise InputError(
-            f"{function}: key shafts.{given[0]}.speed gives the motion of a shaft, and this takes a train that torques alone "
-            "move; leave the speed out"
+            f"{function}: key {scenario.given_key(given[0])} gives the motion of a shaft, and this takes a train that torques "
+            "alone move; leave it out"
         )
 
 
