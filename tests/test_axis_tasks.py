@@ -9,6 +9,7 @@ import pytest
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.model.duty import ArmGravity, Duty, Payload, Process, Supply
+from lostmotion.model.linear import RatedScrew
 from lostmotion.simulation.scenario import LoadTable
 from lostmotion.sizing.axis_rules import (
     derated,
@@ -24,7 +25,7 @@ from lostmotion.sizing.axis_rules import (
 from lostmotion.sizing.finding import TASK_RULES, within
 from lostmotion.sizing.formulas import derating
 from lostmotion.sizing.required_motion import duty_torque, input_demand, required_motion
-from lostmotion.sizing.stages import ScrewStage, at_input, stage_of, together
+from lostmotion.sizing.stages import at_input, stage_of, together
 from lostmotion.studies.axis_rows import Axes
 from lostmotion.studies.task_file import task_of
 
@@ -277,7 +278,7 @@ def test_a_gearbox_and_a_screw_as_one():
     """Losses, inertia and stiffness of both in a row, as a chain of hand calculations."""
     gearbox = lm.Gearbox(**GEARBOX | {"ratio": 5.0, "losses": {"kind": "map", "speeds": [0.0, 1.0], "loads": [-1.0, 0.0, 1.0],
                                        "values": [[0.2, 0.2], [0.01, 0.01], [0.3, 0.3]], "mirrored": False}})  # fmt: skip
-    screw = ScrewStage(lead=0.01, efficiency=0.9, stiffness=9e7, inertia=3e-5, drag_torque=0.1)
+    screw = RatedScrew(lead=0.01, efficiency=0.9, stiffness=9e7, inertia=3e-5, drag_torque=0.1)
     both, ratio = together(gearbox, screw), 2.0 * math.pi / 0.01
     assert both.ratio == pytest.approx(5.0 * ratio)
     assert both.inertia == pytest.approx(2e-6 + 3e-5 / 25.0)

@@ -13,6 +13,7 @@ import lostmotion as lm
 from conftest import ROOT, SCENARIOS
 from html_pages import Page
 from lostmotion.cli import app
+from lostmotion.data_sheets.records import find
 from lostmotion.paper import paper_scenario
 from lostmotion.simulation.scenario import from_tables
 from lostmotion.sizing.drive_check import check_drive
@@ -413,3 +414,82 @@ def test_the_page_of_a_check_has_the_uses_and_verdicts_of_its_findings(tmp_path:
     words = {"ok": "ok", "warning": "WARNING", "unknown": "not judged"}
     assert rows == [(escape(f.what), words[f.verdict]) for f in findings]
     assert findings._repr_html_().startswith("<iframe")  # type: ignore[attr-defined]
+
+
+def screw_at(turns: float, **data: object) -> lm.TrainScenario:
+    """A slide with 500 N of friction on a screw of 40 mm lead that turns at a constant speed [1/s], deflected by that force."""
+    stiffness = lm.model.RatedScrew(lead=40e-3, **data).gear("motor", "table").stiffness
+    deflections = {} if stiffness.kind == "rigid" else {"screw": 500.0 / stiffness.stiffness}
+    return lm.TrainScenario(
+        shafts={"motor": {"inertia": 1e-4, "speed": 2.0 * math.pi * turns}},
+        slides={"table": {"mass": 60.0, "friction_force": 500.0}},
+        screws={"screw": {"input": "motor", "output": "table", "lead": 40e-3} | data},
+        initial={"slide_speeds": {"table": 40e-3 * turns}, "deflections": deflections},
+        simulation={"duration": 1.0, "sample_interval": 0.01},
+    )
+
+
+THK = {
+    "core_diameter": 17.5e-3,
+    "supported_length": 1.1,
+    "nut_stiffness": 3e8,
+    "ball_circle_diameter": 20.75e-3,
+    "dynamic_capacity": 5400.0,
+    "static_capacity": 12600.0,
+    "load_factor": 1.5,
+}
+
+
+def test_a_screw_of_a_train_is_judged_by_its_ratings():
+    """THK A-731 and A-734: 2180 rpm, 7750 N (fixed and supported), 3373 rpm of the balls; 1e6 (C/(f_w F))^3 turns at 10 1/s."""
+    found = {f.rule: f for f in check_drive(screw_at(10.0, **THK)) if f.what.startswith("screw: ")}
+    assert found["critical_speed"].use == pytest.approx(600.0 / 2180.0, rel=5e-3)
+    assert found["buckling"].use == pytest.approx(500.0 / 7750.0, rel=5e-3)
+    assert found["screw_speed"].use == pytest.approx(600.0 / 3373.0, rel=5e-3)
+    assert found["screw_static"].use == pytest.approx(500.0 / 12600.0, rel=1e-6)
+    life = 1e6 * (5400.0 / (1.5 * 500.0)) ** 3 / 10.0 / 3600.0
+    assert found["screw_life"].value == f"{life:.4g} h"
+    assert found["screw_life"].verdict == "unknown"
+    assert "no wanted life" in found["screw_life"].remark
+    assert {found[rule].verdict for rule in ("critical_speed", "buckling", "screw_speed", "screw_static")} == {"ok"}
+
+
+def test_the_verdict_of_a_screw_turns_with_its_speed_and_its_mounting():
+    def verdict(turns: float, rule: str, **changes: object) -> str:
+        findings = check_drive(screw_at(turns, **THK | changes))
+        return next(f.verdict for f in findings if f.rule == rule)
+
+    assert (verdict(36.0, "critical_speed"), verdict(37.0, "critical_speed")) == ("ok", "warning")
+    assert (verdict(56.0, "screw_speed"), verdict(57.0, "screw_speed")) == ("ok", "warning")
+    assert verdict(20.0, "critical_speed", mounting="fixed-free") == "warning"
+    assert verdict(1.0, "buckling", supported_length=4.5, mounting="fixed-free") == "warning"
+
+
+def test_a_screw_of_the_catalogue_has_its_ratings_in_the_check(tmp_path: Path):
+    (tmp_path / "axis.toml").write_text(
+        """[shafts.motor]
+inertia = 1e-4
+speed = "60 rpm"
+[slides.table]
+mass = 60
+friction_force = 500
+[screws.screw]
+input = "motor"
+output = "table"
+from = "hiwin-r20-10k3-fsc"
+mounting = "fixed-fixed"
+[initial.slide_speeds]
+table = 0.01
+[simulation]
+duration = 1
+sample_interval = 0.01
+"""
+    )
+    record = find("hiwin-r20-10k3-fsc", "screw")
+    found = {f.rule: f for f in check_drive(lm.load(tmp_path / "axis.toml")) if f.what.startswith("screw: ")}
+    assert record.static_capacity is not None
+    # From a start without deflection the slide overshoots, up to twice the force of its friction.
+    assert 500.0 < found["screw_static"].use * record.static_capacity < 1001.0
+    bare = {f.rule: f for f in check_drive(screw_at(1.0)) if f.what.startswith("screw: ")}
+    assert bare["screw_static"].remark == "screws.screw.static_capacity is missing"
+    assert bare["screw_life"].remark == "screws.screw.dynamic_capacity is missing"

@@ -7,11 +7,11 @@ import pytest
 
 import lostmotion as lm
 from lostmotion.model.duty import Duty, Supply
+from lostmotion.model.linear import RatedScrew
 from lostmotion.simulation.scenario import LoadTable
 from lostmotion.sizing import formulas
-from lostmotion.sizing.axis_rules import returned, screw_mean_load, screw_rules, supply_rules
+from lostmotion.sizing.axis_rules import axial_load, returned, screw_mean_load, screw_rules, supply_rules
 from lostmotion.sizing.required_motion import RequiredMotion, required_motion
-from lostmotion.sizing.stages import ScrewStage
 from lostmotion.sizing.thermal import rms
 
 RPM = 30.0 / math.pi
@@ -53,7 +53,7 @@ def test_drive_torque_of_a_screw():
     assert formulas.screw_torque(14.7, 10e-3, 0.96) == pytest.approx(24e-3, rel=0.02)
     assert formulas.screw_torque(14.7, 10e-3, 0.32) == pytest.approx(73e-3, rel=5e-3)
     # The efficiency itself: lead angle 5 deg 30', mu 0.003.
-    stage = ScrewStage(
+    stage = RatedScrew(
         lead=10e-3, mean_diameter=10e-3 / math.pi / math.tan(math.radians(5.5)), friction_coefficient=3e-3
     )
     assert stage.efficiencies()[0] == pytest.approx(0.96, abs=0.01)
@@ -62,7 +62,7 @@ def test_drive_torque_of_a_screw():
 def test_stiffness_of_a_screw():
     """THK A-713: BNF2512-2.5, d1 21.9 mm, fixed and supported: 776 and 111 N/um; 1500 N: 1.9 and 13.5 um."""
     for length, stiffness, deflection in ((0.1, 776e6, 1.9e-6), (0.7, 111e6, 13.5e-6)):
-        stage = ScrewStage(lead=12e-3, supported_length=length, core_diameter=21.9e-3)
+        stage = RatedScrew(lead=12e-3, supported_length=length, core_diameter=21.9e-3)
         k = stage.gear("shaft", "slide").stiffness.stiffness
         assert k == pytest.approx(stiffness, rel=2e-3)
         assert 1500.0 / k == pytest.approx(deflection, rel=0.02)
@@ -72,7 +72,7 @@ def test_loads_of_a_horizontal_screw(horizontal: RequiredMotion):
     """THK A-726: 550, 17, -516, -550, -17, 516 N, cubic mean 225 N in each direction."""
     printed = [550.0, 17.0, -516.0, -550.0, -17.0, 516.0]
     assert forces(horizontal) == pytest.approx(printed, rel=PRINTED, abs=0.5)
-    assert screw_mean_load(horizontal) == pytest.approx(225.0, abs=0.5)
+    assert screw_mean_load(axial_load(horizontal)) == pytest.approx(225.0, abs=0.5)
 
 
 def test_buckling_and_speeds_of_a_horizontal_screw():
@@ -94,8 +94,8 @@ def test_life_of_a_horizontal_screw(
 ):
     """THK A-734: f_w 1.5 and 225 N; mean speeds of 400 and 267 rpm are 8 double strokes a minute on these leads."""
     assert formulas.nominal_life(capacity, 225.0, load_factor=1.5) == pytest.approx(life, rel=5e-3)
-    screw = ScrewStage(lead=lead, dynamic_capacity=capacity, load_factor=1.5)
-    found = next(f for f in screw_rules(horizontal, screw, 1e3 * 3600.0) if f.rule == "screw_life")
+    screw = RatedScrew(lead=lead, dynamic_capacity=capacity, load_factor=1.5)
+    found = next(f for f in screw_rules(axial_load(horizontal), screw, 1e3 * 3600.0) if f.rule == "screw_life")
     assert 1e3 / found.use == pytest.approx(hours, rel=0.01)  # the mean load printed is rounded to 0.2 %, cubed
 
 
@@ -118,11 +118,11 @@ def test_a_vertical_screw():
     motion = there_and_back(mass, 20.0, mass * GRAVITY, 0.6, 0.3, 0.2, cycle)
     printed = [585.0, 510.0, 435.0, 395.0, 470.0, 545.0]
     assert forces(motion) == pytest.approx(printed, abs=1.0)
-    assert screw_mean_load(motion) == pytest.approx(492.0, abs=1.0)
+    assert screw_mean_load(axial_load(motion)) == pytest.approx(492.0, abs=1.0)
     assert formulas.buckling_force(12.5e-3, 0.7, "fixed-fixed") == pytest.approx(9960.0, rel=5e-3)
     assert formulas.compression_force(12.5e-3) == pytest.approx(18100.0, rel=PRINTED)
     assert RPM * formulas.critical_speed(12.5e-3, 0.7, "fixed-supported") == pytest.approx(3852.0, rel=PRINTED)
-    screw = ScrewStage(
+    screw = RatedScrew(
         lead=10e-3,
         dynamic_capacity=9800.0,
         static_capacity=25.2e3 / 2.0,
@@ -131,7 +131,7 @@ def test_a_vertical_screw():
         supported_length=0.7,
         mounting="fixed-fixed",
     )
-    found = {f.rule: f for f in screw_rules(motion, screw, 1e3 * 3600.0)}
+    found = {f.rule: f for f in screw_rules(axial_load(motion), screw, 1e3 * 3600.0)}
     assert formulas.nominal_life(9800.0, 492.0, load_factor=1.5) == pytest.approx(2.34e9, rel=2e-3)
     assert 1e3 / found["screw_life"].use == pytest.approx(65000.0, rel=0.01)
     assert found["screw_static"].use == pytest.approx(585.0 / 12600.0, rel=PRINTED)
@@ -215,7 +215,7 @@ def test_energy_that_a_linear_motor_returns():
 
 
 def test_rules_without_their_datum_are_not_judged(horizontal: RequiredMotion):
-    found = screw_rules(horizontal, ScrewStage(lead=40e-3), 3600.0)
+    found = screw_rules(axial_load(horizontal), RatedScrew(lead=40e-3), 3600.0)
     assert {f.verdict for f in found} == {"unknown"}
     assert {f.rule for f in found} == {"screw_life", "screw_static", "buckling", "critical_speed", "screw_speed"}
     assert all("missing" in f.remark for f in found)

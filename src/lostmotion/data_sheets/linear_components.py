@@ -91,7 +91,7 @@ def _at_preload(record: ScrewSheet, preload: Any, values: Mapping[str, Any], whe
     Where no drag is printed, it is that of two halves of the nut pressed against each other by the preload, one of which
     drives while the other is driven back: (1/eta - eta_b) F p/(2 pi).
     """
-    from ..model.linear import ScrewData
+    from ..model.linear import RatedScrew
 
     try:
         force = ScrewConditions(nut_preload=preload).nut_preload
@@ -106,7 +106,7 @@ def _at_preload(record: ScrewSheet, preload: Any, values: Mapping[str, Any], whe
         found = {"drag_torque": record.drag_torque * share}
         if "nut_stiffness" in values:
             found["nut_stiffness"] = record.nut_stiffness * cbrt(share)
-        screw = ScrewData(**values)
+        screw = RatedScrew(**values)
         if not record.drag_torque and (both := screw.efficiencies()) is not None:
             found["drag_torque"] = (1.0 / both[0] - both[1]) * force / screw.ratio()
     except InputError as error:

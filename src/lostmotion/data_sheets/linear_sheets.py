@@ -18,11 +18,10 @@ from ..inputs.quantities import (
     Positive,
     Power,
     Resistance,
-    Speed,
     Voltage,
     Whole,
 )
-from ..model.linear import BeltData, LinearMotorData, RackData, ScrewData
+from ..model.linear import BeltData, LinearMotorData, RackData, RatedScrew
 from .sheet import Record
 
 Alternatives = tuple[tuple[tuple[str, ...], ...], ...]
@@ -74,7 +73,7 @@ class LinearSheet(Record):
         return [need for need, keys in type(self).NEEDS.items() if not any(key in given for key in keys)]
 
 
-class ScrewSheet(LinearSheet, ScrewData):
+class ScrewSheet(LinearSheet, RatedScrew):
     """Data sheet of a ball screw, a roller screw or a lead screw.
 
     Examples
@@ -86,17 +85,12 @@ class ScrewSheet(LinearSheet, ScrewData):
     """
 
     kind: Literal["ball_screw", "roller_screw", "lead_screw"] = "ball_screw"
-    dynamic_capacity: Annotated[Force, Positive] | None = None
-    """C: axial load for a million turns of nominal life"""
-    static_capacity: Annotated[Force, Positive] | None = None
-    """C_0"""
     ball_diameter: Annotated[Length, Positive] | None = None
     nut_preload: Annotated[Force, Positive] | None = None
     """preload of the nut, at which nut_stiffness and drag_torque hold"""
     nut_mass: Annotated[Mass, Positive] | None = None
-    max_input_speed: Annotated[Speed, Positive] | None = None
 
-    PART: ClassVar[type[Part]] = ScrewData
+    PART: ClassVar[type[Part]] = RatedScrew
     ALTERNATIVES: ClassVar[Alternatives] = (
         (("lead",), ("pitch", "starts")),
         (("efficiency", "backdriving_efficiency"), ("friction_coefficient",), ("friction_angle",)),

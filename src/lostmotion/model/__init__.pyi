@@ -11,6 +11,7 @@ from .linear import LinearMotor as LinearMotor
 from .linear import PitchCurve as PitchCurve
 from .linear import PitchHarmonic as PitchHarmonic
 from .linear import Rack as Rack
+from .linear import RatedScrew as RatedScrew
 from .linear import Screw as Screw
 from .linear import ScrewData as ScrewData
 from .linear import StiffnessCurve as StiffnessCurve

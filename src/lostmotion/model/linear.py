@@ -28,6 +28,7 @@ from ..inputs.quantities import (
     Number,
     Positive,
     Pressure,
+    Speed,
     Torque,
     ViscousFriction,
     Whole,
@@ -44,6 +45,9 @@ from .torsion import MAX_PIECES, Hysteresis, LinearStiffness, Rigid, TorsionCurv
 STEEL = 7850.0  # [kg/m^3]
 ELASTIC_MODULUS = 206e9  # of steel [Pa]
 COGGING_POINTS = 72  # in a period: chords that depart from the sine by less than 0.1 % of its amplitude
+
+
+Mounting = Literal["fixed-free", "supported-supported", "fixed-supported", "fixed-fixed"]
 
 
 class ForceCurve(Part):
@@ -422,6 +426,29 @@ class ScrewData(LinearDrive):
         return math.pi / 32.0 * (self.density or STEEL) * self.length * d2 * d2
 
 
+class RatedScrew(ScrewData):
+    """A ball screw or a lead screw alone, with the ratings by which its life, buckling and speed are judged.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> lm.model.RatedScrew(lead="10 mm", efficiency=0.9, dynamic_capacity="20 kN").dynamic_capacity
+    20000.0
+    """
+
+    dynamic_capacity: Annotated[Force, Positive] | None = None
+    """C: axial load for a million turns of nominal life"""
+    static_capacity: Annotated[Force, Positive] | None = None
+    """C_0"""
+    load_factor: Annotated[Number, Positive] = 1.0
+    """f_w of the life: 1.2 to 1.5 for normal motion, more with shocks"""
+    mounting: Mounting = "fixed-supported"
+    """mounting of the ends of the screw, for buckling and bending along supported_length"""
+    ball_circle_diameter: Annotated[Length, Positive] | None = None
+    max_input_speed: Annotated[Speed, Positive] | None = None
+    """left out, 70 m rpm/ball_circle_diameter"""
+
+
 class RackData(LinearDrive):
     """A rack and its pinion alone, as a data sheet has them.
 
@@ -514,7 +541,7 @@ class _Placed(Part):
     """slide"""
 
 
-class Screw(ScrewData, _Placed):
+class Screw(RatedScrew, _Placed):
     """A ball screw or a lead screw between a shaft and a slide.
 
     Examples

@@ -17,7 +17,7 @@ from ..inputs.toml_files import RESULTS, is_in_file, no_such_file, read_toml
 from ..inputs.toml_text import toml_text, without_empty
 from ..inputs.validation import names_like, shortened, shown
 from ..model.gearbox import Gearbox
-from ..model.linear import ScrewData
+from ..model.linear import RatedScrew, ScrewData
 from .axis_form import axis_from_tables, file_schema, is_axis
 from .keys import parse_override, set_values
 from .scenario import Scenario, from_tables, is_train
@@ -323,6 +323,6 @@ def screw_from_record(reference: str, overrides: Iterable[str] = ()) -> ScrewDat
     set_values(changes, ((key.removeprefix("screw."), value) for key, value in map(parse_override, overrides)))
     values = linear_table("screw", reference, changes, "screw")
     try:
-        return ScrewData(**values)
+        return RatedScrew(**values)
     except InputError as error:
         raise InputError(f"screw {reference}: {error}") from None

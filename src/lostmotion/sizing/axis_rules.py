@@ -14,6 +14,7 @@ import numpy as np
 
 from ..model.duty import HoldingBrake, Supply
 from ..model.gearbox import Gearbox
+from ..model.linear import RatedScrew
 from ..model.motor import Motor
 from ..units.practical import RPM
 from .duty_cycle import integral
@@ -33,7 +34,7 @@ from .formulas import (
 )
 from .motor_run import current_voltage_power
 from .required_motion import InputDemand, RequiredMotion
-from .stages import BeltStage, RackStage, ScrewStage, Stage
+from .stages import BeltStage, RackStage, Stage
 
 HOUR = 3600.0
 PLACES = 4
@@ -118,51 +119,87 @@ def holding_brake(demand: InputDemand, brake: HoldingBrake | None) -> Finding:
 
 def stage_rules(motion: RequiredMotion, stage: Stage, wanted_life: float | None) -> list[Finding]:
     """The rules of the stage of a linear axis for the motion of its slide."""
-    if isinstance(stage, ScrewStage):
-        return screw_rules(motion, stage, wanted_life)
+    if isinstance(stage, RatedScrew):
+        return screw_rules(axial_load(motion), stage, wanted_life)
     if isinstance(stage, BeltStage):
         return belt_rules(motion, stage)
     return rack_rules(motion, stage)
 
 
-def screw_mean_load(motion: RequiredMotion) -> float:
+@dataclass(frozen=True)
+class AxialLoad:
+    """What a screw carries over one cycle."""
+
+    time: np.ndarray
+    """[s]"""
+    speed: np.ndarray
+    """speed of the slide [m/s]"""
+    force: np.ndarray
+    """[N]"""
+    cycle: float
+    """[s]"""
+
+
+def axial_load(motion: RequiredMotion) -> AxialLoad:
+    """The load of the screw behind a motion."""
+    return AxialLoad(motion.time, motion.speed, motion.torque, motion.cycle)
+
+
+def screw_mean_load(load: AxialLoad) -> float:
     """Cubic mean of the axial load over the travel in its direction [N]: of both directions the larger, each over all of the travel.
 
     The balls carry one flank at a time. Source: THK general catalogue, A-734; ISO 3408-5.
     """
-    steps = np.diff(motion.time)
-    speed = 0.5 * (np.abs(motion.speed[1:]) + np.abs(motion.speed[:-1]))
-    force = 0.5 * (motion.torque[1:] + motion.torque[:-1])
+    steps = np.diff(load.time)
+    speed = 0.5 * (np.abs(load.speed[1:]) + np.abs(load.speed[:-1]))
+    force = 0.5 * (load.force[1:] + load.force[:-1])
     if not speed.any():
         return 0.0
-    loads = (np.maximum(sign * force, 0.0).tolist() for sign in (1.0, -1.0))
-    return max(mean_load(load, speed.tolist(), steps.tolist()) for load in loads)
+    both = (np.maximum(sign * force, 0.0).tolist() for sign in (1.0, -1.0))
+    return max(mean_load(forces, speed.tolist(), steps.tolist()) for forces in both)
 
 
-def screw_rules(motion: RequiredMotion, screw: ScrewStage, wanted_life: float | None) -> list[Finding]:
-    """Life, static load, buckling, bending speed and ball speed of a screw. Sources: `formulas` and `TASK_RULES`."""
+def screw_life(load: AxialLoad, screw: RatedScrew) -> float | None:
+    """L10h of a screw in its cycle [s]: of the cubic mean load over the turns; None without its dynamic capacity."""
+    if screw.dynamic_capacity is None:
+        return None
+    revolutions = nominal_life(screw.dynamic_capacity, screw_mean_load(load), 3.0, screw.load_factor)
+    turns = integral(load.time, np.abs(load.speed)) / screw.travel()
+    return math.inf if turns == 0.0 else revolutions / turns * load.cycle
+
+
+def screw_rules(load: AxialLoad, screw: RatedScrew, wanted_life: float | None, *, key: str = "screw") -> list[Finding]:
+    """Life, static load, buckling, bending speed and ball speed of a screw. Sources: `formulas` and `TASK_RULES`.
+
+    Parameters
+    ----------
+    wanted_life
+        [s]; None: the life is not judged.
+    key
+        Table of the screw, for what is missing.
+    """
     turning = 2.0 * math.pi / screw.travel()
-    peak = float(np.abs(motion.torque).max())
-    fastest = turning * float(np.abs(motion.speed).max())
+    peak = float(np.abs(load.force).max())
+    fastest = turning * float(np.abs(load.speed).max())
     found = []
     if wanted_life is not None:
-        what = "life of the screw, L10h"
-        if screw.dynamic_capacity is None:
-            found.append(missing("screw_life", what, "screw.dynamic_capacity"))
+        what, life = "life of the screw, L10h", screw_life(load, screw)
+        if life is None:
+            found.append(missing("screw_life", what, f"{key}.dynamic_capacity"))
         else:
-            revolutions = nominal_life(screw.dynamic_capacity, screw_mean_load(motion), 3.0, screw.load_factor)
-            turns = turning * integral(motion.time, np.abs(motion.speed)) / (2.0 * math.pi)
-            hours = math.inf if turns == 0.0 else revolutions / turns * motion.cycle / HOUR
-            found.append(least("screw_life", what, hours, wanted_life / HOUR, "h", "wanted life"))
+            found.append(least("screw_life", what, life / HOUR, wanted_life / HOUR, "h", "wanted life"))
     if screw.static_capacity is None:
-        found.append(missing("screw_static", "axial load of the screw, largest", "screw.static_capacity"))
+        found.append(missing("screw_static", "axial load of the screw, largest", f"{key}.static_capacity"))
     else:
         what, name = "axial load of the screw, largest", "static capacity of the screw"
         found.append(within("screw_static", what, peak, screw.static_capacity, "N", name))
     what = "axial load of the screw against buckling"
     if screw.core_diameter is None or screw.supported_length is None:
-        key = "screw.core_diameter" if screw.core_diameter is None else "screw.supported_length"
-        found += [missing("buckling", what, key), missing("critical_speed", "speed of the screw against bending", key)]
+        lacks = f"{key}.{'core_diameter' if screw.core_diameter is None else 'supported_length'}"
+        found += [
+            missing("buckling", what, lacks),
+            missing("critical_speed", "speed of the screw against bending", lacks),
+        ]
     else:
         d, length = screw.core_diameter, screw.supported_length
         limit = min(buckling_force(d, length, screw.mounting), compression_force(d))
@@ -175,7 +212,7 @@ def screw_rules(motion: RequiredMotion, screw: ScrewStage, wanted_life: float | 
         speed = dn_speed(screw.ball_circle_diameter)
     what = "speed of the screw against that of its balls"
     if speed is None:
-        found.append(missing("screw_speed", what, "screw.max_input_speed or screw.ball_circle_diameter"))
+        found.append(missing("screw_speed", what, f"{key}.max_input_speed or {key}.ball_circle_diameter"))
     else:
         found.append(within("screw_speed", what, RPM * fastest, RPM * speed, "rpm", "largest speed of the screw"))
     return found

@@ -7,11 +7,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Literal
 
-from ..model.linear import ELASTIC_MODULUS, STEEL
-
-Mounting = Literal["fixed-free", "supported-supported", "fixed-supported", "fixed-fixed"]
+from ..model.linear import ELASTIC_MODULUS, STEEL, Mounting
 
 BUCKLING: dict[Mounting, float] = {
     "fixed-free": 0.25,

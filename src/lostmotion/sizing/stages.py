@@ -9,38 +9,15 @@ from typing import Annotated, Any
 import numpy as np
 
 from ..data_sheets.linear_components import linear_table
-from ..inputs.quantities import Force, Length, Number, Positive, Speed
+from ..inputs.quantities import Force, Positive
 from ..model.gear import Gear
 from ..model.gearbox import Gearbox
-from ..model.linear import BeltData, LinearDrive, RackData, ScrewData
+from ..model.linear import BeltData, LinearDrive, RackData, RatedScrew
 from ..model.losses import ConstantEfficiency, LossMap, efficiency_map
 from ..model.torsion import Hysteresis, LinearStiffness, Rigid, TorsionCurve
-from .formulas import Mounting
 from .required_motion import RequiredMotion
 
 SAME = 1e-9  # relative, within which two breaks of a curve are one
-
-
-class ScrewStage(ScrewData):
-    """A ball screw or a lead screw of an axis, with the data that its rules need.
-
-    Examples
-    --------
-    >>> ScrewStage(lead="10 mm", efficiency=0.9, dynamic_capacity="20 kN").dynamic_capacity
-    20000.0
-    """
-
-    dynamic_capacity: Annotated[Force, Positive] | None = None
-    """C: axial load for a million turns of nominal life"""
-    static_capacity: Annotated[Force, Positive] | None = None
-    """C_0"""
-    load_factor: Annotated[Number, Positive] = 1.0
-    """f_w of the life: 1.2 to 1.5 for normal motion, more with shocks"""
-    mounting: Mounting = "fixed-supported"
-    """mounting of the ends of the screw, for buckling and bending along supported_length"""
-    ball_circle_diameter: Annotated[Length, Positive] | None = None
-    max_input_speed: Annotated[Speed, Positive] | None = None
-    """left out, 70 m rpm/ball_circle_diameter"""
 
 
 class RackStage(RackData):
@@ -74,9 +51,9 @@ class BeltStage(BeltData):
     """force of a strand at rest; left out, the largest circumferential force, so that no strand is slack"""
 
 
-Stage = ScrewStage | RackStage | BeltStage
-STAGES: dict[str, type[ScrewStage] | type[RackStage] | type[BeltStage]] = {
-    "screw": ScrewStage,
+Stage = RatedScrew | RackStage | BeltStage
+STAGES: dict[str, type[RatedScrew] | type[RackStage] | type[BeltStage]] = {
+    "screw": RatedScrew,
     "rack": RackStage,
     "belt": BeltStage,
 }
@@ -94,13 +71,15 @@ def stage_of(kind: str, table: Mapping[str, Any]) -> Stage:
     name = table.get("from")
     if name is None:
         return part(**table)
+    from ..data_sheets.linear_sheets import LinearSheet
     from ..data_sheets.records import find
 
-    base = part.__mro__[1].model_fields  # type: ignore[attr-defined]
+    record = find(name, kind)
+    assert isinstance(record, LinearSheet)
+    base = type(record).PART.model_fields
     beside = {key: value for key, value in table.items() if key != "from"}
     only_here = {key: value for key, value in beside.items() if key in part.model_fields and key not in base}
     values = linear_table(kind, name, {k: v for k, v in beside.items() if k not in only_here}, kind)
-    record = find(name, kind)
     printed = {
         key: value for key in part.model_fields if key not in base and (value := getattr(record, key, None)) is not None
     }

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
+from ..model.linear import RatedScrew
 from ..model.losses import ConstantEfficiency, LossMap
 from ..model.task import Task
 from ..simulation.results import RunArrays
 from ..simulation.run import run
 from ..simulation.train_scenario import TrainScenario
+from .axis_rules import HOUR, AxialLoad, missing, screw_life, screw_rules
 from .duty_cycle import duty_cycle
 from .finding import Finding
 from .gearbox_check import input_speeds, loads, locks, loss_map
@@ -33,6 +36,8 @@ def check_train(scenario: TrainScenario) -> tuple[Finding, ...]:
     result = run(scenario.replace(**{"simulation.sample_interval": interval}), energy=False)
     train = scenario.train()
     findings = [f for name in train.gears for f in _gear(scenario, name, result)]
+    for name, screw in scenario.screws.items():
+        findings += _named(name, _screw(scenario, name, screw, result))
     findings += [f for name in train.motors for f in _motor(scenario, name, result)]
     if any(isinstance(g.losses, LossMap) for g in train.gears.values()):
         findings.append(loss_map(result))
@@ -63,6 +68,20 @@ def _gear(scenario: TrainScenario, name: str, result: RunArrays) -> list[Finding
     if not isinstance(gear.losses, ConstantEfficiency) and (torques := _load_torques(scenario, name, result)):
         findings += locks(train, name, torques)
     return findings
+
+
+def _screw(scenario: TrainScenario, name: str, screw: RatedScrew, result: RunArrays) -> list[Finding]:
+    """Life, static load, buckling, bending speed and ball speed of a screw, over the run, repeated without a pause."""
+    train, time = scenario.train(), result.time
+    force, speed = result[train.output_torque_of(name)], result[f"{train.gears[name].output}_speed"]
+    load = AxialLoad(time, speed, force, float(time[-1] - time[0]))
+    life = screw_life(load, screw)
+    findings = screw_rules(load, screw, None, key=f"screws.{name}")
+    if life is None:
+        return [missing("screw_life", "life of the screw, L10h", f"screws.{name}.dynamic_capacity"), *findings]
+    value = "without end" if math.isinf(life) else f"{life / HOUR:.4g} h"
+    remark = "no wanted life is given; a task has task.life"
+    return [Finding("screw_life", "life of the screw, L10h", value, "unknown", remark), *findings]
 
 
 def _load_torques(scenario: TrainScenario, name: str, result: RunArrays) -> list[float]:
