@@ -10,6 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import baseline
+import batches
 import build_times
 import closed_loops
 import commands
@@ -72,6 +73,7 @@ def main() -> None:
     closed_loops.section(report, programs)
     gradients.section(report)
     robots.section(report)
+    batches.section(report)
     identification.section(report)
     costs.section(report, scenario, build, programs)
     studies.section(report, scenario)

@@ -93,3 +93,21 @@ def test_the_environment_is_the_drive_with_and_without_gymnasium(
     # By hand it ends near the target; seeds repeat.
     assert abs(module.episode(axis, module.by_hand, seed=1)[1]) < 2e-3
     assert axis.reset(seed=7)[1] == axis.reset(seed=7)[1]
+
+
+def test_the_batch_of_axes_is_a_vectorised_environment() -> None:
+    gymnasium = pytest.importorskip("gymnasium", reason="pip install --group examples")
+    module = example("batch_axis")
+    axes = module.Axes(6, module.GAPS)
+    assert isinstance(axes, gymnasium.vector.VectorEnv)
+    targets = np.linspace(-module.REACH, module.REACH, 6)
+    seen, _ = axes.reset(options={"targets": targets})
+    assert seen.shape == axes.observation_space.shape
+    assert seen[:, 0] * module.SCALES[0] == pytest.approx(targets)
+    for _ in range(module.STEPS):
+        seen, reward, ended, cut, _ = axes.step(np.clip(2.0 * seen[:, :1] - seen[:, 1:2], -1.0, 1.0))
+    assert reward.shape == ended.shape == cut.shape == (6,)
+    assert cut.all()
+    assert not ended.any()
+    # A proportional law with damping comes near, but for the friction over its gain.
+    assert np.abs(seen[:, 0]).max() * module.SCALES[0] < 0.2 * module.REACH
