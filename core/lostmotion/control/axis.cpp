@@ -12,6 +12,7 @@ void Axis::place(double sample_time) {
     estimate.place(slots, of_speed);
     position_loop.place(slots);
     speed_loop.place(slots);
+    firmware.place(slots, sample_time * position_schedule.every);
     position_share_ = share_of(sample_time * position_schedule.every, blend_time);
     if (current_loop) current_loop->place(slots, sample_time * current_schedule.every);
     if (field_orientation) {
@@ -47,6 +48,7 @@ void Axis::start(const Sampled& y, double sample_time, double* slot) const {
     show_model(slot);
     if (two_encoders)
         slot[blended] = position_sensor.scale * position_sensor.encoder.reading(y.position_angle) - angle / ratio;
+    firmware.start(angle / ratio + slot[blended], slot);
     if (camera.present) {
         slot[position_angle] =
             two_encoders ? position_sensor.scale * position_sensor.encoder.reading(y.position_angle) : 0.0;
@@ -74,9 +76,13 @@ bool Axis::step(std::int64_t sample, double sample_time, const Sampled& y, doubl
         if (!run_own_law(time, y, command, slot)) return false;
         if (std::isfinite(command)) command = in_range(command, torque_range(y, slot));
     } else {
-        if (mode == position_mode && position_schedule.due(sample))
-            run_position_loop(time, sample_time * position_schedule.every, slot);
-        if (mode != torque_mode && speed_schedule.due(sample))
+        if (mode == position_mode && position_schedule.due(sample)) {
+            if (firmware.present)
+                run_firmware(time, y, slot);
+            else
+                run_position_loop(time, sample_time * position_schedule.every, slot);
+        }
+        if (mode != torque_mode && !firmware.present && speed_schedule.due(sample))
             run_speed_loop(time, sample_time * speed_schedule.every, torque_range(y, slot), slot);
         if (mode == torque_mode) {
             const double asked = reference.at(time).value;  // field orientation limits it by itself
@@ -172,6 +178,14 @@ void Axis::run_position_loop(double time, double T, double* slot) const {
     const double e = slot[position_reference] + feedforward.offset(r.rate, T, slot) + twist.angle -
                      taken(Loop::position, slot[measured_position]);
     slot[speed_reference] = ratio * position_loop(e, r.rate + twist.rate, sign_of(ratio) * at_limit(slot), T, slot);
+}
+
+void Axis::run_firmware(double time, const Sampled& y, double* slot) const {
+    slot[position_reference] = wanted(time, slot).value;
+    slot[measured_position] = position(slot);
+    const double e = slot[position_reference] - firmware.filtered(slot[measured_position], slot);
+    const double M = firmware.torque(sign_of(ratio) * firmware.duty(e), y.rotor_speed);
+    slot[torque_reference] = torque_range(y, slot)(M);
 }
 
 void Axis::run_speed_loop(double time, double T, TorqueRange range, double* slot) const {

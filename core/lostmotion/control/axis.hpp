@@ -22,6 +22,7 @@
 #include "feedforward.hpp"
 #include "field_orientation.hpp"
 #include "filter.hpp"
+#include "firmware.hpp"
 #include "inverse_model.hpp"
 #include "load_observer.hpp"
 #include "own_law.hpp"
@@ -150,6 +151,7 @@ class Axis {
     Schedule position_schedule, speed_schedule, current_schedule;
     PositionLoop position_loop;
     SpeedLoop speed_loop;
+    Firmware firmware;  // in the place of both
     std::optional<CurrentLoop> current_loop;
     std::optional<FieldOrientation> field_orientation;  // in its place
     bool commutates_by_encoder = true;                  // of the speed; else the angle of the rotor is known
@@ -223,6 +225,8 @@ class Axis {
     void watch(std::int64_t sample, double sample_time, const Sampled& y, double* slot) const;
 
     void run_position_loop(double time, double T, double* slot) const;
+
+    void run_firmware(double time, const Sampled& y, double* slot) const;
 
     void run_speed_loop(double time, double T, TorqueRange range, double* slot) const;
 

@@ -86,6 +86,12 @@ std::string TrainCheck::controllers() const {
             c.D.size() != m || c.back_calculation.size() != n)
             return name + " has matrices that do not fit its states and signals";
         if (!(c.limit > 0.0)) return name + " has a limit that is not above 0";
+        if (c.curve_in.size() != c.curve_out.size() || c.curve_in.size() == 1 ||
+            (c.curved() && (c.curve_in[0] != 0.0 || c.curve_out[0] != 0.0)) ||
+            std::adjacent_find(c.curve_in.begin(), c.curve_in.end(), std::greater_equal<>()) != c.curve_in.end())
+            return name + " has a curve that does not rise from (0, 0) by two points or more";
+        if (std::string error = too_fine(name + " with its curve", static_cast<int>(c.curve_in.size())); !error.empty())
+            return error;
         for (const LinearController::Signal& s : c.signals)
             if (!exists(s.shaft)) return name + " takes the angle or speed of a shaft that the train does not have";
         if (!exists(c.compared.shaft)) return name + " compares with a shaft that the train does not have";

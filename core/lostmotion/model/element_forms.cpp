@@ -116,7 +116,7 @@ auto ElementForms::controller_signal(int k, const LinearController::Signal& sign
     }
 }
 
-auto ElementForms::controller_output(int k) const -> Row {
+auto ElementForms::controller_input(int k) const -> Row {
     const LinearController& c = train_.controllers[k];
     Row v;
     for (std::size_t j = 0; j < c.states.size(); ++j)
@@ -125,10 +125,21 @@ auto ElementForms::controller_output(int k) const -> Row {
     return v;
 }
 
+auto ElementForms::controller_output(int k, const Key& key) const -> Row {
+    const LinearController& c = train_.controllers[k];
+    Row v = controller_input(k);
+    if (c.curved()) {
+        const int piece = key.branch[places_.controllers[k].piece];
+        v = c.slope(piece) * v + terms_.one(c.offset(piece));
+    }
+    if (c.droop != 0.0) v -= terms_.state(places_.shafts[train_.motors[c.motor].shaft].speed, c.droop);
+    return v;
+}
+
 auto ElementForms::controller_command(int k, const Key& key) const -> Row {
     const int branch = places_.controllers[k].branch;
     const int at = branch == nowhere ? 0 : key.branch[branch];
-    return at == 0 ? controller_output(k) : terms_.one(at * train_.controllers[k].limit);
+    return at == 0 ? controller_output(k, key) : terms_.one(at * train_.controllers[k].limit);
 }
 
 auto ElementForms::controller_rate(int k, std::size_t state, const Key& key) const -> Row {
@@ -138,7 +149,7 @@ auto ElementForms::controller_rate(int k, std::size_t state, const Key& key) con
         rate += terms_.state(places_.controllers[k].first_state + static_cast<int>(j), c.A[state][j]);
     for (std::size_t j = 0; j < c.signals.size(); ++j) rate += c.B[state][j] * controller_signal(k, c.signals[j]);
     if (const double back = c.back_calculation[state]; back != 0.0)
-        rate += back * (controller_command(k, key) - controller_output(k));
+        rate += back * (controller_command(k, key) - controller_output(k, key));
     return rate;
 }
 

@@ -69,7 +69,9 @@ class ElementForms {
         return terms_.input(places_.controllers[k].reference) - controller_signal(k, train_.controllers[k].compared);
     }
     // v, its output without a limit.
-    Row controller_output(int k) const;
+    // Before its curve; before its limit.
+    Row controller_input(int k) const;
+    Row controller_output(int k, const Key& key) const;
     // u, the command of its motor.
     Row controller_command(int k, const Key& key) const;
     Row controller_rate(int k, std::size_t state, const Key& key) const;

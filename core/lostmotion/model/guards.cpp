@@ -266,14 +266,31 @@ void RegimeGuards::add_coupling_pieces() {
     }
 }
 
-// Where the output of a controller reaches its limit, or comes back from it.
+// Where the output of a controller reaches its limit, or comes back from it, and where its curve bends.
 void RegimeGuards::add_output_limits() {
     for (std::size_t k = 0; k < train_.controllers.size(); ++k) {
         const int branch = places_.controllers[k].branch;
+        if (places_.controllers[k].piece != nowhere) add_curve_pieces(static_cast<int>(k));
         if (branch == nowhere) continue;
         const double most = train_.controllers[k].limit;
-        add_limit_guards(terms_, forms_.controller_output(static_cast<int>(k)), -most, most, regime_.key,
+        add_limit_guards(terms_, forms_.controller_output(static_cast<int>(k), regime_.key), -most, most, regime_.key,
                          {.kind = Guard::edge, .branch = branch}, regime_.guards);
+    }
+}
+
+void RegimeGuards::add_curve_pieces(int controller) {
+    const LinearController& c = train_.controllers[static_cast<std::size_t>(controller)];
+    const int branch = places_.controllers[static_cast<std::size_t>(controller)].piece;
+    const int piece = regime_.key.branch[branch], k = std::abs(piece);
+    const Row in = forms_.controller_input(controller);
+    for (const int side : {+1, -1}) {
+        if (piece * side < 0) continue;
+        if (k + 1 < static_cast<int>(c.curve_in.size()))
+            add(terms_.one(c.curve_in[static_cast<std::size_t>(k + 1)]) - double(side) * in, Guard::edge, nowhere,
+                branch, side * (k + 1));
+        if (k > 0)
+            add(double(side) * in - terms_.one(c.curve_in[static_cast<std::size_t>(k)]), Guard::edge, nowhere, branch,
+                side * (k - 1));
     }
 }
 

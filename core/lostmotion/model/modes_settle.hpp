@@ -5,13 +5,12 @@
 
 namespace lostmotion::model {
 
-// Of a controller, before its limit.
+// A form of a controller, which depends on states and inputs and has a constant.
 template <class Sizes>
 template <class Now>
-double SwitchedTrain<Sizes>::output_of(const Now& now, int controller) const {
+double SwitchedTrain<Sizes>::value_of(const Now& now, const Row& v) const {
     const Layout& n = assembly_.layout();
-    const Row v = assembly_.controller_output(controller);
-    double sum = 0.0;
+    double sum = v.c[n.one];
     for (int k = 0; k < n.coupled; ++k) sum += v.c[k] * now.x[k];
     for (int k = 0; k < n.inputs; ++k) sum += v.c[n.first_input + k] * now.input[0][k];
     return sum;
@@ -57,10 +56,12 @@ void SwitchedTrain<Sizes>::locate(const Now& now, Key& trial) const {
             piece == 0 ? Gear::touching : gear.flanks(piece, gear.law.curve.torque(d), gear.mesh_damping * rate));
     }
     for (std::size_t k = 0; k < train().controllers.size(); ++k) {
-        const int branch = places().controllers[k].branch;
-        if (branch == nowhere) continue;
-        const double limit = train().controllers[k].limit;
-        set(branch, side_of(output_of(now, static_cast<int>(k)), -limit, limit));
+        const auto [branch, piece] = std::pair(places().controllers[k].branch, places().controllers[k].piece);
+        const LinearController& c = train().controllers[k];
+        if (piece != nowhere) set(piece, c.piece(value_of(now, assembly_.controller_input(static_cast<int>(k)))));
+        if (branch != nowhere)
+            set(branch,
+                side_of(value_of(now, assembly_.controller_output(static_cast<int>(k), trial)), -c.limit, c.limit));
     }
 }
 

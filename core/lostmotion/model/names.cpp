@@ -157,8 +157,10 @@ std::vector<std::string> branch_names(const Assembly& a) {
         if (c->branch != nowhere) set(c->branch, c->name + ": " + c->piecewise_law());
     for (const auto& e : p.acting)
         if (e->branch != nowhere) set(e->branch, e->name + ": " + e->piecewise_law());
-    for (std::size_t k = 0; k < t.controllers.size(); ++k)
+    for (std::size_t k = 0; k < t.controllers.size(); ++k) {
         set(p.controllers[k].branch, t.controllers[k].name + ": limit of the controller");
+        set(p.controllers[k].piece, t.controllers[k].name + ": duty cycle of the controller");
+    }
     return names;
 }
 

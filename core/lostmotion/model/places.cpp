@@ -202,8 +202,10 @@ void Places::place_memory_and_branches(const Train& train) {
         if (e->piecewise_law() != nullptr) e->branch = next++;
         if (e->period() > 0.0) e->turn = layout.memory++;
     }
-    for (std::size_t k = 0; k < controllers.size(); ++k)
+    for (std::size_t k = 0; k < controllers.size(); ++k) {
         if (train.controllers[k].limited()) controllers[k].branch = next++;
+        if (train.controllers[k].curved()) controllers[k].piece = next++;
+    }
 }
 
 }  // namespace lostmotion::model

@@ -43,7 +43,7 @@ struct CoupledInertia {
 struct ControllerPlace {
     int first_state = nowhere;
     int reference = nowhere, reference_rate = nowhere;  // inputs
-    int branch = nowhere;
+    int branch = nowhere, piece = nowhere;              // branches: the limit, the curve
 };
 
 struct Places {

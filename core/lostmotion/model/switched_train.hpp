@@ -237,7 +237,7 @@ class SwitchedTrain {
     template <class R, class Now>
     void hold(const R& r, Now& now, const Event& event) const;
     template <class Now>
-    double output_of(const Now& now, int controller) const;
+    double value_of(const Now& now, const Row& v) const;
 
     // What a cache knows of a regime: an entry of the kernel's, or the regime itself.
     template <class Cache>

@@ -82,6 +82,20 @@ void describe(F& f, Camera& c) {
     f.integer("stream", c.stream, 0, 0xffffffffLL);
 }
 
+template <class F>
+void describe(F& f, Firmware& w) {
+    w.describe(f);
+    f.list("errors", w.errors, Range::not_negative);
+    f.list("duties", w.duties, Range::share);
+    if constexpr (F::reads) {
+        if (!f.well()) return;
+        if (w.errors.size() < 2 || w.duties.size() != w.errors.size() || w.errors[0] != 0.0 || w.duties[0] != 0.0)
+            return f.wrong("errors", "and duties must be of one length, two at least, and begin at 0");
+        for (std::size_t k = 1; k < w.errors.size(); ++k)
+            if (!(w.errors[k] > w.errors[k - 1])) return f.wrong("errors", "must rise");
+    }
+}
+
 // By the keys of scenario files where these have it.
 template <class F>
 void describe(F& f, Axis& a) {
@@ -109,6 +123,7 @@ void describe(F& f, Axis& a) {
     bool position = a.position_loop.gain != 0.0, speed = a.speed_loop.gain != 0.0;
     f.present("position", position, [&] { a.position_loop.describe(f); });
     f.present("speed", speed, [&] { a.speed_loop.describe(f); });
+    f.present("firmware", a.firmware.present, [&] { describe(f, a.firmware); });
     f.part("estimate", [&] { a.estimate.describe(f); });
     f.optional("current_loop", a.current_loop, CurrentLoop{}, [&](CurrentLoop& c) { c.describe(f); });
     f.optional("field_orientation", a.field_orientation, FieldOrientation{},
@@ -133,6 +148,7 @@ template <class Use>
 void each_table(Use&& use) {
     use("PositionLoop", [](auto& f) { PositionLoop().describe(f); });
     use("SpeedLoop", [](auto& f) { SpeedLoop().describe(f); });
+    use("Firmware", [](auto& f) { Firmware().describe(f); });
     use("Difference", [](auto& f) { SpeedEstimate().describe_difference(f); });
     use("Observer", [](auto& f) { SpeedEstimate().describe_observer(f); });
     use("CurrentLoop", [](auto& f) { CurrentLoop().describe(f); });

@@ -10,6 +10,8 @@ from .continuous import as_state_space as as_state_space
 from .encoder import Encoder as Encoder
 from .filters import TransferFunction as TransferFunction
 from .filters import as_filter as as_filter
+from .firmware import DutyCurve as DutyCurve
+from .firmware import Firmware as Firmware
 from .inverse_model import InverseModel as InverseModel
 from .inverse_model import LoadObserver as LoadObserver
 from .law import Law as Law

@@ -23,26 +23,12 @@ from .filters import core_filter
 from .law import Law
 from .loops import CurrentLoop, FieldOriented, FirstOrderCurrent, SpeedLoop, VoltageCommand
 from .sample_times import whole_multiple
+from .turning import turns
 
 Bound = tuple[float, list[tuple[_core.Axis, int, int, int, int]]]
 """shortest sample time [s]; of each axis the controller, its motor, the shafts of the position's and of the speed's encoder, and that of its reference"""
 OPEN_LOOP: Bound = (1.0, [])
 NO_LAWS: Mapping[str, Law] = MappingProxyType({})
-
-
-def turns(train: DriveTrain, start: str, end: str) -> float | None:
-    """Ratio of the turns of shaft `start` to those of `end`, through gears and clutches; None without a path."""
-    found, waiting = {start: 1.0}, [start]
-    joints = [(g.input, g.output, g.ratio) for g in train.fixed_gears().values()]
-    joints += train.held_together()
-    while waiting:
-        here = waiting.pop()
-        for one, other, ratio in joints:
-            for a, b, i in ((one, other, ratio), (other, one, 1.0 / ratio)):
-                if a == here and b not in found:
-                    found[b] = found[a] * i
-                    waiting.append(b)
-    return found.get(end)
 
 
 @dataclass(frozen=True)
@@ -105,6 +91,7 @@ class _Place:
                 "blend_time": c.blend_time,
                 "feedforward": c.feedforward.core_fields(),
                 "position": c.position and c.position.core_fields(),
+                "firmware": c.firmware and c.firmware.core_fields(),
                 **self._schedules(samples),
                 **({} if c.speed is None else self._speed(c.speed)),
                 **self._current(c.delay * samples),

@@ -31,7 +31,9 @@ from ..model.motor import Motor
 from ..model.signals import CommandSignal, Signal, Step
 from ..model.train import DriveTrain
 from ..reproducible import sin
+from .firmware import Firmware
 from .loops import FirstOrderCurrent, IdealCurrent, VoltageCommand
+from .turning import turns
 
 MAX_ORDER = 8  # of a state space
 Share = Limit(ge=0.0, le=1.0)
@@ -215,6 +217,8 @@ class ContinuousController(Part):
     """controller of a speed, which gives the torque of the motor"""
     state_space: StateSpace | None = None
     """controller of either, which gives the torque of the motor [N·m], or the relative voltage if current.kind is "voltage\""""
+    firmware: Firmware | None = None
+    """position control of a hobby servo: error to duty cycle to the torque of its winding"""
     limit: Annotated[Torque, Positive] | None = None
     """limit of the magnitude of the torque; torque_limit and the largest current of the motor act, too"""
     anti_windup_time: Annotated[Time, Positive] | None = None
@@ -224,12 +228,10 @@ class ContinuousController(Part):
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
         kind = self.reference.kind
-        given = [key for key in ("position", "speed", "state_space") if getattr(self, key) is not None]
-        if len(given) != 1 or given[0] not in (kind, "state_space"):
+        given = [key for key in ("position", "speed", "state_space", "firmware") if getattr(self, key) is not None]
+        if len(given) != 1 or given[0] not in _follow(kind):
             has = f"has {' and '.join(given)}" if given else "has no controller"
-            raise ValueError(
-                f"{has}; with a reference of the {kind}, give {kind} or state_space, and one of them alone"
-            )
+            raise ValueError(f"{has}; with a reference of the {kind}, give {kind} or state_space, and one alone")
         voltage = isinstance(self.current, VoltageCommand)
         if voltage and (self.state_space is None or self.limit is not None):
             raise ValueError(
@@ -253,6 +255,8 @@ class ContinuousController(Part):
         pid = self.position or self.speed
         if pid is not None:
             return pid.system(self.anti_windup_time)
+        if self.firmware is not None:
+            return _seen_by(self.firmware)
         assert self.state_space is not None
         return self.state_space.system()
 
@@ -268,6 +272,8 @@ class ContinuousController(Part):
 
     def start(self, motor: str, measured: float) -> dict[str, float]:
         """States at t = 0 that are not 0, by the name of their result variable: the filter of the derivative has settled."""
+        if self.firmware is not None:
+            return {f"{motor}_filter": measured} if self.firmware.filter_time > 0.0 else {}
         pid = self.position or self.speed
         if pid is None or pid.gains[2] == 0.0 or pid.filter_time == 0.0:
             return {}
@@ -279,7 +285,10 @@ class ContinuousController(Part):
         """Limit of the command, in units of the rated torque or of the rated voltage."""
         if isinstance(self.current, VoltageCommand):
             return math.inf if motor.command_limit is None else motor.command_limit
-        return min(motor.largest_torque, math.inf if self.limit is None else self.limit) / motor.rated_torque
+        limits = [motor.largest_torque, math.inf if self.limit is None else self.limit]
+        if self.firmware is not None and self.firmware.max_current is not None:
+            limits.append(self.firmware.torque_constant * self.firmware.max_current)
+        return min(limits) / motor.rated_torque
 
     def _check_limits(self, motor: Motor, limit: float) -> None:
         """Refuses a voltage limit that would have no effect, and integrators that would wind up at a limit."""
@@ -323,6 +332,9 @@ class ContinuousController(Part):
         self._check_limits(motor, limit)
         system = self.system()
         per_unit = 1.0 if isinstance(self.current, VoltageCommand) else 1.0 / motor.rated_torque
+        curve_in, curve_out, droop = self._curve(train, name, shaft)
+        if curve_in:
+            per_unit = 1.0  # the curve takes the error
         measured = "angle" if self.reference.kind == "position" else "speed"
         places = {"measured": (measured, shaft), "measured_rate": ("speed", shaft)}
         core.add_controller(
@@ -336,7 +348,36 @@ class ContinuousController(Part):
             (per_unit * system.D).tolist(),
             (system.back / per_unit).tolist(),
             limit,
+            curve_in,
+            [value / motor.rated_torque for value in curve_out],
+            droop / motor.rated_torque,
         )
+
+    def _curve(self, train: DriveTrain, name: str, shaft: str) -> tuple[list[float], list[float], float]:
+        """Torque of the motor over the error, and its fall with the speed of the motor; empty without a firmware."""
+        if self.firmware is None:
+            return [], [], 0.0
+        try:
+            errors, torques, droop = self.firmware.curve()
+        except InputError as problem:
+            raise InputError(f"firmware.{problem}") from None
+        turning = turns(train, train.motors[name].shaft, shaft)
+        return errors, [-t for t in torques] if turning is not None and turning < 0.0 else torques, droop
+
+
+def _follow(kind: str) -> tuple[str, ...]:
+    """Controllers that follow a reference of this kind."""
+    return (kind, "state_space", "firmware") if kind == "position" else (kind, "state_space")
+
+
+def _seen_by(firmware: Firmware) -> LinearSystem:
+    """The error of a firmware, whose angle may come through a filter."""
+    tau, signals = firmware.filter_time, ("reference", "measured")
+    none = np.zeros((0, 0))
+    if tau == 0.0:
+        return LinearSystem(signals, (), none, np.zeros((0, 2)), np.zeros(0), np.array([1.0, -1.0]), np.zeros(0))
+    A, B = np.array([[-1.0 / tau]]), np.array([[0.0, 1.0 / tau]])
+    return LinearSystem(signals, ("filter",), A, B, np.array([-1.0]), np.array([1.0, 0.0]), np.zeros(1))
 
 
 def _jumps(signal: Signal[Any]) -> Iterator[tuple[float, float]]:

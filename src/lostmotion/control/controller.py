@@ -10,6 +10,7 @@ from ..inputs.quantities import NotNegative, Positive, Switch, Time, Whole
 from .camera import Camera, Tracker
 from .continuous import ContinuousController
 from .encoder import Encoder
+from .firmware import Firmware
 from .inverse_model import InverseModel
 from .loops import (
     CurrentLoop,
@@ -61,6 +62,8 @@ class Controller(Part):
     """time constant with which the position encoder is taken over beyond that of the speed loop; left out, it counts alone"""
     position: PositionLoop | None = None
     speed: SpeedLoop | None = None
+    firmware: Firmware | None = None
+    """position control of a hobby servo, in place of position and speed loop"""
     current: AnyCurrent = IdealCurrent()
     feedforward: Feedforward = Feedforward()
     inverse_model: InverseModel | None = None
@@ -77,6 +80,9 @@ class Controller(Part):
     @model_validator(mode="after")
     def _loops_fit_the_reference(self) -> Self:
         wanted = {"position": ("position", "speed"), "speed": ("speed",), "torque": ()}[self.reference.kind]
+        if self.firmware is not None:
+            wanted = ()
+            self._check_firmware()
         if self.law:
             wanted = ()
             if isinstance(self.current, CurrentLoop):
@@ -90,15 +96,21 @@ class Controller(Part):
         for loop in ("position", "speed"):
             present = getattr(self, loop) is not None
             if present and loop not in wanted:
-                why = "law = true" if self.law else f"a reference of the {self.reference.kind}"
+                why = (
+                    "law = true"
+                    if self.law
+                    else "a firmware"
+                    if self.firmware
+                    else f"a reference of the {self.reference.kind}"
+                )
                 raise ValueError(f"has the loop {loop}, which has no use with {why}; leave it out")
             if not present and loop in wanted:
                 raise ValueError(
                     f"lacks {loop}, the loop that follows a reference of the {self.reference.kind}; add its gain"
                 )
-        if self.encoder is None and (self.law or self.speed is not None):
+        if self.encoder is None and (self.law or self.firmware is not None or self.speed is not None):
             raise ValueError("lacks encoder; give its lines, bits or resolution, or ideal = true")
-        if self.position_encoder is not None and self.position is None and not self.law:
+        if self.position_encoder is not None and self.position is None and self.firmware is None and not self.law:
             raise ValueError("has a position_encoder but no position loop; leave it out")
         if self.blend_time is not None and self.position_encoder is None:
             raise ValueError("has a blend_time but no position_encoder to blend; leave it out")
@@ -111,6 +123,18 @@ class Controller(Part):
             if self.feedforward != Feedforward():
                 raise ValueError("has feedforward and inverse_model, which both add the torque that is known; give one")
         return self
+
+    def _check_firmware(self) -> None:
+        if self.law:
+            raise ValueError("has firmware and law = true, which both are the loops; give one of them")
+        if self.reference.kind != "position":
+            raise ValueError(
+                f'has a firmware and a reference of the {self.reference.kind}; a firmware follows reference.kind = "position"'
+            )
+        if not isinstance(self.current, IdealCurrent | FirstOrderCurrent):
+            raise ValueError(
+                f'has a firmware, which commands the voltage, and current.kind = "{self.current.kind}"; take "ideal" or "first_order"'
+            )
 
     def _check_camera(self) -> None:
         if (self.camera is None) != (self.tracker is None):

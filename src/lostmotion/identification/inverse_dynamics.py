@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from scipy.signal import savgol_filter
 
-from ..control.axis import turns
+from ..control.turning import turns
 from ..errors import InputError
 from ..model.angle_torques import STANDARD_GRAVITY, AngleTorque, Gravity, TorqueHarmonic
 from ..model.losses import ConstantEfficiency, MeshEfficiency

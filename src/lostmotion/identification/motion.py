@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..control.axis import turns
+from ..control.turning import turns
 from ..errors import InputError
 from ..model.train import DriveTrain
 from .engine import Point

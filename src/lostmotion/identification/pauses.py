@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..control.axis import turns
+from ..control.turning import turns
 from ..errors import InputError
 from ..model.torsion import Rigid
 from .formulas import number

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..control.axis import turns
 from ..control.controller import Controller
 from ..control.references import PositionReference
+from ..control.turning import turns
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Number, Time

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from ..control.axis import turns
 from ..control.controller import Controller
 from ..control.loops import Difference, FirstOrderCurrent, Observer, SampledCurrent
 from ..control.tuning import TwoInertias
+from ..control.turning import turns
 from ..errors import InputError
 from ..model.gear import Gear
 from ..model.gearbox import Gearbox

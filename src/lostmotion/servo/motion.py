@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..control.axis import turns
 from ..control.loops import CurrentLoop, Feedforward, FieldOriented
 from ..control.references import PositionReference
+from ..control.turning import turns
 from ..inputs.part import Part
 from ..model.torsion import TorsionCurve
 from ..response.closed_loop import slowest

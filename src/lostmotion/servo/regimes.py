@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .. import _core
-from ..control.axis import core_control, turns
+from ..control.axis import core_control
 from ..control.controller import Controller
+from ..control.turning import turns
 from ..errors import InputError, need
 from ..inputs.validation import shown
 from ..model.gear import Gear
@@ -129,6 +130,10 @@ def axis_of(scenario: Scenario, motor: str | None = None) -> Axis:
     if scenario.axes()[name].law:
         raise InputError(
             f"the controller of {name} has law = true, a function whose loops are not known; give it loops"
+        )
+    if scenario.axes()[name].firmware is not None:
+        raise InputError(
+            f"the controller of {name} has a firmware, whose duty cycle is not linear in the error; see its answers with response"
         )
     axis = _loaded(Axis(in_long_form(scenario), name))
     if not axis.loops:

@@ -10,10 +10,11 @@ from typing import Annotated, Any, ClassVar, Self, cast
 from pydantic import Field, model_validator
 
 from .. import _core
-from ..control.axis import check_torques, motor_laws, turns
+from ..control.axis import check_torques, motor_laws
 from ..control.continuous import ContinuousController
 from ..control.controller import AnyController, Controller
 from ..control.references import PositionReference, SlideReference
+from ..control.turning import turns
 from ..data_sheets.train_components import CONDITIONS, RECORDS, use_train_records
 from ..errors import InputError
 from ..inputs.kept import kept, kept_while_used

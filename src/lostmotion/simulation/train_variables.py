@@ -68,7 +68,10 @@ WINDING_SIGNALS = tuple(name for name, _, _ in _core.winding_signals())
 
 def signals_of(controller: Controller) -> Iterator[str]:
     """Names of what a controller shows."""
-    yield from LOOP_SIGNALS[controller.reference.kind]
+    if controller.firmware is not None:
+        yield from ("position_reference", "measured_position", "torque_reference")
+    else:
+        yield from LOOP_SIGNALS[controller.reference.kind]
     if controller.inverse_model is not None:
         yield from ("model_loss_factor", "model_friction_torque")
         if controller.inverse_model.load_observer is not None:
