@@ -181,7 +181,7 @@ def test_torque_in_python_is_that_of_the_core() -> None:
         (
             continuous,
             {"supply_resistance": 1.0},
-            "firmware.supply_resistance: makes the torque depend on error and speed",
+            r"firmware\.supply_resistance: makes the torque depend on error and speed",
         ),
         (sampled, {"duty": {"errors": [0.0, 0.1, 0.1], "values": [0.0, 0.5, 0.6]}}, "errors that do not rise"),
         (sampled, {"duty": {"errors": [0.0, 0.1], "values": [0.1, 0.5]}}, "does not begin at 0"),

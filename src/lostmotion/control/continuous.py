@@ -360,7 +360,7 @@ class ContinuousController(Part):
         try:
             errors, torques, droop = self.firmware.curve()
         except InputError as problem:
-            raise InputError(f"firmware.{problem}") from None
+            raise problem.inside("firmware") from None
         turning = turns(train, train.motors[name].shaft, shaft)
         return errors, [-t for t in torques] if turning is not None and turning < 0.0 else torques, droop
 

@@ -92,7 +92,8 @@ class Firmware(FirmwareFields):
         """
         if self.supply_resistance > 0.0:
             raise InputError(
-                "supply_resistance: makes the torque depend on error and speed together; leave it out, or take a sampled controller"
+                "makes the torque depend on error and speed together; leave it out, or take a sampled controller",
+                keys=("supply_resistance",),
             )
         per_volt = self.torque_constant / self.resistance
         errors, torques = [0.0], [0.0]
