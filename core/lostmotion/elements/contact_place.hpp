@@ -12,10 +12,18 @@ struct ContactPlace {
     int a = 0, b = nowhere;           // shafts
     double per_a = 1.0, per_b = 0.0;  // its speed is per_a w_a + per_b w_b + per_housing w_housing
     bool bilateral = false;           // a rigid gear: stuck, without limit
-    bool one_way = false;             // a freewheel: stuck or -1
+    bool one_way = false;             // a freewheel: stuck or -1; rigid flanks: pressed or -1
     int locked = nowhere;             // memory: its torque while the motion does not determine it
     int housing = nowhere;
     double per_housing = 0.0;
+    int flanks = nowhere;  // of rigid flanks with backlash: the state that their twist is
+    double reach = 0.0;    // and half the backlash [rad]
+
+    // May it be at rest where the states are these? Flanks are only where they touch.
+    template <class X>
+    bool may_rest(const X& x) const {
+        return flanks == nowhere || x[flanks] == reach || x[flanks] == -reach;
+    }
 
     // Calls use(shaft, factor) for each part of its speed.
     template <class Use>

@@ -35,6 +35,7 @@ struct Guard {
         turning,      // the torque that drives a contact at its limit turns back
         outside,      // the extended data of a law end
         set_off,      // a contact at rest whose speed is given begins to move
+        impact,       // rigid flanks strike, or have done so infinitely often
     };
     Row form{};
     Kind kind = outside;
@@ -49,7 +50,11 @@ struct Guard {
     // Edge of a law or limit of an input, with a neighbour beyond.
     bool is_edge() const { return kind == edge || kind == input_limit; }
     // Says whether a contact goes on in its mode.
-    bool is_of_contact() const { return kind == speed || kind == capacity || kind == turning || kind == set_off; }
+    bool is_of_contact() const {
+        return kind == speed || kind == capacity || kind == turning || kind == set_off || kind == impact;
+    }
+    // The derivative of the form that is the acceleration of the contact.
+    static int acceleration_order(Kind kind) { return kind == impact ? 2 : kind == speed ? 1 : 0; }
 };
 
 // Speeds that the contacts at rest tie together: each a sum over those that stay free, w_s = sum_k share[s][k] w_k.

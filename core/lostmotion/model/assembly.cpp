@@ -7,7 +7,8 @@ Regime Assembly::build(const Key& key) const {
     r.key = key;
     r.ties = places().ties(key.modes.data());
     for (int c = 0; c < layout().contacts; ++c)
-        r.at_rest[c] = r.ties.redundant[c] || kept_at_rest(places().contacts[c], r.ties);
+        r.at_rest[c] = (places().contacts[c].flanks == nowhere || key.modes[c] == 0) &&
+                       (r.ties.redundant[c] || kept_at_rest(places().contacts[c], r.ties));
 
     std::vector<Row> motion(train().shafts.size());
     equations_.compose(key, r, motion);

@@ -41,8 +41,8 @@ std::vector<CapacityShare> contact_capacity(const Assembly& a, int contact, cons
         return shares;
     }
     if (c.kind == ContactPlace::gear) {
-        const double h =
-            c.bilateral ? std::numeric_limits<double>::infinity() : now.memory[a.places().gears[k].hysteresis];
+        const double h = c.bilateral || c.flanks != nowhere ? std::numeric_limits<double>::infinity()
+                                                            : now.memory[a.places().gears[k].hysteresis];
         return {{a.train().gears[k].name, h, h}};
     }
     const CouplingElement& law = *a.places().couplings[k];

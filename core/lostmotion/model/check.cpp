@@ -107,6 +107,7 @@ std::string TrainCheck::elements() const {
         if (g.efficiencies && !(g.efficiencies->driving() > 0.0))
             return name + " has a drive efficiency of " + std::to_string(g.efficiencies->driving()) +
                    "; it must be > 0: no torque would turn it";
+        if (std::string error = flanks(g, name); !error.empty()) return error;
         if (g.mesh_damping > 0.0 && g.rigid()) return name + " is rigid and has mesh damping; give it a stiffness";
         if (g.damping_limited && !g.parts_flanks())
             return name + " limits its mesh damping, which it does not have, or has no backlash; give it both";
@@ -144,6 +145,32 @@ std::string TrainCheck::elements() const {
             if (!(f.speeds[k] > f.speeds[k - 1]))
                 return shaft(static_cast<int>(s)) + " has a friction curve whose speeds do not rise";
     }
+    return {};
+}
+
+std::string TrainCheck::flanks(const Gear& g, const std::string& name) const {
+    if (!g.strikes()) return {};
+    const auto lossless = [](const Gear& o) {
+        return !o.has_dry_losses() && o.law.losses == Gearbox::constant_efficiency && o.law.efficiency == 1.0;
+    };
+    if (g.law.compliance != Gearbox::rigid) return name + " has rigid flanks and a stiffness; leave one of them out";
+    if (!(g.restitution >= 0.0 && g.restitution <= 1.0))
+        return name + " has a restitution of " + std::to_string(g.restitution) + "; it must lie from 0 to 1";
+    if (g.mesh_damping > 0.0 || g.transmission_error.present())
+        return name + " has rigid flanks with " + (g.mesh_damping > 0.0 ? "mesh damping" : "a transmission error") +
+               "; leave that out, or give a stiffness";
+    if (train_.short_form) return name + " has rigid flanks, which the long form takes: give [shafts] and [gears]";
+    for (std::size_t k = 0; k < train_.gears.size(); ++k)
+        if (const Gear& o = train_.gears[k]; (o.rigid() || o.strikes()) && !lossless(o))
+            return named("gear", o.name, k) + " is rigid and has losses, which impacts in " + name +
+                   " would depend on; give it a stiffness or no losses";
+    for (std::size_t s = 0; s < train_.shafts.size(); ++s)
+        if (train_.shafts[s].given_motion)
+            return name + " has rigid flanks, and the motion of " + shaft(static_cast<int>(s)) +
+                   " is given; give the gear a stiffness, or a torque in place of the motion";
+    for (const auto& c : coupling_elements(train_))
+        if (c->is_one_way())
+            return name + " has rigid flanks beside the freewheel '" + c->name + "'; give the gear a stiffness";
     return {};
 }
 

@@ -37,6 +37,8 @@ class TrainCheck {
 
     // Mass matrices: their shafts, sizes, symmetry and eigenvalues.
     std::string mass_matrices() const;
+    // Rigid flanks with backlash, and what there may be beside them.
+    std::string flanks(const Gear& g, const std::string& name) const;
     std::string inertias() const;
 
     // Shafts without inertia that no rigid gear ties to others.

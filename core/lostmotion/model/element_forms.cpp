@@ -41,7 +41,7 @@ auto ElementForms::twist_rate(int gear, const Key& key) const -> Row {
 
 auto ElementForms::spring_torque(int gear, const Key& key) const -> Row {
     const Gear& g = train_.gears[gear];
-    if (g.rigid()) return Row{};
+    if (g.rigid() || g.strikes()) return Row{};
     const int piece = key.branch[places_.gears[gear].piece];
     return terms_.state(places_.gears[gear].twist, g.law.curve.slope(piece)) + terms_.one(g.law.curve.offset(piece));
 }

@@ -56,7 +56,7 @@ void Equations::compose_gear(int gear, const Key& key, Regime& r, std::vector<Ro
     if (p.contact != nowhere) {
         const int slip = mode(key, p.contact);
         if (slip != 0)
-            H = terms_.memory(p.hysteresis, slip);
+            H = g.strikes() ? Row{} : terms_.memory(p.hysteresis, slip);
         else if (r.ties.redundant[p.contact])
             H = held(p.contact, r) - P;
         else
@@ -157,7 +157,9 @@ LockedTorque<Row> Equations::locked_torque(int contact, const Key& key, const Re
     };
     if (c.kind == ContactPlace::gear) {
         const Row P = forms_.spring_torque(c.element, key);
-        if (!c.bilateral) {
+        if (c.flanks != nowhere) {
+            (key.branch[places_.gears[c.element].side] > 0 ? locked.has_low : locked.has_high) = true;
+        } else if (!c.bilateral) {
             const Row h = terms_.memory(places_.gears[c.element].hysteresis);
             between(P - h, P + h);
         }
@@ -225,6 +227,7 @@ void Equations::set_rates(const Key& key, const std::vector<Row>& acceleration, 
         const GearPlace& p = places_.gears[g];
         if (p.twist != nowhere && !forms_.twist_rests(static_cast<int>(g), r))
             r.rate[p.twist] = forms_.twist_rate(static_cast<int>(g), key);
+        if (p.side != nowhere && std::abs(key.branch[p.side]) == 2) r.rate[p.clock] = terms_.one(-1.0);
     }
     for (std::size_t s = 0; s < train_.shafts.size(); ++s)
         if (places_.shafts[s].angle != nowhere && !r.ties.at_rest[s])

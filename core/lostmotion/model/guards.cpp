@@ -13,6 +13,7 @@ void RegimeGuards::add_all() {
     add_coupling_capacities();
     for (int s = static_cast<int>(train_.shafts.size()) - 1; s >= 0; --s) add_shaft_guards(s);
     add_turning();
+    add_flanks();
     for (std::size_t g = 0; g < train_.gears.size(); ++g) add_twist_pieces(static_cast<int>(g));
     for (std::size_t s = 0; s < train_.shafts.size(); ++s) add_speed_pieces(static_cast<int>(s));
     add_input_limits();
@@ -32,7 +33,7 @@ void RegimeGuards::add_speed_guards() {
     for (int c = 0; c < layout_.contacts; ++c) {
         const int mode = regime_.key.modes[c];
         if (mode == 0 && regime_.ties.redundant[c]) add_given_speed(c);
-        if (mode == 0 || held_in_motion(c)) continue;
+        if (mode == 0 || held_in_motion(c) || places_.contacts[c].flanks != nowhere) continue;
         // (16) sets the hysteresis anew whenever the twist rate reaches zero, whether it then changes sign or not.
         add(static_cast<double>(mode) * forms_.contact_speed(c), Guard::speed, c, nowhere, 0).by_grazing =
             places_.contacts[c].kind == ContactPlace::gear;
@@ -49,10 +50,30 @@ void RegimeGuards::add_given_speed(int contact) {
 void RegimeGuards::add_gear_capacities() {
     for (std::size_t g = 0; g < train_.gears.size(); ++g) {
         const GearPlace& p = places_.gears[g];
-        if (p.contact == nowhere || train_.gears[g].rigid() || regime_.key.modes[p.contact] != 0) continue;
+        if (p.hysteresis == nowhere || regime_.key.modes[p.contact] != 0) continue;
         const Row h = terms_.memory(p.hysteresis), &H = regime_.gear_hysteresis[g];
         add(h - H, Guard::capacity, p.contact, nowhere, +1);
         add(h + H, Guard::capacity, p.contact, nowhere, -1);
+    }
+}
+
+// Rigid flanks strike at the ends of the gap. Those that touch part where they would pull; while impacts accumulate,
+// they do so until the clock has run down.
+void RegimeGuards::add_flanks() {
+    for (std::size_t g = 0; g < train_.gears.size(); ++g) {
+        const GearPlace& p = places_.gears[g];
+        if (p.side == nowhere) continue;
+        const int side = regime_.key.branch[p.side];
+        if (regime_.key.modes[p.contact] != 0) {
+            if (forms_.twist_rests(static_cast<int>(g), regime_)) continue;
+            const double reach = places_.contacts[p.contact].reach;
+            add(terms_.one(reach) - terms_.state(p.twist), Guard::impact, p.contact, nowhere, 0);
+            add(terms_.one(reach) + terms_.state(p.twist), Guard::impact, p.contact, nowhere, 0);
+            continue;
+        }
+        if (!regime_.ties.redundant[p.contact])
+            add((side > 0 ? 1.0 : -1.0) * regime_.output_torque[g], Guard::capacity, p.contact, nowhere, -1);
+        if (std::abs(side) == 2) add(terms_.state(p.clock), Guard::impact, p.contact, p.side, side / 2);
     }
 }
 
@@ -208,7 +229,7 @@ bool RegimeGuards::moves(int state) const {
 void RegimeGuards::add_twist_pieces(int gear) {
     const Gear& g = train_.gears[gear];
     const GearPlace& p = places_.gears[gear];
-    if (forms_.twist_rests(gear, regime_)) return;
+    if (p.piece == nowhere || forms_.twist_rests(gear, regime_)) return;
     const TorsionCurve& curve = g.law.curve;
     const int piece = regime_.key.branch[p.piece];
     const int slip = p.contact == nowhere ? 0 : regime_.key.modes[p.contact];

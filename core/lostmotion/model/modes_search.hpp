@@ -22,7 +22,8 @@ void SwitchedTrain<Sizes>::stop(X& x, AtRest& at_rest) const {
     std::array<std::int8_t, max_contacts> modes{};
     for (int c = 0; c < contacts(); ++c) modes[c] = at_rest[c] ? 0 : 1;
     Ties ties = places().ties(modes.data(), nullptr, true);
-    for (int c = 0; c < contacts(); ++c) at_rest[c] = kept_at_rest(places().contacts[c], ties);
+    for (int c = 0; c < contacts(); ++c)
+        at_rest[c] = places().contacts[c].may_rest(x) && kept_at_rest(places().contacts[c], ties);
     if (!places().driven.empty()) {  // whose speeds stay what they are, to the last bit
         for (int c = 0; c < contacts(); ++c) modes[c] = at_rest[c] ? 0 : 1;
         ties = places().ties(modes.data());
@@ -78,9 +79,9 @@ Found SwitchedTrain<Sizes>::start(Cache& cache, Now& now, Key& key) const {
         });
         // Speeds that differ by rounding are the same: a state that a run has ended with may be that of the next.
         const bool same = std::fabs(speed) <= few_roundings * size;
-        if (p.one_way && speed > 0.0 && !same) return Found::inconsistent;
+        if (p.one_way && p.flanks == nowhere && speed > 0.0 && !same) return Found::inconsistent;
         key.modes[c] = p.one_way || speed < 0.0 ? -1 : +1;
-        event.at_rest[c] = p.bilateral || same;
+        event.at_rest[c] = (p.bilateral || same) && p.may_rest(now.x);
         snap = snap || (same && !p.bilateral && speed != 0.0);
     }
     if (snap) stop(now.x, event.at_rest);
@@ -93,7 +94,7 @@ Found SwitchedTrain<Sizes>::start(Cache& cache, Now& now, Key& key) const {
         if (p.error_turn != nowhere) now.memory[p.error_turn] = gear.transmission_error.turn(error_angle(now, gear));
         const int locked = p.contact == nowhere ? nowhere : places().contacts[p.contact].locked;
         event.gear[g] = locked != nowhere ? now.memory[locked] : 0.0;
-        if (gear.rigid()) continue;
+        if (gear.rigid() || gear.strikes()) continue;
         const double P = gear.law.curve.torque(now.x[p.twist]);
         const double h = p.hysteresis == nowhere ? 0.0 : now.memory[p.hysteresis];
         event.gear[g] = locked == nowhere ? P : std::clamp(event.gear[g], P - h, P + h);
@@ -109,6 +110,7 @@ Found SwitchedTrain<Sizes>::start(Cache& cache, Now& now, Key& key) const {
 template <class Sizes>
 template <class Cache, class Now, class G, class Input>
 Found SwitchedTrain<Sizes>::next(Cache& cache, Now& now, const G* fired, Key& key, const Input& input) const {
+    if (fired != nullptr && fired->kind == Guard::impact) return strikes(cache, now, *fired, key);
     Rest given_rest{};
     const bool comes_to_rest = fired == nullptr && follow_given(now, key, given_rest);
     if (fired != nullptr ? goes_on(cache, now, *fired, key) : !comes_to_rest && stays(cache, now, key, input))
@@ -226,7 +228,7 @@ bool SwitchedTrain<Sizes>::at_its_limit(const Key& key) const {
     std::array<int, max_shafts> direction{};  // of each free shaft
     std::array<double, max_shafts> speed;
     for (std::size_t k = 0; k < all.size(); ++k) {
-        if (key.modes[k] == 0) continue;
+        if (key.modes[k] == 0 || all[k].flanks != nowhere) continue;
         const ContactPlace& c = all[k];
         const unsigned free = tied_speed(c, ties, speed);
         if (free == 0) return true;

@@ -43,7 +43,11 @@ void SwitchedTrain<Sizes>::locate(const Now& now, Key& trial) const {
         const GearPlace& p = places().gears[g];
         if (p.error_piece != nowhere)
             set(p.error_piece, gear.transmission_error.piece(error_angle(now, gear) - now.memory[p.error_turn]));
-        if (gear.rigid()) continue;
+        if (p.side != nowhere) {
+            const int side = now.x[p.twist] > 0.0 ? 1 : -1;
+            set(p.side, trial.modes[p.contact] != 0 ? 0 : now.x[p.clock] > 0.0 ? 2 * side : side);
+        }
+        if (p.piece == nowhere) continue;
         const double d = now.x[p.twist];
         const int piece = gear.law.curve.locate(d);
         set(p.piece, piece);
@@ -111,7 +115,7 @@ auto SwitchedTrain<Sizes>::settle(Cache& cache, Now& now, const Key& modes, cons
     std::array<double, max_contacts> T_2 = event.gear;
     for (std::size_t g = 0; g < train().gears.size(); ++g) {
         const GearPlace& p = places().gears[g];
-        if (train().gears[g].rigid()) continue;
+        if (train().gears[g].rigid() || train().gears[g].strikes()) continue;
         const int slip = p.contact == nowhere ? +2 : trial.modes[p.contact];
         if (slip == 0) continue;
         T_2[g] =

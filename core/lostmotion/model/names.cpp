@@ -55,7 +55,10 @@ std::vector<std::string> state_names(const Assembly& a) {
         set(p.shafts[k].speed, t.shafts[k].name + "_speed");
         set(p.shafts[k].angle, angle_of(t, k));
     }
-    for (std::size_t k = 0; k < t.gears.size(); ++k) set(p.gears[k].twist, gear_result(t, k, "twist"));
+    for (std::size_t k = 0; k < t.gears.size(); ++k) {
+        set(p.gears[k].twist, gear_result(t, k, "twist"));
+        set(p.gears[k].clock, gear_result(t, k, "impacts_left"));
+    }
     for (std::size_t k = 0; k < t.controllers.size(); ++k)
         for (std::size_t j = 0; j < t.controllers[k].states.size(); ++j)
             set(p.controllers[k].first_state + static_cast<int>(j),

@@ -71,7 +71,7 @@ struct PackedGuard {
     using Kind = Guard::Kind;
     static constexpr Kind speed = Guard::speed, capacity = Guard::capacity, edge = Guard::edge,
                           input_limit = Guard::input_limit, turning = Guard::turning, outside = Guard::outside,
-                          set_off = Guard::set_off;
+                          set_off = Guard::set_off, impact = Guard::impact;
 
     PackedForm<D> form;
     Kind kind = outside;
@@ -84,7 +84,9 @@ struct PackedGuard {
     // The contact; -2 - branch for a law that belongs to no contact.
     int subject() const { return contact < 0 && branch >= 0 ? -2 - branch : contact; }
     bool is_edge() const { return kind == edge || kind == input_limit; }
-    bool is_of_contact() const { return kind == speed || kind == capacity || kind == turning || kind == set_off; }
+    bool is_of_contact() const {
+        return kind == speed || kind == capacity || kind == turning || kind == set_off || kind == impact;
+    }
 };
 
 template <class D>

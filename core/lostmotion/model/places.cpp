@@ -6,6 +6,8 @@ ContactPlace twist_place(const Gear& g, int gear) {
     ContactPlace c{ContactPlace::gear, gear, g.input, g.output, 1.0 / g.law.ratio, -1.0, g.rigid()};
     c.housing = g.housing;
     if (g.housing != nowhere) c.per_housing = g.per_housing();
+    c.one_way = g.strikes();
+    c.reach = 0.5 * g.flank_backlash;
     return c;
 }
 
@@ -71,6 +73,8 @@ void Places::place_states(const Train& train) {
     for (ShaftPlace& s : shafts) s.speed = next++;
     for (std::size_t g = 0; g < gears.size(); ++g)
         if (all || !train.gears[g].rigid()) gears[g].twist = next++;
+    for (std::size_t g = 0; g < gears.size(); ++g)
+        if (train.gears[g].strikes()) gears[g].clock = next++;
     for (std::size_t s = 0; s < shafts.size(); ++s)
         if (by_angle[s]) shafts[s].angle = next++;
     for (std::size_t k = 0; k < controllers.size(); ++k) {
@@ -111,9 +115,10 @@ void Places::place_contacts(const Train& train) {
         }
         for (std::size_t k = 0; k < gears.size(); ++k) {
             const Gear& g = train.gears[k];
-            if (g.input != static_cast<int>(s) || !(g.rigid() || g.law.has_hysteresis())) continue;
+            if (g.input != static_cast<int>(s) || !(g.rigid() || g.strikes() || g.law.has_hysteresis())) continue;
             gears[k].contact = static_cast<int>(contacts.size());
             contacts.push_back(twist_place(g, static_cast<int>(k)));
+            if (g.strikes()) contacts.back().flanks = gears[k].twist;
         }
     }
     for (std::size_t k = 0; k < couplings.size(); ++k) {
@@ -170,7 +175,10 @@ void Places::place_inputs(const Train& train) {
 
 void Places::place_memory_and_branches(const Train& train) {
     for (std::size_t k = 0; k < gears.size(); ++k)
-        if (train.gears[k].law.has_hysteresis()) gears[k].hysteresis = layout.memory++;
+        if (train.gears[k].law.has_hysteresis())
+            gears[k].hysteresis = layout.memory++;
+        else if (train.gears[k].strikes())
+            gears[k].impact_loss = layout.memory++;
     // What is redundant while some contacts are stuck is so while all are.
     const std::vector<std::int8_t> all_stuck(contacts.size(), 0);
     const Ties stuck = ties(all_stuck.data());
@@ -184,7 +192,10 @@ void Places::place_memory_and_branches(const Train& train) {
         if (train.shafts[s].friction.pieces() > 1) shafts[s].friction_piece = next++;
     for (std::size_t k = 0; k < gears.size(); ++k) {
         const Gear& g = train.gears[k];
-        if (!g.rigid()) gears[k].piece = next++;
+        if (g.strikes())
+            gears[k].side = next++;
+        else if (!g.rigid())
+            gears[k].piece = next++;
         if (g.has_dry_losses()) {
             gears[k].cell = next++;
             gears[k].cell_back = next++;

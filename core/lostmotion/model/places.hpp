@@ -30,6 +30,9 @@ struct GearPlace {
     int twist = nowhere, contact = nowhere;
     int hysteresis = nowhere;                                                                           // memory
     int piece = nowhere, cell = nowhere, cell_back = nowhere, flanks = nowhere, error_piece = nowhere;  // branches
+    int side = nowhere;   // branch of rigid flanks: +1, -1 where they touch, +2, -2 while impacts accumulate, 0 apart
+    int clock = nowhere;  // state: the time left until impacts have accumulated [s]
+    int impact_loss = nowhere;   // memory: the energy that impacts have taken [J]
     int error_corner = nowhere;  // branch: +1, -1: the input shaft rests on the upper, the lower end of that piece
     int error_turn = nowhere;    // memory
 };

@@ -38,7 +38,7 @@ StoredChange stored_change(const Assembly& a, const X& from, const X& to) {
         sum.add(&StoredChange::kinetic, coupled_kinetic_energy(c.value, from[p], to[p], from[q], to[q]));
     }
     for (std::size_t g = 0; g < a.train().gears.size(); ++g)
-        if (const int d = a.places().gears[g].twist; !a.train().gears[g].rigid())
+        if (const int d = a.places().gears[g].twist; !a.train().gears[g].rigid() && !a.train().gears[g].strikes())
             sum.add(&StoredChange::elastic, a.train().gears[g].law.curve.energy(from[d], to[d]));
     return sum;
 }

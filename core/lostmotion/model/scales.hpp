@@ -50,7 +50,9 @@ void rated_scale(const Assembly& a, State& s) {
     for (std::size_t g = 0; g < train.gears.size(); ++g) {
         const Gear& gear = train.gears[g];
         if (const int k = a.places().gears[g].twist; k != nowhere)
-            s[k] = gear.rigid() ? 1.0 : gear.law.rated_output_torque / gear.law.curve.max_slope();
+            s[k] = gear.rigid()     ? 1.0
+                   : gear.strikes() ? gear.flank_backlash
+                                    : gear.law.rated_output_torque / gear.law.curve.max_slope();
     }
     for (std::size_t k = 0; k < train.controllers.size(); ++k) controller_scale(a, static_cast<int>(k), 1.0, s);
 }
@@ -84,7 +86,7 @@ void balanced_scale(const Assembly& a, State& s, int first_angle) {
         const double in = s[p.shafts[gear.input].speed], i = gear.reduction(), J = inertia(gear.input);
         double& out = s[p.shafts[gear.output].speed];
         double twist;
-        if (gear.rigid()) {
+        if (gear.rigid() || gear.strikes()) {
             out = in / i;
             twist = out * std::fmax(J, least_inertia);
         } else {

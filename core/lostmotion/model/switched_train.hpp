@@ -25,6 +25,7 @@
 #include "held_torque.hpp"
 #include "motion.hpp"
 #include "scales.hpp"
+#include "small_solve.hpp"
 
 namespace lostmotion::model {
 
@@ -205,6 +206,27 @@ class SwitchedTrain {
         }
         return out;
     }
+    // Impacts of rigid flanks: modes_impact.hpp.
+    struct Strike {
+        std::vector<double> impulse;  // of each contact [N m s]
+        std::array<bool, max_shafts> moved{};
+    };
+    template <class Now>
+    Strike strike(Now& now, const Key& key, int contact, double restitution) const;
+    template <class Now>
+    double speed_of(int contact, const Now& now) const {
+        double speed = 0.0;
+        places().contacts[contact].each_shaft(
+            [&](int s, double per) { speed += per * now.x[places().shafts[s].speed]; });
+        return speed;
+    }
+    template <class Cache, class Now, class G>
+    Found strikes(Cache& cache, Now& now, const G& fired, Key& key) const;
+    template <class Cache, class Now>
+    Found find_after(Cache& cache, Now& now, const Strike& s, Event event, const Now& past, Key& key) const;
+    template <class E, class Now>
+    double time_to_rest(const E& e, const Now& now, int contact) const;
+
     template <class Cache, class Now>
     Found enumerate(Cache& cache, Now& now, const Event& event, const Key& from, Key& key) const;
     template <class Cache, class Now>
@@ -336,9 +358,9 @@ class SwitchedTrain {
                 left = &guard;
                 return false;
             }
-            const bool of_speed = guard.kind == Guard::speed;
-            of_contacts.push_back({guard.contact, of_speed ? 0 : guard.neighbour, s.order - (of_speed ? 1 : 0),
-                                   -s.relative, guard.kind == Guard::turning});
+            of_contacts.push_back({guard.contact, guard.kind == Guard::speed ? 0 : guard.neighbour,
+                                   s.order - Guard::acceleration_order(guard.kind), -s.relative,
+                                   guard.kind == Guard::turning});
             return true;
         });
         return left;

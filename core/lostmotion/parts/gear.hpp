@@ -29,6 +29,9 @@ struct Gear {
     double mesh_damping = 0.0;
     // The torque of the damping is at most that of the spring, |c d'| <= |P|, so that none jumps where flanks meet.
     bool damping_limited = false;
+    // Rigid flanks in place of a compliance: what the play is [rad, at the output], 0 of a gear without, and the speed
+    // at which the flanks part over that at which they strike.
+    double flank_backlash = 0.0, restitution = 0.0;
     PeriodicCurve transmission_error;  // e [rad, at the output] over the angle of the input shaft
 
     // What a gear has beside the law of a gearbox.
@@ -47,13 +50,16 @@ struct Gear {
                 "whether the torque of the mesh damping is at most that of the spring, so that no torque jumps where "
                 "flanks meet; needs backlash"},
                damping_limited);
+        f.number({"flanks.backlash", "", "rad", Range::not_negative, Given::none}, flank_backlash);
+        f.number({"flanks.restitution", "", "", Range::any, Given::none}, restitution);
         bool present = transmission_error.present();
         f.curve_if("transmission_error", present, transmission_error);
     }
 
-    bool rigid() const { return law.compliance == Gearbox::rigid; }
+    bool strikes() const { return flank_backlash > 0.0; }
+    bool rigid() const { return law.compliance == Gearbox::rigid && !strikes(); }
     bool has_dry_losses() const { return efficiencies || law.losses == Gearbox::loss_map; }
-    bool has_backlash() const { return !rigid() && law.curve.slope(0) == 0.0; }
+    bool has_backlash() const { return law.compliance != Gearbox::rigid && law.curve.slope(0) == 0.0; }
     bool parts_flanks() const { return mesh_damping > 0.0 && has_backlash(); }
     enum Flanks { touching, parted, limited };
     // Of flanks on one side of the gap (way: +1 or -1), from P and c d'.

@@ -38,7 +38,8 @@ std::vector<SwitchingCause> switching_causes(bool short_form) {
         for (const SwitchingCause& c : {SwitchingCause{model::Guard::edge, "piece or cell of a law"},
                                         SwitchingCause{model::Guard::input_limit, "limit of a command"},
                                         SwitchingCause{model::Guard::turning, "driving torque turned"},
-                                        SwitchingCause{model::Guard::set_off, "given motion began"}})
+                                        SwitchingCause{model::Guard::set_off, "given motion began"},
+                                        SwitchingCause{model::Guard::impact, "flanks struck"}})
             all.push_back(c);
     return all;
 }
@@ -155,6 +156,15 @@ double TrainReport::residual() const {
 std::string error_text(const TrainReport& report, const model::Assembly& a) {
     if (!report.message.empty()) return report.message;
     return train_status_text(a, report.status, report.time, report.contact, report.too_many_guards);
+}
+
+void TrainReport::add_impacts(const std::string& gear, double loss) {
+    const auto entry = std::ranges::find(energy, gear + ": impacts", &TrainEnergy::name);
+    if (entry == energy.end())
+        energy.push_back({gear + ": impacts", model::PowerFlow::loss, loss});
+    else
+        entry->energy += loss;
+    turned_over += loss;
 }
 
 std::vector<std::string> ledger_names(const model::Assembly& a) {

@@ -55,6 +55,10 @@ struct PackedRun {
     void end(TrainReport& report, const System& system, Solver& solver) const {
         report.ended(system, solver);
         report.stored_change = model::stored_change(assembly, start.x, solver.state());
+        for (std::size_t g = 0; g < assembly.train().gears.size(); ++g)
+            if (const int loss = assembly.places().gears[g].impact_loss; loss != model::nowhere)
+                report.add_impacts(assembly.train().gears[g].name, solver.memory()[static_cast<std::size_t>(loss)] -
+                                                                       start.memory[static_cast<std::size_t>(loss)]);
     }
 
     const model::Assembly& assembly;

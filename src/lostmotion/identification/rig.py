@@ -15,7 +15,7 @@ from ..simulation.keys import set_values
 from ..simulation.linear_units import of_slides
 from ..simulation.scenario_files import find_scenario, load
 from ..simulation.sensitivities import channels_of
-from ..simulation.train_scenario import TrainInitial, TrainScenario, in_long_form
+from ..simulation.train_scenario import TrainInitial, TrainScenario, in_long_form, need_no_impacts
 from .formulas import Formula, names_in
 from .prepare import Prepared
 from .shaft_angles import angle_terms
@@ -90,6 +90,7 @@ class Rig:
         self.task = task
         loaded = load(find_scenario(task.scenario, directory))
         self.scenario = in_long_form(loaded)
+        need_no_impacts(self.scenario, "identify")
         self._variants = Variants(self.scenario)
         self._built: dict[Any, Built] = {}
         self._with_given: dict[Any, dict[str, float]] = {}

@@ -97,6 +97,11 @@ class Transmission(TransmissionFields):
         """Fields for the core, in SI units, without those that are None."""
         return super().core_fields() | {
             "stiffness": None if isinstance(self.stiffness, Rigid) else self.stiffness.core(),
+            **(
+                {"flanks.backlash": self.stiffness.backlash, "flanks.restitution": self.stiffness.restitution}
+                if isinstance(self.stiffness, Rigid) and self.stiffness.strikes
+                else {}
+            ),
             "hysteresis.efficiency": None if self.hysteresis is None else self.hysteresis.efficiency,
         }
 
@@ -116,6 +121,12 @@ class Gearbox(Transmission):
     rated_output_torque: Annotated[Torque, Positive]
     """T_2R"""
     losses: Annotated[ConstantEfficiency | LossMap, Field(discriminator="kind")]
+
+    @model_validator(mode="after")
+    def _strikes_not(self) -> Self:
+        if isinstance(self.stiffness, Rigid) and self.stiffness.strikes:
+            raise ValueError("has rigid flanks with backlash, which only gears of the long form have; give a stiffness")
+        return self
 
     def __repr__(self) -> str:
         laws = f"stiffness {self.stiffness.kind}, losses {self.losses.kind}"

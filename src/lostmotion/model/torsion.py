@@ -102,9 +102,33 @@ class LinearStiffness(Part):
 
 
 class Rigid(Part):
-    """No twist at all (7)."""
+    """No twist at all (7), or rigid flanks that strike at the ends of a backlash.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> lm.model.Rigid(backlash="1 mrad", restitution=0.5).strikes
+    True
+    """
 
     kind: Literal["rigid"] = "rigid"
+    backlash: Annotated[Angle, NotNegative] = 0.0
+    """total gap at the output"""
+    restitution: Annotated[Number, Limit(ge=0.0, le=1.0)] | None = None
+    """speed at which the flanks part over that at which they strike; needed with backlash"""
+
+    @property
+    def strikes(self) -> bool:
+        """Whether it has backlash."""
+        return self.backlash > 0.0
+
+    @model_validator(mode="after")
+    def _is_whole(self) -> Self:
+        if self.strikes and self.restitution is None:
+            raise ValueError("has rigid flanks with backlash; give their restitution, 0 to 1, or a stiffness")
+        if not self.strikes and self.restitution is not None:
+            raise ValueError("has a restitution but no backlash; give both or none")
+        return self
 
 
 class Hysteresis(Part):

@@ -24,7 +24,7 @@ from ..model.train import DriveTrain
 from ..simulation.results import variables_of
 from ..simulation.run import run
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario, in_long_form
+from ..simulation.train_scenario import TrainScenario, in_long_form, need_no_impacts
 from ..simulation.train_variables import axis_variables
 from . import fmi2, fmi3
 from .checkout import made_here
@@ -130,6 +130,7 @@ def export_fmu(
         raise InputError(
             f"title: {scenario.title!r} holds a control character, which modelDescription.xml cannot; remove it"
         )
+    need_no_impacts(scenario, "fmu")
     if not controllers:
         scenario = scenario.without_controllers()
     if motion_inputs:

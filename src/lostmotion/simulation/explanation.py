@@ -13,6 +13,7 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Time
 from ..model.drive import Drive
 from ..model.self_locking import SelfLocking, self_locking
+from ..model.torsion import Rigid
 from ..model.train import DriveTrain
 from ..units.practical import charted
 from .core_runs import core_case
@@ -33,6 +34,10 @@ class ContactState:
     capacity_backward: float  # and down to minus this before it slips in reverse
     shares: dict[str, tuple[float, float]] = field(default_factory=dict)  # of a train: of the capacities, by element
     slides: bool = False  # along a straight line: [m/s] and [N] in place of [rad/s] and [N·m]
+    reach: float | None = None
+    """half the backlash of rigid flanks that strike, at the output; None of other contacts"""
+    twist: float = 0.0
+    """twist of these flanks, from minus `reach` to `reach`"""
 
     @property
     def to_free_forward(self) -> float:
@@ -46,6 +51,14 @@ class ContactState:
 
     def __str__(self) -> str:
         unit = "N" if self.slides else "N·m"
+        if self.reach is not None:
+            if self.mode == 0:
+                return f"{self.name}: the flanks touch and press with {abs(self.torque):.4g} {unit}"
+            of, per_second = ("m", "m/s") if self.slides else ("rad", "rad/s")
+            return (
+                f"{self.name}: in the gap, at {_shown(self.twist, of)} of -{_shown(self.reach, of)} to {_shown(self.reach, of)}, "
+                f"changing by {_shown(self.speed, per_second)}"
+            )
         if self.mode != 0:
             way = "forward" if self.mode > 0 else "backward"
             speed = _shown(self.speed, "m/s" if self.slides else "rad/s")
@@ -218,9 +231,15 @@ def _explanation(
     slides = tuple(name for name in train.shafts if train.is_slide(name))
     sliding = {f"{name}_contact" for name in slides}
     sliding |= {f"{train.twist_of(n)}_contact" for n, gear in train.gears.items() if train.is_slide(gear.output)}
+    flanks = {
+        f"{train.twist_of(n)}_contact": (0.5 * gear.stiffness.backlash, named[train.twist_of(n)])
+        for n, gear in train.gears.items()
+        if isinstance(gear.stiffness, Rigid) and gear.stiffness.strikes
+    }
     for name, mode, speed, torque, forward, backward, elements in contacts:
         shares = {element: (one, other) for element, one, other in elements}
-        states.append(ContactState(name, mode, speed, torque, forward, backward, shares, name in sliding))
+        gap = flanks.get(name, (None, 0.0))
+        states.append(ContactState(name, mode, speed, torque, forward, backward, shares, name in sliding, *gap))
     turned = []
     for name, forward, backward in motors:
         motor = train.motors[name]

@@ -639,13 +639,29 @@ def need_open_loop(scenario: Scenario, function: str) -> None:
         )
 
 
-def need_free_motion(scenario: Scenario, function: str) -> None:
-    """Refuses a train in which the motion of a shaft is given, for what torques alone are to move.
+def need_no_impacts(scenario: Scenario, function: str) -> None:
+    """Refuses a train with rigid flanks that strike, for what takes motions without impacts.
 
     Raises
     ------
     InputError
     """
+    for key, gear in scenario.gears_by_key().items():
+        if isinstance(gear.stiffness, Rigid) and gear.stiffness.strikes:
+            raise InputError(
+                f"{function}: {key}.stiffness has rigid flanks with backlash, and this takes no impacts; give a stiffness to the "
+                'backlash, kind = "curve"'
+            )
+
+
+def need_free_motion(scenario: Scenario, function: str) -> None:
+    """Refuses a train in which the motion of a shaft is given or flanks strike, for what torques alone are to move.
+
+    Raises
+    ------
+    InputError
+    """
+    need_no_impacts(scenario, function)
     if given := scenario.given():
         raise InputError(
             f"{function}: key {scenario.given_key(given[0])} gives the motion of a shaft, and this takes a train that torques "

@@ -23,7 +23,7 @@ def start_values(train: DriveTrain, initial: Any) -> dict[str, float]:
     InputError
         A name is unknown, or values contradict each other.
     """
-    stiff = [name for name, g in train.gears.items() if not isinstance(g.stiffness, Rigid)]
+    stiff = [name for name, g in train.gears.items() if not isinstance(g.stiffness, Rigid) or g.stiffness.strikes]
     lossy = [name for name in stiff if (h := train.gears[name].hysteresis) is not None and h.efficiency < 1.0]
     electric = [name for name, m in train.motors.items() if m.kind != "torque_source"]
     speeds, twists = initial.of_all("speeds"), initial.of_all("twists")
@@ -37,11 +37,27 @@ def start_values(train: DriveTrain, initial: Any) -> dict[str, float]:
     _check("hysteresis_forces", initial.hysteresis_forces, lossy, "screw, rack or belt with hysteresis")
     if problem := train.core(()).check_start([speeds.get(name, 0.0) for name in train.shafts]):
         raise InputError(f"key initial.speeds: {problem}")
+    _check_flanks(train, speeds, twists)
     values = {f"{name}_speed": v for name, v in speeds.items()}
     values |= {train.angle_of(s): v for s, v in angles_at_start(train, initial.of_all("angles"), twists).items()}
     values |= {train.twist_of(name): v for name, v in twists.items()}
     values |= {train.motor_torque_of(name): v for name, v in initial.motor_torques.items()}
     return values
+
+
+def _check_flanks(train: DriveTrain, speeds: Mapping[str, float], twists: Mapping[str, float]) -> None:
+    """Refuses rigid flanks that begin beyond their backlash, or at its end with a speed into each other."""
+    for name, gear in train.gears.items():
+        if not isinstance(gear.stiffness, Rigid) or not gear.stiffness.strikes:
+            continue
+        reach, twist = 0.5 * gear.stiffness.backlash, twists.get(name, 0.0)
+        housing = 0.0 if gear.housing is None else speeds.get(gear.housing, 0.0)
+        speed = (speeds.get(gear.input, 0.0) - housing) / gear.ratio - (speeds.get(gear.output, 0.0) - housing)
+        if abs(twist) > reach or (abs(twist) == reach and twist * speed > 0.0):
+            raise InputError(
+                f"key initial.twists.{name}: the flanks begin {'beyond' if abs(twist) > reach else 'with an impact at'} the end of "
+                f"their gap, {reach:g} rad; give a twist inside it"
+            )
 
 
 def _check(key: str, given: Iterable[str], known: Iterable[str], what: str) -> None:

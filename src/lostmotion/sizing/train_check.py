@@ -10,7 +10,7 @@ from ..model.losses import ConstantEfficiency, LossMap
 from ..model.task import Task
 from ..simulation.results import RunArrays
 from ..simulation.run import run
-from ..simulation.train_scenario import TrainScenario
+from ..simulation.train_scenario import TrainScenario, need_no_impacts
 from .axis_rules import HOUR, AxialLoad, missing, screw_life, screw_rules
 from .duty_cycle import duty_cycle
 from .finding import Finding
@@ -31,6 +31,7 @@ def check_train(scenario: TrainScenario) -> tuple[Finding, ...]:
     SolverError
         As `simulate`.
     """
+    need_no_impacts(scenario, "drive check")
     table = scenario.simulation
     interval = min(table.sample_interval, table.duration / SAMPLES)
     result = run(scenario.replace(**{"simulation.sample_interval": interval}), energy=False)
