@@ -126,11 +126,7 @@ def export_fmu(
         raise InputError(f"{path}: must end in .fmu")
     if fmi not in PLATFORMS:
         raise InputError(f"fmi: {fmi} must be 2 (FMI 2.0) or 3 (FMI 3.0)")
-    if any(ord(letter) < 32 and letter not in "\t\n\r" for letter in scenario.title or ""):
-        raise InputError(
-            f"title: {scenario.title!r} holds a control character, which modelDescription.xml cannot; remove it"
-        )
-    need_no_impacts(scenario, "fmu")
+    _check_scenario(scenario)
     if not controllers:
         scenario = scenario.without_controllers()
     if motion_inputs:
@@ -204,6 +200,15 @@ def _with_given(scenario: TrainScenario, names: Sequence[str]) -> TrainScenario:
             own = changes.get(f"initial.{key}", getattr(scenario.initial, key))
             changes[f"initial.{key}"] = {shaft: speed for shaft, speed in own.items() if shaft != name}
     return scenario.replace(**changes) if changes else scenario
+
+
+def _check_scenario(scenario: Scenario) -> None:
+    """Refuse a title that XML cannot hold, and impacts."""
+    if any(ord(letter) < 32 and letter not in "\t\n\r" for letter in scenario.title or ""):
+        raise InputError(
+            f"title: {scenario.title!r} holds a control character, which modelDescription.xml cannot; remove it"
+        )
+    need_no_impacts(scenario, "fmu")
 
 
 def _check_references(scenario: Scenario) -> None:
