@@ -295,7 +295,7 @@ TOPICS = {
         "voltage-",
         "worm-",
     ),
-    "Servo axes": ("position-axis", "speed-axis", "joint-", "field-weakening"),
+    "Servo axes": ("position-axis", "speed-axis", "joint-", "field-weakening", "hobby-servo"),
     "Linear axes": ("ball-screw-", "rack-", "vertical-"),
     "Limit cycles": ("hunting-",),
     "Tracking and pointing": ("tracking-", "direction-finder"),

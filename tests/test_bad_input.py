@@ -305,7 +305,7 @@ OTHER_PLACES = [
     ({"gearbox.backlash": 1e-3}, "key gearbox.backlash: is not known here; it is written as gearbox.stiffness.backlash"),
     (RECORD | {"gearbox.backlash": 1e-3}, "key gearbox.backlash: is not known here; it is written as gearbox.stiffness.backlash"),
     (RECORD | {"gearbox.backlsh": 1e-3}, "did you mean gearbox.stiffness.backlash?"),
-    ({"gearbox.stiffness": {"kind": "linear", "stiffness": 1e4, "backlash": 1e-3}}, 'backlash: is a key of kind "curve", and this table'),
+    ({"gearbox.stiffness": {"kind": "linear", "stiffness": 1e4, "backlash": 1e-3}}, 'backlash: is a key of kind "curve" or "rigid", and this table'),
     ({"motor.max_speed": 1.0}, "it is written as motor.limits.max_speed"),
     ({"gearbox.efficiency": 0.9}, "it is written as gearbox.hysteresis.efficiency or gearbox.losses.efficiency"),
     ({"load_inertia": 1.0}, "key load_inertia: is not known here; it is written as load.inertia"),

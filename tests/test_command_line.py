@@ -334,7 +334,7 @@ MAY_IMPORT = {
     "response paper-2dof-nl-small --amplitudes 0.1 --frequencies 1.0,2.0": DATASETS | NETCDF | FIGURES,
     "servo position-axis": {"scipy", "rich"},
     "track direction-finder": FIGURES | {"rich"},
-    "study study.toml": DATASETS,
+    "study study.toml -o rows": DATASETS,
 }
 # xarray imports dask and pint by itself where they are installed.
 WITHOUT_WHAT_XARRAY_FINDS = """

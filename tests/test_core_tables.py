@@ -22,7 +22,8 @@ from lostmotion.units.conversion import Unit
 # The line of a motor becomes its rated point.
 LINE = {"motor.stall_torque", "motor.no_load_speed", "motor.stall_current", "motor.no_load_current"}
 NOT_OF_THE_CORE = {"motor.rated_voltage", "motor.voltage_limit", "motor.dc_voltage"} | LINE
-OF_THE_CORE_ALONE = {"motor.command_limit"}
+# A stiffness of the kind rigid has the flanks of a gear.
+OF_THE_CORE_ALONE = {"motor.command_limit", "gearbox.flanks.backlash", "gearbox.flanks.restitution"}
 
 
 def plain_numbers(part: Any, prefix: str) -> dict[str, str]:

@@ -114,7 +114,7 @@ def test_a_drive_in_the_joint_of_a_pendulum_converges_to_the_equations_of_both(t
     """The drive is an actuator of another tool: it has the motion of its output shaft as inputs and returns the torque."""
     motor, flange, ratio, stiffness, damping, torque = 1e-4, 0.02, 50.0, 2000.0, 2.0, 0.2
     scenario = lm.TrainScenario(
-        shafts={"motor": {"inertia": motor, "torque": torque}, "joint": {"inertia": flange}},
+        shafts={"motor": {"inertia": motor, "torque": -torque}, "joint": {"inertia": flange}},
         gears={
             "gear": {
                 "input": "motor",

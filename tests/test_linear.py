@@ -426,7 +426,7 @@ def test_no_unit_of_rotation_on_a_slide_in_an_fmu_or_the_live_page():
     assert units.pop("controllers.motor.position_encoder.error_phase") == "rad"  # of its sine
     assert set(units.values()) == {"m"}
     for version in (fmi2, fmi3):
-        model = fmu._model(scenario, parameters, "0" * 32, True)
+        model = fmu._model(scenario, parameters, "0" * 32, True, ())
         described = version.model_description(model).decode()
         assert rotary(re.findall(r"<\w+[^>]*name=\"[^>]*>", described)) == []
         assert 'unit="m/s"' in described

@@ -144,7 +144,7 @@ def test_a_result_draws_the_figures_of_the_command_line() -> None:
     assert np.array_equal(drawn[:, 1], result["load_speed"])
     response = lm.frequency_response(SMALL, [0.5, 5.0], [0.1, 1.0])
     bode = response.lm.plot("twist")
-    assert bode.axes[0].get_ylabel() == "gain [rad / -]"
+    assert bode.axes[0].get_ylabel() == "gain [rad]"
     assert len(response.lm.plot_maps().axes) >= 4
     motion = lm.periodic_motion(SMALL)
     assert np.array_equal(motion.lm.plot().axes[0].lines[0].get_ydata(), motion["command"])

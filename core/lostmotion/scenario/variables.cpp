@@ -56,7 +56,7 @@ bool Variables::shows(const control::Axis& a, int signal) {
         case control::position_reference:
         case control::measured_position: return a.mode == control::Axis::position_mode;
         case control::speed_reference:
-        case control::measured_speed: return a.mode != control::Axis::torque_mode;
+        case control::measured_speed: return a.mode != control::Axis::torque_mode && !a.firmware.present;
         case control::torque_reference: return true;
         case control::target_direction:
         case control::target_seen: return a.camera.present;

@@ -35,7 +35,10 @@ class DutyCurve(Part):
 
 
 class Firmware(FirmwareFields):
-    """``d = duty(e)`` of the error beyond the dead band, ``I = (d U_0 - k w)/(R + d^2 R_s)`` within ``max_current``, torque ``k I``.
+    """Position loop of a hobby servo, from the position error to the duty cycle of its bridge.
+
+    The duty cycle is ``d = duty(e)`` of the error beyond the dead band. The current is ``I = (d U_0 - k w)/(R + d^2 R_s)`` within
+    ``max_current``, and the torque ``k I``.
 
     Examples
     --------

@@ -128,7 +128,7 @@ def stage_rules(motion: RequiredMotion, stage: Stage, wanted_life: float | None)
 
 @dataclass(frozen=True)
 class AxialLoad:
-    """What a screw carries over one cycle."""
+    """Loads of a screw over one cycle."""
 
     time: np.ndarray
     """[s]"""
