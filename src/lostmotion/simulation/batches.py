@@ -61,7 +61,7 @@ class SimulationBatch:
     seed
         Seed of the generator that these functions get.
     threads
-        Number of threads; default that of the processors. Results do not depend on it.
+        Number of threads; default: one for each processor. Results do not depend on it.
 
     Raises
     ------
@@ -101,6 +101,8 @@ class SimulationBatch:
     ) -> None:
         if not MIN_INTERVAL <= step <= MAX_INTERVAL:
             raise InputError(f"step {step} s must lie between {MIN_INTERVAL:g} s and {MAX_INTERVAL:g} s")
+        if seed < 0:
+            raise InputError(f"seed: {seed} must be 0 or above")
         self._step = step
         self._threads = threads or os.cpu_count() or 1
         if isinstance(drives, Drive):
