@@ -161,8 +161,8 @@ class TrainDescription : public model::TrainDescription {
     void add_controller(const std::string& motor, const std::vector<ControllerSignal>& signals,
                         const ControllerSignal& compared, const std::vector<std::string>& states, const Matrix& A,
                         const Matrix& B, const std::vector<double>& C, const std::vector<double>& D,
-                        const std::vector<double>& back_calculation, double limit, const std::vector<double>& curve_in,
-                        const std::vector<double>& curve_out, double droop) {
+                        const std::vector<double>& back_calculation, double limit, const TorsionCurve* curve,
+                        double droop) {
         model::LinearController c;
         for (const ControllerSignal& s : signals) c.signals.push_back(controller_signal(s));
         c.compared = controller_signal(compared);
@@ -173,8 +173,8 @@ class TrainDescription : public model::TrainDescription {
         c.D = D;
         c.back_calculation = back_calculation;
         c.limit = limit;
-        c.curve_in = curve_in;
-        c.curve_out = curve_out;
+        c.curved = curve != nullptr;
+        if (c.curved) c.curve = *curve;
         c.droop = droop;
         model::TrainDescription::add_controller(std::move(c), motor);
     }
@@ -404,7 +404,7 @@ inline void bind_train(nb::module_& m) {
                      "collections.abc.Mapping[str, typing.Any]) -> None"),
              "What joins two shafts and is no gear, in the same way.")
         .def("add_controller", &TrainDescription::add_controller, "motor"_a, "signals"_a, "compared"_a, "states"_a,
-             "A"_a, "B"_a, "C"_a, "D"_a, "back_calculation"_a, "limit"_a, "curve_in"_a, "curve_out"_a, "droop"_a)
+             "A"_a, "B"_a, "C"_a, "D"_a, "back_calculation"_a, "limit"_a, "curve"_a.none(), "droop"_a)
         .def("check", &TrainDescription::check)
         .def_prop_rw(
             "short_form", [](const TrainDescription& t) { return t.train.short_form; },

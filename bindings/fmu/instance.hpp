@@ -185,7 +185,8 @@ class Instance {
         end_ = inputs_;
         for (std::size_t k = 0; k < end_.size(); ++k) end_[k] += rates_[k] * interval;
         const std::vector<lm_motion> motions = motions_over(interval);
-        lm_hold(simulation_.get(), inputs_.data());  // the first step begins with the acceleration of its inputs
+        // The first step begins with the acceleration of its inputs.
+        if (!motions.empty()) lm_hold(simulation_.get(), inputs_.data());
         if (lm_advance_motion(simulation_.get(), interval, inputs_.data(), end_.data(), motions.data(),
                               motions.size()) != LM_OK)
             return failed();

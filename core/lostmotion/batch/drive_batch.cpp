@@ -27,9 +27,9 @@ model::Train Models::train(std::size_t m) const {
     return t;
 }
 
-double Models::number(std::size_t m, const char* key, double of_base) const {
+int Models::place(const char* key) const {
     const auto at = std::ranges::find(keys, key);
-    return at == keys.end() ? of_base : row(m)[at - keys.begin()];
+    return at == keys.end() ? -1 : static_cast<int>(at - keys.begin());
 }
 
 // What a thread keeps: general solvers of some models.
@@ -119,7 +119,9 @@ DriveBatch::DriveBatch(Models models, std::vector<int> model_of, double step)
       drives_(model_of_.size()),
       inputs_(model_of_.size()),
       states_(model_of_.size() * D::states),
-      tables_(models_.size()) {}
+      tables_(models_.size()),
+      rated_output_torque_(models_.place("gearbox.rated_output_torque")),
+      rated_input_speed_(models_.place("gearbox.rated_input_speed")) {}
 
 DriveBatch::~DriveBatch() {
     team_.reset();
@@ -180,16 +182,12 @@ void DriveBatch::step_range(std::size_t begin, std::size_t end, const Input& com
             const Models& all = batch_.models_;
             const model::Gear& gear = all.bases[static_cast<std::size_t>(all.base[model])].gears[0];
             const int s = label.modes[static_cast<std::size_t>(of.input_contact)];
-            const double rated = gear.efficiencies
-                                     ? 1.0
-                                     : all.number(model, "gearbox.rated_output_torque", gear.law.rated_output_torque),
-                         mu = gear.sense() * T_2 / rated,
-                         v = std::fabs(speed) /
-                             all.number(model, "gearbox.rated_input_speed", gear.law.rated_input_speed);
-            label.branch[static_cast<std::size_t>(of.cell)] =
-                static_cast<std::int16_t>(s == 0 ? gear.load_interval(mu) : gear.loss_cell(s * mu, v));
-            label.branch[static_cast<std::size_t>(of.cell_back)] =
-                static_cast<std::int16_t>(s == 0 ? gear.load_interval(-mu) : 0);
+            const double rated =
+                gear.efficiencies ? 1.0 : all.number(model, batch_.rated_output_torque_, gear.law.rated_output_torque);
+            const double rated_speed = all.number(model, batch_.rated_input_speed_, gear.law.rated_input_speed);
+            const auto cells = gear.loss_cells(s, gear.sense() * T_2 / rated, speed, rated_speed);
+            label.branch[static_cast<std::size_t>(of.cell)] = cells[0];
+            label.branch[static_cast<std::size_t>(of.cell_back)] = cells[1];
         }
         std::size_t model = 0;
 
@@ -216,9 +214,8 @@ void DriveBatch::step_range(std::size_t begin, std::size_t end, const Input& com
                 const GuardBlock& g = r->guards(b);
                 const Four constant = g.form.constant(d.memory, u);
                 const Four first = constant + g.form.of_state(x), last = constant + g.form.of_state(to);
-                const Four apart = sum_in_fours<D::coupled>([&](auto j) __attribute__((always_inline)) {
-                    return size.template spread<j>() * load<D>(g.departure[j]);
-                });
+                const Four apart = sum_in_fours<D::coupled>(
+                    [&](auto j) ALWAYS_INLINE { return size.template spread<j>() * load<D>(g.departure[j]); });
                 clear = clear && above(least_of(first, last), apart) == 15u;
             }
             if (clear) [[likely]] {

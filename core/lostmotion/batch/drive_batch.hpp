@@ -38,8 +38,9 @@ struct Models {
     }
     const double* row(std::size_t m) const { return values.data() + m * width(); }
     model::Train train(std::size_t m) const;
-    // The number under a key, or that of the base.
-    double number(std::size_t m, const char* key, double of_base) const;
+    // The index of a key; -1 if all models have the number of their base.
+    int place(const char* key) const;
+    double number(std::size_t m, int place, double of_base) const { return place < 0 ? of_base : row(m)[place]; }
 };
 
 // How many steps have been made, and how.
@@ -137,6 +138,7 @@ class DriveBatch {
     std::vector<Inputs> inputs_;  // of the last step
     std::vector<double> states_;
     std::vector<std::atomic<RegimeTable*>> tables_;  // of each model
+    int rated_output_torque_, rated_input_speed_;    // places of these keys
     std::mutex adding_;
     std::vector<std::unique_ptr<Worker>> workers_;
     std::unique_ptr<Team> team_;

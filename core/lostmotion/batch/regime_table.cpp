@@ -1,45 +1,18 @@
 #include "regime_table.hpp"
 
+#include <algorithm>
+
+#include "../kernel/propagator.hpp"
+
 namespace lostmotion::batch {
 
 namespace {
 
 using Matrix = MatrixOf<D>;
 
-constexpr double series_norm = 2.0;   // |A| times the series' length at most, in scaled units
-constexpr double sample_norm = 0.25;  // the same of what lies between two samples
-constexpr int fewest_halvings = 3, most_halvings = 10;
-
-// G(d) and its integral from 0 to d, from their Taylor series.
-struct Flow {
-    Matrix G, integral, E;  // E = exp(A d) - 1
-    double length;
-
-    Flow(const Matrix& A, double d) : length(d) {
-        Matrix power = Matrix::identity();  // A^k d^k / k!
-        for (int k = 0; k < 20; ++k) {
-            G.add(d / (k + 1), power);
-            integral.add(d * d / ((k + 1) * (k + 2)), power);
-            power = A * power;
-            power.scale(d / (k + 1));
-        }
-        E = A * G;
-    }
-    // To twice the length.
-    void twice() {
-        Matrix I = E * integral;
-        I.add(2.0, integral);
-        I.add(length, G);
-        Matrix doubled = E * G;
-        doubled.add(2.0, G);
-        Matrix change = E * E;
-        change.add(2.0, E);
-        integral = I;
-        G = doubled;
-        E = change;
-        length *= 2.0;
-    }
-};
+// The base interval of the propagator is what may lie between two samples; the series of the motion is eight times as
+// long at most.
+constexpr int series_doublings = 3, fewest_halvings = 3, most_halvings = 10;
 
 // Bound, entry by entry, on how far G departs from its secant over a length d.
 Matrix secant_bound(const Matrix& A, double d) {
@@ -67,23 +40,23 @@ bool can_fall(const model::PackedGuard<D>& guard) {
 }
 
 // R of each guard.
-void set_departures(const model::PackedRegime<D>& r, const Matrix& A, double h, int halvings, RegimeTable& out) {
+void set_departures(const model::PackedRegime<D>& r, Propagator<D>& flow, double h, int halvings, RegimeTable& out) {
     const int samples = 1 << halvings;
     const double d = h / samples;
-    const Flow part(A, d);
+    const Matrix &A = flow.rates().rate, over_part = flow.integral(d).coupled, change = A * over_part;
     const Matrix bound = secant_bound(A, d), &end = out.G;
     std::array<Four, D::guards> before{}, most{};
     Matrix G;
     for (int j = 0; j < samples; ++j) {
-        Matrix flow = A * G;
-        flow.add(1.0, Matrix::identity());
-        Matrix next = part.E * G;
+        Matrix exponential = A * G;
+        exponential.add(1.0, Matrix::identity());
+        Matrix next = change * G;
         next.add(1.0, G);
-        next.add(1.0, part.G);
+        next.add(1.0, over_part);
         for (int g = 0; g < r.n_guards; ++g) {
             const Four C = row_of(r.guards[g].form);
             const Four here = absolute(next.after(C) + (-(j + 1.0) / samples) * end.after(C));
-            const Four between = bound.after(absolute(flow.after(C)));
+            const Four between = bound.after(absolute(exponential.after(C)));
             most[g] = max_of(most[g], max_of(before[g], here) + between);
             before[g] = here;
         }
@@ -152,32 +125,23 @@ RegimeTable::Owned tabulate(const model::Assembly& assembly, const Label& label,
     if (gear.law.has_hysteresis()) details.hysteresis = 0.5 * (1.0 - gear.law.hysteresis_efficiency);
     if (!is_plain(r)) return made;
     const LinearRatesOf<D> rates(r.rate);
-    const Matrix& A = rates.rate;
     State scale;
     scale.fill(1.0);
     model::balanced_scale(assembly, scale, D::coupled);
-    double norm = 0.0;
-    for (int i = 0; i < D::coupled; ++i) {
-        double sum = 0.0;
-        for (int k = 0; k < D::coupled; ++k) sum += std::fabs(A(i, k)) * scale[k] / scale[i];
-        norm = std::fmax(norm, sum);
-    }
-    const auto halvings_to = [&](double most, int halvings) {
-        while (halvings <= most_halvings && !(norm * std::ldexp(h, -halvings) <= most)) ++halvings;
-        return halvings;
-    };
-    const int halvings = halvings_to(series_norm, 0), sample_halvings = halvings_to(sample_norm, fewest_halvings);
-    if (sample_halvings > most_halvings) return made;
+    PhaseRotations constant_inputs(h, {});
+    Propagator<D> flow;
+    flow.prepare(rates, constant_inputs, scale);
+    const int halvings = flow.level_of(h);
+    if (!flow.resolved() || halvings > most_halvings) return made;
     out.plain = true;
     details.at_rest = r.at_rest;
     for (std::size_t k = 0; k < D::coupled; ++k) out.rate.set(k, r.rate[k]);
-    out.series_step = std::ldexp(h, -halvings);
-    Flow flow(A, std::ldexp(h, -sample_halvings));
-    for (int k = 0; k < sample_halvings; ++k) flow.twice();
-    out.G = flow.G;
+    out.series_step = std::ldexp(h, -std::max(0, halvings - series_doublings));
+    const IntegralOf<D> whole = flow.integral(h);
+    out.G = whole.coupled;
+    out.angle = whole.angle[0];
     out.angle_speed = static_cast<std::int8_t>(rates.angle_speed[0]);
     out.angle_coefficient = rates.angle_coefficient[0];
-    for (int k = 0; k < D::coupled; ++k) out.angle[k] = out.angle_coefficient * flow.integral(out.angle_speed, k);
     for (int g = 0; g < 4 * out.n_blocks; ++g) {
         if (g < r.n_guards && can_fall(r.guards[g]))
             out.guards(g / 4).form.set(g % 4, r.guards[g].form);
@@ -189,7 +153,7 @@ RegimeTable::Owned tabulate(const model::Assembly& assembly, const Label& label,
                                                      static_cast<std::int8_t>(guard.branch),
                                                      static_cast<std::int16_t>(guard.neighbour)};
     }
-    set_departures(r, A, h, sample_halvings, out);
+    set_departures(r, flow, h, std::max(halvings, fewest_halvings), out);
     set_stops(assembly, r, details);
     return made;
 }

@@ -69,8 +69,8 @@ struct Forms {
                (u[0] * load<D>(input[0]) + u[1] * load<D>(input[1]));
     }
     [[gnu::always_inline]] Four of_state(const Four& x) const {
-        return sum_in_fours<D::coupled>(
-            [&](auto k) __attribute__((always_inline)) { return x.template spread<k>() * load<D>(state[k]); });
+        return sum_in_fours<D::coupled>([&](auto k)
+                                            ALWAYS_INLINE { return x.template spread<k>() * load<D>(state[k]); });
     }
     // Sums of the magnitudes of the terms.
     Four magnitude_of_state(const Four& size) const {

@@ -30,9 +30,8 @@ struct Firmware {
     void describe(Fields& f) {
         f.number({"supply_voltage", "U_0", "V", Range::positive, Given::needed, "U_0, without current"},
                  supply_voltage);
-        f.number(
-            {"resistance", "R", "ohm", Range::positive, Given::needed, "R of the winding, with that of the bridge"},
-            resistance);
+        f.number({"resistance", "R", "ohm", Range::positive, Given::needed, "R of the winding and of the bridge"},
+                 resistance);
         f.number({"torque_constant", "k", "N*m/A", Range::positive, Given::needed, "k of the motor, at its own shaft"},
                  torque_constant);
         f.number({"supply_resistance", "R_s", "ohm", Range::not_negative, Given::has_default,

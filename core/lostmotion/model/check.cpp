@@ -86,11 +86,7 @@ std::string TrainCheck::controllers() const {
             c.D.size() != m || c.back_calculation.size() != n)
             return name + " has matrices that do not fit its states and signals";
         if (!(c.limit > 0.0)) return name + " has a limit that is not above 0";
-        if (c.curve_in.size() != c.curve_out.size() || c.curve_in.size() == 1 ||
-            (c.curved() && (c.curve_in[0] != 0.0 || c.curve_out[0] != 0.0)) ||
-            std::adjacent_find(c.curve_in.begin(), c.curve_in.end(), std::greater_equal<>()) != c.curve_in.end())
-            return name + " has a curve that does not rise from (0, 0) by two points or more";
-        if (std::string error = too_fine(name + " with its curve", static_cast<int>(c.curve_in.size())); !error.empty())
+        if (std::string error = too_fine(name + " with its curve", c.curve.outermost_piece() + 1); !error.empty())
             return error;
         for (const LinearController::Signal& s : c.signals)
             if (!exists(s.shaft)) return name + " takes the angle or speed of a shaft that the train does not have";
@@ -237,9 +233,9 @@ std::string TrainCheck::inertias() const {
 // The speed of a shaft without inertia follows from dampers: nothing dry may depend on it, and one damper at least has
 // to act in all states of the gears.
 std::string TrainCheck::massless() const {
+    if (Places(train_).massless.empty()) return {};
     const Assembly a(train_);
     const Places& places = a.places();
-    if (places.massless.empty()) return {};
     const auto remedy = [&](int s) {
         return "; give it an inertia (" + harmless_inertia(s) + " is harmless beside its neighbours)";
     };

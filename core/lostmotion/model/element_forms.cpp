@@ -128,10 +128,7 @@ auto ElementForms::controller_input(int k) const -> Row {
 auto ElementForms::controller_output(int k, const Key& key) const -> Row {
     const LinearController& c = train_.controllers[k];
     Row v = controller_input(k);
-    if (c.curved()) {
-        const int piece = key.branch[places_.controllers[k].piece];
-        v = c.slope(piece) * v + terms_.one(c.offset(piece));
-    }
+    if (c.curved) v = on_piece(terms_, v, c.curve, key.branch[places_.controllers[k].piece]);
     if (c.droop != 0.0) v -= terms_.state(places_.shafts[train_.motors[c.motor].shaft].speed, c.droop);
     return v;
 }

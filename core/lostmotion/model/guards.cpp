@@ -291,27 +291,13 @@ void RegimeGuards::add_coupling_pieces() {
 void RegimeGuards::add_output_limits() {
     for (std::size_t k = 0; k < train_.controllers.size(); ++k) {
         const int branch = places_.controllers[k].branch;
-        if (places_.controllers[k].piece != nowhere) add_curve_pieces(static_cast<int>(k));
+        if (const int piece = places_.controllers[k].piece; piece != nowhere)
+            add_piece_guards(terms_, forms_.controller_input(static_cast<int>(k)), train_.controllers[k].curve, piece,
+                             regime_.key, regime_.guards);
         if (branch == nowhere) continue;
         const double most = train_.controllers[k].limit;
         add_limit_guards(terms_, forms_.controller_output(static_cast<int>(k), regime_.key), -most, most, regime_.key,
                          {.kind = Guard::edge, .branch = branch}, regime_.guards);
-    }
-}
-
-void RegimeGuards::add_curve_pieces(int controller) {
-    const LinearController& c = train_.controllers[static_cast<std::size_t>(controller)];
-    const int branch = places_.controllers[static_cast<std::size_t>(controller)].piece;
-    const int piece = regime_.key.branch[branch], k = std::abs(piece);
-    const Row in = forms_.controller_input(controller);
-    for (const int side : {+1, -1}) {
-        if (piece * side < 0) continue;
-        if (k + 1 < static_cast<int>(c.curve_in.size()))
-            add(terms_.one(c.curve_in[static_cast<std::size_t>(k + 1)]) - double(side) * in, Guard::edge, nowhere,
-                branch, side * (k + 1));
-        if (k > 0)
-            add(double(side) * in - terms_.one(c.curve_in[static_cast<std::size_t>(k)]), Guard::edge, nowhere, branch,
-                side * (k - 1));
     }
 }
 

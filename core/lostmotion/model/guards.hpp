@@ -44,7 +44,6 @@ class RegimeGuards {
     void add_input_limits();
     void add_coupling_pieces();
     void add_output_limits();
-    void add_curve_pieces(int controller);
 
     Guard& add(const Row& form, Guard::Kind kind, int contact, int branch, int neighbour);
 

@@ -11,13 +11,34 @@
 // replaced by contact with the same mean torque: a clock runs for the sum of their durations, and then they touch.
 #pragma once
 
+#include <numeric>
+
+#include "../kernel/elimination.hpp"
 #include "switched_train.hpp"
 
 namespace lostmotion::model {
 
+// A row of linear equations: coefficients of the unknowns, then right sides.
+struct ImpactRow {
+    std::vector<double> c;
+    friend ImpactRow operator/(ImpactRow row, double a) {
+        for (double& v : row.c) v /= a;
+        return row;
+    }
+};
+// Solves for as many unknowns as there are rows; their values take the place of the right sides. False: there is no
+// unique solution.
+inline bool solve_impacts(std::vector<ImpactRow>& rows) {
+    std::vector<std::size_t> unknowns(rows.size());
+    std::iota(unknowns.begin(), unknowns.end(), std::size_t{0});
+    return eliminate(rows, unknowns, rows.size(), [](ImpactRow& f, double factor, const ImpactRow& row) {
+        for (std::size_t k = 0; k < f.c.size(); ++k) f.c[k] -= factor * row.c[k];
+    });
+}
+
 template <class Sizes>
 template <class Now>
-auto SwitchedTrain<Sizes>::strike(Now& now, const Key& key, int contact, double restitution) const -> Strike {
+auto SwitchedTrain<Sizes>::strike(Now& now, const Key& key, int contact, double restitution) const -> MovedShafts {
     constexpr double few_roundings = 8.0 * std::numeric_limits<double>::epsilon();
     std::array<std::int8_t, max_contacts> modes{};
     for (int c = 0; c < contacts(); ++c) modes[c] = places().contacts[c].bilateral ? 0 : 1;
@@ -52,46 +73,42 @@ auto SwitchedTrain<Sizes>::strike(Now& now, const Key& key, int contact, double 
         f.target = -e * std::fmax(f.before, 0.0);
         flanks.push_back(std::move(f));
     }
-    // M^-1 G^T, a column for each of the flanks.
-    std::vector<std::vector<double>> moves(flanks.size());
-    for (std::size_t f = 0; f < flanks.size(); ++f) {
-        std::vector<std::vector<double>> M(n, std::vector<double>(n + 1));
-        for (std::size_t k = 0; k < n; ++k) {
-            for (int s = 0; s < shafts; ++s) {
-                const double to = share(s, free[k]);
-                if (to == 0.0) continue;
-                for (std::size_t l = 0; l < n; ++l) {
-                    M[k][l] += to * places().shafts[s].inertia * share(s, free[l]);
-                    places().each_coupled_inertia(s, [&](int t, double J) { M[k][l] += to * J * share(t, free[l]); });
-                }
+    // M, and M^-1 G^T as columns behind it, one for each of the flanks.
+    std::vector<ImpactRow> moves(n);
+    for (std::size_t k = 0; k < n; ++k) {
+        std::vector<double>& row = moves[k].c;
+        row.assign(n, 0.0);
+        for (int s = 0; s < shafts; ++s) {
+            const double to = share(s, free[k]);
+            if (to == 0.0) continue;
+            for (std::size_t l = 0; l < n; ++l) {
+                row[l] += to * places().shafts[s].inertia * share(s, free[l]);
+                places().each_coupled_inertia(s, [&](int t, double J) { row[l] += to * J * share(t, free[l]); });
             }
-            M[k][n] = flanks[f].per[k];
         }
-        moves[f] = solve_positive(M);
+        for (const Flank& f : flanks) row.push_back(f.per[k]);
     }
+    solve_impacts(moves);
     const auto by = [&](std::size_t a, std::size_t b) {
         double sum = 0.0;
-        for (std::size_t k = 0; k < n; ++k) sum += flanks[a].per[k] * moves[b][k];
+        for (std::size_t k = 0; k < n; ++k) sum += flanks[a].per[k] * moves[k].c[n + b];
         return sum;
     };
-    Strike out;
-    out.impulse.assign(static_cast<std::size_t>(contacts()), 0.0);
     std::vector<double> P(flanks.size());
     for (unsigned active = 0; active < 1u << flanks.size(); ++active) {
         std::vector<std::size_t> of;
         for (std::size_t f = 0; f < flanks.size(); ++f)
             if (active >> f & 1) of.push_back(f);
-        std::vector<std::vector<double>> W(of.size(), std::vector<double>(of.size() + 1));
+        std::vector<ImpactRow> W(of.size());
         for (std::size_t a = 0; a < of.size(); ++a) {
-            for (std::size_t b = 0; b < of.size(); ++b) W[a][b] = by(of[a], of[b]);
-            W[a][of.size()] = flanks[of[a]].before - flanks[of[a]].target;
+            for (const std::size_t b : of) W[a].c.push_back(by(of[a], b));
+            W[a].c.push_back(flanks[of[a]].before - flanks[of[a]].target);
         }
-        const std::vector<double> impulse = solve_positive(W);
+        bool holds = solve_impacts(W);
         std::fill(P.begin(), P.end(), 0.0);
-        bool holds = true;
         for (std::size_t a = 0; a < of.size(); ++a) {
-            P[of[a]] = impulse[a];
-            holds = holds && impulse[a] >= 0.0;
+            P[of[a]] = W[a].c.back();
+            holds = holds && P[of[a]] >= 0.0;
         }
         for (std::size_t f = 0; f < flanks.size() && holds; ++f) {
             if (active >> f & 1) continue;
@@ -104,26 +121,26 @@ auto SwitchedTrain<Sizes>::strike(Now& now, const Key& key, int contact, double 
         }
         if (holds) break;
     }
+    MovedShafts moved{};
     for (std::size_t f = 0; f < flanks.size(); ++f) {
         if (P[f] == 0.0) continue;
         const ContactPlace& p = places().contacts[flanks[f].contact];
-        out.impulse[static_cast<std::size_t>(flanks[f].contact)] = P[f];
         now.memory[places().gears[static_cast<std::size_t>(p.element)].impact_loss] +=
             0.5 * (flanks[f].before + flanks[f].target) * P[f];
         for (int s = 0; s < shafts; ++s)
             for (std::size_t k = 0; k < n; ++k) {
-                const double change = share(s, free[k]) * moves[f][k] * P[f];
+                const double change = share(s, free[k]) * moves[k].c[n + f] * P[f];
                 now.x[places().shafts[s].speed] -= change;
-                out.moved[static_cast<std::size_t>(s)] = out.moved[static_cast<std::size_t>(s)] || change != 0.0;
+                moved[static_cast<std::size_t>(s)] = moved[static_cast<std::size_t>(s)] || change != 0.0;
             }
     }
-    return out;
+    return moved;
 }
 
 // The regime after a strike. past: what was before it.
 template <class Sizes>
 template <class Cache, class Now>
-Found SwitchedTrain<Sizes>::find_after(Cache& cache, Now& now, const Strike& s, Event event, const Now& past,
+Found SwitchedTrain<Sizes>::find_after(Cache& cache, Now& now, const MovedShafts& struck, Event event, const Now& past,
                                        Key& key) const {
     constexpr double few_roundings = 8.0 * std::numeric_limits<double>::epsilon();
     const Rest before = event.at_rest;
@@ -133,7 +150,7 @@ Found SwitchedTrain<Sizes>::find_after(Cache& cache, Now& now, const Strike& s, 
         bool moved = false;
         double speed = 0.0, size = 0.0;
         p.each_shaft([&](int shaft, double per) {
-            moved = moved || s.moved[static_cast<std::size_t>(shaft)];
+            moved = moved || struck[static_cast<std::size_t>(shaft)];
             speed += per * now.x[places().shafts[shaft].speed];
             size += std::fabs(per * now.x[places().shafts[shaft].speed]) +
                     std::fabs(per * past.x[places().shafts[shaft].speed]);
@@ -218,7 +235,7 @@ Found SwitchedTrain<Sizes>::strikes(Cache& cache, Now& now, const G& fired, Key&
     const Key key_apart = key;
     now = past;
     key = from;
-    const Strike all = strike(now, key, contact, 0.0);
+    const MovedShafts all = strike(now, key, contact, 0.0);
     clock = left;
     found = find_after(cache, now, all, event, past, key);
     if (found == Found::yes && key.modes[contact] == 0) return found;

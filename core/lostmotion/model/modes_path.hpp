@@ -32,7 +32,7 @@ bool SwitchedTrain<Sizes>::conditions(Cache& cache, Now now, const Key& modes, c
             out[guard.contact][guard.neighbour + 1] =
                 clear(along.rate(guard.form, 1), along.rate_magnitude(guard.form, 1));
         else if (guard.kind == Guard::impact && event.at_rest[guard.contact] && !r.at_rest[guard.contact]) {
-            // Of the two ends of the gap, that where the flanks are.
+            // Two guards, one for each end of the gap: the flanks are at the end whose form is zero.
             if (evaluate(n_, guard.form, now) == 0.0)
                 out[guard.contact][1] = clear(along.rate(guard.form, 2), along.rate_magnitude(guard.form, 2));
         } else if (guard.kind == Guard::speed && event.at_rest[guard.contact] && !r.at_rest[guard.contact])

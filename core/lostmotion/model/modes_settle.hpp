@@ -62,7 +62,8 @@ void SwitchedTrain<Sizes>::locate(const Now& now, Key& trial) const {
     for (std::size_t k = 0; k < train().controllers.size(); ++k) {
         const auto [branch, piece] = std::pair(places().controllers[k].branch, places().controllers[k].piece);
         const LinearController& c = train().controllers[k];
-        if (piece != nowhere) set(piece, c.piece(value_of(now, assembly_.controller_input(static_cast<int>(k)))));
+        if (piece != nowhere)
+            set(piece, c.curve.locate(value_of(now, assembly_.controller_input(static_cast<int>(k)))));
         if (branch != nowhere)
             set(branch,
                 side_of(value_of(now, assembly_.controller_output(static_cast<int>(k), trial)), -c.limit, c.limit));
@@ -80,9 +81,10 @@ void SwitchedTrain<Sizes>::locate_losses(const Now& now, const std::array<double
         const GearPlace& p = places().gears[g];
         const int s = trial.modes[places().shafts[gear.input].contact];
         const double mu = gear.sense() * T_2[g] / gear.rated_torque();
-        const double v = std::fabs(now.x[places().shafts[gear.input].speed]) / gear.law.rated_input_speed;
-        trial.branch[p.cell] = static_cast<std::int16_t>(s == 0 ? gear.load_interval(mu) : gear.loss_cell(s * mu, v));
-        trial.branch[p.cell_back] = static_cast<std::int16_t>(s == 0 ? gear.load_interval(-mu) : 0);
+        const double speed = now.x[places().shafts[gear.input].speed];
+        const auto cells = gear.loss_cells(s, mu, speed, gear.law.rated_input_speed);
+        trial.branch[p.cell] = cells[0];
+        trial.branch[p.cell_back] = cells[1];
     }
 }
 

@@ -215,7 +215,7 @@ void Places::place_memory_and_branches(const Train& train) {
     }
     for (std::size_t k = 0; k < controllers.size(); ++k) {
         if (train.controllers[k].limited()) controllers[k].branch = next++;
-        if (train.controllers[k].curved()) controllers[k].piece = next++;
+        if (train.controllers[k].curved) controllers[k].piece = next++;
     }
 }
 

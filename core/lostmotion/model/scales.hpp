@@ -28,7 +28,7 @@ void controller_scale(const Assembly& a, int controller, double of_output, State
                                                                             : 0.0;
             driven = std::fmax(driven, std::fabs(c.B[j][k]) * size);
         }
-        const double gain = std::fabs(c.C[j]) * c.steepest();
+        const double gain = std::fabs(c.C[j]) * (c.curved ? c.curve.max_slope() : 1.0);
         const double size = driven > 0.0 && gain > 0.0 ? std::sqrt(driven * of_output / gain)
                             : gain > 0.0               ? of_output / gain
                                                        : driven;

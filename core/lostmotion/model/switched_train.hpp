@@ -25,7 +25,6 @@
 #include "held_torque.hpp"
 #include "motion.hpp"
 #include "scales.hpp"
-#include "small_solve.hpp"
 
 namespace lostmotion::model {
 
@@ -207,12 +206,9 @@ class SwitchedTrain {
         return out;
     }
     // Impacts of rigid flanks: modes_impact.hpp.
-    struct Strike {
-        std::vector<double> impulse;  // of each contact [N m s]
-        std::array<bool, max_shafts> moved{};
-    };
+    using MovedShafts = std::array<bool, max_shafts>;
     template <class Now>
-    Strike strike(Now& now, const Key& key, int contact, double restitution) const;
+    MovedShafts strike(Now& now, const Key& key, int contact, double restitution) const;
     template <class Now>
     double speed_of(int contact, const Now& now) const {
         double speed = 0.0;
@@ -223,7 +219,7 @@ class SwitchedTrain {
     template <class Cache, class Now, class G>
     Found strikes(Cache& cache, Now& now, const G& fired, Key& key) const;
     template <class Cache, class Now>
-    Found find_after(Cache& cache, Now& now, const Strike& s, Event event, const Now& past, Key& key) const;
+    Found find_after(Cache& cache, Now& now, const MovedShafts& struck, Event event, const Now& past, Key& key) const;
     template <class E, class Now>
     double time_to_rest(const E& e, const Now& now, int contact) const;
 

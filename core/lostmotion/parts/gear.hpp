@@ -1,7 +1,9 @@
 // A gear between two shafts of a train: ratio, compliance and loss law of a gearbox, and what a train adds to it.
 #pragma once
 
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <optional>
 #include <string>
@@ -93,6 +95,12 @@ struct Gear {
     }
     int loss_cell(double mu, double v) const {
         return with_losses([&](const auto& m) { return m.triangle(mu, v); });
+    }
+    // The cells of both directions at a relative torque and an input speed [rad/s], while the input shaft turns by s.
+    std::array<std::int16_t, 2> loss_cells(int s, double mu, double speed, double rated_speed) const {
+        if (s == 0)
+            return {static_cast<std::int16_t>(load_interval(mu)), static_cast<std::int16_t>(load_interval(-mu))};
+        return {static_cast<std::int16_t>(loss_cell(s * mu, std::fabs(speed) / rated_speed)), 0};
     }
     int load_interval(double mu) const {
         return with_losses([&](const auto& m) { return m.load_interval(mu); });

@@ -11,11 +11,11 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
-#include <cstdlib>
 #include <limits>
 #include <string>
 #include <vector>
+
+#include "torsion_curve.hpp"
 
 namespace lostmotion::model {
 
@@ -39,33 +39,9 @@ struct LinearController {
     std::vector<double> C, D, back_calculation;
     double limit = std::numeric_limits<double>::infinity();  // of |u|
 
-    // Points of the curve from (0, 0) on, beyond the last of which it is constant; none: a line of slope 1.
-    std::vector<double> curve_in, curve_out;
+    bool curved = false;  // whether there is the curve; else it is a line of slope 1
+    TorsionCurve curve;
     double droop = 0.0;  // [s/rad]
-
-    bool curved() const { return !curve_in.empty(); }
-    // Number of a piece, with the sign of its side; that about 0 belongs to both.
-    int piece(double in) const {
-        int k = 0;
-        while (k + 1 < static_cast<int>(curve_in.size()) && std::fabs(in) > curve_in[at(k + 1)]) ++k;
-        return in < 0.0 ? -k : k;
-    }
-    double slope(int piece) const {
-        const std::size_t k = at(std::abs(piece));
-        if (k + 1 >= curve_in.size()) return 0.0;
-        return (curve_out[k + 1] - curve_out[k]) / (curve_in[k + 1] - curve_in[k]);
-    }
-    // What a piece adds to its slope times the input.
-    double offset(int piece) const {
-        const std::size_t k = at(std::abs(piece));
-        const double beyond = curve_out[k] - slope(piece) * curve_in[k];
-        return piece < 0 ? -beyond : beyond;
-    }
-    double steepest() const {
-        double most = curved() ? 0.0 : 1.0;
-        for (int k = 0; k < static_cast<int>(curve_in.size()); ++k) most = std::max(most, std::fabs(slope(k)));
-        return most;
-    }
 
     bool limited() const { return limit < std::numeric_limits<double>::infinity(); }
     bool takes(Signal::Kind kind) const {
@@ -76,9 +52,6 @@ struct LinearController {
                            [shaft](const Signal& s) { return s.kind == Signal::angle && s.shaft == shaft; }) ||
                (compared.kind == Signal::angle && compared.shaft == shaft);
     }
-
- private:
-    static std::size_t at(int k) { return static_cast<std::size_t>(k); }
 };
 
 }  // namespace lostmotion::model

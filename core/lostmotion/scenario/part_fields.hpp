@@ -173,8 +173,7 @@ void describe(F& f, LinearController& c) {
     f.list("D", c.D);
     f.list("back_calculation", c.back_calculation);
     f.number("limit", c.limit, Range::limit);
-    f.list("curve_in", c.curve_in, Range::not_negative);
-    f.list("curve_out", c.curve_out);
+    f.curve_if("curve", c.curved, c.curve);
     f.number("droop", c.droop, Range::not_negative);
 }
 

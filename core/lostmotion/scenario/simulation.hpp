@@ -95,7 +95,7 @@ class ScenarioSimulation {
         std::size_t speed_input, acceleration_input;
         int angle, speed, acceleration;  // -1: there is no such variable
     };
-    // Of a name; nothing if the motion of no such shaft is given.
+    // The shaft of this name if its motion is given.
     std::optional<GivenShaft> given_shaft(const std::string& name) const;
     struct GivenCourse {
         GivenShaft shaft;
