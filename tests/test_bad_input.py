@@ -689,7 +689,7 @@ def test_damaged_result_files_are_refused(tmp_path: Path) -> None:
 
 
 def test_an_error_carries_keys_and_reasons_as_data(tmp_path: Path) -> None:
-    """What a caller needs is no part of a sentence: keys, reasons, file and the number of problems that are not told."""
+    """Errors have keys, reasons, the file and the number of further problems as data."""
     with pytest.raises(lm.InputError) as one:
         lm.Load(inertia=-1.0)
     assert [(p.keys, p.reason) for p in one.value.problems] == [(("inertia",), "-1.0 must be greater than 0")]

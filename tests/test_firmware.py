@@ -163,7 +163,7 @@ def test_gears_that_reverse_the_motion_reverse_the_torque() -> None:
 
 @pytest.mark.parametrize("make", [sampled, continuous])
 def test_each_limit_acts(make: Any) -> None:
-    """The largest torque is that of the largest current, and of the motor where that is less."""
+    """The largest current limits the torque, or the motor does if its limit is lower."""
     for motor, most in (({}, 3.5 * 0.6), ({"torque_limit": 1.5}, 1.5)):
         run = lm.simulate(axis(make(SERVO), **motor))
         assert run["servo_torque"].values.max() == pytest.approx(most, rel=1e-12)

@@ -91,7 +91,7 @@ def test_with_backlash_before_the_node_it_follows_the_other_damper_through_the_g
         scale = float(np.abs(result[name].values).max())
         np.testing.assert_allclose(other[name].values, result[name].values, rtol=0.0, atol=1e-6 * scale, err_msg=name)
     assert abs(lm.energy_of(result)["residual"]) < 1e-11 * lm.energy_of(result)["turned_over"]
-    # In the gap the balance of the node is that of the second stage: k_2 d_2 + c_2 (w/2 - w_b) = 0.
+    # In the gap only the second stage acts on the node: k_2 d_2 + c_2 (w/2 - w_b) = 0.
     free = np.abs(result["first_twist"].values) < 0.005 - 1e-9
     assert free.sum() > 20
     expected = 2.0 * (result["b_speed"].values - SECOND["k"] / SECOND["c"] * result["second_twist"].values)

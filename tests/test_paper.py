@@ -218,7 +218,7 @@ def test_figure_data_are_the_runs(report: tuple[Path, int]) -> None:
 
 
 def test_differences_are_those_of_the_runs(report: tuple[Path, int]) -> None:
-    """In the figures of curves that coincide, and the hysteresis of the small loop is the torque without that of the spring."""
+    """Curves that coincide have a panel of their difference, and the small loop a panel without the torque of the spring."""
     linear, other = (
         lm.simulate(paper_scenario(model, "large"))["load_speed"].values for model in ("2-DOF-L", "1-DOF-L")
     )

@@ -332,9 +332,11 @@ class ContinuousController(Part):
         self._check_limits(motor, limit)
         system = self.system()
         per_unit = 1.0 if isinstance(self.current, VoltageCommand) else 1.0 / motor.rated_torque
-        curve_in, curve_out, droop = self._curve(train, name, shaft)
-        if curve_in:
-            per_unit = 1.0  # the curve takes the error
+        curve, droop = None, 0.0
+        if self.firmware is not None:
+            curve, droop = self._curve(self.firmware, motor)
+            turning = turns(train, motor.shaft, shaft)
+            per_unit = -1.0 if turning is not None and turning < 0.0 else 1.0  # the curve takes the error
         measured = "angle" if self.reference.kind == "position" else "speed"
         places = {"measured": (measured, shaft), "measured_rate": ("speed", shaft)}
         core.add_controller(
@@ -348,21 +350,21 @@ class ContinuousController(Part):
             (per_unit * system.D).tolist(),
             (system.back / per_unit).tolist(),
             limit,
-            curve_in,
-            [value / motor.rated_torque for value in curve_out],
-            droop / motor.rated_torque,
+            curve,
+            droop,
         )
 
-    def _curve(self, train: DriveTrain, name: str, shaft: str) -> tuple[list[float], list[float], float]:
-        """Torque of the motor over the error, and its fall with the speed of the motor; empty without a firmware."""
-        if self.firmware is None:
-            return [], [], 0.0
+    @staticmethod
+    def _curve(firmware: Firmware, motor: Motor) -> tuple[_core.TorsionCurve, float]:
+        """Command of the motor over the error, and its fall with the speed of the motor [s/rad]."""
         try:
-            errors, torques, droop = self.firmware.curve()
+            errors, torques, droop = firmware.curve()
         except InputError as problem:
             raise problem.inside("firmware") from None
-        turning = turns(train, train.motors[name].shaft, shaft)
-        return errors, [-t for t in torques] if turning is not None and turning < 0.0 else torques, droop
+        commands = [torque / motor.rated_torque for torque in torques]
+        points = zip(itertools.pairwise(errors), itertools.pairwise(commands), strict=True)
+        slopes = [(d - c) / (b - a) for (a, b), (c, d) in points]
+        return _core.TorsionCurve(errors[1:], [*slopes, 0.0]), droop / motor.rated_torque
 
 
 def _follow(kind: str) -> tuple[str, ...]:

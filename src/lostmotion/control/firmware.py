@@ -9,6 +9,7 @@ from ..errors import InputError
 from ..inputs.described import FirmwareFields
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, Limit, NotNegative, Number
+from ..reproducible import interpolate
 
 
 class DutyCurve(Part):
@@ -73,12 +74,7 @@ class Firmware(FirmwareFields):
             Torque [N·m].
         """
         beyond = max(abs(error) - self.dead_band, 0.0)
-        points = list(zip(self.duty.errors, self.duty.values, strict=True))
-        duty = points[-1][1]
-        for (e, d), (e_1, d_1) in itertools.pairwise(points):
-            if beyond <= e_1:
-                duty = d + (beyond - e) / (e_1 - e) * (d_1 - d)
-                break
+        duty = interpolate(beyond, self.duty.errors, self.duty.values)
         duty = duty if error >= 0.0 else -duty
         k = self.torque_constant
         current = (duty * self.supply_voltage - k * speed) / (self.resistance + duty * duty * self.supply_resistance)

@@ -7,6 +7,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from ..units.practical import printed
 from .schema import unit_in_schema
 
 
@@ -24,7 +25,7 @@ def table(part: BaseModel) -> str:
             )
             continue
         meaning = fields[name].get("description", "").replace("`", "")
-        cells = (name, _shown(value), (unit_in_schema(fields[name]) or "").replace("*", "·"), meaning)
+        cells = (name, _shown(value), printed(unit_in_schema(fields[name]) or ""), meaning)
         rows.append("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in cells) + "</tr>")
     return f"<div><code>{html.escape(repr(part))}</code><table>{''.join(rows)}</table></div>"
 

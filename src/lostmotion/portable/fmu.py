@@ -146,8 +146,9 @@ def export_fmu(
     resource = description.astype("<f8").tobytes()
     model = _model(scenario, parameters, hashlib.sha256(resource).hexdigest()[:32], references, motion_inputs)
     model = replace(model, identifier=identifier, has_sources=source)
-    content = source_files(directory / "sources", fmi, kernel, identifier, description, model.names()) if source else ()
-    sources = dict(content)
+    sources: dict[str, str] = {}
+    if source:
+        sources = dict(source_files(directory / "sources", fmi, kernel, identifier, description, model.names()))
     icon = (files("lostmotion") / "portable" / "icon.png").read_bytes()
 
     def write(to: Path) -> None:

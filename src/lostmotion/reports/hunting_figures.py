@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
-from ..units.practical import charted
+from ..units.practical import charted, printed
 from . import plots
 from .contours import contours
 from .looks import INK, MUTED, SMALLEST, map_colours
@@ -65,5 +65,5 @@ def _amplitude(found: xarray.Dataset) -> tuple[str, float]:
 def _label(key: xarray.DataArray) -> str:
     """The last two words of a dotted key in plain text, with its unit."""
     words = " ".join(str(key.attrs["long_name"]).split(".")[-2:]).replace("_", " ")
-    unit = str(key.attrs.get("units", "")).replace("*", "·")
+    unit = printed(str(key.attrs.get("units", "")))
     return words if unit in ("", "1") else f"{words} [{unit}]"

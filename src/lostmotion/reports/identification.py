@@ -18,6 +18,7 @@ from ..model.gear import Gear
 from ..model.losses import LossMap, MeshEfficiency, WormMesh, efficiency_map
 from ..simulation.train_scenario import TrainScenario
 from ..units.conversion import si_factor
+from ..units.practical import printed
 from .looks import FAINT, MEASURED, PALETTE, look
 from .page import Headline, Prose, Report, Table
 from .pages import table_csv, write_report, write_text
@@ -178,12 +179,12 @@ def parameter_rows(result: IdentificationResult) -> list[list[str]]:
     for name, p in result.task.parameters.items():
         value, interval = result.values[name], result.intervals.get(name)
         ends = (
-            ["", "", p.unit.replace("*", "·"), "given"]
+            ["", "", printed(p.unit), "given"]
             if interval is None
             else [
                 p.shown(interval.low),
                 p.shown(interval.high),
-                p.unit.replace("*", "·"),
+                printed(p.unit),
                 "; ".join(filter(None, (interval.method, interval.flag))),
             ]
         )
@@ -258,7 +259,7 @@ def _variables(result: IdentificationResult) -> dict[str, str]:
     assert result.rig is not None
     units = result.rig.units
     names = [*shape_variables(result.rig).values(), *(name for name in units if name.endswith("_twist"))]
-    return {name: f"{name} [{units[name].replace('*', '·')}]" for name in names}
+    return {name: f"{name} [{printed(units[name])}]" for name in names}
 
 
 def _overlays(
@@ -292,7 +293,7 @@ def _overlays(
 def _labelled(result: IdentificationResult, channel: str) -> str:
     """A channel with its unit."""
     unit = result.unit(channel)
-    return f"{channel} [{unit.replace('*', '·')}]" if unit else channel
+    return f"{channel} [{printed(unit)}]" if unit else channel
 
 
 def _clouds(

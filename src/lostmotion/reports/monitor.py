@@ -11,6 +11,7 @@ import numpy as np
 from ..identification.monitor import RESIDUAL, MonitorResult, Watched
 from ..identification.parameters import in_unit
 from ..units.conversion import si_factor
+from ..units.practical import printed
 from .looks import FAINT, PALETTE
 from .page import Headline, Prose, Report, Table
 from .pages import table_csv, write_report
@@ -108,7 +109,7 @@ def _row(result: MonitorResult, w: Watched) -> list[str]:
     def shown(value: float) -> str:
         return f"{value:.4g}" if p is None else p.shown(value)
 
-    unit = w.unit.replace("*", "·")
+    unit = printed(w.unit)
     if w.level is None or w.change is None:
         return [w.name, "", "", "", "", unit, "not decided", "not decided"]
     change = "none" if w.begins is None else f"since {result.logs[w.begins].log}"
@@ -160,7 +161,7 @@ def _trend(result: MonitorResult, w: Watched) -> Panel:
             Curve("low", at, low, ENDS, "_"),
             Curve("high", at, high, ENDS, "95 %"),
         ]
-        label = f"{w.name} [{w.unit.replace('*', '·') or '-'}]"
+        label = f"{w.name} [{printed(w.unit) or '-'}]"
     ends = np.array([at.min(), at.max()]) if len(at) else np.zeros(0)
     curves += [Curve(f"limit {x:g}", ends, np.full(len(ends), x), LIMIT) for x in _limits(result, w)]
     marks: tuple[Mark, ...] = ()

@@ -13,6 +13,7 @@ import numpy as np
 from ..atomic_writer import write_bytes
 from ..response.crossovers import characteristics
 from ..simulation.scenario import Scenario
+from ..units.practical import printed
 from .looks import step
 from .page import Headline, Prose, Report, Table
 from .pages import table_csv, write_report
@@ -58,7 +59,7 @@ MODELS: tuple[Any, ...] = ("-", "--", "-.", ":")
 def unit_of_source(response: xarray.Dataset) -> str:
     """Unit of the input, for labels."""
     unit = str(response["amplitude"].attrs["units"])
-    return "-" if unit == "1" else unit.replace("*", "·")
+    return "-" if unit == "1" else printed(unit)
 
 
 def bode(responses: Mapping[str, xarray.Dataset], output: str) -> list[Panel]:
@@ -78,7 +79,7 @@ def bode(responses: Mapping[str, xarray.Dataset], output: str) -> list[Panel]:
             gain.append(Curve(label, f, np.abs(values), style, legend))
             phase.append(Curve(label, f, np.degrees(np.unwrap(np.angle(values))), style, legend))
     source, of_source = first.attrs["source"], unit_of_source(first)
-    unit = str(first["unit"].sel(output=output).item()).replace("*", "·")
+    unit = printed(str(first["unit"].sel(output=output).item()))
     of_gain = unit if of_source == "-" else f"{unit} / {of_source}"
     by = f"by amplitude of the {source.replace('_', ' ')}" + ("" if of_source == "-" else f" [{of_source}]")
     title = f"{output.replace('_', ' ').capitalize()}, {by}"

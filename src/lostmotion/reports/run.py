@@ -12,7 +12,7 @@ from ..simulation.switchings import ATTRIBUTE as SWITCHINGS
 from ..simulation.switchings import names_in, unpacked
 from ..simulation.train_scenario import TrainScenario
 from ..simulation.windings import errors_of
-from ..units.practical import charted, practical
+from ..units.practical import charted, practical, printed
 
 if TYPE_CHECKING:
     import xarray
@@ -219,7 +219,7 @@ def _variables(result: xarray.Dataset) -> Table:
         known = values[np.isfinite(values)]
         if len(known):
             numbers = (float(values[-1]), float(known.min()), float(known.max()), float(np.sqrt(np.mean(known**2))))
-            unit = str(result[name].attrs.get("units", "")).replace("*", "·")
+            unit = printed(str(result[name].attrs.get("units", "")))
             size = max(map(abs, numbers[1:3]))
             rows.append([name, *(_digits(v, size) for v in numbers), "" if unit == "1" else unit])
     note = "A blank value means that the variable is not defined at the end; a blank unit, that it is a plain number."

@@ -13,6 +13,7 @@ from ..studies.engine import study_of
 from ..studies.study import Study
 from ..studies.table import labelled, read_table
 from ..studies.vary import Vary
+from ..units.practical import printed
 from .looks import PALETTE
 from .page import Headline, Prose, Report, Table
 from .pages import table_csv, write_report
@@ -134,7 +135,7 @@ def best_runs(table: pa.Table, name: str, count: int = 10, *, largest: bool = Fa
 
 def _label(table: pa.Table, column: str) -> str:
     """A column with its unit, as charts print it."""
-    return labelled(table, column).replace("*", "·")
+    return printed(labelled(table, column))
 
 
 def distributions(table: pa.Table, study: Study) -> Group:

@@ -22,7 +22,7 @@ from ..response.linear import LinearModel, train_model
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainInitial, TrainScenario, in_long_form, need_free_motion
 from ..simulation.train_state import start_values
-from ..units.practical import charted
+from ..units.practical import charted, printed
 from .winding import OrientedWinding
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class Axis:
         """Result variable and unit of what its loops control: torque and speed of the motor, position at the reference's shaft."""
         train = self.train
         return {
-            "torque": (train.motor_torque_of(self.motor), train.torque_unit(self.motor_shaft).replace("*", "·")),
+            "torque": (train.motor_torque_of(self.motor), printed(train.torque_unit(self.motor_shaft))),
             "speed": (f"{self.motor_shaft}_speed", train.speed_unit(self.motor_shaft)),
             "position": (train.angle_of(self.shaft), train.angle_unit(self.shaft)),
         }

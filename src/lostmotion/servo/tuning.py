@@ -31,6 +31,7 @@ from ..simulation.axis_form import file_schema
 from ..simulation.keys import parse_override
 from ..simulation.linear_units import unit_of_slides
 from ..simulation.scenario import Scenario
+from ..units.practical import printed
 from .data import frictions, inertias, lag_sum, two_inertias
 from .margins import STABLE, bandwidth_of, frequencies, margins
 from .motion import with_controller
@@ -560,4 +561,4 @@ def _value(value: Any, unit: str | None) -> str:
         return "none"
     if isinstance(value, list | tuple):
         return ", ".join(" ".join(f"{k} {_value(v, None)}" for k, v in f.items() if v is not None) for f in value)
-    return f"{value:.6g} {(unit or '').replace('*', '·')}".strip() if isinstance(value, float) else str(value)
+    return f"{value:.6g} {printed(unit or '')}".strip() if isinstance(value, float) else str(value)

@@ -293,7 +293,7 @@ class Scenario(Part):
         Parameters
         ----------
         initial
-            In place of that of the scenario.
+            State in place of the initial state of the scenario.
         """
         raise NotImplementedError
 

@@ -460,7 +460,7 @@ class TrainScenario(Scenario, LinearElements):
         return self.initial.model_copy(update=found)
 
     def _given_speeds(self) -> dict[str, float]:
-        """Speeds at t = 0 [rad/s, m/s] of the shafts and slides whose motion is given, and of those that rigid gears tie to them."""
+        """Speeds at t = 0 [rad/s, m/s] of shafts and slides with a given motion, and of others that rigid gears tie to them."""
         rigid = [
             (g.input, g.output, g.ratio) for g in self.train().fixed_gears().values() if isinstance(g.stiffness, Rigid)
         ]

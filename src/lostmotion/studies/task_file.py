@@ -325,8 +325,7 @@ def _apart(controller: dict[str, Any]) -> tuple[AnyCurrent | None, dict[str, Any
     try:
         current = InnerLoop(current=loop).current
     except InputError as error:
-        text = str(error)
-        raise InputError(text.replace("key ", "key controller.", 1) if text.startswith("key ") else text) from None
+        raise error.inside("controller") from None
     return current, controller | {"current": {"kind": "ideal"}}
 
 

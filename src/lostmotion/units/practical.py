@@ -29,17 +29,22 @@ SMALL = 1e-4  # [m], below which lengths are in µm
 CHARTED_SMALL = {"rad": ("mrad", 1e3), "m": ("µm", 1e6)}
 
 
+def printed(unit: str) -> str:
+    """An SI unit as pages, charts and tables print it: N·m."""
+    return unit.replace("*", "·")
+
+
 def charted(unit: str, *, small: bool = False) -> tuple[str, float]:
     """Unit of a chart or a summary for an SI unit, and how many of them one is."""
     found = CHARTED_SMALL.get(unit) if small else None
-    return found or CHARTED.get(unit, (unit.replace("*", "·"), 1.0))
+    return found or CHARTED.get(unit, (printed(unit), 1.0))
 
 
 def practical(value: Any, unit: str, digits: int = 5) -> str:
     """A value in an SI unit, or several, as text in the practical one; text stays as it is."""
     if isinstance(value, str):
         return value
-    name, factor = PRACTICAL.get(unit, (unit.replace("*", "·"), 1.0))
+    name, factor = PRACTICAL.get(unit, (printed(unit), 1.0))
     values = value if isinstance(value, tuple) else (value,)
     if unit == "m" and any(values) and all(abs(v) < SMALL for v in values):
         name, factor = CHARTED_SMALL["m"]
