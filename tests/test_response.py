@@ -472,6 +472,28 @@ def test_the_command_writes_figures_and_tables(tmp_path: Path):
         assert np.array_equal(np.nan_to_num(line["y"]), np.abs(row))  # no motion has no place on a logarithmic axis
 
 
+def test_scenarios_of_one_name_are_compared_and_not_taken_for_each_other(tmp_path: Path) -> None:
+    """A changed scenario beside itself, and a file of the same name from another directory."""
+    scenario, other = "paper-2dof-l-large", tmp_path / "other" / "paper-2dof-l-large.toml"
+    other.parent.mkdir()
+    other.write_text('base = "paper-2dof-l-large"\nload.inertia = 4.0\n')
+    words = ["--amplitudes", "1.0", "--frequencies", "0.5,2.0", "--set", "load.inertia=3.0", "-o", str(tmp_path / "o")]
+    done = CliRunner().invoke(app, ["response", scenario, *words, "--compare", scenario, "--compare", str(other)])
+    assert done.exit_code == 0, done.output
+    gain, *_ = charts((tmp_path / "o" / "response.html").read_text())
+    for inertia, line in zip((3.0, lm.load(scenario).load.inertia, 4.0), gain["lines"], strict=True):
+        changed = lm.load(scenario, {"load.inertia": inertia})
+        found = lm.frequency_response(changed, [0.5, 2.0], [1.0])["response"].sel(output="load_speed")
+        assert line["y"].tolist() == np.abs(found.values[0]).tolist()
+    done = CliRunner().invoke(app, ["response", scenario, *words, *["--compare", scenario] * 2])
+    assert str(done.exception) == f"--compare {scenario}: is given twice; leave one out"
+
+
+def test_the_command_names_the_file_that_has_no_response(tmp_path: Path) -> None:
+    done = CliRunner().invoke(app, ["response", "paper-2dof-l-large", "--compare", "given-motion"])
+    assert str(done.exception).startswith("given-motion: response: key shafts.crank.speed gives the motion")
+
+
 def test_a_drive_that_never_moves_still_gets_its_figures(tmp_path: Path):
     scenario = str(ROOT / "scenarios" / "paper-2dof-nl-large.toml")
     words = ["--amplitudes", "0.001,0.002", "--frequencies", "1.0,5.0", "-o", str(tmp_path / "o"), "--figures", "png"]

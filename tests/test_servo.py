@@ -4,6 +4,7 @@ import math
 import re
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 
 import control
@@ -441,9 +442,16 @@ def test_the_command_says_what_is_unstable_and_fails(tmp_path: Any) -> None:
     done = lostmotion("servo", scenario, "--tune", "identical_radius", cwd=tmp_path)
     assert (done.returncode, len(done.stderr.splitlines())) == (1, 1)
     assert "at most 4, and it is 16.8" in done.stderr
-    done = lostmotion("servo", "paper-2dof-nl-large", cwd=tmp_path)
-    assert (done.returncode, len(done.stderr.splitlines())) == (1, 1)
-    assert "has no controller" in done.stderr
+
+
+@pytest.mark.parametrize("command", [["servo"], ["servo", "--tune", "margins"], ["track"]])
+def test_the_command_names_the_file_that_has_no_controller(tmp_path: Path, command: list[str]) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text('base = "paper-2dof-nl-large"\n')
+    for source in (str(file), "paper-2dof-nl-large"):
+        done = lostmotion(command[0], source, *command[1:], cwd=tmp_path)
+        assert (done.returncode, len(done.stderr.splitlines())) == (1, 1)
+        assert done.stderr.startswith(f"lostmotion: {source}: the scenario has no controller; add")
 
 
 # --- gains that are kept ---

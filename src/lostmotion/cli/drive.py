@@ -9,7 +9,7 @@ import typer
 
 from .arguments import Overrides, SourceArgument
 from .targets import try_page
-from .terminal import simulating
+from .terminal import about, simulating
 
 
 def check(
@@ -28,7 +28,6 @@ def check(
     lostmotion drive check drive.toml --set task.cycle="2 s"
     lostmotion drive check catalogue-robot-joint --report check.html
     """
-    from ..errors import InputError
     from ..reports.drive_check import check_report, counted
     from ..simulation.sources import load
     from ..sizing.drive_check import check_drive
@@ -36,11 +35,8 @@ def check(
     if report is not None:
         try_page(report)
     loaded = load(scenario, overrides or ())
-    try:
-        with simulating("Checking", loaded):
-            findings = check_drive(loaded)
-    except (InputError, RuntimeError) as error:
-        raise InputError(f"{scenario}: {error}") from None
+    with about(scenario), simulating("Checking", loaded):
+        findings = check_drive(loaded)
     print(loaded.title or scenario)
     for finding in findings:
         print(f"  {finding if finding.verdict == 'warning' else finding.in_short}")

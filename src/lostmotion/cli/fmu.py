@@ -9,7 +9,7 @@ import typer
 
 from .arguments import Overrides, SourceArgument
 from .targets import try_file
-from .terminal import busy
+from .terminal import about, busy
 
 
 def fmu(
@@ -68,7 +68,7 @@ def fmu(
         raise InputError(f"{output}: must end in .fmu")
     try_file(output)
     loaded = load(scenario, overrides or ())
-    with busy("Finding out what its parameters change"):
+    with about(scenario), busy("Finding out what its parameters change"):
         replaced = export_fmu(
             loaded,
             output,

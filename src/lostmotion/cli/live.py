@@ -9,7 +9,7 @@ import typer
 
 from .arguments import Overrides, SourceArgument
 from .targets import try_file
-from .terminal import busy
+from .terminal import about, busy
 
 
 def live(
@@ -37,7 +37,7 @@ def live(
         raise InputError(f"{path}: the ending {path.suffix or '(none)'} is not known; it must be .html")
     try_file(path)
     loaded = load(scenario, overrides or ())
-    with busy("Writing"):
+    with about(scenario), busy("Writing"):
         write_page(path, loaded)
     print(f"Page written to {path}")
     if show:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,7 +10,7 @@ import typer
 
 from .arguments import FiguresOption, Overrides, ReportOption, SourceArgument, number
 from .targets import need_directory, try_directory, writing
-from .terminal import busy, progress
+from .terminal import about, busy, progress
 
 if TYPE_CHECKING:
     from ..simulation.scenario import Scenario
@@ -75,9 +75,10 @@ def response(
 
     pictures = endings(figures)
     need_directory(figures, output)
-    name = Path(scenario).stem
-    loaded = {name: load(scenario, overrides or ())} | {Path(other).stem: load(other) for other in compare or ()}
-    unit, variable = _known(loaded, source, variable)
+    files = _titles(scenario, compare or ())
+    name = next(iter(files))
+    loaded = {title: load(file, (overrides or ()) if title == name else ()) for title, file in files.items()}
+    unit, variable = _known(loaded, files, source, variable)
     from ..response.harmonic import frequency_response
     from .grids import parse_grid
 
@@ -88,7 +89,8 @@ def response(
     responses = {}
     with progress(len(loaded) * len(wanted) * len(grid), "Response") as step:
         for title, s in loaded.items():
-            responses[title] = frequency_response(s, grid, wanted, source=source, refine=refine, progress=step)
+            with about(files[title]):
+                responses[title] = frequency_response(s, grid, wanted, source=source, refine=refine, progress=step)
     first = loaded[name]
     from ..reports.response import amplitude_lines, motion_lines
     from ..response.crossovers import characteristics
@@ -112,15 +114,31 @@ def response(
         print('response.nc is left out: it needs h5netcdf; install it: pip install "lostmotion[netcdf]"')
 
 
-def _known(loaded: Mapping[str, Scenario], source: str | None, variable: str | None) -> tuple[str, str]:
+def _titles(scenario: str, others: Iterable[str]) -> dict[str, str]:
+    """Name in the legends -> source. Of two sources of one name the second has its path."""
+    from ..errors import InputError
+
+    files = {Path(scenario).stem: scenario}
+    for other in others:
+        free = [title for title in (Path(other).stem, other, f"{other} without --set") if title not in files]
+        if not free or other in list(files.values())[1:]:
+            raise InputError(f"--compare {other}: is given twice; leave one out")
+        files[free[0]] = other
+    return files
+
+
+def _known(
+    loaded: Mapping[str, Scenario], files: Mapping[str, str], source: str | None, variable: str | None
+) -> tuple[str, str]:
     """The unit of the input, and the name of the variable, which all of the scenarios must have."""
     from ..errors import InputError
     from ..response.plant import plant_or_loop
 
     units: list[str] = []
     variables: list[str] = []
-    for scenario in loaded.values():
-        plant = plant_or_loop(scenario)
+    for title, scenario in loaded.items():
+        with about(files[title]):
+            plant = plant_or_loop(scenario)
         try:
             units.append(plant.unit(plant.known_source(source)))
         except InputError as error:

@@ -9,7 +9,7 @@ import typer
 
 from .arguments import Overrides, SourceArgument, number
 from .targets import try_file, try_page
-from .terminal import busy, simulating
+from .terminal import about, busy, simulating
 
 if TYPE_CHECKING:
     from ..simulation.results import RunArrays
@@ -93,11 +93,8 @@ def run(
     from ..simulation.run import TOLERANCE
     from ..simulation.run import run as work
 
-    try:
-        with simulating("Simulating", loaded, 0.0 if solver == "exact" else tolerance or TOLERANCE):
-            result = work(loaded, solver=solver, relative_tolerance=tolerance)  # type: ignore[arg-type]
-    except RuntimeError as error:
-        raise InputError(f"{scenario}: {error}") from None
+    with about(scenario), simulating("Simulating", loaded, 0.0 if solver == "exact" else tolerance or TOLERANCE):
+        result = work(loaded, solver=solver, relative_tolerance=tolerance)  # type: ignore[arg-type]
     from ..reports.run import summary
 
     print(summary(result))

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from .arguments import FiguresOption, Overrides, SourceArgument
 from .targets import try_directory, try_file, writing
-from .terminal import busy, console, fail, progress
+from .terminal import about, busy, console, fail, progress
 
 if TYPE_CHECKING:
     from ..servo.commission import ServoReport
+    from ..servo.tuning import Tuning
+    from ..simulation.scenario import Scenario
 
 
 def servo(
@@ -85,16 +87,12 @@ def servo(
         try_directory(path)
     from ..servo.commission import commission, work
 
-    total = work(loaded, motor)
-    tuned = None
-    if rule is not None:
-        from ..servo.tuning import tune
-
-        with busy("Tuning"):
-            tuned = tune(loaded, rule=rule, feedforward=feedforward, motor=motor)
-        loaded = tuned.scenario
+    with about(scenario):
+        total = work(loaded, motor)
+        tuned = None if rule is None else _tuned(loaded, rule, feedforward, motor)
+    loaded = loaded if tuned is None else tuned.scenario
     settled = None if window is None else _settled(loaded, motor, window)
-    with progress(total, "Commissioning") as step:
+    with about(scenario), progress(total, "Commissioning") as step:
         report = commission(loaded, motor=motor, window=settled, progress=step)
     written = []
     for path in files:
@@ -120,7 +118,15 @@ def servo(
         fail(f"unstable: {'; '.join(map(str, report.instabilities()))}")
 
 
-def _settled(scenario: Any, motor: str | None, window: str) -> float:
+def _tuned(scenario: Scenario, rule: str, feedforward: bool, motor: str | None) -> Tuning:
+    """The scenario with the gains of a rule."""
+    from ..servo.tuning import tune
+
+    with busy("Tuning"):
+        return tune(scenario, rule=rule, feedforward=feedforward, motor=motor)
+
+
+def _settled(scenario: Scenario, motor: str | None, window: str) -> float:
     """The window in SI: an angle, or of a slide a distance."""
     from ..errors import InputError
     from ..inputs.validation import shown

@@ -7,9 +7,10 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, Protocol, TextIO
 
-from ..errors import visible
+from ..errors import InputError, visible
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -48,6 +49,17 @@ def fail(text: str, code: int = 1) -> NoReturn:
         text = f"{text[: MAX_LINE // 2]} ... {text[-MAX_LINE // 2 + 5 :]}"
     print(f"lostmotion: {text}", file=sys.stderr)
     sys.exit(code)
+
+
+@contextmanager
+def about(source: str) -> Iterator[None]:
+    """Name the source in the faults of a scenario that was read without one."""
+    try:
+        yield
+    except (InputError, RuntimeError) as error:
+        from ..inputs.toml_files import in_short
+
+        raise InputError(f"{in_short(Path(source))}: {error}") from None
 
 
 class Step(Protocol):

@@ -10,7 +10,7 @@ import typer
 
 from .arguments import FiguresOption, Overrides, ReportOption, SourceArgument, number
 from .targets import need_directory, try_directory, writing
-from .terminal import busy, console, progress
+from .terminal import about, busy, console, progress
 
 if TYPE_CHECKING:
     from ..pointing.budget import PointingBudget
@@ -65,7 +65,7 @@ def track(
         if not equals:
             raise InputError(f'--view: "{text}" must be MOTOR=ANGLE, such as "motor=6.65 deg"')
         angles[motor.strip()] = angle.strip()
-    with progress(runs_of(loaded), "Runs") as step:
+    with about(scenario), progress(runs_of(loaded), "Runs") as step:
         budget = pointing_budget(loaded, after=after, view=angles, progress=step)
     _print_summary(loaded.title or Path(scenario).stem, budget)
     if output is None:
