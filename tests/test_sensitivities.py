@@ -115,7 +115,16 @@ def test_a_parameter_that_sets_a_shaft_at_rest_in_motion_has_no_derivative() -> 
 def test_what_cannot_be_varied_is_refused_by_one_line() -> None:
     scenario = shaft(0.5)
     for keys, words in (
-        (["shafts.table.inerta"], "shafts.table.inerta: the scenario has nothing of that name"),
+        (
+            ["shafts.table.inerta"],
+            "shafts.table.inerta: the scenario has nothing of that name; did you mean shafts.table.inertia?",
+        ),
+        (
+            ["shafts.tabel.inertia"],
+            "shafts.tabel.inertia: the scenario has nothing of that name; did you mean shafts.table.inertia?",
+        ),
+        (["motors.motor.kin"], "motors.motor.kin: the scenario has nothing of that name; give the key of a number"),
+        (["x" * 5000], "xxx...: the scenario has nothing of that name; give the key of a number"),
         (["motors.motor.kind"], 'motors.motor.kind: the scenario has "torque_source" there'),
         ([], "give keys of the scenario"),
         (["shafts.table.inertia"] * 2, "each once"),

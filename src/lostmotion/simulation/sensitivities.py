@@ -16,9 +16,10 @@ import numpy as np
 from .. import _core
 from ..control.axis import Bound
 from ..errors import InputError
-from ..inputs.validation import shown
+from ..inputs.validation import shortened, shown
 from .core_runs import core_case
 from .keys import list_index
+from .near_keys import near_key
 from .scenario import Scenario
 from .train_scenario import need_free_motion
 from .train_variables import named_signals
@@ -56,24 +57,31 @@ def value_at(scenario: Scenario, key: str) -> float:
     InputError
         There is not a number.
     """
+    value = _entry_at(scenario, key)
+    if value is None and key.partition(".")[0] in ("initial", "command"):
+        return 0.0
+    if not _is_a_number(value):
+        near = near_key(scenario, key) if value is None else ""
+        has = "nothing of that name" if value is None else f"{shown(value)} there, and a derivative needs a number"
+        meant = near if near and _is_a_number(_entry_at(scenario, near)) else ""
+        remedy = f"did you mean {meant}?" if meant else "give the key of a number"
+        raise InputError(f"{shortened(key)}: the scenario has {has}; {remedy}", where="sensitivities")
+    return float(value)
+
+
+def _is_a_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _entry_at(scenario: Scenario, key: str) -> Any:
+    """Entry of a scenario under a dotted key, of a signal its mean; None where there is nothing."""
     node: Any = scenario.model_dump()
     for part in key.split("."):
         try:
             node = node[list_index(node, part)] if isinstance(node, list | tuple) else node[part]
         except (KeyError, TypeError, ValueError):
-            node = None
-            break
-    if isinstance(node, Mapping) and "mean" in node:
-        node = node["mean"]
-    if node is None and key.partition(".")[0] in ("initial", "command"):
-        node = 0.0
-    if isinstance(node, bool) or not isinstance(node, int | float):
-        has = "has nothing of that name" if node is None else f"has {shown(node)} there"
-        raise InputError(
-            f"{key}: the scenario {has}, and a derivative needs a number; give its key and a value",
-            where="sensitivities",
-        )
-    return float(node)
+            return None
+    return node["mean"] if isinstance(node, Mapping) and "mean" in node else node
 
 
 def neighbours(scenario: Scenario, key: str) -> list[Neighbour]:

@@ -1,8 +1,7 @@
 """One parameter that a study varies: its key, its values or their distribution, and what they do to a scenario."""
 
-import difflib
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from statistics import NormalDist
 from typing import Annotated, Any, Self
 
@@ -14,10 +13,11 @@ from ..errors import InputError
 from ..inputs.named import Named
 from ..inputs.part import Part
 from ..inputs.quantities import Switch
-from ..inputs.validation import nearest, shown
+from ..inputs.validation import shown
 from ..model.signals import Signal
 from ..reproducible import exp, log
 from ..simulation.keys import list_index
+from ..simulation.near_keys import near_key
 from ..simulation.scenario import Scenario
 from ..simulation.units_of_keys import in_si, unit_in, unit_of_key
 from .records import check_names, is_condition, kind_of_record, names_of, names_that_fit
@@ -206,22 +206,6 @@ def _may_be_left_out(scenario: Scenario, key: str) -> bool:
     except InputError as error:
         raise ValueError(str(error)) from None
     return True
-
-
-def near_key(scenario: Scenario, key: str) -> str:
-    """The key of a scenario of the same name in the same table or within it, or that was misspelt as this one; empty if none is."""
-    known = [*_keys(scenario.model_dump(), ""), *scenario.record_keys()]
-    first, dot, _ = key.partition(".")
-    table = nearest(first, {k.split(".")[0] for k in known}) if dot else None  # left out, it may be any
-    same = [k for k in known if k.rpartition(".")[2] == key.rpartition(".")[2] and table in (None, k.split(".")[0])]
-    return next(iter(difflib.get_close_matches(key, same, n=1, cutoff=0.0)), nearest(key, known))
-
-
-def _keys(table: Mapping[str, Any], before: str) -> Iterator[str]:
-    for name, value in table.items():
-        yield f"{before}{name}"
-        if isinstance(value, dict):
-            yield from _keys(value, f"{before}{name}.")
 
 
 def check_spelling(scenario: Scenario, entries: Any) -> None:
