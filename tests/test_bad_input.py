@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from time import process_time
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -381,6 +382,27 @@ def test_long_lists_in_messages_are_cut(tmp_path: Path) -> None:
         with pytest.raises(ValueError, match=r"^.") as caught:
             Expression(wrong)
         assert len(str(caught.value)) <= 290
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["{} = 1", "[{}]", "[[ {} ]]", "x = {{ {} = 1 }}", "x = [{{ y = 1, {} = 1 }}]"],
+    ids=["key", "table", "list of tables", "entry", "entry in a list"],
+)
+@pytest.mark.parametrize("part", ["a", '"a"', "'a.b'", r'"\""'], ids=["bare", "quoted", "literal", "escaped"])
+def test_a_dotted_key_of_many_parts_is_refused_at_once(tmp_path: Path, text: str, part: str) -> None:
+    """The parser of TOML takes half a minute for it, and four times that for twice as many parts."""
+    path = tmp_path / "dots.toml"
+    path.write_text("title = 'a.b'\n" + text.format(".".join([part] * 40_000)))
+    begin = process_time()
+    assert refused(lambda: lm.load(path)).startswith(f"{path}: has more than 50 levels of tables and lists")
+    assert process_time() - begin < 2.0
+
+
+def test_dots_within_texts_and_comments_are_no_levels(tmp_path: Path) -> None:
+    path, dots = tmp_path / "dots.toml", ".".join(["a"] * 500)
+    path.write_text(f"title = '{dots}' # {dots}\n# {dots}\nbase = 'paper-2dof-nl-small'\n")
+    assert lm.load(path).title == dots
 
 
 def test_what_is_nested_too_deeply_is_refused_with_its_file(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,12 @@ PER_BYTE = 16  # bytes of memory for each byte of a TOML file, measured
 RESULTS = (".nc", ".csv", ".parquet")  # endings of saved results
 MAX_LEVELS = 50  # of tables and lists within each other
 MAX_NAME = 200  # characters of the name of a file that is shown
+# A dotted key of more parts than there may be levels, at the beginning of a line, a table or an entry. The parser
+# takes a time that grows with the square of their number.
+_PART = r"""(?:[A-Za-z0-9_-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
+_DEEP_KEY = re.compile(
+    rf"""(?:^[ \t]*+\[?+\[?+|[{{,])[ \t]*+(?:{_PART}[ \t]*+\.[ \t]*+){{{MAX_LEVELS}}}""", re.MULTILINE
+)
 
 
 def is_in_file(reference: str) -> bool:
@@ -64,6 +71,8 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     except ValueError:
         raise InputError(f"{in_short(path)}: is no name of a file; check it") from None
     try:
+        if _DEEP_KEY.search(text):
+            raise RecursionError
         return shallow(tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path}: is not valid TOML: {error}") from None
