@@ -492,6 +492,36 @@ def test_a_damaged_note_is_restored_from_a_part(tmp_path: Path, content: bytes):
     assert read_table(directory).equals(whole)
 
 
+def test_a_note_of_another_study_is_restored_and_no_part_made_again(tmp_path: Path):
+    directory = lm.study(make(design="random", runs=2 * CHUNK + 1), tmp_path / "s")
+    other = lm.study(make(design="random", runs=2 * CHUNK + 1, seed=5), tmp_path / "other")
+    whole, parts = read_table(directory), {p: p.stat().st_mtime_ns for p in directory.glob("part-*.parquet")}
+    (directory / "_study.json").write_bytes((other / "_study.json").read_bytes())
+    for call in (
+        lambda: read_table(directory),
+        lambda: lm.study(make(design="random", runs=2 * CHUNK + 1, seed=5), directory, repair=True),
+    ):
+        with pytest.raises(
+            InputError, match=r"_study\.json: is of another study than part-000000\.parquet; `lost.*--repair"
+        ):
+            call()
+    done = CliRunner().invoke(app, ["study", "resume", str(directory), "--repair"])
+    assert done.exit_code == 0, done.output
+    assert read_table(directory).equals(whole)
+    assert parts == {p: p.stat().st_mtime_ns for p in directory.glob("part-*.parquet")}
+
+
+def test_a_note_is_restored_from_a_part_that_matches_its_checksum(tmp_path: Path):
+    directory = lm.study(make(design="random", runs=2 * CHUNK + 1), tmp_path / "s")
+    other = lm.study(make(design="random", runs=2 * CHUNK + 1, seed=5), tmp_path / "other")
+    whole = read_table(directory)
+    (directory / "_study.json").unlink()
+    (directory / SWAPPED[0]).write_bytes((other / SWAPPED[0]).read_bytes())
+    done = CliRunner().invoke(app, ["study", "resume", str(directory), "--repair"])
+    assert done.exit_code == 0, done.output
+    assert read_table(directory).equals(whole)
+
+
 @pytest.mark.filterwarnings("default")
 def test_a_dask_worker_that_dies_takes_no_run_with_it(tmp_path: Path):
     from distributed import Client, LocalCluster

@@ -121,7 +121,8 @@ log3 = c.CFUNCTYPE(None, c.c_void_p, c.c_int, c.c_char_p, c.c_char_p)(
 def _step(x: Caller) -> tuple[Any, ...]:
     flags = [c.byref(c.c_bool()) for _ in range(3)]
     last = (*flags, c.byref(c.c_double())) if x.version == 3 else ()
-    return (x.number(), x.number(), x.flag(), *last)
+    interval = x.random.choice([n for n in NUMBERS if n != 1e9])  # 1e9 s of a periodic command take hours
+    return (x.number(), c.c_double(interval), x.flag(), *last)
 
 
 def _begin(x: Caller) -> tuple[Any, ...]:

@@ -42,7 +42,7 @@ peak_load_speed = "peak(load_speed)"
 def damage(random: Random, folder: Path) -> None:
     """Changes, removes, adds or exchanges files."""
     paths = sorted(path for path in folder.iterdir() if path.is_file() and not path.is_symlink())
-    path, other = random.choice(paths), random.choice(sorted((*whole(1)[0].iterdir(), *whole(2)[0].iterdir())))
+    path, other = random.choice(paths), random.choice([p for k in (1, 2) for p in sorted(whole(k)[0].iterdir())])
     match random.randrange(8):
         case 0:
             path.unlink()

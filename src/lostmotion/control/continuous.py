@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from .. import _core
 from ..errors import InputError, need
+from ..inputs.arguments import checked
 from ..inputs.part import Part
 from ..inputs.quantities import (
     Angle,
@@ -400,7 +401,8 @@ def _rate(signal: Signal[Any]) -> CommandSignal:
     return CommandSignal.model_validate({"mean": slopes[0][1], "steps": steps, "sines": sines})
 
 
-def as_state_space(system: Any) -> StateSpace:
+@checked
+def as_state_space(system: "Any") -> StateSpace:
     """Convert a continuous-time system of scipy or python-control to the state space of a controller.
 
     Parameters

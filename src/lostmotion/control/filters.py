@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from .. import _core
 from ..errors import InputError
+from ..inputs.arguments import checked
 from ..inputs.part import Part
 from ..inputs.quantities import Frequency, NotNegative, Number, Positive, Time
 from ..reproducible import tan
@@ -118,7 +119,8 @@ def prewarped(
     return in_z(numerator), in_z(denominator)
 
 
-def as_filter(system: Any) -> TransferFunction:
+@checked
+def as_filter(system: "Any") -> TransferFunction:
     """Convert a discrete-time system of scipy or python-control to a filter.
 
     Parameters

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from ..errors import InputError
+from ..inputs.arguments import checked
 from ..inputs.toml_files import is_in_file, read_toml
 from ..inputs.validation import names_like, shown, unknown_key
 from .gearbox_sheet import GearboxSheet
@@ -35,6 +36,7 @@ KINDS: dict[str, Kind] = {
 COMMON = ("kind", "manufacturer", "note")
 
 
+@checked
 def catalogue() -> tuple[Sheet, ...]:
     """Return all records that are shipped: gearboxes, motors, screws, racks, belts and linear motors.
 

@@ -75,9 +75,10 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
     def call(*args: P.args, **kwargs: P.kwargs) -> R:
         try:
             bound = signature.bind(*args, **kwargs)
-        except TypeError as error:
-            lacking = _lacking(signature, args, kwargs)
-            raise misfit(function.__qualname__, signature.parameters, kwargs, str(error), lacking) from None
+        except TypeError:
+            raise misfit(
+                function.__qualname__, signature.parameters, kwargs, _reason(signature, args, kwargs)
+            ) from None
         for name, annotation in wanted.items():
             if name in bound.arguments:
                 bound.arguments[name] = _read(name, bound.arguments[name], annotation, known)
@@ -86,9 +87,7 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
     return call
 
 
-def misfit(
-    function: str, parameters: Iterable[str], given: Iterable[str], problem: str = "", lacking: str | None = None
-) -> ArgumentError:
+def misfit(function: str, parameters: Iterable[str], given: Iterable[str], problem: str) -> ArgumentError:
     """Error in the names or the number of the arguments of a call.
 
     Parameters
@@ -98,27 +97,36 @@ def misfit(
     given
         Names of those that it was given by name.
     problem
-        What the language says of the call.
-    lacking
-        Name of an argument that is needed and was not given.
+        What is wrong with the call if all names are known.
     """
     known = [name for name in parameters if name != "self"]
     where = f"{function.removesuffix('.__init__')}()"
     if unknown := [name for name in given if name not in known]:
         meant = did_you_mean(unknown[0], known, f"its arguments are {', '.join(known)}" if known else "it has none")
         return ArgumentError(f"{where} has no argument {unknown[0]}; {meant}")
-    return ArgumentError(f"{where} {problem if lacking is None else f'lacks the argument {lacking}; add it'}")
+    return ArgumentError(f"{where} {problem}")
 
 
-def _lacking(signature: inspect.Signature, args: Sized, given: Collection[str]) -> str | None:
-    """The first argument that a call lacks; None where its arguments are too many, or one of them is given twice."""
+def lacks(name: str) -> str:
+    """Problem of a call without an argument that is needed."""
+    return f"lacks the argument {name}; add it"
+
+
+def _reason(signature: inspect.Signature, args: Sized, given: Collection[str]) -> str:
+    """Problem of a call whose arguments all have known names."""
     parameters = signature.parameters.values()
     places = [p.name for p in parameters if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)]
-    by_place = set(places[: len(args)])
-    if len(args) > len(places) or by_place & set(given):
-        return None
+    taken = [name for name in places if name != "self"]
+    if (excess := len(args) - len(places)) > 0:
+        count = f"at most {len(taken)} value{'s' * (len(taken) != 1)}" if taken else "no value"
+        rest = "; give the others by name" if len(parameters) > len(places) else ""
+        return f"takes {count} without a name, not {len(taken) + excess}{rest}"
+    by_place = places[: len(args)]
+    if twice := [name for name in by_place if name in given]:
+        return f"has the argument {twice[0]} twice, by its position and by its name; leave one out"
     needed = [p.name for p in parameters if p.default is p.empty and p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD)]
-    return next((name for name in needed if name not in by_place and name not in given), None)
+    missing = (name for name in needed if name not in by_place and name not in given)
+    return lacks(next(missing, ""))
 
 
 def _read(name: str, value: Any, annotation: str, known: Mapping[str, Any]) -> Any:

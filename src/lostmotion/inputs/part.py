@@ -114,7 +114,7 @@ class Part(BaseModel):
     def _subject(cls) -> str:
         """Name of the part in messages: the torsion curve."""
         name = cls.model_config.get("title") or cls.__name__.split("[")[0]
-        return "the " + " ".join(re.findall("[A-Z][a-z]*", name)).lower()
+        return "the " + " ".join(re.findall("[A-Z]+(?![a-z])|[A-Z][a-z]*", name)).lower()
 
 
 @cache  # it takes longer than all the rest of a refusal

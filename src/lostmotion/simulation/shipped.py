@@ -5,7 +5,10 @@ from __future__ import annotations
 from importlib.resources import files
 from pathlib import Path
 
+from ..inputs.arguments import checked
 
+
+@checked
 def shipped_scenarios() -> dict[str, Path]:
     """Return the scenarios that come with the package.
 

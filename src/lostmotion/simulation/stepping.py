@@ -18,7 +18,7 @@ from ..control.continuous import ContinuousController
 from ..control.controller import Controller
 from ..control.law import as_laws
 from ..errors import InputError
-from ..inputs.arguments import checked, misfit
+from ..inputs.arguments import checked, lacks, misfit
 from ..inputs.quantities import Time, argument
 from ..inputs.validation import did_you_mean, shown
 from ..model.couplings import FULL_COMMAND
@@ -482,7 +482,7 @@ class Simulation:
     def _of_drive(self, command: Ramp, load_torque: Ramp, others: dict[str, Ramp]) -> dict[str, Ramp]:
         """The inputs of a drive by name."""
         if others or (command is _GIVE and not self._controllers):
-            raise misfit("Simulation.advance", ("interval", "command", "load_torque"), others, lacking="command")
+            raise misfit("Simulation.advance", ("interval", "command", "load_torque"), others, lacks("command"))
         if not self._controllers:
             return {"command": command, "load_torque": load_torque}
         if command is not _GIVE:

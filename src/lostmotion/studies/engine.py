@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import (
     FIRST_COMPLETED,
@@ -22,7 +23,18 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Count
 from .chunk import as_parquet, as_table, compute_chunk, parsed, pieces, run_piece
 from .file import from_json, to_json
-from .parts import NO_REPAIR, chunks, damages, forget_missing, part_of, write_part
+from .parts import (
+    FOREIGN,
+    NO_REPAIR,
+    carried,
+    checksum_of,
+    checksums,
+    chunks,
+    damages,
+    forget_missing,
+    part_of,
+    write_part,
+)
 from .study import Study
 
 NOTE = "_study.json"  # a leading underscore: readers of Parquet directories pass it over
@@ -86,7 +98,7 @@ def study(
     directory = Path(directory)
     text = to_json(what)
     _prepare(directory, text)
-    damaged = damages(directory, text, what.total)
+    damaged = damages_of(directory, what)
     refuse_damaged(directory, {path: why for path, why in damaged.items() if not repair or why in NO_REPAIR})
     for path in damaged:
         path.unlink()
@@ -116,6 +128,25 @@ def _rising(progress: Callable[[int], None]) -> Callable[[int], None]:
         progress(furthest)
 
     return report
+
+
+def damages_of(directory: Path, what: Study) -> dict[Path, str]:
+    """Damaged parts of the directory of a study, each with the reason.
+
+    Raises
+    ------
+    InputError
+        The note is what is wrong: it is of another study than all parts, which repairing would remove.
+    """
+    text = to_json(what)
+    damaged = damages(directory, text, what.total)
+    foreign = [path for path, reason in damaged.items() if reason == FOREIGN]
+    if foreign and text not in _studies_carried(directory).values():
+        raise InputError(
+            f"{directory / NOTE}: is of another study than {foreign[0].name}; "
+            f"`lostmotion study resume {directory} --repair` restores it from there"
+        )
+    return damaged
 
 
 def refuse_damaged(directory: Path, damaged: Mapping[Path, str]) -> None:
@@ -251,7 +282,7 @@ def study_of(directory: str | Path) -> Study:
 
 
 def restore_note(directory: Path) -> None:
-    """Write the study that a part carries into the directory, if its own note is missing or damaged.
+    """Write the study that a part carries into the directory, if its own note is missing, damaged or of another study.
 
     Raises
     ------
@@ -259,21 +290,31 @@ def restore_note(directory: Path) -> None:
         No part can be read.
     """
     need("pyarrow", "A study", "study")
-    import pyarrow.parquet as pq
-
     try:
-        study_of(directory)
+        damages_of(directory, study_of(directory))
         return
     except InputError as error:
         problem = error
+    found = _studies_carried(directory)
+    if not found:
+        raise problem
+    if (directory / NOTE).is_symlink():  # which may lead to a device
+        (directory / NOTE).unlink()
+    known, count = checksums(directory), Counter(found.values())
+    source = max(found, key=lambda part: (count[found[part]], checksum_of(part) == known.get(part.name)))
+    write_bytes(directory / NOTE, found[source].encode())
+
+
+def _studies_carried(directory: Path) -> dict[Path, str]:
+    """The studies as JSON that the parts carry; parts that cannot be read are left out."""
+    import pyarrow.parquet as pq
+
+    found = {}
     for part in sorted(directory.glob("part-*.parquet")):
         try:
-            text = (pq.read_schema(part).metadata or {})[b"lostmotion_study"].decode()
+            text = carried(pq.read_schema(part).metadata)
             from_json(text)
-        except Exception:  # damaged in whatever way; the next part may be whole
+        except Exception:  # damaged in whatever way
             continue
-        if (directory / NOTE).is_symlink():  # which may lead to a device
-            (directory / NOTE).unlink()
-        write_bytes(directory / NOTE, text.encode())
-        return
-    raise problem
+        found[part] = text
+    return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from ..atomic_writer import unwritable, write_bytes
@@ -14,6 +14,7 @@ from .design import CHUNK
 CHECKSUMS = "_checksums.txt"  # as `sha256sum` writes and checks it; readers of Parquet directories pass it over
 
 STRAY = "is no part of this study"
+FOREIGN = "belongs to another study"
 FOLDER = "is a directory"
 NO_REPAIR = (STRAY, FOLDER)  # what repairing leaves to the user
 
@@ -71,6 +72,17 @@ def forget_missing(directory: Path) -> None:
     write_bytes(directory / CHECKSUMS, "".join(f"{kept[name]}  {name}\n" for name in sorted(kept)).encode())
 
 
+def checksum_of(path: Path) -> str:
+    """Checksum of a file as it is now."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def carried(metadata: Mapping[bytes, bytes] | None) -> str:
+    """The study as JSON that a part carries; empty for other files."""
+    return (metadata or {}).get(b"lostmotion_study", b"").decode()
+
+
 def damages(directory: Path, text: str, total: int) -> dict[Path, str]:
     """Parts that are damaged, or belong elsewhere, each with the reason.
 
@@ -101,12 +113,11 @@ def _damage(path: Path, first: int, last: int, text: str, checksum: str | None) 
     if checksum is None:
         return f"has no line in {CHECKSUMS}"
     try:
-        with path.open("rb") as file:
-            if hashlib.file_digest(file, "sha256").hexdigest() != checksum:
-                return "is damaged: its checksum differs"
+        if checksum_of(path) != checksum:
+            return "is damaged: its checksum differs"
         with pq.ParquetFile(path) as part:
-            if (part.schema_arrow.metadata or {}).get(b"lostmotion_study", b"").decode() != text:
-                return "belongs to another study"
+            if carried(part.schema_arrow.metadata) != text:
+                return FOREIGN
             if part.read(["run"])["run"].to_pylist() != list(range(first, last)):
                 return f"does not hold the runs {first} to {last - 1}"
     except OSError as error:

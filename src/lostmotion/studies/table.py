@@ -6,9 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
-from .engine import refuse_damaged, study_of
-from .file import to_json
-from .parts import damages
+from .engine import damages_of, refuse_damaged, study_of
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -31,8 +29,7 @@ def read_table(directory: Path) -> pa.Table:
 
 
 def _whole_parts(directory: Path) -> list[str]:
-    what = study_of(directory)
-    refuse_damaged(directory, damages(directory, to_json(what), what.total))
+    refuse_damaged(directory, damages_of(directory, study_of(directory)))
     return sorted(str(p) for p in directory.glob("part-*.parquet"))
 
 
