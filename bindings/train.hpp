@@ -184,7 +184,12 @@ class TrainDescription : public model::TrainDescription {
         if (!run_) run_ = std::make_shared<const SharedRun>(train);
         return run_;
     }
-    std::string check() const { return run()->error(); }
+    // Table and name of the element, and what is wrong with it.
+    std::optional<std::tuple<std::string, std::string, std::string>> check() const {
+        const model::Fault& f = run()->fault();
+        if (f.empty()) return std::nullopt;
+        return std::tuple(f.table, f.name, f.reason);
+    }
     // Shafts whose speeds follow from the balance of torques.
     std::vector<std::string> massless_shafts() const {
         std::vector<std::string> names;

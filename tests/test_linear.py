@@ -280,6 +280,35 @@ def test_bad_input_is_refused(changes, message):
     assert "\n" not in str(refused.value)
 
 
+@pytest.mark.parametrize(
+    ("changes", "key"),
+    [
+        (
+            {"screws.screw.damping": "1 N s/m", "screws.screw.stiffness_curve": None, "screws.screw.hysteresis": None},
+            "screws.screw",
+        ),
+        ({"slides.alone": {"mass": "1 kg"}}, "slides.alone"),
+        ({"shafts.alone": {"inertia": "1 kg m^2"}}, "shafts.alone"),
+    ],
+)
+def test_what_makes_no_train_has_the_key_of_its_table(changes, key):
+    with pytest.raises(lm.InputError) as refused:
+        screw(**changes)
+    (problem,) = refused.value.problems
+    assert problem.keys == (key,)
+    assert "'" not in problem.reason
+
+
+def test_parts_of_slides_and_linear_motors_have_their_keys():
+    stops = {"lower": "-0.1 m", "upper": "0.1 m", "stiffness": "1 kN/mm"}
+    coil = {"slide": "table", "rated_force": "200 N", "cogging_force": "8 N", "pole_pitch": "24 mm"}
+    moved = screw(**{"slides.table.end_stops": stops, "linear_motors.coil": coil})
+    assert moved.key_of("springs", "table_end_stops") == "slides.table.end_stops"
+    assert moved.key_of("angle_torques", "coil_cogging") == "linear_motors.coil.cogging_force"
+    assert moved.key_of("gears", "screw") == "screws.screw"
+    assert moved.key_of("springs", "other_end_stops") == "springs.other_end_stops"
+
+
 def test_start_of_a_slide_is_given_in_units_of_translation():
     scenario = screw(**{"initial.positions": {"table": "20 mm"}, "initial.slide_speeds": {"table": "5 mm/s"}})
     result = lm.simulate(scenario)

@@ -395,7 +395,7 @@ def test_freezing_the_pose_has_an_error_of_the_step() -> None:
 @pytest.mark.parametrize(
     ("matrix", "message"),
     [
-        ({"arm": [[1.0, 2.0], [2.0, 1.0]]}, "mass_matrix: mass matrix 'arm' is not positive definite"),
+        ({"arm": [[1.0, 2.0], [2.0, 1.0]]}, "mass_matrix.arm: is not positive definite"),
         ({"leg": [[1.0]]}, "mass_matrix..leg.: is none of this train; the mass matrices are arm"),
         ([[1.0]], "is no dictionary"),
         ({"arm": "heavy"}, "mass_matrix.arm: "),

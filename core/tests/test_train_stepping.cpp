@@ -257,7 +257,7 @@ TEST_CASE("the command that turns a motor: what is behind a clutch, a freewheel,
     t.motors = {torque_motor(0)};
     const auto commands = [](const Train& train, const Values& u) {
         TrainSimulation s(train, 1e-3);
-        REQUIRE(model::check(train) == "");
+        REQUIRE(model::check(train).empty());
         REQUIRE(s.advance(1e-6, u, u) == Status::done);
         return explain_motors(s.assembly(), point(s));
     };

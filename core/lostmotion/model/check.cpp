@@ -6,77 +6,79 @@
 
 namespace lostmotion::model {
 
-std::string TrainCheck::operator()() const {
+std::string Fault::sentence() const { return kind.empty() ? reason : element() + ' ' + reason; }
+
+Fault TrainCheck::operator()() const {
     for (const auto check : {&TrainCheck::shafts_exist, &TrainCheck::mass_matrices, &TrainCheck::controllers,
                              &TrainCheck::elements, &TrainCheck::inertias, &TrainCheck::rigid_loops,
                              &TrainCheck::turned, &TrainCheck::sizes, &TrainCheck::massless})
-        if (std::string error = (this->*check)(); !error.empty()) return error;
+        if (Fault error = (this->*check)(); !error.empty()) return error;
     return {};
 }
 
-std::string TrainCheck::shafts_exist() const {
-    if (train_.shafts.empty()) return "the train has no shaft";
-    if (std::string error = too_many("shafts", train_.shafts.size(), max_shafts); !error.empty()) return error;
+Fault TrainCheck::shafts_exist() const {
+    if (train_.shafts.empty()) return Fault{} + "the train has no shaft";
+    if (Fault error = too_many("shafts", train_.shafts.size(), max_shafts); !error.empty()) return error;
     std::size_t contacts = train_.shafts.size() + train_.gears.size();
     for (const auto& c : coupling_elements(train_)) contacts += c->is_dry();
-    if (std::string error = too_many("shafts, gears and couplings", contacts, max_contacts); !error.empty())
-        return error;
-    const auto missing = [](const std::string& what, int s) {
-        return what + " names shaft number " + std::to_string(s) + ", which the train does not have";
+    if (Fault error = too_many("shafts, gears and couplings", contacts, max_contacts); !error.empty()) return error;
+    const auto missing = [](const Fault& what, int s) {
+        return what + "names shaft number " + std::to_string(s) + ", which the train does not have";
     };
-    const auto one = [&](const char* kind, const auto& elements) -> std::string {
+    const auto one = [&](const char* table, const char* kind, const auto& elements) -> Fault {
         for (std::size_t k = 0; k < elements.size(); ++k)
-            if (!exists(elements[k].shaft)) return missing(named(kind, elements[k].name, k), elements[k].shaft);
+            if (!exists(elements[k].shaft)) return missing(named(table, kind, elements[k].name, k), elements[k].shaft);
         return {};
     };
-    const auto two = [&](const char* kind, const auto& elements) -> std::string {
+    const auto two = [&](const char* table, const char* kind, const auto& elements) -> Fault {
         for (std::size_t k = 0; k < elements.size(); ++k) {
             const auto& e = elements[k];
-            if (!exists(e.input)) return missing(named(kind, e.name, k), e.input);
-            if (!exists(e.output)) return missing(named(kind, e.name, k), e.output);
+            if (!exists(e.input)) return missing(named(table, kind, e.name, k), e.input);
+            if (!exists(e.output)) return missing(named(table, kind, e.name, k), e.output);
             if (e.input == e.output)
-                return named(kind, e.name, k) + " joins " + shaft(e.input) + " with itself; give it another output";
+                return named(table, kind, e.name, k) + "joins " + shaft(e.input) +
+                       " with itself; give it another output";
         }
         return {};
     };
-    for (std::string error : {one("motor", train_.motors), two("gear", train_.gears), housings()})
+    for (Fault error : {one("motors", "motor", train_.motors), two("gears", "gear", train_.gears), housings()})
         if (!error.empty()) return error;
-    std::string error;
-    Train::each_coupling_kind(train_, [&](const char*, const char* kind, const auto& elements) {
-        if (error.empty()) error = two(kind, elements);
+    Fault error;
+    Train::each_coupling_kind(train_, [&](const char* table, const char* kind, const auto& elements) {
+        if (error.empty()) error = two(table, kind, elements);
     });
-    Train::each_kind(train_, [&](const char*, const char* kind, const auto& elements) {
-        if (error.empty()) error = one(kind, elements);
+    Train::each_kind(train_, [&](const char* table, const char* kind, const auto& elements) {
+        if (error.empty()) error = one(table, kind, elements);
     });
     return error;
 }
 
-std::string TrainCheck::housings() const {
+Fault TrainCheck::housings() const {
     for (std::size_t k = 0; k < train_.gears.size(); ++k) {
         const Gear& g = train_.gears[k];
         if (g.housing == nowhere) continue;
-        const std::string name = named("gear", g.name, k);
+        const Fault name = named("gears", "gear", g.name, k);
         if (!exists(g.housing))
-            return name + " names shaft number " + std::to_string(g.housing) +
+            return name + "names shaft number " + std::to_string(g.housing) +
                    " as its housing, which the train does not have";
         if (g.housing == g.input || g.housing == g.output)
-            return name + " has its housing on " + shaft(g.housing) +
+            return name + "has its housing on " + shaft(g.housing) +
                    ", which it joins as well; give the housing a shaft of its own";
         if (g.has_dry_losses())
-            return name + " has a housing that turns and losses that depend on the direction of its motion, which " +
+            return name + "has a housing that turns and losses that depend on the direction of its motion, which " +
                    "are solved against the frame only; leave one of them out";
     }
     return {};
 }
 
-std::string TrainCheck::controllers() const {
+Fault TrainCheck::controllers() const {
     std::vector<bool> controlled(train_.motors.size());
     for (std::size_t k = 0; k < train_.controllers.size(); ++k) {
         const LinearController& c = train_.controllers[k];
-        const std::string name = named("controller", c.name, k);
+        const Fault name = named("controllers", "controller", c.name, k);
         if (c.motor < 0 || c.motor >= static_cast<int>(controlled.size()))
-            return name + " turns a motor that the train does not have";
-        if (controlled[static_cast<std::size_t>(c.motor)]) return name + " turns a motor that another one turns";
+            return name + "turns a motor that the train does not have";
+        if (controlled[static_cast<std::size_t>(c.motor)]) return name + "turns a motor that another one turns";
         controlled[static_cast<std::size_t>(c.motor)] = true;
         const std::size_t n = c.states.size(), m = c.signals.size();
         const auto wide = [](const auto& rows, std::size_t w) {
@@ -84,93 +86,93 @@ std::string TrainCheck::controllers() const {
         };
         if (c.A.size() != n || c.B.size() != n || !wide(c.A, n) || !wide(c.B, m) || c.C.size() != n ||
             c.D.size() != m || c.back_calculation.size() != n)
-            return name + " has matrices that do not fit its states and signals";
-        if (!(c.limit > 0.0)) return name + " has a limit that is not above 0";
-        if (std::string error = too_fine(name + " with its curve", c.curve.outermost_piece() + 1); !error.empty())
+            return name + "has matrices that do not fit its states and signals";
+        if (!(c.limit > 0.0)) return name + "has a limit that is not above 0";
+        if (Fault error = too_fine(name + "with its curve ", c.curve.outermost_piece() + 1); !error.empty())
             return error;
         for (const LinearController::Signal& s : c.signals)
-            if (!exists(s.shaft)) return name + " takes the angle or speed of a shaft that the train does not have";
-        if (!exists(c.compared.shaft)) return name + " compares with a shaft that the train does not have";
+            if (!exists(s.shaft)) return name + "takes the angle or speed of a shaft that the train does not have";
+        if (!exists(c.compared.shaft)) return name + "compares with a shaft that the train does not have";
     }
     return {};
 }
 
-std::string TrainCheck::elements() const {
+Fault TrainCheck::elements() const {
     for (std::size_t k = 0; k < train_.gears.size(); ++k) {
         const Gear& g = train_.gears[k];
-        const std::string name = named("gear", g.name, k);
-        if (g.law.ratio == 0.0) return name + " has the ratio 0; it must not be 0";
+        const Fault name = named("gears", "gear", g.name, k);
+        if (g.law.ratio == 0.0) return name + "has the ratio 0; it must not be 0";
         if (g.efficiencies && !(g.efficiencies->driving() > 0.0))
-            return name + " has a drive efficiency of " + std::to_string(g.efficiencies->driving()) +
+            return name + "has a drive efficiency of " + std::to_string(g.efficiencies->driving()) +
                    "; it must be > 0: no torque would turn it";
-        if (std::string error = flanks(g, name); !error.empty()) return error;
-        if (g.mesh_damping > 0.0 && g.rigid()) return name + " is rigid and has mesh damping; give it a stiffness";
+        if (Fault error = flanks(g, name); !error.empty()) return error;
+        if (g.mesh_damping > 0.0 && g.rigid()) return name + "is rigid and has mesh damping; give it a stiffness";
         if (g.damping_limited && !g.parts_flanks())
-            return name + " limits its mesh damping, which it does not have, or has no backlash; give it both";
+            return name + "limits its mesh damping, which it does not have, or has no backlash; give it both";
         if (g.parts_flanks() && g.law.has_hysteresis())
-            return name + " has backlash with both mesh damping and hysteresis; take one of them";
+            return name + "has backlash with both mesh damping and hysteresis; take one of them";
         if (g.transmission_error.present() && (g.rigid() || g.law.has_hysteresis()))
-            return name + " has a transmission error; it needs a stiffness, without hysteresis";
-        if (std::string error = too_fine(name + " with its transmission error", g.transmission_error.pieces());
+            return name + "has a transmission error; it needs a stiffness, without hysteresis";
+        if (Fault error = too_fine(name + "with its transmission error ", g.transmission_error.pieces());
             !error.empty())
             return error;
         if (g.law.losses == Gearbox::loss_map)
             if (const std::size_t cells = 2 * g.law.map.speeds().size() * g.law.map.loads().size();
                 cells > static_cast<std::size_t>(max_pieces))
-                return name + " has a loss map of some " + std::to_string(cells) + " triangles; at most " +
+                return name + "has a loss map of some " + std::to_string(cells) + " triangles; at most " +
                        std::to_string(max_pieces) + " are possible: leave out speeds or loads";
     }
-    std::string error;
-    Train::each_kind(train_, [&](const char*, const char* kind, const auto& elements) {
+    Fault error;
+    Train::each_kind(train_, [&](const char* table, const char* kind, const auto& elements) {
         for (std::size_t k = 0; k < elements.size() && error.empty(); ++k)
-            error = too_fine(named(kind, elements[k].name, k), on_shaft(elements[k])->pieces());
+            error = too_fine(named(table, kind, elements[k].name, k), on_shaft(elements[k])->pieces());
     });
-    Train::each_coupling_kind(train_, [&](const char*, const char* kind, const auto& elements) {
+    Train::each_coupling_kind(train_, [&](const char* table, const char* kind, const auto& elements) {
         for (std::size_t k = 0; k < elements.size() && error.empty(); ++k)
-            error = too_fine(named(kind, elements[k].name, k), between_shafts(elements[k])->pieces());
+            error = too_fine(named(table, kind, elements[k].name, k), between_shafts(elements[k])->pieces());
     });
     if (!error.empty()) return error;
     for (std::size_t s = 0; s < train_.shafts.size(); ++s) {
         const DryFriction& f = train_.shafts[s].friction;
         const int drag = 2 * train_.shafts[s].drag.outermost_piece() + 1;
-        for (const auto& [what, pieces] : {std::pair{" with its friction", f.pieces()}, {" with its drag", drag}})
-            if (std::string fine = too_fine(shaft(static_cast<int>(s)) + what, pieces); !fine.empty()) return fine;
+        for (const auto& [what, pieces] : {std::pair{"with its friction ", f.pieces()}, {"with its drag ", drag}})
+            if (Fault fine = too_fine(shaft(static_cast<int>(s)) + what, pieces); !fine.empty()) return fine;
         if (f.speeds.size() != f.torques.size() || (!f.speeds.empty() && f.speeds[0] != 0.0))
-            return shaft(static_cast<int>(s)) + " has a friction curve that does not begin at speed 0";
+            return shaft(static_cast<int>(s)) + "has a friction curve that does not begin at speed 0";
         for (std::size_t k = 1; k < f.speeds.size(); ++k)
             if (!(f.speeds[k] > f.speeds[k - 1]))
-                return shaft(static_cast<int>(s)) + " has a friction curve whose speeds do not rise";
+                return shaft(static_cast<int>(s)) + "has a friction curve whose speeds do not rise";
     }
     return {};
 }
 
-std::string TrainCheck::flanks(const Gear& g, const std::string& name) const {
+Fault TrainCheck::flanks(const Gear& g, const Fault& name) const {
     if (!g.strikes()) return {};
     const auto lossless = [](const Gear& o) {
         return !o.has_dry_losses() && o.law.losses == Gearbox::constant_efficiency && o.law.efficiency == 1.0;
     };
-    if (g.law.compliance != Gearbox::rigid) return name + " has rigid flanks and a stiffness; leave one of them out";
+    if (g.law.compliance != Gearbox::rigid) return name + "has rigid flanks and a stiffness; leave one of them out";
     if (!(g.restitution >= 0.0 && g.restitution <= 1.0))
-        return name + " has a restitution of " + std::to_string(g.restitution) + "; it must lie from 0 to 1";
+        return name + "has a restitution of " + std::to_string(g.restitution) + "; it must lie from 0 to 1";
     if (g.mesh_damping > 0.0 || g.transmission_error.present())
-        return name + " has rigid flanks with " + (g.mesh_damping > 0.0 ? "mesh damping" : "a transmission error") +
+        return name + "has rigid flanks with " + (g.mesh_damping > 0.0 ? "mesh damping" : "a transmission error") +
                "; leave that out, or give a stiffness";
-    if (train_.short_form) return name + " has rigid flanks, which the long form takes: give [shafts] and [gears]";
+    if (train_.short_form) return name + "has rigid flanks, which the long form takes: give [shafts] and [gears]";
     for (std::size_t k = 0; k < train_.gears.size(); ++k)
         if (const Gear& o = train_.gears[k]; (o.rigid() || o.strikes()) && !lossless(o))
-            return named("gear", o.name, k) + " is rigid and has losses, which impacts in " + name +
+            return named("gears", "gear", o.name, k) + "is rigid and has losses, which impacts in " + name +
                    " would depend on; give it a stiffness or no losses";
     for (std::size_t s = 0; s < train_.shafts.size(); ++s)
         if (train_.shafts[s].given_motion)
-            return name + " has rigid flanks, and the motion of " + shaft(static_cast<int>(s)) +
+            return name + "has rigid flanks, and the motion of " + shaft(static_cast<int>(s)) +
                    " is given; give the gear a stiffness, or a torque in place of the motion";
     for (const auto& c : coupling_elements(train_))
         if (c->is_one_way())
-            return name + " has rigid flanks beside the freewheel '" + c->name + "'; give the gear a stiffness";
+            return name + "has rigid flanks beside the freewheel '" + c->name + "'; give the gear a stiffness";
     return {};
 }
 
-std::string TrainCheck::mass_matrices() const {
+Fault TrainCheck::mass_matrices() const {
     constexpr double rounding = 1e-12;  // of entries that were computed, relative to the diagonal
     const auto number = [](double v) {
         char text[32];
@@ -181,33 +183,32 @@ std::string TrainCheck::mass_matrices() const {
     for (std::size_t k = 0; k < train_.mass_matrices.size(); ++k) {
         const MassMatrix& m = train_.mass_matrices[k];
         const std::size_t n = m.shafts.size();
-        const std::string name = named("mass matrix", m.name, k);
-        if (n == 0) return name + " names no shaft; give it shafts";
+        const Fault name = named("mass_matrices", "mass matrix", m.name, k);
+        if (n == 0) return name + "names no shaft; give it shafts";
         for (const int s : m.shafts) {
-            if (!exists(s))
-                return name + " names shaft number " + std::to_string(s) + ", which the train does not have";
+            if (!exists(s)) return name + "names shaft number " + std::to_string(s) + ", which the train does not have";
             std::string& before = of[static_cast<std::size_t>(s)];
-            if (before == name) return name + " names " + shaft(s) + " twice; name it once";
+            if (before == name.element()) return name + "names " + shaft(s) + " twice; name it once";
             if (!before.empty())
-                return name + " names " + shaft(s) + ", which is in " + before + " too; leave it in one";
-            before = name;
+                return name + "names " + shaft(s) + ", which is in " + before + " too; leave it in one";
+            before = name.element();
             if (train_.shafts[static_cast<std::size_t>(s)].inertia != 0.0)
-                return name + " holds the inertia of " + shaft(s) + ", which has an inertia of its own, " +
+                return name + "holds the inertia of " + shaft(s) + ", which has an inertia of its own, " +
                        number(train_.shafts[static_cast<std::size_t>(s)].inertia) +
                        "; leave that out and add it to the diagonal";
         }
         const auto& M = m.matrix;
         if (M.size() != n || std::any_of(M.begin(), M.end(), [n](const auto& row) { return row.size() != n; }))
-            return name + " is for " + std::to_string(n) + " shafts; give its matrix " + std::to_string(n) +
+            return name + "is for " + std::to_string(n) + " shafts; give its matrix " + std::to_string(n) +
                    " rows of " + std::to_string(n) + " numbers";
         for (std::size_t a = 0; a < n; ++a)
             for (std::size_t b = 0; b < a; ++b)
                 if (!(std::fabs(M[a][b] - M[b][a]) <= rounding * std::sqrt(std::fabs(M[a][a] * M[b][b]))))
-                    return name + " is not symmetric: between " + shaft(m.shafts[b]) + " and " + shaft(m.shafts[a]) +
+                    return name + "is not symmetric: between " + shaft(m.shafts[b]) + " and " + shaft(m.shafts[a]) +
                            " it has " + number(M[b][a]) + " and " + number(M[a][b]) + "; give both the same value";
         for (std::size_t a = 0; a < n; ++a)
             if (M[a][a] == 0.0)
-                return name + " has no inertia of " + shaft(m.shafts[a]) +
+                return name + "has no inertia of " + shaft(m.shafts[a]) +
                        " on its diagonal; give one, or leave that shaft out of the matrix";
         bool positive = true;
         auto scaled = M;  // to ones on the diagonal, so that units do not matter
@@ -216,23 +217,23 @@ std::string TrainCheck::mass_matrices() const {
             for (std::size_t b = 0; b < n; ++b) scaled[a][b] /= std::sqrt(std::fabs(M[a][a]) * std::fabs(M[b][b]));
         }
         if (!positive || !(smallest_eigenvalue(scaled) > rounding))
-            return name + " is not positive definite: its smallest eigenvalue is " + number(smallest_eigenvalue(M)) +
+            return name + "is not positive definite: its smallest eigenvalue is " + number(smallest_eigenvalue(M)) +
                    "; with it some motion would have no kinetic energy";
     }
     return {};
 }
 
-std::string TrainCheck::inertias() const {
+Fault TrainCheck::inertias() const {
     const Places places(train_);
     for (std::size_t s = 0; s < train_.shafts.size(); ++s)
         if (!(places.shafts[s].inertia >= 0.0))
-            return shaft(static_cast<int>(s)) + " has a negative inertia; give it none or a positive one";
+            return shaft(static_cast<int>(s)) + "has a negative inertia; give it none or a positive one";
     return {};
 }
 
 // The speed of a shaft without inertia follows from dampers: nothing dry may depend on it, and one damper at least has
 // to act in all states of the gears.
-std::string TrainCheck::massless() const {
+Fault TrainCheck::massless() const {
     if (Places(train_).massless.empty()) return {};
     const Assembly a(train_);
     const Places& places = a.places();
@@ -248,14 +249,14 @@ std::string TrainCheck::massless() const {
         const unsigned moves = rigid[c] == 0 ? 0 : tied_speed(places.contacts[c], tied, per);
         for (const int s : places.massless)
             if (moves >> s & 1)
-                return shaft(s) + " has no inertia, and " + contact_name(a, static_cast<int>(c)) +
+                return shaft(s) + "has no inertia, and " + contact_name(a, static_cast<int>(c)) +
                        " is a dry contact at it" + remedy(s) + ", or leave the contact out";
     }
     for (const LinearController& k : train_.controllers)
         for (const LinearController::Signal& y : k.signals)
             if (y.kind == LinearController::Signal::speed &&
                 places.shafts[static_cast<std::size_t>(y.shaft)].massless != nowhere)
-                return shaft(y.shaft) + " has no inertia, and a controller takes its speed" + remedy(y.shaft);
+                return shaft(y.shaft) + "has no inertia, and a controller takes its speed" + remedy(y.shaft);
     // In the gaps of all gears, while all that is dry slips.
     Key open;
     for (std::size_t c = 0; c < places.contacts.size(); ++c)
@@ -269,7 +270,7 @@ std::string TrainCheck::massless() const {
         found = s;
         break;
     }
-    return shaft(found) + " has no inertia, and no damping acts on it in all states of its gears" + remedy(found) +
+    return shaft(found) + "has no inertia, and no damping acts on it in all states of its gears" + remedy(found) +
            ", or mesh damping to a gear without backlash";
 }
 
@@ -292,7 +293,7 @@ std::string TrainCheck::harmless_inertia(int s) const {
     return text;
 }
 
-std::string TrainCheck::rigid_loops() const {
+Fault TrainCheck::rigid_loops() const {
     std::vector<ContactPlace> rigid;
     for (std::size_t k = 0; k < train_.gears.size(); ++k)
         if (train_.gears[k].rigid()) rigid.push_back(twist_place(train_.gears[k], static_cast<int>(k)));
@@ -303,7 +304,7 @@ std::string TrainCheck::rigid_loops() const {
         const Ties ties = tie(rigid, shafts, modes.data());
         if (!ties.redundant[k] && !ties.at_rest[rigid[k].a]) continue;
         const auto gear = static_cast<std::size_t>(rigid[k].element);
-        return named("gear", train_.gears[gear].name, gear) + " closes a loop of rigid gears with " +
+        return named("gears", "gear", train_.gears[gear].name, gear) + "closes a loop of rigid gears with " +
                (ties.redundant[k] ? "the same ratio: its torque would not be determined"
                                   : "another ratio: nothing could turn") +
                "; give it a stiffness or leave it out";
@@ -311,7 +312,7 @@ std::string TrainCheck::rigid_loops() const {
     return given_motions(rigid);
 }
 
-std::string TrainCheck::given_motions(const std::vector<ContactPlace>& rigid) const {
+Fault TrainCheck::given_motions(const std::vector<ContactPlace>& rigid) const {
     GivenShafts given;
     for (std::size_t s = 0; s < train_.shafts.size(); ++s)
         if (train_.shafts[s].given_motion) given.shafts |= 1u << s;
@@ -319,13 +320,13 @@ std::string TrainCheck::given_motions(const std::vector<ContactPlace>& rigid) co
     const Ties ties = tie(rigid, static_cast<int>(train_.shafts.size()), stuck.data(), nullptr, given);
     for (std::size_t k = 0; k < rigid.size(); ++k)
         if (const auto gear = static_cast<std::size_t>(rigid[k].element); ties.redundant[k])
-            return named("gear", train_.gears[gear].name, gear) +
-                   " is rigid and joins shafts whose motions are both given; give it a stiffness, or leave one of the "
+            return named("gears", "gear", train_.gears[gear].name, gear) +
+                   "is rigid and joins shafts whose motions are both given; give it a stiffness, or leave one of the "
                    "speeds out";
     return {};
 }
 
-std::string TrainCheck::turned() const {
+Fault TrainCheck::turned() const {
     std::vector<bool> acted_on(train_.shafts.size());
     const auto act_on = [&](int s) { acted_on[static_cast<std::size_t>(s)] = true; };
     for (const Gear& g : train_.gears) {
@@ -349,11 +350,11 @@ std::string TrainCheck::turned() const {
     for (std::size_t s = 0; s < acted_on.size(); ++s)
         if (!acted_on[s] && !train_.shafts[s].loaded)
             return shaft(static_cast<int>(s)) +
-                   " is turned by nothing: no motor, gear or load torque acts on it; join it to the train";
+                   "is turned by nothing: no motor, gear or load torque acts on it; join it to the train";
     return {};
 }
 
-std::string TrainCheck::sizes() const {
+Fault TrainCheck::sizes() const {
     const Layout n = Places(train_).layout;
     const std::pair<const char*, std::pair<int, int>> counts[] = {{"states", {n.states, max_states}},
                                                                   {"inputs", {n.inputs, max_inputs}},
@@ -361,20 +362,21 @@ std::string TrainCheck::sizes() const {
                                                                   {"terms", {n.terms, max_terms}},
                                                                   {"piecewise laws", {n.branches, max_branches}}};
     for (const auto& [what, count] : counts)
-        if (std::string error = too_many(what, static_cast<std::size_t>(count.first), count.second); !error.empty())
+        if (Fault error = too_many(what, static_cast<std::size_t>(count.first), count.second); !error.empty())
             return error;
     return {};
 }
 
-std::string TrainCheck::too_fine(const std::string& what, int pieces) {
+Fault TrainCheck::too_fine(const Fault& element, int pieces) {
     if (pieces <= max_pieces) return {};
-    return what + " would take " + std::to_string(pieces) + " straight lines; at most " + std::to_string(max_pieces) +
+    return element + "would take " + std::to_string(pieces) + " straight lines; at most " + std::to_string(max_pieces) +
            " are possible: allow a larger error";
 }
 
-std::string TrainCheck::too_many(const char* what, std::size_t n, int most) {
+Fault TrainCheck::too_many(const char* what, std::size_t n, int most) {
     if (n <= static_cast<std::size_t>(most)) return {};
-    return "the train has " + std::to_string(n) + ' ' + what + "; at most " + std::to_string(most) + " are possible";
+    return Fault{} + "the train has " + std::to_string(n) + ' ' + what + "; at most " + std::to_string(most) +
+           " are possible";
 }
 
 std::string check_start(const Train& train, const std::vector<double>& speed) {

@@ -1,10 +1,11 @@
-// What is wrong with a train, in one line with the names of its elements; empty if nothing is.
+// What is wrong with a train, with the names of its elements.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -12,52 +13,69 @@
 
 namespace lostmotion::model {
 
+// An element of a train and what is wrong with it. Without a kind it is the train as a whole.
+struct Fault {
+    std::string table, kind, name;
+    std::string reason{};  // and the remedy; empty if nothing is wrong
+
+    bool empty() const { return reason.empty(); }
+    std::string element() const { return kind + " '" + name + "'"; }
+    std::string sentence() const;
+
+    friend Fault operator+(Fault fault, std::string_view text) {
+        fault.reason += text;
+        return fault;
+    }
+    friend Fault operator+(Fault fault, char text) { return std::move(fault) + std::string_view(&text, 1); }
+    friend Fault operator+(Fault fault, const Fault& other) { return std::move(fault) + other.element(); }
+};
+
 class TrainCheck {
  public:
     explicit TrainCheck(const Train& train) : train_(train) {}
 
-    std::string operator()() const;
+    Fault operator()() const;
 
  private:
-    static std::string named(const char* kind, const std::string& name, std::size_t k) {
-        return std::string(kind) + " '" + (name.empty() ? std::to_string(k) : name) + "'";
+    static Fault named(const char* table, const char* kind, const std::string& name, std::size_t k) {
+        return {table, kind, name.empty() ? std::to_string(k) : name};
     }
-    std::string shaft(int s) const {
-        return named("shaft", train_.shafts[static_cast<std::size_t>(s)].name, static_cast<std::size_t>(s));
+    Fault shaft(int s) const {
+        return named("shafts", "shaft", train_.shafts[static_cast<std::size_t>(s)].name, static_cast<std::size_t>(s));
     }
     bool exists(int s) const { return s >= 0 && s < static_cast<int>(train_.shafts.size()); }
 
-    std::string shafts_exist() const;
+    Fault shafts_exist() const;
 
-    std::string housings() const;
+    Fault housings() const;
 
-    std::string controllers() const;
+    Fault controllers() const;
 
-    std::string elements() const;
+    Fault elements() const;
 
     // Mass matrices: their shafts, sizes, symmetry and eigenvalues.
-    std::string mass_matrices() const;
+    Fault mass_matrices() const;
     // Rigid flanks with backlash, and what there may be beside them.
-    std::string flanks(const Gear& g, const std::string& name) const;
-    std::string inertias() const;
+    Fault flanks(const Gear& g, const Fault& name) const;
+    Fault inertias() const;
 
     // Shafts without inertia that no rigid gear ties to others.
-    std::string massless() const;
+    Fault massless() const;
     std::string harmless_inertia(int shaft) const;
 
     // Rigid gears alone: a loop either locks the train or leaves its torques undetermined.
-    std::string rigid_loops() const;
+    Fault rigid_loops() const;
 
     // A rigid gear between shafts whose motions are both given.
-    std::string given_motions(const std::vector<ContactPlace>& rigid) const;
+    Fault given_motions(const std::vector<ContactPlace>& rigid) const;
 
     // Does a motor, gear, coupling, spring or load torque act on each shaft? A part without motor and load moves
     // freely.
-    std::string turned() const;
+    Fault turned() const;
 
-    std::string sizes() const;
-    static std::string too_fine(const std::string& what, int pieces);
-    static std::string too_many(const char* what, std::size_t n, int most);
+    Fault sizes() const;
+    static Fault too_fine(const Fault& element, int pieces);
+    static Fault too_many(const char* what, std::size_t n, int most);
 
     const Train& train_;
 };
@@ -65,7 +83,7 @@ class TrainCheck {
 // Empty, or which rigid gear or freewheel the speeds contradict that the shafts begin with.
 std::string check_start(const Train& train, const std::vector<double>& speed);
 
-// Empty, or what is wrong with it. A train is checked before it is assembled.
-inline std::string check(const Train& train) { return TrainCheck(train)(); }
+// A train is checked before it is assembled.
+inline Fault check(const Train& train) { return TrainCheck(train)(); }
 
 }  // namespace lostmotion::model

@@ -14,14 +14,14 @@ std::string check_run(const model::Assembly& a, std::span<const double> start, c
     return wrong.empty() ? check_control(a, control) : wrong;
 }
 
-TrainRun::TrainRun(const model::Train& train) : error_(model::check(train)) {
-    if (!error_.empty()) return;
+TrainRun::TrainRun(const model::Train& train) : fault_(model::check(train)) {
+    if (!fault_.empty()) return;
     assembly_ = std::make_unique<model::Assembly>(train);
     channels_ = std::make_unique<const std::vector<TrainChannel>>(train_channels(*assembly_));
     const model::Layout n = model::Places(train, true).layout;
-    error_ = too_large(train, n);
-    if (error_.empty() && !model::fits<model::Widest>(train, n))
-        error_ = "this core was built for a motor, a gear and a load alone; the train has more";
+    fault_.reason = too_large(train, n);
+    if (fault_.empty() && !model::fits<model::Widest>(train, n))
+        fault_.reason = "this core was built for a motor, a gear and a load alone; the train has more";
 }
 
 const char* TrainRun::kernel() const {

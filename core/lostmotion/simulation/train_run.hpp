@@ -74,9 +74,10 @@ inline std::pair<std::vector<double>, std::vector<double>> in_layout(const model
 // A train that has been checked and composed, in the narrowest kernel that holds it.
 class TrainRun {
  public:
-    // error(): what is wrong with the train, or empty. Then nothing else may be asked for.
+    // What is wrong with the train, or empty. Then nothing else may be asked for.
     explicit TrainRun(const model::Train& train);
-    const std::string& error() const { return error_; }
+    const model::Fault& fault() const { return fault_; }
+    std::string error() const { return fault_.sentence(); }
     const model::Assembly& assembly() const { return *assembly_; }
     const std::vector<TrainChannel>& channels() const { return *channels_; }
 
@@ -165,7 +166,7 @@ class TrainRun {
         return error.empty() ? error : error + "; leave some out";
     }
 
-    std::string error_;
+    model::Fault fault_;
     std::unique_ptr<model::Assembly> assembly_;
     std::unique_ptr<const std::vector<TrainChannel>> channels_;  // readers refer to it, wherever this is moved
 };

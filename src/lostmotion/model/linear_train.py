@@ -36,6 +36,16 @@ class LinearElements(TrainElements):
         """Word for what joins two of its shafts: gear, screw, rack or belt."""
         return next((table[:-1] for table in LINEAR_DRIVES if gear in getattr(self, table)), "gear")
 
+    def key_of(self, table: str, name: str) -> str:
+        """Key in a file of an element that the core has under this name in one of its tables."""
+        for suffix, key in ((END_STOPS, "slides.{}.end_stops"), (COGGING, "linear_motors.{}.cogging_force")):
+            whole = name.removesuffix(suffix)
+            if whole != name and whole in getattr(self, key.partition(".")[0], ()):
+                return key.format(whole)
+        sources = {"shafts": ("slides",), "gears": LINEAR_DRIVES, "motors": ("linear_motors",)}.get(table, ())
+        found = (source for source in sources if name in getattr(self, source, ()))
+        return next((f"{source}.{name}" for source in found), super().key_of(table, name))
+
     def check_places(self, shafts: Mapping[str, Any], slides: Mapping[str, Any]) -> None:
         """Refuse what joins a slide with something that has other units, and names that are given twice.
 

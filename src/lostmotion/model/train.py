@@ -1,6 +1,5 @@
 """A drive train: shafts joined by gears, clutches and dampers, turned by motors, held by brakes, as frozen objects in SI units."""
 
-import re
 from collections.abc import Collection, Iterator, Mapping
 from typing import Annotated, Any, Self, TypeVar, get_args
 
@@ -25,20 +24,6 @@ V = TypeVar("V")
 Elements = Annotated[dict[str, V], AfterValidator(Named)]
 """by name, in the order of the equations"""
 
-# What the core calls an element (core/lostmotion/model/check.hpp), and the tables that it may stand in.
-TABLES = {
-    "shaft": ("shafts", "slides"),
-    "mass matrix": ("mass_matrices",),
-    "motor": ("motors", "linear_motors"),
-    "gear": ("gears", "screws", "racks", "belts"),
-    "brake": ("brakes",),
-    "clutch": ("clutches",),
-    "freewheel": ("freewheels",),
-    "damper": ("dampers",),
-    "angle torque": ("gravity", "angle_torques"),
-    "spring": ("springs", "slides"),
-}
-
 
 class TrainElements(Part):
     """All of a drive train but its shafts."""
@@ -53,6 +38,23 @@ class TrainElements(Part):
     gravity: Elements[Gravity] = Field(default_factory=nothing)
     angle_torques: Elements[AngleTorque] = Field(default_factory=nothing)
     springs: Elements[Spring] = Field(default_factory=nothing)
+
+    def key_of(self, table: str, name: str) -> str:
+        """Key in a file of an element that the core has under this name in one of its tables."""
+        written = (t for t, of_core in ON_SHAFTS.items() if of_core == table and name in getattr(self, t))
+        return f"{next(written, table)}.{name}"
+
+    def check(self, core: _core.Train) -> None:
+        """Refuse a train that was made of these tables and cannot move, or whose motion is not determined.
+
+        Raises
+        ------
+        InputError
+            With the key of the element, what is wrong with it, and the remedy.
+        """
+        if fault := core.check():
+            table, name, reason = fault
+            raise InputError(reason, keys=(self.key_of(table, name),) if table else ())
 
     def commanded(self) -> list[str]:
         """Names of what has a command: motors, brakes and friction clutches."""
@@ -213,35 +215,8 @@ class DriveTrain(TrainElements):
             raise InputError(
                 f"keys gravity.{twice[0]}, angle_torques.{twice[0]}: have the same name; rename one of them"
             )
-        self.check(self.shafts)
+        self.check(self.core(self.shafts))
         return self
-
-    def check(self, loaded: Collection[str], tables: TrainElements | None = None, given: Collection[str] = ()) -> None:
-        """Refuse a train that cannot move, or whose motion is not determined.
-
-        Parameters
-        ----------
-        loaded
-            Names of the shafts that a load torque acts on.
-        tables
-            What the elements were written as, for messages; left out, this train.
-        given
-            Names of the shafts whose motion is given.
-
-        Raises
-        ------
-        InputError
-            With the key of the element, what is wrong with it, and the remedy.
-        """
-        problem = self.core(loaded, given=given).check()
-        if not problem:
-            return
-        found = re.fullmatch(f"({'|'.join(TABLES)}) '([^']*)' (.*)", problem)
-        if found is None:
-            raise InputError(problem)
-        kind, name, text = found.groups()
-        table = next((t for t in TABLES[kind] if name in getattr(tables or self, t, ())), TABLES[kind][0])
-        raise InputError(f"key {table}.{name}: {text}")
 
     def core(
         self, loaded: Collection[str], driven: Mapping[str, MotorLaw | None] = {}, given: Collection[str] = ()

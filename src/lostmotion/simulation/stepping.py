@@ -186,8 +186,8 @@ class Simulation:
         core = self._core_train
         for name, mass in changed.items():
             core = core.with_mass_matrix(name, mass.matrix)
-            if problem := core.check():
-                raise InputError(f"mass_matrix: {problem}")
+            if fault := core.check():
+                raise InputError(fault[-1], where=f"mass_matrix.{name}")
         time, x, memory, regime, values, _, *rest = self._idle().get_state()
         simulation = self._simulation_of(core)
         simulation.set_state(time, x, memory, regime, values, False, *rest)

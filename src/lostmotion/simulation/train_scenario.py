@@ -152,14 +152,14 @@ class TrainScenario(Scenario, LinearElements):
     def _consistent(self) -> Self:
         self._check_shafts()
         train = self.train()
-        train.check(self.loaded(), self, self.given())
+        self.check(train.core(self.loaded(), given=self.given()))
         self._check_given()
         self._check_controllers()
         check_on_reference(self.initial, self.axes(), ("angles", "speeds", "positions", "slide_speeds"))
         core = self.core()
         self._check_massless(core.massless_shafts())
-        if self.continuous() and (problem := core.check()):
-            raise InputError(problem)
+        if self.continuous():
+            self.check(core)
         check_names(train, core, self.axes(), self)
         known = self.commanded()
         for name in self.command:
@@ -616,9 +616,10 @@ def given_train(
                 raise InputError(f"{key}: {shown(name)} is no shaft of this train; {meant}")
     shafts = shafts if loaded is None else list(loaded)
     moved = moved if given is None else list(given)
+    core = train.core(shafts, given=moved)
     if loaded is not None or given is not None:
-        train.check(shafts, given=moved)
-    check_names(train, train.core(shafts, given=moved))
+        train.check(core)
+    check_names(train, core)
     return train, shafts, moved
 
 
