@@ -9,7 +9,7 @@ import numpy as np
 
 import lostmotion as lm
 from lostmotion.reports import plots
-from lostmotion.reports.looks import FIRST, SECOND
+from lostmotion.reports.looks import FIRST, MUTED, SECOND
 from lostmotion.reports.panels import Curve, Panel
 
 MRAD = 1e3
@@ -33,6 +33,30 @@ def run(out: Path, scenario: lm.TrainScenario) -> None:
     plots.draw(panels, 1, (9.0, 5.4)).savefig(out / "hunting-run.png", dpi=100, metadata={"Software": None})
 
 
+def certificates(out: Path, scenario: lm.TrainScenario) -> None:
+    """The map from break-away to break-away, with and without static friction."""
+    without = scenario.replace(**{"shafts.table.breakaway_torque": None})
+    both = {"static friction 8 N·m": (scenario, FIRST), "no more than in motion, 5 N·m": (without, SECOND)}
+    figure = plots.Picture(figsize=(7.0, 4.2))
+    axes = figure.subplots()
+    for name, (one, style) in both.items():
+        certificate = lm.hunting_certificate(one)
+        assert certificate.map is not None
+        axes.plot(MRAD * certificate.map["error"], MRAD * certificate.map["image"], label=name, **style)
+        for point in certificate.fixed_points:
+            axes.plot(MRAD * point.amplitude, -MRAD * point.amplitude, "o", color=style["color"])
+    top = 20.0
+    axes.plot([0.0, top], [0.0, -top], "--", color=MUTED, label="equal and opposite")
+    axes.set(
+        xlim=(0.0, top),
+        ylim=(-10.0, 4.0),
+        xlabel="error at the break-away [mrad]",
+        ylabel="error left by the slip [mrad]",
+    )
+    axes.legend()
+    figure.savefig(out / "hunting-certificate.png", dpi=100, metadata={"Software": None})
+
+
 def maps(out: Path, scenario: lm.TrainScenario) -> None:
     """Over static friction and integral gain."""
     grid = {
@@ -48,4 +72,5 @@ def write(out: Path) -> None:
     scenario = lm.load("hunting-with-static-friction")
     assert isinstance(scenario, lm.TrainScenario)
     run(out, scenario)
+    certificates(out, scenario)
     maps(out, scenario)

@@ -46,6 +46,7 @@ from .response.harmonic import frequency_response as frequency_response
 from .response.linear import linearize as linearize
 from .response.shooting import periodic_motion as periodic_motion
 from .response.spectrum import spectrum as spectrum
+from .servo.certificate import hunting_certificate as hunting_certificate
 from .servo.commission import commission as commission
 from .servo.tuning import tune as tune
 from .simulation.batches import SimulationBatch as SimulationBatch

@@ -22,6 +22,7 @@ _WITH_DATASETS = (
     "response.crossovers",
     "response.harmonic",
     "response.shooting",
+    "servo.certificate",
     "servo.hunting",
     "simulation.result_files",
     "simulation.results",

@@ -1,3 +1,5 @@
+from .certificate import FixedPoint as FixedPoint
+from .certificate import HuntingCertificate as HuntingCertificate
 from .commission import LoopSheet as LoopSheet
 from .commission import ServoReport as ServoReport
 from .commission import Stiffness as Stiffness

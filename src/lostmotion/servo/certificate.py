@@ -1,0 +1,274 @@
+"""Certificate of hunting: the map from break-away to break-away of a stuck contact, with a proof for all starting errors."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import InputError
+from ..inputs.arguments import checked
+from ..inputs.quantities import argument
+from ..inputs.validation import shown
+from ..response.hunting_proof import Certainty, Proof, prove
+from ..response.limit_cycle import SAMPLES, Loop
+from ..response.return_map import Image, Transients, image
+from ..response.stick_slip import AtRestError, StickSlip, UndecidableError, stick_slip
+from ..simulation.scenario import Scenario
+from ..simulation.train_scenario import TrainScenario, in_long_form
+
+if TYPE_CHECKING:
+    import xarray
+
+POINTS = 121  # of the map
+SHOWN = 4.0  # times the largest limit cycle, up to which it is drawn
+BISECTIONS = 50
+STEP = 1e-4  # relative, of the derivative at a fixed point
+LONGER = 4  # times as long each of the runs is that lead to a stuck interval
+RUNS = 4
+FADED = 0.1  # of the error from the second quarter of a run to the last
+SETTLED = 12.0  # slowest time constants of a stuck interval, after which its start counts as forgotten
+
+
+@dataclass(frozen=True)
+class FixedPoint:
+    """A limit cycle of slips of equal size to and fro."""
+
+    amplitude: float
+    """error of the controller at each break-away [rad] or [m]: half of the swing of the measured position"""
+    period: float
+    """[s], of two slips and two stuck intervals"""
+    multiplier: float
+    """factor by which a deviation of the error changes over a period"""
+
+    @property
+    def stable(self) -> bool:
+        """Whether neighbouring motions approach it."""
+        return abs(self.multiplier) < 1.0
+
+
+@dataclass(frozen=True)
+class HuntingCertificate:
+    """Whether one stuck contact under integral action hunts, shown for all starting errors up to a bound."""
+
+    verdict: Certainty
+    """hunts, does not hunt, or not decided"""
+    reason: str
+    """why it does not hunt, or what could not be shown; empty if it hunts"""
+    contact: str
+    """contact that sticks; empty where there is no map"""
+    map: xarray.Dataset | None
+    """``image`` over ``error``: the error left after a slip that begins with an error; ``slip_time`` and ``stuck_time`` [s]; without
+    the errors whose slips are more than one linear regime"""
+    fixed_points: tuple[FixedPoint, ...]
+    """limit cycles, those without stability among them"""
+    largest_error: float
+    """largest starting error for which the verdict is shown"""
+    band: tuple[float, float] | None
+    """magnitudes of errors that the map takes into themselves, of a verdict that it hunts"""
+    ranges: tuple[tuple[float, float], ...]
+    """magnitudes of starting errors from which the band is reached"""
+    factor: float
+    """bound of the share of its error that each slip leaves, of a verdict that it does not hunt; NaN where no slip begins"""
+    reached: float
+    """error with which the run of the scenario first sticks until all but the integrator has settled; NaN if it was not found"""
+
+    def __repr__(self) -> str:
+        if self.verdict != "hunts":
+            return f"{self.verdict}: {self.reason}"
+        cycles = [
+            f"{'stable' if p.stable else 'unstable'} limit cycle of {1.0 / p.period:.6g} Hz" for p in self.fixed_points
+        ]
+        band = "" if self.band is None else f", errors from {self.band[0]:.4g} to {self.band[1]:.4g} are never left"
+        return f"hunts: {', '.join(cycles) or 'no symmetric limit cycle'}{band}"
+
+
+@checked
+def hunting_certificate(scenario: Scenario, *, largest_error: float | str | None = None) -> HuntingCertificate:
+    """Decide by proof whether a stuck contact under integral action hunts.
+
+    While the contact is stuck, the integrator winds up in proportion to the error until the contact breaks away; the slip leaves
+    another error. Slip and stuck interval are linear, and so the map from one error to the next follows exactly from their
+    matrices. A fixed point of it is a limit cycle. The verdict is shown by bounds of the map over intervals of errors: *hunts*
+    if it takes a band of errors into itself that leaves out rest, *does not hunt* if each slip leaves less of its error. The
+    bounds are computed in floating point and widened by what that may round.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        With one continuous position controller, one dry contact with a constant friction in motion, and no other contacts or
+        segments. Its inputs must come to rest.
+    largest_error : float or str, optional
+        Largest starting error [rad] or [m] that is examined. Default: the travel of the reference.
+
+    Returns
+    -------
+    HuntingCertificate
+        Verdict, map, limit cycles and the errors for which the verdict is shown. What cannot be shown is *not decided*, with
+        the reason.
+
+    Raises
+    ------
+    InputError
+        The controller is no continuous position controller, or an input never comes to rest.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> certificate = lm.hunting_certificate(lm.load("hunting-with-static-friction"))
+    >>> certificate.verdict, round(1e3 * certificate.fixed_points[0].amplitude, 3)
+    ('hunts', 5.762)
+    """
+    train = in_long_form(scenario)
+    loop = Loop.of(train)
+    if largest_error is not None:
+        largest_error = argument("largest_error", largest_error, _unit(train))
+        if not largest_error > 0.0:
+            raise InputError(f"largest_error: {shown(largest_error)} must be greater than 0")
+    try:
+        of = stick_slip(train)
+    except UndecidableError as why:
+        return _without_map("not decided", str(why))
+    except AtRestError as why:
+        if _comes_to_rest(loop):
+            return _without_map("does not hunt", str(why))
+        return _without_map("not decided", f"{why}, but the run of the scenario is not seen to come to rest")
+    largest = largest_error or _travel(train)
+    proof = prove(of, largest)
+    reached, fades = _reached(loop, of, proof)
+    verdict, reason = proof.verdict, proof.reason
+    if verdict == "does not hunt" and not (fades or abs(reached) <= proof.largest):
+        verdict = "not decided"
+        reason = f"from errors up to {proof.largest:.4g} it does not hunt, but the run of the scenario is not seen to reach them"
+    points = _map(of, proof, largest)
+    return HuntingCertificate(
+        verdict=verdict,
+        reason=reason,
+        contact=of.contact,
+        map=_dataset(of, points, verdict, train),
+        fixed_points=tuple(_fixed_points(of, points)) if of.excess > 0.0 else (),
+        largest_error=proof.largest,
+        band=proof.band,
+        ranges=proof.ranges,
+        factor=proof.factor,
+        reached=reached,
+    )
+
+
+def _without_map(verdict: Certainty, reason: str) -> HuntingCertificate:
+    none = math.nan
+    return HuntingCertificate(verdict, reason, "", None, (), none, None, (), none, none)
+
+
+def _unit(train: TrainScenario) -> str:
+    """Unit of the error of the only controller."""
+    shafts = [c.shaft for c in train.continuous().values()]
+    return train.train().angle_unit((shafts or [None])[0] or list(train.train().shafts)[-1])
+
+
+def _travel(train: TrainScenario) -> float:
+    """Largest distance of the reference from where it begins; 1 where it never moves."""
+    ((motor, controller),) = train.continuous().items()
+    points = controller.signals(motor)[f"{motor}_reference"].breakpoint_list()
+    values = [value for _, value, _ in points] + [0.0]
+    return float(np.ptp(values)) or 1.0
+
+
+def _comes_to_rest(loop: Loop) -> bool:
+    duration = loop.scenario.simulation.duration
+    return any(loop.outlook(duration * LONGER**k).rests for k in range(RUNS))
+
+
+def _reached(loop: Loop, of: StickSlip, proof: Proof) -> tuple[float, bool]:
+    """Error of the first stuck interval of the scenario's run in which all settles, for which the proof holds if there is one; and
+    whether the errors of the run fade."""
+    settling = SETTLED / np.abs(of.stuck_rates.real).min() if len(of.stuck_rates) else 0.0
+    first = math.nan
+    for k in range(RUNS):
+        whole = loop.settled + loop.scenario.simulation.duration * LONGER**k
+        run = loop.run(whole, SAMPLES)
+        errors, times = run["values"][loop.channels.index(loop.watched)], np.arange(SAMPLES) * whole / SAMPLES
+        for begin, end in _stuck(_modes(loop, of, run["switchings"]), loop.settled, whole):
+            inside = np.flatnonzero((times > begin) & (times < end))
+            if end - begin > settling and len(inside):
+                error = float(errors[inside[-1]])
+                first = error if math.isnan(first) else first
+                if abs(error) <= proof.largest:
+                    return error, False
+        early, late = (np.abs(part).max() for part in np.array_split(errors[times > loop.settled], 4)[1::2])
+        if late <= FADED * early:
+            return first, True
+    return first, False
+
+
+def _modes(loop: Loop, of: StickSlip, switchings: np.ndarray) -> np.ndarray:
+    """Instant, and mode of the contact before and after it, of each switching of the contact."""
+    names = loop.core.switching_columns()
+    columns = [0, *(names.index(f"{of.contact}_{when}") for when in ("before", "after"))]
+    found = switchings[:, columns]
+    return np.asarray(found[found[:, 1] != found[:, 2]])
+
+
+def _stuck(switchings: np.ndarray, settled: float, end: float) -> list[tuple[float, float]]:
+    """Stuck intervals of the only contact after the inputs have come to rest."""
+    found, begin = [], settled
+    for time, before, after in switchings:
+        if before == 0 and after != 0 and time > settled:
+            found.append((max(begin, settled), float(time)))
+        if after == 0:
+            begin = float(time)
+    if len(switchings) and switchings[-1][2] == 0:
+        found.append((max(begin, settled), end))
+    return found
+
+
+# --- the map ---
+
+
+def _map(of: StickSlip, proof: Proof, largest: float) -> list[tuple[float, Image]]:
+    """Points of the map from 0 on, up to some times its largest limit cycle."""
+    top = (proof.largest or largest) if proof.band is None else SHOWN * proof.band[1]
+    none = Transients.none(of)
+    return [(float(e), image(of, e, e, none)) for e in np.linspace(0.0, top, POINTS) if e > 0.0 or of.excess > 0.0]
+
+
+def _left(of: StickSlip, error: float) -> float:
+    found = image(of, error, error, Transients.none(of))
+    return math.nan if found.reason else found.middle
+
+
+def _fixed_points(of: StickSlip, points: list[tuple[float, Image]]) -> list[FixedPoint]:
+    """Errors of which a slip leaves the same error of the other sign."""
+    found = []
+    sums = [math.nan if i.reason else i.middle + e for e, i in points]
+    for k in np.flatnonzero(np.diff(np.sign(sums))):
+        low, high = points[k][0], points[k + 1][0]
+        if not sums[k] * sums[k + 1] <= 0.0:
+            continue
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (low + high)
+            below = (_left(of, middle) + middle) * sums[k] > 0.0
+            low, high = (middle, high) if below else (low, middle)
+        one = image(of, low, low, Transients.none(of))
+        slope = (_left(of, low * (1.0 + STEP)) - _left(of, low * (1.0 - STEP))) / (2.0 * STEP * low)
+        found.append(FixedPoint(low, sum(one.slip) + sum(one.stuck), slope * slope))
+    return found
+
+
+def _dataset(of: StickSlip, points: list[tuple[float, Image]], verdict: str, train: TrainScenario) -> xarray.Dataset:
+    import xarray as xr
+
+    unit = _unit(train)
+    good = [(e, i) for e, i in points if not i.reason]
+    columns = {
+        "image": ([i.middle for _, i in good], unit, "error left after the slip"),
+        "slip_time": ([0.5 * sum(i.slip) for _, i in good], "s", "duration of the slip"),
+        "stuck_time": ([0.5 * sum(i.stuck) for _, i in good], "s", "time until the contact breaks away again"),
+    }
+    return xr.Dataset(
+        {name: ("error", values, {"units": u, "long_name": text}) for name, (values, u, text) in columns.items()},
+        coords={"error": ("error", [e for e, _ in good], {"units": unit, "long_name": "error at the break-away"})},
+        attrs={"contact": of.contact, "verdict": verdict},
+    )

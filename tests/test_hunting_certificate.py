@@ -1,0 +1,136 @@
+"""The certificate of hunting: its map against closed forms and Newton's method, and what it refuses."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lostmotion as lm
+
+INERTIA, K_P, K_I, K_D = 0.5, 50.0, 120.0, 8.0
+SLIDING = 2.0
+
+
+def rotor(breakaway: float, **position: Any) -> lm.TrainScenario:
+    """A rotor on its own with dry friction under a PID controller without a filter."""
+    gains = {"gain": K_P, "integral_gain": K_I, "derivative_gain": K_D} | position
+    return lm.TrainScenario(
+        shafts={"rotor": {"friction_torque": SLIDING, "breakaway_torque": breakaway}},
+        motors={"m": {"kind": "torque_source", "shaft": "rotor", "rotor_inertia": INERTIA, "rated_torque": 10.0}},
+        controllers={
+            "m": {
+                "kind": "continuous",
+                "reference": {"kind": "position", "steps": [{"time": 0.1, "height": 0.2}]},
+                "position": gains,
+            }
+        },
+        simulation={"duration": 20.0, "sample_interval": 1e-3},
+    )
+
+
+def slip_by_hand(error: float, excess: float) -> tuple[float, float, float]:
+    """J e''' + k_d e'' + k_p e' + k_i e = 0, e(0) = error, e'(0) = 0, e''(0) = -excess/J until e' = 0 again: its duration, the error
+    that is left, and the integral of the error."""
+    roots = np.roots([INERTIA, K_D, K_P, K_I])
+    weights = np.linalg.solve(np.vander(roots, increasing=True).T, np.array([error, 0.0, -excess / INERTIA]))
+
+    def derivative(t: float, order: int) -> float:
+        return float((weights * roots**order * np.exp(roots * t)).sum().real)
+
+    t = 0.01
+    while derivative(t, 1) < 0.0:
+        t += 0.01
+    low, high = t - 0.01, t
+    for _ in range(60):
+        t = 0.5 * (low + high)
+        low, high = (t, high) if derivative(t, 1) < 0.0 else (low, t)
+    return t, derivative(t, 0), derivative(t, -1) - derivative(0.0, -1)
+
+
+def test_without_an_excess_each_slip_leaves_the_share_of_the_closed_form() -> None:
+    """J g''' + k_d g'' + k_p g' + k_i g = 0 with g(0) = 1 and g' = g'' = 0 until g' = 0 again: the share is g there."""
+    certificate = lm.hunting_certificate(rotor(SLIDING))
+    duration, share, _ = slip_by_hand(1.0, 0.0)
+    assert certificate.verdict == "does not hunt"
+    assert certificate.factor == pytest.approx(abs(share), rel=1e-7)
+    assert certificate.map is not None
+    assert certificate.map["image"].values == pytest.approx(share * certificate.map["error"].values, rel=1e-9)
+    assert certificate.map["slip_time"].values == pytest.approx(duration, rel=1e-6)
+    assert not certificate.fixed_points
+
+
+@pytest.mark.parametrize("breakaway", [2.2, 3.0, 5.0])
+def test_with_an_excess_the_map_is_that_of_the_closed_form_and_hunts(breakaway: float) -> None:
+    certificate = lm.hunting_certificate(rotor(breakaway))
+    assert certificate.verdict == "hunts"
+    assert certificate.map is not None
+    assert certificate.band is not None
+    for error in certificate.map["error"].values[::15]:
+        one = certificate.map.sel(error=error)
+        duration, left, integral = slip_by_hand(float(error), breakaway - SLIDING)
+        assert float(one["image"]) == pytest.approx(left, abs=1e-10)
+        assert float(one["slip_time"]) == pytest.approx(duration, rel=1e-6)
+        # The torque of the integrator at the stop, from that of the break-away and the error until then; it winds up by k_i e.
+        held = breakaway + K_I * integral + K_P * (left - float(error))
+        room = math.copysign(breakaway, left) - held
+        assert float(one["stuck_time"]) == pytest.approx(room / (K_I * left), rel=1e-5)
+    (cycle,) = certificate.fixed_points
+    low, high = certificate.band
+    assert low < cycle.amplitude < high
+    assert slip_by_hand(cycle.amplitude, breakaway - SLIDING)[1] == pytest.approx(-cycle.amplitude, rel=1e-9)
+
+
+def test_the_fixed_point_is_the_limit_cycle_that_newtons_method_finds() -> None:
+    scenario = lm.load("hunting-with-static-friction")
+    certificate, cycle = lm.hunting_certificate(scenario), lm.servo.limit_cycle(scenario, causes=False)
+    (point,) = certificate.fixed_points
+    assert point.period == pytest.approx(cycle.period, rel=1e-5)
+    assert point.amplitude == pytest.approx(cycle.amplitudes["servo_error"], rel=1e-6)
+    assert point.multiplier == pytest.approx(np.abs(cycle.multipliers).max(), rel=1e-4)
+    assert point.stable
+    assert cycle.stable
+    assert "stable limit cycle of 0.35196" in repr(certificate)
+
+
+def test_what_keeps_an_axis_from_hunting_is_named() -> None:
+    """Without an integrator, or with a limit below the static friction, nothing frees the contact."""
+    scenario = lm.load("hunting-with-static-friction")
+    gain = {"controllers.servo.position.integral_gain": 0.0, "controllers.servo.anti_windup_time": None}
+    still = lm.hunting_certificate(scenario.replace(**gain))
+    assert (still.verdict, still.map) == ("does not hunt", None)
+    assert "no integrator winds up" in still.reason
+    held = lm.hunting_certificate(scenario.replace(**{"controllers.servo.limit": 7.5 / 50.0}))
+    assert held.verdict == "does not hunt"
+    assert "limit of the controller" in held.reason
+    assert (
+        lm.hunting_certificate(scenario.replace(**{"controllers.servo.limit": 8.5 / 50.0})).verdict != "does not hunt"
+    )
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"shafts.motor.friction_torque": 0.01}, "2 dry contacts, motor_contact, table_contact"),
+        ({"shafts.table.stribeck_speed": 0.1}, "friction of table that varies with speed"),
+        ({"controllers.servo.position.integral_gain": 80.0}, "the linear loop is unstable"),
+        (
+            {"gears.drive.stiffness": {"kind": "curve", "backlash": 1e-3, "slopes": [2e4], "breaks": []}},
+            "segments of drive",
+        ),
+    ],
+)
+def test_what_is_not_decided_is_named(changes: dict[str, Any], reason: str) -> None:
+    certificate = lm.hunting_certificate(lm.load("hunting-with-static-friction").replace(**changes))
+    assert certificate.verdict == "not decided"
+    assert reason in certificate.reason
+
+
+def test_a_sampled_controller_and_a_wrong_error_are_refused() -> None:
+    with pytest.raises(lm.InputError, match="0 continuous and 1 sampled controllers"):
+        lm.hunting_certificate(lm.load("position-axis"))
+    with pytest.raises(lm.InputError, match="largest_error: -1"):
+        lm.hunting_certificate(lm.load("hunting-with-static-friction"), largest_error=-1.0)
+    assert (
+        lm.hunting_certificate(lm.load("hunting-with-static-friction"), largest_error="10 mrad").largest_error == 0.01
+    )
