@@ -73,6 +73,16 @@ def test_a_run_has_the_bits_of_python(library: c.CDLL, name: str) -> None:  # no
         assert np.array_equal(there[variable], here[variable].to_numpy(), equal_nan=True), variable
 
 
+def test_the_efficiency_of_a_gearbox_that_reverses_is_that_of_one_that_does_not(library: c.CDLL) -> None:  # noqa: F811
+    straight = lm.load("paper-2dof-nl-small")
+    a, b = (
+        Scenario(library, lm.portable.description(straight.replace(**{"gearbox.ratio": r}), parameters=False)).run()
+        for r in (straight.gearbox.ratio, -straight.gearbox.ratio)
+    )
+    assert np.nanmax(a["efficiency"]) > 0.1
+    assert np.array_equal(a["efficiency"], b["efficiency"], equal_nan=True)
+
+
 @pytest.fixture
 def axis(library: c.CDLL) -> Scenario:  # noqa: F811
     return Scenario(library, lm.portable.description(lm.load("position-axis"), parameters=False))

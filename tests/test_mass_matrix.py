@@ -276,7 +276,7 @@ def test_a_cart_and_its_pendulum_take_units_by_domain() -> None:
         ({"m": {"shafts": ["shoulder", "elbow"], "matrix": [[1.0, 1.0], [1.0, 1.0]]}}, "not positive definite"),
         (
             {"m": {"shafts": ["shoulder", "elbow"], "matrix": [[1.0, 0.0], [0.0, 0.0]]}},
-            "mass_matrices.m: has no inertia of shaft 'elbow' on its diagonal; give one, or leave that shaft out",
+            "mass_matrices.m: has no inertia of shaft 'elbow' on its diagonal; give one, or leave it out",
         ),
         ({"m": {"shafts": ["shoulder", "elbow"], "matrix": [[1.0, 0.5], [0.4, 1.0]]}}, "not symmetric: .* 0.5 and 0.4"),
         ({"m": {"shafts": ["shoulder", "elbow"], "matrix": [[1.0, 0.5]]}}, "give its matrix 2 rows of 2 numbers"),
@@ -302,7 +302,8 @@ def test_what_is_no_mass_matrix_is_refused(matrices: dict[str, Any], message: st
 def test_an_inertia_stated_twice_is_refused() -> None:
     shafts = {"shoulder": {"inertia": 1.5}, "elbow": {}}
     with pytest.raises(
-        lm.InputError, match=r"mass_matrices.arm: holds the inertia of shaft 'shoulder', .* its own, 1.5; leave"
+        lm.InputError,
+        match=r"mass_matrices.arm: holds the inertia of shaft 'shoulder', .* its own, 1.5 kg\*m\^2; leave",
     ):
         scenario(shafts=shafts)
 

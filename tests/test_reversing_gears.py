@@ -90,6 +90,41 @@ def test_the_load_behind_a_reversing_gear_moves_mirrored(losses: str, stiffness:
     assert abs(other["residual"]) < 1e-9 * max(1.0, other["turned_over"])
 
 
+@pytest.mark.parametrize("load", [0.0, 3.0, -3.0])
+@pytest.mark.parametrize("stiffness", STIFFNESS)
+@pytest.mark.parametrize("losses", LOSSES)
+def test_the_command_that_turns_a_reversing_gear_is_that_of_another(losses: str, stiffness: str, load: float) -> None:
+    """Of a motor on its input and one on its output, whose directions are exchanged."""
+    found = []
+    for way in (1.0, -1.0):
+        tables = axis(way * 6.0, losses, stiffness, 2).model_dump(exclude_none=True)
+        tables["shafts"]["load"]["torque"] = {"mean": way * load}
+        tables["motors"]["far"] = {"kind": "torque_source", "shaft": "load", "rotor_inertia": 0.1}
+        tables["command"] = {"m": {"mean": 0.2}, "far": {"mean": 0.3 * way}}
+        found.append({m.name: m for m in lm.explain(lm.TrainScenario(**tables), 0.0).motors})
+    one, other = found
+    assert (one["m"].command_forward, one["m"].command_backward) == pytest.approx(
+        (other["m"].command_forward, other["m"].command_backward), rel=1e-14, nan_ok=False
+    )
+    assert (one["far"].command_forward, one["far"].command_backward) == pytest.approx(
+        (-other["far"].command_backward, -other["far"].command_forward), rel=1e-14, nan_ok=False
+    )
+
+
+def test_the_command_that_turns_a_reversing_gear_by_hand() -> None:
+    """10 N m of friction on the load behind 5:1 at 0.9, and 0.1 N m on the motor."""
+    train = lm.TrainScenario(
+        shafts={"motor": {"friction_torque": 0.1}, "load": {"inertia": 1.0, "friction_torque": 10.0}},
+        motors={"m": {"kind": "torque_source", "shaft": "motor", "rotor_inertia": 1e-3, "rated_torque": 10.0}},
+        gears={"g": {"input": "motor", "output": "load", "ratio": -5.0, "stiffness": {"kind": "linear", "stiffness": 1e4},
+                     "losses": {"kind": "mesh_efficiency", "drive_efficiency": 0.9, "backdrive_efficiency": 0.8}}},
+        simulation={"duration": 1.0, "sample_interval": 0.1},
+    )  # fmt: skip
+    (motor,) = lm.explain(train, 0.5).motors
+    assert motor.command_forward == pytest.approx((10.0 / (5.0 * 0.9) + 0.1) / 10.0, rel=1e-12)
+    assert motor.command_backward == -motor.command_forward
+
+
 @pytest.mark.parametrize("losses", ["two efficiencies", "map"])
 def test_both_solvers_agree_on_reversing_gears(losses: str) -> None:
     scenario = axis(-6.0, losses, "gap", 11)

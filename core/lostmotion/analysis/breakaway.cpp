@@ -83,22 +83,25 @@ std::vector<double> Breakaway::edges(int g) const {
 double Breakaway::to_drive(int g, int s) {
     const model::Gear& gear = train_.gears[static_cast<std::size_t>(g)];
     if (reaches_a_loop(gear.output)) return 0.0;
-    const double T_0 = T_2_[static_cast<std::size_t>(g)], T = to_turn(gear.output, s, &gear);
+    const int turned = gear.law.ratio < 0.0 ? -s : s;  // the output
+    const double T_0 = T_2_[static_cast<std::size_t>(g)], T = to_turn(gear.output, turned, &gear);
     if (std::isinf(T)) return s * never;
     double hardest = s * input_torque(g, T, s);
-    if (s * (T - T_0) <= 0.0) return s * hardest;
+    if (turned * (T - T_0) <= 0.0) return s * hardest;
     hardest = std::fmax(hardest, s * input_torque(g, T_0, s));
     for (const double load : edges(g))
-        if (load > s * T_0 && load < s * T) hardest = std::fmax(hardest, s * input_torque(g, s * load, s));
+        if (load > turned * T_0 && load < turned * T)
+            hardest = std::fmax(hardest, s * input_torque(g, turned * load, s));
     return s * hardest;
 }
 
 double Breakaway::to_drive_back(int g, int s) {
     const model::Gear& gear = train_.gears[static_cast<std::size_t>(g)];
     if (reaches_a_loop(gear.input)) return 0.0;
-    const double wanted = -s * to_turn(gear.input, s, &gear);
+    const int turned = gear.law.ratio < 0.0 ? -s : s;  // the input
+    const double wanted = -turned * to_turn(gear.input, turned, &gear);
     if (std::isinf(wanted)) return s * never;
-    const auto taken = [&](double load) { return s * input_torque(g, s * load, s); };
+    const auto taken = [&](double load) { return turned * input_torque(g, s * load, turned); };
     double load = s * T_2_[static_cast<std::size_t>(g)];
     const bool falls = taken(load) > wanted;  // else it has been wound up too far, and is relieved
     std::vector<double> stops = edges(g);

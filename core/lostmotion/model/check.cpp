@@ -193,9 +193,9 @@ Fault TrainCheck::mass_matrices() const {
                 return name + "names " + shaft(s) + ", which is in " + before + " too; leave it in one";
             before = name.element();
             if (train_.shafts[static_cast<std::size_t>(s)].inertia != 0.0)
-                return name + "holds the inertia of " + shaft(s) + ", which has an inertia of its own, " +
+                return name + "holds the " + inertia(s) + " of " + shaft(s) + ", which has one of its own, " +
                        number(train_.shafts[static_cast<std::size_t>(s)].inertia) +
-                       "; leave that out and add it to the diagonal";
+                       (is_slide(train_, s) ? " kg" : " kg*m^2") + "; leave that out and add it to the diagonal";
         }
         const auto& M = m.matrix;
         if (M.size() != n || std::any_of(M.begin(), M.end(), [n](const auto& row) { return row.size() != n; }))
@@ -208,8 +208,8 @@ Fault TrainCheck::mass_matrices() const {
                            " it has " + number(M[b][a]) + " and " + number(M[a][b]) + "; give both the same value";
         for (std::size_t a = 0; a < n; ++a)
             if (M[a][a] == 0.0)
-                return name + "has no inertia of " + shaft(m.shafts[a]) +
-                       " on its diagonal; give one, or leave that shaft out of the matrix";
+                return name + "has no " + inertia(m.shafts[a]) + " of " + shaft(m.shafts[a]) +
+                       " on its diagonal; give one, or leave it out of the matrix";
         bool positive = true;
         auto scaled = M;  // to ones on the diagonal, so that units do not matter
         for (std::size_t a = 0; a < n; ++a) {
@@ -227,7 +227,8 @@ Fault TrainCheck::inertias() const {
     const Places places(train_);
     for (std::size_t s = 0; s < train_.shafts.size(); ++s)
         if (!(places.shafts[s].inertia >= 0.0))
-            return shaft(static_cast<int>(s)) + "has a negative inertia; give it none or a positive one";
+            return shaft(static_cast<int>(s)) + "has a negative " + inertia(static_cast<int>(s)) +
+                   "; give it none or a positive one";
     return {};
 }
 
@@ -238,7 +239,8 @@ Fault TrainCheck::massless() const {
     const Assembly a(train_);
     const Places& places = a.places();
     const auto remedy = [&](int s) {
-        return "; give it an inertia (" + harmless_inertia(s) + " is harmless beside its neighbours)";
+        return std::string("; give it ") + (is_slide(train_, s) ? "a mass (" : "an inertia (") + harmless_inertia(s) +
+               " is harmless beside its neighbours)";
     };
     std::vector<std::int8_t> rigid(places.contacts.size(), 1);
     for (std::size_t c = 0; c < places.contacts.size(); ++c)
@@ -249,14 +251,15 @@ Fault TrainCheck::massless() const {
         const unsigned moves = rigid[c] == 0 ? 0 : tied_speed(places.contacts[c], tied, per);
         for (const int s : places.massless)
             if (moves >> s & 1)
-                return shaft(s) + "has no inertia, and " + contact_name(a, static_cast<int>(c)) +
+                return shaft(s) + "has no " + inertia(s) + ", and " + contact_name(a, static_cast<int>(c)) +
                        " is a dry contact at it" + remedy(s) + ", or leave the contact out";
     }
     for (const LinearController& k : train_.controllers)
         for (const LinearController::Signal& y : k.signals)
             if (y.kind == LinearController::Signal::speed &&
                 places.shafts[static_cast<std::size_t>(y.shaft)].massless != nowhere)
-                return shaft(y.shaft) + "has no inertia, and a controller takes its speed" + remedy(y.shaft);
+                return shaft(y.shaft) + "has no " + inertia(y.shaft) + ", and a controller takes its speed" +
+                       remedy(y.shaft);
     // In the gaps of all gears, while all that is dry slips.
     Key open;
     for (std::size_t c = 0; c < places.contacts.size(); ++c)
@@ -270,8 +273,8 @@ Fault TrainCheck::massless() const {
         found = s;
         break;
     }
-    return shaft(found) + "has no inertia, and no damping acts on it in all states of its gears" + remedy(found) +
-           ", or mesh damping to a gear without backlash";
+    return shaft(found) + "has no " + inertia(found) + ", and no damping acts on it in all states of its gears" +
+           remedy(found) + ", or mesh damping to a gear without backlash";
 }
 
 // A ten-thousandth of the least inertia next to a shaft, as the shaft feels it: they swing at a hundred times the
@@ -349,8 +352,9 @@ Fault TrainCheck::turned() const {
         if (e->drives()) act_on(e->shaft);
     for (std::size_t s = 0; s < acted_on.size(); ++s)
         if (!acted_on[s] && !train_.shafts[s].loaded)
-            return shaft(static_cast<int>(s)) +
-                   "is turned by nothing: no motor, gear or load torque acts on it; join it to the train";
+            return shaft(static_cast<int>(s)) + "is " + (is_slide(train_, static_cast<int>(s)) ? "moved" : "turned") +
+                   " by nothing: no motor, gear or load " + torque_word(train_, static_cast<int>(s)) +
+                   " acts on it; join it to the train";
     return {};
 }
 
@@ -385,13 +389,11 @@ std::string check_start(const Train& train, const std::vector<double>& speed) {
         std::snprintf(text, sizeof text, "%.10g", v);
         return std::string(text);
     };
-    const auto both = [&](int a, int b) {
-        const auto one = [&](int s) {
-            return train.shafts[static_cast<std::size_t>(s)].name + " = " + number(speed[static_cast<std::size_t>(s)]) +
-                   " rad/s";
-        };
-        return one(a) + " and " + one(b);
+    const auto one = [&](int s) {
+        return train.shafts[static_cast<std::size_t>(s)].name + " = " + number(speed[static_cast<std::size_t>(s)]) +
+               ' ' + speed_unit(train, s);
     };
+    const auto both = [&](int a, int b) { return one(a) + " and " + one(b); };
     constexpr double rounding = 1e-12;  // of speeds that were converted from other units
     const Places places(train);
     const auto follows = [&](int s) { return places.shafts[static_cast<std::size_t>(s)].massless != nowhere; };
@@ -405,11 +407,11 @@ std::string check_start(const Train& train, const std::vector<double>& speed) {
         if (!g.rigid() || std::fabs(in - out + housing) <= rounding * size) continue;
         if (g.housing != nowhere)
             return both(g.input, g.output) + " do not fit the rigid gear " + g.name + " on the housing " +
-                   train.shafts[static_cast<std::size_t>(g.housing)].name + " = " +
-                   number(speed[static_cast<std::size_t>(g.housing)]) +
-                   " rad/s; relative to it their quotient must be its ratio, " + number(g.law.ratio);
-        return both(g.input, g.output) + " do not fit the rigid gear " + g.name +
-               "; their quotient must be its ratio, " + number(g.law.ratio) + ", to twelve digits";
+                   one(g.housing) + "; relative to it their quotient must be its ratio, " + number(g.law.ratio);
+        const bool slides = is_slide(train, g.output);
+        return both(g.input, g.output) + " do not fit " + (slides ? "" : "the rigid gear ") + g.name +
+               (slides ? ", which is rigid" : "") + "; their quotient must be its ratio, " + number(g.law.ratio) +
+               (slides ? " in SI" : "") + ", to twelve digits";
     }
     std::string error;
     Train::each_coupling_kind(train, [&](const char*, const char* kind, const auto& elements) {

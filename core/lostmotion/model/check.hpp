@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "names.hpp"
 #include "places.hpp"
 
 namespace lostmotion::model {
@@ -41,8 +42,11 @@ class TrainCheck {
         return {table, kind, name.empty() ? std::to_string(k) : name};
     }
     Fault shaft(int s) const {
-        return named("shafts", "shaft", train_.shafts[static_cast<std::size_t>(s)].name, static_cast<std::size_t>(s));
+        const bool slides = is_slide(train_, s);
+        return named(slides ? "slides" : "shafts", slides ? "slide" : "shaft",
+                     train_.shafts[static_cast<std::size_t>(s)].name, static_cast<std::size_t>(s));
     }
+    const char* inertia(int s) const { return is_slide(train_, s) ? "mass" : "inertia"; }
     bool exists(int s) const { return s >= 0 && s < static_cast<int>(train_.shafts.size()); }
 
     Fault shafts_exist() const;

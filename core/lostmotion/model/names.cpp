@@ -15,6 +15,11 @@ const char* angle_meaning(const Train& t, int shaft) {
 }
 const char* torque_unit(const Train& t, int shaft) { return is_slide(t, shaft) ? "N" : "N*m"; }
 const char* torque_word(const Train& t, int shaft) { return is_slide(t, shaft) ? "force" : "torque"; }
+std::string law_text(const Train& t, int shaft, std::string law) {
+    const std::string rotary = "torque over angle";
+    const std::size_t at = law.find(rotary);
+    return is_slide(t, shaft) && at != std::string::npos ? law.replace(at, rotary.size(), "force over position") : law;
+}
 std::string angle_of(const Train& t, std::size_t shaft) {
     return t.shafts[shaft].name + (is_slide(t, static_cast<int>(shaft)) ? "_position" : "_angle");
 }
@@ -159,7 +164,7 @@ std::vector<std::string> branch_names(const Assembly& a) {
     for (const auto& c : p.couplings)
         if (c->branch != nowhere) set(c->branch, c->name + ": " + c->piecewise_law());
     for (const auto& e : p.acting)
-        if (e->branch != nowhere) set(e->branch, e->name + ": " + e->piecewise_law());
+        if (e->branch != nowhere) set(e->branch, e->name + ": " + law_text(t, e->shaft, e->piecewise_law()));
     for (std::size_t k = 0; k < t.controllers.size(); ++k) {
         set(p.controllers[k].branch, t.controllers[k].name + ": limit of the controller");
         set(p.controllers[k].piece, t.controllers[k].name + ": duty cycle of the controller");

@@ -14,7 +14,8 @@ const char* angle_unit(const Train& t, int shaft);
 const char* speed_unit(const Train& t, int shaft);
 const char* angle_meaning(const Train& t, int shaft);
 const char* torque_unit(const Train& t, int shaft);
-const char* torque_word(const Train& t, int shaft);  // "torque" or "force"
+const char* torque_word(const Train& t, int shaft);                // "torque" or "force"
+std::string law_text(const Train& t, int shaft, std::string law);  // "torque over angle" or "force over position"
 std::string angle_of(const Train& t, std::size_t shaft);
 std::string motor_torque_of(const Train& t, std::size_t motor);
 std::string twist_of(const Train& t, std::size_t gear);

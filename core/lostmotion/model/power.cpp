@@ -1,5 +1,7 @@
 #include "power.hpp"
 
+#include "names.hpp"
+
 namespace lostmotion::model {
 
 namespace {
@@ -20,7 +22,7 @@ void each_flow(const Assembly& a, Use&& use) {
             [&](const Regime& r) -> Flow { return {{r.drive_torque[k], speed(places.driven[k])}}; });
     for (const auto& e : places.acting)
         if (e->source() != nullptr)
-            use(PowerFlow::source, e->name, e->source(),
+            use(PowerFlow::source, e->name, law_text(train, e->shaft, e->source()),
                 [&](const Regime& r) -> Flow { return {{e->torque(a.site(e->shaft), r.key), speed(e->shaft)}}; });
     for (std::size_t s = 0; s < train.shafts.size(); ++s) {
         const ShaftPlace& p = places.shafts[s];
@@ -82,7 +84,7 @@ void each_flow(const Assembly& a, Use&& use) {
 std::vector<NumberedPower> power_flows(const Assembly& a, const Regime& r) {
     std::vector<NumberedPower> flows;
     int k = 0;
-    each_flow(a, [&](PowerFlow::Kind, const std::string&, const char*, auto&& power) {
+    each_flow(a, [&](PowerFlow::Kind, const std::string&, const auto&, auto&& power) {
         if (auto p = power(r)) {
             r.put_massless_speeds(p->torque);
             r.put_massless_speeds(p->speed);
@@ -95,7 +97,7 @@ std::vector<NumberedPower> power_flows(const Assembly& a, const Regime& r) {
 
 std::vector<PowerFlow> all_flows(const Assembly& a) {
     std::vector<PowerFlow> flows;
-    each_flow(a, [&](PowerFlow::Kind kind, const std::string& element, const char* what, auto&&) {
+    each_flow(a, [&](PowerFlow::Kind kind, const std::string& element, const auto& what, auto&&) {
         flows.push_back({kind, element + ": " + what});
     });
     return flows;

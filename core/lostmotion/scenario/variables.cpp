@@ -99,10 +99,10 @@ double Variables::rate(const Derived& d, const double* x, const double* dx) cons
         case Derived::nothing: return 0.0;
         case Derived::product: return dx[d.a] * x[d.b] + x[d.a] * dx[d.b];
         case Derived::efficiency: {
-            const double eta = efficiency(x[d.a], x[d.b], ratio(d) * x[d.c]);
+            const double eta = efficiency(x[d.a], x[d.b], x[d.c], ratio(d));
             if (eta == 0.0) return 0.0;
             const double relative = dx[d.a] / x[d.a] - dx[d.c] / x[d.c];
-            return x[d.a] * x[d.b] >= 0.0 ? eta * relative : -eta * relative;
+            return x[d.a] * x[d.b] * ratio(d) >= 0.0 ? eta * relative : -eta * relative;
         }
         default: break;
     }
@@ -113,9 +113,10 @@ double Variables::rate(const Derived& d, const double* x, const double* dx) cons
     return dx[d.a] / gear.law.ratio - dx[d.b] - slope * dx[d.a];
 }
 
-double Variables::efficiency(double T_2, double w_M, double i_T_1) {
+double Variables::efficiency(double T_2, double w_M, double T_1, double ratio) {
     if (w_M == 0.0) return std::numeric_limits<double>::quiet_NaN();
-    const double s = w_M > 0.0 ? 1.0 : -1.0, driving = T_2 * s, fed_in = i_T_1 * s;
+    const double s = std::copysign(1.0, w_M), driving = T_2 * s * std::copysign(1.0, ratio),
+                 fed_in = std::fabs(ratio) * T_1 * s;
     if (driving >= 0.0) return driving / fed_in;
     return fed_in < 0.0 ? fed_in / driving : 0.0;
 }

@@ -58,7 +58,7 @@ class Variables {
         switch (d.kind) {
             case Derived::nothing: return 0.0;
             case Derived::product: return at(d.a) * at(d.b);
-            case Derived::efficiency: return efficiency(at(d.a), at(d.b), ratio(d) * at(d.c));
+            case Derived::efficiency: return efficiency(at(d.a), at(d.b), at(d.c), ratio(d));
             default: break;
         }
         const model::Gear& gear = train_.gears[static_cast<std::size_t>(d.gear)];
@@ -68,7 +68,7 @@ class Variables {
     }
     double rate(const Derived& d, const double* x, const double* dx) const;
     // Driving (T_2 has the sign of w_M) it is T_2/(i T_1), overrunning i T_1/T_2; 0 where both sides feed the losses.
-    static double efficiency(double T_2, double w_M, double i_T_1);
+    static double efficiency(double T_2, double w_M, double T_1, double ratio);
     double ratio(const Derived& d) const { return train_.gears[static_cast<std::size_t>(d.gear)].law.ratio; }
 
     std::vector<Variable> all_;

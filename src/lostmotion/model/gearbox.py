@@ -125,7 +125,9 @@ class Gearbox(Transmission):
     @model_validator(mode="after")
     def _strikes_not(self) -> Self:
         if isinstance(self.stiffness, Rigid) and self.stiffness.strikes:
-            raise ValueError("has rigid flanks with backlash, which only gears of the long form have; give a stiffness")
+            raise ValueError(
+                "has rigid flanks with backlash, which require a drive train; read the file by lm.load, or give a stiffness"
+            )
         return self
 
     def __repr__(self) -> str:

@@ -209,6 +209,8 @@ class LinearDrive(Part):
     """force over deflection, in place of stiffness"""
     backlash: Annotated[Length, NotNegative] = 0.0
     """whole axial play at the slide"""
+    restitution: Annotated[Number, Limit(ge=0.0, le=1.0)] | None = None
+    """speed at which rigid flanks part over that at which they strike; needed with backlash and no stiffness"""
     preload: Annotated[Force, NotNegative] = 0.0
     """removes the segments of stiffness_curve below it"""
     damping: Annotated[LinearViscousFriction, NotNegative] = 0.0
@@ -237,10 +239,15 @@ class LinearDrive(Part):
             )
         if self.preload > 0.0 and self.backlash > 0.0:
             raise ValueError("has backlash and preload; a preload removes the backlash, so give only one")
+        strikes = self.restitution is not None
+        if strikes and (self._stiffness() is not None or self.backlash == 0.0):
+            lacks = "a stiffness" if self.backlash > 0.0 else "no backlash"
+            raise ValueError(f"has a restitution and {lacks}; a restitution is that of rigid flanks with backlash")
         if self._stiffness() is None:
             for key in ("backlash", "damping", "pitch_error", "hysteresis"):
-                if getattr(self, key):
-                    raise ValueError(f'has {key} but is rigid; give it a stiffness, such as "200 N/um"')
+                if getattr(self, key) and not (strikes and key == "backlash"):
+                    remedy = ", or the restitution of its flanks, 0 to 1" if key == "backlash" else ""
+                    raise ValueError(f'has {key} but is rigid; give it a stiffness, such as "200 N/um"{remedy}')
         return self
 
     def travel(self) -> float:
@@ -271,6 +278,8 @@ class LinearDrive(Part):
         """The gear between a shaft and a slide that has the same equations."""
         k, both = self._stiffness(), self.efficiencies()
         stiffness: TorsionCurve | LinearStiffness | Rigid = Rigid()
+        if self.restitution is not None:
+            stiffness = Rigid(backlash=self.backlash, restitution=self.restitution)
         if self.stiffness_curve is not None:
             slopes, breaks = self.stiffness_curve.slopes, self.stiffness_curve.breaks
             stiffness = TorsionCurve(slopes=slopes, breaks=breaks, backlash=self.backlash, preload=self.preload)

@@ -399,9 +399,10 @@ def _why(watch: Watch, outlook: Outlook) -> str:
     before, last = watch.swing(0.5, 0.75), watch.swing(0.75, 1.0)
     moving = np.flatnonzero(last > NOISE)
     if not len(moving):
-        return "no shaft moves by more than a billionth of a turn, but not all contacts are stuck, or the controllers still move"
+        return f"nothing moves by more than {NOISE:.2g} (rad or m), but not all contacts are stuck, or the controllers still move"
     k = moving[0]
-    return f"{watch.names[k]} still moves by {last[k]:.3g} rad, {last[k] / max(before[k], last[k] * 1e-9):.3g} of the time before"
+    unit = "m" if watch.names[k].endswith("_position") else "rad"
+    return f"{watch.names[k]} still moves by {last[k]:.3g} {unit}, {last[k] / max(before[k], last[k] * 1e-9):.3g} of the time before"
 
 
 def moving_input(scenario: TrainScenario) -> str:

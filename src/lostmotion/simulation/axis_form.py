@@ -165,4 +165,6 @@ def file_schema() -> dict[str, Any]:
     of_drive["properties"]["controller"]["anyOf"].append({"$ref": "#/$defs/train_ContinuousController"})
     axis.pop("$defs")
     definitions = of_drive.pop("$defs") | {f"train_{name}": node for name, node in long.pop("$defs").items()}
+    motion = definitions["train_ShaftTable"]["properties"]
+    definitions["LoadTable"]["properties"] |= {key: motion[key] for key in ("speed", "motion")}
     return {"title": "Scenario file", "anyOf": [of_drive, long, axis], "$defs": definitions}

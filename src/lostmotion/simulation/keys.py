@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from ..data_sheets.components import as_torque_source, at_voltage
@@ -46,12 +46,13 @@ _FIRST = tuple(
     )
 )
 _SIGNALS = re.compile(r"command|load\.torque")
+_OFF_DIAGONAL = re.compile(r"(mass_matrices\.[^.]+\.matrix)\.(\d+)\.(\d+)")
 _TRAIN_SIGNALS = re.compile(r"command\.[^.]+|shafts\.[^.]+\.torque|slides\.[^.]+\.force")
 
 
 def set_values(data: dict[str, Any], changes: Iterable[tuple[str, Any]]) -> None:
     """Changes values by dotted key. What others depend on comes before them, in whatever order they are given."""
-    changes = [(key, plain(value)) for key, value in changes]
+    changes = [(key, plain(value)) for key, value in _with_mirrored(changes)]
     given = [key for key, _ in changes]
     signals = _TRAIN_SIGNALS if "shafts" in data or "slides" in data else _SIGNALS
     own = _Copies()
@@ -65,6 +66,16 @@ def set_values(data: dict[str, Any], changes: Iterable[tuple[str, Any]]) -> None
         _change_what_follows(data, key, value, given, own)
         first, *rest = key.split(".")
         data[first] = _changed(data.get(first), rest, value, first, signals, own)
+
+
+def _with_mirrored(changes: Iterable[tuple[str, Any]]) -> Iterator[tuple[str, Any]]:
+    """The changes, and of entries of mass matrices those across the diagonal, which are equal, unless they are given too."""
+    all_changes = list(changes)
+    given = {key for key, _ in all_changes}
+    for key, value in all_changes:
+        yield key, value
+        if (entry := _OFF_DIAGONAL.fullmatch(key)) and (other := ".".join(entry.group(1, 3, 2))) not in given:
+            yield other, value
 
 
 class _Copies:

@@ -357,7 +357,15 @@ class DriveScenario(Scenario):
     @model_validator(mode="before")
     @classmethod
     def _sampled(cls, data: Any) -> Any:
-        controller = data.get("controller") if isinstance(data, Mapping) else None
+        if not isinstance(data, Mapping):
+            return data
+        controller, load = data.get("controller"), data.get("load")
+        for key in ("speed", "motion"):
+            if isinstance(load, Mapping) and key in load:
+                raise InputError(
+                    f"key load.{key}: a given motion requires a drive train; read the file by lm.load, or make a TrainScenario with "
+                    f'shafts={{"load": ...}}'
+                )
         if isinstance(controller, ContinuousController) or (
             isinstance(controller, Mapping) and controller.get("kind") == "continuous"
         ):

@@ -19,14 +19,14 @@ from ..inputs.validation import names_like, shortened, shown
 from ..model.gearbox import Gearbox
 from ..model.linear import RatedScrew, ScrewData
 from .axis_form import axis_from_tables, file_schema, is_axis
+from .drive_form import drive_from_tables
 from .keys import parse_override, set_values
-from .scenario import Scenario, from_tables, is_train
+from .scenario import Scenario, is_train
 from .series_files import read_series
 from .shipped import shipped_scenarios
-from .train_scenario import TrainScenario, in_long_form, train_from_tables
+from .train_scenario import train_from_tables
 
 MAX_BASES = 100  # files that are each the base of the one before
-MOTOR = "motor"  # its name in the long form of a drive
 
 
 def find_scenario(name: str | Path, directory: Path = Path()) -> Path:
@@ -105,8 +105,7 @@ def changed(tables: dict[str, Any], path: Path) -> Scenario:
 
 
 def scenario_from(tables: Mapping[str, Any]) -> Scenario:
-    """The scenario of such tables. A drive in the short form with a continuous controller is a drive train, since the states of the
-    controller are states of the train.
+    """The scenario of such tables. A drive in the short form with what only drive trains have is a drive train.
 
     Raises
     ------
@@ -117,25 +116,7 @@ def scenario_from(tables: Mapping[str, Any]) -> Scenario:
         return axis_from_tables(tables)
     if is_train(tables):
         return train_from_tables(tables)
-    controller = tables.get("controller")
-    if not isinstance(controller, Mapping) or controller.get("kind") != "continuous":
-        return from_tables(tables)
-    for key in ("command", "task"):
-        if key in tables:
-            why = (
-                "both turn the motor"
-                if key == "command"
-                else "a continuous controller is simulated, not judged for a task"
-            )
-            raise InputError(f"keys {key}, controller: {why}; leave one of them out")
-    drive = in_long_form(from_tables({key: value for key, value in tables.items() if key != "controller"}))
-    try:
-        return TrainScenario(**{**dict(drive), "command": {}, "controllers": {MOTOR: controller}})
-    except InputError as error:
-        long = f"controllers.{MOTOR}"
-        raise error.with_keys(
-            lambda key: f"controller{key.removeprefix(long)}" if key.startswith(long) else key
-        ) from None
+    return drive_from_tables(tables)
 
 
 def read_tables(path: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..control.axis import Bound
+from ..control.controller import Controller
 from ..inputs.kept import kept
 from ..inputs.named import Named
 from ..model.linear_train import LinearElements
@@ -102,9 +103,10 @@ def _part(scenario: TrainScenario, shafts: Collection[str]) -> TrainScenario:
         table: Named({name: v for name, v in getattr(scenario.initial, table).items() if name in names})
         for table, names in mine.items()
     }
-    return scenario.model_copy(
-        update=kept | {"initial": TrainInitial(**initial, on_reference=scenario.initial.on_reference)}
-    )
+    # A part without a reference of a position does not begin on one.
+    references = [c.reference for c in kept["controllers"].values() if isinstance(c, Controller)]
+    on_reference = scenario.initial.on_reference and any(r.kind == "position" for r in references)
+    return scenario.model_copy(update=kept | {"initial": TrainInitial(**initial, on_reference=on_reference)})
 
 
 def _stands_on(element: Any) -> str:
