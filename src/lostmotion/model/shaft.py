@@ -1,6 +1,7 @@
 """A shaft of a drive train: inertia, friction and drag."""
 
 import itertools
+from functools import lru_cache
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -105,26 +106,40 @@ class EddyCurrentDrag(Part):
     error: Annotated[Torque, Positive] | None = None
     """by which they depart from it at most; left out, 0.1 % of the peak torque"""
 
+    @model_validator(mode="after")
+    def _takes_few_lines(self) -> Self:
+        if len(self._ends()) > MOST_POINTS:
+            raise ValueError(
+                f"has an error of {self._error():g} N*m, which takes more than {MOST_POINTS} straight lines; give a larger one"
+            )
+        return self
+
+    def _error(self) -> float:
+        return SHARE * self.peak_torque if self.error is None else self.error
+
+    def _ends(self) -> tuple[float, ...]:
+        # The largest departure of a chord is found at 32 places.
+        return _chord_ends(0.99 * self._error() / self.peak_torque, self.max_speed / self.critical_speed)
+
     def core(self) -> _core.TorsionCurve:
-        error = SHARE * self.peak_torque if self.error is None else self.error
-        share = 0.99 * error / self.peak_torque  # the largest departure of a chord is found at 32 places
-        top = self.max_speed / self.critical_speed
-        points, torques = [0.0], [0.0]
-        while points[-1] < top:
-            s = _chord_end(points[-1], share)
-            # A short last chord would be another piece for nothing.
-            points.append(top if s > top - 0.1 * (s - points[-1]) else s)
-            torques.append(2.0 * points[-1] / (1.0 + points[-1] * points[-1]))
-            if len(points) > MOST_POINTS:
-                raise ValueError(
-                    f"has an error of {error:g} N*m, which takes more than {MOST_POINTS} straight lines; give a larger one"
-                )
-        speeds = [self.critical_speed * s for s in points]
-        peak = [self.peak_torque * m for m in torques]
-        return DragCurve(speeds=tuple(speeds), torques=tuple(peak), beyond="hold").core()
+        ends = self._ends()
+        speeds = [self.critical_speed * s for s in ends]
+        torques = [self.peak_torque * (2.0 * s / (1.0 + s * s)) for s in ends]
+        return DragCurve(speeds=tuple(speeds), torques=tuple(torques), beyond="hold").core()
 
 
 MOST_POINTS = 100
+
+
+@lru_cache(maxsize=64)
+def _chord_ends(share: float, top: float) -> tuple[float, ...]:
+    """Ends of straight lines along ``2 s/(1 + s^2)`` from 0 to `top`, one too many where these are not enough."""
+    points = [0.0]
+    while points[-1] < top and len(points) <= MOST_POINTS:
+        s = _chord_end(points[-1], share)
+        # A short last chord would be another piece for nothing.
+        points.append(top if s > top - 0.1 * (s - points[-1]) else s)
+    return tuple(points)
 
 
 def _chord_end(begin: float, error: float) -> float:
