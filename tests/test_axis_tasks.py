@@ -13,19 +13,17 @@ from lostmotion.model.linear import RatedScrew
 from lostmotion.simulation.scenario import LoadTable
 from lostmotion.sizing.axis_rules import (
     derated,
-    electrical_power,
     emergency_stop,
     gearbox_life,
     holding_brake,
     output_bearing,
-    returned,
-    supply_rules,
     with_safety,
 )
 from lostmotion.sizing.finding import TASK_RULES, within
 from lostmotion.sizing.formulas import derating
 from lostmotion.sizing.required_motion import duty_torque, input_demand, required_motion
 from lostmotion.sizing.stages import at_input, stage_of, together
+from lostmotion.sizing.supply import electrical_power, returned, supply_rules
 from lostmotion.studies.axis_rows import Axes
 from lostmotion.studies.task_file import task_of
 

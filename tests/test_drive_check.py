@@ -16,6 +16,7 @@ from lostmotion.cli import app
 from lostmotion.data_sheets.records import find
 from lostmotion.paper import paper_scenario
 from lostmotion.simulation.scenario import from_tables
+from lostmotion.simulation.train_scenario import train_from_tables
 from lostmotion.sizing.drive_check import check_drive
 from lostmotion.sizing.duty_cycle import DutyCycle, duty_cycle
 from lostmotion.sizing.finding import RULES, Finding
@@ -493,3 +494,84 @@ sample_interval = 0.01
     bare = {f.rule: f for f in check_drive(screw_at(1.0)) if f.what.startswith("screw: ")}
     assert bare["screw_static"].remark == "screws.screw.static_capacity is missing"
     assert bare["screw_life"].remark == "screws.screw.dynamic_capacity is missing"
+
+
+BRAKING = (
+    0.3125  # energy [J] that one axis of AXES returns: 0.5 N·m · w - 0.5 Ω · (5 A)² from 50 to 25 rad/s, at 500 rad/s²
+)
+AXIS = {"steps": [{"height": 0.5}, {"height": -1.0, "time": 0.1}, {"height": 0.5, "time": 0.2}]}
+MOTOR = {
+    "kind": "torque_source",
+    "rotor_inertia": 5e-4,
+    "rated_torque": 1.0,
+    "limits": {"torque_constant": 0.1, "resistance": 0.5},
+}
+
+
+def axes(later: float = 0.0, cycle: float = 0.5, **supply) -> lm.TrainScenario:
+    """Two axes of 1e-3 kg·m² on one bus, the second one with its motion later."""
+    second = {"steps": [{**step, "time": step.get("time", 0.0) + later} for step in AXIS["steps"]]}
+    return train_from_tables(
+        {
+            "shafts": {"x": {"inertia": 5e-4}, "y": {"inertia": 5e-4}},
+            "motors": {name: {**MOTOR, "shaft": name} for name in ("x", "y")},
+            "command": {"x": AXIS, "y": second},
+            "task": {
+                "cycle": cycle,
+                "supply": {"max_voltage": 48.0, "voltage_limit": 60.0, "capacitance": 1e-3} | supply,
+            },
+            "simulation": {"duration": 0.5, "sample_interval": 1e-3},
+        }
+    )
+
+
+@pytest.mark.parametrize(
+    ("later", "energy"),
+    [(0.0, 2.0 * BRAKING), (0.25, BRAKING), (0.1, BRAKING)],
+    ids=["both brake at once", "one after the other", "one brakes while the other accelerates"],
+)
+def test_a_bus_takes_what_all_axes_together_return(later, energy):
+    """With the motion 0.1 s later, the first axis feeds the second: 500 t W are taken in all, and the second returns its own energy."""
+    found = by_rule(axes(later))["bus_voltage"]
+    assert found.use == pytest.approx(math.sqrt(48.0**2 + 2.0 * energy / 1e-3) / 60.0, rel=1e-4)
+    assert found.verdict == "ok"
+
+
+def test_brake_resistor_of_a_bus_is_judged_over_the_cycle():
+    """Of the energy that returns at once, 1 mF take (50² - 48²)/2 · 1 mF = 0.098 J up to 50 V; the resistor takes the rest."""
+    supply = {"voltage_limit": 50.0, "brake_resistance": 50.0, "brake_power": 2.0}
+    mean = [f for f in check_drive(axes(cycle=0.5, **supply)) if f.rule == "brake_resistor"][-1]
+    assert mean.use == pytest.approx((2.0 * BRAKING - 0.098) / 0.5 / 2.0, rel=1e-3)
+
+
+def test_a_drive_on_its_bus_is_the_train_of_one_axis():
+    scenario = lm.Scenario(
+        motor=MOTOR,
+        gearbox={
+            "ratio": 1.0,
+            "rated_output_torque": 1.0,
+            "rated_input_speed": 100.0,
+            "stiffness": {"kind": "rigid"},
+            "losses": {"kind": "constant_efficiency", "efficiency": 1.0},
+        },
+        load={"inertia": 5e-4},
+        command=AXIS,
+        task={"cycle": 0.5, "supply": {"max_voltage": 48.0, "voltage_limit": 60.0, "capacitance": 1e-3}},
+        simulation={"duration": 0.45, "sample_interval": 1e-3},
+    )
+    assert by_rule(scenario)["bus_voltage"].use == pytest.approx(
+        math.sqrt(48.0**2 + 2.0 * BRAKING / 1e-3) / 60.0, rel=1e-4
+    )
+
+
+def test_a_bus_without_the_data_of_a_motor_is_not_judged():
+    scenario = axes().replace(**{"motors.y.limits.resistance": None})
+    found = by_rule(scenario)["bus_voltage"]
+    assert found.verdict == "unknown"
+    assert "motors.y.limits.resistance" in found.remark
+
+
+@pytest.mark.parametrize("key", ["max_lost_motion", "hold_without_power"])
+def test_a_task_of_a_train_has_no_key_that_would_not_act(key):
+    with pytest.raises(lm.InputError, match=rf"task\.{key}"):
+        axes().replace(**{f"task.{key}": 1.0})

@@ -10,8 +10,9 @@ from lostmotion.model.duty import Duty, Supply
 from lostmotion.model.linear import RatedScrew
 from lostmotion.simulation.scenario import LoadTable
 from lostmotion.sizing import formulas
-from lostmotion.sizing.axis_rules import axial_load, returned, screw_mean_load, screw_rules, supply_rules
+from lostmotion.sizing.axis_rules import axial_load, screw_mean_load, screw_rules
 from lostmotion.sizing.required_motion import RequiredMotion, required_motion
+from lostmotion.sizing.supply import returned, supply_rules
 from lostmotion.sizing.thermal import rms
 
 RPM = 30.0 / math.pi

@@ -171,11 +171,9 @@ class HoldingBrake(Part):
     inertia: Annotated[Inertia, NotNegative] = 0.0
 
 
-class Supply(Part):
-    """DC bus and amplifier that feed the motor."""
+class Bus(Part):
+    """DC bus that feeds motors, and takes what they return."""
 
-    min_voltage: Annotated[Voltage, Positive] | None = None
-    """least voltage of the bus, at which the motor must reach its torque and speed"""
     max_voltage: Annotated[Voltage, Positive] | None = None
     """largest voltage of the bus before energy returns to it"""
     voltage_limit: Annotated[Voltage, Positive] | None = None
@@ -186,20 +184,35 @@ class Supply(Part):
     """resistance of the brake resistor, which is switched on at voltage_limit"""
     brake_power: Annotated[Power, Positive] | None = None
     """continuous power of the brake resistor"""
-    continuous_current: Annotated[Current, Positive] | None = None
-    """continuous current of the amplifier, rms over the cycle"""
     returns_to_mains: Switch = False
     """the energy goes back to the mains, or a battery takes it: neither capacitors nor resistor are judged"""
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
-        if self.min_voltage is not None and self.max_voltage is not None and self.max_voltage < self.min_voltage:
-            raise ValueError("has max_voltage below min_voltage; exchange them")
-        start = self.max_voltage or self.min_voltage
+        start = self.start()
         if self.voltage_limit is not None and start is not None and self.voltage_limit <= start:
             raise ValueError(
                 f"has voltage_limit = {self.voltage_limit:g} V, which is not above {start:g} V, the voltage of the bus"
             )
+        return self
+
+    def start(self) -> float | None:
+        """Voltage of the bus before energy returns [V]."""
+        return self.max_voltage
+
+
+class Supply(Bus):
+    """DC bus and amplifier that feed the motor."""
+
+    min_voltage: Annotated[Voltage, Positive] | None = None
+    """least voltage of the bus, at which the motor must reach its torque and speed"""
+    continuous_current: Annotated[Current, Positive] | None = None
+    """continuous current of the amplifier, rms over the cycle"""
+
+    @model_validator(mode="after")
+    def _voltages_in_order(self) -> Self:
+        if self.min_voltage is not None and self.max_voltage is not None and self.max_voltage < self.min_voltage:
+            raise ValueError("has max_voltage below min_voltage; exchange them")
         return self
 
     def start(self) -> float | None:

@@ -4,14 +4,22 @@ from typing import Annotated
 
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, Positive, Switch, Temperature, Time
+from .duty import Bus
 
 
-class Task(Part):
-    """Requirements of a drive. No run depends on them; the drive check compares with them."""
+class TrainTask(Part):
+    """Cycle and surroundings of a drive train. No run depends on them; the drive check compares with them."""
 
     cycle: Annotated[Time, Positive] | None = None
     """period after which the motion of the run repeats, pause included; left out, it repeats without a pause"""
     ambient_temperature: Temperature = 25.0
+    supply: Bus | None = None
+    """DC bus that feeds all motors, and takes what they return"""
+
+
+class Task(TrainTask):
+    """Requirements of a drive. No run depends on them; the drive check compares with them."""
+
     max_lost_motion: Annotated[Angle, Positive] | None = None
     """largest permissible lost motion at 3 % of the rated torque, total at the output"""
     hold_without_power: Switch = True

@@ -27,7 +27,7 @@ from ..model.linear_train import LinearElements
 from ..model.motor import MotorLaw
 from ..model.shaft import Shaft
 from ..model.signals import CommandSignal, ForceSignal, Signal, SlideSpeedSignal, SpeedSignal, TorqueSignal
-from ..model.task import Task
+from ..model.task import TrainTask
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain, Elements
 from .given_motion import MotionDerivative, check_continuous
@@ -141,6 +141,7 @@ class TrainScenario(Scenario, LinearElements):
     controllers: Elements[AnyController] = Field(default_factory=nothing)
     """controllers of motors, which then have no command"""
     initial: TrainInitial = TrainInitial()
+    task: TrainTask = TrainTask()
     simulation: SimulationTable
 
     @model_validator(mode="before")
@@ -349,7 +350,7 @@ class TrainScenario(Scenario, LinearElements):
         }
 
     def ambient_temperature(self) -> float:
-        return Task().ambient_temperature
+        return self.task.ambient_temperature
 
     def variables(self) -> tuple[Variable, ...]:
         return train_variables(self.train(), self.core())

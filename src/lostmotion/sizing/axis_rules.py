@@ -5,25 +5,21 @@ A rule whose datum is missing gives the verdict "unknown" with the key that woul
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..model.duty import HoldingBrake, Supply
+from ..model.duty import HoldingBrake
 from ..model.gearbox import Gearbox
 from ..model.linear import RatedScrew
-from ..model.motor import Motor
 from ..units.practical import RPM
 from .duty_cycle import integral
 from .finding import Finding, within
 from .formulas import (
     belt_force,
     buckling_force,
-    bus_voltage,
-    capacitor_energy,
     compression_force,
     critical_speed,
     dn_speed,
@@ -32,7 +28,6 @@ from .formulas import (
     nominal_life,
     tooth_forces,
 )
-from .motor_run import current_voltage_power
 from .required_motion import InputDemand, RequiredMotion
 from .stages import BeltStage, RackStage, Stage
 
@@ -246,95 +241,6 @@ def rack_rules(motion: RequiredMotion, rack: RackStage) -> list[Finding]:
         return [missing("rack_force", what, "rack.rated_force")]
     name = "peak force of the rack" if rack.peak_force else "rated force of the rack"
     return [within("rack_force", what, peak, limit, "N", name)]
-
-
-# --- supply ---
-
-
-@dataclass(frozen=True)
-class Returned:
-    """Energy that one cycle of an axis, or of several on one DC bus, returns."""
-
-    largest: float
-    """without a pause [J]"""
-    each: tuple[float, ...]
-    """energy of each stretch of braking [J]"""
-    power: float
-    """largest [W]"""
-    cycle: float
-    """[s]"""
-
-
-def electrical_power(demand: InputDemand, motor: Motor) -> np.ndarray:
-    """Power that a motor takes over its cycle [W], M w + copper loss; NaN where its data do not tell."""
-    torque = demand.motor_torque(motor)
-    copper = motor.copper_loss()
-    if copper is None:
-        return np.full_like(torque, np.nan)
-    return np.asarray(torque * demand.speed + copper[0] * torque**2)
-
-
-def returned(time: np.ndarray, power: np.ndarray, cycle: float) -> Returned:
-    """Energy that a power over one cycle [W] returns; the cycle repeats, so that braking may begin before its end and end after it."""
-    steps = np.diff(time)
-    energy = np.minimum(0.5 * (power[1:] + power[:-1]), 0.0) * steps
-    each: list[float] = []
-    for returns, group in itertools.groupby(energy.tolist(), key=lambda e: e < 0.0):
-        each.append(-sum(group) if returns else 0.0)
-    if len(each) > 1 and each[0] > 0.0 and each[-1] > 0.0:
-        each[0] += each.pop()
-    found = tuple(e for e in each if e > 0.0)
-    return Returned(max(found, default=0.0), found, float(-min(power.min(), 0.0)), cycle)
-
-
-def supply_rules(back: Returned | None, supply: Supply) -> list[Finding]:
-    """Bus voltage, or with a brake resistor its largest and its mean power, for the energy returned in a cycle.
-
-    Source: HIWIN MM99TE07-1701, p. 118: what the capacitors take up to the limit goes there first, the rest to the resistor.
-    """
-    rule = "bus_voltage" if supply.brake_resistance is None else "brake_resistor"
-    what = "DC bus after braking" if supply.brake_resistance is None else "brake resistor"
-    if supply.returns_to_mains:
-        return []
-    if back is None:
-        return [missing(rule, what, "motor.limits.resistance")]
-    if back.largest == 0.0:
-        return [Finding(rule, what, "no energy returns", "ok", "", 0.0)]
-    start = supply.start()
-    for key, value in (
-        ("voltage_limit", supply.voltage_limit),
-        ("capacitance", supply.capacitance),
-        ("max_voltage", start),
-    ):
-        if value is None:
-            return [missing(rule, f"{what}: {back.largest:.4g} J return at once", f"task.supply.{key}")]
-    assert supply.voltage_limit is not None
-    assert supply.capacitance is not None
-    assert start is not None
-    if supply.brake_resistance is None:
-        voltage = bus_voltage(supply.capacitance, start, back.largest)
-        return [within(rule, what, voltage, supply.voltage_limit, "V", "largest voltage of the bus")]
-    most = supply.voltage_limit**2 / supply.brake_resistance
-    found = [within(rule, "brake resistor, largest power", back.power, most, "W", "power of the brake resistor")]
-    taken = capacitor_energy(supply.capacitance, supply.voltage_limit, start)
-    mean = sum(max(e - taken, 0.0) for e in back.each) / back.cycle
-    what = "brake resistor, mean power"
-    if supply.brake_power is None:
-        return [*found, missing(rule, f"{what}: {mean:.4g} W", "task.supply.brake_power")]
-    return [*found, within(rule, what, mean, supply.brake_power, "W", "continuous power of the brake resistor")]
-
-
-def amplifier_current(demand: InputDemand, motor: Motor, limit: float) -> Finding:
-    """Root mean square of the motor current over the cycle against the continuous current of the amplifier [A]."""
-    torque = demand.motor_torque(motor)
-    current = current_voltage_power(motor, np.zeros_like(torque), torque, demand.speed)[0]
-    what = "current, rms over the cycle"
-    if np.isnan(current).any():
-        return missing("amplifier_current", what, "motor.limits.torque_constant")
-    if motor.winding is not None:
-        current = current / math.sqrt(2.0)  # amplitude of a phase
-    square = integral(demand.motion.time, current**2) / demand.motion.cycle
-    return within("amplifier_current", what, math.sqrt(square), limit, "A", "continuous current of the amplifier")
 
 
 def derated(findings: list[Finding], share: float) -> list[Finding]:

@@ -18,10 +18,12 @@ from .gearbox_check import input_speeds, loads, locks, loss_map, lost_motion
 from .motion_check import dead_zone, holdings, inertia, load_torques, resonance, resonances
 from .motor_check import command_of_run, current, heat, largest_speed, peak_torque, voltage
 from .motor_run import oriented_amplitudes
+from .supply import bus_findings, power_in_run
 from .train_check import check_train
 
 POINTS = 40  # samples to a period of the fastest resonance, so that no peak is missed
 SAMPLES = (2_000, 200_000)  # the fewest of a run, and the most at the finest interval
+ON_BUS = 20_000  # the fewest where the energy of braking is summed, since the power jumps with the torque
 
 MEANS = ("average_output_torque", "average_input_speed", "motor_torque", "winding_temperature")
 
@@ -86,6 +88,8 @@ def _findings(scenario: Scenario) -> list[Finding]:
         *holdings(scenario, result),
         *locks(scenario.drive().train(), "gearbox", load_torques(result) or [g.rated_output_torque]),
     ]
+    powers = {"motor": power_in_run(m, result, command, "motor_torque", "motor_speed", "motor")}
+    findings += bus_findings(result, powers, task.supply, task.cycle)
     if g.losses.kind == "map":
         findings.append(loss_map(result))
     return [_with_sinking(f, result, cycle) if f.rule in MEANS else f for f in findings]
@@ -155,7 +159,8 @@ def _finely_sampled(scenario: DriveScenario) -> RunArrays:
     """The run with samples so close that no peak is missed; of a very long one only the beginning, since long ones end in rest."""
     table = scenario.simulation
     fastest = max((f for _, f, _ in resonances(scenario)), default=0.0)
-    fine = min(table.sample_interval, table.duration / SAMPLES[0], 1.0 / (POINTS * fastest) if fastest else math.inf)
+    fewest = SAMPLES[0] if scenario.task.supply is None else ON_BUS
+    fine = min(table.sample_interval, table.duration / fewest, 1.0 / (POINTS * fastest) if fastest else math.inf)
     if table.duration <= fine * SAMPLES[1]:
         return run(scenario.with_inputs(sample_interval=fine), energy=False)
     begin = run(scenario.with_inputs(duration=fine * SAMPLES[1], sample_interval=fine), energy=False)

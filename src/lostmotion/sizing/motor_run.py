@@ -74,13 +74,20 @@ def motor_current(result: xarray.Dataset, motor: str | None = None) -> xarray.Da
     return _dataset(result, found, attributes)
 
 
-def oriented_amplitudes(result: xarray.Dataset | RunArrays, where: str) -> tuple[np.ndarray, np.ndarray] | None:
-    """Current [A], with the sign of the torque, and voltage [V] under field-oriented control; None without."""
+def phase_amplitudes(result: xarray.Dataset | RunArrays, where: str) -> list[np.ndarray] | None:
+    """Currents i_d, i_q [A] and voltages u_d, u_q [V] under field-oriented control; None without."""
     prefix = "" if where == "motor" else f"{where.removeprefix('motors.')}_"
     names = [f"{prefix}{axis}_{what}" for what in ("current", "voltage") for axis in ("direct", "quadrature")]
     if any(name not in result for name in names):
         return None
-    i_d, i_q, u_d, u_q = (np.asarray(result[name]) for name in names)
+    return [np.asarray(result[name]) for name in names]
+
+
+def oriented_amplitudes(result: xarray.Dataset | RunArrays, where: str) -> tuple[np.ndarray, np.ndarray] | None:
+    """Current [A], with the sign of the torque, and voltage [V] under field-oriented control; None without."""
+    if (amplitudes := phase_amplitudes(result, where)) is None:
+        return None
+    i_d, i_q, u_d, u_q = amplitudes
     return np.copysign(np.hypot(i_d, i_q), i_q), np.hypot(u_d, u_q)
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from ..model.linear import RatedScrew
 from ..model.losses import ConstantEfficiency, LossMap
-from ..model.task import Task
 from ..simulation.results import RunArrays
 from ..simulation.run import run
 from ..simulation.train_scenario import TrainScenario, need_no_impacts
@@ -17,6 +18,7 @@ from .finding import Finding
 from .gearbox_check import input_speeds, loads, locks, loss_map
 from .motor_check import command_of_run, current, heat, largest_speed, peak_torque, voltage
 from .motor_run import oriented_amplitudes
+from .supply import bus_findings, power_in_run
 
 SAMPLES = 20_000  # the fewest of a run
 
@@ -24,7 +26,7 @@ NOT_JUDGED = ("inertia_ratio", "resonance", "dead_zone", "lost_motion", "holding
 
 
 def check_train(scenario: TrainScenario) -> tuple[Finding, ...]:
-    """Check a train as `check_drive` does. Motions repeat without a pause, at the ambient temperature of `Task`.
+    """Check a train as `check_drive` does.
 
     Raises
     ------
@@ -39,7 +41,11 @@ def check_train(scenario: TrainScenario) -> tuple[Finding, ...]:
     findings = [f for name in train.gears for f in _gear(scenario, name, result)]
     for name, screw in scenario.screws.items():
         findings += _named(name, _screw(scenario, name, screw, result))
-    findings += [f for name in train.motors for f in _motor(scenario, name, result)]
+    powers = {}
+    for name in train.motors:
+        judged, powers[_place(scenario, name)] = _motor(scenario, name, result)
+        findings += judged
+    findings += bus_findings(result, powers, scenario.task.supply, scenario.task.cycle)
     if any(isinstance(g.losses, LossMap) for g in train.gears.values()):
         findings.append(loss_map(result))
     what = "in the short form, [motor], [gearbox] and [load], of a drive that can be written so"
@@ -58,7 +64,11 @@ def _gear(scenario: TrainScenario, name: str, result: RunArrays) -> list[Finding
     gear, where = train.gears[name], f"{scenario.kind_of(name)}s.{name}"
     torque = train.output_torque_of(name)
     cycle = duty_cycle(
-        result, None, speed=f"{gear.input}_speed", motor_torque=train.input_torque_of(name), output_torque=torque
+        result,
+        scenario.task.cycle,
+        speed=f"{gear.input}_speed",
+        motor_torque=train.input_torque_of(name),
+        output_torque=torque,
     )
     findings = loads(gear, float(abs(result[torque]).max()), cycle, where, slides=train.is_slide(gear.output))
     if gear.rated_input_speed is not None or gear.limits is not None:
@@ -75,7 +85,7 @@ def _screw(scenario: TrainScenario, name: str, screw: RatedScrew, result: RunArr
     """Life, static load, buckling, bending speed and ball speed of a screw, over the run, repeated without a pause."""
     train, time = scenario.train(), result.time
     force, speed = result[train.output_torque_of(name)], result[f"{train.gears[name].output}_speed"]
-    load = AxialLoad(time, speed, force, float(time[-1] - time[0]))
+    load = AxialLoad(time, speed, force, scenario.task.cycle or float(time[-1] - time[0]))
     life = screw_life(load, screw)
     findings = screw_rules(load, screw, None, key=f"screws.{name}")
     if life is None:
@@ -104,11 +114,16 @@ def _load_torques(scenario: TrainScenario, name: str, result: RunArrays) -> list
     return [gear.rated_output_torque]
 
 
-def _motor(scenario: TrainScenario, name: str, result: RunArrays) -> list[Finding]:
+def _place(scenario: TrainScenario, motor: str) -> str:
+    return scenario.key_of("motors", motor)
+
+
+def _motor(scenario: TrainScenario, name: str, result: RunArrays) -> tuple[list[Finding], np.ndarray]:
+    """Findings, and the power that it takes [W]."""
     train = scenario.train()
-    motor, where = train.motors[name], f"{'linear_motors' if name in scenario.linear_motors else 'motors'}.{name}"
+    motor, where = train.motors[name], _place(scenario, name)
     torque, speed = train.motor_torque_of(name), f"{motor.shaft}_speed"
-    cycle = duty_cycle(result, None, speed=speed, motor_torque=torque, output_torque=torque)
+    cycle = duty_cycle(result, scenario.task.cycle, speed=speed, motor_torque=torque, output_torque=torque)
     command, T, w = (result[key] for key in (f"{name}_command", torque, speed))
     command = command_of_run(motor, scenario.controllers.get(name), command, T, w)
     oriented = oriented_amplitudes(result, where)
@@ -116,8 +131,8 @@ def _motor(scenario: TrainScenario, name: str, result: RunArrays) -> list[Findin
     findings = [
         largest_speed(motor, float(abs(w).max()), where, slides=slides),
         *peak_torque(motor, T, where, slides=slides),
-        *heat(motor, cycle, Task().ambient_temperature, where, slides=slides),
+        *heat(motor, cycle, scenario.task.ambient_temperature, where, slides=slides),
         voltage(motor, command, T, w, where, oriented=None if oriented is None else oriented[1]),
         current(motor, T, where),
     ]
-    return _named(name, findings)
+    return _named(name, findings), power_in_run(motor, result, command, torque, speed, where)

@@ -16,16 +16,12 @@ from ..simulation.results import RunArrays
 from ..simulation.run import run
 from ..simulation.scenario import DriveScenario
 from ..sizing.axis_rules import (
-    amplifier_current,
     derated,
-    electrical_power,
     emergency_stop,
     gearbox_life,
     holding_brake,
     output_bearing,
-    returned,
     stage_rules,
-    supply_rules,
     with_safety,
 )
 from ..sizing.finding import Finding
@@ -42,6 +38,7 @@ from ..sizing.required_motion import (
     required_motion,
 )
 from ..sizing.stages import DIRECT, Stage, at_input, together
+from ..sizing.supply import amplifier_current, electrical_power, returned, supply_rules
 from ..worker_threads import thread_pool
 from .axis import FEWEST, REPEATS, AxisTask, reference_of
 from .axis_columns import COLUMNS, change, duty_cycle_of, last_cycle, row_of
