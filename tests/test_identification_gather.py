@@ -138,7 +138,7 @@ NOTED: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "a value beyond all": (
         changed(lambda log: log["entries"][5].update(position=1e300)),
-        "dropped 1 samples in which position is not a number",
+        "the residuals of 1 samples in which position is not a number are left out",
     ),
     "a switch of nothing": (
         changed(lambda log: log["entries"][7].update(torque_enable=None)),

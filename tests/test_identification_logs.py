@@ -518,10 +518,10 @@ def changed(values: np.ndarray, place: Any, to: Any) -> np.ndarray:
 
 
 SCREENED: dict[str, tuple[Log, str]] = {
-    "glitch": (log_of(position=changed(ANGLE, 50, 9.0)), "dropped 1 glitch of position, the first at 0.5 s"),
+    "glitch": (log_of(position=changed(ANGLE, 50, 9.0)), "residuals of 1 glitch of position, the first at 0.5 s"),
     "many glitches": (
         log_of(position=changed(ANGLE, slice(5, 195, 10), 9.0)),
-        "dropped 19 glitches of position, the first at 0.05 s",
+        "residuals of 19 glitches of position, the first at 0.05 s",
     ),
     "repeated time": (
         log_of(changed(TIME, 50, TIME[49])),
@@ -536,7 +536,7 @@ SCREENED: dict[str, tuple[Log, str]] = {
     "pause": (log_of(np.where(TIME > 1.0, TIME + 0.5, TIME)), "1 pauses in the samples, the longest of 0.51 s"),
     "values missing": (
         log_of(position=changed(ANGLE, slice(20, 25), np.nan)),
-        "dropped 5 samples in which position is not a number",
+        "the residuals of 5 samples in which position is not a number are left out; inputs keep these samples",
     ),
     "stall": (
         log_of(

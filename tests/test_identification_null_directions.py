@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -71,6 +72,48 @@ def test_the_combination_that_is_determined_is_that_of_the_formula(
     result = identified(tmp_path, values, input={"scale": scale}, measured={"offset": offset})
     (said,) = [u.text for u in result.undetermined]
     assert said.removeprefix("only the ").partition(" is determined")[0] in what
+
+
+@pytest.mark.parametrize(
+    ("values", "scale", "said"),
+    [
+        ({"a": 1.1, "b": 0.9, "c": 1.3}, "a*b*c", "the product {a*b*c}"),
+        ({"a": 1.1, "b": 0.9, "c": 1.3}, "a*b/c", "{a*b}/c"),
+        ({"a": 0.4, "b": 0.35, "c": 0.3}, "a + b + c", "the sum {a + b + c}"),
+        ({"a": 0.9, "b": 0.9, "c": 0.8}, "a + b - c", "{a + b} - c"),
+        ({"a": 0.5, "b": 0.6, "c": 1.2}, "(a + b)*c", "one combination of {a, b, c}"),
+    ],
+)
+def test_one_value_of_three_is_one_sentence(tmp_path: Path, values: dict[str, float], scale: str, said: str) -> None:
+    """Two null directions, which any rotation mixes: no pair of the three is determined."""
+    result = identified(tmp_path, values, input={"scale": scale})
+    (found,) = result.undetermined
+    text = found.text.removeprefix("only ").partition(" is determined")[0]
+    before, within, after = re.fullmatch(r"(.*)\{(.*)\}(.*)", said).groups()  # type: ignore[union-attr]
+    assert text.startswith(before) and text.endswith(after)
+    order = text[len(before) : len(text) - len(after)]
+    assert sorted(re.split(r"\W+", order)) == sorted(re.split(r"\W+", within))
+    assert set(re.findall(r"[*+,]", order)) == set(re.findall(r"[*+,]", within)) and found.directions == 2
+
+
+def test_two_pairs_are_not_mixed(tmp_path: Path) -> None:
+    """All directions of an eigenspace are alike to its decomposition; a pair has no part in the other."""
+    values = {"a": 1.1, "b": 0.9, "own": 110.0, "guide": 90.0}
+    result = identified(
+        tmp_path, values, input={"scale": "a*b"}, set={"shafts.carriage.viscous_friction": "own + guide"}
+    )
+    said = {u.text.partition(" is determined")[0] for u in result.undetermined}
+    assert len(said) == 2
+    assert said & {"only the product a*b", "only the product b*a"}
+    assert said & {"only the sum own + guide", "only the sum guide + own"}
+
+
+def test_a_weighted_sum_is_neither_a_sum_nor_a_product(tmp_path: Path) -> None:
+    values = {"own": 60.0, "guide": 80.0}
+    result = identified(tmp_path, values, set={"shafts.carriage.viscous_friction": "2*own + guide"})
+    (said,) = result.undetermined
+    assert said.text.startswith("the logs stay the same if these change together: guide +10 %, own -")
+    assert said.changes["own"] == pytest.approx(-80.0 / 120.0, rel=0.01)
 
 
 def test_advice_does_not_ask_for_what_the_log_has(tmp_path: Path) -> None:

@@ -166,11 +166,7 @@ class IdentificationResult:
         taken, found = self.rungs[self.chosen], []
         for rung in self.rungs[self.chosen + 1 :]:
             gain = 1.0 - rung.error / taken.error
-            if (
-                gain > GAIN
-                and len(rung.failed) <= len(taken.failed)
-                and len(rung.undetermined) > len(taken.undetermined)
-            ):
+            if gain > GAIN and len(rung.failed) <= len(taken.failed) and rung.loose > taken.loose:
                 text = "; ".join(u.text for u in rung.undetermined)
                 found.append(
                     f"{rung.name}: not taken for a gain of {100 * gain:.2g} %, since these logs do not determine its parameters: {text}"

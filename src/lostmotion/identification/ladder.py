@@ -62,6 +62,11 @@ class RungResult:
         """By which rungs are compared: that of the logs held out, or where there is none, of those fitted."""
         return self.train if math.isnan(self.held_out) else self.held_out
 
+    @property
+    def loose(self) -> int:
+        """Number of directions that the logs do not determine."""
+        return sum(u.directions for u in self.undetermined)
+
 
 def free_on(task: Identification, rung: int) -> dict[str, FreeParameter]:
     """Parameters that are sought on a rung."""
@@ -322,7 +327,7 @@ def chosen(rungs: Sequence[RungResult]) -> int:
     for k, rung in enumerate(rungs):
         best = rungs[taken]
         less = len(rung.failed) - len(best.failed)
-        gain = GAIN_UNDETERMINED if len(rung.undetermined) > len(best.undetermined) else GAIN
+        gain = GAIN_UNDETERMINED if rung.loose > best.loose else GAIN
         if less < 0 or (less == 0 and rung.error < best.error * (1.0 - gain)):
             taken = k
     return taken

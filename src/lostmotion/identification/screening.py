@@ -150,19 +150,19 @@ def _numbers(log: Log, measured: list[str], inputs: list[str]) -> Log:
                 where=log.name,
             )
         if bad.any():
-            log = _without(
-                log, name, bad, name in inputs, f"dropped {np.sum(bad)} samples in which {name} is not a number"
-            )
+            log = _without(log, name, bad, name in inputs, f"{np.sum(bad)} samples in which {name} is not a number")
     return log
 
 
 def _without(log: Log, name: str, bad: np.ndarray, acts: bool, note: str) -> Log:
     """Without some samples of a channel: all of the log's if the channel acts, else NaN there, so that inputs keep theirs."""
     if acts:
-        return log.only(~bad, note)
+        return log.only(~bad, f"dropped {note}")
     channel = log.channels[name]
     masked = replace(channel, values=np.where(bad, np.nan, channel.values))
-    return replace(log, channels={**log.channels, name: masked}).noted(note)
+    return replace(log, channels={**log.channels, name: masked}).noted(
+        f"the residuals of {note} are left out; inputs keep these samples"
+    )
 
 
 def _without_glitches(log: Log, name: str, acts: bool) -> Log:
@@ -187,7 +187,7 @@ def _without_glitches(log: Log, name: str, acts: bool) -> Log:
     glitch = np.zeros(len(log.time), dtype=bool)
     glitch[found] = True
     k, count = int(found[0]), len(found)
-    note = f"dropped {count} glitch{'es' if count > 1 else ''} of {name}, the first at {log.time[k]:.4g} s"
+    note = f"{count} glitch{'es' if count > 1 else ''} of {name}, the first at {log.time[k]:.4g} s"
     return _without(log, name, glitch, acts, f"{note} ({log.values(name)[k]:.6g})")
 
 
