@@ -125,6 +125,13 @@ def test_the_command_that_turns_a_reversing_gear_by_hand() -> None:
     assert motor.command_backward == -motor.command_forward
 
 
+def test_a_bevel_differential_is_explained_without_a_number_that_statics_do_not_give() -> None:
+    """Its housing turns: with unequal loads it has no rest at any command."""
+    text = str(lm.explain(lm.load("bevel-differential"), 1.0))
+    assert "forward at a command that statics do not determine (gears in a loop, or a housing that turns)" in text
+    assert "-0 " not in text
+
+
 @pytest.mark.parametrize("losses", ["two efficiencies", "map"])
 def test_both_solvers_agree_on_reversing_gears(losses: str) -> None:
     scenario = axis(-6.0, losses, "gap", 11)

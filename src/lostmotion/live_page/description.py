@@ -13,6 +13,7 @@ from ..model.torsion import TorsionCurve
 from ..portable.descriptions import described
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import need_free_motion
+from ..simulation.units_of_keys import unit_for
 from ..units.practical import ARCMIN
 from ..version import __version__
 from . import sliders
@@ -122,7 +123,9 @@ def _sliders(scenario: Scenario, values: list[tuple[str, float]], closed: str | 
     for key, _ in values:
         if key.endswith("friction_torque") or (key.startswith("slides.") and key.endswith("friction_force")):
             usual[key] = _usual_friction(scenario, key)
-    found = [*_signal_sliders(scenario), *_reference_sliders(scenario), *sliders.of_parameters(values, usual, views)]
+    units = {key: unit_for(scenario, key) for key, _ in values if key.startswith("controllers.")}
+    parameters = sliders.of_parameters(values, usual, views, units)
+    found = [*_signal_sliders(scenario), *_reference_sliders(scenario), *parameters]
     return [
         *sliders.ordered(found),
         sliders.duration(scenario.simulation.duration, scenario.simulation.sample_interval),

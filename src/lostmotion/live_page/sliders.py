@@ -145,7 +145,10 @@ TABLES = (
 
 
 def of_parameters(
-    values: Iterable[tuple[str, float]], usual: Mapping[str, float], views: Mapping[str, Place]
+    values: Iterable[tuple[str, float]],
+    usual: Mapping[str, float],
+    views: Mapping[str, Place],
+    units: Mapping[str, str | None],
 ) -> Iterator[Slider]:
     """Sliders of the values that the core can change.
 
@@ -157,6 +160,8 @@ def of_parameters(
         Of keys that are 0: to where the slider goes.
     views
         Of keys that are drawn: where they stand.
+    units
+        Of keys of controllers: SI units, which are those of forces where a motor moves a slide.
     """
     for key, value in values:
         table, *names = key.split(".")
@@ -165,6 +170,8 @@ def of_parameters(
         if table not in TABLES or label is None or none:
             continue
         text, unit, way = label
+        if (own := units.get(key)) and own != unit:
+            text, unit = text.replace("torque", "force").replace("inertia", "mass"), own
         if way == "share":
             reach = Range(min(SHARE.min, value), SHARE.max)
         elif isinstance(way, float) and value > 0.0:

@@ -29,7 +29,7 @@ PROBABLE = 0.6744897501960817  # of a normal distribution, in standard deviation
 
 @dataclass(frozen=True)
 class PointingError:
-    """Errors of one axis over a run [rad]."""
+    """Errors of one axis over a run [rad, of a slide m]."""
 
     rms: float
     peak: float
@@ -67,9 +67,9 @@ class PointingBudget:
     time: np.ndarray
     """[s]"""
     errors: Mapping[str, np.ndarray]
-    """reference less angle of the load [rad] over time, by the motor of the axis"""
+    """reference less angle of the load [rad], or position of the slide [m], over time, by the motor of the axis"""
     measured: Mapping[str, np.ndarray]
-    """error of the measured direction [rad] over time, as in `PointingError`"""
+    """error of the measured direction [rad, m] over time, as in `PointingError`"""
     whole: Errors
     """errors of the scenario as it is"""
     without: Mapping[str, Errors]
@@ -88,11 +88,13 @@ class PointingBudget:
     """by the factor on the speed of the targets, 1 included; empty where the references are no targets with a speed"""
     pixels: Mapping[str, float]
     """angle of a pixel [rad] of the axes with a camera"""
+    units: Mapping[str, str]
+    """unit of each axis: rad, or m of a slide"""
     view: View | None = None
     """view, if a field of view is given or cameras have one"""
 
     def contributions(self, axis: str) -> dict[str, float]:
-        """By how much the mean square error of an axis falls [rad²] with each cause as all are taken away one after another.
+        """By how much the mean square error of an axis falls [rad², m²] with each cause as all are taken away one after another.
 
         They add up to ``whole[axis].rms**2 - ideal[axis].rms**2``; one that is negative hides another.
         """
@@ -125,7 +127,7 @@ def pointing_budget(
         start: on the reference or, if the scenario begins on it, at rest there. Errors count after twice the time in which both
         agree to a tenth of the rms error, or as far as they do in the second half.
     view : mapping of str to float or str, optional
-        Full angle of view [rad] of each axis, by the name of its motor. Default: the angles of view of the cameras.
+        Full angle of view [rad, of a slide m] of each axis, by the name of its motor. Default: the angles of view of the cameras.
     robustness : bool
         Whether to run other temperatures, target speeds, wear, and wrong losses in the controller, too.
     progress : callable, optional
@@ -134,7 +136,7 @@ def pointing_budget(
     Returns
     -------
     PointingBudget
-        Errors of each axis [rad], contributions of the causes, and robustness.
+        Errors of each axis [rad, of a slide m], contributions of the causes, and robustness.
 
     Raises
     ------
@@ -197,6 +199,7 @@ def pointing_budget(
         group("robustness"),
         dict(sorted((speeds | {1.0: whole}).items())) if speeds else {},
         {m: c.camera.pixel for m, c in loaded.axes().items() if c.camera is not None and c.camera.pixel is not None},
+        _units(loaded),
         _in_view(time >= start, errors, angles) if angles else None,
     )
 
@@ -290,11 +293,17 @@ def _view(scenario: TrainScenario, view: Mapping[str, float | str]) -> dict[str,
             raise InputError(f"view: {shown(motor)} is the motor of no axis; {meant}")
     cameras = {motor: c.camera.field for motor, c in scenario.axes().items() if c.camera is not None}
     view = view or {motor: angle for motor, angle in cameras.items() if angle is not None}
-    angles = {motor: argument(f"view[{motor}]", angle, "rad") for motor, angle in view.items()}
+    units = _units(scenario)
+    angles = {motor: argument(f"view[{motor}]", angle, units[motor]) for motor, angle in view.items()}
     for motor, angle in angles.items():
         if not angle > 0.0:
-            raise InputError(f"view[{motor}]: {angle:g} rad must be above 0")
+            raise InputError(f"view[{motor}]: {angle:g} {units[motor]} must be above 0")
     return angles
+
+
+def _units(scenario: TrainScenario) -> dict[str, str]:
+    """Unit of the position that each axis controls, by its motor."""
+    return {motor: scenario.train().angle_unit(scenario.controlled(motor)) for motor in scenario.axes()}
 
 
 Found = tuple[np.ndarray, dict[str, np.ndarray], dict[str, np.ndarray]]

@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, TypeVar
 
+from ..model.linear_train import LINEAR_DRIVES
 from ..simulation.train_scenario import TrainScenario
 
 Tables = dict[str, Any]
 K = TypeVar("K")
+
+SCREW_LOSSES = ("efficiency", "backdriving_efficiency", "mean_diameter", "friction_coefficient", "friction_angle")
+
+
+def linear_drives(data: Tables) -> Iterator[Tables]:
+    """The tables of screws, racks and belts."""
+    for table in LINEAR_DRIVES:
+        yield from data.get(table, {}).values()
 
 
 def _backlash(data: Tables) -> None:
@@ -22,6 +31,9 @@ def _backlash(data: Tables) -> None:
             gap = stiffness["breaks"][0]
             stiffness["slopes"] = tuple(slopes[1:])
             stiffness["breaks"] = tuple(b - gap for b in stiffness["breaks"][1:])
+    for drive in linear_drives(data):
+        drive["backlash"] = 0.0
+        drive.pop("restitution", None)
 
 
 def _low_stiffness(data: Tables) -> None:
@@ -30,10 +42,13 @@ def _low_stiffness(data: Tables) -> None:
         if stiffness["kind"] == "curve":
             stiff = stiffness["slopes"][-1]
             stiffness["slopes"] = tuple(stiff if slope > 0.0 else 0.0 for slope in stiffness["slopes"])
+    for drive in linear_drives(data):
+        if curve := drive.get("stiffness_curve"):
+            curve["slopes"] = tuple(curve["slopes"][-1] if slope > 0.0 else 0.0 for slope in curve["slopes"])
 
 
 def _hysteresis(data: Tables) -> None:
-    for gear in data["gears"].values():
+    for gear in (*data["gears"].values(), *linear_drives(data)):
         gear.pop("hysteresis", None)
 
 
@@ -43,11 +58,19 @@ def _friction(data: Tables) -> None:
     for shaft in data["shafts"].values():
         for key in ("friction_torque", "breakaway_torque", "stribeck_speed", "friction_error", "friction_curve"):
             shaft.pop(key, None)
+    for slide in data.get("slides", {}).values():
+        for key in ("friction_force", "breakaway_force", "stribeck_speed", "friction_error", "friction_curve"):
+            slide.pop(key, None)
+    for drive in linear_drives(data):
+        drive["drag_torque"] = 0.0
 
 
 def _losses(data: Tables) -> None:
     for gear in data["gears"].values():
         gear["losses"] = {"kind": "constant_efficiency", "efficiency": 1.0}
+    for drive in linear_drives(data):
+        for key in SCREW_LOSSES:
+            drive.pop(key, None)
 
 
 def _quantisation(data: Tables) -> None:

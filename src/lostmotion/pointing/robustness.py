@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from .causes import Tables
+from .causes import Tables, linear_drives
 
 COPPER, MAGNETS, LUBRICANT = (
     3.93e-3,
@@ -17,6 +17,7 @@ COPPER, MAGNETS, LUBRICANT = (
 MAP_FACTORS = (0.6, 0.8, 1.25, 1.5)
 TEMPERATURES = (-40.0, -20.0, 20.0, 40.0)  # [K], from that of the data
 WEAR = (0.5, 1.0, 2.0, 5.0)  # [arcmin]
+AXIAL_WEAR = (1.0, 2.0, 5.0, 10.0)  # [µm]
 SPEED_FACTORS = (0.25, 0.5, 1.5, 2.0)
 
 Change = Callable[[Tables], None]
@@ -47,6 +48,12 @@ def warmer(difference: float) -> Change:
         for gear in data["gears"].values():
             gear["viscous_friction"] = lubricant * gear.get("viscous_friction", 0.0)
             gear["losses"] = _scaled(gear["losses"], lubricant)
+        for drive in linear_drives(data):
+            for key in ("viscous_friction", "drag_torque", "friction_coefficient", "friction_angle"):
+                if key in drive:
+                    drive[key] = lubricant * drive[key]
+            if "efficiency" in drive:
+                drive["efficiency"] = max(1e-3, 1.0 - lubricant * (1.0 - drive["efficiency"]))
 
     return change
 
@@ -99,6 +106,17 @@ def worn(arcmin: float) -> Change:
     return change
 
 
+def worn_axially(micrometres: float) -> Change:
+    """Screws, racks and belts with a stiffness, or with flanks that strike, get so much more backlash."""
+
+    def change(data: Tables) -> None:
+        for drive in linear_drives(data):
+            if "stiffness" in drive or "stiffness_curve" in drive or "restitution" in drive or "nut_stiffness" in drive:
+                drive |= {"backlash": drive.get("backlash", 0.0) + 1e-6 * micrometres, "preload": 0.0}
+
+    return change
+
+
 def faster(factor: float) -> Change:
     """All targets at so many times their speed; each axis begins on its reference."""
 
@@ -118,6 +136,7 @@ ROBUSTNESS: dict[str, Change] = {
     **{f"losses in the controller x {factor:g}": scaled_losses(factor) for factor in MAP_FACTORS},
     **{f"{difference:+g} K": warmer(difference) for difference in TEMPERATURES},
     **{f"wear: {arcmin:g} arcmin more backlash": worn(arcmin) for arcmin in WEAR},
+    **{f"wear: {gap:g} µm more axial backlash": worn_axially(gap) for gap in AXIAL_WEAR},
 }
 """what axes may become, or their controllers take them for"""
 

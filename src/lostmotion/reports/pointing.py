@@ -15,7 +15,7 @@ from .pages import table_csv, write_report
 from .panels import Bars, Curve, Group, Panel
 
 NUMBERS = ("rms", "peak", "probable", "mean", "measured, rms")
-ROUNDING = 1e-12  # [rad], below which an error is rounding
+ROUNDING = 1e-12  # [rad, m], below which an error is rounding
 
 
 def header(budget: PointingBudget) -> list[str]:
@@ -46,7 +46,7 @@ def _numbers(budget: PointingBudget, axis: str, found: Errors) -> list[str]:
 
 def contribution_header(budget: PointingBudget) -> tuple[str, ...]:
     """Header of the contributions."""
-    return ("axis", "cause", "mean square falls by [µrad²]", "share [%]", f"remaining rms [{_unit(budget)[1]}]")
+    return ("axis", "cause", _falls(budget), "share [%]", f"remaining rms [{_unit(budget)[1]}]")
 
 
 def contribution_rows(budget: PointingBudget) -> list[list[str]]:
@@ -78,21 +78,30 @@ def _dotted(k: int) -> dict[str, Any]:
     return look(k) | {"marker": "o", "markersize": 5.0}
 
 
-def _unit(budget: PointingBudget) -> tuple[float, str]:
-    """In which errors are drawn: how many of one rad, and the unit."""
-    return (1e6, "µrad") if max(e.peak for e in budget.whole.values()) < 5e-5 else (1e3, "mrad")
+def _unit(budget: PointingBudget, axis: str | None = None) -> tuple[float, str]:
+    """In which errors are shown: how many of one rad or m, and the unit of an axis, or of all."""
+    factor, prefix = (1e6, "µ") if max(e.peak for e in budget.whole.values()) < 5e-5 else (1e3, "m")
+    return factor, " or ".join(f"{prefix}{unit}" for unit in _units(budget, axis))
+
+
+def _units(budget: PointingBudget, axis: str | None) -> list[str]:
+    return [budget.units[axis]] if axis is not None else sorted(set(budget.units.values()), reverse=True)
+
+
+def _falls(budget: PointingBudget, axis: str | None = None) -> str:
+    return f"mean square falls by [{' or '.join(f'µ{unit}²' for unit in _units(budget, axis))}]"
 
 
 def error_panels(budget: PointingBudget) -> list[Panel]:
     """Error of each axis and of the measured direction over time, from the instant at which they count."""
     kept = budget.time >= budget.after
     time = budget.time[kept]
-    factor, unit = _unit(budget)
+    factor, _ = _unit(budget)
     return [
         Panel(
             axis,
             "time [s]",
-            f"error [{unit}]",
+            f"error [{_unit(budget, axis)[1]}]",
             (
                 Curve("measured direction", time, factor * budget.measured[axis][kept], look(1)),
                 Curve("true direction: reference less load", time, factor * error[kept], look(0), "true direction"),
@@ -108,7 +117,7 @@ def speed_panels(budget: PointingBudget) -> list[Panel]:
         return []
     factors = np.array(list(budget.speeds))
 
-    factor, unit = _unit(budget)
+    factor, _ = _unit(budget)
 
     def curve(axis: str, name: str, style: dict[str, Any]) -> Curve:
         values = np.array([factor * getattr(found[axis], name) for found in budget.speeds.values()])
@@ -118,7 +127,7 @@ def speed_panels(budget: PointingBudget) -> list[Panel]:
         Panel(
             axis,
             "speed of the target, times that of the scenario",
-            f"error [{unit}]",
+            f"error [{_unit(budget, axis)[1]}]",
             (curve(axis, "rms", _dotted(0)), curve(axis, "peak", _dotted(1))),
             y_range=(0.0, 1.1 * factor * max(found[axis].peak for found in budget.speeds.values()) or 1.0),
         )
@@ -131,8 +140,10 @@ def robustness_panels(budget: PointingBudget) -> list[Panel]:
     kinds: Mapping[str, tuple[str, str, float]] = {
         "losses in the controller": ("losses in the controller", "factor", 1.0),
         " K": ("temperature", "change of temperature [K]", 0.0),
-        "wear": ("wear", "added backlash [arcmin]", 0.0),
+        "arcmin": ("wear", "added backlash [arcmin]", 0.0),
+        "µm": ("wear", "added axial backlash [µm]", 0.0),
     }
+    unit = " or ".join(f"m{unit}" for unit in _units(budget, None))
     panels = []
     for sign, (title, label, nominal) in kinds.items():
         found = {_number(name): errors for name, errors in budget.robustness.items() if sign in name}
@@ -143,7 +154,7 @@ def robustness_panels(budget: PointingBudget) -> list[Panel]:
                 for k, axis in enumerate(budget.whole)
             )
             top = 1.1 * max(float(c.y.max()) for c in curves) or 1.0
-            panels.append(Panel(title, label, "rms error [mrad]", curves, y_range=(0.0, top)))
+            panels.append(Panel(title, label, f"rms error [{unit}]", curves, y_range=(0.0, top)))
     return panels
 
 
@@ -155,9 +166,7 @@ def _number(name: str) -> float:
 def _bars(budget: PointingBudget) -> Group:
     """Contributions of the causes to the mean square error of each axis."""
     charts = tuple(
-        Bars(
-            axis, "mean square falls by [µrad²]", {n: (1e12 * part,) for n, part in budget.contributions(axis).items()}
-        )
+        Bars(axis, _falls(budget, axis), {n: (1e12 * part,) for n, part in budget.contributions(axis).items()})
         for axis in budget.whole
     )
     return Group("contributions", "Contributions of the causes", CONTRIBUTED, charts, max(1, len(charts)))
@@ -166,8 +175,8 @@ def _bars(budget: PointingBudget) -> Group:
 def _verdict(budget: PointingBudget) -> Headline:
     """The error of each axis, what causes most of it, how long the target is in view."""
     errors, causes = [], []
-    factor, unit = _unit(budget)
     for axis, e in budget.whole.items():
+        factor, unit = _unit(budget, axis)
         pixel = budget.pixels.get(axis)
         pixels = f" ({e.rms / pixel:.3g} px)" if pixel else ""
         errors.append(f"{axis}: rms {factor * e.rms:.4g} {unit}{pixels}, peak {factor * e.peak:.4g} {unit}")

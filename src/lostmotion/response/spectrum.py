@@ -170,6 +170,10 @@ def spectrum(
     train = long.train()
     name = _motor(train, motor)
     over = train.motors[name].shaft
+    if train.is_slide(over):
+        raise InputError(
+            f"motor: {shown(name)} moves the slide {over}, which makes no revolutions; name a motor of a shaft"
+        )
     controller = long.axes().get(name)
     follows = isinstance(controller, Controller) and isinstance(controller.reference, PositionReference)
     against = against or ("reference" if follows else "motor")

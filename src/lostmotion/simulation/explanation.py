@@ -103,7 +103,9 @@ class MotorState:
         moves = "slide moves" if self.slides else "shaft turns"
         for way, beyond, command in ways:
             if math.isnan(command):
-                turns.append(f"{way} at a command that statics do not determine (gears in a loop)")
+                turns.append(
+                    f"{way} at a command that statics do not determine (gears in a loop, or a housing that turns)"
+                )
             elif math.isinf(command):
                 turns.append(f"{way} at no command (a gear locks itself, or something holds without limit)")
             else:
