@@ -212,6 +212,26 @@ def test_stiffness_of_screw_nut_and_bearings_in_series():
     assert part.gear("a", "b").stiffness.stiffness == pytest.approx(1.0 / (1 / 4e8 + 1 / 6e8 + 1 / shank), rel=1e-14)
 
 
+def test_a_preloaded_belt_loses_half_of_its_stiffness_where_a_strand_goes_slack():
+    """Each of two strands of 1e6 N/0.5 m: 2 MN/m. 100 N of preload are used up at 50 um, by a force of 200 N."""
+    belt = {"input": "a", "output": "b", "teeth": 20, "pitch": "5 mm", "specific_stiffness": "1e6 N"}
+    made = lm.model.Belt(**belt, free_lengths=["500 mm", "500 mm"], preload="100 N")
+    curve = made.gear("a", "b").stiffness
+    for deflection, force in ((20e-6, 80.0), (50e-6, 200.0), (90e-6, 280.0), (-90e-6, -280.0)):
+        assert float(curve.torque(deflection)) == pytest.approx(force, rel=1e-12)
+    with pytest.raises(lm.InputError, match=r"a preload takes two strands of the same length"):
+        lm.model.Belt(**belt, free_lengths=["500 mm", "400 mm"], preload="100 N")
+
+
+def test_a_shaft_without_inertia_has_the_key_of_the_short_form():
+    with pytest.raises(
+        lm.InputError, match=r"key axis.screw: has no inertia, and screw_contact is a dry contact at it"
+    ):
+        axis(
+            **{"axis.gearbox": {"ratio": 3.0, "stiffness": {"kind": "linear", "stiffness": 1e4}, "mesh_damping": 10.0}}
+        )
+
+
 def test_inertia_of_a_screw_follows_from_its_size():
     part = lm.model.Screw(input="a", output="b", lead="10 mm", diameter="25 mm", length="1 m")
     mass = 7850.0 * math.pi / 4.0 * 0.025**2

@@ -233,7 +233,7 @@ class LinearDrive(Part):
             raise ValueError("has stiffness and stiffness_curve, which say the same; give one")
         if self.backdriving_efficiency is not None and self.efficiency is None:
             raise ValueError("has a backdriving_efficiency without efficiency; give both, or leave it out")
-        if self.preload > 0.0 and self.stiffness_curve is None:
+        if self.preload > 0.0 and self.stiffness_curve is None and not self._goes_slack():
             raise ValueError(
                 "has a preload, which acts on the segments of a stiffness_curve; give one, or leave it out"
             )
@@ -264,6 +264,14 @@ class LinearDrive(Part):
             return self.stiffness_curve.slopes[-1]
         return self.stiffness
 
+    def _goes_slack(self) -> bool:
+        """Whether a preload keeps strands tight, rather than removing segments of a curve."""
+        return False
+
+    def _curve(self) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
+        """Slopes [N/m] and breaks [m] of the force over the deflection, where it is more than one line."""
+        return None if self.stiffness_curve is None else (self.stiffness_curve.slopes, self.stiffness_curve.breaks)
+
     def _turning_inertia(self) -> float:
         return self.inertia
 
@@ -280,9 +288,9 @@ class LinearDrive(Part):
         stiffness: TorsionCurve | LinearStiffness | Rigid = Rigid()
         if self.restitution is not None:
             stiffness = Rigid(backlash=self.backlash, restitution=self.restitution)
-        if self.stiffness_curve is not None:
-            slopes, breaks = self.stiffness_curve.slopes, self.stiffness_curve.breaks
-            stiffness = TorsionCurve(slopes=slopes, breaks=breaks, backlash=self.backlash, preload=self.preload)
+        if (curve := self._curve()) is not None:
+            preload = 0.0 if self._goes_slack() else self.preload
+            stiffness = TorsionCurve(slopes=curve[0], breaks=curve[1], backlash=self.backlash, preload=preload)
         elif k is not None and self.backlash > 0.0:
             stiffness = TorsionCurve(slopes=(k,), backlash=self.backlash)
         elif k is not None:
@@ -524,7 +532,22 @@ class BeltData(LinearDrive):
         for key in ("stiffness", "stiffness_curve"):
             if self.free_lengths is not None and getattr(self, key) is not None:
                 raise ValueError(f"has {key} and specific_stiffness, which say the same; give one")
+        if self._goes_slack() and (len(lengths := self.free_lengths or ()) != 2 or lengths[0] != lengths[1]):
+            raise ValueError(
+                f"has a preload and free_lengths {list(lengths)}; a preload takes two strands of the same length, one of which goes "
+                "slack; give them, or a stiffness_curve"
+            )
         return self
+
+    def _goes_slack(self) -> bool:
+        return self.preload > 0.0 and self.free_lengths is not None
+
+    def _curve(self) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
+        if not self._goes_slack():
+            return super()._curve()
+        # Both strands carry until the deflection takes the preload from one of them; the other goes on alone.
+        both = self._stiffness() or 0.0
+        return (both, 0.5 * both), (2.0 * self.preload / both,)
 
     def travel(self) -> float:
         if self.travel_per_turn is not None:

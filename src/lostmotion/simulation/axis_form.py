@@ -35,7 +35,7 @@ def axis_from_tables(tables: Mapping[str, Any]) -> TrainScenario:
     except InputError as error:
         text = str(error)
         for short, long in DRIVES.items():
-            text = text.replace(f"{long}.{short}", f"axis.{short}")
+            text = text.replace(f"{long}.{short}", f"axis.{short}").replace(f"shafts.{short}", f"axis.{short}")
         for long, short in (
             (f"controllers.{MOTOR}", "controller"),
             (f"command.{MOTOR}", "command"),
