@@ -91,19 +91,22 @@ def stable_axis(rng: random.Random) -> lm.TrainScenario:
 
 
 def errors_of(scenario: lm.TrainScenario, duration: float) -> list[float]:
-    """Errors of the controller at the ends of stuck intervals of an exact run that begin after its step and last for a sample."""
+    """Errors of the controller at the ends of stuck intervals of an exact run that begin after its step and last for a sample, from the
+    first one on in which all but the integrator settles."""
     loop = Loop.of(in_long_form(scenario))
     run, count = loop.run(duration, 40_000), 40_000
     error = run["values"][loop.channels.index("m_error")]
     names = loop.core.switching_columns()
     before, after = (names.index(f"load_contact_{when}") for when in ("before", "after"))
+    rates = np.abs(np.linalg.eigvals(lm.linearize(scenario, lm.TrainInitial()).A).real)
+    settling = 12.0 / min(rates[rates > 1e-6 * rates.max(initial=0.0)], default=math.inf)
     found, begin = [], math.nan
     for row in run["switchings"]:
         if row[after] == 0:
             begin = row[0]
         elif row[before] == 0 and begin > 0.1:
             k = int(row[0] / duration * count)
-            if k * duration / count > begin:
+            if k * duration / count > begin and (found or row[0] - begin > settling):
                 found.append(float(error[k]))
     return found
 

@@ -1,12 +1,16 @@
 """The certificate of hunting: its map against closed forms and Newton's method, and what it refuses."""
 
+import csv
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import lostmotion as lm
+from lostmotion.cli import app
 
 INERTIA, K_P, K_I, K_D = 0.5, 50.0, 120.0, 8.0
 SLIDING = 2.0
@@ -134,3 +138,20 @@ def test_a_sampled_controller_and_a_wrong_error_are_refused() -> None:
     assert (
         lm.hunting_certificate(lm.load("hunting-with-static-friction"), largest_error="10 mrad").largest_error == 0.01
     )
+
+
+def test_the_command_prints_the_certificate_and_writes_its_page(tmp_path: Path) -> None:
+    """The amplitude of 5.762 mrad is 19.81 arcmin; the chart has the points of the map."""
+    found = CliRunner().invoke(app, ["servo", "hunting-with-static-friction", "-o", str(tmp_path)])
+    assert found.exit_code == 0
+    assert "limit cycle    ±19.81 arcmin, 0.352 Hz, stable" in found.stdout
+    certificate = lm.hunting_certificate(lm.load("hunting-with-static-friction"))
+    assert certificate.map is not None
+    with (tmp_path / "hunting.csv").open() as file:
+        points = [
+            (float(row["x"]), float(row["y"])) for row in csv.DictReader(file) if row["curve"] == "after the slip"
+        ]
+    assert np.array(points)[:, 1] == pytest.approx(1e3 * certificate.map["image"].values)
+    assert "From break-away to break-away" in (tmp_path / "servo.html").read_text()
+    refused = CliRunner().invoke(app, ["servo", "hunting-with-static-friction", "--tune", "suited"])
+    assert "--tune: for sampled controllers" in str(refused.exception)

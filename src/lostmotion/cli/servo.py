@@ -64,7 +64,8 @@ def servo(
     """Commission a servo axis: margins, bandwidths, steps, following, settling, stiffness, limit cycle.
 
     The report is servo.html (one page) with the data of its charts and the margins as CSV. Exit code 1 if the complete loop
-    is unstable in one of its regimes; what was asked for is written all the same.
+    is unstable in one of its regimes; what was asked for is written all the same. With a continuous controller it is the
+    certificate of hunting.
 
     \b
     lostmotion servo position-axis -o sheet
@@ -85,6 +86,14 @@ def servo(
         try_file(path)
     for path in directories:
         try_directory(path)
+    if loaded.continuous() and not loaded.axes():
+        asked = {"--tune": rule, "--window": window, "--motor": motor, "--drive-units": drive_units or None}
+        if given := [option for option, value in asked.items() if value is not None]:
+            raise InputError(
+                f"{', '.join(given)}: for sampled controllers, and this scenario has continuous ones; leave it out"
+            )
+        _certify(loaded, scenario, directories, pictures)
+        return
     from ..servo.commission import commission, work
 
     with about(scenario):
@@ -116,6 +125,22 @@ def servo(
     print("\n".join([*written, _next(scenario, files, directories, rule)]))
     if not report.stable:
         fail(f"unstable: {'; '.join(map(str, report.instabilities()))}")
+
+
+def _certify(loaded: Scenario, source: str, directories: list[Path], pictures: tuple[str, ...]) -> None:
+    """Print whether an axis with a continuous controller hunts, with its page on request."""
+    from ..reports.certificate import certificate_rows, write_certificate
+    from ..servo.certificate import hunting_certificate
+
+    with about(source), busy("Bounding the map from break-away to break-away"):
+        certificate = hunting_certificate(loaded)
+    print(loaded.title or Path(source).stem)
+    _print_columns(certificate_rows(certificate))
+    for path in directories:
+        with writing(path), busy("Writing"):
+            print(f"Report: {write_certificate(path, Path(source).stem, loaded.title, certificate, pictures)}")
+    if not directories:
+        print(f"The map as a chart: lostmotion servo {source} -o sheet")
 
 
 def _tuned(scenario: Scenario, rule: str, feedforward: bool, motor: str | None) -> Tuning:

@@ -23,6 +23,8 @@ SLIPS = 30  # after which transients are given up that do not repeat
 ORBIT = 80  # slips that lead to where a band is looked for
 LAST = 40  # of them, whose errors the band encloses
 WIDER = (0.6, 0.3, 0.1, 0.03, 0.01, 0.002)  # by which it is larger than these, relative, the first that can be shown
+GROWTHS = 4  # of a band to what it is taken to
+MARGIN = 1e-3  # by which it then is larger, relative
 CELLS = 48  # into which a band is divided
 RANGE_CELLS = 120  # of all errors
 ROUNDS = 6  # after which transients that grow are given up
@@ -126,10 +128,14 @@ def _band(of: StickSlip, largest: float) -> Proof:
     least, most = min(orbit[-LAST:]), max(orbit[-LAST:])
     for wider in WIDER:
         low, high = least * (1.0 - wider), most * (1.0 + wider)
-        transients, reason = _kept(of, low, high)
-        if not reason:
-            ranges = _leading_to(of, low, high, max(largest, high), transients)
-            return Proof("hunts", "", max(b for _, b in ranges), band=(low, high), ranges=ranges)
+        for _ in range(GROWTHS):
+            kept, reason = _kept(of, low, high)
+            if isinstance(kept, Transients):
+                ranges = _leading_to(of, low, high, max(largest, high), kept)
+                return Proof("hunts", "", max(b for _, b in ranges), band=(low, high), ranges=ranges)
+            if kept is None:
+                break
+            low, high = min(low, (1.0 - MARGIN) * kept[0]), max(high, (1.0 + MARGIN) * kept[1])
     return Proof("not decided", reason, 0.0)
 
 
@@ -146,23 +152,23 @@ def _orbit(of: StickSlip) -> tuple[list[float], str]:
     return errors, ""
 
 
-def _kept(of: StickSlip, low: float, high: float) -> tuple[Transients, str]:
-    """Bound of the transients with which the map takes a band into itself, and why it does not."""
-    edges = np.linspace(low, high, CELLS + 1)
+def _kept(of: StickSlip, low: float, high: float) -> tuple[Transients | tuple[float, float] | None, str]:
+    """Bound of the transients with which the map takes a band into itself; else the band that it takes it to, if there is one, and why."""
     left = Transients.none(of)
     for _ in range(ROUNDS):
-        after = np.zeros(len(of.stuck_rates))
-        for a, b in itertools.pairwise(edges):
-            found = image(of, a, b, left)
-            if found.reason:
-                return left, found.reason
-            if not low <= found.least <= found.largest <= high:
-                return left, f"no band of errors about {0.5 * (low + high):.4g} is shown to be taken into itself"
-            after = np.maximum(after, found.left.largest)
+        images = [image(of, a, b, left) for a, b in itertools.pairwise(np.linspace(low, high, CELLS + 1))]
+        if reason := next((found.reason for found in images if found.reason), ""):
+            return None, reason
+        least, most = min(found.least for found in images), max(found.largest for found in images)
+        if not low <= least <= most <= high:
+            return (least, most) if least > 0.0 else None, (
+                f"no band of errors about {0.5 * (low + high):.4g} is shown to be taken into itself"
+            )
+        after = np.max([found.left.largest for found in images], axis=0)
         if np.all(after <= left.radius):
             return left, ""
         left = Transients(left.middle, SLACK * after)
-    return left, "the transients grow from slip to slip"
+    return None, "the transients grow from slip to slip"
 
 
 def _leading_to(

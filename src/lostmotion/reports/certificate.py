@@ -1,0 +1,100 @@
+"""The certificate of hunting as a page and as lines of text: verdict, limit cycles and the map from break-away to break-away."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ..servo.certificate import HuntingCertificate
+from ..units.practical import practical
+from .looks import FAINT, look
+from .page import Headline, Prose, Report, Table
+from .pages import write_report
+from .panels import Curve, Group, Mark, Panel
+
+CAPTION = (
+    "While the contact is stuck, the integrator winds up until it breaks away; the curve is the error that the slip leaves. Where it crosses "
+    "the line of equal and opposite errors there is a limit cycle."
+)
+COMPUTED = (
+    "Slip and stuck interval are linear, so that the map follows from their matrices. The verdict is shown by bounds of the map over "
+    "intervals of errors, in floating point, widened by its rounding.",
+    "It holds for starts at rest in which all but the integrator has settled, with the errors that are given.",
+)
+STATES = {"hunts": "bad", "does not hunt": "good", "not decided": "open"}
+
+
+def certificate_rows(certificate: HuntingCertificate) -> list[tuple[str, str]]:
+    """Verdict, limit cycles and errors, as (what, value)."""
+    unit = "rad" if certificate.map is None else str(certificate.map["error"].attrs["units"])
+    rows = [("hunting", certificate.verdict + (f": {certificate.reason}" if certificate.reason else ""))]
+    for point in certificate.fixed_points:
+        kind = "stable" if point.stable else "unstable"
+        rows.append(("limit cycle", f"±{practical(point.amplitude, unit)}, {1.0 / point.period:.4g} Hz, {kind}"))
+    if certificate.band is not None:
+        rows.append(("never left", f"errors from {_range(certificate.band, unit)}"))
+        rows.append(("reached from", f"errors from {', '.join(_range(one, unit) for one in certificate.ranges)}"))
+    elif certificate.verdict == "does not hunt" and not math.isnan(certificate.factor):
+        rows.append(("shown for", f"errors up to {practical(certificate.largest_error, unit)}"))
+    if not math.isnan(certificate.reached):
+        rows.append(("run sticks at", f"an error of {practical(certificate.reached, unit)}"))
+    return rows
+
+
+def _range(pair: tuple[float, float], unit: str) -> str:
+    low, high = pair
+    return f"{practical(low, unit)} to {practical(high, unit)}" if low > 0.0 else f"0 to {practical(high, unit)}"
+
+
+def map_panel(certificate: HuntingCertificate) -> Panel | None:
+    """The error left by a slip over the error at its begin."""
+    found = certificate.map
+    if found is None or not found.sizes["error"]:
+        return None
+    unit, factor = ("µm", 1e6) if found["error"].attrs["units"] == "m" else ("mrad", 1e3)
+    error, image = factor * found["error"].values, factor * found["image"].values
+    ends = np.array([0.0, min(error.max(), max(-image.min(), 0.5 * error.max()))])
+    curves = (Curve("after the slip", error, image, look(0)), Curve("equal and opposite", ends, -ends, FAINT))
+    marks = tuple(
+        Mark(factor * p.amplitude, -factor * p.amplitude, f"{1.0 / p.period:.3g} Hz", look(0))
+        for p in certificate.fixed_points
+    )
+    return Panel(
+        "error left by a slip",
+        f"error at the break-away [{unit}]",
+        f"error left [{unit}]",
+        curves,
+        marks=marks,
+        level=0.0,
+    )
+
+
+def certificate_report(name: str, title: str, certificate: HuntingCertificate) -> Report:
+    """The page of a certificate."""
+    rows = certificate_rows(certificate)
+    panel = map_panel(certificate)
+    lines = tuple(f"{what[0].upper()}{what[1:]}: {value}." for what, value in rows[:3])
+    return Report(
+        title=title or name,
+        lead=f"Certificate of hunting of `{name}`"
+        + (f", contact `{certificate.contact}`." if certificate.contact else "."),
+        verdict=Headline(STATES[certificate.verdict], lines),  # type: ignore[arg-type]
+        main=Group("hunting", "From break-away to break-away", CAPTION, () if panel is None else (panel,), 1),
+        parts=(Table("Hunting", ("quantity", "value"), rows), Prose("What is computed", COMPUTED)),
+    )
+
+
+def write_certificate(
+    directory: Path, name: str, title: str, certificate: HuntingCertificate, pictures: Sequence[str] = ()
+) -> Path:
+    """``servo.html`` and its data as CSV in a directory, made if missing; on request pictures with these endings.
+
+    Returns
+    -------
+    Path
+        Of the page.
+    """
+    return write_report(directory, "servo.html", certificate_report(name, title, certificate), {}, pictures)
