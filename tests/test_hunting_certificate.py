@@ -116,6 +116,7 @@ def test_what_keeps_an_axis_from_hunting_is_named() -> None:
     ("changes", "reason"),
     [
         ({"shafts.motor.friction_torque": 0.01}, "2 dry contacts, motor_contact, table_contact"),
+        ({"gravity": {"arm": {"shaft": "table", "mass": 1.0, "radius": 0.1}}}, "regime: it has gravity"),
         ({"shafts.table.stribeck_speed": 0.1}, "friction of table that varies with speed"),
         ({"controllers.servo.position.integral_gain": 80.0}, "the linear loop is unstable"),
         (

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -87,8 +88,7 @@ class Flow:
         """Least and largest values of an output at instants."""
         decay = np.exp(np.outer(times, self.of.slip_rates))
         middle, half = (decay @ (row * part) for part in (self.middle, self.half))
-        size = np.exp(np.outer(times, self.of.slip_rates.real))
-        loose = size @ (np.abs(row) * (self.radius + self.of.rounding * self.size))
+        loose = np.abs(decay) @ (np.abs(row) * (self.radius + self.of.rounding * self.size))
         spread = np.abs(half.real) + loose
         return middle.real - spread, middle.real + spread
 
@@ -128,8 +128,17 @@ class Flow:
         """After which a slip counts as endless [s]."""
         return float(LATEST / np.abs(self.of.slip_rates.real).min())
 
-    def grid(self, *, whole: bool) -> np.ndarray:
-        """Instants between which the speed departs little from its chord; as a rule until a little after it is 0."""
+    @cached_property
+    def short_grid(self) -> np.ndarray:
+        """Instants between which the speed departs little from its chord, until a little after the end of the middle slip."""
+        return self._grid(whole=False)
+
+    @cached_property
+    def whole_grid(self) -> np.ndarray:
+        """The same until a slip counts as endless."""
+        return self._grid(whole=True)
+
+    def _grid(self, *, whole: bool) -> np.ndarray:
         rates, speed = self.of.slip_rates, self.of.speed
         rough = np.concatenate([[0.0], np.geomspace(1e-3 / np.abs(rates).max(), self.latest, 400)])
         values = (np.exp(np.outer(rough, rates)) @ (speed * self.middle)).real
@@ -156,13 +165,13 @@ class Flow:
 
     def grid_from(self, first: float) -> np.ndarray:
         """The instants after one."""
-        times = self.grid(whole=True)
+        times = self.whole_grid
         return np.append(first, times[times > first])
 
     def end(self) -> tuple[float, float] | str:
         """Earliest and latest end of a slip, infinite where it creeps to zero error; else why that is not shown."""
-        found = self.end_within(self.grid(whole=False))
-        return self.end_within(self.grid(whole=True)) if isinstance(found, str) or math.isinf(found[1]) else found
+        found = self.end_within(self.short_grid)
+        return self.end_within(self.whole_grid) if isinstance(found, str) or math.isinf(found[1]) else found
 
     def end_within(self, times: np.ndarray) -> tuple[float, float] | str:
         """The same with these instants."""
@@ -254,8 +263,8 @@ def image(of: StickSlip, low: float, high: float, left: Transients) -> Image:
 
 def _may_be_limited(flow: Flow, end: float, error: float, transients: np.ndarray) -> bool:
     """Whether the command may reach its limit in a slip, or in the stuck interval after it."""
-    of, times = flow.of, flow.grid(whole=False)
-    times = times if times[-1] >= end else flow.grid(whole=True)
+    of, times = flow.of, flow.short_grid
+    times = times if times[-1] >= end else flow.whole_grid
     low, high = flow.range_of(of.command, np.append(times[times < end], end))
     offset = of.command_per_torque * of.sliding
     stuck = abs(of.command_per_torque) * of.breakaway + abs(of.command_per_error) * error

@@ -23,6 +23,8 @@ from .limit_cycle import Loop
 from .linear import LinearModel, train_model
 
 SLIP_SPEED = 1e-9  # [rad/s] or [m/s], at which the matrices of the slip are taken
+LINEAR = ("shafts", "motors", "gears", "springs", "dampers", "mass_matrices")
+"""tables of a train whose elements have one linear regime, but for what is named apart"""
 NONE = 1e-9  # of the largest singular value, below which one is none
 ILL = 1e9  # condition number of the modes, above which rounding is not small
 
@@ -92,8 +94,12 @@ def stick_slip(scenario: TrainScenario) -> StickSlip:
         Nothing winds up while the contact is stuck, or its limit keeps the controller from freeing it.
     """
     motor, loop = _motor(scenario), Loop.of(scenario)
+    if scenario.continuous()[motor].firmware is not None:
+        raise UndecidableError(f"the firmware of {motor} is no linear law")
     shaft, breakaway = _contact(loop)
     still, forward, reverse = (_model(loop, shaft, way * SLIP_SPEED) for way in (0.0, 1.0, -1.0))
+    if not np.allclose(forward.A, reverse.A, rtol=NONE, atol=0.0):
+        raise UndecidableError("it slips forward otherwise than in reverse")
     if [m.contacts[f"{shaft}_contact"] for m in (still, forward, reverse)] != [0, 1, -1]:
         raise UndecidableError("at small speeds the contact does not slip as one linear regime")
     return _Builder(loop, motor, shaft, still, forward, reverse).build(breakaway)
@@ -148,6 +154,8 @@ def _others(train: Any) -> Any:
                 yield f"backlash of {name}"
         elif len(gear.stiffness.pieces()[1]) > 1:
             yield f"several segments of {name}"
+        if gear.housing is not None:
+            yield f"the housing of {name}, which turns"
         if gear.transmission_error is not None:
             yield f"transmission error of {name}"
     for name, spring in train.springs.items():
@@ -156,8 +164,9 @@ def _others(train: Any) -> Any:
     for name, damper in train.dampers.items():
         if damper.drag is not None:
             yield f"drag of {name}"
-    if train.gravity or train.angle_torques:
-        yield "a torque over an angle"
+    for table in type(train).model_fields:
+        if table not in LINEAR and getattr(train, table):
+            yield table
 
 
 def _model(loop: Loop, shaft: str, speed: float) -> LinearModel:
