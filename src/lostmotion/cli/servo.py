@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -88,11 +89,7 @@ def servo(
         try_directory(path)
     if loaded.continuous() and not loaded.axes():
         asked = {"--tune": rule, "--window": window, "--motor": motor, "--drive-units": drive_units or None}
-        if given := [option for option, value in asked.items() if value is not None]:
-            raise InputError(
-                f"{', '.join(given)}: for sampled controllers, and this scenario has continuous ones; leave it out"
-            )
-        _certify(loaded, scenario, directories, pictures)
+        _certify(loaded, scenario, directories, pictures, asked)
         return
     from ..servo.commission import commission, work
 
@@ -115,23 +112,38 @@ def servo(
             written.append(f"Report: {write_servo(path, Path(scenario).stem, report, pictures)}")
     _print_summary(loaded.title or Path(scenario).stem, report)
     if tuned is not None:
-        print(f"Tuned by the rule {tuned.rule}: {tuned.why}")
-        _print_columns([(key, f"{old} -> {new}") for key, old, new in tuned.changes()])
+        _print_tuned(tuned)
     if drive_units:
-        from ..servo.tuning import drive_units as in_drive_units
-
-        print("In the units of drives:")
-        print("\n".join(f"  {line}" for line in in_drive_units(loaded, motor)))
+        _print_drive_units(loaded, motor)
     print("\n".join([*written, _next(scenario, files, directories, rule)]))
     if not report.stable:
         fail(f"unstable: {'; '.join(map(str, report.instabilities()))}")
 
 
-def _certify(loaded: Scenario, source: str, directories: list[Path], pictures: tuple[str, ...]) -> None:
+def _print_tuned(tuned: Tuning) -> None:
+    print(f"Tuned by the rule {tuned.rule}: {tuned.why}")
+    _print_columns([(key, f"{old} -> {new}") for key, old, new in tuned.changes()])
+
+
+def _print_drive_units(scenario: Scenario, motor: str | None) -> None:
+    from ..servo.tuning import drive_units
+
+    print("In the units of drives:")
+    print("\n".join(f"  {line}" for line in drive_units(scenario, motor)))
+
+
+def _certify(
+    loaded: Scenario, source: str, directories: list[Path], pictures: tuple[str, ...], asked: Mapping[str, object]
+) -> None:
     """Print whether an axis with a continuous controller hunts, with its page on request."""
+    from ..errors import InputError
     from ..reports.certificate import certificate_rows, write_certificate
     from ..servo.certificate import hunting_certificate
 
+    if given := [option for option, value in asked.items() if value is not None]:
+        raise InputError(
+            f"{', '.join(given)}: for sampled controllers, and this scenario has continuous ones; leave it out"
+        )
     with about(source), busy("Bounding the map from break-away to break-away"):
         certificate = hunting_certificate(loaded)
     print(loaded.title or Path(source).stem)
