@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from conftest import ROOT
 from lostmotion.cli import app
 
-SCREEN = 60  # lines
+SCREEN = 40  # lines
 # Commands that take minutes with any input that is worth showing; their other tests run them on less.
 LONG = {"select": "1705 pairs", "identify": "three models of three logs", "reproduce": "all figures of the paper"}
 
@@ -63,9 +63,28 @@ def test_the_help_of_a_command_has_an_example_that_runs(
     assert done.exit_code == 0, done.output
     left = {path.name for path in tmp_path.iterdir()} - {"examples"}
     assert left <= {Path(word).name for word in words} | {"drive.html", "paper-2dof-nl-small.html"}
-    if name not in (("schema",), ("scenarios",), ("catalogue",)):  # lists, whose length is that of their subject
-        assert len(done.stdout.splitlines()) <= SCREEN
-    assert "-0.0 " not in done.stdout
+    if name != ("schema",):  # which is for programs
+        lines = done.stdout.splitlines()
+        assert len(lines) <= SCREEN
+        assert re.search(r"(lostmotion|fmpy) \w+ ", lines[-1]), "the next command is the last line"
+        assert not re.search(r"-0(\.0+)? ", done.stdout)
+        numbers = re.findall(r"\d+\.\d+", done.stdout)
+        assert [n for n in numbers if len(n.replace(".", "").lstrip("0")) > 5] == [], "digits that no one reads"
+
+
+def test_the_summaries_of_commands_fit_on_a_line() -> None:
+    listed = CliRunner().invoke(app, ["--help"]).stdout
+    assert not re.search(r"\w\.\.\.$", listed, re.MULTILINE)
+    assert all(len(line) <= 80 for line in listed.splitlines())
+
+
+@pytest.mark.parametrize("kind", ["strain_wave", "planetary", "motor", "screw", "belt", "rack"])
+def test_a_list_of_the_catalogue_fits_on_a_screen_unless_all_is_asked_for(kind: str) -> None:
+    lines = CliRunner().invoke(app, ["catalogue", "--kind", kind]).stdout.splitlines()
+    assert len(lines) <= SCREEN
+    whole = CliRunner().invoke(app, ["catalogue", "--kind", kind, "--all"]).stdout.splitlines()
+    more = [int(line.split()[0]) for line in lines if line.endswith(" more: add --all, or narrow the list")]
+    assert len(whole) == len(lines) + sum(more) - len(more)
 
 
 UNASKED = [

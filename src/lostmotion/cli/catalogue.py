@@ -30,11 +30,12 @@ def catalogue(
         str | None, typer.Option("--lead", metavar="MIN..MAX", help='Lead of a screw [m], e.g. "5 mm..10 mm".')
     ] = None,
     complete: Annotated[bool, typer.Option("--complete", help="Only records that can be simulated.")] = False,
+    every: Annotated[bool, typer.Option("--all", help="List all that fit, not only a screen of them.")] = False,
     output: Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE", help="With `new`: the file.")] = None,
 ) -> None:
-    """List the components, show one with its sources and gaps, or start your own data sheet.
+    """List components, show one, or write a data sheet template.
 
-    Without an option: how many records of each kind there are. The list says of each record how it runs, or what it lacks.
+    Without an option: how many records of each kind there are. The list has a column with the level of the model, or the missing data.
 
     \b
     lostmotion catalogue --kind strain_wave --ratio 50..120 --torque 20..100
@@ -56,10 +57,11 @@ def catalogue(
         if output.exists():
             raise InputError(f"{output}: exists; name another file")
         write_text(output, text)
-        print(f"Template written to {output}; fill in what your data sheet says and delete the rest")
+        print(f"Template written to {output}; fill in the data of your sheet and delete the rest")
+        print(f"Next: lostmotion catalogue {output}")
     elif name is not None:
         print(record_text(name))
-    elif not complete and (kind, ratio, torque, force, lead) == (None,) * 5:
+    elif not complete and not every and (kind, ratio, torque, force, lead) == (None,) * 5:
         print(summary())
     else:
-        print(list_records(kind, ratio, torque, complete, force, lead))
+        print(list_records(kind, ratio, torque, complete, force, lead, every))

@@ -19,7 +19,9 @@ def check(
         Path | None, typer.Option("-o", "--report", metavar="FILE", help="Also write the findings as a page: .html.")
     ] = None,
 ) -> None:
-    """Torques, speeds, voltage, current, heat, inertia ratio, resonance, dead zone, lost motion, holding and self-locking.
+    """Check torques, speeds, heat, resonance and holding.
+
+    Also checks voltage, current, inertia ratio, dead zone, lost motion and self-locking.
 
     The check of a drive train covers torques, speeds, voltage, current, heat and self-locking of each gear and motor. Warnings and the
     page name the source of each rule. The table [task] of the scenario gives the duty cycle and requirements.
@@ -45,6 +47,7 @@ def check(
         from ..reports.page import write_page
 
         write_page(report, check_report(Path(scenario).stem, findings, loaded.title))
-        print(f"The page is at {report}")
+        print(f"Report written to {report}")
+        print(f"Next: lostmotion run {scenario} --plot run.png")
     else:
         print(f"All rules with their sources on a page: lostmotion drive check {scenario} --report check.html")

@@ -50,7 +50,9 @@ def fmu(
         ),
     ] = None,
 ) -> None:
-    """Write a scenario as an FMU (Co-Simulation and Model Exchange) for Simulink, Modelica tools and others.
+    """Write a scenario as an FMU for Simulink and other tools.
+
+    An FMU is for Co-Simulation and Model Exchange.
 
     Inputs are commands, load torques and references of continuous controllers. Each follows its signal in the scenario until the importer sets it. Outputs are the result variables; parameters have the keys of the scenario file.
 
@@ -79,6 +81,7 @@ def fmu(
             motion_inputs=motion_inputs or (),
             libraries=libraries,
         )
-    print(f"{output}")
+    print(f"FMU written to {output}")
     for name, key in replaced.items():
         print(f"Input {name} replaces {key} of the scenario as soon as the importer sets it.")
+    print(f"Try it with FMPy: fmpy simulate {output} --show-plot")

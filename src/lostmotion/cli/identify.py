@@ -51,9 +51,9 @@ def identify(
     ] = False,
     figures: FiguresOption = None,
 ) -> None:
-    """Identify a drive from measured logs: values with intervals, and unidentifiable parameters.
+    """Identify a drive from measured logs.
 
-    Prints values, intervals and dropped parts of logs. With -o, writes identified.toml (the rig with the identified values, a
+    Prints values, intervals, unidentifiable parameters and dropped parts of logs. With -o, writes identified.toml (the rig with the identified values, a
     scenario), identified.html (one page), errors.csv (of each log), parameters.csv and, with the key record, gearbox.toml (a data
     sheet). An interrupted command with -o keeps its fitted models in identify-progress.json, and continues with the next one.
 
@@ -103,7 +103,8 @@ def identify(
         from ..reports.identification import write_identification
 
         page = write_identification(output, file.stem, result, pictures, all_logs=all_logs)
-    print(f"The page is at {page}")
+    print(f"Report written to {page}")
+    print(f"Next: lostmotion run {output / 'identified.toml'} --plot run.png")
 
 
 def _new(directory: Path | None, rig: str | None, output: Path | None) -> None:
@@ -126,7 +127,8 @@ def _new(directory: Path | None, rig: str | None, output: Path | None) -> None:
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror}") from None
     doubts = text.count("# Doubt: ")
-    print(f"First identification file written to {path}; it has {doubts} lines that begin with Doubt:")
+    print(f"First identification file written to {path}; {doubts} of its lines begin with Doubt:")
+    print(f"Next, once they are settled: lostmotion identify {path} -o identified")
 
 
 def _print_summary(result: IdentificationResult) -> None:
@@ -134,9 +136,9 @@ def _print_summary(result: IdentificationResult) -> None:
     print(*(f"  {text}" for text in result.warnings()), sep="\n", end="\n" if result.warnings() else "")
     unit = f" {result.error_unit}".rstrip()
     for k, rung in enumerate(result.rungs):
-        held_out = "" if math.isnan(rung.held_out) else f", held out {rung.held_out:.5g}{unit}"
+        held_out = "" if math.isnan(rung.held_out) else f", held out {rung.held_out:.4g}{unit}"
         print(
-            f"  {'*' if k == result.chosen else ' '} {rung.name}: mean absolute error {rung.train:.5g}{unit}{held_out}"
+            f"  {'*' if k == result.chosen else ' '} {rung.name}: mean absolute error {rung.train:.4g}{unit}{held_out}"
         )
     print(*result.lines()[len(result.warnings()) :], sep="\n")
     if result.left_out:

@@ -20,7 +20,7 @@ def live(
     overrides: Overrides = None,
     show: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in the browser.")] = True,
 ) -> None:
-    """Write a drive as one page for the browser: sliders, and a drawing that moves.
+    """Write a drive as a page with sliders for the browser.
 
     The page solves the drive itself, by the same core as here; it needs no server and no network, and can be sent to others.
 
@@ -40,6 +40,7 @@ def live(
     with about(scenario), busy("Writing"):
         write_page(path, loaded)
     print(f"Page written to {path}")
+    print(f"Next: lostmotion run {scenario} --plot run.png")
     if show:
         import webbrowser
 

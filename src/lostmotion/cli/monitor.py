@@ -23,7 +23,9 @@ def monitor(
     output: ReportOption = None,
     figures: FiguresOption = None,
 ) -> None:
-    """Follow backlash, friction, stiffness and losses of a drive over its life, from ordinary operation logs.
+    """Follow the wear of a drive from operation logs.
+
+    Estimates backlash, friction, stiffness and losses over the life of the drive.
 
     Prints the findings; with -o, writes monitor.html (one page), values.csv (each log) and watched.csv (trends, changes, limits).
     Exit code 1 if a value has changed or is beyond its limit.
@@ -55,6 +57,7 @@ def monitor(
             from ..reports.monitor import write_monitor
 
             page = write_monitor(output, file.stem, result, pictures)
-        print(f"The page is at {page}")
+        print(f"Report written to {page}")
+        print(f"Next: lostmotion identify {file} -o identified")
     if result.alarms:
         raise typer.Exit(1)

@@ -11,7 +11,9 @@ def reproduce(
     output: ReportOption = None,
     figures: FiguresOption = None,
 ) -> None:
-    """Reproduce the paper "Simplified dynamic model of the transmission": figures, data and a report.
+    """Reproduce the paper: its figures, data and deviations.
+
+    The paper is "Simplified dynamic model of the transmission".
 
     Prints the main results. With -o, writes report.html (a single self-contained page), the data of its figures as CSV, and the
     constants as constants.csv.
@@ -34,7 +36,8 @@ def reproduce(
 
     with writing(output), progress(WORK, "Reproducing") as step:
         report = work(output, step, pictures)
-    print(f"The report is at {report}")
+    print(f"Report written to {report}")
+    print("Next: lostmotion run paper-2dof-nl-small --plot run.png")
 
 
 def _print_results() -> None:

@@ -60,7 +60,9 @@ def response(
     output: ReportOption = None,
     figures: FiguresOption = None,
 ) -> None:
-    """Frequency response over amplitude: each point from a periodic motion, on all cores.
+    """Compute the frequency response over amplitude.
+
+    Each point is computed from a periodic motion, on all cores.
 
     The scenario gives the drive or train, its controllers and the constant parts of the inputs. Prints bandwidth and dead zone. With
     -o, writes response.html (gain and phase, maps of gain, phase, efficiency and distortion over amplitude and frequency) and all
@@ -109,9 +111,10 @@ def response(
         from ..reports.response import write_response
 
         page = write_response(output, responses, first, variable, pictures)
-    print(f"The page is at {page}")
+    print(f"Report written to {page}")
     if not (output / "response.nc").exists():
         print('response.nc is left out: it needs h5netcdf; install it: pip install "lostmotion[netcdf]"')
+    print(f"Next: lostmotion run {scenario} --plot run.png")
 
 
 def _titles(scenario: str, others: Iterable[str]) -> dict[str, str]:

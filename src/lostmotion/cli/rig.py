@@ -52,13 +52,13 @@ def rig(
     ] = None,
     figures: FiguresOption = None,
 ) -> None:
-    """Measure a gearbox or a screw on the virtual test rig and compare with its data sheet.
+    """Measure a gearbox or screw on the virtual test rig.
 
-    Prints the comparison; with -o, writes rig.html (one page) and the measurements as CSV. A screw is measured at a tenth of its dynamic capacity.
+    Prints the comparison with its data sheet; with -o, writes rig.html (one page) and the measurements as CSV. A screw is measured at a tenth of its dynamic capacity.
 
     \b
     lostmotion rig schaeffler-rt1-h-20-100
-    lostmotion rig my-gearbox.toml -o sheet --set loss_factor=1.3
+    lostmotion rig my-gearbox.toml -o rig --set loss_factor=1.3
     lostmotion rig rexroth-25x10rx3-i4 --set "supported_length=600 mm"
     lostmotion rig my-gearbox.toml --logs campaign --ripple "2 0.02 N*m"
     """
@@ -120,7 +120,8 @@ def _rig_of_gearbox(
         torque = None if ripple is None else _ripple(ripple)
         with busy("Running the rig"):
             file = write_campaign(logs, part, title=title, ripple=torque)
-        print(f"The logs are in {logs / 'logs'}; lostmotion identify {file} -o identified finds the gearbox in them")
+        print(f"Logs written to {logs / 'logs'}")
+        print(f"Next: lostmotion identify {file} -o identified")
         return
     from ..test_rig.measurement import WORK, measure
 
@@ -136,8 +137,10 @@ def _rig_of_gearbox(
 
 
 def next_line(name: str, page: Path | None) -> str:
-    """Place of the report, or the command that writes it."""
-    return f"All charts on a page: lostmotion rig {name} -o rig" if page is None else f"The report is at {page}"
+    """Path of the report and the next command, or the command that writes the report."""
+    if page is None:
+        return f"All charts on a page: lostmotion rig {name} -o rig"
+    return f"Report written to {page}\nIts data, sources and gaps: lostmotion catalogue {name}"
 
 
 def _print_all(
@@ -176,4 +179,4 @@ def _print_comparisons(comparisons: Sequence[Comparison]) -> None:
     for c in comparisons:
         unit = "" if c.unit == "1" else f" [{c.unit}]"
         remark = f"  ({c.remark})" if c.remark else ""
-        print(f"  {c.quantity + unit:<44} {c.catalogue:>10.5g} {c.rig:>10.5g} {percent(c.difference):>12}{remark}")
+        print(f"  {c.quantity + unit:<44} {c.catalogue:>10.4g} {c.rig:>10.4g} {percent(c.difference):>12}{remark}")

@@ -50,7 +50,7 @@ def run(
             "--explain",
             metavar="TIME",
             parser=number("s"),
-            help="Say what each contact holds at this instant [s], and what would free it.",
+            help="Print which contacts are stuck at this instant [s], what they hold, and what would free them.",
         ),
     ] = None,
     solver: Annotated[
@@ -118,8 +118,9 @@ def run(
             from ..reports.run import run_report
 
             write_page(report, run_report(Path(scenario).stem, result.dataset()))
-        print(f"The page is at {report}")
-    if output is None and plot is None and report is None and explain is None and not spectrum:
+        print(f"Report written to {report}")
+        print(f"Next: lostmotion live {scenario}")
+    else:
         print(f"All charts on a page: lostmotion run {scenario} --report {Path(scenario).stem}.html")
 
 

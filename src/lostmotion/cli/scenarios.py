@@ -4,7 +4,9 @@ from __future__ import annotations
 
 
 def scenarios() -> None:
-    """List the scenarios that come with the package; `run`, `response` and `drive check` take their names.
+    """List the shipped scenarios.
+
+    All commands take their names in place of a file.
 
     \b
     lostmotion scenarios
@@ -16,12 +18,13 @@ def scenarios() -> None:
     width = max(map(len, found))
     for name, path in found.items():
         print(f"{name:<{width}}  {read_toml(path, 'a scenario')['title']}")
+    print("Next: lostmotion run position-axis --plot run.png")
 
 
 def schema() -> None:
-    """Print the JSON Schema of scenario files, of drives and of drive trains.
+    """Print the JSON Schema of scenario files.
 
-    Editors complete and check scenario files with it.
+    Editors complete and check scenario files of drives and of drive trains with it.
 
     \b
     lostmotion schema > scenario.schema.json

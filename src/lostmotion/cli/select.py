@@ -19,7 +19,9 @@ def select(
     processes: ProcessesOption = None,
     scheduler: SchedulerOption = None,
 ) -> None:
-    """Choose motor and gearbox for a task: judge each pair by the manufacturers' rules, tune and simulate those that pass.
+    """Choose motor and gearbox for a task.
+
+    Judges each pair by the manufacturers' rules, and tunes and simulates those that pass.
 
     The task file has the motion, the load and what is wanted; motors and gearboxes are all of the catalogue, or those that it
     names. Prints the ranking and the reasons for refusal. The runs are kept in the directory given by -o, and an interrupted

@@ -62,14 +62,16 @@ def servo(
     overrides: Overrides = None,
     figures: FiguresOption = None,
 ) -> None:
-    """Commission a servo axis: margins, bandwidths, steps, following, settling, stiffness, limit cycle.
+    """Commission a servo axis: margins, steps, limit cycles.
+
+    Also computes bandwidths, following error, settling and stiffness.
 
     The report is servo.html (one page) with the data of its charts and the margins as CSV. Exit code 1 if the complete loop
     is unstable in one of its regimes; what was asked for is written all the same. With a continuous controller it is the
     certificate of hunting.
 
     \b
-    lostmotion servo position-axis -o sheet
+    lostmotion servo position-axis -o servo
     lostmotion servo position-axis --tune margins --feedforward -o tuned.toml
     """
     from ..errors import InputError
@@ -104,12 +106,12 @@ def servo(
     for path in files:
         assert tuned is not None
         tuned.write(path, scenario, overrides or ())
-        written.append(f"Tuned scenario: {path}")
+        written.append(f"Tuned scenario written to {path}")
     for path in directories:
         with writing(path), busy("Writing"):
             from ..reports.servo import write_servo
 
-            written.append(f"Report: {write_servo(path, Path(scenario).stem, report, pictures)}")
+            written.append(f"Report written to {write_servo(path, Path(scenario).stem, report, pictures)}")
     _print_summary(loaded.title or Path(scenario).stem, report)
     if tuned is not None:
         _print_tuned(tuned)
@@ -195,7 +197,7 @@ def _next(scenario: str, files: list[Path], directories: list[Path], rule: str |
         return f"Keep these gains: lostmotion servo {scenario} --tune {rule} -o tuned.toml"
     if directories:
         return f"Next: lostmotion servo {scenario} --tune margins -o tuned.toml"
-    return f"All charts on a page: lostmotion servo {scenario} -o sheet"
+    return f"All charts on a page: lostmotion servo {scenario} -o servo"
 
 
 def _print_summary(title: str, report: ServoReport) -> None:

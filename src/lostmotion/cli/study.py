@@ -52,7 +52,7 @@ def study(
     repair: Annotated[bool, typer.Option("--repair", help="Make damaged parts of the directory again.")] = False,
     figures: FiguresOption = None,
 ) -> None:
-    """Many runs: vary parameters, store selected results, resume after an interruption.
+    """Run many variants: vary parameters, store results, resume.
 
     The directory given by -o holds Parquet files, one row a run, that pandas, DuckDB and polars open directly. Prints a summary.
     Failed runs have their reasons in the column error, and the exit code is 1. `show` prints the summary of a directory; with -o,
@@ -139,7 +139,8 @@ def _show(directory: Path, best: str | None, output: Path | None, figures: str |
         return
     with writing(output), busy("Writing"):
         page = write_study(directory, output, pictures)
-    print(f"The page is at {page}")
+    print(f"Report written to {page}")
+    print(f"The same in the terminal: lostmotion study show {directory}")
 
 
 def print_outcome(directory: Path, total: int) -> None:
@@ -149,7 +150,7 @@ def print_outcome(directory: Path, total: int) -> None:
 
     print("\n".join(summary_lines(directory)))
     print(
-        f"{total} runs are in {directory}; all charts on a page: lostmotion study show {directory} -o {directory.resolve().name}-report"
+        f"{total} runs written to {directory}\nAll charts on a page: lostmotion study show {directory} -o {directory.resolve().name}-report"
     )
     failed = failures(directory)
     if failed:

@@ -39,14 +39,14 @@ def track(
     overrides: Overrides = None,
     figures: FiguresOption = None,
 ) -> None:
-    """Pointing report: errors of axes that follow a direction, and the contribution of each cause.
+    """Compute pointing errors and the contribution of each cause.
 
-    Prints the errors; with -o, writes track.html (one page) and its data as CSV: errors over time, over the speed of the target, with wrong
-    losses, at other temperatures, with wear, and the contributions.
+    Prints the errors; with -o, writes track.html (one page) and its data as CSV. The page has the errors over time
+    and over the speed of the target, their contributions, and the influence of wrong losses, temperature and wear.
 
     \b
     lostmotion track tracking-loss-map
-    lostmotion track axes.toml --view "traverse=6.65 deg" --view "elevation=5.27 deg" -o sheet
+    lostmotion track axes.toml --view "traverse=6.65 deg" --view "elevation=5.27 deg" -o track
     """
     from ..errors import InputError
     from ..reports.pictures import endings
@@ -75,7 +75,8 @@ def track(
         from ..reports.pointing import write_pointing
 
         page = write_pointing(output, Path(scenario).stem, budget, pictures)
-    print(f"The report is at {page}")
+    print(f"Report written to {page}")
+    print(f"Next: lostmotion run {scenario} --report {Path(scenario).stem}.html")
 
 
 ROWS = 24  # of the table in a terminal; a longer one is without the runs of one cause alone, which are on the page

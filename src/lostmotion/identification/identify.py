@@ -146,7 +146,7 @@ class IdentificationResult:
                     own = [e for e in self.errors if e.held_out == held_out and e.channel == channel]
                     n = sum(not math.isnan(e.mae) for e in own)
                     unit = f" {self.unit(channel)}".rstrip()
-                    lines.append(f"  {channel}, {_logs(n)} {what}: MAE {mae:.5g}{unit}, RMSE {rmse:.5g}{unit}")
+                    lines.append(f"  {channel}, {_logs(n)} {what}: MAE {mae:.4g}{unit}, RMSE {rmse:.4g}{unit}")
         lines += [f"  {condition.text(self.error_unit)}" for condition in self.conditions]
         lines += [f"  {u.text}" for u in self.undetermined] + [f"  {text}" for text in self.at_bounds]
         return lines + [f"  {text}" for text in [*self.differences(), *self.inputs, *self.starts()]]

@@ -21,6 +21,8 @@ from ..units.conversion import si_value
 from ..units.practical import RPM
 from .sheet_rows import rows_of
 
+SCREEN = 34  # records that fit on a screen with the lines around them
+
 
 def _range(text: str | None, option: str, unit: str = "") -> tuple[float, float]:
     """Bounds from ``MIN..MAX``; each may be left out."""
@@ -48,6 +50,7 @@ def list_records(
     complete: bool = False,
     force: str | None = None,
     lead: str | None = None,
+    every: bool = True,
 ) -> str:
     """The records that fit, a line each, with what they lack for a simulation.
 
@@ -59,6 +62,8 @@ def list_records(
         ``MIN..MAX``; torque and force are the rated ones [N·m, N], of a screw the dynamic capacity.
     complete
         Only records that lack nothing.
+    every
+        All of them, or as many as a screen shows.
 
     Raises
     ------
@@ -89,7 +94,9 @@ def list_records(
     if not found:
         return "No record fits."
     head = f"{'name':<34} {'type':<12} {'kind':<12} {'ratio, lead':>11} {'rated':>10} {'rpm':>6}  runs as"
-    return "\n".join([head, *map(_line, found), _counts(found), "`lostmotion catalogue NAME` shows one."])
+    shown = found if every or len(found) <= SCREEN else found[:SCREEN]
+    more = [f"{len(found) - len(shown)} more: add --all, or narrow the list"] if len(shown) < len(found) else []
+    return "\n".join([head, *map(_line, shown), *more, _counts(found), f"Next: lostmotion catalogue {shown[0].name}"])
 
 
 def summary() -> str:
@@ -112,9 +119,7 @@ def summary() -> str:
         ]
         rows.append(f"{table:<13} {kind:<12} {len(records):>7}  {'; '.join(filter(None, spans)):<40} {runs}")
     head = f"{'type':<13} {'kind':<12} {'records':>7}  {'ratio or lead; rated':<40} run as"
-    return "\n".join(
-        [head, *rows, _counts(list(catalogue())), "`lostmotion catalogue --kind KIND` lists those of a kind."]
-    )
+    return "\n".join([head, *rows, _counts(list(catalogue())), "Next: lostmotion catalogue --kind planetary"])
 
 
 def _span(records: list[Sheet], data_of: Callable[[Sheet], float | None], unit: str, factor: float) -> str:
@@ -221,6 +226,10 @@ def record_text(name: str) -> str:
         beside = " and ".join(f"{key} ({text})" for key, text in choices.items())
         lines.append(f"Beside `from` a scenario gives {beside}.")
     lines += [f"Note: {record.note}"] if record.note else []
+    if table in ("gearbox", "screw") and not missing:
+        lines.append(f"Measure it: lostmotion rig {name}")
+    else:
+        lines.append(f"Others of its kind: lostmotion catalogue --kind {record.kind}")
     return "\n".join(lines)
 
 

@@ -52,10 +52,9 @@ def summary(result: xarray.Dataset | RunArrays) -> str:
             "load_friction",
             "load_work",
         )
-        parts = ", ".join(f"{name.replace('_', ' ')} {e[name]:.4g}" for name in names if e[name] != 0.0)
-        lines.append(
-            f"  energy [J]: from the motor {e['source']:.4g}; {parts}; stored {e['kinetic_change'] + e['elastic_change']:.4g}"
-        )
+        parts = [f"{name.replace('_', ' ')} {e[name]:.4g}" for name in names if e[name] != 0.0]
+        ends = f"from the motor {e['source']:.4g}", f"stored {e['kinetic_change'] + e['elastic_change']:.4g}"
+        lines.append(f"  energy [J]: {', '.join([ends[0], *parts, ends[1]])}")
         if e["turned_over"] > 0.0:
             lines.append(f"  energy balance closes to {closes_to(result)}")
     lines += [*contact_lines(result), *error_lines(result)]
@@ -104,7 +103,7 @@ def train_summary(result: xarray.Dataset | RunArrays) -> str:
     def end_and_peak(name: str, unit: str, *, small: bool = False) -> str:
         shown, factor = charted(unit, small=small)
         values = factor * np.asarray(result[name])
-        return f"{values[-1]:.5g} {shown}, peak {np.max(np.abs(values)):.5g}"
+        return f"{values[-1]:.4g} {shown}, peak {np.max(np.abs(values)):.4g}"
 
     time = float(np.asarray(result["time"])[-1])
     lines = [
@@ -116,7 +115,7 @@ def train_summary(result: xarray.Dataset | RunArrays) -> str:
         lines.append(f"  motor {name}: {end_and_peak(train.motor_torque_of(name), unit)}")
     for name in train.shafts:
         angle, (unit, factor) = train.angle_of(name), charted(train.angle_unit(name))
-        at = f"; at {factor * float(np.asarray(result[angle])[-1]):.6g} {unit}" if angle in result else ""
+        at = f"; at {factor * float(np.asarray(result[angle])[-1]):.4g} {unit}" if angle in result else ""
         kind = "slide" if train.is_slide(name) else "shaft"
         lines.append(f"  {kind} {name}: {end_and_peak(f'{name}_speed', train.speed_unit(name))}{at}")
     for name, gear in train.gears.items():
@@ -195,7 +194,7 @@ def _motion_lines(result: xarray.Dataset) -> list[str]:
         if axis not in errors and measured in result:  # the position, where there is one
             error = result[name].values - result[measured].values
             unit = str(result[name].attrs.get("units", ""))
-            peak, rms = (practical(float(v), unit) for v in (np.abs(error).max(), np.sqrt(np.mean(error**2))))
+            peak, rms = (practical(float(v), unit, 4) for v in (np.abs(error).max(), np.sqrt(np.mean(error**2))))
             of = f"{axis.replace('_', ' ')} " if axis else ""
             errors[axis] = f"{of}{quantity} peak {peak}, rms {rms}"
     stuck = [

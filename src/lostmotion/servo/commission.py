@@ -332,5 +332,5 @@ def decibels(factor: float) -> float:
     return 20.0 * math.log10(factor) if factor > 0.0 else math.nan
 
 
-def _shown(value: float, unit: str, digits: int = 5) -> str:
+def _shown(value: float, unit: str, digits: int = 4) -> str:
     return f"{value:.4g} {unit}" if unit in ("N·m", "N") else practical(value, unit, digits)
