@@ -35,7 +35,7 @@ def test_the_tutorial_can_be_followed(tmp_path: Path) -> None:
     printed = [run(command) for command in commands[1:]]
     assert "hysteresis loss" in printed[0]
     assert "holds 3.89 N·m" in printed[1]
-    assert (tmp_path / "sheet" / "rig.html").exists()
+    assert (tmp_path / "rig" / "rig.html").exists()
     assert (tmp_path / "my-drive.png").exists()
     assert "input shaft: stuck" in printed[4]
     assert "motor first_motor: its shaft turns forward with a constant command above" in printed[5]

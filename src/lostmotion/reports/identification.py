@@ -370,8 +370,8 @@ def _laws(result: IdentificationResult, table: dict[str, dict[str, np.ndarray]])
 def friction_curves(result: IdentificationResult, shaft: str) -> tuple[Curve, ...]:
     """Friction of a shaft and of its motor's bearings over speed, and in the phases in which it is another.
 
-    What a file adds to the viscous friction for the back-e.m.f. of a motor is not in that of a phase with the motor off: this one
-    is the friction alone.
+    A file may add the back-e.m.f. of a motor to its viscous friction. In a phase with the motor off that part is left
+    out, and the friction alone is shown.
     """
     found: dict[str, Curve] = {}
     for label, scenario in [("dry and viscous", result.scenario), *_phases(result)]:

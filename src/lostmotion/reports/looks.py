@@ -57,6 +57,7 @@ SMALLEST = 9.0
 """size of the smallest text of a picture [pt], which is read at half the size of the picture too"""
 MATPLOTLIB: Any = {
     "figure.constrained_layout.use": True,
+    "figure.constrained_layout.w_pad": 0.07,
     "figure.dpi": 110,
     "savefig.dpi": 150,
     "font.size": 10.5,

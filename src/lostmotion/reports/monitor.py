@@ -168,7 +168,9 @@ def _trend(result: MonitorResult, w: Watched) -> Panel:
     if w.begins is not None:
         k = w.logs.index(w.begins)
         marks = (Mark(float(at[k]), float(y[k]), result.logs[w.begins].log, VALUES),)
-    return Panel(w.name, place, label, tuple(curves), marks=marks)
+    whole = [e.at for e in result.logs]
+    span = (min(whole), max(whole)) if len(at) == 1 and len(whole) > 1 else None
+    return Panel(w.name, place, label, tuple(curves), x_range=span, marks=marks)
 
 
 def _evidence(result: MonitorResult, w: Watched) -> Panel:

@@ -38,15 +38,15 @@ def _bars(axes: Any, chart: Bars) -> None:
     axes.set_yticks(y, order)
     axes.axvline(0.0 if chart.limit is None else chart.limit, color=INK, linewidth=0.8)
     axes.set(xlabel=chart.label, xlim=chart.x_range)
-    if chart.series:
-        axes.legend()
 
 
 def _histogram(axes: Any, chart: Histogram) -> None:
     values = np.asarray(chart.values)
     axes.hist(values, bins=min(60, max(5, round(len(values) ** 0.5))), color=FIRST)
-    for value in np.quantile(values, chart.quantiles):
-        axes.axvline(value, color=SECOND, linewidth=1.2)
+    label = f"{', '.join(f'{100.0 * q:g}' for q in chart.quantiles)} % of the runs lie below"
+    axes.plot([], [], color=FIRST, label="number of runs")
+    for k, value in enumerate(np.quantile(values, chart.quantiles)):
+        axes.axvline(value, color=SECOND, linewidth=1.2, label="_" if k else label)
     axes.set(xlabel=chart.label, ylabel="runs")
 
 
@@ -77,6 +77,8 @@ def _contacts(axes: Any, chart: Contacts) -> None:
         for mode, (low, high) in {0: (-0.35, 0.7), 1: (0.0, 0.35), -1: (-0.35, 0.35)}.items():
             spans = [(time[a], time[b] - time[a]) for a, b in pairwise(edges.tolist()) if m[a] == mode]
             axes.broken_barh(spans, (low - k, high), facecolor=COLOURS["slips" if mode else "stuck"])
+    for name, text in {"stuck": "stuck", "slips": "slips (up forward, down reverse)"}.items():
+        axes.broken_barh([], (0.0, 0.0), facecolor=COLOURS[name], label=text)
     axes.set_yticks([-k for k in range(len(chart.modes))], list(chart.modes))
     axes.set(xlabel="time [s]")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
@@ -15,7 +15,7 @@ from matplotlib.ticker import MaxNLocator
 from . import other_plots as others
 from .contours import Contour
 from .looks import COLOURS, INK, MATPLOTLIB, MUTED, SMALLEST, map_colours
-from .panels import Chart, Curve, Ground, Group, Panel
+from .panels import Chart, Curve, Ground, Group, Mark, Matrix, Panel
 from .run_charts import figure_charts, run_charts
 from .thinning import thinned
 
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 HALO = (withStroke(linewidth=2.0, foreground=COLOURS["surface"]),)  # so that text is read over lines
 KEY_LINE = 0.18  # height of a line of a key [inch]
+MAX_NAMES = 24  # along an axis; of more, every second, third, ...
+LEGEND_ROWS = 2  # of a legend above a panel; a longer one is in the panel
 
 # Decorates what makes or draws figures; the looks of the user's figures stay as they are.
 in_our_looks = mpl.rc_context(MATPLOTLIB)
@@ -59,7 +61,7 @@ def draw(charts: Iterable[Chart], columns: int, size: tuple[float, float], note:
             _panel(axes, chart)
         else:
             others.draw(axes, chart)
-        axes.set_title(chart.title)
+        axes.set_title(chart.title if "_" in chart.title else chart.title[:1].upper() + chart.title[1:])
     _legends(figure, every)
     if note:
         figure.supxlabel(note, fontsize=SMALLEST, color=MUTED)
@@ -74,16 +76,42 @@ def _legends(figure: Figure, every: list[Any]) -> None:
         columns = len(longest) if len(longest) <= 4 else 3
         figure.legend(list(longest.values()), list(longest), loc="outside upper center", ncols=columns)
         return
-    for axes, labels in zip(every, entries, strict=True):
-        if len(labels) > 1:
-            axes.legend(loc="best")
+    rows = [_legend_above(axes, labels) for axes, labels in zip(every, entries, strict=True)]
+    for axes in every:  # titles beside each other are at one height
+        beside = (n for other, n in zip(every, rows, strict=True) if _row(other) == _row(axes))
+        axes.set_title(axes.get_title(), pad=6.0 + 14.0 * max(beside))
+
+
+def _row(axes: Any) -> int:
+    return int(axes.get_subplotspec().rowspan.start)
+
+
+def _legend_above(axes: Any, labels: Mapping[str, Any]) -> int:
+    """The legend of a panel between its title and its curves, and its rows; inside, where it is long."""
+    if len(labels) < 2:
+        return 0
+    room = axes.figure.get_figwidth() / axes.get_gridspec().ncols - 0.65  # inch, beside the labels of y
+    lengths = list(map(len, labels))
+    for rows in range(1, LEGEND_ROWS + 1):
+        columns = -(-len(labels) // rows)
+        longest = [max(lengths[k * rows : (k + 1) * rows], default=0) for k in range(columns)]
+        if sum(0.5 + 0.07 * n for n in longest) <= room:
+            break
+    else:
+        axes.legend(loc="best")
+        return 0
+    place = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.2, "borderpad": 0.1}
+    axes.legend(list(labels.values()), list(labels), ncols=columns, columnspacing=1.2, **place)
+    return rows
 
 
 def draw_group(group: Group) -> Figure:
     """The picture of a group of charts."""
     columns = min(group.columns, len(group.charts))
     rows = -(-len(group.charts) // columns)
-    return draw(group.charts, columns, (max(6.0, min(4.2 * columns, 12.0)), 0.6 + 2.7 * rows))
+    names = max((len(chart.names) for chart in group.charts if isinstance(chart, Matrix)), default=0)
+    width, height = max(6.0, min(4.2 * columns, 12.0)), max(2.7, 1.2 + 0.5 * names)
+    return draw(group.charts, columns, (max(width, 2.5 + 0.55 * names), 0.6 + height * rows))
 
 
 def _panel(axes: Any, panel: Panel) -> None:
@@ -100,7 +128,6 @@ def _panel(axes: Any, panel: Panel) -> None:
     for mark in panel.marks:
         axes.plot([mark.x, mark.x], [mark.y, mark.y if mark.to is None else mark.to], color=mark.style["color"])
         axes.plot([mark.x], [mark.y], ".", color=mark.style["color"])
-        axes.annotate(mark.text, (mark.x, mark.y), (4, 4), textcoords="offset points", fontsize=SMALLEST)
     if panel.log_x:
         axes.set_xscale("log")
     if panel.log_y and (panel.ground or any(np.any(np.asarray(curve.y) > 0.0) for curve in panel.curves)):
@@ -108,14 +135,36 @@ def _panel(axes: Any, panel: Panel) -> None:
     axes.set(xlabel=panel.x_label, ylabel=panel.y_label)
     if "[deg" in panel.y_label and not panel.log_y:
         axes.yaxis.set_major_locator(MaxNLocator(steps=[1, 1.5, 3, 4.5, 9, 10]))
+    if panel.x_label == "log":  # the number of a log
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     if panel.x_names:
-        axes.set_xticks(range(len(panel.x_names)), panel.x_names, rotation=45, ha="right", fontsize=SMALLEST)
+        shown = range(0, len(panel.x_names), -(-len(panel.x_names) // MAX_NAMES))
+        names = [panel.x_names[k] for k in shown]
+        axes.set_xticks(shown, names, rotation=45, ha="right", fontsize=SMALLEST)
     if panel.x_range is not None:
         axes.set_xlim(*panel.x_range)
     if panel.y_range is not None:
         axes.set_ylim(*panel.y_range)
     elif panel.x_range is not None and panel.curves:
         axes.set_ylim(*_range_within(panel.curves, panel.x_range))
+    _texts_of_marks(axes, panel.marks)
+
+
+def _texts_of_marks(axes: Any, marks: Iterable[Mark]) -> None:
+    """Texts beside the marks, as far as they do not cover each other: above, else below, as on pages."""
+    to_axes = axes.transData + axes.transAxes.inverted()
+    grid, (width, height) = axes.get_gridspec(), axes.figure.get_size_inches()
+    room = 72.0 * width / grid.ncols - 60.0, 72.0 * height / grid.nrows - 65.0  # of the axes [pt], about
+    written: list[tuple[float, float, float]] = []
+    for mark in {mark.text: mark for mark in marks}.values():
+        x, y = (share * size for share, size in zip(to_axes.transform((mark.x, mark.y)), room, strict=True))
+        end = x + 4.0 + 0.55 * SMALLEST * len(mark.text)
+        free = (up for up in (4.0, -12.0, 16.0, -24.0) if all(
+            x > b or end < a or abs(y + up - other) > SMALLEST + 2.0 for a, b, other in written))  # fmt: skip
+        if (up := next(free, None)) is not None:
+            written.append((x, end, y + up))
+            text = axes.annotate(mark.text, (mark.x, mark.y), (4, up), textcoords="offset points", fontsize=SMALLEST)
+            text.set_path_effects(HALO)
 
 
 def _numbers(axes: Any, curve: Curve) -> None:

@@ -145,12 +145,15 @@ def robustness_panels(budget: PointingBudget) -> list[Panel]:
     }
     unit = " or ".join(f"m{unit}" for unit in _units(budget, None))
     panels = []
+    factor, unit = _unit(budget)
     for sign, (title, label, nominal) in kinds.items():
         found = {_number(name): errors for name, errors in budget.robustness.items() if sign in name}
         if found:
             points = dict(sorted((found | {nominal: budget.whole}).items()))
             curves = tuple(
-                Curve(axis, np.array(list(points)), np.array([1e3 * e[axis].rms for e in points.values()]), _dotted(k))
+                Curve(
+                    axis, np.array(list(points)), np.array([factor * e[axis].rms for e in points.values()]), _dotted(k)
+                )
                 for k, axis in enumerate(budget.whole)
             )
             top = 1.1 * max(float(c.y.max()) for c in curves) or 1.0

@@ -108,13 +108,13 @@ def maps(response: xarray.Dataset, output: str) -> list[Panel]:
 
     return [
         panel(
-            f"Gain of {output.replace('_', ' ')}, down to {MAP_DEPTH:g} dB below the largest",
-            "[dB]",
+            f"Gain of {output.replace('_', ' ')}",
+            "gain [dB]",
             np.where(shown, gain, np.nan),
         ),
-        panel("Phase", "[degrees]", np.where(shown, phase, np.nan)),
-        panel("Mean efficiency", "[-]", response["efficiency"].values),
-        panel("Total harmonic distortion", "[%]", harmonics),
+        panel("Phase", "phase [degrees]", np.where(shown, phase, np.nan)),
+        panel("Mean efficiency", "efficiency [-]", response["efficiency"].values),
+        panel("Total harmonic distortion", "THD [%]", harmonics),
     ]
 
 
@@ -204,7 +204,10 @@ def response_report(
         Prose("Motions", motion_lines(response), listed=True),
     ]
     if grounds := maps(response, output):
-        parts.insert(0, Group("maps", "Over frequency and amplitude", "", tuple(grounds)))
+        note = (
+            f"Gain, phase and distortion are blank where the gain is {MAP_DEPTH:g} dB or more below its largest value."
+        )
+        parts.insert(0, Group("maps", "Over frequency and amplitude", note, tuple(grounds)))
     report = Report(
         title=scenario.title or name,
         lead=f"Frequency response of `{name}` from {source} to {output.replace('_', ' ')}.{compared}",

@@ -37,11 +37,11 @@ def panels(report: RigReport, sheet: GearboxSheet | None) -> list[Panel]:
         running += _printed_no_load_torque(sheet)
     load, values = report.map["load"].values, report.map["efficiency"].values
     across = [Curve(f"load {load[j]:g}", rpm, values[j], step(k, 4)) for k, j in enumerate((2, 4, 5, 7))]
-    relative, share, at_input = "relative load [-]", "efficiency [-]", "at the input [N·m]"
+    relative, share, at_input = "relative load [-]", "efficiency [-]", "torque at the input [N·m]"
     return [
         Panel("efficiency over load (motor drives)", relative, share, tuple(efficiency), y_range=(0.0, 1.0)),
         Panel("efficiency over speed", "input speed [rpm]", share, tuple(across), y_range=(0.0, 1.0)),
-        Panel("torque lost", relative, at_input, tuple(lost)),
+        Panel("loss torque", relative, at_input, tuple(lost)),
         Panel("no-load running torque", "input speed [rpm]", at_input, tuple(running)),
         *_torsion_panels(report, sheet),
     ]
@@ -120,9 +120,11 @@ def _torsion_rows(report: RigReport) -> list[tuple[str, str]]:
     # Without their cause, what is measured is rounding.
     hysteresis = g.hysteresis is not None and g.hysteresis.efficiency < 1.0
     backlash = g.stiffness.pieces()[1][0] == 0.0
-    width = practical(loop.width, "rad") if hysteresis or backlash else "none: neither hysteresis nor backlash is given"
+    width = (
+        practical(loop.width, "rad", 4) if hysteresis or backlash else "none: neither hysteresis nor backlash is given"
+    )
     return [
-        (f"lost motion at ±{100 * LOST_MOTION_LOAD:.0f} % of rated torque", practical(report.lost_motion, "rad")),
+        (f"lost motion at ±{100 * LOST_MOTION_LOAD:.0f} % of rated torque", practical(report.lost_motion, "rad", 4)),
         ("width of the loop at zero torque, rated torque in both directions", width),
         ("energy lost in that loop", f"{loop.area:.4g} J" if hysteresis else "none: no hysteresis is given"),
     ]

@@ -216,8 +216,10 @@ def _stiffness_group(report: ServoReport) -> list[Group]:
     slides = report.stiffness[0].slides
     factor = 1e-6 if slides else 1.0
     curves = tuple(Curve(s.regime, s.frequency, factor * s.stiffness, look(k)) for k, s in enumerate(report.stiffness))
-    title = f"stiffness against load at {report.stiffness[0].shaft}"
-    panel = Panel(title, "frequency [Hz]", "[N/µm]" if slides else "[N·m/rad]", curves, log_x=True, log_y=True)
+    title = f"stiffness at {report.stiffness[0].shaft}"
+    panel = Panel(
+        title, "frequency [Hz]", "stiffness [N/µm]" if slides else "stiffness [N·m/rad]", curves, log_x=True, log_y=True
+    )
     return [
         Group(
             "stiffness",
