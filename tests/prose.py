@@ -33,7 +33,7 @@ def paragraphs(page: str) -> Iterator[str]:
 
 def words_of(sentence: str) -> list[str]:
     """Words of a sentence; a piece of code or a formula is one word, a link is its text."""
-    shown = re.sub(r"\$[^$]+\$", "x", sentence)
+    shown = re.sub(r"\$[^$]+\$", "x", sentence.replace("``", "`"))
     shown = re.sub(r"`[^`]*`", "code", shown)
     shown = re.sub(r"!?\[([^\]]*)\]\([^)]*\)", r"\1", shown)
     return WORD.findall(shown)

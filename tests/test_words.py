@@ -1,6 +1,8 @@
 """How README, documentation, docstrings and messages are written: short sentences, words of the field."""
 
 import ast
+import importlib
+import json
 import re
 from pathlib import Path
 from statistics import mean
@@ -19,12 +21,44 @@ LONGEST = 30  # words of a sentence
 AVERAGE = 18
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
-def test_no_sentence_is_long_and_none_begins_with_a_relative_clause(page: Path) -> None:
-    found = list(sentences(page.read_text()))
+def check_sentences(text: str) -> None:
+    """No sentence is long, and none begins with a relative clause."""
+    found = list(sentences(text))
     assert [s for s in found if len(words_of(s)) > LONGEST] == []
     openings = [s for s in found if words_of(s)[0] in ("Of", "Where", "What") and not s.endswith("?")]
     assert openings == [], "subject first, then verb"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_no_sentence_is_long_and_none_begins_with_a_relative_clause(page: Path) -> None:
+    check_sentences(page.read_text())
+
+
+@pytest.mark.parametrize("scenario", sorted((ROOT / "scenarios").glob("*.toml")), ids=lambda p: p.stem)
+def test_sentences_of_a_scenario_are_short(scenario: Path) -> None:
+    lines = (line.lstrip("# ") if line.startswith("#") else "" for line in scenario.read_text().splitlines())
+    check_sentences("\n".join(lines))
+
+
+@pytest.mark.parametrize("notebook", sorted((ROOT / "docs" / "notebooks").glob("*.ipynb")), ids=lambda p: p.stem)
+def test_sentences_of_a_notebook_are_short(notebook: Path) -> None:
+    cells = json.loads(notebook.read_text())["cells"]
+    check_sentences("\n\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "markdown"))
+
+
+@pytest.mark.parametrize("name", ["scenario_reference", "train_reference", "variables", "commands"])
+def test_sentences_of_a_generated_page_are_short(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(ROOT / "docs")
+    check_sentences(getattr(importlib.import_module("generate"), name)())
+
+
+@pytest.mark.parametrize("module", MODULES, ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_sentences_of_docstrings_are_short(module: Path) -> None:
+    """Those above the sections, whose entries are no sentences, and above examples of commands."""
+    for node in ast.walk(ast.parse(module.read_text())):
+        if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.Module):
+            text = re.split(r"^\w+\n-{3,}\n|\x08", ast.get_docstring(node) or "", flags=re.MULTILINE)[0]
+            assert [s for s in sentences(text) if len(words_of(s)) > LONGEST] == []
 
 
 def test_sentences_are_short_on_average() -> None:

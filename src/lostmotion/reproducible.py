@@ -5,9 +5,9 @@ from a scenario before the core sees it uses these functions, the operations + -
 rounded everywhere. The error of each function is stated in ``core/lostmotion/kernel`` and tested there against quadruple
 precision.
 
-Not used here, since their order of operations or their use of fused multiply-add depends on the library: ``np.dot``, ``@``,
-``np.einsum``, ``np.convolve``, ``np.interp``, ``np.fft``, complex products, powers (``**``) of floats, and ``sum`` of a list of floats, which Python compensates
-from version 3.12 on.
+The order of operations or the use of fused multiply-add of some functions depends on the library. Not used here are
+``np.dot``, ``@``, ``np.einsum``, ``np.convolve``, ``np.interp``, ``np.fft``, complex products, powers (``**``) of
+floats, and ``sum`` of a list of floats. Python compensates the latter from version 3.12 on.
 """
 
 from __future__ import annotations

@@ -12,8 +12,8 @@ from ..inputs.quantities import NotNegative, Positive, Time
 class Camera(CameraFields):
     """Camera on the shaft of the reference, which measures the angle between the target and the line of sight.
 
-    Frame n, at n ``sample_time``: ``p floor((o + noise N_n)/p + 1/2)`` of the offset o while ``|o| <= field/2``, added to what the encoder of
-    the position says then; N_n are standard normal, p is ``pixel/pixel_parts``.
+    Frame n, at n ``sample_time``: ``p floor((o + noise N_n)/p + 1/2)`` of the offset o while ``|o| <= field/2``,
+    added to the reading of the position encoder. N_n are standard normal, p is ``pixel/pixel_parts``.
     """
 
     sample_time: Annotated[Time, Positive]

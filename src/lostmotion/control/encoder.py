@@ -15,9 +15,9 @@ RESOLUTION_KEYS = ("lines", "bits", "grating_period", "resolution")
 class Encoder(EncoderFields):
     """A rotary encoder on a shaft: ``q floor(angle/q + 1/2) + error sin(periods angle + phase)``.
 
-    Its resolution q is that of an incremental encoder of so many `lines`, 2 pi/(4 lines); of an absolute one of so many
-    `bits` in a turn, 2 pi/2**bits; with `lines` and `bits` of one with sine and cosine, 2 pi/(lines 2**bits). A linear scale on a slide
-    has a `grating_period` p: p/4, or with `bits` p/2**bits.
+    Its resolution q is 2 pi/(4 lines) for an incremental encoder, which has `lines`. For an absolute encoder, which
+    has `bits` in a turn, it is 2 pi/2**bits. For an encoder with sine and cosine, which has both, it is 2 pi/(lines
+    2**bits). A linear scale on a slide has a `grating_period` p: p/4, or with `bits` p/2**bits.
 
     Examples
     --------

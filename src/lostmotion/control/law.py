@@ -23,14 +23,15 @@ SIGNATURE = (
 class Law:
     """A function that is called at each sample time in place of the loops.
 
-    In Python ``function(time, measured, reference, state) -> command``; compiled, a numba cfunc or a ctypes function
-    pointer of the C type `SIGNATURE`, which writes the command and returns 0 (anything else ends the run).
+    In Python ``function(time, measured, reference, state) -> command``. Compiled, it is a numba cfunc or a ctypes
+    function pointer of the C type `SIGNATURE`. It writes the command and returns 0; any other value ends the run.
 
     ``measured`` is (position of the reference's shaft [rad], speed of the motor [rad/s], torque of the motor [N·m]),
-    ``reference`` (value, first, second, third derivative); ``command`` is in the unit of `[command]`: 1 is rated torque,
-    or with ``current.kind = "voltage"`` rated voltage. With ``current.kind = "field_oriented"`` ``measured`` goes on with i_d and
-    i_q [A], and the command is the pair u_d, u_q [V] in coordinates of the rotor as it is read now; the inverter turns it ahead
-    to where the rotor will be in the middle of the time that it acts, and holds it in the stator.
+    ``reference`` is (value, first, second, third derivative). ``command`` is in the unit of `[command]`: 1 is rated
+    torque, or with ``current.kind = "voltage"`` rated voltage. With ``current.kind = "field_oriented"`` ``measured``
+    also has i_d and i_q [A]. The command is the pair u_d, u_q [V] in coordinates of the rotor as it is read now. The
+    inverter advances its angle to that of the rotor in the middle of the time that the voltage acts, and holds the
+    voltage in the stator.
     """
 
     function: Any

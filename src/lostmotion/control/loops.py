@@ -118,8 +118,9 @@ class CurrentLoop(CurrentLoopFields, SampledCurrent):
 class FieldOriented(FieldOrientedFields, SampledCurrent):
     """Sampled control of both currents of a synchronous motor, i_d and i_q, each as the loop of kind "pi".
 
-    Voltage circle dc_voltage/sqrt(3), current circle `motor.winding.max_current_rms` with priority for i_d, maximum torque per
-    ampere, field weakening ``i_d* += k (u_f^2 - |u|^2)``; the inverter holds its voltage in coordinates of the stator.
+    Voltage circle dc_voltage/sqrt(3), current circle `motor.winding.max_current_rms` with priority for i_d, maximum
+    torque per ampere, field weakening ``i_d* += k (u_f^2 - |u|^2)``. The inverter holds its voltage in coordinates of
+    the stator.
     """
 
     kind: Literal["field_oriented"]

@@ -1,9 +1,9 @@
 """Moves from rest to rest in the shortest time that limits of speed, acceleration and jerk permit.
 
-The profile has up to seven segments: the jerk is +j, 0, -j while it speeds up, 0 at constant speed, and -j, 0, +j while it
-slows down. It is symmetric about its middle. For these moves the closed form below is exact also where a limit is not
-reached, takes arrays of moves, and needs no library; Ruckig, which solves the general case (any speed and acceleration at
-both ends, several axes), is what the tests compare it with.
+The profile has up to seven segments: the jerk is +j, 0, -j while it speeds up, 0 at constant speed, and -j, 0, +j
+while it slows down. It is symmetric about its middle. For these moves the closed form below is exact also if a limit
+is not reached. It takes arrays of moves and needs no library. The tests compare it with Ruckig, which solves the
+general case: any speed and acceleration at both ends, several axes.
 """
 
 from __future__ import annotations
@@ -25,10 +25,11 @@ def segment_durations(distance: Any, speed: Any, acceleration: Any, jerk: Any) -
     The arguments may be arrays; limits are above 0. An infinite jerk gives the trapezoidal speed, with segments with jerk of no
     duration.
 
-    Derivation, with D the distance and v, a, j the limits: let t be the duration of a segment with jerk, A = j t the acceleration
-    reached, and x = t + (duration of constant acceleration). Then the speed reached is A x, and a move without constant speed
-    covers A x (x + t); one without constant acceleration either, where x = t, covers 2 j t^3. So t is the least of
-    (D/(2 j))^(1/3), sqrt(v/j) and a/j; where it is the last, x is the lesser of v/A and the root of x^2 + t x = D/A.
+    Derivation, with D the distance and v, a, j the limits. Let t be the duration of a segment with jerk and A = j t
+    the acceleration reached. Let x = t + (duration of constant acceleration). Then the speed reached is A x, and a
+    move without constant speed covers A x (x + t). A move without constant acceleration either has x = t and covers 2
+    j t^3. So t is the least of (D/(2 j))^(1/3), sqrt(v/j) and a/j. If it is a/j, x is the lesser of v/A and the root
+    of x^2 + t x = D/A.
     """
     D, v, a, j = np.broadcast_arrays(*(np.asarray(x, float) for x in (distance, speed, acceleration, jerk)))
     D = np.abs(D)

@@ -30,8 +30,9 @@ def sidereal_time(days: float, more: np.ndarray) -> np.ndarray:
 class Satellite(TargetPath):
     """A satellite over a place on the earth, without refraction. Traverse is the azimuth less the bearing of y.
 
-    Its position in the true equator, mean equinox frame of SGP4 is turned into the earth's by the mean sidereal time (IAU 1982); the motion of the pole, up to
-    0.5 arcsec, is left out. What SGP4 itself is wrong by is a kilometre after a day, and more beyond.
+    Its position in the true equator, mean equinox frame of SGP4 is turned into the earth's by the mean sidereal time
+    (IAU 1982). The motion of the pole, up to 0.5 arcsec, is left out. What SGP4 itself is wrong by is a kilometre
+    after a day, and more beyond.
     """
 
     path: Literal["satellite"]

@@ -108,9 +108,9 @@ def identical_radius(drive: TwoInertias) -> SpeedGains:
 def identical_real_part(drive: TwoInertias, damping: float) -> SpeedGains:
     """All poles with the same real part -s, the less damped pair with the damping zeta: K_p = 4 s J_M.
 
-    With w_1^2 + w_2^2 = 2 w_a^2, written as (1 -+ d) w_a^2: K_i = J_M w_a^2 (1 - d^2), 4 s^2 = (R - d^2) w_a^2, and
-    s = zeta w_2 gives d = -2 zeta^2 + sqrt(4 zeta^4 - 4 zeta^2 + R). The other pair is complex while s < w_1, so that d lies from 0
-    to (1 - zeta^2)/(1 + zeta^2).
+    With ``w_1^2 + w_2^2 = 2 w_a^2``, written as ``(1 -+ d) w_a^2``: ``K_i = J_M w_a^2 (1 - d^2)``, ``4 s^2 = (R -
+    d^2) w_a^2``, and ``s = zeta w_2`` gives ``d = -2 zeta^2 + sqrt(4 zeta^4 - 4 zeta^2 + R)``. The other pair is
+    complex while s < w_1, so that d lies from 0 to (1 - zeta^2)/(1 + zeta^2).
 
     Raises
     ------
@@ -147,9 +147,10 @@ class CascadeGains:
 def suited(drive: TwoInertias, lag: float, position_time: float) -> CascadeGains:
     """The rule that suits a drive.
 
-    Where load and motor are so far apart that both pole pairs can be damped alike, they are, with 0.7; where they are not, or
-    where that takes more gain than the sampling allows since the drive is as good as rigid, the symmetrical optimum with
-    a = 2, its reference not filtered. The position loop gets half of the reciprocal of the speed loop's equivalent time.
+    If load and motor allow the same damping of both pole pairs, the rule gives both a damping ratio of 0.7. Otherwise
+    it takes the symmetrical optimum with a = 2, without a filter of the reference. It does so too if the drive is
+    almost rigid, so that equal damping takes more gain than the sampling allows. The position loop gets half of the
+    reciprocal of the speed loop's equivalent time.
 
     Parameters
     ----------

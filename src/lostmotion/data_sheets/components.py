@@ -38,8 +38,8 @@ def gearbox_table(
 ) -> tuple[dict[str, Any], BuiltMap | None]:
     """Values of `[gearbox]`, or of the table `where`, for a record with `changes`, and the loss map's origin.
 
-    A change takes the place of what it names and of nothing else: the hysteresis stays that of the record as printed,
-    whatever its stiffness is changed to, and wear that adds backlash leaves it as it is.
+    A change replaces the value that it names and nothing else. The hysteresis stays that of the record as printed,
+    also if the stiffness is changed or wear adds backlash.
 
     Raises
     ------

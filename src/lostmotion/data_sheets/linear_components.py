@@ -88,8 +88,8 @@ def _need_all(record: LinearSheet, reference: str, values: Mapping[str, Any], wh
 def _at_preload(record: ScrewSheet, preload: Any, values: Mapping[str, Any], where: str) -> dict[str, float]:
     """Stiffness and drag of a nut at another preload: the stiffness of its Hertzian contacts grows as the cube root.
 
-    Where no drag is printed, it is that of two halves of the nut pressed against each other by the preload, one of which
-    drives while the other is driven back: (1/eta - eta_b) F p/(2 pi).
+    If no drag is printed, it is computed for two halves of the nut that the preload presses against each other. One
+    half drives while the other is driven back: (1/eta - eta_b) F p/(2 pi).
     """
     from ..model.linear import RatedScrew
 

@@ -169,8 +169,8 @@ class MotorSheet(Record):
     def synchronous(self) -> Motor:
         """A brushless motor with field orientation in place of block commutation, its rated voltage as the dc voltage.
 
-        Resistance and inductance of a sheet are those between two terminals, its torque constant that of block commutation,
-        (3 sqrt(3)/pi) p psi; the voltage is taken to be sinusoidal.
+        Resistance and inductance of a sheet are those between two terminals. Its torque constant is that of block
+        commutation, (3 sqrt(3)/pi) p psi. The voltage is taken to be sinusoidal.
 
         Raises
         ------

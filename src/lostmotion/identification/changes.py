@@ -1,18 +1,19 @@
 """Change detection in a series of estimates, with a probability of a false alarm that holds at every length of the series.
 
-Value k of the series is ``x_k = c_k' beta + sigma sqrt(v_k) e_k`` as long as nothing changes: a level and the effects of known
-conditions, with relative variances v_k and normal errors e_k. From value j on, a change adds ``sigma a d_k``, where d is a step or a
-ramp. The size a has a normal prior of standard deviation s, or a half-normal one if only one direction is of interest. beta and sigma
-are unknown and have the right Haar prior, the density ``1/sigma``. The Bayes factor of "changed from j on" against "unchanged" is
-then the likelihood ratio of the maximal invariant, and a martingale with expectation 1 for all beta and sigma as long as nothing
-changes (Perez-Ortiz, Lardy, de Heide, Grunwald 2024). So by Doob's inequality
+Value k of the series is ``x_k = c_k' beta + sigma sqrt(v_k) e_k`` as long as nothing changes. It consists of a level,
+the effects of known conditions, and normal errors e_k with relative variances v_k. From value j on, a change adds
+``sigma a d_k``, where d is a step or a ramp. The size a has a normal prior of standard deviation s, or a half-normal
+one if only one direction is of interest. The parameters beta and sigma are unknown and have the right Haar prior, the
+density ``1/sigma``. The Bayes factor of "changed from j on" against "unchanged" is then the likelihood ratio of the
+maximal invariant. As long as nothing changes, it is a martingale with expectation 1 for all beta and sigma
+(Perez-Ortiz, Lardy, de Heide, Grunwald 2024). So by Doob's inequality
 
     evidence_n = mean over shapes and s of sum over j <= n of BF_j,n / N
 
 exceeds ``1/alpha`` at some time within N values behind the baseline with probability of at most alpha.
 
-With d, x and the columns c divided by ``sqrt(v)`` and projected onto what is orthogonal to c, ``q = d'd``, ``b = d'x`` and
-``R = x'x``, the Bayes factor of n values and p conditions is
+Divide d, x and the columns c by ``sqrt(v)``, and project them onto the orthogonal complement of c. With ``q = d'd``,
+``b = d'x`` and ``R = x'x`` the Bayes factor of n values and p conditions is
 
     BF = (1 + s^2 q)^(-1/2) (1 - s^2 b^2/((1 + s^2 q) R))^(-(n - p)/2),
 

@@ -64,8 +64,9 @@ class Engine:
     ) -> list[np.ndarray]:
         """Derivatives of the residuals of each log by each parameter: channels x samples x parameters.
 
-        From where a motion only touches a condition it has no derivative: there, and of parameters by which there is none, it
-        is a central difference over a hundredth of the parameter's scale. One on its bound is changed to the inner side alone.
+        From an instant at which a motion only touches a condition, it has no derivative. There, and for parameters
+        without a derivative, a central difference over a hundredth of the parameter's scale is taken. One on its
+        bound is changed to the inner side alone.
         """
         names = list(parameters)
         self.runs += len(logs)

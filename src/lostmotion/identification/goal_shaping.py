@@ -1,7 +1,7 @@
 """Goal shaping by the firmware of a servo: a filter, and limits of rate and acceleration.
 
-The goal does not depend on the motion, so its course is computed beforehand: at a grid that is finer than the samples of the log,
-in straight lines from one point of the grid to the next.
+The goal does not depend on the motion, so its course is computed beforehand. The grid is finer than the samples of
+the log, with straight lines between its points.
 """
 
 from __future__ import annotations

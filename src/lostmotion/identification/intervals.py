@@ -32,11 +32,12 @@ class Interval:
 def bootstrap(problem: Problem, fit: Fit, seed: int = 0, hidden: float = 0.0) -> dict[str, Interval]:
     """By resampling blocks of the residuals, with one Gauss-Newton step for each sample.
 
-    The pieces of the gradient of half a second each are drawn anew with replacement, so that errors that last, as those of a
-    model that is not quite right do, widen the interval. It is at least that of independent errors: a few blocks say little.
-    With `CLUSTERS` logs or more, whole logs are drawn, too, and so are whole conditions of ``fit.leave_out``: errors that last
-    through a log widen the interval. With `hidden`, weighted squares of residuals that no noise explains, it is wider by all that these can be the effect of.
-    Along the directions that neither logs nor priors determine, the parameters go on together until one is at its bound.
+    Segments of the gradient of half a second each are drawn with replacement. So lasting errors, such as those of an
+    incomplete model, widen the interval. It is at least that of independent errors: a few blocks say little. With
+    `CLUSTERS` logs or more, whole logs are drawn, too, and so are whole conditions of ``fit.leave_out``: errors that
+    last through a log widen the interval. With `hidden`, weighted squares of residuals that no noise explains, it is
+    wider by all that these can be the effect of. Along the directions that neither logs nor priors determine, the
+    parameters go on together until one is at its bound.
     """
     names = list(problem.parameters)
     if not names:

@@ -1,9 +1,10 @@
 """Monitoring of a drive over its life: one estimate for each operation log, and the changes of these estimates.
 
-Each log is estimated alone by the least squares of an identification, with the exact Jacobian: the logs of the baseline from the start
-values, all others from the medians of the baseline. Parameters that a log says nothing of are held by a wide prior around these
-values, and are marked. The scatter of the estimates of the baseline tells how far a log may be off without a change: it includes noise,
-and what the model lacks as far as this differs from log to log. `changes` finds what is beyond it.
+Each log is estimated alone by the least squares of an identification, with the exact Jacobian. The logs of the
+baseline begin from the start values, all others from the medians of the baseline. Parameters that a log says nothing
+of are held by a wide prior around these values, and are marked. The scatter of the estimates of the baseline is the
+scatter without a change. It includes noise, and the errors of the model as far as these differ from log to log.
+`changes` finds what is beyond it.
 """
 
 from __future__ import annotations

@@ -232,9 +232,10 @@ def _decoder(path: Path, topic: str, encoding: str, schema: Any) -> Callable[[by
 def _types(text: str, name: str, *, idl: bool) -> dict[str, Any]:
     """Types that a definition holds, checked before the library writes and runs code that reads them.
 
-    The library takes only letters, digits and underscores into names, and writes out values as literals. What it does
-    without limit is refused here: fixed lists of words or messages, for each entry of which it writes lines of code, lists
-    of messages without any byte, and shifts to numbers of any length.
+    The library takes only letters, digits and underscores into names, and writes out values as literals. Definitions
+    that it would process without limit are refused here. They are fixed lists of words or messages, for each entry of
+    which it writes lines of code. They are also lists of messages without any byte, and shifts to numbers of any
+    length.
 
     Raises
     ------

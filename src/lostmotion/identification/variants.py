@@ -20,8 +20,8 @@ from ..simulation.train_scenario import TrainScenario
 class Variants:
     """Scenarios like another one.
 
-    What parts of a train must have to do with each other is checked once for each set of keys that are changed; from then on
-    only the elements that differ are.
+    Conditions between parts of a train are checked once for each set of changed keys. From then on only the elements
+    that differ are checked.
     """
 
     def __init__(self, scenario: TrainScenario) -> None:

@@ -79,8 +79,8 @@ class Payload(Part):
 
 
 class Process(Part):
-    """A torque or a force against the motion in the positive direction, over time or over the position: straight lines through
-    points; before the first and after the last the value stays."""
+    """A torque or a force against the motion in the positive direction, over time or over the position. It follows
+    straight lines through points, and is constant before the first and after the last."""
 
     times: tuple[Annotated[Time, NotNegative], ...] | None = Field(None, min_length=2)
     positions: tuple[Angle, ...] | None = Field(None, min_length=2)

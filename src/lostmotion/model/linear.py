@@ -1,7 +1,8 @@
 """Linear motion: slides, the screws, racks and belts that move them, and linear motors.
 
-The equations are those of shafts and gears. A slide is a shaft whose inertia is a mass [kg], whose angle is a position [m] and
-whose torques are forces [N]; a screw of lead p is a gear of ratio 2 pi/p between a shaft and a slide.
+The equations are those of shafts and gears. A slide is a shaft whose inertia is a mass [kg], whose angle is a
+position [m] and whose torques are forces [N]. A screw of lead p is a gear of ratio 2 pi/p between a shaft and a
+slide.
 """
 
 import math

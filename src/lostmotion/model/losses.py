@@ -142,8 +142,8 @@ class MeshEfficiency(TwoEfficiencies):
 class WormMesh(TwoEfficiencies):
     """A worm and its wheel with friction: eta_f = tan g/tan(g + r), eta_b = tan(g - r)/tan g. Only in drive trains.
 
-    The lead angle g is given, or follows from module, number of starts and reference diameter of the worm; the friction
-    angle r is given, or follows from the coefficient of friction. It is self-locking where g < r.
+    The lead angle g is given, or follows from module, number of starts and reference diameter of the worm. The
+    friction angle r is given, or follows from the coefficient of friction. It is self-locking where g < r.
     """
 
     kind: Literal["worm"] = "worm"

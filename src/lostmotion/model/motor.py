@@ -329,8 +329,8 @@ class Motor(MotorFields):
     def at_voltage(self, voltage: Voltage) -> Self:
         """The same DC motor where command 1 is another voltage [V].
 
-        Stall torque M_DR k_N and no-load speed omega_DR k_N/(k_N - 1) of (2) go with the voltage; the rated torque, which is
-        a matter of heat, and the time constant stay.
+        Stall torque M_DR k_N and no-load speed omega_DR k_N/(k_N - 1) of (2) are proportional to the voltage. The
+        rated torque, which heat limits, and the time constant stay.
 
         Raises
         ------

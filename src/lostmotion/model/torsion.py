@@ -38,8 +38,9 @@ def check_segments(slopes: tuple[float, ...], breaks: tuple[float, ...], what: s
 class TorsionCurve(Part):
     """Torque against twist (eq. 14): odd, continuous, piecewise linear.
 
-    `backlash` (total gap at the output) and `preload` change the given segments: a gap of half the backlash comes
-    before the first, or the segments below the preload torque drop out, as where two flanks are pressed together.
+    `backlash` (total gap at the output) and `preload` change the given segments. A gap of half the backlash comes
+    before the first segment. Segments below the preload torque are left out, since two flanks are pressed together
+    there.
 
     Examples
     --------

@@ -299,10 +299,11 @@ class Actuated:
     def _solve_with_contact(self, h: float, acceleration: np.ndarray) -> np.ndarray:
         """The same with contacts, limits and equalities: MuJoCo's solver finds their forces.
 
-        It is given the inertia matrix that they feel over the step: that of the robot, and that of the drives B = -dtau/da. For
-        that the whole step is made without contact forces and once for each drive with another torque, which is that of the
-        contacts found before: so B holds between both, whatever switches there. Where a mesh swings within the step, the mean
-        over it is that of the position, 2 (q - q_0 - v_0 h)/h^2, which always follows the force.
+        It is given the inertia matrix that they feel over the step: that of the robot, and that of the drives B =
+        -dtau/da. For that the whole step is made without contact forces, and once for each drive with another torque.
+        This torque is that of the contacts found before, so that B holds between both, whatever switches there. Where
+        a mesh swings within the step, the mean over it is that of the position, 2 (q - q_0 - v_0 h)/h^2, which always
+        follows the force.
         """
         mj, m, d, dofs = self._mj, self.model, self.data, self._dofs
         force = self._forces(h, acceleration)

@@ -78,9 +78,9 @@ def reduce(
 ) -> Reduction:
     """Describe a drive by armature, damping, friction loss and gear, best for one motion.
 
-    The drive moves its load along a sum of two sines, of the frequency with the amplitude and of 2.3 times the frequency with a
-    third of it, against a constant load torque. Least squares then fit
-    ``gear * motor_torque - armature * a - damping * v - frictionloss * sign(v)`` to the torque on the joint.
+    The drive moves its load along a sum of two sines against a constant load torque. The second sine has 2.3 times
+    the frequency and a third of the amplitude. Least squares then fit ``gear * motor_torque - armature * a - damping
+    * v - frictionloss * sign(v)`` to the torque on the joint.
 
     Parameters
     ----------

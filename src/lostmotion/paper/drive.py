@@ -1,8 +1,9 @@
 """The published drive that the project starts from: its scenarios and its constants, printed and recomputed.
 
-Source: "Simplified dynamic model of the transmission", on the transmission of a passive optoelectronic rangefinder, written
-within grant project FT-TA3/103 of the Ministry of Industry and Trade of the Czech Republic; a continuation of Čech and
-Jevický (2005). Equations and figures are numbered as there. docs/citing.md says what else is known of it.
+Source: "Simplified dynamic model of the transmission", on the transmission of a passive optoelectronic rangefinder.
+It was written within grant project FT-TA3/103 of the Ministry of Industry and Trade of the Czech Republic, and
+continues Čech and Jevický (2005). Equations and figures are numbered as there. docs/citing.md says what else is known
+of it.
 """
 
 from __future__ import annotations

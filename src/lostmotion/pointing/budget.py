@@ -113,10 +113,11 @@ def pointing_budget(
 ) -> PointingBudget:
     """Compute the pointing error of axes and the contribution of each cause.
 
-    All motions are simulated, several at a time: the scenario as it is; without each cause; with each cause alone; with one cause
-    after another removed; with other controllers, temperatures, wear and target speeds. Causes are backlash, the zone of low
-    stiffness, hysteresis, dry friction, gear losses, encoder steps, delay, wind, and latency, noise and pixels of cameras. A
-    controller with an inverse model knows the drive of each run, except its temperature.
+    All motions are simulated, several at a time. They are the scenario as it is, without each cause, with each cause
+    alone, and with one cause after another removed. Further motions have other controllers, temperatures, wear and
+    target speeds. Causes are backlash, the zone of low stiffness, hysteresis, dry friction, gear losses, encoder
+    steps, delay, wind, and latency, noise and pixels of cameras. A controller with an inverse model knows the drive
+    of each run, except its temperature.
 
     Parameters
     ----------

@@ -332,8 +332,8 @@ def _given_position(shaft: str, *, slide: bool) -> Declared:
 
 
 def _fine(state: Declared) -> Declared:
-    """A state with a hundredth of its size: integrators take their absolute tolerance from there, and what follows a standstill is
-    decided by speeds that fade below that of the largest."""
+    """A state with a hundredth of its size. Integrators take their absolute tolerance from there, and small speeds
+    decide the motion after a standstill."""
     return replace(state, size=state.size / 100.0)
 
 

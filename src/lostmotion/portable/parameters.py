@@ -195,8 +195,8 @@ def _together(
 def predicted(base: np.ndarray, parameters: Iterable[Parameter], values: Mapping[str, float]) -> np.ndarray:
     """The numbers of a scenario with other values of parameters, as the C interface makes them.
 
-    A number that follows from several is their product, in terms of its present value, if that is not 0 and all of them are
-    without an offset, else the sum of their changes.
+    A number that depends on several parameters is their product in terms of its present value, if that is not 0 and
+    no parameter has an offset. Otherwise it is the sum of their changes.
     """
     effects = defaultdict(list)
     for p in parameters:

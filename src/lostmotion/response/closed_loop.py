@@ -1,10 +1,11 @@
 """Periodic motions of closed loops under a sine, by shooting with the state of the controllers in the map.
 
-The map leads over whole periods that take a whole number of sample times, from the middle of a tick to that of another. Its
-state is that of the drive and all that the controllers remember. A quantised encoder makes it constant by pieces, so that no
-derivative of it means anything; neither does the state of a controller at its limits. What is used is therefore the sequence of
-states itself: its limit, extrapolated by the method of reduced rank (which is exact in d + 1 steps where the map is affine on d dimensions, and
-converges as Newton's method does where it is smooth), and taken only if the motion from there repeats better.
+The map leads over whole periods that take a whole number of sample times, from the middle of a tick to that of
+another. Its state is that of the drive and all that the controllers remember. A quantised encoder makes it constant
+by pieces, so that no derivative of it means anything; neither does the state of a controller at its limits. Therefore
+the limit of the sequence of states is extrapolated by the method of reduced rank. The method is exact in d + 1 steps
+if the map is affine on d dimensions, and converges as Newton's method does if it is smooth. Its limit is taken only
+if the motion from there repeats better.
 """
 
 from __future__ import annotations

@@ -107,10 +107,10 @@ def spectrum(
 ) -> Spectrum:
     """Periodic error of a shaft at constant speed, by orders, with the part that causes each.
 
-    The scenario is run as it is; its end must be at constant speed. Its samples, which are exact, are interpolated at equal angles of
-    the motor's shaft by cubics through values and speeds, over whole revolutions. A cause is named where exactly one part
-    states the order: a transmission error (tooth mesh, worm or screw turn), a torque over the angle (cogging), gravity, the error
-    of an encoder.
+    The scenario is run as it is; its end must be at constant speed. Its samples, which are exact, are interpolated at
+    equal angles of the motor's shaft by cubics through values and speeds, over whole revolutions. A cause is named if
+    exactly one part has the order. Such parts are a transmission error (tooth mesh, worm or screw turn), a torque
+    over the angle (cogging), gravity, and the error of an encoder.
 
     Parameters
     ----------

@@ -1,9 +1,10 @@
 """Whether a loop whose inputs have come to rest swings on, rests for ever, or is not decided.
 
-A state in which all contacts are stuck is no proof of rest: an integrator that still moves breaks a contact away. From one
-frame, the time after which all sample times of the controllers repeat, to the next, stuck drive and controllers are a map.
-Where it takes the state into itself, the state is an equilibrium. Where its numbers go on as polynomials of time of second
-degree, as those of two integrators in series do, so do the torques of the contacts, which gives the time of the break-away.
+A state in which all contacts are stuck is no proof of rest: an integrator that still moves breaks a contact away.
+From one frame, the time after which all sample times of the controllers repeat, to the next, stuck drive and
+controllers are a map. Where it takes the state into itself, the state is an equilibrium. If its numbers are
+polynomials of time of second degree, as those of two integrators in series are, so are the torques of the contacts.
+They give the time of the break-away.
 """
 
 from __future__ import annotations

@@ -232,7 +232,8 @@ class SampledLoop:
         return -self._samples(f"{self.loop}_measured", w, one @ self._entered[0].T, one)
 
     def compliance(self, frequency: Any, shaft: str, load: str) -> np.ndarray:
-        """Angle of a shaft [rad], or position of a slide [m], at the samples, for a load torque of 1 N·m or force of 1 N that is a sine of continuous time [Hz]."""
+        """Angle of a shaft [rad], or position of a slide [m], at the samples. The load torque is a sine of 1 N·m, of
+        a slide the force a sine of 1 N, of continuous time [Hz]."""
         m, n, winding = self.model, len(self.model.states), self.regime.winding
         w, b = _angular(frequency), m.B[:, m.inputs.index(self.axis.train.load_torque_of(load))]
         force = np.zeros((len(w), len(self.transition)), complex)

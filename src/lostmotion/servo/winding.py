@@ -1,8 +1,8 @@
 """The winding of a synchronous motor under field-oriented control about a steady motion: what small deviations of it do.
 
-The rotor turns at the speed of the regime, and the motor gives the torque that keeps it. Over the sample time of the currents that
-motion repeats: the inverter holds its voltage in coordinates of the stator, so that currents and voltages in those of the rotor
-go through the same course from sample to sample. About it
+The rotor turns at the speed of the regime, and the motor gives the torque that keeps it. Over the sample time of the
+currents that motion repeats. The inverter holds its voltage in coordinates of the stator, so that currents and
+voltages in coordinates of the rotor have the same course from sample to sample. About it
 
     L_d di_d' = du_d - R di_d + w_e L_q di_q + p dw L_q i_q        du_d' =  w_e du_q + p dw u_q
     L_q di_q' = du_q - R di_q - w_e L_d di_d - p dw (L_d i_d + psi)    du_q' = -w_e du_d - p dw u_d
@@ -277,8 +277,9 @@ class OrientedWinding:
 
     @cached_property
     def over_ticks(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Matrices of each sample instant after a sample of the currents: from (plant, i_d, i_q, u_d, u_q) at its beginning to the plant and the
-        currents at its end, (n + 2, n + 4), and to the same from each of Gauss's points, (12, n + 2, n + 4)."""
+        """Matrices of each sample instant after a sample of the currents. They map (plant, i_d, i_q, u_d, u_q) at its
+        beginning to the plant and the currents at its end, (n + 2, n + 4). Those from each of Gauss's points to the
+        same end are (12, n + 2, n + 4)."""
         return [self._over_tick(start) for start in self._starts]
 
     @cached_property

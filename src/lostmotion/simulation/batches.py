@@ -157,8 +157,9 @@ class SimulationBatch:
     def counts(self) -> dict[str, int]:
         """Numbers of steps of drives since the beginning, by name.
 
-        ``steps``: all; ``with_events``: those that were searched for switchings; ``switchings``: those found there;
-        ``general``: steps made by the solver of `Simulation`, as of a drive whose contacts have still to be found.
+        ``steps``: all. ``with_events``: steps that were searched for switchings. ``switchings``: the number found
+        there. ``general``: steps by the solver of `Simulation`, for example of a drive whose contacts are not known
+        yet.
         """
         return dict(zip(("steps", "with_events", "general", "switchings"), self._core.counts, strict=True))
 

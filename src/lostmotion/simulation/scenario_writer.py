@@ -31,7 +31,7 @@ def write_changed(
 ) -> None:
     """Write a scenario that differs from that of a file by some values.
 
-    The comments and the order of the file are kept. The written file is read again and compared with the scenario; where
+    The comments and the order of the file are kept. The written file is read again and compared with the scenario. If
     the changes cannot be made in the file, or the source is a saved result, the whole scenario is written instead.
 
     Parameters

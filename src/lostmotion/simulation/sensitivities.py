@@ -1,7 +1,7 @@
 """Derivatives of runs with respect to values of their scenarios.
 
-The core propagates them exactly. What it needs of a parameter is how its own numbers change with it; these follow from the
-scenario by smooth formulas, of which the derivative is found by differences of fourth order.
+The core propagates them exactly. The core needs the derivatives of its own numbers by a parameter. These numbers
+follow from the scenario by smooth formulas, whose derivatives are found by differences of fourth order.
 """
 
 from __future__ import annotations

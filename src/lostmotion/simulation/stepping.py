@@ -317,8 +317,8 @@ class Simulation:
 
     @property
     def error_bound(self) -> dict[str, float]:
-        """By how much currents, torque and speed of motors under field-oriented control may have been wrong (SI) at the ends of the
-        steps since t = 0, by the names of the variables, as `simulate` gives it for a run.
+        """Bounds of the errors of currents, torque and speed of motors under field-oriented control (SI), by the
+        names of the variables. They hold at the ends of the steps since t = 0, as `simulate` gives them for a run.
 
         Raises
         ------
@@ -645,8 +645,8 @@ class Simulation:
 def _parts(
     what: Drive | Scenario | DriveTrain, loaded: Sequence[str] | None, given: Sequence[str] | None
 ) -> tuple[Drive | DriveTrain, DriveTrain, _core.Train, tuple[str, ...], tuple[str, ...], Initial | TrainInitial]:
-    """Parts of a simulation: its subject, the same as a train, the solver's train, the shafts that a load torque may act on, those whose motion is
-    given, and the start."""
+    """Parts of a simulation: its subject, the same as a train, the solver's train, the loadable shafts, the shafts
+    with given motion, and the start."""
     if isinstance(what, DriveTrain | TrainScenario):
         train, shafts, moved = given_train(what, loaded, given)
         if isinstance(what, DriveTrain):

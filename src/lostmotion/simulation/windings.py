@@ -50,8 +50,8 @@ def coarser(control: Bound) -> Bound:
 def error_bound(scenario: Scenario, fine: Mapping[str, Any], coarse: Mapping[str, Any]) -> dict[str, float]:
     """By how much the variables of the motors may be wrong, from a run with one exchange in each tick and one with two.
 
-    The error of the second is a sixteenth of the difference where nothing switches, a quarter where the torque jumps; the
-    difference itself is the bound, with what the passes leave.
+    The error of the second is a sixteenth of the difference if nothing switches, and a quarter if the torque jumps.
+    The bound is the difference itself, plus the remainder of the passes.
     """
     names = bounded(scenario)
     apart = {name: float(np.max(np.abs(fine[name] - coarse[name]))) for name in names}

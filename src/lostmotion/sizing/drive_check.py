@@ -128,8 +128,8 @@ def _known_losses(scenario: Scenario, end: int) -> Scenario:
 def _with_sinking(finding: Finding, result: RunArrays, cycle: DutyCycle) -> Finding:
     """A mean, with what the load does to it where it drives the motor with command 0.
 
-    Such a motion that goes on at the end of the run has no end of its own: the mean depends on the duration, and is not judged
-    where no `task.cycle` says that all of it repeats. Elsewhere it is a part of the cycle, and is told.
+    If such a motion has not ended at the end of the run, the mean depends on the duration. It is not judged then,
+    unless `task.cycle` states that all of the run repeats. Elsewhere it is a part of the cycle, and is told.
     """
     sinking, at_end = _sinking(result)
     shortest = MIN_REST * cycle.duration

@@ -1,7 +1,7 @@
 """The duty cycle of a run, and the means over it by which gearboxes and motors are sized.
 
-Rest before and after the motion says nothing about the task, so no mean depends on how much of it a run has: the motion is
-taken to repeat without a pause, or after `task.cycle`.
+Rest before and after the motion is not part of the task, so that no mean depends on its duration. The motion is taken
+to repeat without a pause, or after `task.cycle`.
 """
 
 from __future__ import annotations
@@ -113,8 +113,8 @@ def duty_cycle(
 ) -> DutyCycle:
     """The duty cycle of a run.
 
-    A standstill at its beginning or end is rest if it is no mere reversal of the motion: if it is not too short, and the torque
-    of the motor does not change.
+    A standstill at its beginning or end is rest if it is no mere reversal of the motion. That is, it is not too
+    short, and the torque of the motor does not change.
 
     Parameters
     ----------

@@ -225,9 +225,10 @@ def bus_voltage(capacitance: float, start: float, energy: float) -> float:
 def derating(altitude: float, ambient: float, winding: float | None) -> float:
     """Share of its continuous torque that a motor has left at an altitude [m] and an ambient temperature [degC].
 
-    1 % is lost to each 100 m above 1000 m. Above 40 degC the rise that the winding (its largest temperature, or None) may
-    have shrinks, and the torque with its root, since the copper loss goes with the square of the torque. Source: IEC 60034-1,
-    5.1 and 6 (ratings hold up to 1000 m and 40 degC); the catalogues of servo motors state the 1 %.
+    1 % is lost to each 100 m above 1000 m. Above 40 degC the permitted rise of the winding (from its largest
+    temperature, or None) is smaller. The torque is proportional to the root of the rise, since the copper loss is
+    proportional to the square of the torque. Source: IEC 60034-1, 5.1 and 6 (ratings hold up to 1000 m and 40 degC);
+    the catalogues of servo motors state the 1 %.
 
     Examples
     --------

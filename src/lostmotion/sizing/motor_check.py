@@ -49,8 +49,8 @@ def peak_torque(m: Motor, torque: np.ndarray, where: str = "motor", *, slides: b
 def heat(
     m: Motor, cycle: DutyCycle, ambient: float, where: str = "motor", *, rise: float | None = None, slides: bool = False
 ) -> list[Finding]:
-    """Torque over the cycle and the temperature of the winding at this ambient temperature [°C]; `rise` [K] over it, where that is
-    known already. slides: the motor moves a slide, by a force."""
+    """Torque over the cycle, and the temperature of the winding at this ambient temperature [°C]. `rise` [K] is the
+    rise over it, if it is known already. `slides`: the motor moves a slide, by a force."""
     limits = m.limits
     word, unit = ("force", "N") if slides else ("torque", "N·m")
     torque = cycle.rms_motor_torque()
@@ -82,8 +82,8 @@ def heat(
 
 
 def _rise(m: Motor, cycle: DutyCycle, torque: float, ambient: float) -> float | None:
-    """Rise of the winding over the ambient [K]: its peak in the repeated cycle, or with fewer data that of the rms torque [N·m];
-    None if it is not known."""
+    """Rise of the winding over the ambient [K]. It is the peak in the repeated cycle, or with fewer data the rise by
+    the rms torque [N·m]. None if it is not known."""
     steady, bodies = rms_rise(m, torque, ambient), TwoBodies.of(m, ambient)
     if steady is None or bodies is None or cycle.held_longer:
         return steady
@@ -122,8 +122,9 @@ def command_of_run(
     torque: np.ndarray,
     speed: np.ndarray,
 ) -> np.ndarray:
-    """E_C over a run [-]: its command, or where that is of a current loop whose voltage the run does not contain, what torque
-    [N·m] and speed [rad/s] need, under one of first order with the inductance, under any other without."""
+    """E_C over a run [-]: its command. If the command is that of a current loop whose voltage the run does not
+    contain, E_C is computed from torque [N·m] and speed [rad/s]. The inductance counts under a current loop of first
+    order only."""
     law = None if controller is None else driven(controller)
     if law is None:  # u_q ends at the amplifier
         return np.clip(command, -1.0, 1.0) if m.kind == "synchronous" else command

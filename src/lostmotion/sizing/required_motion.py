@@ -85,8 +85,8 @@ def required_motion(
 
 
 def duty_torque(motion: RequiredMotion, load: LoadTable) -> tuple[np.ndarray, np.ndarray]:
-    """Instants [s] and load torque [N·m] of a run in place of duty, along the reference: what holds the load and what moves its
-    payloads, by the fewest straight lines that depart from it by 0.1 % of its peak at most."""
+    """Instants [s] and load torque [N·m] of a run in place of duty, along the reference. The torque holds the load
+    and moves its payloads. It has as few straight lines as keep the error below 0.1 % of the peak."""
     torque = motion.holding + (motion.inertia - load.inertia) * motion.acceleration
     lines = _fewest_lines(motion.time, torque, LINES * float(np.abs(torque).max(initial=0.0)))
     return motion.time[lines], torque[lines]

@@ -1,5 +1,5 @@
-"""The last stage of a linear axis, a screw, a rack or a belt: what it asks of the shaft that drives it, and the gearbox that it makes
-together with the one before it."""
+"""Last stage of a linear axis: a screw, a rack or a belt. Computes the requirements on the shaft that drives it, and
+the gearbox that it forms together with the gearbox before it."""
 
 import itertools
 import math
@@ -142,8 +142,8 @@ def together(g: Gearbox, stage: LinearDrive) -> Gearbox:
 
 
 def _damping(g: Gearbox, own: Gear, ratio: float) -> float:
-    """Damping of both at the slide [N s/m]: forces are alike, and what damps each is its share of the deflection rate, so that
-    c/k^2 add up to first order."""
+    """Damping of both at the slide [N s/m]. The forces are equal, and each is damped by its share of the deflection
+    rate. So the terms c/k^2 add up to first order."""
     both = [
         (gear.mesh_damping * scale**2, gear.stiffness.pieces()[1][-1] * scale**2)
         for gear, scale in ((g, ratio), (own, 1.0))

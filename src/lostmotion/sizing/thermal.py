@@ -59,8 +59,8 @@ class TwoBodies:
         return cls(*limits.thermal_parts, *times, *copper, ambient, alpha)
 
     def steps(self, time: np.ndarray, square: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """For each interval between instants [s]: the map x -> F x + g of the temperatures x = (T_w, T_c) - T_a: F (n, 2, 2) and
-        g (n, 2), by the mean of M² over it [(N·m)²]."""
+        """Map x -> F x + g of the temperatures x = (T_w, T_c) - T_a for each interval between instants [s]. F (n, 2,
+        2) and g (n, 2) follow from the mean of M² over the interval [(N·m)²]."""
         h = np.diff(time)
         heat = self.loss * square
         C_w, C_c = self.winding_time / self.winding_case, self.case_time / self.case_ambient
@@ -99,8 +99,8 @@ class TwoBodies:
     def error_bound(self, time: np.ndarray, torque: np.ndarray, hottest: float) -> float:
         """Error bound of the temperatures [K], through the mean of M² over each interval.
 
-        The heat of an interval h whose values lie within dP of each other leads or lags by at most h dP/4, and the
-        temperature that one joule leaves behind decays: h dP/(4 C_w), and as much again within an interval.
+        In an interval h, values within dP of each other make the heat lead or lag by at most h dP/4. The temperature
+        that one joule leaves decays. So the error is h dP/(4 C_w), and as much again within an interval.
         """
         square = torque**2
         low = np.where(torque[1:] * torque[:-1] < 0.0, 0.0, np.minimum(square[1:], square[:-1]))

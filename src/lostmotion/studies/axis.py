@@ -328,8 +328,8 @@ def current_loop(controller: Controller, wanted: AnyCurrent | None, motor: Motor
 
 
 def tuned(base: DriveScenario, motor: Motor, g: Gearbox, current: AnyCurrent | None = None) -> Controller:
-    """The controller of the base with gains by rule for a motor, a gearbox and its load, and with the torque of their inertia fed
-    forward; `current` is its current loop if not that of the base."""
+    """Controller of the base with gains by rule for a motor, a gearbox and its load. The torque of their inertia is
+    fed forward. `current` is its current loop, if not that of the base."""
     assert base.controller is not None
     controller = base.controller
     controller = controller.model_copy(update={"current": current_loop(controller, current, motor)})

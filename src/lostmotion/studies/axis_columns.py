@@ -100,8 +100,8 @@ def duty_cycle_of(result: RunArrays, cycle: slice, period: float) -> DutyCycle:
 
 
 def temperatures_of(motor: Motor, time: np.ndarray, square: np.ndarray, ambient: float) -> tuple[float, float]:
-    """Highest temperatures of winding and case [°C] in the cycle repeated for ever, as far as the data of the motor tell: without its
-    time constants the winding alone, by the rms torque; NaN where nothing is known.
+    """Highest temperatures of winding and case [°C] in the cycle repeated for ever, as far as the data of the motor
+    allow. Without its time constants the winding alone is computed, by the rms torque. NaN if nothing is known.
 
     Parameters
     ----------

@@ -36,9 +36,10 @@ class Electrical:
     def of(cls, scenario: DriveScenario, result: RunArrays, here: slice) -> Electrical:
         """Quantities of the last cycle of a run that is sampled at each sample instant of its controller.
 
-        Under field-oriented control the core has integrated energy and heat. Any other motor has the command E for the whole of a
-        tick, and with tau dm/dt = k_N E - (k_N - 1) w/w_DR - m the integral of its torque over it is known; between its ends
-        the torque is the parabola with that integral, whose square errs by (T/tau)^4/720 of the ripple's.
+        Under field-oriented control the core has integrated energy and heat. Any other motor has the command E for a
+        whole sample time. With tau dm/dt = k_N E - (k_N - 1) w/w_DR - m the integral of its torque over the sample
+        time is known. Between its ends the torque is the parabola with that integral. The error of its square is
+        (T/tau)^4/720 of the square of the ripple.
         """
         m, step = scenario.motor, float(result.time[1] - result.time[0])
         torque = result["motor_torque"][here]

@@ -98,8 +98,8 @@ def run_in_core(study: Study, parameters: np.ndarray, threads: int) -> Runs:
 def _out_of_range(study: Study, parameters: np.ndarray) -> list[str]:
     """For each run, why it is no valid scenario; empty if it is.
 
-    The range of each number is an interval, so if the least and the largest value are valid, all are; a run is looked at by
-    itself only where that fails.
+    The range of each number is an interval. So if the least and the largest value are valid, all are. A run is
+    checked by itself only if they are not.
     """
     errors = [""] * len(parameters)
     low, high = parameters.min(axis=0), parameters.max(axis=0)

@@ -8,8 +8,9 @@ import numpy as np
 
 
 class Runs(SimpleNamespace):
-    """Results of a chunk: parameters (runs x parameters), samples (variable -> runs x samples), what the core has made of them instead
-    (column -> runs), energy (entry -> runs), columns of the drive check, switchings, errors; of drives that the core varies, the ratio (runs)."""
+    """Results of a chunk: parameters (runs x parameters), samples (variable -> runs x samples) or their reductions by
+    the core (column -> runs), energy (entry -> runs). Further columns are those of the drive check, switchings,
+    errors, and the ratio (runs) of drives that the core varies."""
 
     parameters: np.ndarray
     samples: dict[str, np.ndarray]

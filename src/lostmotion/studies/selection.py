@@ -72,8 +72,8 @@ class Price:
 
 
 def candidates(table: pa.Table, study: Study) -> list[Candidate]:
-    """The runs of a study that selects: first those that fit, then those that violate one limit, two, ..., each from the best to
-    the worst, and last those that cannot be run.
+    """Rank the runs of a study that selects. Runs that fit come first, then those that violate one limit, two, ...,
+    each from the best to the worst. Runs that failed come last.
 
     Raises
     ------

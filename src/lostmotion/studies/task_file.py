@@ -41,9 +41,9 @@ POSITION = {"sample_time": 1e-3, "feedforward": 1.0}
 def load_task(path: str | Path) -> Study:
     """Read a task file.
 
-    Its tables are those of a scenario (`[load]`, `[controller]` with its reference but without gains, `[motor]` and `[gearbox]` with
-    keys beside a record), a table `[task]` (`AxisTask`), and those of a study: `[candidates]` or `[[vary]]` for motors and gearboxes, by default the
-    whole catalogue, and `[select]`.
+    Its tables are those of a scenario: `[load]`, `[controller]` with its reference but without gains, `[motor]` and
+    `[gearbox]` with keys beside a record. Further tables are `[task]` (`AxisTask`), and `[candidates]` or `[[vary]]`
+    and `[select]` of a study. Without the former, motors and gearboxes are those of the whole catalogue.
 
     Parameters
     ----------

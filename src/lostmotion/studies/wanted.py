@@ -27,8 +27,8 @@ def needed(study: Study) -> frozenset[str]:
 
 
 def reductions(study: Study) -> dict[str, tuple[str, str]]:
-    """Reduction and variable of each column that needs samples, if they are all of that kind, so that the core can do them and
-    no samples need leave it; else empty."""
+    """Reduction and variable of each column that needs samples, if the core can compute all of them. No samples need
+    leave the core then. Otherwise empty."""
     all_of_them = {name: e.reduction for name, e in study.expressions.items() if e.variables}
     known = {name: r for name, r in all_of_them.items() if r is not None}
     return known if study.trajectories is None and len(known) == len(all_of_them) else {}

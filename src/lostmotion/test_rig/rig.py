@@ -1,6 +1,6 @@
 """Virtual test rig: what manufacturers measure of a gearbox, measured on the simulated one.
 
-Nothing here reads the loss map or the torsion curve back; every value comes out of a simulated run, as on the rigs of
+Nothing here reads the loss map or the torsion curve. Every value is measured in a simulated run, as on the rigs of
 figures 6 to 8 of the paper.
 """
 
