@@ -75,7 +75,7 @@ def write_weakening(out: Path) -> None:
     result = lm.simulate(lm.load("field-weakening"))
     time, rpm = result["time"].values, 30.0 / np.pi
     speed = (
-        Curve("wanted", time, rpm * result["m_speed_reference"].values, FAINT),
+        Curve("reference", time, rpm * result["m_speed_reference"].values, FAINT),
         Curve("motor", time, rpm * result["motor_speed"].values, FIRST),
     )
     currents = (

@@ -59,7 +59,7 @@ def loops(out: Path, scenario: lm.Scenario) -> None:
     )
     panels = [
         Panel("open speed loop: gain", "frequency [Hz]", "|L| [-]", gains, log_x=True, log_y=True),
-        Panel("open speed loop: phase", "frequency [Hz]", "[deg]", phases, log_x=True),
+        Panel("open speed loop: phase", "frequency [Hz]", "phase [deg]", phases, log_x=True),
     ]
     _save(out, "servo-loops", panels, 2, (10.0, 3.6))
 

@@ -19,7 +19,7 @@ MODELS: dict[str, tuple[dict[str, Any] | None, dict[str, Any]]] = {
     "no feedforward of torque": (None, FAINT),
     "constant efficiency of 0.9": ({"efficiency": 0.9}, SECOND),
     "loss map": ({}, FIRST),
-    "0.6 of the losses, adapting": (
+    "adaptive, from 0.6 of the losses": (
         {"loss_factor": 0.6, "loss_adaptation": {"rate": 500.0}, "min_speed": 0.05},
         THIRD,
     ),
@@ -83,7 +83,7 @@ def fly_by(out: Path) -> None:
             factors.append(Curve(label, t, run["model_loss_factor"].to_numpy(), style))
     panels = [
         Panel("elevation of a fly-by: reference less load", "time [s]", "error [mrad]", tuple(errors)),
-        Panel("factor on the losses in the controller", "time [s]", "[-]", tuple(factors)),
+        Panel("factor on the losses in the controller", "time [s]", "factor [-]", tuple(factors)),
     ]
     _save(out, "tracking-fly-by", panels, 2, (10.0, 3.6))
 
@@ -109,7 +109,7 @@ def by_camera(out: Path) -> None:
         over.append(Curve(label, 1e3 * latencies, 1e3 * np.array(rms), style))
     panels = [
         Panel("elevation of a fly-by: target less load", "time [s]", "error [mrad]", tuple(errors)),
-        Panel("its rms after 2 s", "latency of the camera [ms]", "error [mrad]", tuple(over)),
+        Panel("rms error after 2 s", "latency of the camera [ms]", "error [mrad]", tuple(over)),
     ]
     _save(out, "tracking-camera", panels, 2, (10.0, 3.6))
 

@@ -206,7 +206,9 @@ def opening(out: Path) -> None:
     for share, look in ((0.3, THIRD), (0.7, SECOND), (1.1, FIRST)):
         run = lm.simulate(after_step(share * enough, step))
         curves.append(
-            Curve(f"{share:g} of it", 1e3 * run["time"].values, run["second_gear_output_torque"].values, look)
+            Curve(
+                f"{share:g} of the needed bias", 1e3 * run["time"].values, run["second_gear_output_torque"].values, look
+            )
         )
         if share < 1.0:
             marks.append(1e3 * math.acos(1.0 - 2.0 * share) / OMEGA)
@@ -220,10 +222,8 @@ def opening(out: Path) -> None:
     )
     save(
         [
-            Panel(
-                "0.2 N·m at once; bias, of what is needed", "time [ms]", "second gear at the ring [N·m]", tuple(curves)
-            ),
-            Panel("its gap opens", "bias, of what is needed [-]", "time [ms]", drawn),
+            Panel("step of 0.2 N·m", "time [ms]", "second gear at the ring [N·m]", tuple(curves)),
+            Panel("opening of the gap", "bias / needed bias [-]", "time [ms]", drawn),
         ],
         2,
         (10.0, 3.6),
@@ -315,7 +315,7 @@ def preload(out: Path) -> None:
         )
         panels.append(
             Panel(
-                f"{title}: lost in the gears {lost:.1f} J, Σ T² {heat:.3f}",
+                f"{title}: {lost:.1f} J lost, Σ T² {heat:.3f}",
                 "time [s]",
                 "at the ring [N·m], [0.01 rad/s]",
                 curves,

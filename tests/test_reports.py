@@ -221,7 +221,7 @@ def test_a_run_is_reported_with_the_numbers_of_its_dataset(tmp_path: Path) -> No
     assert np.array_equal(modes["input shaft"], result["input_contact"].values)
     assert found["Energy of the whole run"]["energies"] == lm.energy_of(result)
     assert len(found["Loss map of gearbox"]["lines"][0]["x"]) == result.sizes["time"]
-    assert practical(float(np.abs(wanted).max()), "rad") in page
+    assert practical(float(np.abs(wanted).max()), "rad", 4) in page
     assert not Page(page).faults
     assert result.lm._repr_html_().startswith("<iframe")
 

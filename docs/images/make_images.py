@@ -42,7 +42,7 @@ def tutorial() -> None:
         scenario = lm.load(path)
         record = find(str(path.parent / "my-gearbox.toml"), "gearbox")
     plots.overview(lm.simulate(scenario)).savefig(HERE / "overview.png", dpi=90, metadata={"Software": None})
-    rig = plots.draw(panels(measure(scenario.gearbox), record), 2, (10.0, 10.5))
+    rig = plots.draw(panels(measure(scenario.gearbox), record), 2, (10.0, 11.5))
     rig.savefig(HERE / "rig.png", dpi=80, metadata={"Software": None})
 
 

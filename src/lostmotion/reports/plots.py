@@ -90,18 +90,19 @@ def _legend_above(axes: Any, labels: Mapping[str, Any]) -> int:
     """The legend of a panel between its title and its curves, and its rows; inside, where it is long."""
     if len(labels) < 2:
         return 0
-    room = axes.figure.get_figwidth() / axes.get_gridspec().ncols - 0.65  # inch, beside the labels of y
+    room = axes.figure.get_figwidth() / axes.get_gridspec().ncols - 0.95  # inch, beside the labels of y
     lengths = list(map(len, labels))
     for rows in range(1, LEGEND_ROWS + 1):
         columns = -(-len(labels) // rows)
         longest = [max(lengths[k * rows : (k + 1) * rows], default=0) for k in range(columns)]
-        if sum(0.5 + 0.07 * n for n in longest) <= room:
+        if sum(0.55 + 0.068 * n for n in longest) <= room:
             break
     else:
         axes.legend(loc="best")
         return 0
     place = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.2, "borderpad": 0.1}
-    axes.legend(list(labels.values()), list(labels), ncols=columns, columnspacing=1.2, **place)
+    legend = axes.legend(list(labels.values()), list(labels), ncols=columns, columnspacing=1.2, **place)
+    legend.set_in_layout(False)  # the title above makes the room
     return rows
 
 
