@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 PARETO = "Each point is a candidate; point at it to read its name and values. The list below names the numbered ones."
 NEAREST = 5  # candidates that do not fit, for which a slower cycle is sought
-MAX_LINES = 10  # lines of each list that are printed; selection.csv has all
+MAX_LINES = 6  # lines of each list that are printed; selection.csv has all
 MAX_ROWS = 25  # of a table on the page
 
 
