@@ -577,6 +577,11 @@ CALLS = [
     ("a report into a file", ["reproduce", "-o", "good.toml"], ["good.toml", "directory"]),
     ("a run that leaves all bounds", ["run", "good.toml", "--set", "command.amplitude=1e12"], ["t ="]),
     (
+        "a range without measure",
+        ["response", "good.toml", "--frequencies", "1..100:1000000000"],
+        ["--frequencies 1..100:1000000000", "has more than 100000 values"],
+    ),
+    (
         "a stiffness without measure",
         ["run", "good.toml", "--set", 'gearbox.stiffness={kind="linear", stiffness=1e200}'],
         ["left the range that can be computed at t =", "stiffness"],

@@ -261,9 +261,22 @@ def test_an_interval_below_the_resolution_of_the_time_is_refused():
 
 
 def test_samples_that_do_not_fit_into_memory_are_refused_before_the_run(monkeypatch):
-    monkeypatch.setattr("lostmotion.simulation.run.free_memory", lambda: 5_000_000_000)
+    monkeypatch.setattr("lostmotion.inputs.limits.free_memory", lambda: 5_000_000_000)
     with pytest.raises(lm.InputError, match=r"1e\+08 samples need 18\.3 GB of memory, and 5 GB are free"):
         lm.simulate(lm.load("paper-2dof-nl-small"), duration=100.0, sample_interval=1.0000001e-6)
+
+
+def test_results_that_do_not_fit_into_memory_are_refused_before_they_are_made(monkeypatch):
+    """A thousand times a thousand points, with at least 16 bytes for each harmonic of each output."""
+    monkeypatch.setattr("lostmotion.inputs.limits.free_memory", lambda: 1_000_000_000)
+    drive, many = lm.load("paper-2dof-nl-small"), np.linspace(1.0, 2.0, 1000)
+    for call, said in (
+        (lambda: lm.frequency_response(drive, many, many), r"1e\+06 points of the response need .* GB"),
+        (lambda: lm.SimulationBatch(drive.drive(), step=1e-3, count=10**9), r"count: 1e\+09 drives need .* GB"),
+        (lambda: lm.test_rig.TestRig(drive.gearbox).efficiency_map(many, np.ones(10**5)), r"1e\+08 points of the map"),
+    ):
+        with pytest.raises(lm.InputError, match=said + ".* of memory, and 1 GB are free; "):
+            call()
 
 
 def test_a_billion_seconds_at_constant_command_end():

@@ -70,6 +70,8 @@ def _run() -> NoReturn:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
+    except MemoryError:
+        fail("more memory is needed than is free; give fewer values or samples, or close other programs")
     except OSError as error:
         what = f"{in_short(Path(str(error.filename)))}: " if error.filename is not None else ""
         fail(f"{what}{error.strerror or error}")

@@ -11,6 +11,8 @@ from ..errors import InputError
 from ..inputs.validation import shown
 from ..units.conversion import si_value
 
+MOST = 100_000  # values of a range
+
 
 def parse_grid(text: str, option: str, unit: str = "") -> list[float]:
     """Values from ``0.1,1,10`` or, with equal ratios, ``0.1..100:60`` (first, last, how many).
@@ -34,6 +36,8 @@ def parse_grid(text: str, option: str, unit: str = "") -> list[float]:
         low, _, high = bounds.partition("..")
         if not (count.isascii() and count.isdecimal() and int(count) > 0):
             raise InputError(problem)
+        if len(count) > len(str(MOST)) or int(count) > MOST:
+            raise InputError(f"--{option} {text}: has more than {MOST} values; give fewer")
         ends = [_value(entry, unit, problem) for entry in (low, high)]
         if min(ends) <= 0.0:
             raise InputError(f"{problem}, all of them above 0")

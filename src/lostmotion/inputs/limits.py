@@ -14,6 +14,7 @@ LOG = 2**29  # [bytes] that an input file may need; 10 channels at 1 kHz for an 
 RESULT = 2**32  # [bytes] that a saved result may need
 PER_BYTE = 32  # bytes of memory for each byte of a table that is read into lists of Python's numbers, measured
 
+ALWAYS_FREE = 4_000_000  # bytes, for which the system is not asked
 PREFIXES = {"": 1.0, "k": 1e3, "M": 1e6, "G": 1e9, "T": 1e12}
 
 
@@ -75,6 +76,42 @@ def check_memory(needed: float, what: str, default: int = LOG) -> None:
             f"{what}: needs {shown_size(needed)} of memory or more, and the limit is {shown_size(limit)}; "
             f"shorten it, or raise the limit with `lostmotion --memory SIZE ...` or {VARIABLE}=SIZE"
         )
+
+
+def check_free(needed: float, what: str, remedy: str) -> None:
+    """Refuse results that do not fit into the memory that is free.
+
+    Parameters
+    ----------
+    needed
+        Bytes.
+    what
+        The results in the plural, as the beginning of the message.
+    remedy
+        Its end.
+
+    Raises
+    ------
+    InputError
+        It states the memory that they need and the free memory.
+    """
+    free = None if needed < ALWAYS_FREE else free_memory()
+    if free is not None and needed > free:
+        raise InputError(f"{what} need {needed / 1e9:.3g} GB of memory, and {free / 1e9:.3g} GB are free; {remedy}")
+
+
+def free_memory() -> int | None:
+    """Bytes of memory that programs can still have, or None where the system does not say."""
+    try:
+        with open("/proc/meminfo", encoding="ascii") as table:
+            kilobytes = next(line.split()[1] for line in table if line.startswith("MemAvailable:"))
+        return 1024 * int(kilobytes)
+    except (OSError, StopIteration):
+        pass
+    try:
+        return os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, OSError, ValueError):
+        return None
 
 
 def read_text(path: Path, *, per_byte: float = PER_BYTE, default: int = LOG) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..inputs.arguments import checked
+from ..inputs.limits import check_free
 from ..inputs.quantities import Count, Number, Torque, arguments
 from ..model.drive import Drive
 from ..simulation.scenario import Scenario
@@ -24,6 +25,8 @@ from .windows import SAMPLES
 if TYPE_CHECKING:
     import control
     import xarray
+
+HARMONIC = 200.0  # bytes for each harmonic of a point, of a few outputs
 
 
 @checked
@@ -108,6 +111,12 @@ def frequency_response(
     plant = plant_or_loop(drive)
     source = plant.known_source(source)
     frequencies, amplitudes = _checked(frequencies, amplitudes, plant.unit(source))
+    points = len(frequencies) * len(amplitudes)
+    check_free(
+        points * HARMONIC * (harmonics + 1.0),
+        f"{points:.3g} points of the response",
+        "give fewer of them, or fewer harmonics",
+    )
     plant = plant.with_means(mean_command, mean_load_torque)
     if plant.closed is None and law is not None:
         raise InputError("law: the scenario has no controller with law = true; set it, or leave law out")

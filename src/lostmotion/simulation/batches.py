@@ -12,12 +12,15 @@ import numpy as np
 from .. import _core
 from ..errors import InputError
 from ..inputs.arguments import checked
+from ..inputs.limits import check_free
 from ..inputs.quantities import Count, Time
 from ..inputs.validation import did_you_mean, listed, shown
 from ..model.drive import Drive
 from ..model.torsion import Rigid, TorsionCurve
 from .stepping import MAX_INTERVAL, MIN_INTERVAL
 from .variables import STATES
+
+DRIVE_BYTES = 150.0  # memory that a drive of a batch takes at least
 
 BACKLASH = "gearbox.stiffness.backlash"
 KEYS = (
@@ -116,6 +119,7 @@ class SimulationBatch:
         own = _Own([], np.zeros((1, 0)), -1)
         if several is None:
             self._count = _count_of(count, vary or {})
+            check_free(DRIVE_BYTES * self._count, f"count: {self._count:.3g} drives", "take several batches")
             own = _own_parameters(one, vary or {}, self._count, np.random.default_rng(seed))
             bases, models = [one], np.zeros(self._count, dtype=int)
             values = own.values

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal, overload
@@ -12,6 +11,7 @@ from ..control.axis import Bound
 from ..control.law import as_laws
 from ..errors import InputError
 from ..inputs.arguments import checked
+from ..inputs.limits import check_free
 from ..inputs.quantities import Number
 from ..model.drive import Drive
 from ..model.signals import CommandSignal, TorqueSignal
@@ -35,7 +35,6 @@ TOLERANCE = 1e-8  # of the adaptive solver, if none is given
 TOLERANCES = (1e-15, 1e-3)  # beyond rounding, and beyond what finds the switching instants
 
 MAX_SWITCHINGS = 100_000  # kept with a result; beyond it they are only counted
-ALWAYS_FREE = 4_000_000  # bytes, for which the system is not asked
 BYTES_PER_VALUE = 12.2  # of a result while it is made: 8.8 to 12.1 measured over drives, trains and controllers
 
 
@@ -240,24 +239,8 @@ def check_memory(samples: int, width: float) -> None:
     InputError
         It says what they need and what there is.
     """
-    needed = samples * width
-    free = None if needed < ALWAYS_FREE else free_memory()
-    if free is not None and needed > free:
-        raise InputError(
-            f"simulation.sample_interval: {samples:.3g} samples need {needed / 1e9:.3g} GB of memory, and {free / 1e9:.3g}"
-            " GB are free; take a longer sample_interval, or a shorter duration"
-        )
-
-
-def free_memory() -> int | None:
-    """Bytes of memory that programs can still have, or None where the system does not say."""
-    try:
-        with open("/proc/meminfo", encoding="ascii") as table:
-            kilobytes = next(line.split()[1] for line in table if line.startswith("MemAvailable:"))
-        return 1024 * int(kilobytes)
-    except (OSError, StopIteration):
-        pass
-    try:
-        return os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, OSError, ValueError):
-        return None
+    check_free(
+        samples * width,
+        f"simulation.sample_interval: {samples:.3g} samples",
+        "take a longer sample_interval, or a shorter duration",
+    )

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..inputs.arguments import checked
+from ..inputs.limits import check_free
 from ..inputs.quantities import Count, Number, Speed, Torque
 from ..inputs.validation import shown
 from ..model.drive import Drive
@@ -28,6 +29,8 @@ from ..simulation.run import run
 from ..simulation.scenario import Initial, of_drive
 from ..simulation.switchings import names_in, unpacked
 from .loop import Loop
+
+PAIR = 100.0  # bytes for a point of a map
 
 if TYPE_CHECKING:
     import xarray
@@ -142,6 +145,8 @@ class TestRig:
         speeds, loads = list(speeds), list(loads)
         if not speeds or not loads:
             raise InputError("a map of the efficiency needs at least one speed and one load")
+        points = len(speeds) * len(loads)
+        check_free(PAIR * points, f"{points:.3g} points of the map", "give fewer speeds or loads")
         rows = []
         for mu in loads:
             rows.append([self.steady(n, mu) for n in speeds])
