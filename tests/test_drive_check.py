@@ -455,6 +455,18 @@ def test_a_screw_of_a_train_is_judged_by_its_ratings():
     assert {found[rule].verdict for rule in ("critical_speed", "buckling", "screw_speed", "screw_static")} == {"ok"}
 
 
+def test_what_moves_a_slide_is_asked_for_no_rating_of_a_gearbox():
+    """A screw is judged by its axial load; of a rack the largest force of the run is named."""
+    screw = [f for f in check_drive(screw_at(10.0, **THK)) if f.what.startswith("screw: ")]
+    assert screw
+    assert not [f for f in screw if "gearbox" in str(f.remark) or "rated_output_torque" in str(f.remark)]
+    rack = lm.load("rack-axis-with-play")
+    force = float(abs(lm.simulate(rack)["rack_output_force"]).max())
+    (found,) = [f for f in check_drive(rack) if f.what == "rack: output force, largest"]
+    assert (found.value, found.verdict) == (f"{force:.4g} N", "unknown")
+    assert found.remark == "a rack has no rated force here; compare with its data sheet"
+
+
 def test_the_verdict_of_a_screw_turns_with_its_speed_and_its_mounting():
     def verdict(turns: float, rule: str, **changes: object) -> str:
         findings = check_drive(screw_at(turns, **THK | changes))

@@ -19,21 +19,17 @@ if TYPE_CHECKING:
     from ..simulation.results import RunArrays
 
 
-def loads(
-    g: Transmission, peak: float, cycle: DutyCycle, where: str = "gearbox", *, slides: bool = False
-) -> list[Finding]:
-    """Mean and largest output torque, `peak` [N·m] being the latter. where: the table of the gearbox; slides: it moves a slide, by a
-    force [N]."""
-    torque, unit = ("force", "N") if slides else ("torque", "N·m")
+def loads(g: Transmission, peak: float, cycle: DutyCycle, where: str = "gearbox") -> list[Finding]:
+    """Mean and largest output torque, `peak` [N·m] being the latter. where: the table of the gearbox."""
     average = g.limits.average_output_torque if g.limits else None
-    name = f"{'rated' if average is None else 'average'} output {torque}"
+    name = f"{'rated' if average is None else 'average'} output torque"
     return [
         within(
             "average_output_torque",
-            f"output {torque}, cubic mean",
+            "output torque, cubic mean",
             cycle.mean_output_torque(),
             average or g.rated_output_torque,
-            unit,
+            "N·m",
             name,
             key=f"{where}.rated_output_torque",
             cycle=cycle,
@@ -41,11 +37,11 @@ def loads(
         _with_momentary(
             within(
                 "peak_output_torque",
-                f"output {torque}, largest",
+                "output torque, largest",
                 peak,
                 g.limits.peak_output_torque if g.limits else None,
-                unit,
-                f"repeated peak {torque} of the gearbox",
+                "N·m",
+                "repeated peak torque of the gearbox",
                 key=f"{where}.limits.peak_output_torque",
             ),
             peak,

@@ -70,7 +70,8 @@ def _gear(scenario: TrainScenario, name: str, result: RunArrays) -> list[Finding
         motor_torque=train.input_torque_of(name),
         output_torque=torque,
     )
-    findings = loads(gear, float(abs(result[torque]).max()), cycle, where, slides=train.is_slide(gear.output))
+    peak = float(abs(result[torque]).max())
+    findings = _force(scenario.kind_of(name), peak) if train.is_slide(gear.output) else loads(gear, peak, cycle, where)
     if gear.rated_input_speed is not None or gear.limits is not None:
         findings += input_speeds(gear, cycle, where)
     findings = _named(name, findings)
@@ -79,6 +80,13 @@ def _gear(scenario: TrainScenario, name: str, result: RunArrays) -> list[Finding
     if not isinstance(gear.losses, ConstantEfficiency) and (torques := _load_torques(scenario, name, result)):
         findings += locks(train, name, torques)
     return findings
+
+
+def _force(kind: str, peak: float) -> list[Finding]:
+    """Largest force of a rack or a belt, whose ratings no table holds. A screw has rules of its own."""
+    remark = f"a {kind} has no rated force here; compare with its data sheet"
+    what = "output force, largest"
+    return [] if kind == "screw" else [Finding("peak_output_torque", what, f"{peak:.4g} N", "unknown", remark)]
 
 
 def _screw(scenario: TrainScenario, name: str, screw: RatedScrew, result: RunArrays) -> list[Finding]:
