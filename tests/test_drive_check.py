@@ -463,7 +463,9 @@ def test_what_moves_a_slide_is_asked_for_no_rating_of_a_gearbox():
     rack = lm.load("rack-axis-with-play")
     force = float(abs(lm.simulate(rack)["rack_output_force"]).max())
     (found,) = [f for f in check_drive(rack) if f.what == "rack: output force, largest"]
-    assert (found.value, found.verdict) == (f"{force:.4g} N", "unknown")
+    assert found.verdict == "unknown"
+    assert found.value.endswith(" N")
+    assert float(found.value.removesuffix(" N")) == pytest.approx(force, rel=0.01)  # of denser samples
     assert found.remark == "a rack has no rated force here; compare with its data sheet"
 
 
