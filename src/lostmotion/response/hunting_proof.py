@@ -1,8 +1,8 @@
 """Whether a stuck contact hunts from any error: a proof by bounds of the map from break-away to break-away.
 
-With ``T_S = T_C`` the map is a fixed share of the error, the same for all: it is enough to bound it once. With ``T_S > T_C`` it
-does not vanish with the error, so that small errors grow; where it takes a band of errors into itself, no motion that begins in
-it ever rests.
+With ``T_S = T_C`` the map is a fixed share of the error, the same for all: it is enough to bound it once. With ``T_S
+> T_C`` it does not vanish with the error, so that small errors grow. If it maps a band of errors into itself, no
+motion that begins in the band ever rests.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """The map from break-away to break-away of one contact: points of it, and bounds of all its values over an interval.
 
-A slip from the errors ``e + x d``, ``-1 <= x <= 1``, is ``sum of c_k exp(l_k t) (a_k + x b_k + r_k)`` over the modes, with unknown
-``|r_k| <= radius_k`` left by the stuck interval before it. Between two instants a function departs from its chord by no more than
-an eighth of the square of their distance times the largest second derivative, which is bounded by that of each mode at the
-earlier instant. All bounds are widened by what floating point rounds.
+A slip from the errors ``e + x d``, ``-1 <= x <= 1``, is ``sum of c_k exp(l_k t) (a_k + x b_k + r_k)`` over the modes,
+with unknown ``|r_k| <= radius_k`` left by the stuck interval before it. Between two instants a function departs from
+its chord by at most an eighth of the square of their distance, times the largest second derivative. The latter is
+bounded by that of each mode at the earlier instant. All bounds are widened by what floating point rounds.
 """
 
 from __future__ import annotations

@@ -89,11 +89,11 @@ class HuntingCertificate:
 def hunting_certificate(scenario: Scenario, *, largest_error: float | str | None = None) -> HuntingCertificate:
     """Decide by proof whether a stuck contact under integral action hunts.
 
-    While the contact is stuck, the integrator winds up in proportion to the error until the contact breaks away; the slip leaves
-    another error. Slip and stuck interval are linear, and so the map from one error to the next follows exactly from their
-    matrices. A fixed point of it is a limit cycle. The verdict is shown by bounds of the map over intervals of errors: *hunts*
-    if it takes a band of errors into itself that leaves out rest, *does not hunt* if each slip leaves less of its error. The
-    bounds are computed in floating point and widened by what that may round.
+    While the contact is stuck, the integrator winds up in proportion to the error until the contact breaks away; the
+    slip leaves another error. Slip and stuck interval are linear, and so the map from one error to the next follows
+    exactly from their matrices. A fixed point of it is a limit cycle. The verdict follows from bounds of the map over
+    intervals of errors. *Hunts* means that it maps a band of errors without rest into itself. *Does not hunt* means
+    that each slip reduces its error. The bounds are computed in floating point and widened by what that may round.
 
     Parameters
     ----------
