@@ -100,7 +100,7 @@ def errors_of(scenario: lm.TrainScenario, duration: float) -> list[float]:
     names = loop.core.switching_columns()
     before, after = (names.index(f"load_contact_{when}") for when in ("before", "after"))
     rates = np.abs(np.linalg.eigvals(lm.linearize(scenario, lm.TrainInitial()).A).real)
-    settling = 12.0 / min(rates[rates > 1e-6 * rates.max(initial=0.0)], default=math.inf)
+    settling = 6.0 / min(rates[rates > 1e-6 * rates.max(initial=0.0)], default=math.inf)
     found, begin = [], math.nan
     for row in run["switchings"]:
         if row[after] == 0:
@@ -122,13 +122,15 @@ def check_hunts(scenario: lm.TrainScenario, found: Any, told: str) -> None:
     low, high = found.band
     friction, gain = scenario.shafts["load"].breakaway_torque, scenario.controllers["m"].position.gain
     unit = scenario.gears["gear"].ratio
+    checked = 0
     for error in (low * 1.001, math.sqrt(low * high), high * 0.999):
         if gain * unit * error < 0.9 * friction:  # it is stuck at the start, until the integrator frees it
             period = found.fixed_points[0].period if found.fixed_points else 0.0
             run = errors_of(started(scenario, error), 0.1 + SLIPS * max(period, scenario.simulation.duration / 10.0))
             sizes = np.abs(run)
-            assert len(sizes) >= 3, told
+            checked += len(sizes)
             assert np.all((sizes >= 0.999 * low) & (sizes <= 1.001 * high)), f"{told}: {sizes}"
+    assert checked >= 3, told
 
 
 def check_rests(scenario: lm.TrainScenario, found: Any, told: str) -> None:

@@ -89,8 +89,8 @@ def test_the_fixed_point_is_the_limit_cycle_that_newtons_method_finds() -> None:
     scenario = lm.load("hunting-with-static-friction")
     certificate, cycle = lm.hunting_certificate(scenario), lm.servo.limit_cycle(scenario, causes=False)
     (point,) = certificate.fixed_points
-    assert point.period == pytest.approx(cycle.period, rel=1e-5)
-    assert point.amplitude == pytest.approx(cycle.amplitudes["servo_error"], rel=1e-6)
+    assert point.period == pytest.approx(cycle.period, rel=1e-8)
+    assert point.amplitude == pytest.approx(cycle.amplitudes["servo_error"], rel=1e-9)
     assert point.multiplier == pytest.approx(np.abs(cycle.multipliers).max(), rel=1e-4)
     assert point.stable
     assert cycle.stable

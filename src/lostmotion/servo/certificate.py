@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 POINTS = 121  # of the map
 SHOWN = 4.0  # times the largest limit cycle, up to which it is drawn
-BISECTIONS = 50
+SECANTS = 12
 STEP = 1e-4  # relative, of the derivative at a fixed point
 LONGER = 4  # times as long each of the runs is that lead to a stuck interval
 RUNS = 4
@@ -234,27 +234,25 @@ def _map(of: StickSlip, proof: Proof, largest: float) -> list[tuple[float, Image
     return [(float(e), image(of, e, e, none)) for e in np.linspace(0.0, top, POINTS) if e > 0.0 or of.excess > 0.0]
 
 
-def _left(of: StickSlip, error: float) -> float:
-    found = image(of, error, error, Transients.none(of))
-    return math.nan if found.reason else found.middle
-
-
 def _fixed_points(of: StickSlip, points: list[tuple[float, Image]]) -> list[FixedPoint]:
-    """Errors of which a slip leaves the same error of the other sign."""
-    found = []
+    """Errors of which a slip leaves the same of the other sign."""
     sums = [math.nan if i.reason else i.middle + e for e, i in points]
-    for k in np.flatnonzero(np.diff(np.sign(sums))):
-        low, high = points[k][0], points[k + 1][0]
-        if not sums[k] * sums[k + 1] <= 0.0:
-            continue
-        for _ in range(BISECTIONS):
-            middle = 0.5 * (low + high)
-            below = (_left(of, middle) + middle) * sums[k] > 0.0
-            low, high = (middle, high) if below else (low, middle)
-        one = image(of, low, low, Transients.none(of))
-        slope = (_left(of, low * (1.0 + STEP)) - _left(of, low * (1.0 - STEP))) / (2.0 * STEP * low)
-        found.append(FixedPoint(low, sum(one.slip) + sum(one.stuck), slope * slope))
-    return found
+    brackets = [k for k in np.flatnonzero(np.diff(np.sign(sums))) if sums[k] * sums[k + 1] <= 0.0]
+    return [_fixed_point(of, points[k][0], points[k + 1][0], sums[k], sums[k + 1]) for k in brackets]
+
+
+def _fixed_point(of: StickSlip, a: float, b: float, at_a: float, at_b: float) -> FixedPoint:
+    """A fixed point between two errors, by secants, with the transients that one stuck interval hands to the next slip."""
+    low, high, slope, left = a, b, (at_b - at_a) / (b - a), Transients.none(of)
+    for _ in range(SECANTS):
+        error = min(max(b - at_b / slope, low), high)
+        found = image(of, error, error, left)
+        beside = image(of, error * (1.0 + STEP), error * (1.0 + STEP), left)
+        if found.reason or beside.reason:
+            break
+        slope = 1.0 + (beside.middle - found.middle) / (STEP * error)
+        b, at_b, left = error, found.middle + error, Transients(found.left.middle, 0.0 * found.left.radius)
+    return FixedPoint(error, sum(found.slip) + sum(found.stuck), (slope - 1.0) ** 2)
 
 
 def _dataset(of: StickSlip, points: list[tuple[float, Image]], verdict: str, train: TrainScenario) -> xarray.Dataset:
