@@ -96,6 +96,13 @@ def test_bad_input_is_refused_with_the_keys_of_the_short_form(tables: dict[str, 
     assert message in str(refused.value)
 
 
+def test_a_rigid_gear_without_backlash_stays_in_the_short_form() -> None:
+    """Also with the values that are left out, as a scenario's own tables have them."""
+    scenario = scenario_from(short(stiffness={"kind": "rigid"}))
+    assert isinstance(scenario, lm.simulation.DriveScenario)
+    assert scenario_from(scenario.model_dump()) == scenario
+
+
 def test_the_constructor_names_the_way_to_a_given_motion() -> None:
     with pytest.raises(lm.InputError, match=r"key load.speed: a given motion requires a drive train; read the file by"):
         lm.Scenario(**short({"speed": 1.0}))

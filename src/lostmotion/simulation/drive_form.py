@@ -32,9 +32,9 @@ def drive_from_tables(tables: Mapping[str, Any]) -> Scenario:
     """
     controller, load, gearbox = (_table(tables, key) for key in ("controller", LOAD, GEARBOX))
     continuous = controller.get("kind") == "continuous"
-    given = {key: load[key] for key in GIVEN if key in load}
+    given = {key: load[key] for key in GIVEN if load.get(key) is not None}
     stiffness = _table(gearbox, "stiffness")
-    strikes = stiffness.get("kind") == "rigid" and not {"backlash", "restitution"}.isdisjoint(stiffness)
+    strikes = stiffness.get("kind") == "rigid" and bool(stiffness.get("backlash") or stiffness.get("restitution"))
     if not (continuous or given or strikes):
         return from_tables(tables)
     if continuous:
