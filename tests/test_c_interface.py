@@ -99,6 +99,10 @@ class Train:
             both = doubles(g.losses.efficiencies()) if hasattr(g.losses, "efficiencies") else None
             parameters = self.parameters(g, "gearbox")
             self.add("lm_add_gear", name, g.input, g.output, *parameters, curve, None, both, None)
+            if g.mesh_stiffness is not None:
+                period, angles, factors = g.mesh_stiffness.curve()
+                mesh = PeriodicCurve(period, doubles(angles), doubles(factors), len(angles))
+                self.add("lm_set_mesh_stiffness", name, c.byref(mesh))
         for name, b in train.brakes.items():
             self.add("lm_add_brake", name, b.shaft, b.torque, b.breakaway_torque or 0.0)
         for name, k in train.clutches.items():
@@ -242,6 +246,16 @@ def test_clutches_freewheels_and_torques_over_an_angle_have_the_bits_of_python(l
             "b": {"inertia": 0.02},
             "c": {"inertia": 0.03, "friction_torque": 0.05},
             "d": {"inertia": 0.2, "viscous_friction": 0.4, "torque": 0.0},
+            "e": {"inertia": 0.01},
+        },
+        gears={
+            "mesh": {
+                "input": "d",
+                "output": "e",
+                "ratio": 2.0,
+                "stiffness": {"kind": "linear", "stiffness": 5.0},
+                "mesh_stiffness": {"teeth": 60, "pairs": [[0.0, 1.0], [0.4, 0.5], [0.7, 0.8]], "phase": 0.03},
+            }
         },
         motors={"motor": {"shaft": "a", "kind": "torque_source", "rated_torque": 4.0, "rotor_inertia": 0.01}},
         clutches={

@@ -32,6 +32,7 @@ GAP = {"kind": "curve", "backlash": 0.1, "slopes": [100.0]}
 PIVOT = {"kind": "linear", "stiffness": 5.0}
 STOPS = {"kind": "curve", "backlash": 0.4, "slopes": [20.0, 80.0], "breaks": [0.05]}
 ERROR = {"kind": "sine", "amplitude": 1e-3, "order": 5, "error": 1e-5}
+PAIRS = {"teeth": 24, "contact_ratio": 1.4, "fewer_pairs": 0.6}
 ELEMENTS = {
     "brake": two_shafts(
         gears={"g": SOFT},
@@ -67,6 +68,15 @@ ELEMENTS = {
     "spring": two_shafts(gears={"g": SOFT}, springs={"pivot": {"shaft": "b", "stiffness": PIVOT, "rest_angle": 0.3}}),
     "end stops": two_shafts(gears={"g": SOFT}, springs={"stops": {"shaft": "b", "stiffness": STOPS}}),
     "transmission error": two_shafts(gears={"g": SOFT | {"mesh_damping": 0.01, "transmission_error": ERROR}}),
+    "mesh stiffness": two_shafts(gears={"g": SOFT | {"mesh_damping": 0.01, "mesh_stiffness": PAIRS}}),
+    "mesh stiffness with play": two_shafts(
+        gears={"g": SOFT | {"stiffness": GAP, "mesh_damping": 0.2, "mesh_stiffness": PAIRS}},
+        shafts={"b": {"inertia": 2e-3, "torque": 0.0, "friction_torque": 0.05}},
+    ),
+    "mesh stiffness with hysteresis": two_shafts(
+        gears={"g": SOFT | {"hysteresis": {"efficiency": 0.8}, "mesh_stiffness": PAIRS}},
+        shafts={"a": {"inertia": 1e-3, "friction_torque": 0.02}},
+    ),
     "housing": two_shafts(
         gears={
             "g": SOFT | {"housing": "h", "stiffness": GAP, "mesh_damping": 0.01},

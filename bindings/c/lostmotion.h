@@ -162,7 +162,7 @@ typedef struct {
     size_t n_breaks;
 } lm_curve;
 
-/* Values over the angle, by straight lines through the points, repeating with the period. */
+/* Values over the angle, repeating with the period: by straight lines through the points, if nothing else is said. */
 typedef struct {
     double period;
     const double* angles;
@@ -203,6 +203,10 @@ LM_API int lm_add_gear(lm_train* train, const char* name, const char* input, con
 /* Limits the torque of the mesh damping of a gear with backlash to that of its spring, so that no torque jumps where
  * flanks meet. LM_INVALID: there is none of that name. */
 LM_API int lm_limit_mesh_damping(lm_train* train, const char* gear);
+/* Scales the stiffness of a gear by a factor over the angle of its input shaft, as more and fewer pairs of teeth mesh:
+ * factors.values[k] > 0 holds from factors.angles[k] on to the next angle. LM_INVALID: there is no gear of that name.
+ */
+LM_API int lm_set_mesh_stiffness(lm_train* train, const char* gear, const lm_periodic_curve* factors);
 /* Makes a slide of a shaft: its inertia is a mass [kg], its angle a position [m], torques on it are forces [N], and
  * results have the names "<name>_position" and "<name>_load_force". The ratio of a screw of lead p that drives it is 2
  * pi/p. LM_INVALID: there is none of that name. */

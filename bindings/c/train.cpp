@@ -189,6 +189,15 @@ int lm_limit_mesh_damping(lm_train* train, const char* gear) {
     });
 }
 
+int lm_set_mesh_stiffness(lm_train* train, const char* gear, const lm_periodic_curve* factors) {
+    return train->attempt([&] {
+        for (lm::model::Gear& g : train->description.train.gears)
+            if (g.name == text(gear))
+                return read(*factors, "gear '" + text(gear) + "': mesh stiffness", g.mesh_stiffness);
+        return "there is no gear '" + text(gear) + "'";
+    });
+}
+
 int lm_set_slide(lm_train* train, const char* shaft) {
     return train->attempt([&] {
         for (lm::model::Shaft& s : train->description.train.shafts)

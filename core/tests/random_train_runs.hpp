@@ -351,7 +351,7 @@ struct LawTally {
 // Nothing of it tells forward from backward.
 inline bool is_symmetric(const Train& t) {
     return t.angle_torques.empty() && t.freewheels.empty() &&
-           std::none_of(t.gears.begin(), t.gears.end(), [](const Gear& g) { return g.transmission_error.present(); });
+           std::none_of(t.gears.begin(), t.gears.end(), [](const Gear& g) { return g.over_angle(); });
 }
 // What it turns into heat is nowhere negative: a constant efficiency gives energy where the load drives.
 inline bool loses_only(const Train& t) {

@@ -9,8 +9,8 @@ namespace lostmotion::model {
 class RandomTrains {
  public:
     // housings: those of some gears turn; such a train may not be possible. dampers: between some shafts.
-    explicit RandomTrains(unsigned seed, bool housings = false, bool dampers = false)
-        : housings_(housings), dampers_(dampers), random_(seed) {}
+    explicit RandomTrains(unsigned seed, bool housings = false, bool dampers = false, bool meshes = false)
+        : housings_(housings), dampers_(dampers), meshes_(meshes), random_(seed) {}
 
     double uniform(double a, double b) { return std::uniform_real_distribution<double>(a, b)(random_); }
     double spread(double a, double b) { return std::exp(uniform(std::log(a), std::log(b))); }
@@ -118,6 +118,7 @@ class RandomTrains {
         for (Gear& g : t.gears)
             if (g.housing >= 0) g.law.viscous_friction = 0.02 * g.law.ratio;
         if (dampers_) put_dampers(t);
+        if (meshes_) put_meshes(t);
         return t;
     }
 
@@ -147,6 +148,7 @@ class RandomTrains {
             const double torque = spread(0.05, 10.0);
             t.brakes.push_back({"brake", pick(0, shafts - 1), torque, coin() ? torque * uniform(1.0, 2.0) : 0.0});
         }
+        if (meshes_) put_meshes(t);
         return t;
     }
 
@@ -310,7 +312,22 @@ class RandomTrains {
         }
     }
 
-    bool housings_, dampers_;
+    // Stiffnesses with two to four values in a period of a fiftieth to a fifth of a turn.
+    void put_meshes(Train& t) {
+        for (Gear& g : t.gears) {
+            if (g.law.compliance == Gearbox::rigid) continue;
+            const double period = spread(0.02, 0.2) * 2.0 * pi;
+            // Not at the angle 0, where a shaft at rest could have the torque of either side.
+            std::vector<double> angles{uniform(0.1, 0.3) * period}, factors{uniform(0.4, 1.0)};
+            for (int n = pick(1, 3); n > 0; --n) {
+                angles.push_back(angles.back() + uniform(0.2, 0.8) * (period - angles.back()));
+                factors.push_back(uniform(0.4, 1.0));
+            }
+            g.mesh_stiffness = PeriodicCurve(period, std::move(angles), std::move(factors));
+        }
+    }
+
+    bool housings_, dampers_, meshes_;
     std::mt19937_64 random_;
 };
 

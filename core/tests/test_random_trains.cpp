@@ -44,6 +44,27 @@ TEST_CASE("both solvers agree on trains with hysteresis beside contacts at rest,
     CHECK(tally.jammed == 0);
 }
 
+TEST_CASE("both solvers agree on random trains whose mesh stiffness steps over the angle, and their energies balance") {
+    SolverTally tally;
+    LawTally laws;
+    RandomTrains random(71, false, false, true), braked(72, false, false, true);
+    for (int n = 0; n < cases(600); ++n) {
+        CAPTURE(n);
+        compare_solvers(random, 4, 0.5, tally, ("meshes 71 " + std::to_string(n)).c_str());
+        check_laws(random, 4, 0.4, laws, ("meshes 71 " + std::to_string(n)).c_str());
+        const Train t = braked.braked(braked.pick(2, 3));
+        compare_solvers({t, braked.signals(Assembly(named(t)), 0.5)}, {}, 0.5, tally,
+                        ("meshes 72 " + std::to_string(n)).c_str());
+    }
+    MESSAGE(tally.compared << " trains compared, largest difference " << tally.worst << "; " << tally.undecided
+                           << " that the adaptive solver does not settle, " << tally.forked << " with two motions, "
+                           << tally.outlasted << " that the adaptive solver follows for a time, " << tally.jammed
+                           << " that jam; largest residual " << laws.residual);
+    CHECK(tally.compared > share(1150));
+    CHECK(tally.failed() == 0);
+    CHECK(laws.failed() == 0);
+}
+
 struct BrakedTrain {
     Train train;
     std::vector<Signal> inputs;

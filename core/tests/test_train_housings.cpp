@@ -249,7 +249,7 @@ TEST_CASE("what is not possible with a housing that turns is refused in one line
     const auto refused = [&](auto&& change, const char* words) {
         Train wrong = named(t);
         change(wrong);
-        CHECK(check(wrong).find(words) != std::string::npos);
+        CHECK(check(wrong).reason.find(words) != std::string::npos);
     };
     refused([](Train& w) { w.gears[0].housing = 1; }, "give the housing a shaft of its own");
     refused([](Train& w) { w.gears[0].housing = 7; }, "which the train does not have");

@@ -182,20 +182,27 @@ TEST_CASE("a pendulum held by friction stays; once it slips, chords and sine dif
     }
 }
 
-// The slope of the error, and with it the torque at the input, (1 - e') T_2, jumps there: T_2 = 10 N m takes 11 N m
-// ahead of the corner and 9 N m behind it.
+// What the input takes of 10 N m steps at 0 or h of each period 2h: from 9 N m behind to 11 N m ahead, as the slope of
+// the transmission error jumps, (1 - e') T_2, or the stiffness of the mesh.
+void put_step(Gear& g, bool mesh, double h, bool at_zero = false) {
+    if (mesh)
+        g.mesh_stiffness = PeriodicCurve(2.0 * h, {0.0, h}, {at_zero ? 1.1 : 0.9, at_zero ? 0.9 : 1.1});
+    else
+        g.transmission_error = PeriodicCurve(2.0 * h, {0.0, h}, {at_zero ? 0.1 * h : 0.0, at_zero ? 0.0 : 0.1 * h});
+}
+
 TEST_CASE("a shaft at rest on a corner of a transmission error stays as either side of it can hold it") {
-    const auto run = [](double motor, double corner, double tolerance) {
+    bool mesh = false;
+    SUBCASE("transmission error") {}
+    SUBCASE("mesh stiffness") { mesh = true; }
+    const auto run = [mesh](double motor, double corner, double tolerance) {
         Train t;
         t.shafts = {shaft(1.0), shaft(1.0)};
         t.shafts[0].friction.torque = 1.0;
         t.shafts[1].friction.torque = 1e3;
         t.motors = {torque_motor(0)};
         t.gears = {spring(0, 1, 1.0, TorsionCurve({}, {100.0}))};
-        // A peak at the corner.
-        constexpr double h = 0.7;
-        const double at_zero = corner == 0.0 ? 0.1 * h : 0.0;
-        t.gears[0].transmission_error = PeriodicCurve(2.0 * h, {0.0, h}, {at_zero, 0.1 * h - at_zero});
+        put_step(t.gears[0], mesh, 0.7, corner == 0.0);
         const Assembly a(t);
         std::vector<double> x(static_cast<std::size_t>(a.layout().states));
         x[static_cast<std::size_t>(a.places().gears[0].twist)] = 0.1;
@@ -225,15 +232,17 @@ TEST_CASE("a shaft at rest on a corner of a transmission error stays as either s
 // pushes it to the other. Of all accelerations a, the principle of least constraint takes the one that makes
 // a^2/2 - 10 a + 0.5 |a| + (9 or 11) a least: none from 8.5 to 11.5 N m of the motor, beyond that what is left over.
 TEST_CASE("a shaft that both sides of a corner of a transmission error push back rests on it") {
-    const auto run = [](const Signal& motor, double angle, double tolerance, double duration) {
+    bool mesh = false;
+    SUBCASE("transmission error") {}
+    SUBCASE("mesh stiffness") { mesh = true; }
+    const auto run = [mesh](const Signal& motor, double angle, double tolerance, double duration) {
         Train t;
         t.shafts = {shaft(1.0), shaft(1.0)};
         t.shafts[0].friction.torque = 0.5;
         t.shafts[1].friction.torque = 1e3;
         t.motors = {torque_motor(0)};
         t.gears = {spring(0, 1, 1.0, TorsionCurve({}, {1e-3}))};
-        constexpr double h = 0.7;
-        t.gears[0].transmission_error = PeriodicCurve(2.0 * h, {0.0, h}, {0.0, 0.1 * h});
+        put_step(t.gears[0], mesh, 0.7);
         const Assembly a(t);
         std::vector<double> x(static_cast<std::size_t>(a.layout().states));
         x[static_cast<std::size_t>(a.places().gears[0].twist)] = 1e4;
@@ -268,6 +277,9 @@ TEST_CASE("a shaft that both sides of a corner of a transmission error push back
 // It slides to the corner with 0.5 rad/s^2 and is braked behind it with 1.5: each time it goes a third as far, and
 // after infinitely many passages it rests there. The times are a geometric series.
 TEST_CASE("a shaft comes to rest on a corner of a transmission error that pushes it back from both sides") {
+    bool mesh = false;
+    SUBCASE("transmission error") {}
+    SUBCASE("mesh stiffness") { mesh = true; }
     Train t;
     t.shafts = {shaft(1.0), shaft(1.0)};
     t.shafts[0].friction.torque = 0.5;
@@ -275,7 +287,7 @@ TEST_CASE("a shaft comes to rest on a corner of a transmission error that pushes
     t.motors = {torque_motor(0)};
     t.gears = {spring(0, 1, 1.0, TorsionCurve({}, {1e-6}))};
     constexpr double h = 0.7, off = 0.01;
-    t.gears[0].transmission_error = PeriodicCurve(2.0 * h, {0.0, h}, {0.0, 0.1 * h});
+    put_step(t.gears[0], mesh, h);
     const Assembly a(t);
     std::vector<double> x(static_cast<std::size_t>(a.layout().states));
     x[static_cast<std::size_t>(a.places().gears[0].twist)] = 1e7;

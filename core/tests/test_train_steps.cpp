@@ -56,6 +56,16 @@ TEST_CASE("the exact solver follows what time stepping converges to, on random t
     CHECK(tally.wrong == 0);
 }
 
+TEST_CASE("the exact solver follows what time stepping converges to, where the mesh stiffness steps over the angle") {
+    RandomTrains random(63, false, false, true);
+    SteppingTally tally;
+    for (int n = 0; n < 60; ++n) compare_with_steps(random, 3, 0.4, 1000, tally, std::to_string(n).c_str());
+    MESSAGE(tally.compared << " trains compared, " << tally.undecided << " undecided, " << tally.open
+                           << " whose break-away rigid bodies leave open; largest difference " << tally.worst);
+    CHECK(tally.compared > 50);
+    CHECK(tally.wrong == 0);
+}
+
 }  // namespace lostmotion::model
 
 TEST_SUITE_END();

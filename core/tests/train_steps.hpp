@@ -194,6 +194,14 @@ class TrainSteps {
         if (gear(g).housing >= 0) f.c[at(gear(g).housing)] += 1.0 - 1.0 / gear(g).law.ratio + error_slope(g);
         return f;
     }
+    // Of the stiffness, in the middle of the step.
+    double factor(int g) const {
+        const PeriodicCurve& mesh = gear(g).mesh_stiffness;
+        if (!mesh.present()) return 1.0;
+        const double phi = relative(g, angle) + 0.5 * h_ * relative(g, speed);
+        return mesh.value(mesh.piece(phi - mesh.turn(phi)));
+    }
+    double spring(int g, double d) const { return factor(g) * gear(g).law.curve.torque(d); }
     bool has_gap(int g) const { return gear(g).law.curve.torque(1e-12) == 0.0; }
     void choose_flanks() {
         for (int g = 0; g < gears(); ++g) {
@@ -201,7 +209,7 @@ class TrainSteps {
             modes_.flanks[at(g)] = has_gap(g) && gear(g).law.curve.torque(twist[at(g)]) == 0.0 ? 0 : 1;
             if (modes_.flanks[at(g)] == 0 || !has_gap(g)) continue;
             const double rate = value(twist_rate(g), speed);
-            const double P = gear(g).law.curve.torque(twist[at(g)]);
+            const double P = spring(g, twist[at(g)]);
             const double damping = gear(g).mesh_damping * rate;
             if (P * (P + damping) < 0.0) modes_.flanks[at(g)] = -1;
             if (gear(g).damping_limited && P * (damping - P) > 0.0) modes_.flanks[at(g)] = 2;
@@ -217,14 +225,14 @@ class TrainSteps {
         const Linear rate = twist_rate(g);
         // The slope of the curve in the direction in which the twist goes is found by one small difference.
         constexpr double small = 1e-9;
-        const double P = e.law.curve.torque(twist[at(g)]);
+        const double P = spring(g, twist[at(g)]);
         const double way = value(rate, speed) >= 0.0 ? small : -small;
         f.one = P;
-        f.add(rate, h_ * (e.law.curve.torque(twist[at(g)] + way) - P) / way);
+        f.add(rate, h_ * (spring(g, twist[at(g)] + way) - P) / way);
         if (m.flanks[at(g)] == 1) f.add(rate, e.mesh_damping);
         if (m.flanks[at(g)] == 2) {
             f.one += f.one;
-            f.add(rate, h_ * (e.law.curve.torque(twist[at(g)] + way) - P) / way);
+            f.add(rate, h_ * (spring(g, twist[at(g)] + way) - P) / way);
         }
         if (contact >= 0) f.add(torque_of(contact), 1.0);
         return f;
@@ -483,8 +491,7 @@ class TrainSteps {
             if (k < 0 || gear(g).law.compliance == Gearbox::rigid) continue;
             const int now = direction(g);
             if (direction_[at(g)] == 0 || now == direction_[at(g)]) continue;
-            capacity[at(g)] =
-                0.5 * (1.0 - gear(g).law.hysteresis_efficiency) * std::fabs(gear(g).law.curve.torque(twist[at(g)]));
+            capacity[at(g)] = 0.5 * (1.0 - gear(g).law.hysteresis_efficiency) * std::fabs(spring(g, twist[at(g)]));
             direction_[at(g)] = 0;
             any = true;
         }

@@ -44,13 +44,16 @@ void ResetTangent::tied_speeds(const std::int8_t* modes, const double* x, double
     }
 }
 
-void ResetTangent::capacity(std::size_t gear, double twist, double* to) const {
+void ResetTangent::capacity(std::size_t gear, double twist, const model::Key& key, double* to) const {
     const model::Assembly& a = trains_.base();
     const int row = a.layout().first_memory + a.places().gears[gear].hysteresis;
-    const double own = a.train().gears[gear].law.hysteresis_capacity(twist);
+    const auto of = [&](const model::Assembly& one) {
+        return one.stiffness_factor(static_cast<int>(gear), key) *
+               one.train().gears[gear].law.hysteresis_capacity(twist);
+    };
+    const double own = of(a);
     for (const VariedTrain::Beside& b : trains_.beside())
-        to[row * parameters_ + b.parameter] +=
-            b.weight * (b.assembly().train().gears[gear].law.hysteresis_capacity(twist) - own);
+        to[row * parameters_ + b.parameter] += b.weight * (of(b.assembly()) - own);
 }
 
 void ResetTangent::turn(const RegimeTangent& before, std::size_t guard, double* to) const {

@@ -50,7 +50,7 @@ class ResetTangent {
     // Speeds that the contacts at rest tie to others. x: of before.
     void tied_speeds(const std::int8_t* modes, const double* x, double* to) const;
     // At a turning point of the twist of a gear.
-    void capacity(std::size_t gear, double twist, double* to) const;
+    void capacity(std::size_t gear, double twist, const model::Key& key, double* to) const;
     // Where an angle begins another turn.
     void turn(const RegimeTangent& before, std::size_t guard, double* to) const;
     // A locked torque that a regime gives: of what is set anew beside it, `to` has the derivatives already.

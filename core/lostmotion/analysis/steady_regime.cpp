@@ -45,7 +45,7 @@ SteadyRegime steady_regime(model::Train train, const SteadyMotion& motion) {
     model::Train::each_kind(train, [](const char*, const char*, auto& elements) {
         std::erase_if(elements, [](const auto& e) { return model::on_shaft(e)->over_angle(); });
     });
-    for (model::Gear& g : train.gears) g.transmission_error = {};
+    for (model::Gear& g : train.gears) g.transmission_error = g.mesh_stiffness = {};
     const model::Assembly a(std::move(train));
     const model::Regime r = a.build(key_of(a, motion));
     const int n = a.layout().coupled;

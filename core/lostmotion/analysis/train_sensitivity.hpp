@@ -274,7 +274,7 @@ class TrainSensitivity final : public TrainWatcher<D> {
             const model::GearPlace& p = a.places().gears[g];
             if (p.hysteresis == model::nowhere || r.before.at_rest[p.contact]) continue;
             if (model::kept_at_rest(a.places().contacts[static_cast<std::size_t>(p.contact)], now))
-                resets_.capacity(g, left_w[p.twist], to);
+                resets_.capacity(g, left_w[p.twist], r.before.key, to);
         }
         if (w.guard >= 0) resets_.turn(old, static_cast<std::size_t>(w.guard), to);
         enter(r.after);

@@ -31,12 +31,12 @@ std::vector<CapacityShare> contact_capacity(const Assembly& a, int contact, cons
         std::vector<CapacityShare> shares =
             shaft_capacity(a, c.a, r.at_rest[contact] ? 0.0 : now.x[a.places().shafts[k].speed], now, T_2);
         for (std::size_t g = 0; g < a.train().gears.size(); ++g) {
-            const int corner = a.places().gears[g].error_corner;
-            const int side = corner == nowhere || a.train().gears[g].input != c.a ? 0 : r.key.branch[corner];
-            if (side == 0 || r.key.modes[contact] != 0) continue;
-            const double more =
-                side * evaluate(a.layout(), a.beyond_corner(static_cast<int>(g), r.key, r.output_torque[g]), now);
-            shares.push_back({a.train().gears[g].name, side > 0 ? more : 0.0, side < 0 ? more : 0.0});
+            const Gear& gear = a.train().gears[g];
+            if (gear.input != c.a || !gear.over_angle() || r.key.modes[contact] != 0) continue;
+            const auto more = [&](int way) {
+                return evaluate(a.layout(), a.beyond_corner(static_cast<int>(g), way, r.key, r.output_torque[g]), now);
+            };
+            if (more(+1) != 0.0 || more(-1) != 0.0) shares.push_back({gear.name, more(+1), more(-1)});
         }
         return shares;
     }

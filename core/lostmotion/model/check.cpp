@@ -116,6 +116,7 @@ Fault TrainCheck::elements() const {
         if (Fault error = too_fine(name + "with its transmission error ", g.transmission_error.pieces());
             !error.empty())
             return error;
+        if (Fault error = mesh_stiffness(g, name); !error.empty()) return error;
         if (g.law.losses == Gearbox::loss_map)
             if (const std::size_t cells = 2 * g.law.map.speeds().size() * g.law.map.loads().size();
                 cells > static_cast<std::size_t>(max_pieces))
@@ -144,6 +145,17 @@ Fault TrainCheck::elements() const {
                 return shaft(static_cast<int>(s)) + "has a friction curve whose speeds do not rise";
     }
     return {};
+}
+
+Fault TrainCheck::mesh_stiffness(const Gear& g, const Fault& name) const {
+    const PeriodicCurve& mesh = g.mesh_stiffness;
+    if (!mesh.present()) return {};
+    if (g.law.compliance == Gearbox::rigid)
+        return name + "has a mesh stiffness over the angle and no stiffness, which it scales; give it one";
+    for (int k = 0; k < mesh.pieces(); ++k)
+        if (!(mesh.value(k) > 0.0) || !std::isfinite(mesh.value(k)))
+            return name + "has a mesh stiffness of " + std::to_string(mesh.value(k)) + " times its own; it must be > 0";
+    return too_fine(name + "with its mesh stiffness ", mesh.pieces());
 }
 
 Fault TrainCheck::flanks(const Gear& g, const Fault& name) const {

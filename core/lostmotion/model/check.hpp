@@ -59,6 +59,7 @@ class TrainCheck {
 
     // Mass matrices: their shafts, sizes, symmetry and eigenvalues.
     Fault mass_matrices() const;
+    Fault mesh_stiffness(const Gear& g, const Fault& name) const;
     // Rigid flanks with backlash, and what there may be beside them.
     Fault flanks(const Gear& g, const Fault& name) const;
     Fault inertias() const;

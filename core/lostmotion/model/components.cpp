@@ -25,10 +25,11 @@ std::vector<PeriodicAngle> periodic_angles(const Assembly& a) {
             if (e->turn != nowhere && e->shaft == angle.shaft) angle.turns.push_back({e->turn, e->period()});
         for (std::size_t g = 0; g < train.gears.size(); ++g) {
             const Gear& gear = train.gears[g];
-            if (!gear.transmission_error.present()) continue;
-            const PeriodicAngle::Turn turn{a.places().gears[g].error_turn, gear.transmission_error.period()};
-            if (gear.input == angle.shaft) angle.turns.push_back(turn);
-            if (gear.housing == angle.shaft) angle.turns.push_back({turn.memory, turn.period, -1.0});
+            a.places().gears[g].each_over_angle(gear, [&](const PeriodicCurve& curve, const OverAngle& law) {
+                const PeriodicAngle::Turn turn{law.turn, curve.period()};
+                if (gear.input == angle.shaft) angle.turns.push_back(turn);
+                if (gear.housing == angle.shaft) angle.turns.push_back({turn.memory, turn.period, -1.0});
+            });
         }
         std::vector<double> periods;
         for (const PeriodicAngle::Turn& t : angle.turns) periods.push_back(t.period);

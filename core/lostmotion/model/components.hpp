@@ -15,7 +15,7 @@ namespace lostmotion::model {
 // longest.
 double common_period(const std::vector<double>& periods);
 
-// An angle that torques or a transmission error depend on.
+// An angle that torques, or laws of a gear, depend on.
 struct PeriodicAngle {
     struct Turn {
         int memory;
@@ -133,6 +133,7 @@ class ComponentLaws<model::TrainSystem<D>> {
             if (!model::kept_at_rest(contacts()[p.contact], t)) continue;
             jump.row[D::states + p.hysteresis] = {};
             jump.row[D::states + p.hysteresis][p.twist] =
+                assembly_.stiffness_factor(static_cast<int>(g), r.before.key) *
                 assembly_.train().gears[g].law.hysteresis_capacity_slope(r.x[p.twist]);
         }
         ResetRatesOf<D> rates;

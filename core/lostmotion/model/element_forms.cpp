@@ -4,24 +4,42 @@ namespace lostmotion::model {
 
 double ElementForms::per_input(int gear, const Key& key) const {
     const Gear& g = train_.gears[gear];
-    const int k = places_.gears[gear].error_piece;
+    const int k = places_.gears[gear].error.piece;
     return k == nowhere ? 1.0 / g.law.ratio : 1.0 / g.law.ratio - g.transmission_error.slope(key.branch[k]);
 }
 
-auto ElementForms::error_angle(int gear) const -> Row {
+auto ElementForms::input_angle(int gear) const -> Row {
     const Gear& g = train_.gears[gear];
     Row angle = terms_.state(places_.shafts[g.input].angle);
     if (g.housing != nowhere) angle -= terms_.state(places_.shafts[g.housing].angle);
     return angle;
 }
 
-auto ElementForms::beyond_corner(int gear, const Key& key, const Row& T_2) const -> Row {
+auto ElementForms::beyond_corner(int gear, int way, const Key& key, const Row& T_2) const -> Row {
     const Gear& g = train_.gears[gear];
     const GearPlace& p = places_.gears[gear];
-    const PeriodicCurve& e = g.transmission_error;
-    const int k = key.branch[p.error_piece], n = e.pieces();
-    const double more = e.slope(k) - e.slope((k + key.branch[p.error_corner] + n) % n);
-    return more / (g.law.losses == Gearbox::constant_efficiency ? g.law.efficiency : 1.0) * T_2;
+    const double efficiency = g.law.losses == Gearbox::constant_efficiency ? g.law.efficiency : 1.0;
+    const auto beyond = [way](const PeriodicCurve& curve, int k) {
+        return (k + way + curve.pieces()) % curve.pieces();
+    };
+    const auto rests = [&](const OverAngle& law) { return law.corner != nowhere && key.branch[law.corner] == way; };
+    Row more;
+    if (rests(p.error)) {
+        const PeriodicCurve& e = g.transmission_error;
+        const int k = key.branch[p.error.piece];
+        more = static_cast<double>(way) * (e.slope(k) - e.slope(beyond(e, k))) / efficiency * T_2;
+    }
+    if (rests(p.mesh)) {
+        const PeriodicCurve& s = g.mesh_stiffness;
+        const int k = key.branch[p.mesh.piece];
+        more += way * (s.value(beyond(s, k)) / s.value(k) - 1.0) / efficiency / g.law.ratio * spring_torque(gear, key);
+    }
+    return more;
+}
+
+double ElementForms::stiffness_factor(int gear, const Key& key) const {
+    const int branch = places_.gears[gear].mesh.piece;
+    return branch == nowhere ? 1.0 : train_.gears[gear].mesh_stiffness.value(key.branch[branch]);
 }
 
 auto ElementForms::contact_speed(int contact) const -> Row {
@@ -43,7 +61,9 @@ auto ElementForms::spring_torque(int gear, const Key& key) const -> Row {
     const Gear& g = train_.gears[gear];
     if (g.rigid() || g.strikes()) return Row{};
     const int piece = key.branch[places_.gears[gear].piece];
-    return terms_.state(places_.gears[gear].twist, g.law.curve.slope(piece)) + terms_.one(g.law.curve.offset(piece));
+    const double factor = stiffness_factor(gear, key);
+    return terms_.state(places_.gears[gear].twist, factor * g.law.curve.slope(piece)) +
+           terms_.one(factor * g.law.curve.offset(piece));
 }
 
 auto ElementForms::motor_terms(int motor) const -> Motor::Terms {

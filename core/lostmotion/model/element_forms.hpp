@@ -25,11 +25,32 @@ class ElementForms {
     double per_input(int gear, const Key& key) const;
     // The same for the speed of the housing.
     double per_housing(int gear, const Key& key) const { return 1.0 - per_input(gear, key); }
-    // The angle that the transmission error depends on: of the input, relative to the housing.
-    Row error_angle(int gear) const;
-    // Where the input shaft rests on a corner of the transmission error: by how much the torque that it takes on the
-    // other side differs from that of this piece, times the output torque T_2.
-    Row beyond_corner(int gear, const Key& key, const Row& T_2) const;
+    // The angle that laws of the gear depend on: of the input, relative to the housing.
+    Row input_angle(int gear) const;
+    // Where the input shaft rests on a corner of such a law, at the end of its piece in the direction `way`: by how
+    // much the torque that the shaft takes on the other side exceeds that of this piece, at the output torque T_2.
+    Row beyond_corner(int gear, int way, const Key& key, const Row& T_2) const;
+    // Of the stiffness, over the angle of the input shaft.
+    double stiffness_factor(int gear, const Key& key) const;
+    // The pieces of the stiffness over the angles of a state.
+    template <class State>
+    Key meshes_at(const State& x) const {
+        Key key;
+        for (std::size_t g = 0; g < train_.gears.size(); ++g)
+            if (const int branch = places_.gears[g].mesh.piece; branch != nowhere) {
+                const PeriodicCurve& mesh = train_.gears[g].mesh_stiffness;
+                const double phi = angle_of_input(g, x);
+                key.branch[static_cast<std::size_t>(branch)] =
+                    static_cast<std::int16_t>(mesh.piece(phi - mesh.turn(phi)));
+            }
+        return key;
+    }
+    template <class State>
+    double angle_of_input(std::size_t gear, const State& x) const {
+        const Gear& g = train_.gears[gear];
+        const double phi = x[places_.shafts[g.input].angle];
+        return g.housing == nowhere ? phi : phi - x[places_.shafts[g.housing].angle];
+    }
     // The speed of a contact, as a form.
     Row contact_speed(int contact) const;
     Row twist_rate(int gear, const Key& key) const;

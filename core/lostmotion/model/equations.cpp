@@ -75,7 +75,7 @@ void Equations::compose_gear(int gear, const Key& key, Regime& r, std::vector<Ro
 
     Row& T_1 = r.input_torque[gear];
     T_1 = T_2 / i;
-    if (p.error_piece != nowhere) T_1 -= g.transmission_error.slope(key.branch[p.error_piece]) * T_2;
+    if (p.error.piece != nowhere) T_1 -= g.transmission_error.slope(key.branch[p.error.piece]) * T_2;
     if (!g.has_dry_losses()) {
         if (g.law.losses == Gearbox::constant_efficiency) T_1 = T_1 / g.law.efficiency;
         return;

@@ -20,10 +20,11 @@ void RegimeGuards::add_all() {
     add_coupling_pieces();
     add_output_limits();
     for (std::size_t g = 0; g < train_.gears.size(); ++g) {
-        const GearPlace& p = places_.gears[g];
-        if (p.error_piece != nowhere && turns(train_.gears[g].input, train_.gears[g].housing))
-            add_piece_guards(terms_, forms_.error_angle(static_cast<int>(g)), train_.gears[g].transmission_error,
-                             p.error_turn, p.error_piece, regime_.key, regime_.guards);
+        if (!turns(train_.gears[g].input, train_.gears[g].housing)) continue;
+        places_.gears[g].each_over_angle(train_.gears[g], [&](const PeriodicCurve& curve, const OverAngle& law) {
+            add_piece_guards(terms_, forms_.input_angle(static_cast<int>(g)), curve, law.turn, law.piece, regime_.key,
+                             regime_.guards);
+        });
     }
     for (const auto& e : places_.acting)
         e->add_guards(forms_.site(e->shaft), regime_.key, turns(e->shaft, nowhere), regime_.guards);
@@ -104,10 +105,8 @@ void RegimeGuards::add_shaft_guards(int shaft) {
         Row F = forms_.held_friction(shaft, regime_.key);
         each_gear([&](int g) { add_loss_cells(g, s, F); });
         for (std::size_t g = 0; g < train_.gears.size(); ++g)
-            if (const int corner = places_.gears[g].error_corner;
-                corner != nowhere && train_.gears[g].input == shaft && regime_.key.branch[corner] == s)
-                F += static_cast<double>(s) *
-                     forms_.beyond_corner(static_cast<int>(g), regime_.key, regime_.output_torque[g]);
+            if (train_.gears[g].input == shaft && train_.gears[g].over_angle())
+                F += forms_.beyond_corner(static_cast<int>(g), s, regime_.key, regime_.output_torque[g]);
         add(F - static_cast<double>(s) * regime_.contact_torque[p.contact], Guard::capacity, p.contact, nowhere, s);
     }
 }
@@ -241,7 +240,7 @@ void RegimeGuards::add_twist_pieces(int gear) {
             slip > 0;
     if (p.flanks == nowhere || piece == 0) return;
     const double way = piece > 0 ? 1.0 : -1.0;
-    const Row P = terms_.state(p.twist, curve.slope(piece)) + terms_.one(curve.offset(piece)),
+    const Row P = forms_.spring_torque(gear, regime_.key),
               damping = g.mesh_damping * forms_.twist_rate(gear, regime_.key), pressed = way * (P + damping),
               spare = way * (P - damping);
     const auto change = [&](const Row& form, Gear::Flanks to) { add(form, Guard::edge, p.contact, p.flanks, to); };

@@ -163,6 +163,7 @@ Found SwitchedTrain<Sizes>::find_after(Cache& cache, Now& now, const MovedShafts
             p.kind == ContactPlace::gear ? &places().gears[static_cast<std::size_t>(p.element)] : nullptr;
         if (gear != nullptr && gear->hysteresis != nowhere && !before[c] && (same || mode != key.modes[c]))
             now.memory[gear->hysteresis] =
+                assembly_.stiffness_factor(p.element, key) *
                 train().gears[static_cast<std::size_t>(p.element)].law.hysteresis_capacity(now.x[gear->twist]);
         if (!event.at_rest[c] || !before[c]) key.modes[c] = static_cast<std::int8_t>(mode);
     }

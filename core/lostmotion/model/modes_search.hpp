@@ -88,14 +88,18 @@ Found SwitchedTrain<Sizes>::start(Cache& cache, Now& now, Key& key) const {
     Now before = now;  // as if nothing had acted on the train
     before.x = {};
     before.input = {};
+    const Key meshes = assembly_.meshes_at(now.x);
     for (std::size_t g = 0; g < train().gears.size(); ++g) {
         const Gear& gear = train().gears[g];
         const GearPlace& p = places().gears[g];
-        if (p.error_turn != nowhere) now.memory[p.error_turn] = gear.transmission_error.turn(error_angle(now, gear));
+        p.each_over_angle(gear, [&](const PeriodicCurve& curve, const OverAngle& law) {
+            now.memory[law.turn] = curve.turn(assembly_.angle_of_input(g, now.x));
+        });
         const int locked = p.contact == nowhere ? nowhere : places().contacts[p.contact].locked;
         event.gear[g] = locked != nowhere ? now.memory[locked] : 0.0;
         if (gear.rigid() || gear.strikes()) continue;
-        const double P = gear.law.curve.torque(now.x[p.twist]);
+        const double P =
+            assembly_.stiffness_factor(static_cast<int>(g), meshes) * gear.law.curve.torque(now.x[p.twist]);
         const double h = p.hysteresis == nowhere ? 0.0 : now.memory[p.hysteresis];
         event.gear[g] = locked == nowhere ? P : std::clamp(event.gear[g], P - h, P + h);
     }
@@ -146,7 +150,8 @@ Found SwitchedTrain<Sizes>::next(Cache& cache, Now& now, const G* fired, Key& ke
     for (std::size_t g = 0; g < train().gears.size(); ++g) {
         const GearPlace& p = places().gears[g];
         if (p.hysteresis != nowhere && event.at_rest[p.contact] && !before[p.contact])
-            now.memory[p.hysteresis] = train().gears[g].law.hysteresis_capacity(now.x[p.twist]);
+            now.memory[p.hysteresis] = assembly_.stiffness_factor(static_cast<int>(g), key) *
+                                       train().gears[g].law.hysteresis_capacity(now.x[p.twist]);
     }
     if (event.with_guard && event.kind == Guard::capacity && breaks_away(cache, now, event, margin_size, near, key))
         return Found::yes;

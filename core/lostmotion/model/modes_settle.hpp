@@ -41,8 +41,9 @@ void SwitchedTrain<Sizes>::locate(const Now& now, Key& trial) const {
     for (std::size_t g = 0; g < train().gears.size(); ++g) {
         const Gear& gear = train().gears[g];
         const GearPlace& p = places().gears[g];
-        if (p.error_piece != nowhere)
-            set(p.error_piece, gear.transmission_error.piece(error_angle(now, gear) - now.memory[p.error_turn]));
+        p.each_over_angle(gear, [&](const PeriodicCurve& curve, const OverAngle& law) {
+            set(law.piece, curve.piece(assembly_.angle_of_input(g, now.x) - now.memory[law.turn]));
+        });
         if (p.side != nowhere) {
             const int side = now.x[p.twist] > 0.0 ? 1 : -1;
             set(p.side, trial.modes[p.contact] != 0 ? 0 : now.x[p.clock] > 0.0 ? 2 * side : side);
@@ -56,8 +57,8 @@ void SwitchedTrain<Sizes>::locate(const Now& now, Key& trial) const {
         double rate = assembly_.per_input(static_cast<int>(g), trial) * w_in - w_out;
         if (gear.housing != nowhere)
             rate += assembly_.per_housing(static_cast<int>(g), trial) * now.x[places().shafts[gear.housing].speed];
-        set(p.flanks,
-            piece == 0 ? Gear::touching : gear.flanks(piece, gear.law.curve.torque(d), gear.mesh_damping * rate));
+        const double P = assembly_.stiffness_factor(static_cast<int>(g), trial) * gear.law.curve.torque(d);
+        set(p.flanks, piece == 0 ? Gear::touching : gear.flanks(piece, P, gear.mesh_damping * rate));
     }
     for (std::size_t k = 0; k < train().controllers.size(); ++k) {
         const auto [branch, piece] = std::pair(places().controllers[k].branch, places().controllers[k].piece);
@@ -121,7 +122,8 @@ auto SwitchedTrain<Sizes>::settle(Cache& cache, Now& now, const Key& modes, cons
         const int slip = p.contact == nowhere ? +2 : trial.modes[p.contact];
         if (slip == 0) continue;
         T_2[g] =
-            train().gears[g].law.curve.torque(now.x[p.twist]) + (slip == 2 ? 0.0 : slip * now.memory[p.hysteresis]);
+            assembly_.stiffness_factor(static_cast<int>(g), trial) * train().gears[g].law.curve.torque(now.x[p.twist]) +
+            (slip == 2 ? 0.0 : slip * now.memory[p.hysteresis]);
     }
     locate_losses(now, T_2, trial);
     if (some_redundant_) hold(cache.regime(trial), now, event);
@@ -151,7 +153,8 @@ auto SwitchedTrain<Sizes>::settle(Cache& cache, Now& now, const Key& modes, cons
     return result;
 }
 
-// The torque that a transmission error lets an input shaft feel jumps at its corners. A shaft at rest on one may have
+// The torque that an input shaft feels jumps at the corners of a transmission error and at the steps of a stiffness. A
+// shaft at rest on one may have
 // that of either side, or, where both sides push it back, any between: does the piece on the other side of such a
 // corner hold, or the corner itself?
 template <class Sizes>
@@ -159,32 +162,33 @@ template <class Cache, class Now>
 bool SwitchedTrain<Sizes>::settle_on_corner(Cache& cache, Now& now, const Event& event, const Key& trial,
                                             Key& key) const {
     const auto memory = now.memory;
-    for (std::size_t g = 0; g < train().gears.size(); ++g) {
-        const GearPlace& p = places().gears[g];
-        if (p.error_piece == nowhere) continue;
-        const PeriodicCurve& e = train().gears[g].transmission_error;
-        const double phi = error_angle(now, train().gears[g]);
-        const int k = trial.branch[p.error_piece], last = e.pieces() - 1;
-        for (const bool ahead : {false, true}) {
-            const double corner = now.memory[p.error_turn] + (ahead ? e.upper(k) : e.lower(k)),
-                         off = std::fabs(phi - corner) / (std::fabs(phi) + e.period());
-            if (off <= on_corner) {
-                const bool turns = k == (ahead ? last : 0);
-                Key other = trial;
-                other.branch[p.error_piece] = static_cast<std::int16_t>(turns ? last - k : ahead ? k + 1 : k - 1);
-                if (turns) now.memory[p.error_turn] += ahead ? e.period() : -e.period();
-                if (walk(cache, now, event, other, key).found == Found::yes) return true;
-                now.memory = memory;
+    bool found = false;
+    for (std::size_t g = 0; g < train().gears.size(); ++g)
+        places().gears[g].each_over_angle(train().gears[g], [&](const PeriodicCurve& curve, const OverAngle& law) {
+            const double phi = assembly_.angle_of_input(g, now.x);
+            const int k = trial.branch[law.piece], last = curve.pieces() - 1;
+            for (const bool ahead : {false, true}) {
+                if (found) return;
+                const double corner = now.memory[law.turn] + (ahead ? curve.upper(k) : curve.lower(k)),
+                             off = std::fabs(phi - corner) / (std::fabs(phi) + curve.period());
+                if (off <= on_corner) {
+                    const bool turns = k == (ahead ? last : 0);
+                    Key other = trial;
+                    other.branch[law.piece] = static_cast<std::int16_t>(turns ? last - k : ahead ? k + 1 : k - 1);
+                    if (turns) now.memory[law.turn] += ahead ? curve.period() : -curve.period();
+                    found = walk(cache, now, event, other, key).found == Found::yes;
+                    if (found) return;
+                    now.memory = memory;
+                }
+                if (off > rounding || law.corner == nowhere) continue;
+                if (trial.modes[places().shafts[train().gears[g].input].contact] != 0) continue;
+                Key between = trial;
+                between.branch[law.corner] = ahead ? +1 : -1;
+                found = walk(cache, now, event, between, key).found == Found::yes;
+                if (!found) now.memory = memory;
             }
-            if (off > rounding || p.error_corner == nowhere) continue;
-            if (trial.modes[places().shafts[train().gears[g].input].contact] != 0) continue;
-            Key between = trial;
-            between.branch[p.error_corner] = ahead ? +1 : -1;
-            if (walk(cache, now, event, between, key).found == Found::yes) return true;
-            now.memory = memory;
-        }
-    }
-    return false;
+        });
+    return found;
 }
 
 // Is this combination, in which a contact is at its limit, consistent, or, if what drives it there turns back, does

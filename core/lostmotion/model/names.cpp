@@ -158,8 +158,10 @@ std::vector<std::string> branch_names(const Assembly& a) {
         set(p.gears[k].cell, name + ": cell of the losses");
         set(p.gears[k].cell_back, name + ": cell of the losses backward");
         set(p.gears[k].flanks, name + ": flanks parted, or their damping at its limit");
-        set(p.gears[k].error_piece, name + ": piece of the transmission error");
-        set(p.gears[k].error_corner, name + ": rest on a corner of the transmission error");
+        set(p.gears[k].error.piece, name + ": piece of the transmission error");
+        set(p.gears[k].error.corner, name + ": rest on a corner of the transmission error");
+        set(p.gears[k].mesh.piece, name + ": piece of the mesh stiffness");
+        set(p.gears[k].mesh.corner, name + ": rest on a step of the mesh stiffness");
     }
     for (const auto& c : p.couplings)
         if (c->branch != nowhere) set(c->branch, c->name + ": " + c->piecewise_law());

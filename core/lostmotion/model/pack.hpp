@@ -31,7 +31,7 @@ inline bool is_plain(const Train& t) {
     Train::each_kind(t, none);
     Train::each_coupling_kind(t, none);
     for (const Shaft& s : t.shafts) plain = plain && s.friction.speeds.empty() && !s.has_drag();
-    for (const Gear& g : t.gears) plain = plain && !g.transmission_error.present() && !g.parts_flanks();
+    for (const Gear& g : t.gears) plain = plain && !g.over_angle() && !g.parts_flanks();
     return plain;
 }
 

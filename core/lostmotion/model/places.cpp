@@ -54,7 +54,7 @@ void Places::place_states(const Train& train) {
     for (const auto& e : acting)
         if (e->over_angle()) by_angle[e->shaft] = true;
     for (const Gear& g : train.gears)
-        if (g.transmission_error.present()) {
+        if (g.over_angle()) {
             by_angle[g.input] = true;
             if (g.housing != nowhere) by_angle[g.housing] = true;
         }
@@ -201,10 +201,15 @@ void Places::place_memory_and_branches(const Train& train) {
             gears[k].cell_back = next++;
         }
         if (g.parts_flanks()) gears[k].flanks = next++;
-        if (g.transmission_error.present()) {
-            gears[k].error_piece = next++;
-            if (shafts[g.input].contact != nowhere && g.housing == nowhere) gears[k].error_corner = next++;
-            gears[k].error_turn = layout.memory++;
+        const auto place = [&](OverAngle& law) {
+            law.piece = next++;
+            if (shafts[g.input].contact != nowhere && g.housing == nowhere) law.corner = next++;
+            law.turn = layout.memory++;
+        };
+        if (g.transmission_error.present()) place(gears[k].error);
+        if (g.mesh_stiffness.present()) {
+            place(gears[k].mesh);
+            gears[k].parametric_work = layout.memory++;
         }
     }
     for (const auto& c : couplings)

@@ -26,15 +26,28 @@ struct MotorPlace {
     int branch = nowhere;
     int controller = nowhere;  // its number
 };
+// A law over the angle of an input shaft.
+struct OverAngle {
+    int piece = nowhere;   // branch
+    int corner = nowhere;  // branch: +1, -1: the input shaft rests on the upper, the lower end of that piece
+    int turn = nowhere;    // memory
+};
 struct GearPlace {
     int twist = nowhere, contact = nowhere;
-    int hysteresis = nowhere;                                                                           // memory
-    int piece = nowhere, cell = nowhere, cell_back = nowhere, flanks = nowhere, error_piece = nowhere;  // branches
+    int hysteresis = nowhere;                                                    // memory
+    int piece = nowhere, cell = nowhere, cell_back = nowhere, flanks = nowhere;  // branches
     int side = nowhere;   // branch of rigid flanks: +1, -1 where they touch, +2, -2 while impacts accumulate, 0 apart
     int clock = nowhere;  // state: the time left until impacts have accumulated [s]
-    int impact_loss = nowhere;   // memory: the energy that impacts have taken [J]
-    int error_corner = nowhere;  // branch: +1, -1: the input shaft rests on the upper, the lower end of that piece
-    int error_turn = nowhere;    // memory
+    int impact_loss = nowhere;      // memory: the energy that impacts have taken [J]
+    int parametric_work = nowhere;  // memory: the energy that steps of the stiffness have given [J]
+    OverAngle error, mesh;
+
+    // Calls use(curve, place) for each law of the gear over the angle of its input shaft.
+    template <class Use>
+    void each_over_angle(const Gear& g, Use&& use) const {
+        if (g.transmission_error.present()) use(g.transmission_error, error);
+        if (g.mesh_stiffness.present()) use(g.mesh_stiffness, mesh);
+    }
 };
 
 // What couples two shafts by a mass matrix, off its diagonal: J_a w_a' + value w_b' = T_a, and likewise of b.

@@ -65,6 +65,8 @@ void each_flow(const Assembly& a, Use&& use) {
         if (gear.housing != nowhere && gear.law.viscous_friction > 0.0)
             use(PowerFlow::loss, gear.name, "viscous friction on the housing",
                 [&](const Regime& r) -> Flow { return {{a.housing_friction(g, r), relative()}}; });
+        if (gear.mesh_stiffness.present())
+            use(PowerFlow::source, gear.name, "parametric work", [](const Regime&) -> Flow { return {}; });
         if (gear.strikes()) use(PowerFlow::loss, gear.name, "impacts", [](const Regime&) -> Flow { return {}; });
         if ((gear.rigid() || gear.strikes()) && !train.short_form) continue;
         use(PowerFlow::loss, gear.name, "hysteresis and damping", [&](const Regime& r) -> Flow {

@@ -19,7 +19,8 @@ struct PowerFlow {
     std::string name;  // of the element, and what it is: "drum: viscous friction"
 };
 
-// What kinetic and elastic energy grow by from one state to another [J].
+// What kinetic and elastic energy grow by from one state to another [J]; before, after: the regimes there, by whose
+// angles the stiffness of a mesh may differ.
 struct StoredChange {
     double kinetic = 0.0, elastic = 0.0, all = 0.0;
 
@@ -29,7 +30,8 @@ struct StoredChange {
     }
 };
 template <class X>
-StoredChange stored_change(const Assembly& a, const X& from, const X& to) {
+StoredChange stored_change(const Assembly& a, const X& from, const X& to, const Key& before = {},
+                           const Key& after = {}) {
     StoredChange sum;
     for (const ShaftPlace& s : a.places().shafts)
         sum.add(&StoredChange::kinetic, kinetic_energy(s.inertia, from[s.speed], to[s.speed]));
@@ -38,8 +40,13 @@ StoredChange stored_change(const Assembly& a, const X& from, const X& to) {
         sum.add(&StoredChange::kinetic, coupled_kinetic_energy(c.value, from[p], to[p], from[q], to[q]));
     }
     for (std::size_t g = 0; g < a.train().gears.size(); ++g)
-        if (const int d = a.places().gears[g].twist; !a.train().gears[g].rigid() && !a.train().gears[g].strikes())
-            sum.add(&StoredChange::elastic, a.train().gears[g].law.curve.energy(from[d], to[d]));
+        if (const int d = a.places().gears[g].twist; !a.train().gears[g].rigid() && !a.train().gears[g].strikes()) {
+            const TorsionCurve& curve = a.train().gears[g].law.curve;
+            const double factor = a.stiffness_factor(static_cast<int>(g), after),
+                         step = factor - a.stiffness_factor(static_cast<int>(g), before);
+            sum.add(&StoredChange::elastic,
+                    factor * curve.energy(from[d], to[d]) + (step == 0.0 ? 0.0 : step * curve.energy(from[d])));
+        }
     return sum;
 }
 

@@ -240,11 +240,6 @@ class SwitchedTrain {
     template <class E, class Now>
     bool turns_the_other_way(const E& e, const Now& now, const Event& event) const;
     template <class Now>
-    double error_angle(const Now& now, const Gear& g) const {
-        const double phi = now.x[places().shafts[g.input].angle];
-        return g.housing == nowhere ? phi : phi - now.x[places().shafts[g.housing].angle];
-    }
-    template <class Now>
     void locate(const Now& now, Key& trial) const;
     // Where the motion of shafts is given, sets their speeds to what they are now. True if contacts that slip and whose
     // speeds follow from that alone have none: those are marked.

@@ -66,11 +66,14 @@ class TrainSystem {
     template <class Cache>
     Found start(Cache& cache, InstantOf<D>& now, Key& key) const {
         const Found found = search_.start(cache, now, key);
+        add_parametric_work(assembly_.meshes_at(now.x), key, now);
         return overflowed_ ? Found::outside : found;
     }
     template <class Cache>
     Found next(Cache& cache, InstantOf<D>& now, const Guard* fired, Key& key, const InputsOf<D>& input) const {
+        const Key before = key;
         const Found found = search_.next(cache, now, fired, key, input);
+        add_parametric_work(before, key, now);
         return overflowed_ ? Found::outside : found;
     }
     void near_event(const FormTable<D, D::guards>& guards, typename FormTable<D, D::guards>::Values& out) const {
@@ -127,6 +130,18 @@ class TrainSystem {
     }
 
  private:
+    // A step of the stiffness changes the energy of a spring at the twist that it has.
+    void add_parametric_work(const Key& before, const Key& after, InstantOf<D>& now) const {
+        for (std::size_t g = 0; g < assembly_.train().gears.size(); ++g) {
+            const GearPlace& p = assembly_.places().gears[g];
+            if (p.parametric_work == nowhere) continue;
+            const auto gear = static_cast<int>(g);
+            now.memory[p.parametric_work] +=
+                (assembly_.stiffness_factor(gear, after) - assembly_.stiffness_factor(gear, before)) *
+                assembly_.train().gears[g].law.curve.energy(now.x[p.twist]);
+        }
+    }
+
     const Assembly& assembly_;
     SwitchedTrain<D> search_;
     std::array<int, D::coupled> twists_{};

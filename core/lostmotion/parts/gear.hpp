@@ -35,6 +35,9 @@ struct Gear {
     // at which the flanks part over that at which they strike.
     double flank_backlash = 0.0, restitution = 0.0;
     PeriodicCurve transmission_error;  // e [rad, at the output] over the angle of the input shaft
+    // Factor on the stiffness over the same angle, constant from each angle of the curve to the next, as more and fewer
+    // pairs of teeth mesh.
+    PeriodicCurve mesh_stiffness;
 
     // What a gear has beside the law of a gearbox.
     template <class Fields>
@@ -56,8 +59,11 @@ struct Gear {
         f.number({"flanks.restitution", "", "", Range::any, Given::none}, restitution);
         bool present = transmission_error.present();
         f.curve_if("transmission_error", present, transmission_error);
+        bool varies = mesh_stiffness.present();
+        f.curve_if("mesh_stiffness", varies, mesh_stiffness);
     }
 
+    bool over_angle() const { return transmission_error.present() || mesh_stiffness.present(); }
     bool strikes() const { return flank_backlash > 0.0; }
     bool rigid() const { return law.compliance == Gearbox::rigid && !strikes(); }
     bool has_dry_losses() const { return efficiencies || law.losses == Gearbox::loss_map; }

@@ -22,10 +22,11 @@ struct SineOfAngle {
 class PeriodicCurve {
  public:
     PeriodicCurve() = default;
-    // angles: [rad], rising from 0 and below the period; values there. The last piece leads back to the first value.
+    // angles: [rad], rising from 0 or above and below the period; values there. The last piece leads back to the first
+    // value, a period after the first angle.
     PeriodicCurve(double period, std::vector<double> angles, std::vector<double> values, const SineOfAngle& of = {})
         : period_(period), angles_(std::move(angles)), values_(std::move(values)), sine_(of) {
-        angles_.push_back(period_);
+        angles_.push_back(angles_.front() + period_);
         values_.push_back(values_.front());
     }
 
@@ -74,13 +75,13 @@ class PeriodicCurve {
         while (k + 1 < pieces() && within >= angles_[k + 1]) ++k;
         return k;
     }
-    double turn(double phi) const { return period_ * std::floor(phi / period_); }
+    double turn(double phi) const { return period_ * std::floor((phi - angles_.front()) / period_); }
     double operator()(double phi) const {
         const double within = phi - turn(phi);
         const int k = piece(within);
         return at_zero(k) + slope(k) * within;
     }
-    // Integral from 0 to phi [value * rad].
+    // Integral from 0 to phi [value * rad], of a curve whose first angle is 0.
     double integral(double phi) const {
         const double turns = std::floor(phi / period_), within = phi - period_ * turns;
         double sum = 0.0, whole = 0.0;

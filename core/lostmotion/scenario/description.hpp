@@ -51,7 +51,7 @@ struct ScenarioParameter {
 
 class ScenarioDescription {
  public:
-    static constexpr double mark = 19533.0, version = 11.0;
+    static constexpr double mark = 19533.0, version = 12.0;
     static constexpr std::size_t head = 4;
 
     static std::vector<double> write(Scenario scenario, std::vector<ScenarioParameter> parameters = {});

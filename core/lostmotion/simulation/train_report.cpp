@@ -23,6 +23,7 @@ enum CauseOfDrive : int {
     voltage_limit,
     torque_turned
 };
+constexpr int mesh_step = model::Guard::impact + 1;  // of a drive and of a train
 
 std::vector<SwitchingCause> switching_causes(bool short_form) {
     std::vector<SwitchingCause> all{{input_changed, input_changed_name},
@@ -41,6 +42,7 @@ std::vector<SwitchingCause> switching_causes(bool short_form) {
                                         SwitchingCause{model::Guard::set_off, "given motion began"},
                                         SwitchingCause{model::Guard::impact, "flanks struck"}})
             all.push_back(c);
+    all.push_back({mesh_step, "step of the mesh stiffness"});
     return all;
 }
 
@@ -48,6 +50,8 @@ namespace {
 
 int cause_of(const model::Assembly& a, const TrainSwitching& s) {
     if (s.input_jump) return input_changed;
+    const auto steps = [&s](const model::GearPlace& g) { return s.branch >= 0 && s.branch == g.mesh.piece; };
+    if (s.kind == model::Guard::edge && std::ranges::any_of(a.places().gears, steps)) return mesh_step;
     if (!a.train().short_form) return s.kind;
     const model::GearPlace& gear = a.places().gears[0];
     switch (s.kind) {
@@ -127,6 +131,10 @@ NamedInOrder ledger_of(const TrainReport& report, const model::Assembly& a) {
         for (const ShortFlow& f : short_flows) ledger.emplace_back(f.name, flow(f.flow));
         double residual = ledger[0].second - kinetic - elastic;
         for (std::size_t k = 1; k < ledger.size(); ++k) residual -= ledger[k].second;
+        if (a.train().gears[0].mesh_stiffness.present()) {
+            ledger.emplace_back("parametric_work", flow("gearbox: parametric work"));
+            residual += ledger.back().second;
+        }
         ledger.emplace_back("kinetic_change", kinetic);
         ledger.emplace_back("elastic_change", elastic);
         ledger.emplace_back("residual", residual);
@@ -158,13 +166,13 @@ std::string error_text(const TrainReport& report, const model::Assembly& a) {
     return train_status_text(a, report.status, report.time, report.contact, report.too_many_guards);
 }
 
-void TrainReport::add_impacts(const std::string& gear, double loss) {
-    const auto entry = std::ranges::find(energy, gear + ": impacts", &TrainEnergy::name);
+void TrainReport::add(const std::string& name, model::PowerFlow::Kind kind, double more) {
+    const auto entry = std::ranges::find(energy, name, &TrainEnergy::name);
     if (entry == energy.end())
-        energy.push_back({gear + ": impacts", model::PowerFlow::loss, loss});
+        energy.push_back({name, kind, more});
     else
-        entry->energy += loss;
-    turned_over += loss;
+        entry->energy += more;
+    turned_over += std::fabs(more);
 }
 
 std::vector<std::string> ledger_names(const model::Assembly& a) {

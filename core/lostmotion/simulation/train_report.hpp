@@ -83,8 +83,8 @@ struct TrainReport {
     SearchCounts searches;
     bool too_many_guards = false;  // a regime has more conditions than the kernel has room for
 
-    // What impacts of rigid flanks have taken [J], which no power is the rate of.
-    void add_impacts(const std::string& gear, double loss);
+    // Energy [J] that no power is the rate of.
+    void add(const std::string& name, model::PowerFlow::Kind kind, double more);
 
     template <class System, class Solver>
     void ended(const System& system, Solver& solver) {

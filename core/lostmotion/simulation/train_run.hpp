@@ -66,7 +66,8 @@ inline std::pair<std::vector<double>, std::vector<double>> in_layout(const model
         memory[static_cast<std::size_t>(p.hysteresis)] = value_of(start.hysteresis_capacities, gears[g].name);
         if (const int locked = a.places().contacts[static_cast<std::size_t>(p.contact)].locked;
             locked != model::nowhere)
-            memory[static_cast<std::size_t>(locked)] = gears[g].law.curve.torque(x[static_cast<std::size_t>(p.twist)]);
+            memory[static_cast<std::size_t>(locked)] = a.stiffness_factor(static_cast<int>(g), a.meshes_at(x)) *
+                                                       gears[g].law.curve.torque(x[static_cast<std::size_t>(p.twist)]);
     }
     return {x, memory};
 }

@@ -54,11 +54,19 @@ struct PackedRun {
     template <class System, class Solver>
     void end(TrainReport& report, const System& system, Solver& solver) const {
         report.ended(system, solver);
-        report.stored_change = model::stored_change(assembly, start.x, solver.state());
-        for (std::size_t g = 0; g < assembly.train().gears.size(); ++g)
-            if (const int loss = assembly.places().gears[g].impact_loss; loss != model::nowhere)
-                report.add_impacts(assembly.train().gears[g].name, solver.memory()[static_cast<std::size_t>(loss)] -
-                                                                       start.memory[static_cast<std::size_t>(loss)]);
+        report.stored_change =
+            model::stored_change(assembly, start.x, solver.state(), assembly.meshes_at(start.x), solver.regime().key);
+        const auto remembered = [&](int place) {
+            return solver.memory()[static_cast<std::size_t>(place)] - start.memory[static_cast<std::size_t>(place)];
+        };
+        for (std::size_t g = 0; g < assembly.train().gears.size(); ++g) {
+            const model::GearPlace& p = assembly.places().gears[g];
+            const std::string& name = assembly.train().gears[g].name;
+            if (p.impact_loss != model::nowhere)
+                report.add(name + ": impacts", model::PowerFlow::loss, remembered(p.impact_loss));
+            if (p.parametric_work != model::nowhere)
+                report.add(name + ": parametric work", model::PowerFlow::source, remembered(p.parametric_work));
+        }
     }
 
     const model::Assembly& assembly;

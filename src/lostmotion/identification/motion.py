@@ -60,7 +60,8 @@ def shown_motion(rig: Rig) -> Shown:
 def depends_on_angle(train: DriveTrain) -> bool:
     """Whether a torque of a train depends on an angle."""
     by_angle = bool(train.gravity or train.angle_torques or train.springs)
-    return by_angle or any(gear.transmission_error is not None for gear in train.gears.values())
+    gears = train.gears.values()
+    return by_angle or any(gear.transmission_error is not None or gear.mesh_stiffness is not None for gear in gears)
 
 
 def measured_course(rig: Rig, log: Prepared, channel: str, known: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:

@@ -20,6 +20,7 @@ from .losses import LossMap as LossMap
 from .losses import MeshEfficiency as MeshEfficiency
 from .losses import WormMesh as WormMesh
 from .mass_matrix import MassMatrix as MassMatrix
+from .mesh_stiffness import MeshStiffness as MeshStiffness
 from .motor import MotorLimits as MotorLimits
 from .shaft import DragCurve as DragCurve
 from .shaft import EddyCurrentDrag as EddyCurrentDrag

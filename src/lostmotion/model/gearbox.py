@@ -16,6 +16,7 @@ from ..inputs.quantities import (
 )
 from ..units.practical import practical
 from .losses import ConstantEfficiency, LossMap
+from .mesh_stiffness import MeshStiffness
 from .torsion import Hysteresis, LinearStiffness, Rigid, TorsionCurve
 
 
@@ -48,6 +49,8 @@ class Transmission(TransmissionFields):
 
     stiffness: Annotated[TorsionCurve | LinearStiffness | Rigid, Field(discriminator="kind")]
     hysteresis: Hysteresis | None = None
+    mesh_stiffness: MeshStiffness | None = None
+    """factor on the stiffness over the angle of the input shaft; left out, 1"""
     limits: GearboxLimits | None = None
     loss_range: tuple[Annotated[Number, Positive], Annotated[Number, Positive]] | None = None
     """range of estimated losses: the multiples between which those of such gearboxes lie. No run depends on it; the drive check says
@@ -85,6 +88,8 @@ class Transmission(TransmissionFields):
         backlash = not isinstance(self.stiffness, Rigid) and self.stiffness.pieces()[1][0] == 0.0
         if hysteresis and rigid:
             raise ValueError("has hysteresis but is rigid; leave hysteresis out or give it a stiffness")
+        if self.mesh_stiffness is not None and rigid:
+            raise ValueError("has mesh_stiffness, a factor on its stiffness, but is rigid; give it a stiffness")
         if self.mesh_damping > 0.0 and rigid:
             raise ValueError("has mesh damping but is rigid; leave mesh_damping out or give it a stiffness")
         if self.mesh_damping > 0.0 and backlash and hysteresis:
@@ -102,6 +107,7 @@ class Transmission(TransmissionFields):
                 if isinstance(self.stiffness, Rigid) and self.stiffness.strikes
                 else {}
             ),
+            "mesh_stiffness": self.mesh_stiffness and self.mesh_stiffness.core(),
             "hysteresis.efficiency": None if self.hysteresis is None else self.hysteresis.efficiency,
         }
 
@@ -136,5 +142,10 @@ class Gearbox(Transmission):
         return f"Gearbox({self.ratio:g}:1, {rated}, {laws})"
 
     def forward(self) -> Self:
-        """The same with a ratio above 0, as the test rig takes it: a gearbox that reverses has the same values."""
-        return self if self.ratio > 0.0 else self.model_copy(update={"ratio": -self.ratio})
+        """The same as the test rig takes it: with a ratio above 0, and with the factor 1 on its stiffness at all angles.
+
+        One that reverses has the same values.
+        """
+        if self.ratio > 0.0 and self.mesh_stiffness is None:
+            return self
+        return self.model_copy(update={"ratio": abs(self.ratio), "mesh_stiffness": None})

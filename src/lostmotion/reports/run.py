@@ -8,8 +8,9 @@ import numpy as np
 
 from ..errors import visible
 from ..simulation.results import RunArrays, energy_of, is_train_result, whole
+from ..simulation.scenario import Scenario
 from ..simulation.switchings import ATTRIBUTE as SWITCHINGS
-from ..simulation.switchings import names_in, unpacked
+from ..simulation.switchings import MESH_STEP, names_in, unpacked
 from ..simulation.train_scenario import TrainScenario
 from ..simulation.windings import errors_of
 from ..units.practical import charted, practical, printed
@@ -44,6 +45,7 @@ def summary(result: xarray.Dataset | RunArrays) -> str:
     if "energy" in result.attrs:
         e = energy_of(result)
         names = (
+            "parametric_work",
             "gear_losses",
             "hysteresis",
             "motor_friction",
@@ -52,12 +54,12 @@ def summary(result: xarray.Dataset | RunArrays) -> str:
             "load_friction",
             "load_work",
         )
-        parts = [f"{name.replace('_', ' ')} {e[name]:.4g}" for name in names if e[name] != 0.0]
+        parts = [f"{name.replace('_', ' ')} {e[name]:.4g}" for name in names if e.get(name, 0.0) != 0.0]
         ends = f"from the motor {e['source']:.4g}", f"stored {e['kinetic_change'] + e['elastic_change']:.4g}"
         lines.append(f"  energy [J]: {', '.join([ends[0], *parts, ends[1]])}")
         if e["turned_over"] > 0.0:
             lines.append(f"  energy balance closes to {closes_to(result)}")
-    lines += [*contact_lines(result), *error_lines(result)]
+    lines += [*contact_lines(result), *mesh_lines(result), *error_lines(result)]
     lines += [f"  warning: {result.attrs['warning']}"] if "warning" in result.attrs else []
     lines += [f"  note: {result.attrs['note']}"] if "note" in result.attrs else []
     return "\n".join(lines)
@@ -81,6 +83,18 @@ def contact_lines(result: xarray.Dataset | RunArrays) -> list[str]:
         if parts:
             found.append(f"{name.removesuffix('_contact').replace('_', ' ')} {', '.join(parts)}")
     return [f"  contacts [times]: {'; '.join(found)}"] if found else []
+
+
+def mesh_lines(result: xarray.Dataset | RunArrays) -> list[str]:
+    """Number of events at which the stiffness of a mesh has stepped, and how many of them one turn of its input shaft has."""
+    gears = Scenario.from_json(result.attrs["scenario"]).gears_by_key().items()
+    meshes = {key.removeprefix("gears."): gear.mesh_stiffness for key, gear in gears if gear.mesh_stiffness is not None}
+    if not meshes or not result.attrs.get(SWITCHINGS):
+        return []
+    causes = unpacked(result.attrs)[:, names_in(result.attrs).index("cause")]
+    count = int(np.sum(causes == MESH_STEP))
+    each = ", ".join(f"{name} {mesh.teeth * mesh.steps():g}" for name, mesh in meshes.items())
+    return [f"  steps of the mesh stiffness: {count} events; in a turn of the input shaft {each}"]
 
 
 def error_lines(result: xarray.Dataset | RunArrays) -> list[str]:
@@ -132,7 +146,7 @@ def train_summary(result: xarray.Dataset | RunArrays) -> str:
         lines.append(f"  energy [J]: {parts or 'none'}")
         if e["turned_over"] > 0.0:
             lines.append(f"  energy balance closes to {closes_to(result)}")
-    lines += [*contact_lines(result), *error_lines(result)]
+    lines += [*contact_lines(result), *mesh_lines(result), *error_lines(result)]
     lines += [f"  {kind}: {result.attrs[kind]}" for kind in ("warning", "note") if kind in result.attrs]
     return "\n".join(lines)
 

@@ -398,6 +398,7 @@ def _why_several_regimes(drive: Drive) -> str:
         "hysteresis": g.hysteresis is not None and g.hysteresis.efficiency < 1.0,
         "a torsion curve of several pieces": not isinstance(g.stiffness, Rigid) and len(g.stiffness.pieces()[1]) > 1,
         "a voltage limit": m.command_limit is not None,
+        "a mesh stiffness over the angle": g.mesh_stiffness is not None,
     }
     return ", ".join(reason for reason, holds in reasons.items() if holds)
 
@@ -418,6 +419,7 @@ def _why_several_regimes_of(train: DriveTrain, core: _core.Train) -> str:
         "a torque over an angle": bool(train.gravity or train.angle_torques),
         "a spring of several pieces": any(len(s.stiffness.pieces()[1]) > 1 for s in train.springs.values()),
         "a transmission error": any(g.transmission_error is not None for g in gears),
+        "a mesh stiffness over the angle": any(g.mesh_stiffness is not None for g in gears),
     }
     return ", ".join(reason for reason, holds in reasons.items() if holds)
 

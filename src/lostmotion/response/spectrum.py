@@ -393,6 +393,8 @@ def _sources(long: TrainScenario, train: DriveTrain, over: str) -> Iterator[tupl
             slide = train.is_slide(gear.output)
             kind = ("screw turn" if slide else "worm turn") if order == 1.0 else "tooth mesh"
             yield f"{kind}: transmission error of {name}", of(gear.input, order), curve
+        if gear.mesh_stiffness is not None:
+            yield f"tooth mesh: mesh stiffness of {name}", of(gear.input, gear.mesh_stiffness.teeth), True
     driven = {motor.shaft for motor in train.motors.values()}
     for name, torque in train.angle_torques.items():
         order, curve = _order(torque)

@@ -20,6 +20,9 @@ CAUSES = dict(_core.causes(short_form=True))
 TRAIN_CAUSES = dict(_core.causes(short_form=False))
 """the same of a drive train"""
 
+MESH_STEP = next(number for number, cause in CAUSES.items() if cause == "step of the mesh stiffness")
+"""number of that cause, in both forms"""
+
 ATTRIBUTE = "switchings"
 NAMES = tuple(_core.switching_columns())
 CONTACTS_OF_TRAIN = "contacts"  # attribute of the result of a train: the names of its contacts, apart by blanks
