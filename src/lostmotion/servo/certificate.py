@@ -182,8 +182,10 @@ def _comes_to_rest(loop: Loop) -> bool:
 
 
 def _reached(loop: Loop, of: StickSlip, proof: Proof) -> tuple[float, bool]:
-    """Error of the first stuck interval of the scenario's run in which all settles, and whether the errors of the run
-    fade. The proof, if there is one, holds for that error."""
+    """Error of the first settled stuck interval of the scenario's run, and whether the errors of the run fade.
+
+    An interval for which the proof holds goes before the first one.
+    """
     settling = SETTLED / np.abs(of.stuck_rates.real).min() if len(of.stuck_rates) else 0.0
     first = math.nan
     for k in range(RUNS):
