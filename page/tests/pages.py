@@ -13,10 +13,14 @@ import numpy as np
 
 import lostmotion as lm
 from lostmotion.live_page.page import write_page
+from lostmotion.reports.drive_check import check_report
 from lostmotion.reports.looks import DOTS, look
 from lostmotion.reports.page import Headline, Prose, Report, Table, render
 from lostmotion.reports.panels import Bars, Contacts, Curve, Flows, Ground, Group, Histogram, Mark, Matrix, Panel
+from lostmotion.reports.response import response_report
+from lostmotion.reports.run import run_report
 from lostmotion.reports.servo import servo_report
+from lostmotion.sizing.drive_check import check_drive
 
 # Page -> scenario, and what the test changes on it by its address.
 PAGES = {
@@ -74,6 +78,11 @@ def write_reports(directory: Path) -> None:
     """reports of an axis, and of each kind of chart with the numbers of one of them."""
     axis = servo_report("speed-axis", lm.commission(lm.load("speed-axis")))
     (directory / "servo.html").write_text(render(axis))
+    joint = lm.load("catalogue-robot-joint")
+    (directory / "run.html").write_text(render(run_report("joint", lm.simulate(joint))))
+    (directory / "check.html").write_text(render(check_report("joint", check_drive(joint), joint.title)))
+    response = lm.frequency_response(joint, [1.0, 3.0, 9.0], [0.1, 0.5])
+    (directory / "response.html").write_text(render(response_report({"joint": response}, joint, "load_speed")[0]))
     x = np.geomspace(0.1, 1000.0, 200)
     y = np.where(x > 100.0, np.nan, 10.0 / x)
     named = Curve("designs", np.arange(3.0), np.array([2.0, 1.0, 3.0]), DOTS, names=("first", "second", "third"))

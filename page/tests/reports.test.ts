@@ -35,6 +35,9 @@ test.each([
   ["charts", "dark", 390],
   ["servo", "light", 800],
   ["servo", "dark", 390],
+  ["run", "light", 390],
+  ["check", "dark", 800],
+  ["response", "light", 390],
 ] as const)("the report %s has no barrier that axe finds (%s, %i pixels)", async (name, colorScheme, width) => {
   const { page, seen } = await open(name, { colorScheme, viewport: { width, height: 900 } });
   expect(await barriers(page)).toEqual([]);
