@@ -104,6 +104,18 @@ def test_backlash_is_found_from_other_starts_by_default(tmp_path: Path, start: f
     assert not result.warnings()
 
 
+@pytest.mark.parametrize(("truth", "start"), [("hold", 8e-3), ("linear", 6e-3), ("hold", 0.8e-3)])
+def test_interpolation_and_backlash_are_found_together_from_far_starts(
+    tmp_path: Path, truth: str, start: float
+) -> None:
+    """At such starts the residuals of both interpolations say nothing; at the backlash that is found they do."""
+    result = identified(tmp_path, truth, None, start)
+    assert result.task.inputs["drive_command"].interpolation == truth
+    assert result.values["backlash"] == pytest.approx(2.4e-3, rel=1e-3)
+    assert result.error()[1] == pytest.approx(NOISE, rel=0.05)
+    assert not result.warnings()
+
+
 def test_a_wrong_interpolation_is_reported_and_no_interval_is_narrow(tmp_path: Path) -> None:
     """Held against the truth, the torque is 0.5 ms late on average; the residuals are hundreds of times the noise."""
     result = identified(tmp_path, "linear", "hold", 2e-3)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -17,19 +17,19 @@ from ..simulation.scenario_files import scenario_text
 from ..simulation.train_scenario import TrainScenario
 from .engine import Engine, Point
 from .errors_of_logs import LogError, total
-from .fit import Fit, Problem, linearised
+from .fit import Fit, Problem, linearised, search
 from .gather import gathered
 from .identifiability import Undetermined, at_bounds, resting_on
 from .intervals import Interval, bootstrap, profile, widest
 from .ladder import GAIN, RungResult, begun_with, chosen, climb, first_fit, free_on, is_rough, problem_of, start_point
 from .leave_out import ConditionError, left_out_errors
-from .misfit import Misfit, hidden, misfits, with_shapes
+from .misfit import Misfit, explained, hidden, misfits, with_shapes
 from .odd_logs import OddLog, odd_logs
 from .pauses import split_at_pauses
 from .prepare import DEFAULT, Prepared
 from .progress import Progress
 from .record import gear_sheet, sheet_text
-from .recorded import as_recorded, nearer_ways
+from .recorded import Way, as_recorded, nearer_ways
 from .rig import Rig
 from .runs import run_logs
 from .start import Regression, regressed
@@ -358,12 +358,41 @@ class _Climbed:
 
 def _climbed(rig: Rig, logs: list[Prepared], threads: int | None, notify: Notify, progress: Progress) -> _Climbed:
     """All models fitted to logs; the intervals wait until no log is left out any more."""
-    rig, logs, point, start, ways = _begun(rig, logs, threads, notify)
-    engine = Engine(rig, threads)
-    rungs = climb(rig, engine, logs, point, notify, progress.of(rig.task, logs))
-    best = chosen(rungs)
+    rig, logs, point, start, ways, undecided = _begun(rig, logs, threads, notify)
+    while True:
+        engine = Engine(rig, threads)
+        rungs = climb(rig, engine, logs, point, notify, progress.of(rig.task, logs))
+        best = chosen(rungs)
+        turned = _turned(engine, logs, rungs[best].fit, best, undecided)
+        if turned is None:
+            break
+        rig, point, words = turned
+        ways |= words
+        undecided = ()  # each way has been fitted from values that explain the logs best
+        logs = [replace(log, cache={}) for log in logs]
     odd = odd_logs(rig, engine, logs, point, rungs[best].fit, best)
-    return _Climbed(engine, logs, start, ways, rungs, best, odd)
+    return _Climbed(engine, logs, start, list(ways.values()), rungs, best, odd)
+
+
+def _turned(
+    engine: Engine, logs: list[Prepared], fit: Fit, rung: int, undecided: Collection[str]
+) -> tuple[Rig, Point, dict[str, str]] | None:
+    """(rig, where the search goes on, words) if inputs go the other way between their samples, seen from the values of a fit.
+
+    The way was chosen at the first values, which may be so far off that the residuals of both ways say nothing.
+    """
+    rig, train = engine.rig, [log for log in logs if not log.held_out]
+    if not undecided or explained(problem_of(rig, engine, train, rung), engine.residuals(train, fit.point, rung)):
+        return None
+    ways: dict[str, Way] = {name: rig.task.inputs[name].interpolation or "hold" for name in undecided}
+
+    def fitted(other: Rig, some: list[Prepared], point: Point) -> Fit:
+        return search(
+            problem_of(other, Engine(other, engine.threads), some, rung), point, iterations=rig.task.fit.iterations
+        )
+
+    other, point, words = nearer_ways(rig, train, ways, fit.point, fitted)
+    return None if other is rig else (other, point, words)
 
 
 def _answer(found_by: _Climbed, profiles: bool) -> IdentificationResult:
@@ -400,8 +429,8 @@ def _answer(found_by: _Climbed, profiles: bool) -> IdentificationResult:
 
 def _begun(
     rig: Rig, logs: list[Prepared], threads: int | None, notify: Notify
-) -> tuple[Rig, list[Prepared], Point, Regression, list[str]]:
-    """(rig and logs with a way for each input, where the search begins, why there, words on the inputs)."""
+) -> tuple[Rig, list[Prepared], Point, Regression, dict[str, str], Collection[str]]:
+    """(rig and logs with a way for each input, where the search begins, why there, words on the inputs, those that runs decide)."""
     rig, ways, undecided = as_recorded(rig, logs)
     point, start = start_point(rig.task, logs), Regression()
     train = [log for log in logs if not log.held_out]
@@ -416,7 +445,7 @@ def _begun(
         rig, point, more = nearer_ways(rig, few, undecided, point, fitted)
         ways |= more
         logs = [replace(log, cache={}) for log in logs]
-    return rig, logs, point, start, list(ways.values())
+    return rig, logs, point, start, ways, undecided if train else ()
 
 
 def _intervals(
