@@ -170,10 +170,6 @@ def spectrum(
     train = long.train()
     name = _motor(train, motor)
     over = train.motors[name].shaft
-    if train.is_slide(over):
-        raise InputError(
-            f"motor: {shown(name)} moves the slide {over}, which makes no revolutions; name a motor of a shaft"
-        )
     controller = long.axes().get(name)
     follows = isinstance(controller, Controller) and isinstance(controller.reference, PositionReference)
     against = against or ("reference" if follows else "motor")
@@ -245,10 +241,14 @@ def _motor(train: DriveTrain, motor: str | None) -> str:
     if motor is None:
         if len(train.motors) != 1:
             raise InputError(f"motor: there are {len(train.motors)}; name one of {', '.join(train.motors)}")
-        return next(iter(train.motors))
+        motor = next(iter(train.motors))
     if motor not in train.motors:
         meant = did_you_mean(motor, train.motors, f"the motors are {', '.join(train.motors)}")
         raise InputError(f"motor: {shown(motor)} is no motor; {meant}")
+    if train.is_slide(slide := train.motors[motor].shaft):
+        raise InputError(
+            f"motor: {shown(motor)} moves the slide {slide}, which makes no revolutions; name a motor of a shaft"
+        )
     return motor
 
 
