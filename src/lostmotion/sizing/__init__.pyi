@@ -6,3 +6,4 @@ from .finding import Finding as Finding
 from .finding import Findings as Findings
 from .motor_run import motor_current as motor_current
 from .motor_run import temperatures as temperatures
+from .warming import warm_up as warm_up

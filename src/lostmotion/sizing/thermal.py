@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -58,25 +59,34 @@ class TwoBodies:
         times = limits.thermal_time_constant_winding, limits.thermal_time_constant_motor
         return cls(*limits.thermal_parts, *times, *copper, ambient, alpha)
 
+    def equations(self, square: Any, case_heat: Any = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Matrix A and vector b of x' = A x + b for x = (T_w, T_c) - T_a, by the mean of M² [(N·m)²] and further heat in the case [W]."""
+        heat = np.asarray(self.loss * square)
+        C_w, C_c = self.winding_time / self.winding_case, self.case_time / self.case_ambient
+        A, b = np.empty((*heat.shape, 2, 2)), np.empty((*heat.shape, 2))
+        A[..., 0, 0] = (self.alpha * heat - 1.0 / self.winding_case) / C_w
+        A[..., 0, 1], A[..., 1, 0] = 1.0 / (self.winding_case * C_w), 1.0 / (self.winding_case * C_c)
+        A[..., 1, 1] = -(1.0 / self.winding_case + 1.0 / self.case_ambient) / C_c
+        b[..., 0] = heat * (1.0 + self.alpha * (self.ambient - self.reference)) / C_w
+        b[..., 1] = case_heat / C_c
+        return A, b
+
     def steps(self, time: np.ndarray, square: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Map x -> F x + g of the temperatures x = (T_w, T_c) - T_a for each interval between instants [s]. F (n, 2,
         2) and g (n, 2) follow from the mean of M² over the interval [(N·m)²]."""
-        h = np.diff(time)
-        heat = self.loss * square
-        C_w, C_c = self.winding_time / self.winding_case, self.case_time / self.case_ambient
-        a11 = (self.alpha * heat - 1.0 / self.winding_case) / C_w
-        a12, a21 = 1.0 / (self.winding_case * C_w), 1.0 / (self.winding_case * C_c)
-        a22 = -(1.0 / self.winding_case + 1.0 / self.case_ambient) / C_c
-        A = np.empty((len(h), 2, 2))
-        A[:, 0, 0], A[:, 0, 1], A[:, 1, 0], A[:, 1, 1] = a11, a12, a21, a22
+        return self.response(np.diff(time), square)
+
+    def response(self, h: np.ndarray, square: Any, case_heat: Any = 0.0) -> tuple[np.ndarray, np.ndarray]:
+        """Map of the same kind over the durations h [s], with further heat in the case [W]."""
+        A, b = self.equations(np.broadcast_to(square, h.shape), case_heat)
         # The eigenvalues are real, since a12 a21 > 0; q(A) of a function q is q(l_1) + q[l_1, l_2] (A - l_1).
-        middle, half = 0.5 * (a11 + a22), np.sqrt((0.5 * (a11 - a22)) ** 2 + a12 * a21)
+        a11, a22 = A[:, 0, 0], A[:, 1, 1]
+        middle, half = 0.5 * (a11 + a22), np.sqrt((0.5 * (a11 - a22)) ** 2 + A[:, 0, 1] * A[:, 1, 0])
         l_1, l_2 = middle + half, middle - half
         unit = np.eye(2)
         slope, integral = _divided(l_1, l_2, h), _integral(l_1, h)
         whole = integral[:, None, None] * unit + slope[:, None, None] * (A - l_1[:, None, None] * unit)
-        constant = heat * (1.0 + self.alpha * (self.ambient - self.reference)) / C_w
-        return unit + A @ whole, whole[:, :, 0] * constant[:, None]
+        return unit + A @ whole, whole[:, :, 0] * b[:, :1] + whole[:, :, 1] * b[:, 1:]
 
     def course(self, time: np.ndarray, square: np.ndarray, start: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
         """Temperatures of winding and case [°C] at the instants, from those at the first."""
