@@ -166,9 +166,23 @@ def test_the_friction_of_a_shaft_has_that_of_its_motor_s_bearings_without_back_e
 
 
 def test_loops_bear_the_names_of_their_logs() -> None:
-    run = {"g_twist": np.array([0.0, 1e-3]), "g_output_torque": np.array([0.0, 5.0])}
+    run = {"coupling_twist": np.array([0.0, 1e-3]), "coupling_output_torque": np.array([0.0, 5.0])}
     table = {"runs/locked-ramp.csv": run, "other.csv": {}, "braked.csv": run}
-    assert [c.label for c in loop_curves("g", table)] == ["runs/locked-ramp", "braked"]
+    train = lm.load("worm-lowering").train()
+    assert [c.label for c in loop_curves(train, "coupling", table)] == ["runs/locked-ramp", "braked"]
+
+
+def test_laws_of_slides_and_screws_have_units_of_translation() -> None:
+    scenario = lm.load("ball-screw-axis").long()
+    curve = friction_curve(scenario, "slide", "friction")
+    assert curve is not None
+    assert curve.x[-1] <= 1.0  # m/s
+    assert 40.0 < curve.y[0] < 55.0 and curve.y[-1] == pytest.approx(
+        40.0, rel=0.02
+    )  # from the break-away to the friction in motion
+    run = {"screw_deflection": np.array([0.0, 2e-6]), "screw_output_force": np.array([0.0, 50.0])}
+    (loop,) = loop_curves(scenario.train(), "screw", {"ramp.csv": run})
+    assert loop.x[-1] == pytest.approx(2.0) and loop.y[-1] == 50.0  # µm, N
 
 
 def test_correlations_of_what_the_logs_do_not_tell_are_numbers(found: IdentificationResult) -> None:

@@ -26,7 +26,7 @@ from .rig import Rig
 from .task import Identification
 
 ROUGH = re.compile(
-    r"(^|\.)(backlash|breaks|breakaway_torque|stribeck_speed|friction_curve)(\.|$)"
+    r"(^|\.)(backlash|breaks|breakaway_(torque|force)|stribeck_speed|friction_curve)(\.|$)"
 )  # keys on which a motion does not depend smoothly
 SCAN = 9  # values of such a parameter at which the cost is computed
 SPAN = 8.0  # from an eighth of the value found to eight times it

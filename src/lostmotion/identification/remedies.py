@@ -28,12 +28,12 @@ def remedy_for(rig: Rig, names: Sequence[str]) -> str:
         return "give a slow torque ramp with the output locked"
     if enter("delay", "sample_time"):
         return f"give a log with steps of the {'reference' if _has_reference(rig) else 'command'}"
-    if enter("breakaway_torque", "stribeck_speed", "friction_curve"):
+    if enter("breakaway_torque", "breakaway_force", "stribeck_speed", "friction_curve"):
         return "give slow reversals, and a log that creeps from rest"
-    if enter("rotor_inertia", "inertia"):
+    if enter("rotor_inertia", "inertia", "mass"):
         known = "" if torque else " and a known torque"
         return f"give a log with high acceleration{known}, or the inertia of the data sheet"
-    if enter("gain", "limit", "rated_torque", "viscous_friction", "friction_torque"):
+    if enter("gain", "limit", "rated_torque", "rated_force", "viscous_friction", "friction_torque", "friction_force"):
         if torque:
             return "give a log with other speeds, or one that coasts without torque"
         return "give a stall torque, a log of the motor's torque or current, or a log in which the motor is off"
@@ -42,11 +42,11 @@ def remedy_for(rig: Rig, names: Sequence[str]) -> str:
 
 def torque_known(rig: Rig) -> bool:
     """Whether the torque of each motor is an input or in a channel."""
-    variables = {m.variable for m in rig.task.measured.values()}
+    variables, train = {m.variable for m in rig.task.measured.values()}, rig.scenario.train()
     return all(
         (motor.kind == "torque_source" and f"{name}_command" in rig.task.inputs)
-        or variables & {f"{name}_torque", f"{name}_current"}
-        for name, motor in rig.scenario.motors.items()
+        or variables & {train.motor_torque_of(name), f"{name}_current"}
+        for name, motor in train.motors.items()
     )
 
 

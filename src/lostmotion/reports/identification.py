@@ -16,6 +16,7 @@ from ..identification.misfit import shape_variables
 from ..identification.prepare import Prepared
 from ..model.gear import Gear
 from ..model.losses import LossMap, MeshEfficiency, WormMesh, efficiency_map
+from ..model.train import DriveTrain
 from ..simulation.train_scenario import TrainScenario
 from ..units.conversion import si_factor
 from ..units.practical import printed
@@ -258,7 +259,10 @@ def _variables(result: IdentificationResult) -> dict[str, str]:
     """Variables of the rig that residuals are shown over, with their labels."""
     assert result.rig is not None
     units = result.rig.units
-    names = [*shape_variables(result.rig).values(), *(name for name in units if name.endswith("_twist"))]
+    names = [
+        *shape_variables(result.rig).values(),
+        *(name for name in units if name.endswith(("_twist", "_deflection"))),
+    ]
     return {name: f"{name} [{printed(units[name])}]" for name in names}
 
 
@@ -354,16 +358,23 @@ def _profile(result: IdentificationResult, name: str) -> Panel:
 
 
 def _laws(result: IdentificationResult, table: dict[str, dict[str, np.ndarray]]) -> list[Panel]:
-    """Friction of the shafts over speed, and the loops of gears with a twist."""
+    """Friction of the shafts and slides over speed, and the loops of what joins them with a twist or a deflection."""
     panels = []
-    for name in result.scenario.shafts:
+    train = result.scenario.train()
+    for name in train.shafts:
         if curves := friction_curves(result, name):
-            panels.append(Panel(f"friction of {name}", "speed [rad/s]", "torque [N·m]", curves))
-    for name, gear in result.scenario.gears.items():
+            torque = f"{train.torque_word(name)} [{printed(train.torque_unit(name))}]"
+            panels.append(Panel(f"friction of {name}", f"speed [{train.speed_unit(name)}]", torque, curves))
+    for name, gear in train.gears.items():
+        unit = printed(train.torque_unit(gear.output))
+        output = f"output {train.torque_word(gear.output)} [{unit}]"
         if curves := loss_curves(gear):
-            panels.append(Panel(f"losses of {name}", "output torque [N·m]", "lost at the output [N·m]", curves))
-        if curves := loop_curves(name, table):
-            panels.append(Panel(f"torsion of {name}", "twist [mrad]", "output torque [N·m]", curves))
+            panels.append(Panel(f"losses of {name}", output, f"lost at the output [{unit}]", curves))
+        if curves := loop_curves(train, name, table):
+            what, title = (
+                ("deflection [µm]", "stiffness") if train.is_slide(gear.output) else ("twist [mrad]", "torsion")
+            )
+            panels.append(Panel(f"{title} of {name}", what, output, curves))
     return panels
 
 
@@ -392,21 +403,24 @@ def _phases(result: IdentificationResult) -> list[tuple[str, TrainScenario]]:
 
 def friction_curve(scenario: TrainScenario, name: str, label: str) -> Curve | None:
     """Friction of a shaft and of the bearings of its motors over speed; none without any."""
-    shaft = scenario.shafts[name]
+    train = scenario.train()
+    shaft = train.shafts[name]
     slipping, at_rest, speeds, torques = shaft.friction()
-    w = np.linspace(1e-3, max([5.0, *speeds]) if len(speeds) else 10.0, 200)
+    usual = 0.1 if train.is_slide(name) else 1.0
+    w = usual * 1e-3 + (max([5.0 * usual, *speeds]) if len(speeds) else 10.0 * usual) * np.linspace(0.0, 1.0, 200)
     dry = np.interp(w, speeds, torques) if len(speeds) else np.full(200, slipping)
-    bearings = sum(m.friction_torque for m in scenario.motors.values() if m.shaft == name)
+    bearings = sum(m.friction_torque for m in train.motors.values() if m.shaft == name)
     if max(float(np.max(dry)), at_rest, bearings, shaft.viscous_friction) <= 0.0:
         return None
     return Curve(label, w, dry + bearings + shaft.viscous_friction * w, look(0))
 
 
-def loop_curves(gear: str, table: dict[str, dict[str, np.ndarray]]) -> tuple[Curve, ...]:
-    """Torque of a gear over its twist in the first logs, by the names of the logs."""
-    twist, torque = f"{gear}_twist", f"{gear}_output_torque"
+def loop_curves(train: DriveTrain, gear: str, table: dict[str, dict[str, np.ndarray]]) -> tuple[Curve, ...]:
+    """Torque of a gear over its twist [mrad] in the first logs, or force over deflection [µm], by the names of the logs."""
+    twist, torque = train.twist_of(gear), train.output_torque_of(gear)
+    factor = 1e6 if train.is_slide(train.gears[gear].output) else 1e3
     runs = [(log, run) for log, run in table.items() if twist in run and torque in run][:LOOPS]
-    return tuple(Curve(_short(log), 1e3 * run[twist], run[torque], look(k)) for k, (log, run) in enumerate(runs))
+    return tuple(Curve(_short(log), factor * run[twist], run[torque], look(k)) for k, (log, run) in enumerate(runs))
 
 
 def _short(log: str) -> str:
