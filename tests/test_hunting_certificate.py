@@ -152,7 +152,8 @@ def test_the_command_prints_the_certificate_and_writes_its_page(tmp_path: Path) 
         points = [
             (float(row["x"]), float(row["y"])) for row in csv.DictReader(file) if row["curve"] == "after the slip"
         ]
-    assert np.array(points)[:, 1] == pytest.approx(1e3 * certificate.map["image"].values)
+    arcmin = np.degrees(certificate.map["image"].values) * 60.0
+    assert np.array(points)[:, 1] == pytest.approx(arcmin)
     assert "From break-away to break-away" in (tmp_path / "servo.html").read_text()
     refused = CliRunner().invoke(app, ["servo", "hunting-with-static-friction", "--tune", "suited"])
     assert "--tune: for sampled controllers" in str(refused.exception)

@@ -30,7 +30,7 @@ STATES = {"hunts": "bad", "does not hunt": "good", "not decided": "open"}
 def certificate_rows(certificate: HuntingCertificate) -> list[tuple[str, str]]:
     """Verdict, limit cycles and errors, as (what, value)."""
     unit = "rad" if certificate.map is None else str(certificate.map["error"].attrs["units"])
-    rows = [("hunting", certificate.verdict + (f": {certificate.reason}" if certificate.reason else ""))]
+    rows = [("axis", certificate.verdict + (f": {certificate.reason}" if certificate.reason else ""))]
     for point in certificate.fixed_points:
         kind = "stable" if point.stable else "unstable"
         rows.append(("limit cycle", f"±{practical(point.amplitude, unit)}, {1.0 / point.period:.4g} Hz, {kind}"))
@@ -54,7 +54,7 @@ def map_panel(certificate: HuntingCertificate) -> Panel | None:
     found = certificate.map
     if found is None or not found.sizes["error"]:
         return None
-    unit, factor = ("µm", 1e6) if found["error"].attrs["units"] == "m" else ("mrad", 1e3)
+    unit, factor = ("µm", 1e6) if found["error"].attrs["units"] == "m" else ("arcmin", 60.0 * math.degrees(1.0))
     error, image = factor * found["error"].values, factor * found["image"].values
     ends = np.array([0.0, min(error.max(), max(-image.min(), 0.5 * error.max()))])
     curves = (Curve("after the slip", error, image, look(0)), Curve("equal and opposite", ends, -ends, FAINT))

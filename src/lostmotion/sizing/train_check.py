@@ -48,7 +48,7 @@ def check_train(scenario: TrainScenario) -> tuple[Finding, ...]:
     findings += bus_findings(result, powers, scenario.task.supply, scenario.task.cycle)
     if any(isinstance(g.losses, LossMap) for g in train.gears.values()):
         findings.append(loss_map(result))
-    what = "in the short form, [motor], [gearbox] and [load], of a drive that can be written so"
+    what = "judged only in the short form: [motor], [gearbox], [load]"
     findings += [
         Finding(rule, rule.replace("_", " "), "not judged of a drive train", "unknown", what) for rule in NOT_JUDGED
     ]
