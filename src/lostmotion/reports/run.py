@@ -27,7 +27,7 @@ def summary(result: xarray.Dataset | RunArrays) -> str:
         return train_summary(result)
 
     def last(name: str) -> float:
-        return float(np.asarray(result[name])[-1])
+        return _end(np.asarray(result[name]))
 
     def peak(name: str) -> float:
         return float(np.max(np.abs(np.asarray(result[name]))))
@@ -117,7 +117,7 @@ def train_summary(result: xarray.Dataset | RunArrays) -> str:
     def end_and_peak(name: str, unit: str, *, small: bool = False) -> str:
         shown, factor = charted(unit, small=small)
         values = factor * np.asarray(result[name])
-        return f"{values[-1]:.4g} {shown}, peak {np.max(np.abs(values)):.4g}"
+        return f"{_end(values):.4g} {shown}, peak {np.max(np.abs(values)):.4g}"
 
     time = float(np.asarray(result["time"])[-1])
     lines = [
@@ -149,6 +149,11 @@ def train_summary(result: xarray.Dataset | RunArrays) -> str:
     lines += [*contact_lines(result), *mesh_lines(result), *error_lines(result)]
     lines += [f"  {kind}: {result.attrs[kind]}" for kind in ("warning", "note") if kind in result.attrs]
     return "\n".join(lines)
+
+
+def _end(values: np.ndarray) -> float:
+    """The last value; 0 where it is no more than the rounding of the largest."""
+    return float(values[-1]) if abs(values[-1]) > 1e-12 * np.max(np.abs(values)) else 0.0
 
 
 def closes_to(result: xarray.Dataset | RunArrays) -> str:
