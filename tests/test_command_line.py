@@ -45,7 +45,9 @@ def test_shipped_scenarios_are_known_by_name(tmp_path: Path) -> None:
     # But for the next command that is named: with what was given.
     assert by_name.stdout == by_file.stdout.replace(str(SCENARIOS[0].parent / f"{SMALL}.toml"), SMALL)
     listed = lostmotion("scenarios", cwd=tmp_path).stdout
-    for path, line in zip(ALL_SCENARIOS, listed.splitlines(), strict=True):
+    *lines, then = listed.splitlines()
+    assert then.startswith("Next: lostmotion run ")
+    for path, line in zip(ALL_SCENARIOS, lines, strict=True):
         assert line.split(maxsplit=1) == [path.stem, lm.load(path).title]
 
 

@@ -72,6 +72,7 @@ OTHER = {
     "gearbox.limits.average_input_speed": "100 rpm",
     "gearbox.limits.max_input_speed": "100 rpm",
     "gearbox.mesh_damping": "20 N*m*s/rad",
+    "gearbox.mesh_stiffness": {"teeth": 30, "contact_ratio": 1.6, "fewer_pairs": 0.7},
     "gearbox.damping_limited": True,
     "gearbox.note": "worn",
     "gearbox.loss_range": [0.5, 2.0],

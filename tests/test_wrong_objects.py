@@ -129,6 +129,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "select": (lm.select, {"task": "task.toml", "directory": None, "threads": 1, "executor": None, "progress": None}),
     "load_task": (lm.studies.load_task, {"path": "task.toml"}),
     "temperatures": (lm.sizing.temperatures, {"result": HEAT, "motor": None, "ambient": 25.0, "winding": 25.0, "case": 25.0, "repeated": False, "constant_resistance": False}),
+    "warm_up": (lm.sizing.warm_up, {"scenario": HEATED, "update": 0.01, "motor": None, "lubricant": None, "lubricant_temperature": 25.0, "magnet_coefficient": 0.0, "ambient": 25.0, "winding": 25.0, "housing": 25.0, "heating": None}),
     "to_control": (lm.response.to_control, {"response": RESPONSE, "amplitude": 1.0, "output": "load_speed"}),
     "Simulation": (lm.Simulation, {"drive": SCENARIO, "step": 1e-3, "initial": None, "loaded": None, "given": None, "law": None, "error_bound": False}),
     "SimulationBatch": (lm.SimulationBatch, {"drives": SCENARIO.drive(), "step": 1e-3, "count": 2, "vary": None, "seed": 0, "threads": 1}),

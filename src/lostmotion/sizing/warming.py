@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 SUMS = ("switching_count", "steps", "mode_trials", "mode_fallbacks")
 HEAT = (": viscous friction", ": dry friction", ": mesh", ": hysteresis and damping")
 SHORT_HEAT = ("input_damper", "motor_friction", "gear_losses", "hysteresis")
-WHOLE = 1e-9  # by which a number of samples may miss a whole one
+WHOLE = 1e-6  # share by which a number of samples may miss a whole one, as numbers in single precision do
 
 
 @dataclass(frozen=True)
