@@ -552,7 +552,7 @@ def test_a_bus_takes_what_all_axes_together_return(later, energy):
 
 
 def test_brake_resistor_of_a_bus_is_judged_over_the_cycle():
-    """Of the energy that returns at once, 1 mF take (50² - 48²)/2 · 1 mF = 0.098 J up to 50 V; the resistor takes the rest."""
+    """Up to 50 V the capacitors take (50² - 48²)/2 · 1 mF = 0.098 J. The resistor takes the rest of what returns at once."""
     supply = {"voltage_limit": 50.0, "brake_resistance": 50.0, "brake_power": 2.0}
     mean = [f for f in check_drive(axes(cycle=0.5, **supply)) if f.rule == "brake_resistor"][-1]
     assert mean.use == pytest.approx((2.0 * BRAKING - 0.098) / 0.5 / 2.0, rel=1e-3)

@@ -156,7 +156,7 @@ def _kept(of: StickSlip, low: float, high: float) -> tuple[Transients | tuple[fl
     """Bound of the transients with which the map takes a band into itself; else the band that it takes it to, if there is one, and why."""
     left = Transients.none(of)
     for _ in range(ROUNDS):
-        images = [image(of, a, b, left) for a, b in itertools.pairwise(np.linspace(low, high, CELLS + 1))]
+        images = _images(of, low, high, left)
         if reason := next((found.reason for found in images if found.reason), ""):
             return None, reason
         least, most = min(found.least for found in images), max(found.largest for found in images)
@@ -209,9 +209,12 @@ def _met(edges: np.ndarray, found: Image) -> tuple[int, int]:
 
 
 def _kept_with(of: StickSlip, low: float, high: float, left: Transients) -> bool:
-    edges = np.linspace(low, high, CELLS + 1)
-    images = [image(of, a, b, left) for a, b in itertools.pairwise(edges)]
-    return all(not i.reason and low <= i.least <= i.largest <= high for i in images)
+    return all(not i.reason and low <= i.least <= i.largest <= high for i in _images(of, low, high, left))
+
+
+def _images(of: StickSlip, low: float, high: float, left: Transients) -> list[Image]:
+    """Images of the cells of a band."""
+    return [image(of, a, b, left) for a, b in itertools.pairwise(np.linspace(low, high, CELLS + 1))]
 
 
 def _led(edges: np.ndarray, images: list[Image], inside: np.ndarray) -> np.ndarray:

@@ -43,7 +43,7 @@ def check_train(scenario: TrainScenario) -> tuple[Finding, ...]:
         findings += _named(name, _screw(scenario, name, screw, result))
     powers = {}
     for name in train.motors:
-        judged, powers[_place(scenario, name)] = _motor(scenario, name, result)
+        judged, powers[scenario.key_of("motors", name)] = _motor(scenario, name, result)
         findings += judged
     findings += bus_findings(result, powers, scenario.task.supply, scenario.task.cycle)
     if any(isinstance(g.losses, LossMap) for g in train.gears.values()):
@@ -122,14 +122,10 @@ def _load_torques(scenario: TrainScenario, name: str, result: RunArrays) -> list
     return [gear.rated_output_torque]
 
 
-def _place(scenario: TrainScenario, motor: str) -> str:
-    return scenario.key_of("motors", motor)
-
-
 def _motor(scenario: TrainScenario, name: str, result: RunArrays) -> tuple[list[Finding], np.ndarray]:
     """Findings, and the power that it takes [W]."""
     train = scenario.train()
-    motor, where = train.motors[name], _place(scenario, name)
+    motor, where = train.motors[name], scenario.key_of("motors", name)
     torque, speed = train.motor_torque_of(name), f"{motor.shaft}_speed"
     cycle = duty_cycle(result, scenario.task.cycle, speed=speed, motor_torque=torque, output_torque=torque)
     command, T, w = (result[key] for key in (f"{name}_command", torque, speed))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -196,9 +196,9 @@ def warm_up(
             f"warm_up: key {scenario.controller_key(next(iter(scenario.axes())))} is a sampled controller, whose state an update does "
             "not keep; give commands, or a continuous controller"
         )
-    if magnet_coefficient and _motor(scenario, motor)[1].kind != "dc":
-        raise InputError('warm_up: magnet_coefficient acts on a motor of kind "dc"; leave it out')
     name, driven = _motor(scenario, motor)
+    if magnet_coefficient and driven.kind != "dc":
+        raise InputError('warm_up: magnet_coefficient acts on a motor of kind "dc"; leave it out')
     ambient = scenario.ambient_temperature() if ambient is None else ambient
     bodies = need_two_bodies(driven, ambient, COPPER, scenario.motor_key(name))
     at = ambient if lubricant_temperature is None else lubricant_temperature
@@ -212,7 +212,7 @@ def warm_up(
     check_memory(table.samples, 24.0 * len(scenario.variables()))
     start = (ambient if winding is None else winding, ambient if housing is None else housing)
     coarse, fine = (_course(law, samples, start) for samples in (round(each), round(each / 2)))
-    # The error of freezing is of first order: that of the coarse run is twice the difference.
+    # The error of freezing falls linearly with the interval, so the coarse run errs by twice the difference of both.
     error = {
         body: 2.0 * float(np.max(np.abs(getattr(coarse, body) - getattr(fine, body))))
         for body in ("winding", "housing")
@@ -286,7 +286,7 @@ def _course(law: _Law, each: int, start: tuple[float, float]) -> _Course:
         core = law.at(*now).core()
         case = (core, [_later(signals[name], begin) for name in names], state, capacities)
         result = core_run(case, (length, table.sample_interval, samples + 1, True, 0.0, MAX_SWITCHINGS))
-        state, capacities = _end(result["end_state"], scenario)
+        state, capacities = _end(result["end_state"], capacities, short=scenario.core().short_form)
         square = float(np.mean(mean_square(np.asarray(result["values"][torque])))) / law.magnet_factor(now[1]) ** 2
         losses = math.fsum(result["energy"][entry] for entry in law.heating) / length
         now, course = _warmed(law.bodies, square, losses, now, np.arange(1, samples + 1) * table.sample_interval, heat)
@@ -296,11 +296,9 @@ def _course(law: _Law, each: int, start: tuple[float, float]) -> _Course:
     return _Course(_joined(results, each * table.sample_interval), both[0], both[1], heat)
 
 
-def _end(end: Mapping[str, float], scenario: Scenario) -> tuple[dict[str, float], dict[str, float]]:
-    """State and hysteresis capacities with which the next interval begins."""
-    _, _, _, capacities = core_case(scenario)
-    short = scenario.core().short_form
-    names = {gear: "hysteresis_capacity" if short else f"{gear}_hysteresis_capacity" for gear in capacities}
+def _end(end: Mapping[str, float], gears: Iterable[str], *, short: bool) -> tuple[dict[str, float], dict[str, float]]:
+    """State with which the next interval begins, and the hysteresis capacities of these gears."""
+    names = {gear: "hysteresis_capacity" if short else f"{gear}_hysteresis_capacity" for gear in gears}
     kept = set(names.values())
     return {name: v for name, v in end.items() if name not in kept}, {
         gear: end.get(n, 0.0) for gear, n in names.items()
