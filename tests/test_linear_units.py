@@ -146,7 +146,7 @@ def strings(node: Any, key: str = "") -> Iterator[tuple[str, str]]:
 
 
 def test_what_a_description_for_other_programs_names_has_none() -> None:
-    """Of the variables that the C interface lists, and of the keys that it can change."""
+    """The C interface lists variables, and keys that it can change: both have units of translation."""
     scenario = scenario_from(tomllib.loads(AXIS + COMMAND + RUN))
     parameters = parameters_of(scenario, numbers_of).parameters
     assert len(parameters) > 5

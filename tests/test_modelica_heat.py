@@ -29,7 +29,7 @@ LAST_TIMES = np.arange(1001) * 1e-3
 
 
 def efficiency(w: float) -> float:
-    """Of the lossy gear: 0.8 at rest, 0.7 at 1 rad/s, the line goes on."""
+    """Efficiency of the lossy gear: 0.8 at rest, 0.7 at 1 rad/s, and further along that line."""
     return 0.8 - 0.1 * abs(w)
 
 
@@ -362,7 +362,7 @@ def brake_steps(step: float) -> tuple[Vector, float]:
 
 
 def test_eddy_current_brake_in_steps() -> None:
-    """Excitation and temperature are held over steps: the error falls with their square until that of the straight lines remains."""
+    """Excitation and temperature are held over steps. The error falls with the square of the step; the straight lines leave the rest."""
     errors = []
     for step in (0.05, 0.025, 0.0125):
         times = np.arange(round(1.0 / step) + 1) * step

@@ -94,7 +94,7 @@ def test_the_load_behind_a_reversing_gear_moves_mirrored(losses: str, stiffness:
 @pytest.mark.parametrize("stiffness", STIFFNESS)
 @pytest.mark.parametrize("losses", LOSSES)
 def test_the_command_that_turns_a_reversing_gear_is_that_of_another(losses: str, stiffness: str, load: float) -> None:
-    """Of a motor on its input and one on its output, whose directions are exchanged."""
+    """One motor is on the input, one on the output. The gear exchanges their directions."""
     found = []
     for way in (1.0, -1.0):
         tables = axis(way * 6.0, losses, stiffness, 2).model_dump(exclude_none=True)
