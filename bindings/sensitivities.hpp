@@ -45,9 +45,10 @@ inline std::vector<Variation> variations_of(const std::vector<VariationNumbers>&
 using SensitiveNumbers = std::tuple<ComposedTrain, std::vector<Signal>, Named, Named, BoundControl,
                                     std::vector<VariationNumbers>, double, double, std::size_t, std::vector<double>>;
 
-// Of each run: what is wrong with what is asked for, and with its motion, or empty; values, channels x samples;
-// derivatives, parameters x channels x samples; what the controllers show, axes x signals x samples; its derivatives,
-// both empty where `signals` is false; the end state by name; from when the derivatives do not exist [s], and why.
+// Of each run: what is wrong with what is asked for, with the parameter, and with its motion, or empty; values,
+// channels x samples; derivatives, parameters x channels x samples; what the controllers show, axes x signals x
+// samples; its derivatives, both empty where `signals` is false; the end state by name; from when the derivatives do
+// not exist [s], and why.
 inline nb::list run_sensitive_trains(const std::vector<SensitiveNumbers>& cases,
                                      const std::vector<std::string>& channels, bool signals, unsigned threads) {
     std::vector<SensitiveCase> all;
@@ -71,7 +72,8 @@ inline nb::list run_sensitive_trains(const std::vector<SensitiveNumbers>& cases,
         SensitiveRow& r = rows[k];
         const std::size_t samples = all[k].options.times().count, parameters = all[k].variations.size();
         const std::size_t axes = signals ? all[k].options.control.axes.size() : 0, shown = control::n_axis_signals;
-        out.append(nb::make_tuple(r.problem, r.error, as_array(std::move(r.values), {channels.size(), samples}),
+        out.append(nb::make_tuple(nb::make_tuple(r.problem.parameter, r.problem.reason), r.error,
+                                  as_array(std::move(r.values), {channels.size(), samples}),
                                   as_array(std::move(r.derivatives), {parameters, channels.size(), samples}),
                                   as_array(std::move(r.signals), {axes, shown, samples}),
                                   as_array(std::move(r.signal_derivatives), {parameters, axes, shown, samples}),
@@ -88,7 +90,7 @@ inline void bind_sensitivities(nb::module_& m) {
             "train"_a);
     m.def("run_sensitive_trains", &run_sensitive_trains, "cases"_a, "channels"_a, "signals"_a, "threads"_a,
           nb::sig("def run_sensitive_trains(cases: collections.abc.Sequence[tuple[object, ...]], channels: "
-                  "collections.abc.Sequence[str], signals: bool, threads: int) -> list[tuple[str, str, "
+                  "collections.abc.Sequence[str], signals: bool, threads: int) -> list[tuple[tuple[str, str], str, "
                   "numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], "
                   "numpy.typing.NDArray[numpy.float64], numpy.typing.NDArray[numpy.float64], dict[str, float], float, "
                   "str]]"));

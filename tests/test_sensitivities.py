@@ -132,3 +132,14 @@ def test_what_cannot_be_varied_is_refused_by_one_line() -> None:
         assert words in refused(lambda keys=keys: lm.simulate(scenario, sensitivities=keys))
     other = refused(lambda: lm.simulate(scenario, solver="dormand-prince", sensitivities=["shafts.table.inertia"]))
     assert "derivatives are those of the exact solver" in other
+
+
+def test_the_parameter_without_derivatives_is_data_of_the_error() -> None:
+    scenario = lm.load("position-axis").replace(
+        **{"simulation.duration": 0.01, "controller.position.sample_time": None}
+    )
+    keys = ["load.inertia", "controller.sample_time"]
+    with pytest.raises(lm.InputError, match=r"^sensitivities: key controller\.sample_time: ") as caught:
+        lm.simulate(scenario, sensitivities=keys)
+    ((named, reason),) = caught.value.problems
+    assert named == ("controller.sample_time",) and reason.startswith("changes the instants")

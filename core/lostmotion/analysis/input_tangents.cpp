@@ -115,7 +115,7 @@ bool InputTangents::shift_of_breakpoint(double t, double* by_parameter) const {
 void InputTangents::add(int i, int p, const Signal& at, double weight, const std::vector<Variation>& all) {
     const Signal& s = inputs_[static_cast<std::size_t>(i)];
     if (s.breakpoints.size() != at.breakpoints.size() || s.sines.size() != at.sines.size()) {
-        error_ = "beside the value of " + all[static_cast<std::size_t>(p)].name + " an input has other pieces";
+        fault_ = {all[static_cast<std::size_t>(p)].name, "beside its value an input has other pieces"};
         return;
     }
     const auto note = [&](Varied& to, std::size_t k, int what, double a, double b) {

@@ -16,7 +16,7 @@ class InputTangents {
  public:
     InputTangents(const model::Layout& layout, const std::vector<Signal>& inputs, const std::vector<Variation>& all);
 
-    const std::string& error() const { return error_; }
+    const DerivativeFault& fault() const { return fault_; }
     int size() const { return size_; }
     int parameters() const { return parameters_; }
     // Rows of the vector that change within a regime, and those of them that a parameter changes beside the states.
@@ -68,7 +68,7 @@ class InputTangents {
     std::vector<Varied> breakpoints_;               // of each input: pieces x (time, value, slope)
     std::vector<Varied> sines_;                     // of each input: sines x (amplitude, frequency, phase)
     bool varying_ = false, frequency_varies_ = false;
-    std::string error_;
+    DerivativeFault fault_;
 };
 
 }  // namespace lostmotion

@@ -28,7 +28,7 @@ std::vector<SensitiveRow> run_sensitive(const std::vector<SensitiveCase>& cases,
             const std::size_t begin = first[n], count = first[n + 1] - begin;
             const TrainRun& run = *cases[begin].run;
             if (!run.error().empty()) {
-                for (std::size_t k = 0; k < count; ++k) rows[begin + k].problem = run.error();
+                for (std::size_t k = 0; k < count; ++k) rows[begin + k].problem.reason = run.error();
                 continue;
             }
             run.in_kernel([&]<class D>(const typename TrainReader<D>::Model& model) {

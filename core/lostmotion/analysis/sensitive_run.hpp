@@ -31,10 +31,12 @@ struct SensitivityOutput {
 
     double ends_at = std::numeric_limits<double>::infinity();  // [s] from where it is not, and why
     std::string ends_by;
+    DerivativeFault fault;  // then there is no run
 };
 
 struct SensitiveRow {
-    std::string problem, error;                             // of what is asked for, of the motion, or empty
+    DerivativeFault problem;                                // of what is asked for
+    std::string error;                                      // of the motion, or empty
     std::unique_ptr<double[]> values, derivatives;          // channels x samples; parameters x channels x samples
     std::unique_ptr<double[]> signals, signal_derivatives;  // of the controllers: (axes x signals) x samples, as above
     NamedInOrder end_state;                                 // of a run that has ended well

@@ -17,22 +17,23 @@ bool acts_at_the_same_instants(const Control& a, const Control& b) {
     return true;
 }
 
-std::string check_derivatives(const Control& control, const std::vector<Variation>& variations) {
+DerivativeFault check_derivatives(const Control& control, const std::vector<Variation>& variations) {
     for (const ControlledAxis& axis : control.axes) {
         if (axis.law.field_orientation)
-            return "field-oriented control has no derivatives here; take a current loop of kind \"pi\"";
+            return {{}, "field-oriented control has no derivatives here; take a current loop of kind \"pi\""};
         if (axis.law.camera.present && axis.law.camera.pixel > 0.0)
-            return "a camera of finite resolution has no derivative; leave its pixels out";
+            return {{}, "a camera of finite resolution has no derivative; leave its pixels out"};
         for (const auto* encoder : {&axis.law.speed_sensor.encoder, &axis.law.position_sensor.encoder})
             if (encoder->step() > 0.0 && encoder->error > 0.0)
-                return "an encoder with a resolution and an interpolation error has no derivatives here; leave one of "
-                       "them out";
+                return {{},
+                        "an encoder with a resolution and an interpolation error has no derivatives here; leave one "
+                        "of them out"};
     }
     for (const Variation& v : variations)
         for (const Neighbour& n : v.neighbours)
             if (n.control && !acts_at_the_same_instants(control, *n.control))
-                return v.name + ": changes the instants at which a controller acts, which has no derivative";
-    return "";
+                return {v.name, "changes the instants at which a controller acts, which has no derivative"};
+    return {};
 }
 
 }  // namespace lostmotion

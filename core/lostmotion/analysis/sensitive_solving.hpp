@@ -10,8 +10,8 @@ namespace lostmotion {
 // Ticks, delays and schedules that differ beside the value of a parameter have no derivative.
 bool acts_at_the_same_instants(const Control& a, const Control& b);
 
-// Why the controllers of a run have no derivatives, or empty.
-std::string check_derivatives(const Control& control, const std::vector<Variation>& variations);
+// Of the controllers of a run.
+DerivativeFault check_derivatives(const Control& control, const std::vector<Variation>& variations);
 
 // Runs of one train, each with its derivatives, by the exact solver. What their regimes are is found once for all.
 template <class D>
@@ -20,19 +20,17 @@ class SensitiveRuns {
     explicit SensitiveRuns(const typename TrainReader<D>::Model& model) : model_(model) {}
 
     // out: values, as TrainRun::run; output: derivatives of the same channels and instants.
-    // The error of the variations in the message of the report.
     TrainReport operator()(const SensitiveCase& c, const TrainOptions& options, double* out,
                            SensitivityOutput& output) {
         const auto [x, memory] = c.run->in_layout(c.start);
         if (c.variations.empty())
             return run_train_exactly_in<D>(model_, c.inputs, x, memory, options, out, nullptr, workspace_);
-        TrainReport failed;
         const auto trains = std::make_shared<const VariedTrain>(*c.run, c.variations);
         const auto tangents = std::make_shared<const InputTangents>(c.run->assembly().layout(), c.inputs, c.variations);
-        for (const std::string& error :
-             {check_derivatives(options.control, c.variations), trains->error(), tangents->error()})
-            if (!error.empty()) failed.message = error;
-        if (!failed.message.empty()) return failed;
+        for (const DerivativeFault& fault :
+             {check_derivatives(options.control, c.variations), trains->fault(), tangents->fault()})
+            if (!fault.empty()) output.fault = fault;
+        if (!output.fault.empty()) return {};
         output.times = options.times();
         if (!regimes_ || !regimes_->serve(*trains, *tangents, output.channels))
             regimes_.emplace(trains, tangents, output.channels);
@@ -62,14 +60,14 @@ SensitiveRow run_sensitive(SensitiveRuns<D>& runs, const SensitiveCase& one, con
     row.signals = room(shown);
     row.signal_derivatives = room(parameters * shown);
     if (signals) options.control_out = row.signals.get();
-    row.problem = find_channels(*one.run, channels, options.channels.emplace());
+    row.problem.reason = find_channels(*one.run, channels, options.channels.emplace());
     if (!row.problem.empty()) return row;
     SensitivityOutput output;
     output.channels = *options.channels;
     output.out = row.derivatives.get();
     if (signals) output.axes_out = row.signal_derivatives.get();
     const TrainReport report = runs(one, options, row.values.get(), output);
-    row.problem = report.message;
+    row.problem = output.fault.empty() ? DerivativeFault{{}, report.message} : output.fault;
     if (row.problem.empty()) row.error = error_text(report, one.run->assembly());
     if (row.problem.empty() && row.error.empty()) row.end_state = named_end(report, one.run->assembly());
     row.ends_at = output.ends_at;

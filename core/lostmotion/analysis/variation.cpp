@@ -8,15 +8,15 @@ VariedTrain::VariedTrain(const TrainRun& base, const std::vector<Variation>& all
 }
 
 void VariedTrain::add(int parameter, const std::string& name, const Neighbour& n) {
-    if (!n.train || !error_.empty()) return;
+    if (!n.train || !fault_.empty()) return;
     if (!n.train->error().empty()) {
-        error_ = "beside the value of " + name + ": " + n.train->error();
+        fault_ = {name, "beside its value, " + n.train->error()};
         return;
     }
     const model::Layout &a = base().layout(), &b = n.train->assembly().layout();
     if (a.coupled != b.coupled || a.angles != b.angles || a.memory != b.memory || a.inputs != b.inputs ||
         a.contacts != b.contacts || a.branches != b.branches || !same_pieces(n.train->assembly())) {
-        error_ = "beside the value of " + name + " the train has other states, contacts or pieces of laws";
+        fault_ = {name, "beside its value the train has other states, contacts or pieces of laws"};
         return;
     }
     const auto &own = base().train().gears, &other = n.train->assembly().train().gears;

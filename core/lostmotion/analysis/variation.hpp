@@ -27,6 +27,14 @@ struct Variation {
     std::vector<Neighbour> neighbours;
 };
 
+// Why a run has no derivatives.
+struct DerivativeFault {
+    std::string parameter;  // empty: whatever the parameters are
+    std::string reason;     // empty: there is no fault
+
+    bool empty() const { return reason.empty(); }
+};
+
 // The trains beside a train.
 class VariedTrain {
  public:
@@ -42,8 +50,7 @@ class VariedTrain {
 
     // base must stay.
     VariedTrain(const TrainRun& base, const std::vector<Variation>& all);
-    // Why derivatives do not exist, or empty.
-    const std::string& error() const { return error_; }
+    const DerivativeFault& fault() const { return fault_; }
     const model::Assembly& base() const { return base_.assembly(); }
     const std::vector<Beside>& beside() const { return beside_; }
     friend bool operator==(const VariedTrain& a, const VariedTrain& b) {
@@ -58,7 +65,7 @@ class VariedTrain {
 
     const TrainRun& base_;
     std::vector<Beside> beside_;
-    std::string error_;
+    DerivativeFault fault_;
 };
 
 }  // namespace lostmotion

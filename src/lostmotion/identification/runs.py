@@ -93,7 +93,10 @@ def run_logs(
             try:
                 rows = run_cases([c.case for c in alike], list(channels), threads, signals=False)
             except InputError as problem:
-                raise _refused(problem, by) from None
+                if not by:
+                    raise
+                keys, reason = problem.problems[0]
+                raise NoDerivativeError(next(iter(keys or by)), reason) from None
             for course, row in zip(alike, rows, strict=True):
                 course.take(row)
     return [c.seen() for c in courses]
@@ -113,14 +116,6 @@ def run_log(rig: Rig, log: Prepared, values: Values, rung: int, extra: tuple[str
     if seen.error is not None:
         raise seen.error
     return {**dict(zip(rig.task.measured, seen.values, strict=True)), **seen.extra}
-
-
-def _refused(problem: InputError, names: Mapping[str, Any]) -> Exception:
-    text = problem.reason
-    for name in sorted(names, key=len, reverse=True):
-        if text.startswith((f"{name}: ", f"beside the value of {name} ", f"beside the value of {name}:")):
-            return NoDerivativeError(name, text)
-    return NoDerivativeError(next(iter(names)), text) if names else problem
 
 
 class _Course:
@@ -241,7 +236,7 @@ class _Course:
                 there = _begun({**changes, **rig.changes(known, self._rung, phase, keys)}, segment, known)
                 at = rig.built(there) if of_rig else built
             except InputError as error:
-                raise NoDerivativeError(name, f"beside the value of {name}: {error}") from None
+                raise NoDerivativeError(name, f"beside its value: {error}") from None
             self._note_terms(list(self._by).index(name), at, weight)
             start: tuple[dict[str, float], dict[str, float]] | None = None
             if moved is not None:
@@ -332,7 +327,7 @@ def _refuse_held_delay(task: Identification, name: str, references: set[str]) ->
         channel = task.inputs[i]
         if channel.interpolation != "linear" and name in names_in(channel.delay):
             raise NoDerivativeError(
-                name, f"{name}: delays {i}, which is held between samples and read by a sampled controller at its ticks"
+                name, f"delays {i}, which is held between samples and read by a sampled controller at its ticks"
             )
 
 

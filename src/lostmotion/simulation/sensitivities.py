@@ -220,8 +220,9 @@ def run_cases(
     """
     out = []
     for row in _core.run_sensitive_trains(list(cases), list(channels), signals, threads):
-        if row[0]:
-            raise InputError(row[0], where="sensitivities")
+        parameter, reason = row[0]
+        if reason:
+            raise InputError(reason, keys=(parameter,) if parameter else (), where="sensitivities")
         out.append(CoreDerivatives(*row[1:]))
     return out
 
