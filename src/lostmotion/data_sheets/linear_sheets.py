@@ -25,6 +25,8 @@ from ..model.linear import BeltData, LinearMotorData, RackData, RatedScrew
 from .sheet import Record
 
 Alternatives = tuple[tuple[tuple[str, ...], ...], ...]
+# Level of a linear motor whose winding is not known.
+FORCE_SOURCE = "force source"
 STIFFNESSES = (("stiffness",), ("stiffness_curve",))
 
 
@@ -233,6 +235,19 @@ class LinearMotorSheet(LinearSheet, LinearMotorData):
     )
     PARTNERS: ClassVar[dict[str, tuple[str, ...]]] = {"pole_pitch": ("cogging_force",)}
     NEEDS: ClassVar[dict[str, tuple[str, ...]]] = {"rated_force": ("rated_force", "rated_current"), "mass": ("mass",)}
+
+    def level(self) -> str | None:
+        """Level of a run with these data: ``"all data"``, ``"force source"`` where voltage and heat are not known, or None."""
+        winding = (self.force_constant, self.resistance, self.inductance, self.pole_pitch)
+        return super().level() if self.missing() or None not in winding else FORCE_SOURCE
+
+    def assumptions(self) -> tuple[str, ...]:
+        """Assumptions of a run beyond the data, one sentence each."""
+        if self.level() != FORCE_SOURCE:
+            return ()
+        return (
+            f"{self.name} runs as a force source, since its winding is not given: voltage and heat are not judged.",
+        )
 
     @model_validator(mode="after")
     def _is_a_motor(self) -> Self:

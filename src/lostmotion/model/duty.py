@@ -164,11 +164,21 @@ class Duty(Part):
 
 
 class HoldingBrake(Part):
-    """Brake on the shaft of the motor."""
+    """Brake on the shaft of the motor, or on a slide."""
 
-    torque: Annotated[Torque, Positive]
+    torque: Annotated[Torque, Positive] | None = None
     """static, that it holds"""
     inertia: Annotated[Inertia, NotNegative] = 0.0
+    force: Annotated[Force, Positive] | None = None
+    """static, of a brake on the slide of a linear axis, in place of torque"""
+
+    @model_validator(mode="after")
+    def _holds_something(self) -> Self:
+        if (self.torque is None) == (self.force is None):
+            raise ValueError("needs torque, or force of a brake on a slide, one of the two")
+        if self.force is not None and self.inertia > 0.0:
+            raise ValueError("has force and inertia; a brake on a slide does not turn, so leave the inertia out")
+        return self
 
 
 class Bus(Part):

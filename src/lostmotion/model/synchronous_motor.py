@@ -118,7 +118,7 @@ MISREADINGS = {
 class PhaseValues:
     """The winding and the magnets in the quantities of the equations above."""
 
-    pole_pairs: int
+    pole_pairs: float
     """p"""
     resistance: float
     """R of a phase [ohm]"""
@@ -303,7 +303,7 @@ class Winding(Part):
             f"more than {100 * AGREEMENT:.0f} %.{why}"
         )
 
-    def _pairs(self) -> int:
+    def _pairs(self) -> float:
         return self.pole_pairs if self.pole_pairs is not None else (self.poles or 0) // 2
 
     def _one(self, forms: Forms) -> float | None:

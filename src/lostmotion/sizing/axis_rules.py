@@ -100,14 +100,20 @@ def emergency_stop(motion: RequiredMotion, g: Gearbox, deceleration: float) -> F
     return within("emergency_stop", what, peak, limit, "N·m", "momentary torque of the gearbox")
 
 
-def holding_brake(demand: InputDemand, brake: HoldingBrake | None) -> Finding:
+def holding_brake(demand: InputDemand, brake: HoldingBrake | None, slide: RequiredMotion | None = None) -> Finding:
     """Static torque of a brake on the motor against the largest holding torque of the cycle, max |T_hold|/i, without friction.
 
+    The force of a brake on the slide is compared with the largest holding force.
     Source: data sheets of servo motors; friction of gearbox and load, which may vanish by vibration, is not counted.
     """
+    if slide is not None and (demand.motion is slide or (brake is not None and brake.force is not None)):
+        force, what = float(np.abs(slide.holding).max()), "force that the brake of the slide carries"
+        if brake is None or brake.force is None:
+            return missing("holding_brake", f"{what}: {force:.4g} N", "task.brake.force")
+        return within("holding_brake", what, force, brake.force, "N", "force of the brake")
     need = float(np.abs(demand.motion.holding).max()) / abs(demand.gearbox.ratio)
     what = "torque that the holding brake carries"
-    if brake is None:
+    if brake is None or brake.torque is None:
         return missing("holding_brake", f"{what}: {need:.4g} N·m", "task.brake.torque")
     return within("holding_brake", what, need, brake.torque, "N·m", "torque of the brake")
 

@@ -48,6 +48,7 @@ TASK_RULES = {
     "belt_force": "pretension + circumferential force: Elatech and Mulco, timing belts, linear drives",
     "belt_teeth": "teeth in mesh, 12 at most: Elatech and Mulco, timing belts",
     "rack_force": "the rack's data sheet",
+    "guide_friction": "attraction of the linear motor times friction coefficient of the guide: definition",
     "amplifier_current": "rms current over the cycle with the continuous current of the amplifier",
     "bus_voltage": "energy balance of the capacitors: HIWIN MM99TE07-1701, p. 118",
     "brake_resistor": "energy beyond the capacitors: HIWIN MM99TE07-1701, p. 118",

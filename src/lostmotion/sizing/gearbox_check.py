@@ -105,14 +105,13 @@ def locks(train: DriveTrain, gear: str, torques: Collection[float]) -> list[Find
     ]
 
 
-def lost_motion(g: Gearbox, limit: float | None) -> Finding:
-    """limit: of the task [rad]."""
+def lost_motion(g: Gearbox, limit: float | None, *, slides: bool = False) -> Finding:
+    """limit: of the task [rad], of a slide [m]."""
     lost = 0.0 if isinstance(g.stiffness, Rigid) else TestRig(g).lost_motion()
     what = f"lost motion at ±{100.0 * LOST_MOTION_LOAD:.0f} % of rated torque"
-    maximum = None if limit is None else ARCMIN * limit
-    return within(
-        "lost_motion", what, ARCMIN * lost, maximum, "arcmin", "limit of the task", key="task.max_lost_motion"
-    )
+    factor, unit = (1e6, "um") if slides else (ARCMIN, "arcmin")
+    maximum = None if limit is None else factor * limit
+    return within("lost_motion", what, factor * lost, maximum, unit, "limit of the task", key="task.max_lost_motion")
 
 
 def loss_map(result: RunArrays) -> Finding:

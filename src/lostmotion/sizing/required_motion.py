@@ -179,17 +179,24 @@ def check_gearbox(demand: InputDemand) -> list[Finding]:
 
 
 def check_motor(
-    demand: InputDemand, motor: Motor, load_inertia: float, ambient: float, largest: float
+    demand: InputDemand,
+    motor: Motor,
+    load_inertia: float,
+    ambient: float,
+    largest: float | None,
+    *,
+    slides: bool = False,
 ) -> list[Finding]:
-    """The rules for a motor at this gearbox; `largest` is the largest permissible ratio of the inertias."""
+    """The rules for a motor at this gearbox, or with `slides` for a linear motor. `largest` is the largest permissible ratio of
+    the inertias; None: it is not judged."""
     torque = demand.motor_torque(motor)
     cycle = demand.cycle(torque)
     rise = rms_rise(motor, cycle.rms_motor_torque(), ambient)
     return [
-        largest_speed(motor, cycle.peak_input_speed),
-        *peak_torque(motor, torque),
-        *heat(motor, cycle, ambient, rise=rise),
+        largest_speed(motor, cycle.peak_input_speed, slides=slides),
+        *peak_torque(motor, torque, slides=slides),
+        *heat(motor, cycle, ambient, rise=rise, slides=slides),
         voltage(motor, needed_command(motor, torque, demand.speed), torque, demand.speed),
         current(motor, torque),
-        inertia_ratio(motor, demand.whole, load_inertia, largest),
+        *([] if largest is None else [inertia_ratio(motor, demand.whole, load_inertia, largest)]),
     ]

@@ -23,6 +23,7 @@ from ..inputs.quantities import (
     NotNegative,
     Number,
     Positive,
+    Switch,
     Time,
     Whole,
 )
@@ -54,9 +55,12 @@ REQUIREMENTS = {
 class LinearAxis(Part):
     """Last stage of a linear axis and the slope of its slide."""
 
-    kind: Literal["screw", "rack", "belt"]
+    kind: Literal["screw", "rack", "belt"] | None = None
+    """left out where linear motors alone are candidates"""
     stage: dict[str, Any] = Field(default={})
     """the table `[screw]`, `[rack]` or `[belt]`, of which a record may vary"""
+    guide_friction: Annotated[Number, NotNegative] | None = None
+    """friction coefficient of the guide, on which the attraction of a linear motor acts"""
     rise: Annotated[Number, Limit(ge=-1.0, le=1.0)] = 0.0
     """sine of the slide's inclination"""
 
@@ -111,6 +115,11 @@ class AxisTask(Task, Duty):
     linear: LinearAxis | None = None
     """tables `[slide]` and `[screw]`, `[rack]` or `[belt]`; all values of the load are then in units of translation"""
 
+    whole: dict[str, dict[str, Any]] = Field(default={})
+    """table `[linear_motor]`: values beside its records"""
+    pairs: Switch = True
+    """whether pairs of motor and gearbox are candidates"""
+
     @model_validator(mode="after")
     def _rules_are_known(self) -> Self:
         for rule in self.safety_factors:
@@ -135,12 +144,17 @@ class AxisTask(Task, Duty):
         return self
 
     @property
+    def stage_kind(self) -> str | None:
+        """Kind of the last stage of a linear axis; None where there is none."""
+        return None if self.linear is None else self.linear.kind
+
+    @property
     def rise(self) -> float | None:
         """Sine of the slope of a slide; None of a rotary load."""
         return None if self.linear is None else self.linear.rise
 
-    def fed(self, motor: Motor) -> Motor:
-        """A motor with the inertia of the brake, at the least voltage of the supply.
+    def fed(self, motor: Motor, *, slides: bool = False) -> Motor:
+        """A motor with the inertia of the brake, at the least voltage of the supply; a linear motor has no such brake.
 
         Raises
         ------
@@ -148,7 +162,7 @@ class AxisTask(Task, Duty):
             The motor has a voltage that contradicts it.
         """
         changes: dict[str, Any] = {}
-        if self.brake is not None and self.brake.inertia > 0.0:
+        if self.brake is not None and self.brake.inertia > 0.0 and not slides:
             changes["rotor_inertia"] = motor.rotor_inertia + self.brake.inertia
         voltage = None if self.supply is None else self.supply.min_voltage
         if voltage is not None:
@@ -315,6 +329,15 @@ def axis_scenario(base: DriveScenario, motor: Motor, gearbox: Gearbox, task: Axi
     )
 
 
+def with_scale_alone(base: DriveScenario) -> DriveScenario:
+    """The base with the scale of its slide as the only encoder, as with a linear motor."""
+    controller = base.controller
+    assert controller is not None
+    assert controller.position_encoder is not None
+    scale = controller.position_encoder.model_copy(update={"shaft": None})
+    return base.model_copy(update={"controller": controller.model_copy(update={"encoder": scale})})
+
+
 def current_loop(controller: Controller, wanted: AnyCurrent | None, motor: Motor) -> AnyCurrent:
     """The current loop of a task for a motor: of a torque source, whose winding is not known, a lag as long as that of a sampled loop.
 
@@ -358,11 +381,10 @@ def tuned(base: DriveScenario, motor: Motor, g: Gearbox, current: AnyCurrent | N
 
 
 def torque_limit(motor: Motor) -> float | None:
-    """By the largest current [N·m]; None where that is not given."""
-    if motor.winding is not None:
-        rms = motor.winding.max_current
-        return None if rms is None else math.sqrt(2.0) * rms * motor.winding.phase_values().torque_constant
-    limits = motor.limits
-    if limits is None or limits.max_current is None or limits.torque_constant is None:
-        return None
-    return limits.max_current * limits.torque_constant
+    """By the largest current, or the peak torque if that is less [N·m]; None where neither is given."""
+    limits, found = motor.limits, [motor.largest_torque]
+    if limits is not None and limits.peak_torque is not None:
+        found.append(limits.peak_torque)
+    if limits is not None and limits.max_current is not None and limits.torque_constant is not None:
+        found.append(limits.max_current * limits.torque_constant)
+    return None if math.isinf(min(found)) else min(found)

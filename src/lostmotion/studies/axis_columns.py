@@ -23,6 +23,8 @@ COLUMNS = {
     "voltage_rms": ("V", "rms voltage of the motor"),
     "motor_torque_peak": ("N*m", "largest torque of the motor"),
     "motor_torque_rms": ("N*m", "rms torque of the motor"),
+    "motor_force_peak": ("N", "largest force of the linear motor"),
+    "motor_force_rms": ("N", "rms force of the linear motor"),
     "winding_temperature": ("degC", "highest temperature of the winding after many cycles"),
     "case_temperature": ("degC", "highest temperature of the motor's case after many cycles"),
     "output_torque_peak": ("N*m", "largest torque at the gearbox output"),
@@ -60,6 +62,20 @@ OF_LOAD = (
     "reversal_error",
 )
 """columns in units of translation where the load is a slide"""
+
+
+OF_ROTARY_MOTORS = (
+    "motor_torque_peak",
+    "motor_torque_rms",
+    "output_torque_peak",
+    "output_torque_mean",
+    "input_speed_peak",
+    "input_speed_mean",
+    "inertia_ratio",
+    "speed_gain",
+    "integral_gain",
+)
+"""columns that a linear motor does not have"""
 
 
 def unit_of_column(name: str, *, slides: bool) -> str:
@@ -120,8 +136,10 @@ def temperatures_of(motor: Motor, time: np.ndarray, square: np.ndarray, ambient:
     return math.nan if rise is None else ambient + rise, math.nan
 
 
-def row_of(scenario: DriveScenario, task: AxisTask, result: RunArrays, count: int) -> dict[str, float]:
-    """The columns of one run."""
+def row_of(
+    scenario: DriveScenario, task: AxisTask, result: RunArrays, count: int, *, slides: bool = False
+) -> dict[str, float]:
+    """The columns of one run; `slides`: of a linear motor, which has no torque, no input shaft and no ratio of inertias."""
     here = last_cycle(result, count)
     time = result.time[here]
     duty = duty_cycle_of(result, here, task.cycle)
@@ -135,13 +153,14 @@ def row_of(scenario: DriveScenario, task: AxisTask, result: RunArrays, count: in
     assert controller.position is not None
     assert controller.speed is not None
     error = result["load_angle"] - reference_of(scenario).at(result.time)[0]
-    return {
+    peak, mean = float(np.abs(torque).max()), math.sqrt(float(e.torque_square.mean()))
+    columns = {
         "current_peak": float(np.abs(e.current).max()),
         "current_rms": e.current_rms,
         "voltage_peak": float(np.abs(e.voltage).max()),
         "voltage_rms": rms(e.voltage),
-        "motor_torque_peak": float(np.abs(torque).max()),
-        "motor_torque_rms": math.sqrt(float(e.torque_square.mean())),
+        "motor_torque_peak": peak,
+        "motor_torque_rms": mean,
         "winding_temperature": winding,
         "case_temperature": case,
         "output_torque_peak": float(np.abs(duty.output_torque).max()),
@@ -161,6 +180,10 @@ def row_of(scenario: DriveScenario, task: AxisTask, result: RunArrays, count: in
         "cycles": float(count),
         "change": change(result, count),
     }
+    if not slides:
+        return columns
+    forces = {"motor_force_peak": peak, "motor_force_rms": mean}
+    return {name: value for name, value in columns.items() if name not in OF_ROTARY_MOTORS} | forces
 
 
 def _at_rest(

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..data_sheets.linear_sheets import LinearMotorSheet
 from ..errors import InputError
 from ..model.gearbox import Gearbox
 from ..model.motor import Motor
@@ -20,6 +21,7 @@ from ..sizing.axis_rules import (
     emergency_stop,
     gearbox_life,
     holding_brake,
+    missing,
     output_bearing,
     stage_rules,
     with_safety,
@@ -99,8 +101,8 @@ class Axes:
         return self._once(key, lambda: self._demand(row))  # type: ignore[no-any-return]
 
     def _stage_key(self, row: np.ndarray) -> Any:
-        linear = self.task.linear
-        return None if linear is None else self.study.part_key(linear.kind, row)
+        kind = self.task.stage_kind
+        return None if kind is None or self.study.slides_itself(row) else self.study.part_key(kind, row)
 
     def stage(self, row: np.ndarray) -> tuple[Stage, RequiredMotion, list[Finding]] | None:
         """The last stage of a linear axis, the motion of its shaft and what its rules say; None of a rotary load.
@@ -110,7 +112,7 @@ class Axes:
         InputError
             Its record lacks data.
         """
-        if self.task.linear is None:
+        if self.task.linear is None or self.study.slides_itself(row):
             return None
         found = self._once(("stage motion", self._stage_key(row)), lambda: self._stage(row))
         if isinstance(found, InputError):
@@ -140,9 +142,9 @@ class Axes:
                 findings.append(emergency_stop(demand.motion, g, rate))
             findings += output_bearing(g, task.radial_force, task.axial_force)
         if task.brake is not None or (task.hold_without_power and (task.gravity is not None or task.rise)):
-            findings.append(holding_brake(demand, task.brake))
+            findings.append(holding_brake(demand, task.brake, None if task.linear is None else self.motion()))
         if task.max_lost_motion is not None:
-            findings.append(lost_motion(demand.whole, task.max_lost_motion))
+            findings.append(lost_motion(demand.whole, task.max_lost_motion, slides=task.linear is not None))
         return demand, findings
 
     def motor(self, row: np.ndarray) -> Motor | InputError:
@@ -166,9 +168,22 @@ class Axes:
             )
         if lacking:
             return InputError("; ".join(lacking))
-        task, load = self.task, float(self.motion().inertia.max())
-        found = check_motor(demand, motor, load, task.ambient_temperature, task.max_inertia_ratio)
+        task, load, slides = self.task, float(self.motion().inertia.max()), self.study.slides_itself(row)
+        largest = None if slides else task.max_inertia_ratio
+        found = check_motor(demand, motor, load, task.ambient_temperature, largest, slides=slides)
+        if slides:
+            found += self._attraction(row)
         return self._under_task([*findings, *found, *self._supplied(demand, motor)], motor)
+
+    def _attraction(self, row: np.ndarray) -> list[Finding]:
+        """Not judged: the friction that the attraction of a linear motor causes on a guide of unknown friction."""
+        sheet, linear = self.study.records(row)["linear_motor"], self.task.linear
+        assert isinstance(sheet, LinearMotorSheet)
+        assert linear is not None
+        if sheet.attraction_force is None or linear.guide_friction is not None:
+            return []
+        what = f"friction of the guide under the attraction of {sheet.attraction_force:.4g} N"
+        return [missing("guide_friction", what, "slide.friction_coefficient")]
 
     def choice(self, row: np.ndarray) -> dict[str, tuple[float, list[str]]]:
         """Mass, length, price and lead time of a pair, each with the kinds of record that lack it."""
@@ -252,8 +267,7 @@ class Axes:
         def make() -> Axes:
             study = self.study.model_copy()
             kept = {k: v for k, v in self.study.kept.items() if k[0] in ("motor", "checked", "motion", "stage motion")}
-            linear = self.task.linear
-            kept |= {k: v for k, v in self.study.kept.items() if linear is not None and k[0] == linear.kind}
+            kept |= {k: v for k, v in self.study.kept.items() if k[0] == self.task.stage_kind}
             study._kept = kept | {key: self.study.part("gearbox", row).with_losses(factor)}
             return Axes(study)
 
@@ -290,7 +304,7 @@ class Axes:
             It cannot be run.
         """
         scenario, result, count = self.until_it_repeats(row)
-        columns = row_of(scenario, self.task, result, count)
+        columns = row_of(scenario, self.task, result, count, slides=self.study.slides_itself(row))
         found = self._after_run(row, scenario, result, count, columns["winding_temperature"])
         chosen = {column: value for column, (value, _) in self.choice(row).items()}
         return columns_of(found, CHECKS) | columns | chosen, int(result.attrs["switching_count"])
@@ -310,18 +324,19 @@ class Axes:
     ) -> list[Finding]:
         """The same rules, of the cycle that was run, and the temperature of its winding [°C]; those that only the required motion
         has are of that."""
-        here, task = last_cycle(result, count), self.task
+        here, task, slides = last_cycle(result, count), self.task, self.study.slides_itself(row)
         duty, g, m = duty_cycle_of(result, here, task.cycle), scenario.gearbox, scenario.motor
         command, torque, speed = (result[name][here] for name in ("command", "motor_torque", "motor_speed"))
         command = command_of_run(m, scenario.controller, command, torque, speed)
         oriented = oriented_amplitudes(result, "motor")
         of_motor = [
-            largest_speed(m, duty.peak_input_speed),
-            *peak_torque(m, torque),
+            largest_speed(m, duty.peak_input_speed, slides=slides),
+            *peak_torque(m, torque, slides=slides),
             *heat(
                 m,
                 duty,
                 task.ambient_temperature,
+                slides=slides,
                 rise=None if math.isnan(winding) else winding - task.ambient_temperature,
             ),
             voltage(m, command, torque, speed, oriented=None if oriented is None else oriented[1][here]),

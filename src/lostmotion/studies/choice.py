@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 from ..data_sheets.records import Sheet
 from ..sizing.finding import Finding, within
+from ..sizing.whole_drives import WHOLE
 
 DAY = 86400.0  # [s]
 
@@ -46,7 +47,7 @@ def value_of(column: str, records: Mapping[str, Sheet]) -> tuple[float, list[str
     values = {
         kind: getattr(record, quantity.key)
         for kind, record in records.items()
-        if quantity.stage or kind in ("motor", "gearbox")
+        if quantity.stage or kind in ("motor", "gearbox", *WHOLE)
     }
     lacking = [kind for kind, value in values.items() if value is None]
     if lacking or not values:

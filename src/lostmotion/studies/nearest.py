@@ -142,14 +142,18 @@ def _tried(study: Study, miss: Miss) -> Miss:
         factor = least_factor(study, row)
         if factor is None:
             return Miss(miss.candidate, miss.lacks, None, f"no cycle up to {SLOWEST:g} times as long passes the rules")
-        return Miss(miss.candidate, miss.lacks, factor, _said(study, slowed(study, factor), row, factor))
+        said = _said(study, slowed(study, factor), row, factor)
+        by_rules = Miss(miss.candidate, miss.lacks, factor, said)
+        slower = by_rules if said.startswith(FITS) else _run_slower(study, miss, row, factor)
+        return by_rules if slower.slower is None else slower
     except (InputError, RuntimeError) as error:
         return Miss(miss.candidate, miss.lacks, None, f"a slower cycle was not tried: {error}")
 
 
-def _run_slower(study: Study, miss: Miss, row: np.ndarray) -> Miss:
-    """With the first of some factors whose run fits: errors of runs need not fall steadily with the time, so that none is sought between."""
-    for factor in TRIES:
+def _run_slower(study: Study, miss: Miss, row: np.ndarray, least: float = 1.0) -> Miss:
+    """With the first of some factors above the `least` whose run fits: errors of runs need not fall steadily with the time, so that
+    none is sought between."""
+    for factor in (math.ceil(DIGITS * least * share) / DIGITS for share in TRIES):
         slower = slowed(study, factor)
         if Axes(slower).refused(row) is None and (said := _said(study, slower, row, factor)).startswith(FITS):
             return Miss(miss.candidate, miss.lacks, factor, said)
@@ -157,7 +161,7 @@ def _run_slower(study: Study, miss: Miss, row: np.ndarray) -> Miss:
         miss.candidate,
         miss.lacks,
         None,
-        f"its run violates a limit in all cycles tried, up to {TRIES[-1]:g} times as long",
+        f"its run violates a limit in all cycles tried, up to {least * TRIES[-1]:.3g} times as long",
     )
 
 

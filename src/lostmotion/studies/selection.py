@@ -100,8 +100,12 @@ def _candidate(
     row: dict[str, Any], study: Study, select: Selection, bounds: dict[str, tuple[float, float]]
 ) -> Candidate:
     values = {column: float(row[column]) for column in select.objectives}
-    shown = [shown_name(row[v.title]) if v.names is not None else f"{v.title} {row[v.title]:.6g}" for v in study.vary]
-    name = ", ".join(shown)
+    shown = [
+        shown_name(row[v.title]) if v.names is not None else f"{v.title} {row[v.title]:.6g}"
+        for v in study.vary
+        if v.names is not None or math.isfinite(row[v.title])
+    ]
+    name = ", ".join(filter(None, shown)) or "motor and gearbox of the task"
     choice = {column: float(row[column]) for column in CHOICE if math.isfinite(row.get(column, math.nan))}
     if row["error"]:
         return Candidate(row["run"], name, (NOT_RUN,), row["error"], "", values)

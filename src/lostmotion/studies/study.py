@@ -18,7 +18,8 @@ from ..simulation.scenario import DriveScenario, Scenario, short_form
 from ..simulation.train_scenario import TrainScenario
 from ..simulation.units_of_keys import unit_in, unit_of_key
 from ..sizing.stages import stage_of, together
-from .axis import FEWEST, AxisTask, axis_scenario
+from ..sizing.whole_drives import WHOLE, whole_drive
+from .axis import FEWEST, AxisTask, axis_scenario, with_scale_alone
 from .axis_columns import COLUMNS as AXIS_COLUMNS
 from .axis_columns import unit_of_column
 from .check import ESTIMATED
@@ -114,13 +115,13 @@ class Study(Part):
                 "is the task of a drive train, but only a drive can be selected; write the short form"
             ) from None
         for key in (key for v in self.vary for key in v.all_keys):
-            if key.split(".", maxsplit=1)[0] not in ("gearbox", "motor") and not self._is_stage(key):
+            if key.split(".", maxsplit=1)[0] not in ("gearbox", "motor") and not self._is_own(key):
                 raise ValueError(f"varies {key}, but of a task motor, gearbox and stage vary; change it in the task")
         task.check(drive)
 
-    def _is_stage(self, key: str) -> bool:
-        """Whether it is the key of the last stage of a linear task."""
-        return self.axis is not None and self.axis.linear is not None and key == self.axis.linear.kind
+    def _is_own(self, key: str) -> bool:
+        """Whether it is a key of a task alone: that of a whole drive, or of the last stage of a linear one."""
+        return self.axis is not None and (key in WHOLE or key == self.axis.stage_kind)
 
     def _check_names(self) -> None:
         titles = [v.title for v in self.vary]
@@ -181,7 +182,7 @@ class Study(Part):
 
     def _check_keys(self) -> None:
         """Sees that the keys are there to be varied: in the base, or where records vary, with one that can be run."""
-        keys = [(key, v.relative) for v in self.vary for key in v.all_keys if not self._is_stage(key)]
+        keys = [(key, v.relative) for v in self.vary for key in v.all_keys if not self._is_own(key)]
         owners = {owner_of(key) for key, _ in keys if kind_of_record(key)}
         for key, _ in keys:
             if kind_of_record(key) or is_condition(key):
@@ -203,7 +204,7 @@ class Study(Part):
 
     def _with_first_records(self) -> Scenario:
         """The base with the first of the varied records that can be run."""
-        named = {v.all_keys[0]: v.names for v in self.vary if v.names is not None and not self._is_stage(v.all_keys[0])}
+        named = {v.all_keys[0]: v.names for v in self.vary if v.names is not None and not self._is_own(v.all_keys[0])}
         for names in itertools.islice(itertools.product(*named.values()), 1000):
             try:
                 return with_records(self.tables, dict(zip(named, names, strict=True)))
@@ -258,12 +259,28 @@ class Study(Part):
         """
         motor, gearbox = self.part("motor", row), self.part("gearbox", row)
         assert self.axis is not None
-        if self.axis.linear is not None:
+        base = self.drive
+        if self.slides_itself(row):
+            base = with_scale_alone(base)
+        elif self.axis.linear is not None:
             gearbox = together(gearbox, self.part("stage", row))
-        return axis_scenario(self.drive, motor, gearbox, self.axis, cycles)
+        return axis_scenario(base, motor, gearbox, self.axis, cycles)
+
+    def whole_drive(self, row: np.ndarray) -> tuple[str, int] | None:
+        """Key and place in `vary` of the whole drive of a row of a task; None of a pair of motor and gearbox."""
+        found = ((v.all_keys[0], k) for k, v in enumerate(self.vary) if v.all_keys[0] in WHOLE)
+        return next(((key, k) for key, k in found if not math.isnan(row[k])), None)
+
+    def slides_itself(self, row: np.ndarray) -> bool:
+        """Whether the drive of a row of a task is a linear motor, which needs no stage."""
+        whole = self.whole_drive(row)
+        return whole is not None and whole[0] == "linear_motor"
 
     def part_key(self, kind: str, row: np.ndarray) -> tuple[Any, ...]:
         """Column of a row that determines its ``"gearbox"`` or its ``"motor"``."""
+        whole = self.whole_drive(row) if kind in ("gearbox", "motor") else None
+        if whole is not None:
+            return (kind, (whole[1], float(row[whole[1]])))
         return (kind, *((k, float(row[k])) for k, v in enumerate(self.vary) if v.all_keys[0].split(".")[0] == kind))
 
     def part(self, kind: str, row: np.ndarray) -> Any:
@@ -275,16 +292,28 @@ class Study(Part):
             There is none.
         """
         linear = None if self.axis is None else self.axis.linear
-        key = self.part_key(linear.kind if kind == "stage" and linear is not None else kind, row)
+        key = self.part_key(linear.kind if kind == "stage" and linear is not None and linear.kind else kind, row)
         if key not in self.kept:
-            if kind == "stage":
+            if kind in ("gearbox", "motor") and (whole := self.whole_drive(row)) is not None:
+                self._keep_whole(*whole, row)
+            elif kind == "stage":
                 assert linear is not None
+                assert linear.kind is not None
                 names = [self.vary[k].value(number) for k, number in key[1:]]
                 self.kept[key] = stage_of(linear.kind, {"from": names[0], **linear.stage} if names else linear.stage)
             else:
                 found = getattr(self.scenario_with(dict(key[1:])), kind)
                 self.kept[key] = self._under(self.axis, found) if kind == "motor" and self.axis is not None else found
         return self.kept[key]
+
+    def _keep_whole(self, kind: str, k: int, row: np.ndarray) -> None:
+        """Keeps motor and gearbox of a whole drive."""
+        task = self.axis
+        assert task is not None
+        beside, friction = task.whole.get(kind, {}), 0.0 if task.linear is None else task.linear.guide_friction
+        motor, gearbox = whole_drive(kind, str(self.vary[k].value(row[k])), beside, friction or 0.0)
+        self.kept[self.part_key("gearbox", row)] = gearbox
+        self.kept[self.part_key("motor", row)] = task.fed(motor, slides=kind == "linear_motor")
 
     def _under(self, task: AxisTask, motor: Motor) -> Motor:
         """A motor as the supply of a task feeds it.
@@ -309,10 +338,13 @@ class Study(Part):
         """
         assert self.axis is not None
         linear = self.axis.linear
+        found: dict[str, Sheet] = {}
         tables = {"motor": self.tables.get("motor", {}), "gearbox": self.tables.get("gearbox", {})}
-        if linear is not None:
+        if (whole := self.whole_drive(row)) is not None:
+            kind, k = whole
+            found[kind], tables = find(str(self.vary[k].value(row[k])), kind), {}
+        if linear is not None and linear.kind is not None and not self.slides_itself(row):
             tables[linear.kind] = linear.stage
-        found = {}
         for kind, table in tables.items():
             varied = [self.vary[k].value(number) for k, number in self.part_key(kind, row)[1:] if self.vary[k].names]
             name = varied[0] if varied else table.get("from")
@@ -372,12 +404,22 @@ class Study(Part):
         """Expressions to keep, parsed."""
         return {name: read_expression(text, self.vocabulary) for name, text in self.keep.items()}
 
+    def _grids(self) -> list[list[int]]:
+        """Places in `vary` that are combined with each other: all, or of a task those of pairs, then each kind of whole drive."""
+        whole = [k for k, v in enumerate(self.vary) if self.axis is not None and v.all_keys[0] in WHOLE]
+        pairs = [k for k in range(len(self.vary)) if k not in whole]
+        return ([pairs] if self.axis is None or self.axis.pairs else []) + [[k] for k in whole]
+
+    def _size(self, grid: list[int]) -> int:
+        """Number of combinations of a grid."""
+        sizes: list[int] = [len(self.vary[k].levels()) for k in grid]  # type: ignore[arg-type]
+        return math.prod(sizes)
+
     @property
     def total(self) -> int:
         """Number of runs."""
         if self.design == "grid":
-            counts = [len(v.levels()) for v in self.vary]  # type: ignore[arg-type]
-            return math.prod(counts)
+            return sum(self._size(grid) for grid in self._grids())
         if self.design == "list":
             return len(self.vary[0].levels())  # type: ignore[arg-type]
         assert self.runs is not None
@@ -389,12 +431,16 @@ class Study(Part):
         index = np.arange(first, last)
         if self.design == "grid":
             levels = [v.levels() for v in self.vary]
-            out, rest = np.empty((len(index), p)), index.copy()
-            for k in range(p - 1, -1, -1):
-                values = levels[k]
-                assert values is not None
-                out[:, k] = values[rest % len(values)]
-                rest //= len(values)
+            out, begin = np.full((len(index), p), math.nan), 0
+            for grid in self._grids():
+                end = begin + self._size(grid)
+                here = (index >= begin) & (index < end)
+                rest, begin = index[here] - begin, end
+                for k in reversed(grid):
+                    values = levels[k]
+                    assert values is not None
+                    out[here, k] = values[rest % len(values)]
+                    rest = rest // len(values)
             return out
         if self.design == "list":
             return np.stack([v.levels()[first:last] for v in self.vary], axis=1)  # type: ignore[index]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import sqrt
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from ..inputs.quantities import argument
 from ..inputs.schema import follow, unit_in_schema
 from ..inputs.toml_files import is_in_file, read_toml
 from ..inputs.validation import shown, unknown_key
+from ..model.angle_torques import STANDARD_GRAVITY
 from ..model.linear import Slide
 from ..model.signals import ForceSignal, TorqueSignal
 from ..model.task import Task
@@ -21,17 +23,36 @@ from ..simulation.linear_units import in_si, of_slides
 from ..simulation.scenario import from_tables
 from ..simulation.train_scenario import train_schema
 from ..sizing.stages import DIRECT, STAGES, stage_of
+from ..sizing.whole_drives import BESIDE, LINEAR, WHOLE
 from .axis import AxisTask, InnerLoop
 from .file import find_sheets
 from .records import kind_of_record, names_that_fit
 from .select import Selection
 from .study import Study
 
-TABLES = ("title", "task", "load", "slide", *STAGES, "controller", "motor", "gearbox", "candidates", "vary", "select")
-CANDIDATES = ("gearbox", "motor", *STAGES)
+TABLES = (
+    "title",
+    "task",
+    "load",
+    "slide",
+    *STAGES,
+    *WHOLE,
+    "controller",
+    "motor",
+    "gearbox",
+    "candidates",
+    "vary",
+    "select",
+)
+CANDIDATES = ("gearbox", "motor", *STAGES, *WHOLE)
 OBJECTIVES = {"energy": "least", "tracking_error_peak": "least"}
 OF_TORQUE_SOURCES = {"mechanical_energy": "least", "tracking_error_peak": "least"}  # whose windings are not known
-SLIDE_KEYS = ("mass", "viscous_friction", "friction_force", "inclination", "force")
+SLIDE_KEYS = ("mass", "viscous_friction", "friction_force", "friction_coefficient", "inclination", "force")
+NO_PAIR = {
+    "kind": "torque_source",
+    "rotor_inertia": 1.0,
+    "rated_torque": 1.0,
+}  # in the base of a task without pairs; never run
 GAINS = {"position": {"gain": 1.0}, "speed": {"gain": 1.0}}  # which the rule replaces
 CONTROLLER = {"sample_time": 125e-6, "encoder": {"lines": 2048}, "current": {"kind": "pi"}}
 POSITION = {"sample_time": 1e-3, "feedforward": 1.0}
@@ -96,20 +117,24 @@ def task_of(tables: dict[str, Any], directory: Path = Path()) -> Study:
     task = AxisTask(**given)
     controller = _controller(tables["controller"])
     current, controller = _apart(controller)
-    if current is not None:
-        task = task.model_copy(update={"current": current})
+    vary = _vary(tables, directory)
+    pairs = _has_pairs(tables, vary)
+    task = task.model_copy(update={"current": current, "pairs": pairs, "whole": _beside_whole(tables)})
+    _need_scale(controller, vary)
     time = argument("controller.sample_time", controller["sample_time"], "s")
     written = {
         "title": tables.get("title", ""),
-        "load": tables["load"],
+        "load": _on_its_guide(tables["load"], task),
         "controller": controller,
         "motor": _table(tables, "motor"),
         "gearbox": _table(tables, "gearbox"),
-        "task": {key: value for key, value in tables["task"].items() if key in Task.model_fields},
+        "task": {key: value for key, value in tables["task"].items() if key in Task.model_fields and key != "supply"},
         "simulation": {"duration": task.cycle, "sample_interval": time},
     }
-    vary = _vary(tables, directory)
-    _with_parts(written, vary, linear=linear is not None)
+    if pairs:
+        _with_parts(written, vary, linear=linear is not None)
+    else:
+        written |= {"motor": NO_PAIR, "gearbox": DIRECT.model_dump()}
     select = tables.get("select", {})
     if not isinstance(select, dict):
         raise InputError(f"key select: {shown(select)} must be a table, such as [select]")
@@ -177,8 +202,12 @@ def _relative(tables: dict[str, Any], directory: Path) -> dict[str, Any]:
 
 def _torque_sources(written: dict[str, Any], vary: list[Any]) -> bool:
     """Whether a candidate of the motor runs as a torque source, so that only its mechanical energy is known."""
+    from ..data_sheets.linear_sheets import FORCE_SOURCE
     from ..data_sheets.motor_sheet import TORQUE_SOURCE, MotorSheet
 
+    whole = [entry for entry in vary if isinstance(entry, dict) and entry.get("key") in WHOLE]
+    if any(find(name, entry["key"]).level() == FORCE_SOURCE for entry in whole for name in _names(entry)):
+        return True
     varied = [entry for entry in vary if isinstance(entry, dict) and str(entry.get("key")).split(".")[0] == "motor"]
     names = [name for entry in varied if kind_of_record(str(entry["key"])) for name in _names(entry)]
     if not varied:
@@ -210,13 +239,23 @@ def linear_axis(tables: dict[str, Any]) -> dict[str, Any] | None:
     InputError
         A table is missing, or does not fit the others.
     """
-    given = [kind for kind in STAGES if kind in tables or _varied(tables, kind)]
-    if "slide" not in tables and not given:
+    given, direct = ([kind for kind in kinds if kind in tables or _varied(tables, kind)] for kinds in (STAGES, LINEAR))
+    if "slide" not in tables and not given and not direct:
         return None
     if "load" in tables:
         raise InputError("keys load, slide: the load turns or slides; leave one of them out")
+    slope = argument("slide.inclination", tables.get("slide", {}).get("inclination", 0.0), "rad")
+    own: dict[str, Any] = {"rise": sin(slope)}
+    if (friction := tables.get("slide", {}).get("friction_coefficient")) is not None:
+        own["guide_friction"] = argument("slide.friction_coefficient", friction, "1")
+        if own["guide_friction"] < 0.0:
+            raise InputError(f"key slide.friction_coefficient: {shown(friction)} must be at least 0")
+    if direct and not given:
+        return own
     if len(given) != 1:
-        what = f"has {' and '.join(given)}; keep one" if given else f"lacks one of {', '.join(STAGES)}; add it"
+        what = (
+            f"has {' and '.join(given)}; keep one" if given else f"lacks one of {', '.join((*STAGES, *LINEAR))}; add it"
+        )
         raise InputError(f"key slide: what moves it {what}")
     (kind,) = given
     stage = tables.get(kind, {})
@@ -225,8 +264,7 @@ def linear_axis(tables: dict[str, Any]) -> dict[str, Any] | None:
         raise InputError(f"key {kind}: {shown(stage)} must be a table [{kind}], or the name of a record")
     if not _varied(tables, kind):
         stage_of(kind, stage)
-    slope = argument("slide.inclination", tables.get("slide", {}).get("inclination", 0.0), "rad")
-    return {"kind": kind, "stage": dict(stage), "rise": sin(slope)}
+    return {"kind": kind, "stage": dict(stage), **own}
 
 
 def _varied(tables: dict[str, Any], kind: str) -> bool:
@@ -248,7 +286,7 @@ def in_translation(tables: dict[str, Any]) -> dict[str, Any]:
     for key in slide:
         if key not in SLIDE_KEYS:
             raise InputError(f"key slide.{key}: {unknown_key(key, SLIDE_KEYS)}")
-    own = Slide(**{key: value for key, value in slide.items() if key != "force"})
+    own = Slide(**{key: value for key, value in slide.items() if key not in ("force", "friction_coefficient")})
     given = slide.get("force", 0.0)
     force = ForceSignal(**given) if isinstance(given, dict) else ForceSignal(mean=given)
     torque = TorqueSignal(**force.model_dump())
@@ -268,6 +306,16 @@ def in_translation(tables: dict[str, Any]) -> dict[str, Any]:
         controller["position_encoder"] = {"shaft": "load", **rest, "resolution": step}
     controller["shaft"] = "load"
     return {"load": load, "controller": controller, "task": _task_in_translation(tables["task"])}
+
+
+def _on_its_guide(load: dict[str, Any], task: AxisTask) -> dict[str, Any]:
+    """Load with the dry friction of its guide under the weight of the slide and its largest payload across it."""
+    linear = task.linear
+    if linear is None or not linear.guide_friction:
+        return load
+    carried = [sum(p.mass for p in task.payload if p.begin <= one.begin < p.end) for one in task.payload]
+    weight = (load["inertia"] + max(carried, default=0.0)) * STANDARD_GRAVITY * sqrt(1.0 - linear.rise * linear.rise)
+    return load | {"friction_torque": load["friction_torque"] + linear.guide_friction * weight}
 
 
 def _task_in_translation(task: Any) -> Any:
@@ -334,12 +382,60 @@ def _vary(tables: dict[str, Any], directory: Path) -> list[Any]:
     entries = tables.get("vary")
     if entries is None:
         kinds = ("motor",) if "slide" in tables and "gearbox" not in tables else ("gearbox", "motor")
-        entries = [{"key": kind, "catalogue": {}} for kind in kinds if not _whole(tables, kind)]
+        alone = any(kind in tables for kind in WHOLE) and not any(kind in tables for kind in (*kinds, *STAGES))
+        entries = [{"key": kind, "catalogue": {}} for kind in kinds if not alone and not _whole(tables, kind)]
+    if isinstance(entries, list):
+        entries = [
+            *entries,
+            *(_entry_of(tables, kind) for kind in WHOLE if kind in tables and not _varied(tables, kind)),
+        ]
     if not isinstance(entries, list):
         raise InputError(f"key vary: {shown(entries)} must be tables; write [[vary]] with double brackets")
     for entry in entries:
         find_sheets(entry, directory)
     return entries
+
+
+def _entry_of(tables: dict[str, Any], kind: str) -> dict[str, Any]:
+    """The entry of `[[vary]]` of a table of whole drives: the record that it names, or all."""
+    name = _table(tables, kind).get("from")
+    return {"key": kind, "catalogue": {}} if name is None else {"key": kind, "values": [name]}
+
+
+def _beside_whole(tables: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Values beside the records of whole drives.
+
+    Raises
+    ------
+    InputError
+        One is none of such a drive.
+    """
+    given = {kind: _table(tables, kind) for kind in WHOLE if kind in tables}
+    for kind, table in given.items():
+        for key in table:
+            if key not in ("from", *BESIDE[kind]):
+                raise InputError(f"key {kind}.{key}: {unknown_key(key, BESIDE[kind])}")
+    return {kind: {key: value for key, value in table.items() if key != "from"} for kind, table in given.items()}
+
+
+def _has_pairs(tables: dict[str, Any], vary: list[Any]) -> bool:
+    """Whether a task has pairs of motor and gearbox among its candidates, and not whole drives alone."""
+    keys = [str(entry.get("key")).split(".")[0] for entry in vary if isinstance(entry, dict)]
+    return not set(keys) & set(WHOLE) or bool({*keys, *tables} & {"motor", "gearbox", *STAGES})
+
+
+def _need_scale(controller: dict[str, Any], vary: list[Any]) -> None:
+    """Sees that a task with linear motors has the scale by which they are controlled.
+
+    Raises
+    ------
+    InputError
+        It has none.
+    """
+    if controller.get("position_encoder") is None and _varied({"vary": vary}, "linear_motor"):
+        raise InputError(
+            'key controller.position_encoder: a linear motor needs a scale; add it, such as { grating_period = "20 um", bits = 10 }'
+        )
 
 
 def _whole(tables: dict[str, Any], kind: str) -> bool:

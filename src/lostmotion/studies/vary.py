@@ -1,5 +1,6 @@
 """One parameter that a study varies: its key, its values or their distribution, and what they do to a scenario."""
 
+import math
 import re
 from collections.abc import Mapping
 from statistics import NormalDist
@@ -122,8 +123,10 @@ class Vary(Part):
         return (unit_of_key(self.all_keys[0]) if not self.relative else None) or "1"
 
     def value(self, number: float) -> float | str:
-        """Value of a number of `levels` or `quantile`: itself, or the name at this index."""
-        return float(number) if self.names is None else self.names[int(number)]
+        """Value of a number of `levels` or `quantile`: itself, or the name at this index, none for NaN."""
+        if self.names is None:
+            return float(number)
+        return "" if math.isnan(number) else self.names[int(number)]
 
     def levels(self) -> np.ndarray | None:
         """Values of a grid or list, of names their places in it; None for a distribution."""
