@@ -28,7 +28,7 @@ from lostmotion.inputs.part import Part
 from lostmotion.inputs.schema import options, unit_in_schema
 from lostmotion.model import signals
 from lostmotion.namespace import homes_of
-from lostmotion.simulation.scenario import json_schema
+from lostmotion.simulation.drive_scenario import json_schema
 from lostmotion.simulation.train_scenario import train_schema
 from lostmotion.simulation.variables import VARIABLES
 from lostmotion.units.grammar import PREFIXED, SPELLINGS

@@ -15,7 +15,7 @@ from html_pages import Page
 from lostmotion.cli import app
 from lostmotion.data_sheets.records import find
 from lostmotion.paper import paper_scenario
-from lostmotion.simulation.scenario import from_tables
+from lostmotion.simulation.drive_scenario import from_tables
 from lostmotion.simulation.train_scenario import train_from_tables
 from lostmotion.sizing.drive_check import check_drive
 from lostmotion.sizing.duty_cycle import DutyCycle, duty_cycle

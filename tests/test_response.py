@@ -17,7 +17,7 @@ from html_pages import charts
 from lostmotion.cli import app
 from lostmotion.cli.grids import parse_grid
 from lostmotion.paper import paper_scenario
-from lostmotion.response.linear import rigid_constants
+from lostmotion.response.rigid import rigid_constants
 from lostmotion.response.shooting import PERIODICITY
 from lostmotion.simulation.variables import STATES
 

@@ -9,7 +9,7 @@ import pytest
 
 import lostmotion as lm
 from conftest import ALL_SCENARIOS, ROOT, SCENARIOS
-from lostmotion.simulation.scenario import json_schema
+from lostmotion.simulation.drive_scenario import json_schema
 
 
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda p: p.stem)

@@ -12,8 +12,8 @@ import pytest
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.control.tuning import TwoInertias, suited
+from lostmotion.simulation.drive_scenario import LoadTable
 from lostmotion.simulation.run import run
-from lostmotion.simulation.scenario import LoadTable
 from lostmotion.sizing.duty_cycle import DutyCycle
 from lostmotion.sizing.required_motion import check_motor, input_demand, required_motion
 from lostmotion.studies.axis import repeated

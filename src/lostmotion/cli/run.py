@@ -77,8 +77,8 @@ def run(
     lostmotion run result.csv --explain 0.25
     """
     from ..errors import InputError
+    from ..simulation.needs import need_open_loop
     from ..simulation.sources import load
-    from ..simulation.train_scenario import need_open_loop
 
     _try_files(output, plot, report)
     _check_figure(figure, plot)

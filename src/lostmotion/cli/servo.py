@@ -15,7 +15,7 @@ from .terminal import about, busy, console, fail, progress
 
 if TYPE_CHECKING:
     from ..servo.commission import ServoReport
-    from ..servo.tuning import Tuning
+    from ..servo.tuned import Tuning
     from ..simulation.scenario import Scenario
 
 

@@ -13,9 +13,11 @@ from ..errors import InputError
 from ..inputs.validation import did_you_mean
 from ..simulation.keys import set_values
 from ..simulation.linear_units import of_slides
+from ..simulation.needs import need_no_impacts
 from ..simulation.scenario_files import find_scenario, load
 from ..simulation.sensitivities import channels_of
-from ..simulation.train_scenario import TrainInitial, TrainScenario, in_long_form, need_no_impacts
+from ..simulation.train_scenario import TrainScenario, in_long_form
+from ..simulation.train_tables import TrainInitial
 from .formulas import Formula, names_in
 from .prepare import Prepared
 from .shaft_angles import angle_terms

@@ -11,8 +11,8 @@ import numpy as np
 from ..model.signals import Signal
 from ..model.torsion import TorsionCurve
 from ..portable.descriptions import described
+from ..simulation.needs import need_free_motion
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import need_free_motion
 from ..simulation.units_of_keys import unit_for
 from ..units.practical import ARCMIN
 from ..version import __version__

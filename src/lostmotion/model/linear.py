@@ -15,16 +15,12 @@ from ..inputs.part import Part
 from ..inputs.quantities import (
     Angle,
     AxialStiffness,
-    Current,
     Density,
     Force,
-    ForceConstant,
     Inertia,
     Length,
     Limit,
-    LinearSpeed,
     LinearViscousFriction,
-    Mass,
     NotNegative,
     Number,
     Positive,
@@ -34,121 +30,17 @@ from ..inputs.quantities import (
     ViscousFriction,
     Whole,
 )
-from ..reproducible import arctan, cos, sin
-from .angle_torques import STANDARD_GRAVITY, AngleCurve, ErrorCurve, ErrorHarmonic, Harmonic, TorqueCurve
+from ..reproducible import arctan
+from .angle_torques import AngleCurve, ErrorCurve, ErrorHarmonic, Harmonic
 from .gear import Gear
 from .losses import ConstantEfficiency, MeshEfficiency
-from .motor import ShaftMotor
-from .shaft import FrictionCurve, Shaft, check_points
-from .springs import Spring
 from .torsion import MAX_PIECES, Hysteresis, LinearStiffness, Rigid, TorsionCurve, check_segments
 
 STEEL = 7850.0  # [kg/m^3]
 ELASTIC_MODULUS = 206e9  # of steel [Pa]
-COGGING_POINTS = 72  # in a period: chords that depart from the sine by less than 0.1 % of its amplitude
 
 
 Mounting = Literal["fixed-free", "supported-supported", "fixed-supported", "fixed-fixed"]
-
-
-class ForceCurve(Part):
-    """Dry friction force over the magnitude of the speed: straight lines through the points, constant beyond the last."""
-
-    speeds: tuple[Annotated[LinearSpeed, NotNegative], ...] = Field(min_length=2, max_length=100)
-    """rising from 0"""
-    forces: tuple[Annotated[Force, NotNegative], ...]
-
-    @model_validator(mode="after")
-    def _is_a_curve(self) -> Self:
-        check_points(self.speeds, self.forces, "forces")
-        return self
-
-
-class EndStops(Part):
-    """Elastic stops at both ends of the travel: free between them, a spring beyond."""
-
-    lower: Length
-    upper: Length
-    stiffness: Annotated[AxialStiffness, Positive]
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        if self.upper <= self.lower:
-            raise ValueError(f"has upper = {self.upper} m, which is not above lower = {self.lower} m; exchange them")
-        return self
-
-    def spring(self, slide: str) -> Spring:
-        """The same as a spring on the slide."""
-        curve = TorsionCurve(slopes=(self.stiffness,), backlash=self.upper - self.lower)
-        return Spring(shaft=slide, stiffness=curve, rest_angle=0.5 * (self.lower + self.upper))
-
-
-class Slide(Part):
-    """A mass that moves along a straight line: a table, a carriage, a ram. Masses of linear motors on it are added.
-
-    Examples
-    --------
-    >>> import lostmotion as lm
-    >>> lm.Slide(mass="20 kg", friction_force="30 N", inclination="90 deg").weight()
-    196.13299999999998
-    """
-
-    mass: Annotated[Mass, NotNegative] = 0.0
-    viscous_friction: Annotated[LinearViscousFriction, NotNegative] = 0.0
-    friction_force: Annotated[Force, NotNegative] = 0.0
-    """dry friction while it slips"""
-    breakaway_force: Annotated[Force, NotNegative] | None = None
-    """dry friction at rest; left out, the same"""
-    stribeck_speed: Annotated[LinearSpeed, Positive] | None = None
-    """v_S: the friction falls from breakaway_force to friction_force by ``exp(-(v/v_S)^2)``; left out, at once"""
-    friction_error: Annotated[Force, Positive] | None = None
-    """by which straight lines depart from that curve at most; left out, 0.1 % of the difference of both forces"""
-    friction_curve: ForceCurve | None = None
-    """dry friction over speed, in place of friction_force and stribeck_speed"""
-    inclination: Annotated[Angle, Limit(ge=-0.5 * math.pi, le=0.5 * math.pi)] = 0.0
-    """inclination of the positive direction above the horizontal; 90 deg: vertical, positive upwards. The weight's share along the slide acts
-    against it"""
-    end_stops: EndStops | None = None
-
-    def __repr__(self) -> str:
-        return f"{type(self).__name__}({self.mass:.4g} kg)"
-
-    @model_validator(mode="after")
-    def _friction_is_clear(self) -> Self:
-        slipping = self.friction_force
-        if self.friction_curve is not None:
-            for key in ("friction_force", "stribeck_speed"):
-                if getattr(self, key):
-                    raise ValueError(f"has {key} and friction_curve, which say the same; give one")
-            slipping = self.friction_curve.forces[0]
-        if self.breakaway_force is not None and self.breakaway_force < slipping:
-            raise ValueError(
-                f"has breakaway_force = {self.breakaway_force} N, less than its friction in motion, {slipping} N; "
-                "give at least that, or leave it out"
-            )
-        if self.stribeck_speed is not None and not (self.breakaway_force or 0.0) > slipping:
-            raise ValueError("has a stribeck_speed, which needs a breakaway_force above friction_force; give it")
-        if self.friction_error is not None and self.stribeck_speed is None:
-            raise ValueError("has a friction_error, which belongs to stribeck_speed; leave it out")
-        return self
-
-    def weight(self, mass: float | None = None) -> float:
-        """Force of gravity against the positive direction [N], of its own mass or of another one [kg]."""
-        return (self.mass if mass is None else mass) * STANDARD_GRAVITY * sin(self.inclination)
-
-    def shaft(self) -> Shaft:
-        """The same as a shaft of the equations, in units of translation."""
-        curve = self.friction_curve
-        return Shaft(
-            domain="translation",
-            inertia=self.mass,
-            viscous_friction=self.viscous_friction,
-            friction_torque=self.friction_force,
-            breakaway_torque=self.breakaway_force,
-            stribeck_speed=self.stribeck_speed,
-            friction_error=self.friction_error,
-            friction_curve=None if curve is None else FrictionCurve(speeds=curve.speeds, torques=curve.forces),
-        )
 
 
 class StiffnessCurve(Part):
@@ -313,7 +205,7 @@ class LinearDrive(Part):
         )
 
 
-def _one_way(part: Part, ways: dict[str, tuple[str, ...]], optional: tuple[str, ...] = ()) -> str:
+def one_way(part: Part, ways: dict[str, tuple[str, ...]], optional: tuple[str, ...] = ()) -> str:
     """Choice among equivalent sets of keys."""
     given = {way: [key for key in keys if getattr(part, key) is not None] for way, keys in ways.items()}
     used = [way for way, keys in given.items() if keys]
@@ -369,7 +261,7 @@ class ScrewData(LinearDrive):
 
     @model_validator(mode="after")
     def _is_a_screw(self) -> Self:
-        _one_way(self, {"lead": ("lead",), "pitch": ("pitch", "starts")})
+        one_way(self, {"lead": ("lead",), "pitch": ("pitch", "starts")})
         friction = [key for key in ("friction_coefficient", "friction_angle") if getattr(self, key) is not None]
         if len(friction) == 2:
             raise ValueError("has friction_coefficient and friction_angle, which say the same; give one")
@@ -467,114 +359,16 @@ class RatedScrew(ScrewData):
     """left out, 70 m rpm/ball_circle_diameter"""
 
 
-class RackData(LinearDrive):
-    """A rack and its pinion alone, as a data sheet has them.
+class Placed(Part):
+    """Base of what turns into a straight line, with the names of its shaft and its slide."""
 
-    Examples
-    --------
-    >>> RackData(module="2 mm", teeth=20).travel()
-    0.12566370614359174
-    """
-
-    module: Annotated[Length, Positive] | None = None
-    """normal module"""
-    teeth: Annotated[Whole, Field(ge=4, le=1000)] | None = None
-    """teeth of the pinion"""
-    helix_angle: Annotated[Angle, Limit(ge=0.0, le=0.25 * math.pi)] | None = None
-    """left out, 0: straight teeth"""
-    travel_per_turn: Annotated[Length, Positive] | None = None
-    """in place of module and teeth"""
-
-    @model_validator(mode="after")
-    def _is_a_rack(self) -> Self:
-        ways = {"teeth": ("module", "teeth", "helix_angle"), "travel": ("travel_per_turn",)}
-        _one_way(self, ways, ("helix_angle",))
-        return self
-
-    def travel(self) -> float:
-        if self.travel_per_turn is not None:
-            return self.travel_per_turn
-        assert self.module is not None and self.teeth is not None  # noqa: PT018
-        return math.pi * self.module * self.teeth / cos(self.helix_angle or 0.0)
-
-
-class BeltData(LinearDrive):
-    """A toothed belt and its pulley alone, as a data sheet has them.
-
-    Examples
-    --------
-    >>> BeltData(teeth=20, pitch="5 mm", specific_stiffness="1e6 N", free_lengths=["0.5 m", "1.5 m"]).gear("m", "s").stiffness.stiffness
-    2666666.6666666665
-    """
-
-    pulley_diameter: Annotated[Length, Positive] | None = None
-    """at the belt's pitch line"""
-    teeth: Annotated[Whole, Field(ge=4, le=1000)] | None = None
-    """teeth of the pulley"""
-    pitch: Annotated[Length, Positive] | None = None
-    """pitch of the belt"""
-    travel_per_turn: Annotated[Length, Positive] | None = None
-    """in place of both"""
-    specific_stiffness: Annotated[Force, Positive] | None = None
-    """c_sp, force to unit strain: with free_lengths, in place of stiffness"""
-    free_lengths: tuple[Annotated[Length, Positive], ...] | None = Field(None, min_length=1, max_length=10)
-    """lengths of the strands between pulley and slide that carry together: stiffness = c_sp (1/L_1 + 1/L_2 ...)"""
-
-    @model_validator(mode="after")
-    def _is_a_belt(self) -> Self:
-        ways = {
-            "diameter": ("pulley_diameter",),
-            "teeth": ("teeth", "pitch"),
-            "travel": ("travel_per_turn",),
-        }
-        _one_way(self, ways)
-        if (self.specific_stiffness is None) != (self.free_lengths is None):
-            raise ValueError("has one of specific_stiffness and free_lengths; the stiffness of the belt needs both")
-        for key in ("stiffness", "stiffness_curve"):
-            if self.free_lengths is not None and getattr(self, key) is not None:
-                raise ValueError(f"has {key} and specific_stiffness, which say the same; give one")
-        if self._goes_slack() and (len(lengths := self.free_lengths or ()) != 2 or lengths[0] != lengths[1]):
-            raise ValueError(
-                f"has a preload and free_lengths {list(lengths)}; a preload takes two strands of the same length, one of which goes "
-                "slack; give them, or a stiffness_curve"
-            )
-        return self
-
-    def _goes_slack(self) -> bool:
-        return self.preload > 0.0 and self.free_lengths is not None
-
-    def _curve(self) -> tuple[tuple[float, ...], tuple[float, ...]] | None:
-        if not self._goes_slack():
-            return super()._curve()
-        # Both strands carry until the deflection takes the preload from one of them; the other goes on alone.
-        both = self._stiffness() or 0.0
-        return (both, 0.5 * both), (2.0 * self.preload / both,)
-
-    def travel(self) -> float:
-        if self.travel_per_turn is not None:
-            return self.travel_per_turn
-        if self.pulley_diameter is not None:
-            return math.pi * self.pulley_diameter
-        assert self.teeth is not None and self.pitch is not None  # noqa: PT018
-        return self.teeth * self.pitch
-
-    def _stiffness(self) -> float | None:
-        if self.specific_stiffness is None or self.free_lengths is None:
-            return super()._stiffness()
-        stiffness = 0.0
-        for length in self.free_lengths:
-            stiffness += self.specific_stiffness / length
-        return stiffness
-
-
-class _Placed(Part):
     input: str
     """shaft"""
     output: str
     """slide"""
 
 
-class Screw(RatedScrew, _Placed):
+class Screw(RatedScrew, Placed):
     """A ball screw or a lead screw between a shaft and a slide.
 
     Examples
@@ -584,122 +378,3 @@ class Screw(RatedScrew, _Placed):
     >>> round(screw.ratio(), 3)
     628.319
     """
-
-
-class Rack(RackData, _Placed):
-    """A pinion on a shaft and its rack on a slide, or the other way round.
-
-    Examples
-    --------
-    >>> import lostmotion as lm
-    >>> lm.model.Rack(input="pinion", output="carriage", module="2 mm", teeth=20).ratio()
-    49.99999999999999
-    """
-
-
-class Belt(BeltData, _Placed):
-    """A toothed belt from a pulley on a shaft to a slide.
-
-    Examples
-    --------
-    >>> import lostmotion as lm
-    >>> lm.model.Belt(input="motor", output="carriage", teeth=20, pitch="5 mm").travel()
-    0.1
-    """
-
-
-class LinearMotorData(Part):
-    """A linear motor alone, as a data sheet has it: a source of force.
-
-    Examples
-    --------
-    >>> LinearMotorData(force_constant="50 N/A", rated_current="4 A", peak_current="12 A").forces()
-    (200.0, 600.0)
-    """
-
-    mass: Annotated[Mass, NotNegative] = 0.0
-    """mass of the part that moves"""
-    rated_force: Annotated[Force, Positive] | None = None
-    """force at command 1"""
-    peak_force: Annotated[Force, Positive] | None = None
-    """at which the force ends; left out, without limit"""
-    force_constant: Annotated[ForceConstant, Positive] | None = None
-    """force to the current in the unit of the currents"""
-    rated_current: Annotated[Current, Positive] | None = None
-    """with force_constant, in place of rated_force"""
-    peak_current: Annotated[Current, Positive] | None = None
-    """with force_constant, in place of peak_force"""
-    friction_force: Annotated[Force, NotNegative] = 0.0
-    """dry friction"""
-    cogging_force: Annotated[Force, Positive] | None = None
-    """amplitude, over the position with the period pole_pitch"""
-    pole_pitch: Annotated[Length, Positive] | None = None
-    """tau, from a north pole to the next south pole: half a magnetic period"""
-    note: str = ""
-    """note for readers of the results"""
-
-    @model_validator(mode="after")
-    def _is_a_motor(self) -> Self:
-        for name in ("rated", "peak"):
-            force, current = f"{name}_force", f"{name}_current"
-            if getattr(self, current) is not None and self.force_constant is None:
-                raise ValueError(f"has {current} without force_constant; add it, or give {force}")
-            if getattr(self, force) is not None and getattr(self, current) is not None:
-                raise ValueError(f"has {force} and {current}, which with force_constant say the same; give one")
-        rated, peak = self.forces()
-        if peak < rated:
-            raise ValueError(
-                f"has a peak force of {peak:g} N, less than the rated one, {rated:g} N; give at least that"
-            )
-        if (self.cogging_force is None) != (self.pole_pitch is None):
-            raise ValueError("has one of cogging_force and pole_pitch; the cogging needs both")
-        return self
-
-    def forces(self) -> tuple[float, float]:
-        """(rated, peak) [N]; infinite without a limit."""
-        rated, peak = self.rated_force, self.peak_force
-        if rated is None:
-            if self.rated_current is None or self.force_constant is None:
-                raise ValueError("lacks rated_force, or force_constant and rated_current; add it")
-            rated = self.force_constant * self.rated_current
-        if peak is None and self.peak_current is not None and self.force_constant is not None:
-            peak = self.force_constant * self.peak_current
-        return rated, math.inf if peak is None else peak
-
-
-class LinearMotor(LinearMotorData):
-    """A linear motor that moves a slide: its command times the rated force acts without delay.
-
-    Examples
-    --------
-    >>> import lostmotion as lm
-    >>> motor = lm.model.LinearMotor(slide="table", rated_force="200 N", peak_force="600 N", mass="2.5 kg")
-    >>> motor.motor().torque_limit
-    600.0
-    """
-
-    slide: str
-
-    def motor(self) -> ShaftMotor:
-        """The source of torque with the same equations."""
-        rated, peak = self.forces()
-        return ShaftMotor(
-            kind="torque_source",
-            shaft=self.slide,
-            rotor_inertia=self.mass,
-            friction_torque=self.friction_force,
-            rated_torque=rated,
-            torque_limit=None if math.isinf(peak) else peak,
-        )
-
-    def cogging(self) -> TorqueCurve | None:
-        """Its cogging as a force over the position; None without."""
-        if self.cogging_force is None or self.pole_pitch is None:
-            return None
-        share = [k / COGGING_POINTS for k in range(COGGING_POINTS)]
-        return TorqueCurve(
-            shaft=self.slide,
-            period=self.pole_pitch,
-            angles=tuple(self.pole_pitch * x for x in share),
-            torques=tuple(self.cogging_force * sin(2.0 * math.pi * x) for x in share),
-        )

@@ -9,8 +9,10 @@ from ..errors import InputError
 from ..inputs.named import nothing
 from ..inputs.validation import did_you_mean, shown
 from .gear import Gear
-from .linear import Belt, LinearDrive, LinearMotor, Rack, Screw
+from .linear import LinearDrive, Screw
+from .linear_motor import LinearMotor
 from .motor import ShaftMotor
+from .rack_and_belt import Belt, Rack
 from .shaft import FrictionCurve, Shaft
 from .train import Elements, TrainElements
 

@@ -21,8 +21,9 @@ from ..model.drive import Drive
 from ..model.load import Load
 from ..model.motor import Motor
 from ..model.train import DriveTrain
+from ..simulation.drive_scenario import DriveScenario, LoadTable
 from ..simulation.joint_trains import Driven, JointDrive, JointTrains, joint_drive
-from ..simulation.scenario import DriveScenario, LoadTable, SimulationTable
+from ..simulation.scenario import SimulationTable
 from ..simulation.shipped import shipped_scenarios
 from ..simulation.sources import load_drive
 from .joints import joint_id

@@ -18,8 +18,8 @@ from ..model.load import Load
 from ..model.losses import ConstantEfficiency
 from ..model.motor import Motor
 from ..model.torsion import Rigid
+from ..simulation.drive_scenario import DriveScenario, drive_of
 from ..simulation.joint_trains import joint_drive
-from ..simulation.scenario import DriveScenario, drive_of
 from ..simulation.stepping import Simulation
 from .joints import joint_id
 

@@ -13,8 +13,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..errors import InputError
-from ..response.linear import RigidConstants, rigid_constants
-from ..simulation.scenario import DriveScenario
+from ..response.rigid import RigidConstants, rigid_constants
+from ..simulation.drive_scenario import DriveScenario
 from ..simulation.sources import load_drive
 
 MODELS = ("1-DOF-L", "2-DOF-L", "2-DOF-NL")

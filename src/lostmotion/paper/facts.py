@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..response.crossovers import three_decibels_down
-from ..response.linear import rigid_constants
+from ..response.rigid import rigid_constants
 from ..simulation.results import energy_of
 from .drive import AMPLITUDES, MODELS, paper_scenario
 from .runs import FREQUENCIES, Results, stuck_intervals

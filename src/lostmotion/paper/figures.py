@@ -13,7 +13,7 @@ from ..reports.looks import FAINT, LEVEL, STYLES, step
 from ..reports.pages import panels_csv, plain, table_csv
 from ..reports.panels import Chart, Curve, Drawing, Ground, Panel, scientific
 from ..response.crossovers import THREE_DECIBELS
-from ..response.linear import rigid_constants
+from ..response.rigid import rigid_constants
 from .drive import AMPLITUDES, MODELS, paper_scenario
 from .facts import Facts
 from .runs import FREQUENCIES, Results, stuck_intervals

@@ -13,8 +13,8 @@ from ..inputs.validation import shown
 from ..live_page.drawn import axis_figures
 from ..model.losses import LossMap
 from ..model.train import DriveTrain
+from ..simulation.drive_scenario import short_form
 from ..simulation.results import energy_of, is_train_result, scenario_of
-from ..simulation.scenario import short_form
 from ..simulation.train_parts import parts_of
 from ..simulation.train_scenario import in_long_form
 from ..units.practical import charted

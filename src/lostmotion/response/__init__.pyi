@@ -2,8 +2,8 @@ from .crossovers import bandwidth as bandwidth
 from .crossovers import characteristics as characteristics
 from .harmonic import to_control as to_control
 from .linear import LinearModel as LinearModel
-from .linear import RigidConstants as RigidConstants
-from .linear import rigid_constants as rigid_constants
+from .rigid import RigidConstants as RigidConstants
+from .rigid import rigid_constants as rigid_constants
 from .shooting import periodic_motions as periodic_motions
 from .spectrum import Spectrum as Spectrum
 from .spectrum import SpectrumLine as SpectrumLine

@@ -11,8 +11,9 @@ from ..errors import InputError, need
 from ..inputs.arguments import checked
 from ..inputs.quantities import Frequency, Number, Torque
 from ..model.drive import Drive
+from ..simulation.drive_scenario import DriveScenario, drive_of
 from ..simulation.explanation import smallest_commands
-from ..simulation.scenario import DriveScenario, Scenario, drive_of
+from ..simulation.scenario import Scenario
 from .harmonic import of_output
 from .plant import plant_of
 from .shooting import MAX_PERIODS, reason_of, respond

@@ -11,7 +11,8 @@ import numpy as np
 from .. import _core
 from ..errors import InputError
 from ..simulation.core_runs import core_case, core_run
-from ..simulation.train_scenario import TrainScenario, need_free_motion
+from ..simulation.needs import need_free_motion
+from ..simulation.train_scenario import TrainScenario
 from .shooting import PERIODICITY, SAMPLES_PER_PERIOD, reason_of
 from .standstill import FOREVER, NOTHING_MOVES, Outlook, Verdict, Watch, frequency_of
 

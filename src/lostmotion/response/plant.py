@@ -14,8 +14,9 @@ from ..errors import InputError
 from ..inputs.validation import listed, shown
 from ..model.drive import Drive
 from ..model.signals import Signal
-from ..simulation.scenario import Scenario, of_drive
-from ..simulation.train_scenario import need_free_motion, need_open_loop
+from ..simulation.drive_scenario import of_drive
+from ..simulation.needs import need_free_motion, need_open_loop
+from ..simulation.scenario import Scenario
 from ..simulation.train_variables import axis_variables
 from ..simulation.variables import Variable
 

@@ -14,8 +14,9 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Count, Number, Torque
 from ..model.drive import Drive
 from ..model.signals import CommandSignal, Signal, TorqueSignal
-from ..simulation.scenario import Initial, Scenario
-from ..simulation.train_scenario import TrainInitial
+from ..simulation.drive_scenario import Initial
+from ..simulation.scenario import Scenario
+from ..simulation.train_tables import TrainInitial
 from .plant import Plant, plant_of
 
 if TYPE_CHECKING:

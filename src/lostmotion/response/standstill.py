@@ -18,7 +18,8 @@ from typing import Literal
 import numpy as np
 
 from ..simulation.explanation import explain
-from ..simulation.stepping import Simulation, SimulationState
+from ..simulation.simulation_state import SimulationState
+from ..simulation.stepping import Simulation
 from ..simulation.train_scenario import TrainScenario
 from .closed_loop import running_slots
 from .closed_response import frame_of

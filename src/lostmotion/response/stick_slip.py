@@ -18,7 +18,8 @@ from .. import _core
 from ..control.turning import turns
 from ..errors import InputError
 from ..model.torsion import Rigid
-from ..simulation.train_scenario import TrainInitial, TrainScenario
+from ..simulation.train_scenario import TrainScenario
+from ..simulation.train_tables import TrainInitial
 from .limit_cycle import Loop
 from .linear import LinearModel, train_model
 

@@ -14,4 +14,4 @@ from .motion import Following as Following
 from .motion import LimitCycle as LimitCycle
 from .motion import Settling as Settling
 from .motion import StepResponse as StepResponse
-from .tuning import Tuning as Tuning
+from .tuned import Tuning as Tuning

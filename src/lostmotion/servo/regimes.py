@@ -19,9 +19,11 @@ from ..model.gear import Gear
 from ..model.signals import ForceSignal, TorqueSignal
 from ..model.torsion import Rigid
 from ..response.linear import LinearModel, train_model
+from ..simulation.needs import need_free_motion
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainInitial, TrainScenario, in_long_form, need_free_motion
+from ..simulation.train_scenario import TrainScenario, in_long_form
 from ..simulation.train_state import start_values
+from ..simulation.train_tables import TrainInitial
 from ..units.practical import charted, printed
 from .winding import OrientedWinding
 

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
-from functools import cache
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -23,20 +20,16 @@ from ..control.tuning import (
     symmetrical_optimum,
 )
 from ..errors import InputError, need
-from ..inputs.arguments import ScenarioName, checked
+from ..inputs.arguments import checked
 from ..inputs.quantities import Angle, Number
-from ..inputs.schema import follow, unit_in_schema
 from ..inputs.validation import did_you_mean, shown
-from ..simulation.axis_form import file_schema
-from ..simulation.keys import parse_override
-from ..simulation.linear_units import unit_of_slides
 from ..simulation.scenario import Scenario
-from ..units.practical import printed
 from .data import frictions, inertias, lag_sum, two_inertias
 from .margins import STABLE, bandwidth_of, frequencies, margins
 from .motion import with_controller
 from .regimes import Axis, Regime, axis_of, regimes
 from .sampled import SampledLoop
+from .tuned import Tuning, aligned, conventions, differences
 
 RULES = (
     "suited",
@@ -56,140 +49,6 @@ WORST_PEAK = 1.7  # of the sensitivity, that a search permits in the speed loop 
 EVALUATIONS = 80
 
 
-@dataclass(frozen=True)
-class Tuning:
-    """Gains of an axis, and the scenario with these gains."""
-
-    rule: str
-    why: str
-    """data of the gains, in one line"""
-    scenario: Scenario
-    gain: float
-    """K_p of the speed loop, torque of the motor per speed of the motor [N·m·s/rad]"""
-    integral_gain: float
-    """K_i [N·m/rad]"""
-    position_gain: float | None
-    """K_v [1/s]; None without a position loop"""
-    filter_time: float
-    """time constant of the filter of the speed reference [s]; 0: none"""
-    torque_constant: float | None
-    """torque constant of the motor [N·m/A], if its data contain it; for a winding per ampere of amplitude of a phase"""
-    changed: Mapping[str, tuple[Any, Any]] = field(default_factory=dict)
-    """old and new value [SI] of each key of the scenario that differs; None where there is none"""
-    linear_motor: bool = False
-    """whether the motor moves a slide: gains in [N·s/m] and [N/m]"""
-
-    @property
-    def integral_time(self) -> float:
-        """T_i = K_p/K_i [s]; infinite without an integrator."""
-        return self.gain / self.integral_gain if self.integral_gain else math.inf
-
-    def conventions(self) -> list[tuple[str, str, str]]:
-        """The same gains as manufacturers of drives write them: (what, value with unit, where it is written so)."""
-        return _conventions(
-            self.gain, self.integral_gain, self.position_gain, self.filter_time, self.torque_constant, self.linear_motor
-        )
-
-    def changes(self) -> list[tuple[str, str, str]]:
-        """Changes by the tuning: (key of the scenario, old value, new value), with units.
-
-        Examples
-        --------
-        >>> for key, old, new in lm.tune(lm.load("position-axis"), rule="suited").changes():
-        ...     print(f"{key}: {old} -> {new}")
-        controller.position.gain: 10 1/s -> 25.4241 1/s
-        controller.speed.gain: 0.00829 N·m·s/rad -> 0.00829231 N·m·s/rad
-        controller.speed.integral_gain: 0.1266 N·m/rad -> 0.126631 N·m/rad
-        """
-        units = {key: self._unit(key) for key in self.changed}
-        return [(key, _value(old, units[key]), _value(new, units[key])) for key, (old, new) in self.changed.items()]
-
-    @checked
-    def write(self, path: Path, source: ScenarioName | Path, overrides: Iterable[str] = ()) -> None:
-        """Write the tuned scenario as a file.
-
-        Comments and order of the source file are kept where it can carry the new values; else the file is a new one, of
-        the whole scenario. Either way it loads to `scenario`, which is checked before the file gets its name.
-
-        Parameters
-        ----------
-        path
-            Of the new file (.toml).
-        source
-            Scenario file or name that the tuned scenario was loaded from.
-        overrides
-            Changes with which it was loaded, as ``KEY=VALUE``.
-
-        Raises
-        ------
-        InputError
-            The file cannot be written; nothing is left behind.
-
-        Examples
-        --------
-        >>> tuned = lm.tune(lm.load("position-axis"), rule="suited")
-        >>> tuned.write("tuned.toml", "position-axis")
-        >>> lm.load("tuned.toml") == tuned.scenario
-        True
-        """
-        need("tomlkit", "Writing a tuned scenario", "control")
-        from ..simulation.scenario_writer import write_changed
-
-        if path.suffix != ".toml":
-            raise InputError(f"{path}: a scenario is a TOML file; its name must end in .toml")
-        values = dict(map(parse_override, overrides))
-        values |= {key: _with_unit(new, self._unit(key)) for key, (_, new) in self.changed.items()}
-        notes = [f" by the rule {self.rule}: {self.why}"]
-        notes += [f": {key}, {old} -> {new}" for key, old, new in self.changes()]
-        write_changed(path, self.scenario, source, values, notes)
-
-    def _unit(self, key: str) -> str | None:
-        """The SI unit of a key of the scenario: of a slide m and N in place of rad and N*m."""
-        unit = _unit(key)
-        return unit and unit_of_slides(self.scenario.model_dump(), key, unit)
-
-    def __str__(self) -> str:
-        """The gains with units, in the words of a scenario and of manufacturers."""
-        return "\n".join([f"rule {self.rule}: {self.why}", *_aligned(self.conventions())])
-
-
-def _conventions(
-    gain: float,
-    integral_gain: float,
-    K_v: float | None,
-    filter_time: float,
-    torque_constant: float | None,
-    linear_motor: bool = False,
-) -> list[tuple[str, str, str]]:
-    if linear_motor:
-        rows = [("speed loop, gain", f"{gain:.5g} N/(m/s)", "force of the motor per speed of the motor")]
-    else:
-        rows = [("speed loop, gain", f"{gain:.5g} N·m/(rad/s)", "torque at the motor per speed of the motor")]
-        rows.append(("", f"{gain * math.pi / 30.0:.5g} N·m/rpm", "the same per revolution in a minute"))
-    if torque_constant is not None:
-        amps = gain / torque_constant
-        if linear_motor:
-            rows.append(("", f"{amps:.5g} A/(m/s)", f"with {torque_constant:.4g} N/A"))
-        else:
-            rows.append(("", f"{amps:.5g} A/(rad/s)", f"with {torque_constant:.4g} N·m/A"))
-            rows.append(("", f"{1e3 * amps * math.pi / 30.0:.5g} mA/rpm", "the same per revolution in a minute"))
-    if integral_gain:
-        time = gain / integral_gain
-        rows.append(("speed loop, integral time", f"{1e3 * time:.5g} ms", "K_p/K_i, reset time T_N"))
-        rows.append(("", f"{1.0 / time:.5g} 1/s", "its inverse"))
-        rows.append(("", f"{integral_gain:.5g} {'N/m' if linear_motor else 'N·m/rad'}", "parallel form, K_i"))
-    if filter_time:
-        rows.append(("filter of the speed reference", f"{1e3 * filter_time:.5g} ms", "time constant"))
-    if K_v is not None:
-        rows.append(("position loop, gain", f"{K_v:.5g} 1/s", "K_v"))
-        rows.append(("", f"{0.06 * K_v:.5g} (m/min)/mm", "K_v of linear axes: 1/s times 0.06"))
-    return rows
-
-
-def _aligned(rows: list[tuple[str, str, str]]) -> list[str]:
-    return [f"{what:<30} {value:<24} {where}" for what, value, where in rows]
-
-
 def drive_units(scenario: Scenario, motor: str | None = None) -> list[str]:
     """The gains of an axis as manufacturers of drives write them, as lines."""
     axis = axis_of(scenario, motor)
@@ -199,8 +58,8 @@ def drive_units(scenario: Scenario, motor: str | None = None) -> list[str]:
     filters = [f for f in speed.reference_filters if isinstance(f, LowPass)]
     time = 1.0 / (2.0 * math.pi * filters[0].frequency) if len(filters) == 1 else 0.0
     K_v = None if position is None else position.gain
-    return _aligned(
-        _conventions(speed.gain, speed.k_i, K_v, time, _torque_constant(axis), axis.train.is_slide(axis.motor_shaft))
+    return aligned(
+        conventions(speed.gain, speed.k_i, K_v, time, _torque_constant(axis), axis.train.is_slide(axis.motor_shaft))
     )
 
 
@@ -522,43 +381,8 @@ def _tuning(
     controller = axis.controller.model_copy(update=_fields(axis, gains, K_v))
     changed = scenario.with_axes({axis.motor: controller})
     where, before = scenario.controller_key(axis.motor), scenario.axes()[axis.motor]
-    differences = dict(_differences(before.model_dump(), controller.model_dump(), where))
+    changes = dict(differences(before.model_dump(), controller.model_dump(), where))
     constant = _torque_constant(axis)
     slides = axis.train.is_slide(axis.motor_shaft)
     found = (gains.gain, gains.integral_gain, K_v, gains.filter_time, constant)
-    return Tuning(rule, why, changed, *found, differences, slides)
-
-
-def _differences(old: Any, new: Any, key: str) -> Iterator[tuple[str, tuple[Any, Any]]]:
-    """Values that differ between nested tables, by dotted key; those that are removed first."""
-    if not isinstance(old, Mapping) or not isinstance(new, Mapping):
-        if old != new:
-            yield key, (old, new)
-        return
-    for name in sorted(new, key=lambda name: new[name] is not None):
-        yield from _differences(old.get(name), new[name], f"{key}.{name}")
-
-
-@cache
-def _unit(key: str) -> str | None:
-    """The SI unit of a key of a scenario, for shafts."""
-    _, nodes = follow(file_schema(), tuple(key.split(".")))
-    return next((unit for node in nodes if (unit := unit_in_schema(node)) is not None), None)
-
-
-def _with_unit(value: Any, unit: str | None) -> Any:
-    """A value as a scenario file writes it."""
-    if isinstance(value, float) and unit not in (None, "", "1"):
-        return f"{value!r} {unit}"
-    if isinstance(value, list | tuple):
-        return [{k: v for k, v in f.items() if v is not None} if isinstance(f, Mapping) else f for f in value]
-    return value
-
-
-def _value(value: Any, unit: str | None) -> str:
-    """A value with its unit, for readers."""
-    if value is None or (isinstance(value, list | tuple) and not value):
-        return "none"
-    if isinstance(value, list | tuple):
-        return ", ".join(" ".join(f"{k} {_value(v, None)}" for k, v in f.items() if v is not None) for f in value)
-    return f"{value:.6g} {printed(unit or '')}".strip() if isinstance(value, float) else str(value)
+    return Tuning(rule, why, changed, *found, changes, slides)

@@ -1,12 +1,12 @@
 from .batches import BatchState as BatchState
+from .drive_scenario import DriveScenario as DriveScenario
 from .explanation import ContactState as ContactState
 from .explanation import Explanation as Explanation
 from .explanation import MotorState as MotorState
 from .results import RunArrays as RunArrays
 from .results import scenario_of as scenario_of
-from .scenario import DriveScenario as DriveScenario
-from .stepping import SimulationState as SimulationState
-from .train_scenario import ShaftTable as ShaftTable
-from .train_scenario import SlideTable as SlideTable
+from .simulation_state import SimulationState as SimulationState
+from .train_tables import ShaftTable as ShaftTable
+from .train_tables import SlideTable as SlideTable
 from .variables import VARIABLES as VARIABLES
 from .variables import Variable as Variable

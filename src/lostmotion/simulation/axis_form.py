@@ -9,7 +9,8 @@ from typing import Any
 
 from ..errors import InputError
 from ..inputs.validation import did_you_mean, shown
-from .scenario import RECORD_NAME, json_schema
+from .drive_scenario import json_schema
+from .scenario import RECORD_NAME
 from .train_scenario import TrainScenario, train_from_tables, train_schema
 
 DRIVES = {"screw": "screws", "rack": "racks", "belt": "belts"}

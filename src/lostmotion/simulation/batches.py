@@ -17,7 +17,7 @@ from ..inputs.quantities import Count, Time
 from ..inputs.validation import did_you_mean, listed, shown
 from ..model.drive import Drive
 from ..model.torsion import Rigid, TorsionCurve
-from .stepping import MAX_INTERVAL, MIN_INTERVAL
+from .stepping_parts import MAX_INTERVAL, MIN_INTERVAL
 from .variables import STATES
 
 DRIVE_BYTES = 150.0  # memory that a drive of a batch takes at least

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..errors import InputError
-from .scenario import Scenario, from_tables
+from .drive_scenario import from_tables
+from .scenario import Scenario
 from .train_scenario import TrainScenario, in_long_form
 
 MOTOR, LOAD, GEARBOX = "motor", "load", "gearbox"  # names in the long form

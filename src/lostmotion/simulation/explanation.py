@@ -17,9 +17,9 @@ from ..model.torsion import Rigid
 from ..model.train import DriveTrain
 from ..units.practical import charted
 from .core_runs import core_case
+from .needs import need_open_loop
 from .scenario import Scenario
 from .stepping import Simulation
-from .train_scenario import need_open_loop
 
 
 @dataclass(frozen=True)

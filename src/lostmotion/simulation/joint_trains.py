@@ -13,9 +13,10 @@ from ..errors import InputError
 from ..model.drive import Drive
 from ..model.load import Load
 from ..model.train import DriveTrain
-from .scenario import DriveScenario, Initial
-from .stepping import Simulation, SimulationState
-from .train_scenario import TrainInitial
+from .drive_scenario import DriveScenario, Initial
+from .simulation_state import SimulationState
+from .stepping import Simulation
+from .train_tables import TrainInitial
 
 ROWS = {name: k for k, name in enumerate(_core.joint_rows())}
 

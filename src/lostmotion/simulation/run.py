@@ -17,9 +17,10 @@ from ..model.drive import Drive
 from ..model.signals import CommandSignal, TorqueSignal
 from ..worker_threads import thread_pool
 from .core_runs import core_result
+from .drive_scenario import Initial, of_drive
 from .ledger import warned
 from .results import RunArrays, raw_result, variables_of
-from .scenario import Initial, Scenario, of_drive
+from .scenario import Scenario
 from .sensitivities import run_sensitivities
 from .train_parts import SIDE_BY_SIDE
 from .windings import ATTRIBUTE as ERROR_BOUND

@@ -20,8 +20,8 @@ from ..inputs.validation import shortened, shown
 from .core_runs import core_case
 from .keys import list_index
 from .near_keys import near_key
+from .needs import need_free_motion
 from .scenario import Scenario
-from .train_scenario import need_free_motion
 from .train_variables import named_signals
 from .variables import CONTACTS
 

@@ -10,8 +10,9 @@ from typing import Any
 from ..errors import InputError
 from ..inputs.arguments import ScenarioName, checked
 from . import scenario_files
+from .drive_scenario import DriveScenario, short_form
 from .result_files import FORMATS, open_result
-from .scenario import DriveScenario, Scenario, short_form
+from .scenario import Scenario
 from .scenario_files import changed, override
 
 

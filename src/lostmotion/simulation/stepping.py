@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import itertools
-import math
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
-from dataclasses import dataclass, field
-from typing import Any, Self, overload
-
-import numpy as np
+from typing import Any, Self
 
 from .. import _core
 from ..control.axis import OPEN_LOOP, Bound
@@ -24,54 +20,30 @@ from ..inputs.validation import did_you_mean, shown
 from ..model.couplings import FULL_COMMAND
 from ..model.drive import Drive
 from ..model.mass_matrix import MassMatrix
-from ..model.synchronous_motor import PhaseValues
 from ..model.train import DriveTrain
+from .drive_scenario import Initial, capacities_of, state_of
 from .given_motion import SLIDE_UNITS, UNITS, motion_given
-from .scenario import DriveScenario, Initial, Scenario, capacities_of, drive_of, state_of
+from .scenario import Scenario
+from .simulation_readings import Derived, SimulationReadings
+from .simulation_state import SimulationState
 from .step_bound import StepBound
-from .train_scenario import TrainInitial, TrainScenario, given_train
+from .stepping_parts import MAX_INTERVAL, MIN_INTERVAL, ends_of, masses_given, no_input, no_interval, parts
 from .train_state import start_values
+from .train_tables import TrainInitial
 from .train_variables import (
-    ALL_SIGNALS,
-    WINDING_SIGNALS,
-    angle_through,
-    angles_through_gears,
-    axis_variables,
-    signals_of,
     train_variables,
 )
 from .variables import VARIABLES, Variable
-from .windings import bounded, coarser, oriented
+from .windings import bounded, coarser
 
 INPUTS_OF_STATE = 4  # where the core's state of a simulation has the last values of its inputs
-
-MIN_INTERVAL, MAX_INTERVAL = 1e-12, 1e12
-"""Of a step [s]: below, it is lost in the rounding of the time; above, in that of a motion's phase."""
 
 _GIVE: Any = object()  # in place of what has no default
 
 Ramp = float | str | tuple[float | str, float | str]
-Derived = Callable[[list[float]], float]
 
 
-@dataclass(frozen=True)
-class SimulationState:
-    """Everything that a simulation needs to continue bit for bit, contact modes and hysteresis memory included."""
-
-    time: float
-    """[s]"""
-    values: tuple[Any, ...] = field(repr=False)
-    drive: Drive | DriveTrain = field(repr=False)
-    """drive of this state"""
-    controllers: dict[str, Controller | ContinuousController] = field(default_factory=dict, repr=False)
-    """controllers of its motors"""
-    mass_matrices: dict[str, MassMatrix] = field(default_factory=dict, repr=False)
-    """mass matrices in force at this instant"""
-    bound: Any = field(default=None, repr=False)
-    """state of the second simulation for an error bound"""
-
-
-class Simulation:
+class Simulation(SimulationReadings):
     """A drive or a train that is advanced interval by interval.
 
     Parameters
@@ -143,7 +115,7 @@ class Simulation:
         self._control = self._exchanging(scenario.control(laws)) if scenario is not None else OPEN_LOOP
         self._bound: StepBound | None = None
         self._signals: dict[str, int] = {}  # of the controllers
-        self._drive, self._train, core, self._loaded, self._given, self._initial = _parts(drive, loaded, given)
+        self._drive, self._train, core, self._loaded, self._given, self._initial = parts(drive, loaded, given)
         self._core_train = core
         self._short = core.short_form
         self._masses = dict(self._train.mass_matrices)
@@ -195,23 +167,6 @@ class Simulation:
         if self._bound is not None:
             self._bound.coarse._change_masses(masses)
 
-    def _masses_given(self, given: Any) -> dict[str, MassMatrix]:
-        """The mass matrices that `advance` is given, by name."""
-        if not isinstance(given, Mapping):
-            raise InputError(f"mass_matrix: {shown(given)} is no dictionary; give the rows by the name of the matrix")
-        found = {}
-        for name, matrix in given.items():
-            if name not in self._masses:
-                known = f"the mass matrices are {', '.join(self._masses) or 'none'}"
-                raise InputError(
-                    f"mass_matrix.{shown(name)}: is none of this train; {did_you_mean(name, self._masses, known)}"
-                )
-            try:
-                found[name] = MassMatrix(shafts=self._masses[name].shafts, matrix=matrix)
-            except InputError as problem:
-                raise InputError(f"mass_matrix.{name}: {problem}") from None
-        return found
-
     def _place_inputs(self, names: Sequence[str]) -> None:
         """Slots of the core for the inputs of `advance`."""
         self._inputs = len(names)
@@ -223,35 +178,6 @@ class Simulation:
         controlled = self._controlled()
         self._input_places = {name: k for k, name in enumerate(names) if name not in controlled and k not in motions}
         self._required = [name for name in self._input_places if not name.endswith("load_torque")]
-
-    def _add_signals(self, scenario: Scenario | None) -> None:
-        """Add the signals of controllers, and the torque of a winding in place of the straight line that drives the mechanics."""
-        if scenario is None or not self._controllers:
-            return
-        names = (*ALL_SIGNALS, *WINDING_SIGNALS)
-        for k, (prefix, controller) in enumerate(scenario.by_prefix().items()):
-            shown_here = set(signals_of(controller))
-            self._signals |= {
-                f"{prefix}{name}": k * len(names) + n for n, name in enumerate(names) if name in shown_here
-            }
-        for prefix, _, phase in oriented(scenario):
-            self._derived[f"{prefix or 'motor_'}torque"] = self._torque_of(prefix, phase)
-            self._channel = {n: c for n, c in self._channel.items() if n != f"{prefix or 'motor_'}torque"}
-        self._variables += axis_variables(scenario.by_prefix(), scenario.sliding())
-
-    def _torque_of(self, prefix: str, phase: PhaseValues) -> Derived:
-        def torque(values: list[float]) -> float:
-            i_d, i_q = (self._value(f"{prefix}{axis}_current", values) for axis in ("direct", "quadrature"))
-            return float(phase.torque(i_d, i_q))
-
-        return torque
-
-    def winding_torques(self) -> Iterator[tuple[int, Derived]]:
-        """Channel of the solver's torque of each motor under field-oriented control, and the true torque from the channels."""
-        channels = {v.name: k for k, v in enumerate(self._variables)}
-        for name, derived in self._derived.items():
-            if name.endswith("_torque") and name not in self._channel:
-                yield channels[name], derived
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For copies, which go on by themselves from the present state, and for pickling."""
@@ -360,7 +286,7 @@ class Simulation:
     @property
     def time(self) -> float:
         """[s]"""
-        return self._core.time()
+        return float(self._core.time())
 
     def advance(
         self,
@@ -402,15 +328,15 @@ class Simulation:
         """
         if self._short:
             inputs = self._of_drive(command, load_torque, inputs)
-        elif command is not _GIVE or _ramp("load_torque", load_torque, "N*m") != (0.0, 0.0):
+        elif command is not _GIVE or ends_of("load_torque", load_torque, "N*m") != (0.0, 0.0):
             raise InputError(f"a train takes its inputs by name: {', '.join(self._input_places)}")
         places, begin, end = self._input_places, [0.0] * self._inputs, [0.0] * self._inputs
         for name, value in inputs.items():
             if name in self._controlled():
                 raise InputError(f"{name}: a controller of the scenario turns this motor; leave it out")
             if name not in places:
-                raise self._no_input(name)
-            ramp = begin[places[name]], end[places[name]] = _ramp(name, value, self._input_units[name])
+                raise no_input(self._train, self.inputs, name)
+            ramp = begin[places[name]], end[places[name]] = ends_of(name, value, self._input_units[name])
             if name in self._shares and max(ramp) > FULL_COMMAND:
                 raise InputError(f"{name} {shown(value)} is a share, and 1 is the full torque; give at most that")
         if missing := [name for name in self._required if name not in inputs]:
@@ -427,7 +353,7 @@ class Simulation:
         with self._turn:
             before = self.state
             try:
-                self._change_masses(self._masses_given(given))
+                self._change_masses(masses_given(self._masses, given))
                 if motion or self._motions:
                     self._step_with_motions(interval, begin, end, motion or {})
                 else:
@@ -440,7 +366,7 @@ class Simulation:
         """In parts, in each of which all accelerations are straight lines."""
         h = argument("interval", interval, "s")
         if not MIN_INTERVAL <= h <= MAX_INTERVAL:
-            raise self._no_interval(h)
+            raise no_interval(self.time, h)
         for name in motion:
             if name not in self._motions:
                 meant = did_you_mean(name, self._motions, f"those are {', '.join(self._motions) or 'none'}")
@@ -503,7 +429,7 @@ class Simulation:
         with self._turn:
             time = self._idle().time()
             if not MIN_INTERVAL <= interval <= MAX_INTERVAL or time + interval == time:
-                raise self._no_interval(interval)
+                raise no_interval(self.time, interval)
             before = None if self._bound is None else self._bound.coarse.state
             self._stepping = True
             try:
@@ -526,94 +452,6 @@ class Simulation:
         if self._stepping:
             raise InputError("the simulation is within a step; a law has to take what it needs from its arguments")
         return self._core
-
-    def _no_interval(self, interval: float) -> InputError:
-        if not MIN_INTERVAL <= interval <= MAX_INTERVAL:
-            return InputError(
-                f"interval {shown(interval)} s must lie between {MIN_INTERVAL:g} s and {MAX_INTERVAL:g} s"
-            )
-        return InputError(
-            f"interval {interval} s is below the resolution of the time, {self.time} s; take a longer one, or reset"
-        )
-
-    def _no_input(self, name: str) -> InputError:
-        shaft = name.removesuffix("_load_torque").removesuffix("_load_force")
-        if shaft in self._train.shafts and name == self._train.load_torque_of(shaft):
-            word = self._train.torque_word(shaft)
-            kind = "slide" if word == "force" else "shaft"
-            return InputError(
-                f'{name}: no load {word} acts on this {kind}; make the simulation with loaded=["{shaft}"]'
-            )
-        meant = did_you_mean(name, self.inputs, f"the inputs are {', '.join(self.inputs)}")
-        return InputError(f"{name}: is no input of this train; {meant}")
-
-    @overload
-    def __getitem__(self, name: str) -> float: ...
-    @overload
-    def __getitem__(self, name: tuple[str, ...] | list[str]) -> np.ndarray: ...
-    def __getitem__(self, name: str | tuple[str, ...] | list[str]) -> float | np.ndarray:
-        """Value of a result variable now (SI), with the inputs at their last values; of several, as an array.
-
-        Raises
-        ------
-        InputError
-            There is no such variable.
-        """
-        with self._turn:
-            values = self._idle().read()
-            if isinstance(name, tuple | list):
-                return np.array([self._value(one, values) for one in name])
-            return self._value(name, values)
-
-    def _value(self, name: str, values: list[float]) -> float:
-        try:
-            channel = self._channel.get(name)
-            if channel is None and name in self._signals:
-                return self._core.control_signals()[self._signals[name]]
-            return values[channel] if channel is not None else self._derived[name](values)
-        except (KeyError, TypeError):  # unknown, or nothing that could be a name
-            names = [v.name for v in self._variables]
-            hint = did_you_mean(str(name), names, f"the variables are {', '.join(names)}")
-            raise InputError(f"{shown(name)} is no variable; {hint}") from None
-
-    def read(self) -> dict[str, float]:
-        """All result variables (SI), by name."""
-        with self._turn:
-            values = self._idle().read()
-            return {v.name: self._value(v.name, values) for v in self._variables}
-
-    # The array functions of `results` take ten times as long for a single number.
-
-    def _motor_power(self, values: list[float]) -> float:
-        return self._value("motor_torque", values) * values[self._channel["motor_speed"]]
-
-    def _efficiency(self, values: list[float]) -> float:
-        speed = values[self._channel["motor_speed"]]
-        if speed == 0.0:
-            return math.nan
-        ratio, way = self._train.gears["gearbox"].ratio, math.copysign(1.0, speed)
-        driving = math.copysign(way, way * ratio) * values[self._channel["output_torque"]]
-        fed_in = way * values[self._channel["input_torque"]] * abs(ratio)
-        if driving >= 0.0:
-            return driving / fed_in if fed_in != 0.0 else math.nan if driving == 0.0 else math.inf
-        return fed_in / driving if fed_in < 0.0 else 0.0
-
-    def _derived_of(self, train: DriveTrain) -> dict[str, Derived]:
-        """Values that the solver does not integrate: twists of rigid gears, and the angles that follow through the gears."""
-
-        def angle_of(source: str, name: str, forward: bool) -> Derived:
-            gear, twist, angle = train.gears[name], train.twist_of(name), train.angle_of(source)
-            return lambda values: float(
-                angle_through(gear, self._value(angle, values), self._value(twist, values), forward=forward)
-            )
-
-        known = [name for name in train.shafts if train.angle_of(name) in self._channel]
-        derived: dict[str, Derived] = {
-            twist: lambda _: 0.0 for twist in map(train.twist_of, train.gears) if twist not in self._channel
-        }
-        for shaft, source, gear, forward in angles_through_gears(train, known):
-            derived[train.angle_of(shaft)] = angle_of(source, gear, forward)
-        return derived
 
     @property
     def state(self) -> SimulationState:
@@ -642,25 +480,6 @@ class Simulation:
             raise InputError(f"{shown(state)} is the state of another drive, with other parameters or controllers")
 
 
-def _parts(
-    what: Drive | Scenario | DriveTrain, loaded: Sequence[str] | None, given: Sequence[str] | None
-) -> tuple[Drive | DriveTrain, DriveTrain, _core.Train, tuple[str, ...], tuple[str, ...], Initial | TrainInitial]:
-    """Parts of a simulation: its subject, the same as a train, the solver's train, the loadable shafts, the shafts
-    with given motion, and the start."""
-    if isinstance(what, DriveTrain | TrainScenario):
-        train, shafts, moved = given_train(what, loaded, given)
-        if isinstance(what, DriveTrain):
-            return train, train, train.core(shafts, given=moved), tuple(shafts), tuple(moved), TrainInitial()
-        return train, train, what.core(loaded=shafts, given=moved), tuple(shafts), tuple(moved), what.begin()
-    assert isinstance(what, Drive | DriveScenario)
-    if loaded is not None:
-        raise InputError("loaded: is for trains; a drive has one load torque, on its load")
-    if given is not None:
-        raise InputError("given: is for trains; give drive.train() for a drive whose motor or load has a given motion")
-    start = what.begin() if isinstance(what, DriveScenario) else Initial()
-    return drive_of(what), what.train(), what.core(), (), (), start
-
-
 def _remade(kind: Any, made: Mapping[str, Any], sines: Any, initial: Any, state: SimulationState) -> Any:
     """A simulation made as another one, in its state."""
     new = kind.__new__(kind)
@@ -668,24 +487,6 @@ def _remade(kind: Any, made: Mapping[str, Any], sines: Any, initial: Any, state:
     Simulation.__init__(new, **made)
     new._initial, new.state = initial, state
     return new
-
-
-def _ramp(name: str, value: Any, unit: str) -> tuple[float, float]:
-    """The values of an input at the begin and the end of an interval.
-
-    Raises
-    ------
-    InputError
-        It is neither a number nor a pair of numbers.
-    """
-    if type(value) is float and value - value == 0.0:  # nearly always
-        return value, value
-    if not isinstance(value, tuple):
-        number = argument(name, value, unit)
-        return number, number
-    if len(value) != 2:
-        raise InputError(f"{name}: {shown(value)} must be a number, or a pair of numbers (begin, end)")
-    return argument(name, value[0], unit), argument(name, value[1], unit)
 
 
 class _Coarser(Simulation):

@@ -14,7 +14,8 @@ from ..inputs.named import Named
 from ..model.linear_train import LinearElements
 from ..model.train import COUPLINGS
 from .scenario import Scenario
-from .train_scenario import TrainInitial, TrainScenario, in_long_form
+from .train_scenario import TrainScenario, in_long_form
+from .train_tables import TrainInitial
 
 INSTANT, LEADING = 0, 2  # of a switching: the column of its instant, and how many come before those of contacts
 NO_CONTACT = 2.0

@@ -3,119 +3,40 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping
 from functools import cache, lru_cache
-from typing import Annotated, Any, ClassVar, Self, cast
+from typing import Any, ClassVar, Self, cast
 
 from pydantic import Field, model_validator
 
 from .. import _core
-from ..control.axis import check_torques, motor_laws
+from ..control.axis import motor_laws
 from ..control.continuous import ContinuousController
 from ..control.controller import AnyController, Controller
-from ..control.references import PositionReference, SlideReference
 from ..control.turning import turns
 from ..data_sheets.train_components import CONDITIONS, RECORDS, use_train_records
 from ..errors import InputError
 from ..inputs.kept import kept, kept_while_used
 from ..inputs.named import Named, nothing
-from ..inputs.part import Part
-from ..inputs.quantities import Angle, Force, Length, LinearSpeed, NotNegative, Number, Speed, Switch, Torque
-from ..inputs.validation import did_you_mean, shown
-from ..model.linear import Slide
-from ..model.linear_train import LinearElements
+from ..inputs.validation import did_you_mean
 from ..model.motor import MotorLaw
 from ..model.shaft import Shaft
-from ..model.signals import CommandSignal, ForceSignal, Signal, SlideSpeedSignal, SpeedSignal, TorqueSignal
+from ..model.signals import CommandSignal, ForceSignal, Signal
 from ..model.task import TrainTask
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain, Elements
-from .given_motion import MotionDerivative, check_continuous
+from .given_motion import MotionDerivative
 from .keys import set_values
 from .linear_units import in_si
 from .scenario import BASE, RECORD_NAME, Scenario, SimulationTable, check_on_reference
+from .train_checks import TrainChecks
 from .train_state import angles_at_start, start_values
+from .train_tables import LINEAR_INITIAL, ShaftTable, SlideTable, TrainInitial
 from .train_variables import add_angles, check_names, train_variables
 from .variables import Variable
 
 
-class ShaftTable(Shaft):
-    """A shaft, the load torque on it, and its motion where that is given."""
-
-    torque: TorqueSignal | None = None
-    """M_Z, against its motion; left out, none can act on it"""
-    speed: SpeedSignal | None = None
-    """speed that it has whatever acts on it; the torque that this takes is the variable ``NAME_drive_torque``; left out, it moves
-    as the torques let it"""
-    motion: PositionReference | None = None
-    """angle that it has whatever acts on it, such as moves, in place of speed"""
-
-
-class SlideTable(Slide):
-    """A slide and the load force on it."""
-
-    force: ForceSignal | None = None
-    """against its motion, beside its weight; left out, none can act on it unless it is inclined"""
-    speed: SlideSpeedSignal | None = None
-    """speed that it has whatever acts on it; the force that this takes is the variable ``NAME_drive_force``; left out, it moves
-    as the forces let it"""
-    motion: SlideReference | None = None
-    """position that it has whatever acts on it, such as moves, in place of speed"""
-
-
-class TrainInitial(Part):
-    """State of a drive train at t = 0; missing values are 0.
-
-    Examples
-    --------
-    >>> import lostmotion as lm
-    >>> lm.TrainInitial(speeds={"motor": "100 rpm"}).speeds["motor"]
-    10.471975511965978
-    """
-
-    speeds: Elements[Speed] = Field(default_factory=nothing)
-    """speeds of shafts"""
-    angles: Elements[Angle] = Field(default_factory=nothing)
-    """angles of shafts; those of others follow through the gears"""
-    twists: Elements[Angle] = Field(default_factory=nothing)
-    """twists of gears with a stiffness"""
-    positions: Elements[Length] = Field(default_factory=nothing)
-    """positions of slides"""
-    slide_speeds: Elements[LinearSpeed] = Field(default_factory=nothing)
-    """slide speeds of slides"""
-    deflections: Elements[Length] = Field(default_factory=nothing)
-    """deflections of screws, racks and belts with a stiffness"""
-    motor_torques: Elements[Torque] = Field(default_factory=nothing)
-    """motor torques of DC motors"""
-    controller_states: Elements[Number] = Field(default_factory=nothing)
-    """states of continuous controllers, by their result variables (SI), such as ``MOTOR_integral``; the filter of a derivative that is
-    left out has settled"""
-    hysteresis_capacities: Elements[Annotated[Torque, NotNegative]] = Field(default_factory=nothing)
-    """capacities of gears with hysteresis after the last turning point before t = 0"""
-    hysteresis_forces: Elements[Annotated[Force, NotNegative]] = Field(default_factory=nothing)
-    """the same of screws, racks and belts"""
-    on_reference: Switch = False
-    """angles of the shafts of controllers, and the speeds of all that turns with them, are those of their references at t = 0"""
-
-    def at_rest(self) -> TrainInitial:
-        """The same without motion, with its angles and twists."""
-        return TrainInitial(angles=self.of_all("angles"), twists=self.of_all("twists"))
-
-    def of_all(self, key: str) -> dict[str, float]:
-        """The values of a key with those of slides or what moves them."""
-        return {**getattr(self, key), **getattr(self, LINEAR_INITIAL[key])}
-
-
-# Keys of `initial` for shafts and gears, and those of the same quantity for slides and what moves them.
-LINEAR_INITIAL = {
-    "angles": "positions",
-    "speeds": "slide_speeds",
-    "twists": "deflections",
-    "hysteresis_capacities": "hysteresis_forces",
-}
-
-
-class TrainScenario(Scenario, LinearElements):
+class TrainScenario(TrainChecks):
     """A scenario in the long form: a drive train with its inputs, controllers, task and the duration of its run.
 
     Examples
@@ -179,91 +100,6 @@ class TrainScenario(Scenario, LinearElements):
         self.start()
         self.control()
         return self
-
-    def _check_shafts(self) -> None:
-        if not self.shafts and not self.slides:
-            raise InputError("key shafts: there is neither a shaft nor a slide; add [shafts.NAME] or [slides.NAME]")
-        for name, shaft in self.shafts.items():
-            if shaft.domain != "rotation":
-                raise InputError(
-                    f"key shafts.{name}.domain: is translation; write the slide as [slides.{name}], with its mass"
-                )
-        self.check_places(self.shafts, self.slides)
-        for name, mass in self.mass_matrices.items():
-            for slide in mass.shafts:
-                if slide in self.slides and self.slides[slide].inclination != 0.0:
-                    raise InputError(
-                        f"keys mass_matrices.{name}, slides.{slide}.inclination: the weight of a slide follows from its mass, "
-                        "which the matrix holds; leave the inclination out and give the weight in slides."
-                        f"{slide}.force"
-                    )
-        for key, linear in LINEAR_INITIAL.items():
-            of_slides = self.linear_drives() if key in ("twists", "hysteresis_capacities") else self.slides
-            for given, other in ((key, linear), (linear, key)):
-                for name in getattr(self.initial, given):
-                    if (name in of_slides) == (given == key):
-                        what = (
-                            "moves along a straight line"
-                            if given == key
-                            else "is none that moves along a straight line"
-                        )
-                        raise InputError(
-                            f"key initial.{given}.{name}: {shown(name)} {what}; give initial.{other}.{name}"
-                        )
-
-    def _check_given(self) -> None:
-        for name in self.given():
-            key, shaft = self.given_key(name), self._tables()[name]
-            if shaft.speed is not None and shaft.motion is not None:
-                raise InputError(
-                    f"keys {key.removesuffix('.motion')}.speed, {key}: both give the motion; leave one out"
-                )
-            if name in self.initial.of_all("speeds"):
-                how = "moves" if name in self.slides else "turns"
-                raise InputError(
-                    f"keys {key}, {self.initial_key('speeds', name)}: both say how fast the {self._kind(name)} {how} at t = 0; "
-                    "leave the initial speed out"
-                )
-            if shaft.motion is None:
-                continue
-            if name in self.initial.of_all("angles"):
-                raise InputError(
-                    f"keys {key}, {self.initial_key('angles', name)}: both say where the {self._kind(name)} is at t = 0; leave "
-                    "the initial one out"
-                )
-            try:
-                check_continuous(shaft.motion, "m" if name in self.slides else "rad")
-            except ValueError as problem:
-                raise InputError(f"key {key}: {problem}") from None
-
-    def _check_massless(self, massless: Collection[str]) -> None:
-        for key in ("speeds", "slide_speeds"):
-            for name in getattr(self.initial, key):
-                if name in massless:
-                    raise InputError(
-                        f"key initial.{key}.{name}: {name} has no inertia, and its speed follows from the torques on it; leave "
-                        "it out, or give an inertia"
-                    )
-        train = self.train()
-        for motor, controller in self.axes().items():
-            encoders = [e.shaft for e in (controller.encoder, controller.position_encoder) if e is not None]
-            for name in {train.motors[motor].shaft, self.controlled(motor), *filter(None, encoders)}:
-                if name in massless:
-                    raise InputError(
-                        f"key controllers.{motor}: measures or turns {name}, which has no inertia; give it one"
-                    )
-
-    def _check_controllers(self) -> None:
-        motors = self.train().motors
-        for name in self.controllers:
-            if name not in motors:
-                meant = did_you_mean(name, motors, f"the motors are {', '.join(motors) or 'none'}")
-                raise InputError(f"key controllers.{name}: is no motor of this train; {meant}")
-            if name in self.command:
-                raise InputError(
-                    f"keys command.{name}, controllers.{name}: both turn the same motor; leave one of them out"
-                )
-        check_torques(self.axes(), self.initial.motor_torques, "initial.motor_torques.{}")
 
     def axes(self) -> dict[str, Controller]:
         return {name: c for name, c in self.controllers.items() if isinstance(c, Controller)}
@@ -583,92 +419,6 @@ def _core_train(
         except InputError as problem:
             raise problem.inside(f"controllers.{name}") from None
     return core
-
-
-def loaded_train(what: DriveTrain | TrainScenario) -> tuple[DriveTrain, list[str]]:
-    """A train, and the names of the shafts that a load torque may act on: those of the scenario, of a train alone all."""
-    return given_train(what, None, None)[:2]
-
-
-def given_train(
-    what: DriveTrain | TrainScenario, loaded: Sequence[str] | None, given: Sequence[str] | None
-) -> tuple[DriveTrain, list[str], list[str]]:
-    """A train, the names of the shafts that a load torque may act on, and of those whose motion is given.
-
-    Parameters
-    ----------
-    loaded
-        Default: as in the scenario; all for a train alone.
-    given
-        Default: as in the scenario; none for a train alone.
-
-    Raises
-    ------
-    InputError
-        One of them is no shaft, or names of variables coincide.
-    """
-    train = what if isinstance(what, DriveTrain) else what.train()
-    shafts = list(train.shafts) if isinstance(what, DriveTrain) else what.loaded()
-    moved = [] if isinstance(what, DriveTrain) else what.given()
-    for key, names in (("loaded", loaded), ("given", given)):
-        for name in names or ():
-            if name not in train.shafts:
-                meant = did_you_mean(name, train.shafts, f"the shafts are {', '.join(train.shafts)}")
-                raise InputError(f"{key}: {shown(name)} is no shaft of this train; {meant}")
-    shafts = shafts if loaded is None else list(loaded)
-    moved = moved if given is None else list(given)
-    core = train.core(shafts, given=moved)
-    if loaded is not None or given is not None:
-        train.check(core)
-    check_names(train, core)
-    return train, shafts, moved
-
-
-def need_open_loop(scenario: Scenario, function: str) -> None:
-    """Refuses a scenario with controllers, for what follows given commands alone.
-
-    Raises
-    ------
-    InputError
-    """
-    if scenario.axes():
-        table = scenario.controller_key("").partition(".")[0]
-        none = "None" if table == "controller" else "{}"
-        has = f"a {table}" if table == "controller" else table
-        raise InputError(
-            f"{function}: the scenario has {has}, and this takes a drive whose commands are given; for the drive without, give "
-            f"scenario.replace({table}={none}), or in a file [command] over its base"
-        )
-
-
-def need_no_impacts(scenario: Scenario, function: str) -> None:
-    """Refuses a train with rigid flanks that strike, for what takes motions without impacts.
-
-    Raises
-    ------
-    InputError
-    """
-    for key, gear in scenario.gears_by_key().items():
-        if isinstance(gear.stiffness, Rigid) and gear.stiffness.strikes:
-            raise InputError(
-                f"{function}: {key}.stiffness has rigid flanks with backlash, and this takes no impacts; give a stiffness to the "
-                'backlash, kind = "curve"'
-            )
-
-
-def need_free_motion(scenario: Scenario, function: str) -> None:
-    """Refuses a train in which the motion of a shaft is given or flanks strike, for what torques alone are to move.
-
-    Raises
-    ------
-    InputError
-    """
-    need_no_impacts(scenario, function)
-    if given := scenario.given():
-        raise InputError(
-            f"{function}: key {scenario.given_key(given[0])} gives the motion of a shaft, and this takes a train that torques "
-            "alone move; leave it out"
-        )
 
 
 def train_from_tables(tables: Mapping[str, Any]) -> TrainScenario:

@@ -11,8 +11,9 @@ from ..inputs.schema import follow, unit_in_schema
 from ..inputs.validation import shown
 from ..units.conversion import to_si
 from ..units.scalars import is_number, objection
+from .drive_scenario import DriveScenario, json_schema
 from .linear_units import unit_of_slides
-from .scenario import DriveScenario, Scenario, json_schema
+from .scenario import Scenario
 from .train_scenario import TrainScenario, train_schema
 
 

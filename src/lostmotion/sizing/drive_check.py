@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from ..inputs.arguments import checked
+from ..simulation.drive_scenario import DriveScenario
 from ..simulation.results import RunArrays
 from ..simulation.run import run
-from ..simulation.scenario import DriveScenario, Scenario
+from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import in_long_form
 from .duty_cycle import MIN_REST, STANDSTILL, DutyCycle, duty_cycle
 from .finding import Finding, Findings

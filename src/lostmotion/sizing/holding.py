@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 from ..model.signals import Ramp, TorqueSignal
+from ..simulation.drive_scenario import DriveScenario, Initial
 from ..simulation.run import run
-from ..simulation.scenario import DriveScenario, Initial
 
 MAX_DURATION = 1000.0  # [s]
 SAMPLES = 2000

@@ -8,9 +8,9 @@ from .. import _core
 from ..model.gearbox import Gearbox
 from ..model.motor import Motor
 from ..model.torsion import Rigid
+from ..simulation.drive_scenario import DriveScenario
 from ..simulation.explanation import smallest_commands
 from ..simulation.results import RunArrays
-from ..simulation.scenario import DriveScenario
 from ..test_rig.rig import TestRig
 from .finding import Finding, Verdict
 from .holding import holding

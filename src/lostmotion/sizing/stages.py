@@ -12,8 +12,9 @@ from ..data_sheets.linear_components import linear_table
 from ..inputs.quantities import Force, Positive
 from ..model.gear import Gear
 from ..model.gearbox import Gearbox
-from ..model.linear import BeltData, LinearDrive, RackData, RatedScrew
+from ..model.linear import LinearDrive, RatedScrew
 from ..model.losses import ConstantEfficiency, LossMap, efficiency_map
+from ..model.rack_and_belt import BeltData, RackData
 from ..model.torsion import Hysteresis, LinearStiffness, Rigid, TorsionCurve
 from .required_motion import RequiredMotion
 

@@ -9,9 +9,10 @@ import numpy as np
 
 from ..model.linear import RatedScrew
 from ..model.losses import ConstantEfficiency, LossMap
+from ..simulation.needs import need_no_impacts
 from ..simulation.results import RunArrays
 from ..simulation.run import run
-from ..simulation.train_scenario import TrainScenario, need_no_impacts
+from ..simulation.train_scenario import TrainScenario
 from .axis_rules import HOUR, AxialLoad, missing, screw_life, screw_rules
 from .duty_cycle import duty_cycle
 from .finding import Finding

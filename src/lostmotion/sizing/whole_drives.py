@@ -11,7 +11,7 @@ from ..data_sheets.linear_sheets import FORCE_SOURCE, LinearMotorSheet
 from ..data_sheets.records import find
 from ..inputs.quantities import Length, Positive
 from ..model.gearbox import Gearbox
-from ..model.linear import LinearMotorData
+from ..model.linear_motor import LinearMotorData
 from ..model.motor import Motor, MotorLimits
 from ..model.synchronous_motor import Winding
 from .stages import DIRECT

@@ -34,7 +34,8 @@ from ..model.motor import Motor
 from ..model.signals import Samples, TimeFunction, TorqueSignal
 from ..model.task import Task
 from ..servo.data import lag_sum, secant
-from ..simulation.scenario import DriveScenario, Initial, LoadTable, SimulationTable
+from ..simulation.drive_scenario import DriveScenario, Initial, LoadTable
+from ..simulation.scenario import SimulationTable
 from ..sizing.finding import SOURCES
 from ..sizing.motion_check import INERTIA_RATIO
 from ..sizing.required_motion import duty_torque, required_motion

@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from ..model.motor import Motor
+from ..simulation.drive_scenario import DriveScenario
 from ..simulation.linear_units import of_slides
 from ..simulation.results import RunArrays
-from ..simulation.scenario import DriveScenario
 from ..sizing.duty_cycle import DutyCycle
 from ..sizing.motor_check import rms_rise
 from ..sizing.thermal import TwoBodies

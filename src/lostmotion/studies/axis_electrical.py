@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..control.loops import FirstOrderCurrent, IdealCurrent
+from ..simulation.drive_scenario import DriveScenario
 from ..simulation.results import RunArrays
-from ..simulation.scenario import DriveScenario
 from ..sizing.motor_check import command_of_run
 from ..sizing.motor_run import current_voltage_power, oriented_amplitudes
 from ..sizing.thermal import mean_square

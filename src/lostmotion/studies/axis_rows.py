@@ -13,9 +13,9 @@ from ..data_sheets.linear_sheets import LinearMotorSheet
 from ..errors import InputError
 from ..model.gearbox import Gearbox
 from ..model.motor import Motor
+from ..simulation.drive_scenario import DriveScenario
 from ..simulation.results import RunArrays
 from ..simulation.run import run
-from ..simulation.scenario import DriveScenario
 from ..sizing.axis_rules import (
     derated,
     emergency_stop,

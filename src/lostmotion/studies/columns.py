@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..response.crossovers import bandwidth
-from ..simulation.scenario import DriveScenario
+from ..simulation.drive_scenario import DriveScenario
 from ..simulation.variables import CHANNEL_NAMES, add_efficiency
 from ..worker_threads import thread_pool
 from .records import kind_of_record

@@ -10,8 +10,8 @@ from .. import _core
 from ..errors import InputError
 from ..model.torsion import Rigid
 from ..simulation.core_runs import core_case
+from ..simulation.drive_scenario import DriveScenario
 from ..simulation.results import ENERGY
-from ..simulation.scenario import DriveScenario
 from .functions import REDUCTIONS
 from .runs import Runs, spread
 from .study import Study

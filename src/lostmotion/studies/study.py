@@ -14,7 +14,8 @@ from ..inputs.part import Part
 from ..inputs.quantities import Whole
 from ..inputs.validation import listed
 from ..model.motor import Motor
-from ..simulation.scenario import DriveScenario, Scenario, short_form
+from ..simulation.drive_scenario import DriveScenario, short_form
+from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
 from ..simulation.units_of_keys import unit_in, unit_of_key
 from ..sizing.stages import stage_of, together

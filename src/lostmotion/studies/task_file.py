@@ -15,12 +15,12 @@ from ..inputs.schema import follow, unit_in_schema
 from ..inputs.toml_files import is_in_file, read_toml
 from ..inputs.validation import shown, unknown_key
 from ..model.angle_torques import STANDARD_GRAVITY
-from ..model.linear import Slide
 from ..model.signals import ForceSignal, TorqueSignal
+from ..model.slide import Slide
 from ..model.task import Task
 from ..reproducible import sin
+from ..simulation.drive_scenario import from_tables
 from ..simulation.linear_units import in_si, of_slides
-from ..simulation.scenario import from_tables
 from ..simulation.train_scenario import train_schema
 from ..sizing.stages import DIRECT, STAGES, stage_of
 from ..sizing.whole_drives import BESIDE, LINEAR, WHOLE

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from ..simulation.drive_scenario import DriveScenario
 from ..simulation.pointing_error import pointing_names
 from ..simulation.results import ENERGY
-from ..simulation.scenario import DriveScenario, Scenario
+from ..simulation.scenario import Scenario
 from ..simulation.train_variables import axis_variables
 from ..simulation.variables import CHANNEL_NAMES, VARIABLES
 from ..simulation.windings import bound_names

@@ -24,9 +24,9 @@ from ..model.load import Load
 from ..model.motor import Motor
 from ..model.signals import CommandSignal, Samples, TorqueSignal
 from ..model.torsion import Rigid
+from ..simulation.drive_scenario import Initial, of_drive
 from ..simulation.results import RunArrays
 from ..simulation.run import run
-from ..simulation.scenario import Initial, of_drive
 from ..simulation.switchings import names_in, unpacked
 from .loop import Loop
 

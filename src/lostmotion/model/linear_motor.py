@@ -1,0 +1,119 @@
+"""Linear motors: a force on a slide, from the data of the motor."""
+
+import math
+from typing import Annotated, Self
+
+from pydantic import model_validator
+
+from ..inputs.part import Part
+from ..inputs.quantities import (
+    Current,
+    Force,
+    ForceConstant,
+    Length,
+    Mass,
+    NotNegative,
+    Positive,
+)
+from ..reproducible import sin
+from .angle_torques import TorqueCurve
+from .motor import ShaftMotor
+
+COGGING_POINTS = 72  # in a period: chords that depart from the sine by less than 0.1 % of its amplitude
+
+
+class LinearMotorData(Part):
+    """A linear motor alone, as a data sheet has it: a source of force.
+
+    Examples
+    --------
+    >>> LinearMotorData(force_constant="50 N/A", rated_current="4 A", peak_current="12 A").forces()
+    (200.0, 600.0)
+    """
+
+    mass: Annotated[Mass, NotNegative] = 0.0
+    """mass of the part that moves"""
+    rated_force: Annotated[Force, Positive] | None = None
+    """force at command 1"""
+    peak_force: Annotated[Force, Positive] | None = None
+    """at which the force ends; left out, without limit"""
+    force_constant: Annotated[ForceConstant, Positive] | None = None
+    """force to the current in the unit of the currents"""
+    rated_current: Annotated[Current, Positive] | None = None
+    """with force_constant, in place of rated_force"""
+    peak_current: Annotated[Current, Positive] | None = None
+    """with force_constant, in place of peak_force"""
+    friction_force: Annotated[Force, NotNegative] = 0.0
+    """dry friction"""
+    cogging_force: Annotated[Force, Positive] | None = None
+    """amplitude, over the position with the period pole_pitch"""
+    pole_pitch: Annotated[Length, Positive] | None = None
+    """tau, from a north pole to the next south pole: half a magnetic period"""
+    note: str = ""
+    """note for readers of the results"""
+
+    @model_validator(mode="after")
+    def _is_a_motor(self) -> Self:
+        for name in ("rated", "peak"):
+            force, current = f"{name}_force", f"{name}_current"
+            if getattr(self, current) is not None and self.force_constant is None:
+                raise ValueError(f"has {current} without force_constant; add it, or give {force}")
+            if getattr(self, force) is not None and getattr(self, current) is not None:
+                raise ValueError(f"has {force} and {current}, which with force_constant say the same; give one")
+        rated, peak = self.forces()
+        if peak < rated:
+            raise ValueError(
+                f"has a peak force of {peak:g} N, less than the rated one, {rated:g} N; give at least that"
+            )
+        if (self.cogging_force is None) != (self.pole_pitch is None):
+            raise ValueError("has one of cogging_force and pole_pitch; the cogging needs both")
+        return self
+
+    def forces(self) -> tuple[float, float]:
+        """(rated, peak) [N]; infinite without a limit."""
+        rated, peak = self.rated_force, self.peak_force
+        if rated is None:
+            if self.rated_current is None or self.force_constant is None:
+                raise ValueError("lacks rated_force, or force_constant and rated_current; add it")
+            rated = self.force_constant * self.rated_current
+        if peak is None and self.peak_current is not None and self.force_constant is not None:
+            peak = self.force_constant * self.peak_current
+        return rated, math.inf if peak is None else peak
+
+
+class LinearMotor(LinearMotorData):
+    """A linear motor that moves a slide: its command times the rated force acts without delay.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> motor = lm.model.LinearMotor(slide="table", rated_force="200 N", peak_force="600 N", mass="2.5 kg")
+    >>> motor.motor().torque_limit
+    600.0
+    """
+
+    slide: str
+
+    def motor(self) -> ShaftMotor:
+        """The source of torque with the same equations."""
+        rated, peak = self.forces()
+        return ShaftMotor(
+            kind="torque_source",
+            shaft=self.slide,
+            rotor_inertia=self.mass,
+            friction_torque=self.friction_force,
+            rated_torque=rated,
+            torque_limit=None if math.isinf(peak) else peak,
+        )
+
+    def cogging(self) -> TorqueCurve | None:
+        """Its cogging as a force over the position; None without."""
+        if self.cogging_force is None or self.pole_pitch is None:
+            return None
+        share = [k / COGGING_POINTS for k in range(COGGING_POINTS)]
+        return TorqueCurve(
+            shaft=self.slide,
+            period=self.pole_pitch,
+            angles=tuple(self.pole_pitch * x for x in share),
+            torques=tuple(self.cogging_force * sin(2.0 * math.pi * x) for x in share),
+        )

@@ -1,0 +1,54 @@
+"""What a function requires of a scenario, with the line that refuses another one."""
+
+from __future__ import annotations
+
+from ..errors import InputError
+from ..model.torsion import Rigid
+from .scenario import Scenario
+
+
+def need_open_loop(scenario: Scenario, function: str) -> None:
+    """Refuses a scenario with controllers, for what follows given commands alone.
+
+    Raises
+    ------
+    InputError
+    """
+    if scenario.axes():
+        table = scenario.controller_key("").partition(".")[0]
+        none = "None" if table == "controller" else "{}"
+        has = f"a {table}" if table == "controller" else table
+        raise InputError(
+            f"{function}: the scenario has {has}, and this takes a drive whose commands are given; for the drive without, give "
+            f"scenario.replace({table}={none}), or in a file [command] over its base"
+        )
+
+
+def need_no_impacts(scenario: Scenario, function: str) -> None:
+    """Refuses a train with rigid flanks that strike, for what takes motions without impacts.
+
+    Raises
+    ------
+    InputError
+    """
+    for key, gear in scenario.gears_by_key().items():
+        if isinstance(gear.stiffness, Rigid) and gear.stiffness.strikes:
+            raise InputError(
+                f"{function}: {key}.stiffness has rigid flanks with backlash, and this takes no impacts; give a stiffness to the "
+                'backlash, kind = "curve"'
+            )
+
+
+def need_free_motion(scenario: Scenario, function: str) -> None:
+    """Refuses a train in which the motion of a shaft is given or flanks strike, for what torques alone are to move.
+
+    Raises
+    ------
+    InputError
+    """
+    need_no_impacts(scenario, function)
+    if given := scenario.given():
+        raise InputError(
+            f"{function}: key {scenario.given_key(given[0])} gives the motion of a shaft, and this takes a train that torques "
+            "alone move; leave it out"
+        )

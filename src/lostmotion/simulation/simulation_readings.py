@@ -1,0 +1,143 @@
+"""What a simulation that is advanced step by step shows: result variables, from the channels of the solver and from others."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable, Iterator
+from typing import Any, overload
+
+import numpy as np
+
+from ..control.controller import Controller
+from ..errors import InputError
+from ..inputs.validation import did_you_mean, shown
+from ..model.synchronous_motor import PhaseValues
+from ..model.train import DriveTrain
+from .scenario import Scenario
+from .train_variables import (
+    ALL_SIGNALS,
+    WINDING_SIGNALS,
+    angle_through,
+    angles_through_gears,
+    axis_variables,
+    signals_of,
+)
+from .variables import Variable
+from .windings import oriented
+
+Derived = Callable[[list[float]], float]
+
+
+class SimulationReadings:
+    """Base of simulations: their result variables by name."""
+
+    _core: Any
+    _turn: threading.RLock
+    _train: DriveTrain
+    _controllers: dict[str, Controller]
+    _signals: dict[str, int]
+    """of the controllers"""
+    _channel: dict[str, int]
+    _derived: dict[str, Derived]
+    _variables: tuple[Variable, ...]
+
+    def _idle(self) -> Any:
+        raise NotImplementedError
+
+    def _add_signals(self, scenario: Scenario | None) -> None:
+        """Add the signals of controllers, and the torque of a winding in place of the straight line that drives the mechanics."""
+        if scenario is None or not self._controllers:
+            return
+        names = (*ALL_SIGNALS, *WINDING_SIGNALS)
+        for k, (prefix, controller) in enumerate(scenario.by_prefix().items()):
+            shown_here = set(signals_of(controller))
+            self._signals |= {
+                f"{prefix}{name}": k * len(names) + n for n, name in enumerate(names) if name in shown_here
+            }
+        for prefix, _, phase in oriented(scenario):
+            self._derived[f"{prefix or 'motor_'}torque"] = self._torque_of(prefix, phase)
+            self._channel = {n: c for n, c in self._channel.items() if n != f"{prefix or 'motor_'}torque"}
+        self._variables += axis_variables(scenario.by_prefix(), scenario.sliding())
+
+    def _torque_of(self, prefix: str, phase: PhaseValues) -> Derived:
+        def torque(values: list[float]) -> float:
+            i_d, i_q = (self._value(f"{prefix}{axis}_current", values) for axis in ("direct", "quadrature"))
+            return float(phase.torque(i_d, i_q))
+
+        return torque
+
+    def winding_torques(self) -> Iterator[tuple[int, Derived]]:
+        """Channel of the solver's torque of each motor under field-oriented control, and the true torque from the channels."""
+        channels = {v.name: k for k, v in enumerate(self._variables)}
+        for name, derived in self._derived.items():
+            if name.endswith("_torque") and name not in self._channel:
+                yield channels[name], derived
+
+    @overload
+    def __getitem__(self, name: str) -> float: ...
+    @overload
+    def __getitem__(self, name: tuple[str, ...] | list[str]) -> np.ndarray: ...
+    def __getitem__(self, name: str | tuple[str, ...] | list[str]) -> float | np.ndarray:
+        """Value of a result variable now (SI), with the inputs at their last values; of several, as an array.
+
+        Raises
+        ------
+        InputError
+            There is no such variable.
+        """
+        with self._turn:
+            values = self._idle().read()
+            if isinstance(name, tuple | list):
+                return np.array([self._value(one, values) for one in name])
+            return self._value(name, values)
+
+    def _value(self, name: str, values: list[float]) -> float:
+        try:
+            channel = self._channel.get(name)
+            if channel is None and name in self._signals:
+                return float(self._core.control_signals()[self._signals[name]])
+            return values[channel] if channel is not None else self._derived[name](values)
+        except (KeyError, TypeError):  # unknown, or nothing that could be a name
+            names = [v.name for v in self._variables]
+            hint = did_you_mean(str(name), names, f"the variables are {', '.join(names)}")
+            raise InputError(f"{shown(name)} is no variable; {hint}") from None
+
+    def read(self) -> dict[str, float]:
+        """All result variables (SI), by name."""
+        with self._turn:
+            values = self._idle().read()
+            return {v.name: self._value(v.name, values) for v in self._variables}
+
+    # The array functions of `results` take ten times as long for a single number.
+
+    def _motor_power(self, values: list[float]) -> float:
+        return self._value("motor_torque", values) * values[self._channel["motor_speed"]]
+
+    def _efficiency(self, values: list[float]) -> float:
+        speed = values[self._channel["motor_speed"]]
+        if speed == 0.0:
+            return math.nan
+        ratio, way = self._train.gears["gearbox"].ratio, math.copysign(1.0, speed)
+        driving = math.copysign(way, way * ratio) * values[self._channel["output_torque"]]
+        fed_in = way * values[self._channel["input_torque"]] * abs(ratio)
+        if driving >= 0.0:
+            return driving / fed_in if fed_in != 0.0 else math.nan if driving == 0.0 else math.inf
+        return fed_in / driving if fed_in < 0.0 else 0.0
+
+    def _derived_of(self, train: DriveTrain) -> dict[str, Derived]:
+        """Values that the solver does not integrate: twists of rigid gears, and the angles that follow through the gears."""
+
+        def angle_of(source: str, name: str, forward: bool) -> Derived:
+            gear, twist, angle = train.gears[name], train.twist_of(name), train.angle_of(source)
+            return lambda values: float(
+                angle_through(gear, self._value(angle, values), self._value(twist, values), forward=forward)
+            )
+
+        known = [name for name in train.shafts if train.angle_of(name) in self._channel]
+        derived: dict[str, Derived] = {
+            twist: lambda _: 0.0 for twist in map(train.twist_of, train.gears) if twist not in self._channel
+        }
+        for shaft, source, gear, forward in angles_through_gears(train, known):
+            derived[train.angle_of(shaft)] = angle_of(source, gear, forward)
+        return derived

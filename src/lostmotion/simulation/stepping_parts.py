@@ -1,0 +1,95 @@
+"""What a simulation is made of and given, step by step, with the lines that refuse it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from .. import _core
+from ..errors import InputError
+from ..inputs.quantities import argument
+from ..inputs.validation import did_you_mean, shown
+from ..model.drive import Drive
+from ..model.mass_matrix import MassMatrix
+from ..model.train import DriveTrain
+from .drive_scenario import DriveScenario, Initial, drive_of
+from .scenario import Scenario
+from .train_ports import given_train
+from .train_scenario import TrainScenario
+from .train_tables import TrainInitial
+
+MIN_INTERVAL, MAX_INTERVAL = 1e-12, 1e12
+"""Of a step [s]: below, it is lost in the rounding of the time; above, in that of a motion's phase."""
+
+
+def parts(
+    what: Drive | Scenario | DriveTrain, loaded: Sequence[str] | None, given: Sequence[str] | None
+) -> tuple[Drive | DriveTrain, DriveTrain, _core.Train, tuple[str, ...], tuple[str, ...], Initial | TrainInitial]:
+    """Parts of a simulation: its subject, the same as a train, the solver's train, the loadable shafts, the shafts
+    with given motion, and the start."""
+    if isinstance(what, DriveTrain | TrainScenario):
+        train, shafts, moved = given_train(what, loaded, given)
+        if isinstance(what, DriveTrain):
+            return train, train, train.core(shafts, given=moved), tuple(shafts), tuple(moved), TrainInitial()
+        return train, train, what.core(loaded=shafts, given=moved), tuple(shafts), tuple(moved), what.begin()
+    assert isinstance(what, Drive | DriveScenario)
+    if loaded is not None:
+        raise InputError("loaded: is for trains; a drive has one load torque, on its load")
+    if given is not None:
+        raise InputError("given: is for trains; give drive.train() for a drive whose motor or load has a given motion")
+    start = what.begin() if isinstance(what, DriveScenario) else Initial()
+    return drive_of(what), what.train(), what.core(), (), (), start
+
+
+def masses_given(masses: Mapping[str, MassMatrix], given: Any) -> dict[str, MassMatrix]:
+    """The mass matrices that `advance` is given, by name."""
+    if not isinstance(given, Mapping):
+        raise InputError(f"mass_matrix: {shown(given)} is no dictionary; give the rows by the name of the matrix")
+    found = {}
+    for name, matrix in given.items():
+        if name not in masses:
+            known = f"the mass matrices are {', '.join(masses) or 'none'}"
+            raise InputError(f"mass_matrix.{shown(name)}: is none of this train; {did_you_mean(name, masses, known)}")
+        try:
+            found[name] = MassMatrix(shafts=masses[name].shafts, matrix=matrix)
+        except InputError as problem:
+            raise InputError(f"mass_matrix.{name}: {problem}") from None
+    return found
+
+
+def no_interval(time: float, interval: float) -> InputError:
+    """Refusal of an interval that `advance` is given."""
+    if not MIN_INTERVAL <= interval <= MAX_INTERVAL:
+        return InputError(f"interval {shown(interval)} s must lie between {MIN_INTERVAL:g} s and {MAX_INTERVAL:g} s")
+    return InputError(
+        f"interval {interval} s is below the resolution of the time, {time} s; take a longer one, or reset"
+    )
+
+
+def no_input(train: DriveTrain, inputs: Sequence[str], name: str) -> InputError:
+    """Refusal of an input that `advance` is given."""
+    shaft = name.removesuffix("_load_torque").removesuffix("_load_force")
+    if shaft in train.shafts and name == train.load_torque_of(shaft):
+        word = train.torque_word(shaft)
+        kind = "slide" if word == "force" else "shaft"
+        return InputError(f'{name}: no load {word} acts on this {kind}; make the simulation with loaded=["{shaft}"]')
+    meant = did_you_mean(name, inputs, f"the inputs are {', '.join(inputs)}")
+    return InputError(f"{name}: is no input of this train; {meant}")
+
+
+def ends_of(name: str, value: Any, unit: str) -> tuple[float, float]:
+    """The values of an input at the begin and the end of an interval.
+
+    Raises
+    ------
+    InputError
+        It is neither a number nor a pair of numbers.
+    """
+    if type(value) is float and value - value == 0.0:  # nearly always
+        return value, value
+    if not isinstance(value, tuple):
+        number = argument(name, value, unit)
+        return number, number
+    if len(value) != 2:
+        raise InputError(f"{name}: {shown(value)} must be a number, or a pair of numbers (begin, end)")
+    return argument(name, value[0], unit), argument(name, value[1], unit)
