@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 
 import lostmotion as lm
 from lostmotion.errors import InputError
+from lostmotion.identification.goal_shaping import shaped
 
 J, B = 0.03, 0.02  # kg m2, N m s/rad
 T = 1e-3  # s
@@ -94,6 +95,57 @@ def test_a_sampled_firmware_is_its_law_at_each_sample(supply_resistance: float, 
     limited = np.isclose(np.abs(torques), 3.5 * 0.6)
     assert 20 < limited.sum() < 1000, "the current is limited for a while"
     assert any(duty(e) == 0.0 for e in goal - np.array(angles)), "the dead band is entered"
+
+
+def goal_course(goal: float, rate: float, acceleration: float | None, times: np.ndarray) -> np.ndarray:
+    """From 0 to a goal at rest: a ramp, or a trapezoid of the speed, in closed form."""
+    if acceleration is None:
+        return np.asarray(np.minimum(rate * times, goal))
+    up, end = rate / acceleration, goal / rate + rate / acceleration
+    s = np.clip(times, 0.0, end)
+    rising, braking = 0.5 * acceleration * s**2, goal - 0.5 * acceleration * (end - s) ** 2
+    return np.where(s < up, rising, np.where(s > end - up, braking, rate * (s - 0.5 * up)))
+
+
+@pytest.mark.parametrize("acceleration", [None, 8.0])
+def test_the_goal_keeps_to_its_rate_and_acceleration(acceleration: float | None) -> None:
+    """The reference that the loop follows is the closed form within the steps of the samples."""
+    rate, goal, step = 2.0, 1.2, 0.05
+    firmware = SERVO | {"goal_rate_limit": rate}
+    if acceleration is not None:
+        firmware |= {"goal_acceleration_limit": acceleration}
+    reference = {"kind": "position", "steps": [{"time": step, "height": goal}]}
+    run = lm.simulate(axis(sampled(firmware, reference=reference), duration=2.5))
+    course, time = run["servo_position_reference"].values, run["time"].values
+    wanted = goal_course(goal, rate, acceleration, np.maximum(time - step + T, 0.0))  # the sample at the step sees it
+    assert np.max(np.abs(course - wanted)) < rate * T + 3.0 * (acceleration or 0.0) * T**2
+    assert course[-1] == pytest.approx(goal, abs=1e-12)
+    assert np.max(np.abs(np.diff(course))) <= rate * T * (1.0 + 1e-9)
+    if acceleration is not None:
+        assert np.max(np.abs(np.diff(course, 2))) <= acceleration * T**2 * (1.0 + 1e-6)
+    plain = lm.simulate(axis(sampled(SERVO, reference=reference), duration=2.5))
+    assert abs(plain["arm_angle"].values[400] - run["arm_angle"].values[400]) > 0.05, "the limit acts on the motion"
+
+
+def test_the_filter_of_the_goal_is_exact_and_starts_at_rest() -> None:
+    tau = 0.04
+    reference = {"kind": "position", "mean": 0.3, "steps": [{"time": 0.05, "height": 1.0}]}
+    run = lm.simulate(axis(sampled(SERVO | {"goal_filter_time": tau}, reference=reference)))
+    time, course = run["time"].values, run["servo_position_reference"].values
+    samples = np.maximum(np.round((time - 0.05) / T) + 1.0, 0.0)  # those that have seen the step
+    assert np.allclose(course, 0.3 + 1.0 - np.exp(-samples * T / tau), atol=1e-12)
+
+
+def test_the_limits_of_the_goal_are_those_of_an_identification() -> None:
+    """`goal_shaping` of identification steps on a grid of its own: at that sample time both are the same numbers."""
+    limits = {"rate": 3.0, "acceleration": 20.0, "filter_time": 0.01}
+    keys = {"rate": "goal_rate_limit", "acceleration": "goal_acceleration_limit", "filter_time": "goal_filter_time"}
+    run = lm.simulate(axis(sampled(SERVO | {keys[k]: v for k, v in limits.items()})))
+    time = run["time"].values
+    goal = np.where(time < 0.05 - 1e-9, 0.0, np.where(time < 0.8 - 1e-9, 1.0, -0.4))
+    _, course, count = shaped(time, goal, held=True, **limits)
+    assert count == 1
+    assert np.max(np.abs(course[1:] - run["servo_position_reference"].values[:-1])) < 1e-12
 
 
 def test_without_sample_time_the_motion_is_that_of_an_integrator() -> None:
@@ -183,6 +235,10 @@ def test_torque_in_python_is_that_of_the_core() -> None:
             {"supply_resistance": 1.0},
             r"firmware\.supply_resistance: makes the torque depend on error and speed",
         ),
+        (continuous, {"goal_rate_limit": 4.0}, r"firmware\.goal_rate_limit: acts from sample to sample"),
+        (continuous, {"goal_acceleration_limit": 4.0}, r"firmware\.goal_acceleration_limit: acts from sample to"),
+        (continuous, {"goal_filter_time": 4e-3}, r"firmware\.goal_filter_time: acts from sample to sample"),
+        (sampled, {"goal_rate_limit": 0.0}, r"goal_rate_limit"),
         (sampled, {"duty": {"errors": [0.0, 0.1, 0.1], "values": [0.0, 0.5, 0.6]}}, "errors that do not rise"),
         (sampled, {"duty": {"errors": [0.0, 0.1], "values": [0.1, 0.5]}}, "does not begin at 0"),
         (sampled, {"duty": {"errors": [0.0, 0.1], "values": [0.0, 1.5]}}, "1.5"),

@@ -23,6 +23,7 @@ TRUTH = {
     "max_current": 0.7,
     "supply_resistance": 1.2,
     "filter_time": 4e-3,
+    "goal_rate_limit": 6.0,
 }
 CORNER, LAST = 0.05, 0.3  # rad
 STEP = 1e-3  # s
@@ -76,12 +77,13 @@ def goal(k: int, time: np.ndarray) -> np.ndarray:
 
 
 def log(k: int, *, sampled: bool) -> Log:
-    """Angles at 100 Hz of the law, with the torque held for 1 ms, or with its derivative taken every 0.05 ms."""
+    """Angles at 100 Hz of the law, with torque and limited goal held for 1 ms, or with its derivative taken every 0.05 ms."""
     time = np.arange(0.0, 2.0, 0.01)
     wanted = goal(k, time)
     inner = 20
     fine = STEP / inner
     angle = speed = seen = 0.0
+    followed = float(wanted[0])
     angles = []
     held = 0.0
 
@@ -94,7 +96,8 @@ def log(k: int, *, sampled: bool) -> Log:
         for _ in range(10):
             if sampled:
                 seen += (1.0 - math.exp(-STEP / TRUTH["filter_time"])) * (angle - seen)
-                held = torque(r - seen, speed, TRUTH["supply_resistance"])
+                followed += min(max(r - followed, -TRUTH["goal_rate_limit"] * STEP), TRUTH["goal_rate_limit"] * STEP)
+                held = torque(followed - seen, speed, TRUTH["supply_resistance"])
             for _ in range(inner):  # the midpoint rule, of second order
                 middle = rates(speed, angle, r)
                 speed, angle = (
@@ -136,8 +139,8 @@ def test_dead_band_duty_curve_and_current_limit_are_found(tmp_path: Path) -> Non
         assert low - 0.005 * value <= TRUTH[name] <= high + 0.005 * value, name
 
 
-def test_a_supply_that_sags_and_a_filter_are_found(tmp_path: Path) -> None:
+def test_a_supply_that_sags_a_filter_and_the_rate_of_the_goal_are_found(tmp_path: Path) -> None:
     starts = {"supply_resistance": 0.6, "filter_time": 2e-3, "dead_band": 0.02, "corner_duty": 0.2, "max_duty": 0.8}
-    starts |= {"max_current": 1.0}
+    starts |= {"max_current": 1.0, "goal_rate_limit": 8.0}
     for name, (value, _, _) in identified(tmp_path, SAMPLED, starts).items():
         assert value == pytest.approx(TRUTH[name], rel=0.05), name

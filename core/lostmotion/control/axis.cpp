@@ -48,12 +48,12 @@ void Axis::start(const Sampled& y, double sample_time, double* slot) const {
     show_model(slot);
     if (two_encoders)
         slot[blended] = position_sensor.scale * position_sensor.encoder.reading(y.position_angle) - angle / ratio;
-    firmware.start(angle / ratio + slot[blended], slot);
     if (camera.present) {
         slot[position_angle] =
             two_encoders ? position_sensor.scale * position_sensor.encoder.reading(y.position_angle) : 0.0;
         tracker.start(slot[target_direction] = line_of_sight(angle, slot), speed_sensor.scale * y.speed / ratio, slot);
     }
+    firmware.start(angle / ratio + slot[blended], wanted(y.time, slot).value, slot);
     if (field_orientation) {
         field_orientation->start(y.rotor_angle, y.rotor_speed, slot);
         set_course(WindingCourse::at(field_orientation->winding, y.time, {}, {}, y.rotor_speed), slot);
@@ -78,7 +78,7 @@ bool Axis::step(std::int64_t sample, double sample_time, const Sampled& y, doubl
     } else {
         if (mode == position_mode && position_schedule.due(sample)) {
             if (firmware.present)
-                run_firmware(time, y, slot);
+                run_firmware(time, sample_time * position_schedule.every, y, slot);
             else
                 run_position_loop(time, sample_time * position_schedule.every, slot);
         }
@@ -180,8 +180,8 @@ void Axis::run_position_loop(double time, double T, double* slot) const {
     slot[speed_reference] = ratio * position_loop(e, r.rate + twist.rate, sign_of(ratio) * at_limit(slot), T, slot);
 }
 
-void Axis::run_firmware(double time, const Sampled& y, double* slot) const {
-    slot[position_reference] = wanted(time, slot).value;
+void Axis::run_firmware(double time, double T, const Sampled& y, double* slot) const {
+    slot[position_reference] = firmware.followed(wanted(time, slot).value, T, slot);
     slot[measured_position] = position(slot);
     const double e = slot[position_reference] - firmware.filtered(slot[measured_position], slot);
     const double M = firmware.torque(sign_of(ratio) * firmware.duty(e), y.rotor_speed);

@@ -226,7 +226,7 @@ class Axis {
 
     void run_position_loop(double time, double T, double* slot) const;
 
-    void run_firmware(double time, const Sampled& y, double* slot) const;
+    void run_firmware(double time, double T, const Sampled& y, double* slot) const;
 
     void run_speed_loop(double time, double T, TorqueRange range, double* slot) const;
 

@@ -2,6 +2,21 @@
 
 namespace lostmotion::control {
 
+double Firmware::followed(double goal, double h, double* slot) const {
+    double *own = slot + first_, &filtered = own[filtered_goal], &limited = own[limited_goal], &rate = own[goal_rate];
+    filtered += goal_share_ * (goal - filtered);
+    const double distance = filtered - limited, a = goal_acceleration_limit;
+    if (std::isinf(a)) {
+        if (std::fabs(distance) <= h * goal_rate_limit) return limited = filtered;
+        rate = std::copysign(goal_rate_limit, distance);
+    } else {
+        const double braking = h * a * (std::sqrt(0.25 + 2.0 * std::fabs(distance) / (h * h * a)) - 0.5);
+        const double wanted = std::copysign(std::min({braking, goal_rate_limit, std::fabs(distance) / h}), distance);
+        rate = std::clamp(wanted, rate - h * a, rate + h * a);
+    }
+    return limited += h * rate;
+}
+
 double Firmware::duty(double error) const {
     const double e = std::fmax(std::fabs(error) - dead_band, 0.0);
     std::size_t k = 1;

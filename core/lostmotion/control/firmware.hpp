@@ -16,10 +16,16 @@ namespace lostmotion::control {
 // w)/R. The supply gives the current d I (a bridge without losses), and its voltage falls by that: U = U_0 - R_s d I.
 // Both together are I = (d U_0 - k w)/(R + d^2 R_s), |I| <= I_max, and the torque is k I. Error and speed are those of
 // the sample, and the torque is held until the next one.
+//
+// The goal comes through a filter of first order and then within limits of its rate and acceleration. The limited goal
+// brakes so that it ends on the filtered one: with n steps of h^2 a left, the distance is h^2 a n(n + 1)/2.
 struct Firmware {
     bool present = false;
     double dead_band = 0.0;
     double filter_time = 0.0;
+    double goal_filter_time = 0.0;
+    double goal_rate_limit = std::numeric_limits<double>::infinity();
+    double goal_acceleration_limit = std::numeric_limits<double>::infinity();
     double supply_voltage = 1.0, supply_resistance = 0.0;
     double resistance = 1.0, torque_constant = 1.0;
     double max_current = std::numeric_limits<double>::infinity();
@@ -45,17 +51,34 @@ struct Firmware {
         f.number({"filter_time", "tau", "s", Range::not_negative, Given::has_default,
                   "tau of the first-order filter of the angle that is read"},
                  filter_time);
+        f.number({"goal_filter_time", "tau_g", "s", Range::not_negative, Given::has_default,
+                  "tau_g of the first-order filter of the goal"},
+                 goal_filter_time);
+        f.number({"goal_rate_limit", "v_g", "rad/s", Range::limit, Given::may_be_left_out,
+                  "v_g: largest rate of the goal that the loop follows"},
+                 goal_rate_limit);
+        f.number({"goal_acceleration_limit", "a_g", "rad/s^2", Range::limit, Given::may_be_left_out,
+                  "a_g: largest rate of that rate"},
+                 goal_acceleration_limit);
     }
 
     void place(Slots& slots, double sample_time) {
-        first_ = slots.take(present ? 1 : 0);
+        first_ = slots.take(present ? n_own_slots : 0);
         share_ = share_of(sample_time, filter_time);
+        goal_share_ = share_of(sample_time, goal_filter_time);
     }
-    void start(double angle, double* slot) const {
-        if (present) slot[first_] = angle;
+    // At rest on its goal.
+    void start(double angle, double goal, double* slot) const {
+        if (!present) return;
+        slot[first_ + seen_angle] = angle;
+        slot[first_ + filtered_goal] = slot[first_ + limited_goal] = goal;
     }
     // The angle as the firmware sees it.
-    double filtered(double angle, double* slot) const { return slot[first_] += share_ * (angle - slot[first_]); }
+    double filtered(double angle, double* slot) const {
+        return slot[first_ + seen_angle] += share_ * (angle - slot[first_ + seen_angle]);
+    }
+    // The goal that the loop follows, a sample time h after the last one.
+    double followed(double goal, double h, double* slot) const;
 
     double duty(double error) const;
     // [N m] of the motor; the duty cycle turns it the way of its sign.
@@ -66,7 +89,9 @@ struct Firmware {
     }
 
  private:
-    double share_ = 1.0;
+    enum OwnSlot : int { seen_angle, filtered_goal, limited_goal, goal_rate, n_own_slots };
+
+    double share_ = 1.0, goal_share_ = 1.0;
     int first_ = 0;
 };
 

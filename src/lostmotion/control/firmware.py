@@ -87,8 +87,15 @@ class Firmware(FirmwareFields):
         Raises
         ------
         InputError
-            The supply has a resistance, with which the torque is no piecewise linear function of error and speed.
+            The supply has a resistance, with which the torque is no piecewise linear function of error and speed; or the goal is
+            filtered or limited from sample to sample.
         """
+        for key in ("goal_filter_time", "goal_rate_limit", "goal_acceleration_limit"):
+            if getattr(self, key):
+                raise InputError(
+                    "acts from sample to sample; leave it out, give a reference that keeps to it, or take a sampled controller",
+                    keys=(key,),
+                )
         if self.supply_resistance > 0.0:
             raise InputError(
                 "makes the torque depend on error and speed together; leave it out, or take a sampled controller",

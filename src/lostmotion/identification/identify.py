@@ -36,6 +36,7 @@ from .start import Regression, regressed
 from .task import Identification, load_identification
 
 Notify = Callable[[str, int, float], None]
+MANY = 10  # fitted logs for one that is left out: as many keep the models near to what they were
 
 
 @dataclass
@@ -328,8 +329,9 @@ def identify_logs(
     kept = progress or Progress(None)
     rig, logs, left_out = split_at_pauses(rig, logs)
     spoiled: list[OddLog] = []
+    found: _Climbed | None = None
     while True:
-        found = _climbed(rig, logs, threads, notify, kept)
+        found = _climbed(rig, logs, threads, notify, kept, found)
         if not (more := [o for o in found.odd if o.left_out]):
             break
         spoiled += more
@@ -356,12 +358,19 @@ class _Climbed:
     odd: list[OddLog]
 
 
-def _climbed(rig: Rig, logs: list[Prepared], threads: int | None, notify: Notify, progress: Progress) -> _Climbed:
-    """All models fitted to logs; the intervals wait until no log is left out any more."""
+def _climbed(
+    rig: Rig, logs: list[Prepared], threads: int | None, notify: Notify, progress: Progress, before: _Climbed | None
+) -> _Climbed:
+    """All models fitted to logs; the intervals wait until no log is left out any more.
+
+    Without a few of many logs the models continue from the values that they had before.
+    """
     rig, logs, point, start, ways, undecided = _begun(rig, logs, threads, notify)
+    near = before is not None and len(logs) >= MANY * (len(before.logs) - len(logs))
+    kept = {rung.name: (rung.fit.point, rung.minima) for rung in before.rungs} if before and near else {}
     while True:
         engine = Engine(rig, threads)
-        rungs = climb(rig, engine, logs, point, notify, progress.of(rig.task, logs))
+        rungs = climb(rig, engine, logs, point, notify, progress.of(rig.task, logs, kept))
         best = chosen(rungs)
         turned = _turned(engine, logs, rungs[best].fit, best, undecided)
         if turned is None:
@@ -369,6 +378,7 @@ def _climbed(rig: Rig, logs: list[Prepared], threads: int | None, notify: Notify
         rig, point, words = turned
         ways |= words
         undecided = ()  # each way has been fitted from values that explain the logs best
+        kept = {}
         logs = [replace(log, cache={}) for log in logs]
     odd = odd_logs(rig, engine, logs, point, rungs[best].fit, best)
     return _Climbed(engine, logs, start, list(ways.values()), rungs, best, odd)

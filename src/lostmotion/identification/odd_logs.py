@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -112,8 +111,7 @@ def odd_logs(rig: Rig, engine: Engine, logs: Sequence[Prepared], start: Point, f
     agreeing, point = _agreeing(rig, engine, train, start, fit, rung)
     sizes = _Sizes(rig, engine, agreeing, point, rung)
     found = []
-    for log in logs:
-        rows, ratio = sizes.of(log)
+    for log, (rows, ratio) in zip(logs, sizes.of_each(logs), strict=True):
         if not ratio > SUSPECT:
             continue
         fault, mended = _explained(rig, log, sizes)
@@ -135,28 +133,37 @@ class _Sizes:
         floor = problem.resolution / math.sqrt(12.0)
         if problem.given is not None:
             floor = np.maximum(floor, problem.given)
-        rows = np.array([self._rms(log) for log in logs])
+        rows = self.all_of(logs)
         relative = rows / np.array([_spread(log) for log in logs])
         self.median = np.maximum(np.maximum(np.median(rows, axis=0), floor), 1e-300)
         self.relative = np.maximum(np.median(relative, axis=0), 1e-300)
 
     def of(self, log: Prepared) -> tuple[np.ndarray, float]:
         """(residuals of each measured channel [SI], ratio to those of the other logs)."""
-        rows = self._rms(log)
-        return rows, self._ratio(log, rows)
+        return self.of_each([log])[0]
+
+    def of_each(self, logs: Sequence[Prepared]) -> list[tuple[np.ndarray, float]]:
+        """The same of several logs, whose runs are made together."""
+        return [(rows, self._ratio(log, rows)) for log, rows in zip(logs, self.all_of(logs), strict=True)]
 
     def several(self, logs: Sequence[Prepared]) -> list[float]:
         """Ratios of logs, with nuisances as they are; one run each, all at once."""
         residuals = self.engine.residuals(logs, self.point, self.rung)
         return [self._ratio(log, _rms(log, r)) for log, r in zip(logs, residuals, strict=True)]
 
-    def _rms(self, log: Prepared) -> np.ndarray:
+    def all_of(self, logs: Sequence[Prepared]) -> np.ndarray:
+        """Residuals of logs [SI], one row for each log, each with nuisances of its own."""
         point = self.point
         if self.rig.task.nuisance:
-            alone = replace(problem_of(self.rig, self.engine, [log], self.rung), parameters={})
-            with suppress(InputError):  # without a run: the residuals are NaN then
-                point = search(alone, point, iterations=10).point
-        return _rms(log, self.engine.residuals([log], point, self.rung)[0])
+            residuals = self.engine.residuals(logs, point, self.rung)
+            able = [log for log in logs if log.name not in self.engine.failed]  # without a run the residuals are NaN
+            own = replace(problem_of(self.rig, self.engine, able, self.rung), parameters={})
+            if own.given is None:  # the size of most logs, so that one that is far off does not weaken the others
+                rows = np.array([_rms(log, r) for log, r in zip(logs, residuals, strict=True)])
+                own = replace(own, given=np.maximum(np.nanmedian(rows, axis=0), 1e-12))
+            point = search(own, point, iterations=10).point if able else point
+        residuals = self.engine.residuals(logs, point, self.rung)
+        return np.array([_rms(log, r) for log, r in zip(logs, residuals, strict=True)])
 
     def _ratio(self, log: Prepared, rows: np.ndarray) -> float:
         # A large motion has large residuals and a small one is covered by noise: both measures must be unusual.
@@ -183,7 +190,7 @@ def _agreeing(
     most = max(1, len(train) // SHARE)
     for _ in range(ROUNDS):
         sizes = _Sizes(rig, engine, kept, point, rung)
-        ratios = [sizes.of(log)[1] for log in train]
+        ratios = [ratio for _, ratio in sizes.of_each(train)]
         worst = sorted(range(len(train)), key=lambda k: -ratios[k])[:most]
         aside = {k for k in worst if ratios[k] > SUSPECT}
         if not aside and len(kept) == len(train):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -34,14 +34,16 @@ class Progress:
             except (ValueError, KeyError, TypeError, OSError):
                 self._kept = {}  # of another program, or cut off: the work begins anew
 
-    def of(self, task: Identification, logs: Sequence[Prepared]) -> Models:
-        """Models of these logs."""
+    def of(
+        self, task: Identification, logs: Sequence[Prepared], others: Mapping[str, tuple[Point, list[Point]]]
+    ) -> Models:
+        """Models of these logs; ``others``: values of models of almost the same logs, by name."""
         digest = hashlib.sha256(task.model_dump_json().encode())
         for log in logs:
             digest.update(repr((log.name, log.held_out, len(log.time))).encode())
             for values in (log.time, *log.inputs.values(), *log.measured.values()):
                 digest.update(values.tobytes())
-        return Models(self, digest.hexdigest())
+        return Models(self, digest.hexdigest(), others)
 
     def names(self) -> list[str]:
         """Names of the models that are kept."""
@@ -68,13 +70,17 @@ class Progress:
 class Models:
     """Models of one set of logs in a `Progress`."""
 
-    def __init__(self, progress: Progress, key: str) -> None:
-        self._progress, self._key = progress, key
+    def __init__(self, progress: Progress, key: str, others: Mapping[str, tuple[Point, list[Point]]]) -> None:
+        self._progress, self._key, self._others = progress, key, others
 
     def fitted(self, name: str) -> tuple[Point, list[Point]] | None:
         """(values found, other minima) of a model; None if it is not kept."""
         data = self._progress.read(self._key, name)
-        return None if data is None else (Point(**data["point"]), [Point(**point) for point in data["minima"]])
+        return (
+            self._others.get(name)
+            if data is None
+            else (Point(**data["point"]), [Point(**point) for point in data["minima"]])
+        )
 
     def keep(self, name: str, point: Point, minima: Sequence[Point]) -> None:
         """Keep a model that has been fitted."""
