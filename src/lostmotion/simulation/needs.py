@@ -1,4 +1,4 @@
-"""What a function requires of a scenario, with the line that refuses another one."""
+"""Requirements of functions on scenarios, with the line that refuses another one."""
 
 from __future__ import annotations
 

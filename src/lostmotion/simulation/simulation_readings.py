@@ -1,4 +1,4 @@
-"""What a simulation that is advanced step by step shows: result variables, from the channels of the solver and from others."""
+"""Result variables of a simulation that is advanced step by step."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class SimulationReadings:
     _train: DriveTrain
     _controllers: dict[str, Controller]
     _signals: dict[str, int]
-    """of the controllers"""
+    """places of the signals of controllers"""
     _channel: dict[str, int]
     _derived: dict[str, Derived]
     _variables: tuple[Variable, ...]

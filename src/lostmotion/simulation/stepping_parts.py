@@ -1,4 +1,4 @@
-"""What a simulation is made of and given, step by step, with the lines that refuse it."""
+"""Parts and inputs of a simulation that is advanced step by step, with the lines that refuse them."""
 
 from __future__ import annotations
 

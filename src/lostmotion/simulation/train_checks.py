@@ -1,4 +1,4 @@
-"""What must fit together in a scenario in the long form, with the line that refuses it."""
+"""Checks of a scenario in the long form that involve several of its tables."""
 
 from __future__ import annotations
 
