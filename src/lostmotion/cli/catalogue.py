@@ -17,7 +17,7 @@ def catalogue(
         typer.Option(
             "--kind",
             metavar="KIND",
-            help="gearbox, motor, screw, rack, belt, linear_motor, or a kind of one: strain_wave, planetary, worm, ironless, ...",
+            help="gearbox, motor, screw, rack, belt, linear_motor, actuator, brake, amplifier, or a kind of one: planetary, ironless, ...",
         ),
     ] = None,
     ratio: Annotated[str | None, typer.Option("--ratio", metavar="MIN..MAX", help="Gear ratio.")] = None,
@@ -28,6 +28,9 @@ def catalogue(
     ] = None,
     lead: Annotated[
         str | None, typer.Option("--lead", metavar="MIN..MAX", help='Lead of a screw [m], e.g. "5 mm..10 mm".')
+    ] = None,
+    current: Annotated[
+        str | None, typer.Option("--current", metavar="MIN..MAX", help="Continuous current of an amplifier [A].")
     ] = None,
     complete: Annotated[bool, typer.Option("--complete", help="Only records that can be simulated.")] = False,
     every: Annotated[bool, typer.Option("--all", help="List all that fit, not only a screen of them.")] = False,
@@ -61,7 +64,7 @@ def catalogue(
         print(f"Next: lostmotion catalogue {output}")
     elif name is not None:
         print(record_text(name))
-    elif not complete and not every and (kind, ratio, torque, force, lead) == (None,) * 5:
+    elif not complete and not every and (kind, ratio, torque, force, lead, current) == (None,) * 6:
         print(summary())
     else:
-        print(list_records(kind, ratio, torque, complete, force, lead, every))
+        print(list_records(kind, ratio, torque, complete, force, lead, every, current))

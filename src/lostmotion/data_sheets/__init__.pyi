@@ -1,3 +1,6 @@
+from .accessory_sheets import AmplifierSheet as AmplifierSheet
+from .accessory_sheets import BrakeSheet as BrakeSheet
+from .actuator_sheet import ActuatorSheet as ActuatorSheet
 from .gearbox_sheet import GearboxSheet as GearboxSheet
 from .linear_sheets import BeltSheet as BeltSheet
 from .linear_sheets import LinearMotorSheet as LinearMotorSheet

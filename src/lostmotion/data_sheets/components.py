@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from contextlib import suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from ..errors import InputError
@@ -11,6 +12,7 @@ from ..inputs.arguments import RecordName, checked
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, NotNegative, Number, Positive, Temperature, argument
 from ..inputs.schema import keys_within
+from ..inputs.toml_files import is_in_file
 from ..inputs.validation import shortened, shown, unknown_key
 from ..model.gearbox import Gearbox
 from ..model.motor import DC_KEYS, Motor
@@ -46,8 +48,7 @@ def gearbox_table(
     InputError
         The record lacks what a run needs and `changes` do not give it; the message says where to read it.
     """
-    from .gearbox_sheet import SCALARS, GearboxSheet  # here, as most scenarios name no record
-    from .loss_map_builder import build_loss_map
+    from .gearbox_sheet import GearboxSheet  # here, as most scenarios name no record
     from .records import find
 
     known = {*Gearbox.model_fields, *Conditions.model_fields}
@@ -58,17 +59,35 @@ def gearbox_table(
             raise InputError(f"key {where}.{shortened(key)}: {unknown_key(key, known, inner)}")
     record = find(reference, "gearbox")
     assert isinstance(record, GearboxSheet)
+    return _table_of_sheet(record, f"{where} from {shown(reference)}", changes, where)
+
+
+def gearbox_of(sheet: GearboxSheet) -> Gearbox:
+    """The gearbox of a data sheet.
+
+    Raises
+    ------
+    InputError
+        It lacks what a run needs.
+    """
+    return Gearbox(**_table_of_sheet(sheet, sheet.name, {}, "gearbox")[0])
+
+
+def _table_of_sheet(
+    record: GearboxSheet, what: str, changes: Mapping[str, Any], where: str
+) -> tuple[dict[str, Any], BuiltMap | None]:
+    from .gearbox_sheet import SCALARS, GearboxSheet
+    from .loss_map_builder import build_loss_map
+
     scalars = {key: value for key, value in changes.items() if key in SCALARS}
     try:
         sheet = GearboxSheet(**_given(record) | scalars) if scalars else record
         conditions = Conditions(**{key: changes[key] for key in Conditions.model_fields if key in changes})
     except InputError as error:
-        raise InputError(f"{where} from {shown(reference)}: {error}") from None
-    for key, what in sheet.missing().items():
+        raise InputError(f"{what}: {error}") from None
+    for key, hint in sheet.missing().items():
         if key not in changes:
-            raise InputError(
-                f"{where} from {shown(reference)}: the record lacks {key}, {what}; give {where}.{key} beside {_naming(where)}"
-            )
+            raise InputError(f"{what}: the record lacks {key}, {hint}; give {where}.{key} beside {_naming(where)}")
     built = None
     if not _whole(changes.get("losses")):
         try:
@@ -319,8 +338,85 @@ def at_voltage(table: Mapping[str, Any], voltage: Any, given: Collection[str], w
     return changed | {key: getattr(moved, key) for key in follow}
 
 
+OF_THE_MOTOR = "of the motor"
+"""brake of a task: that which is built into the motor"""
+# Tables of a task that may name a record, and the keys of both that say the same.
+ACCESSORIES = {
+    "brake": {"torque": "holding_torque", "inertia": "inertia"},
+    "amplifier": {key: key for key in ("continuous_current", "peak_current", "peak_time", "max_dc_voltage")},
+}
+
+
+def built_in_brake(motor: str) -> dict[str, Any]:
+    """Values of `task.brake` for the brake of a record of a motor.
+
+    Raises
+    ------
+    InputError
+        The catalogue has none.
+    """
+    from .accessory_sheets import BrakeSheet
+    from .records import catalogue
+
+    found = next((r for r in catalogue() if isinstance(r, BrakeSheet) and motor.lower() in r.motors), None)
+    if found is None:
+        raise InputError(
+            f"task.brake: the catalogue has no brake of {motor}; give its torque and inertia from the data sheet"
+        )
+    return _accessory("brake", {"from": found.name})
+
+
+def _accessory(kind: str, table: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of `task.brake` or `task.amplifier` with those of the record that it names; the other keys go before them."""
+    from .records import find
+
+    record = find(table["from"], kind)
+    for key, hint in record.missing().items():
+        raise InputError(f"task.{kind} from {shown(table['from'])}: the record lacks {key}, {hint}")
+    values = {key: getattr(record, own) for key, own in ACCESSORIES[kind].items()}
+    beside = {key: value for key, value in table.items() if key != "from"}
+    return {key: value for key, value in values.items() if value is not None} | beside
+
+
+def use_accessories(task: Any, motor: Any = None) -> Any:
+    """A table `[task]` with the values of the records of brake and amplifier; the brake of the motor that `motor` names, if it does.
+
+    Raises
+    ------
+    InputError
+        A record is unknown, or lacks its main datum.
+    """
+    if not isinstance(task, dict):
+        return task
+    found = dict(task)
+    for kind in ACCESSORIES:
+        given = found.get(kind)
+        if kind == "brake" and given == OF_THE_MOTOR:
+            name = motor.get("from") if isinstance(motor, dict) else motor
+            found[kind] = built_in_brake(name) if isinstance(name, str) else {"of_the_motor": True}
+        elif isinstance(given, str) or (isinstance(given, dict) and "from" in given):
+            found[kind] = _accessory(kind, {"from": given} if isinstance(given, str) else given)
+    return found
+
+
+def find_accessories(data: dict[str, Any], directory: Path) -> dict[str, Any]:
+    """Tables whose files with brake and amplifier of the task are relative to a directory, by their whole names."""
+    task = data.get("task")
+    if not isinstance(task, dict):
+        return data
+    found = dict(task)
+    for kind in ACCESSORIES:
+        given = found.get(kind)
+        name = given.get("from") if isinstance(given, dict) else given
+        if isinstance(name, str) and is_in_file(name):
+            found[kind] = {**(given if isinstance(given, dict) else {}), "from": str(directory / name)}
+    return {**data, "task": found}
+
+
 def use_records(data: dict[str, Any]) -> None:
     """Puts the values of a record in place of `from`; the other keys of the table go before them."""
+    if "task" in data:
+        data["task"] = use_accessories(data["task"], data.get("motor"))
     for table in ("gearbox", "motor"):
         changes = data.get(table)
         if isinstance(changes, str):

@@ -13,12 +13,24 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.toml_files import is_in_file, read_toml
 from ..inputs.validation import names_like, shown, unknown_key
+from .accessory_sheets import AmplifierSheet, BrakeSheet
+from .actuator_sheet import ActuatorSheet
 from .gearbox_sheet import GearboxSheet
 from .linear_sheets import BeltSheet, LinearMotorSheet, RackSheet, ScrewSheet
 from .motor_sheet import MotorSheet
 from .sheet import in_current_words
 
-Sheet: TypeAlias = GearboxSheet | MotorSheet | ScrewSheet | RackSheet | BeltSheet | LinearMotorSheet
+Sheet: TypeAlias = (
+    GearboxSheet
+    | MotorSheet
+    | ScrewSheet
+    | RackSheet
+    | BeltSheet
+    | LinearMotorSheet
+    | ActuatorSheet
+    | BrakeSheet
+    | AmplifierSheet
+)
 Kind: TypeAlias = type[Sheet]
 Entry: TypeAlias = tuple[Kind, dict[str, Any], str]
 # The table of a record in a sheet file.
@@ -29,6 +41,9 @@ KINDS: dict[str, Kind] = {
     "rack": RackSheet,
     "belt": BeltSheet,
     "linear_motor": LinearMotorSheet,
+    "actuator": ActuatorSheet,
+    "brake": BrakeSheet,
+    "amplifier": AmplifierSheet,
 }
 
 
@@ -38,7 +53,7 @@ COMMON = ("kind", "manufacturer", "note")
 
 @checked
 def catalogue() -> tuple[Sheet, ...]:
-    """Return all records that are shipped: gearboxes, motors, screws, racks, belts and linear motors.
+    """Return all records that are shipped: gearboxes, motors, screws, racks, belts, linear motors, actuators, brakes and amplifiers.
 
     Returns
     -------
@@ -69,7 +84,8 @@ def table_of(record: Sheet) -> str:
 
 def called(table: str) -> str:
     """A kind of record in a sentence, such as ``"a linear motor"``."""
-    return f"a {table.replace('_', ' ')}"
+    name = table.replace("_", " ")
+    return f"{'an' if name[0] == 'a' else 'a'} {name}"
 
 
 @cache

@@ -11,7 +11,7 @@ from ..inputs.validation import shown
 from ..model.gear import Gear
 from ..model.gearbox import Gearbox
 from ..model.motor import Motor, ShaftMotor
-from .components import Conditions, gearbox_table, motor_table
+from .components import Conditions, gearbox_table, motor_table, use_accessories
 from .linear_components import ScrewConditions, linear_table
 
 # For each table of elements: the key that names a record, and the keys that a record does not give.
@@ -37,6 +37,8 @@ def use_train_records(data: dict[str, Any]) -> None:
     InputError
         A record is unknown or lacks what a run needs.
     """
+    if "task" in data:
+        data["task"] = use_accessories(data["task"])
     for table in RECORDS:
         if isinstance(data.get(table), dict):
             data[table] = {name: _with_record(table, name, value) for name, value in data[table].items()}

@@ -172,12 +172,35 @@ class HoldingBrake(Part):
     force: Annotated[Force, Positive] | None = None
     """static, of a brake on the slide of a linear axis, in place of torque"""
 
+    of_the_motor: Switch = False
+    """the brake that is built into the record of the motor"""
+
     @model_validator(mode="after")
     def _holds_something(self) -> Self:
-        if (self.torque is None) == (self.force is None):
-            raise ValueError("needs torque, or force of a brake on a slide, one of the two")
+        if [self.torque is not None, self.force is not None, self.of_the_motor].count(True) != 1:
+            raise ValueError('needs torque, force of a brake on a slide, or the text "of the motor", one of them')
+        if self.of_the_motor and self.inertia > 0.0:
+            raise ValueError("has of_the_motor and inertia, which the record of the brake says; leave one of them out")
         if self.force is not None and self.inertia > 0.0:
             raise ValueError("has force and inertia; a brake on a slide does not turn, so leave the inertia out")
+        return self
+
+
+class Amplifier(Part):
+    """Amplifier that feeds the motor. Of a motor with a winding currents are effective values of a phase."""
+
+    continuous_current: Annotated[Current, Positive]
+    """rms over the cycle"""
+    peak_current: Annotated[Current, Positive] | None = None
+    peak_time: Annotated[Time, Positive] | None = None
+    """longest time above the continuous current"""
+    max_dc_voltage: Annotated[Voltage, Positive] | None = None
+    """largest voltage of the DC bus"""
+
+    @model_validator(mode="after")
+    def _peak_is_above(self) -> Self:
+        if self.peak_current is not None and self.peak_current < self.continuous_current:
+            raise ValueError("has a peak_current below its continuous_current; exchange them")
         return self
 
 

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, Positive, Switch, Temperature, Time
-from .duty import Bus
+from .duty import Amplifier, Bus, HoldingBrake
 
 
 class TrainTask(Part):
@@ -15,11 +15,15 @@ class TrainTask(Part):
     ambient_temperature: Temperature = 25.0
     supply: Bus | None = None
     """DC bus that feeds all motors, and takes what they return"""
+    amplifier: Amplifier | None = None
+    """amplifier that feeds the motor, also as the name of a record; for one motor"""
 
 
 class Task(TrainTask):
     """Requirements of a drive. No run depends on them; the drive check compares with them."""
 
+    brake: HoldingBrake | None = None
+    """holding brake on the motor, also as the name of a record, or "of the motor" """
     max_lost_motion: Annotated[Angle, Positive] | None = None
     """largest permissible lost motion at 3 % of the rated torque, total at the output"""
     hold_without_power: Switch = True

@@ -10,6 +10,8 @@ from typing import get_args
 
 import numpy as np
 
+from ..data_sheets.accessory_sheets import AmplifierSheet, BrakeSheet
+from ..data_sheets.actuator_sheet import ActuatorSheet
 from ..data_sheets.gearbox_sheet import GearboxSheet
 from ..data_sheets.linear_sheets import BeltSheet, LinearMotorSheet, LinearSheet, RackSheet, ScrewSheet
 from ..data_sheets.motor_sheet import MotorSheet
@@ -51,6 +53,7 @@ def list_records(
     force: str | None = None,
     lead: str | None = None,
     every: bool = True,
+    current: str | None = None,
 ) -> str:
     """The records that fit, a line each, with what they lack for a simulation.
 
@@ -58,8 +61,9 @@ def list_records(
     ----------
     kind
         A table of records, such as ``"gearbox"`` or ``"screw"``, or a kind within one, such as ``"worm"``.
-    ratio, torque, force, lead
-        ``MIN..MAX``; torque and force are the rated ones [N·m, N], of a screw the dynamic capacity.
+    ratio, torque, force, lead, current
+        ``MIN..MAX``; torque and force are the rated ones [N·m, N], of a screw the dynamic capacity, of a brake the holding torque.
+        The current is the continuous one of an amplifier [A].
     complete
         Only records that lack nothing.
     every
@@ -81,6 +85,7 @@ def list_records(
             ("torque", torque, "N*m", _rated_torque),
             ("force", force, "N", _rated_force),
             ("lead", lead, "m", _lead),
+            ("current", current, "A", _current),
         )
         if text is not None
     ]
@@ -115,6 +120,7 @@ def summary() -> str:
                 (_lead, " mm", 1e3),
                 (_rated_torque, " N·m", 1.0),
                 (_rated_force, " N", 1.0),
+                (_current, " A", 1.0),
             )
         ]
         rows.append(f"{table:<13} {kind:<12} {len(records):>7}  {'; '.join(filter(None, spans)):<40} {runs}")
@@ -128,12 +134,14 @@ def _span(records: list[Sheet], data_of: Callable[[Sheet], float | None], unit: 
 
 
 def _ratio(record: Sheet) -> float | None:
-    return record.ratio if isinstance(record, GearboxSheet) else None
+    return record.ratio if isinstance(record, GearboxSheet | ActuatorSheet) else None
 
 
 def _rated_torque(record: Sheet) -> float | None:
-    if isinstance(record, GearboxSheet):
+    if isinstance(record, GearboxSheet | ActuatorSheet):
         return record.rated_output_torque
+    if isinstance(record, BrakeSheet):
+        return record.holding_torque
     return record.rated_torque if isinstance(record, MotorSheet) else None
 
 
@@ -142,6 +150,11 @@ def _rated_force(record: Sheet) -> float | None:
     if isinstance(record, ScrewSheet):
         return record.dynamic_capacity
     return record.rated_force if isinstance(record, RackSheet | BeltSheet | LinearMotorSheet) else None
+
+
+def _current(record: Sheet) -> float | None:
+    """[A]."""
+    return record.continuous_current if isinstance(record, AmplifierSheet) else None
 
 
 def _lead(record: Sheet) -> float | None:
@@ -153,13 +166,14 @@ def _lead(record: Sheet) -> float | None:
 
 def _line(record: Sheet) -> str:
     ratio, lead, torque, force = _ratio(record), _lead(record), _rated_torque(record), _rated_force(record)
+    current = _current(record)
     speed = None
     if isinstance(record, GearboxSheet):
         speed = record.rated_input_speed
     elif isinstance(record, MotorSheet):
         speed = record.rated_speed
     first = f"{ratio:.4g}" if ratio else f"{1e3 * lead:.4g} mm" if lead else ""
-    rated = f"{torque:.4g} N·m" if torque else f"{force:.4g} N" if force else "?"
+    rated = f"{torque:.4g} N·m" if torque else f"{force:.4g} N" if force else f"{current:.4g} A" if current else "?"
     turns = isinstance(record, GearboxSheet | MotorSheet)
     rpm = f"{RPM * speed:.0f}" if speed else "?" if turns else ""
     missing = ", ".join(record.missing())
@@ -175,7 +189,8 @@ def _counts(records: list[Sheet]) -> str:
             whole = sum(not r.missing() for r in of_it)
             one = table.replace("_", " ")
             many = "gearboxes" if table == "gearbox" else f"{one}s"
-            parts.append(f"{len(of_it)} {many if len(of_it) > 1 else one}, {whole} of them run")
+            named = f"{len(of_it)} {many if len(of_it) > 1 else one}"
+            parts.append(named if table in ("brake", "amplifier") else f"{named}, {whole} of them run")
     return f"{len(records)} record{'s' if len(records) > 1 else ''}: {'; '.join(parts)}."
 
 
@@ -217,7 +232,9 @@ def record_text(name: str) -> str:
     missing = record.missing()
     lines += [
         "",
-        f"It can be simulated: {record.level()}."
+        "The rules have all data that they need."
+        if not missing and table in ("brake", "amplifier")
+        else f"It can be simulated: {record.level()}."
         if not missing
         else f"Not complete: a simulation also needs {', '.join(missing)}.",
         *record.assumptions(),

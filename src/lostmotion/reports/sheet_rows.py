@@ -36,6 +36,8 @@ def rows_of(record: Record) -> list[tuple[str, str, str]]:
             add(name, "torsional stiffness", "rigid: no twist")
         elif name == "losses":
             _add_losses(value, add)
+        elif isinstance(value, tuple) and all(isinstance(x, str) for x in value):
+            add(name, label, ", ".join(value))
         elif isinstance(value, Part):
             units = type(value).model_json_schema()["properties"]
             for key in type(value).model_fields:

@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ..data_sheets.components import gearbox_table
+from ..data_sheets.components import find_accessories, gearbox_table
 from ..data_sheets.linear_components import linear_table
 from ..data_sheets.train_components import RECORDS, without_record
 from ..errors import InputError
@@ -200,6 +200,7 @@ def _change_voltages(based: dict[str, Any], data: Mapping[str, Any]) -> None:
 
 def _find_records(data: dict[str, Any], directory: Path) -> None:
     """Files with a record are relative to the scenario."""
+    data |= find_accessories(data, directory)
     for table in ("gearbox", "motor"):
         if isinstance(data.get(table), str):
             data[table] = {"from": data[table]}

@@ -118,6 +118,18 @@ def holding_brake(demand: InputDemand, brake: HoldingBrake | None, slide: Requir
     return within("holding_brake", what, need, brake.torque, "N·m", "torque of the brake")
 
 
+def brake_of_a_run(brake: HoldingBrake, need: float) -> Finding:
+    """Static torque of a brake against the largest load torque of a run at the motor [N·m], without friction."""
+    what = "torque that the holding brake carries"
+    if brake.torque is None:
+        return missing("holding_brake", f"{what}: {need:.4g} N·m", "task.brake.torque")
+    found = within("holding_brake", what, need, brake.torque, "N·m", "torque of the brake")
+    if brake.inertia == 0.0:
+        return found
+    told = f"its inertia of {brake.inertia:.4g} kg·m² is not in the run; add it to motor.rotor_inertia"
+    return replace(found, remark="; ".join(filter(None, [found.remark, told])))
+
+
 def stage_rules(motion: RequiredMotion, stage: Stage, wanted_life: float | None) -> list[Finding]:
     """The rules of the stage of a linear axis for the motion of its slide."""
     if isinstance(stage, RatedScrew):

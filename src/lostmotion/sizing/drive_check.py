@@ -13,13 +13,14 @@ from ..simulation.results import RunArrays
 from ..simulation.run import run
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import in_long_form
+from .axis_rules import brake_of_a_run
 from .duty_cycle import MIN_REST, STANDSTILL, DutyCycle, duty_cycle
 from .finding import Finding, Findings
 from .gearbox_check import input_speeds, loads, locks, loss_map, lost_motion
 from .motion_check import dead_zone, holdings, inertia, load_torques, resonance, resonances
 from .motor_check import command_of_run, current, heat, largest_speed, peak_torque, voltage
 from .motor_run import oriented_amplitudes
-from .supply import bus_findings, power_in_run
+from .supply import amplifier_of_a_run, bus_findings, power_in_run
 from .train_check import check_train
 
 POINTS = 40  # samples to a period of the fastest resonance, so that no peak is missed
@@ -91,9 +92,21 @@ def _findings(scenario: Scenario) -> list[Finding]:
     ]
     powers = {"motor": power_in_run(m, result, command, "motor_torque", "motor_speed", "motor")}
     findings += bus_findings(result, powers, task.supply, task.cycle)
+    findings += _accessories(scenario, result, torque, speed)
     if g.losses.kind == "map":
         findings.append(loss_map(result))
     return [_with_sinking(f, result, cycle) if f.rule in MEANS else f for f in findings]
+
+
+def _accessories(scenario: DriveScenario, result: RunArrays, torque: np.ndarray, speed: np.ndarray) -> list[Finding]:
+    """The rules of the holding brake and of the amplifier, where the task has them."""
+    task, found = scenario.task, list[Finding]()
+    if task.brake is not None:
+        loads = load_torques(result)
+        found.append(brake_of_a_run(task.brake, max(map(abs, loads), default=0.0) / abs(scenario.gearbox.ratio)))
+    if task.amplifier is not None:
+        found += amplifier_of_a_run(result, scenario.motor, torque, speed, task)
+    return found
 
 
 def _over_estimates(scenario: Scenario, findings: list[Finding]) -> list[Finding]:

@@ -50,6 +50,8 @@ TASK_RULES = {
     "rack_force": "the rack's data sheet",
     "guide_friction": "attraction of the linear motor times friction coefficient of the guide: definition",
     "amplifier_current": "rms current over the cycle with the continuous current of the amplifier",
+    "amplifier_peak": "largest current, and the longest time above the continuous one, with those of the amplifier",
+    "amplifier_voltage": "the data sheet of the amplifier",
     "bus_voltage": "energy balance of the capacitors: HIWIN MM99TE07-1701, p. 118",
     "brake_resistor": "energy beyond the capacitors: HIWIN MM99TE07-1701, p. 118",
     "mass": "total_mass in the data sheets of the parts",

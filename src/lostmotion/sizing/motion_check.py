@@ -117,9 +117,11 @@ def _held(scenario: DriveScenario, load_torque: float, speed: float) -> Finding:
         value = f"the load torque drives the load {_at(found.from_rest)}"
     else:
         value = f"at rest only: if the power fails at {abs(found.begin):.3g} rad/s, the load goes on {_at(found.from_motion)}"
+    if scenario.task.brake is not None:
+        return Finding("holding", what, value, "ok", "the brake holds the load")
     if not scenario.task.hold_without_power:
         return Finding("holding", what, value, "ok", "not required by the task")
-    remedy = "it needs a brake or a motor under control; then set task.hold_without_power = false"
+    remedy = "it needs a brake, task.brake, or a motor under control, task.hold_without_power = false"
     return Finding("holding", what, value, "warning", f"{remedy}; {_static_holding(scenario.gearbox)}")
 
 

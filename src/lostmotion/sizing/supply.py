@@ -9,8 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model.duty import Bus
+from ..model.duty import Amplifier, Bus
 from ..model.motor import Motor
+from ..model.task import TrainTask
 from ..simulation.results import RunArrays
 from .axis_rules import missing
 from .duty_cycle import integral
@@ -127,14 +128,69 @@ def supply_rules(back: Returned | None, supply: Bus) -> list[Finding]:
     return [*found, within(rule, what, mean, supply.brake_power, "W", "continuous power of the brake resistor")]
 
 
-def amplifier_current(demand: InputDemand, motor: Motor, limit: float) -> Finding:
-    """Root mean square of the motor current over the cycle against the continuous current of the amplifier [A]."""
-    torque = demand.motor_torque(motor)
-    current = current_voltage_power(motor, np.zeros_like(torque), torque, demand.speed)[0]
-    what = "current, rms over the cycle"
+def amplifier_rules(
+    time: np.ndarray, current: np.ndarray, cycle: float, amplifier: Amplifier, bus: float | None
+) -> list[Finding]:
+    """Rules of an amplifier: rms and largest current, the longest time above the continuous one, and the voltage of the bus.
+
+    Source: definitions of data sheets.
+
+    Parameters
+    ----------
+    time, current
+        Current of the motor over the cycle [A], as the data sheet of the amplifier counts it; NaN where it is not known.
+    bus
+        Largest voltage of the DC bus before energy returns [V].
+    """
+    what, continuous = "current, rms over the cycle", amplifier.continuous_current
     if np.isnan(current).any():
-        return missing("amplifier_current", what, "motor.limits.torque_constant")
-    if motor.winding is not None:
-        current = current / math.sqrt(2.0)  # amplitude of a phase
-    square = integral(demand.motion.time, current**2) / demand.motion.cycle
-    return within("amplifier_current", what, math.sqrt(square), limit, "A", "continuous current of the amplifier")
+        found = [missing("amplifier_current", what, "motor.limits.torque_constant")]
+    else:
+        square = integral(time, current**2) / cycle
+        found = [
+            within("amplifier_current", what, math.sqrt(square), continuous, "A", "continuous current of the amplifier")
+        ]
+        if amplifier.peak_current is not None:
+            peak, name = float(np.abs(current).max()), "peak current of the amplifier"
+            found.append(
+                within("amplifier_peak", "current of the amplifier, largest", peak, amplifier.peak_current, "A", name)
+            )
+        if amplifier.peak_time is not None:
+            longest = longest_above(time, np.abs(current), continuous)
+            what, name = "longest time above the continuous current", "peak time of the amplifier"
+            found.append(within("amplifier_peak", what, longest, amplifier.peak_time, "s", name))
+    if amplifier.max_dc_voltage is not None:
+        key, name = "task.supply.max_voltage", "largest bus voltage of the amplifier"
+        what = "DC bus of the amplifier"
+        if bus is None:
+            found.append(missing("amplifier_voltage", what, key))
+        else:
+            found.append(within("amplifier_voltage", what, bus, amplifier.max_dc_voltage, "V", name))
+    return found
+
+
+def amplifier_of_a_run(
+    result: RunArrays, motor: Motor, torque: np.ndarray, speed: np.ndarray, task: TrainTask
+) -> list[Finding]:
+    """The rules of an amplifier for a run, over the cycle of the task, or repeated without a pause."""
+    assert task.amplifier is not None
+    time, bus = result.time, None if task.supply is None else task.supply.start()
+    current = effective_current(motor, torque, speed)
+    return amplifier_rules(time, current, task.cycle or float(time[-1] - time[0]), task.amplifier, bus)
+
+
+def longest_above(time: np.ndarray, values: np.ndarray, limit: float) -> float:
+    """Longest time without a pause during which values are above a limit; the cycle repeats, so that it may span its end."""
+    above = np.minimum(values[1:], values[:-1]) > limit
+    each, steps = [], np.diff(time)
+    for over, group in itertools.groupby(range(len(steps)), key=lambda k: bool(above[k])):
+        each.append(float(steps[list(group)].sum()) if over else 0.0)
+    if len(each) > 1 and each[0] > 0.0 and each[-1] > 0.0:
+        each[0] += each.pop()
+    return max(each, default=0.0)
+
+
+def effective_current(motor: Motor, torque: np.ndarray, speed: np.ndarray) -> np.ndarray:
+    """Current of a motor [A], of one with a winding the effective value of a phase; NaN where its data do not tell."""
+    current = current_voltage_power(motor, np.zeros_like(torque), torque, speed)[0]
+    return current if motor.winding is None else current / math.sqrt(2.0)

@@ -19,7 +19,7 @@ from .finding import Finding
 from .gearbox_check import input_speeds, loads, locks, loss_map
 from .motor_check import command_of_run, current, heat, largest_speed, peak_torque, voltage
 from .motor_run import oriented_amplitudes
-from .supply import bus_findings, power_in_run
+from .supply import amplifier_of_a_run, bus_findings, power_in_run
 
 SAMPLES = 20_000  # the fewest of a run
 
@@ -47,6 +47,7 @@ def check_train(scenario: TrainScenario) -> tuple[Finding, ...]:
         judged, powers[scenario.key_of("motors", name)] = _motor(scenario, name, result)
         findings += judged
     findings += bus_findings(result, powers, scenario.task.supply, scenario.task.cycle)
+    findings += _amplifier(scenario, result)
     if any(isinstance(g.losses, LossMap) for g in train.gears.values()):
         findings.append(loss_map(result))
     what = "judged only in the short form: [motor], [gearbox], [load]"
@@ -54,6 +55,19 @@ def check_train(scenario: TrainScenario) -> tuple[Finding, ...]:
         Finding(rule, rule.replace("_", " "), "not judged of a drive train", "unknown", what) for rule in NOT_JUDGED
     ]
     return tuple(findings)
+
+
+def _amplifier(scenario: TrainScenario, result: RunArrays) -> list[Finding]:
+    """The rules of the amplifier of the one motor; not judged of several motors."""
+    train = scenario.train()
+    if scenario.task.amplifier is None:
+        return []
+    if len(train.motors) != 1:
+        remark = f"one amplifier feeds one motor, and this train has {len(train.motors)}; check each axis on its own"
+        return [Finding("amplifier_current", "amplifier", "not judged", "unknown", remark)]
+    ((name, motor),) = train.motors.items()
+    torque, speed = result[train.motor_torque_of(name)], result[f"{motor.shaft}_speed"]
+    return amplifier_of_a_run(result, motor, torque, speed, scenario.task)
 
 
 def _named(name: str, findings: list[Finding]) -> list[Finding]:

@@ -1,4 +1,4 @@
-"""Drives that are one record: a linear motor, as a motor and a gearbox of ratio 1 in units of translation."""
+"""Drives that are one record: an actuator, and a linear motor as a motor and a gearbox of ratio 1 in units of translation."""
 
 from __future__ import annotations
 
@@ -6,10 +6,14 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Any
 
+from ..data_sheets.actuator_sheet import ActuatorSheet
+from ..data_sheets.components import gearbox_of
 from ..data_sheets.linear_components import linear_table
 from ..data_sheets.linear_sheets import FORCE_SOURCE, LinearMotorSheet
 from ..data_sheets.records import find
+from ..errors import InputError
 from ..inputs.quantities import Length, Positive
+from ..inputs.validation import shown
 from ..model.gearbox import Gearbox
 from ..model.linear_motor import LinearMotorData
 from ..model.motor import Motor, MotorLimits
@@ -17,10 +21,13 @@ from ..model.synchronous_motor import Winding
 from .stages import DIRECT
 
 LINEAR = ("linear_motor",)
-"""of these the kinds that move a slide themselves"""
-WHOLE = LINEAR
+"""kinds of records that move a slide themselves"""
+WHOLE = (*LINEAR, "actuator")
 """kinds of records that need no gearbox and no stage"""
-BESIDE = {"linear_motor": ("mass", "rated_force", "peak_force", "force_constant", "friction_force")}
+BESIDE: dict[str, tuple[str, ...]] = {
+    "actuator": ("rotor_inertia", "efficiency"),
+    "linear_motor": ("mass", "rated_force", "peak_force", "force_constant", "friction_force"),
+}
 """keys of a task beside such a record"""
 
 
@@ -56,6 +63,12 @@ def whole_drive(kind: str, name: str, beside: Mapping[str, Any], guide_friction:
         The record lacks what a run needs.
     """
     sheet = find(name, kind)
+    if isinstance(sheet, ActuatorSheet):
+        if beside:
+            sheet = ActuatorSheet(**{key: getattr(sheet, key) for key in sheet.model_fields_set} | dict(beside))
+        for key, hint in sheet.missing().items():
+            raise InputError(f"actuator from {shown(name)}: the record lacks {key}, {hint}")
+        return sheet.motor(), gearbox_of(sheet.gearbox_sheet())
     assert isinstance(sheet, LinearMotorSheet)
     data = LinearMotorData(**linear_table(kind, name, beside, kind))
     return force_source(sheet, data, guide_friction), DIRECT

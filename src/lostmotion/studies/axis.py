@@ -28,9 +28,9 @@ from ..inputs.quantities import (
     Whole,
 )
 from ..inputs.validation import unknown_key
-from ..model.duty import Duty, HoldingBrake, Supply
+from ..model.duty import Amplifier, Duty, HoldingBrake, Supply
 from ..model.gearbox import Gearbox
-from ..model.motor import Motor
+from ..model.motor import Motor, MotorLimits
 from ..model.signals import Samples, TimeFunction, TorqueSignal
 from ..model.task import Task
 from ..servo.data import lag_sum, secant
@@ -107,7 +107,6 @@ class AxisTask(Task, Duty):
     """on the output bearing of the gearbox"""
     axial_force: Annotated[Force, NotNegative] | None = None
     """on the output bearing of the gearbox"""
-    brake: HoldingBrake | None = None
     supply: Supply | None = None
     safety_factors: dict[str, Annotated[Number, Positive]] = Field(default={})
     """by rule"""
@@ -135,6 +134,8 @@ class AxisTask(Task, Duty):
                 raise ValueError(f"has payload[{k}].inertia, which a slide has no use for; give its mass")
             if self.linear is None and payload.mass > 0.0 and payload.radius is None:
                 raise ValueError(f"has payload[{k}].mass without its radius from the axis; add payload[{k}].radius")
+        if self.amplifier is not None and self.supply is not None and self.supply.continuous_current is not None:
+            raise ValueError("has amplifier and supply.continuous_current, which say the same; leave the latter out")
         wanted = "torques" if self.linear is None else "forces"
         for k, process in enumerate(self.process):
             if getattr(process, wanted) is None:
@@ -154,8 +155,13 @@ class AxisTask(Task, Duty):
         """Sine of the slope of a slide; None of a rotary load."""
         return None if self.linear is None else self.linear.rise
 
-    def fed(self, motor: Motor, *, slides: bool = False) -> Motor:
-        """A motor with the inertia of the brake, at the least voltage of the supply; a linear motor has no such brake.
+    def amplifier_of_task(self) -> Amplifier | None:
+        """The amplifier, also where `supply` alone says its continuous current."""
+        current = None if self.supply is None else self.supply.continuous_current
+        return self.amplifier if current is None else Amplifier(continuous_current=current)
+
+    def fed(self, motor: Motor, brake: HoldingBrake | None) -> Motor:
+        """A motor with the inertia of its brake, at the least voltage of the supply and the peak current of the amplifier.
 
         Raises
         ------
@@ -163,8 +169,8 @@ class AxisTask(Task, Duty):
             The motor has a voltage that contradicts it.
         """
         changes: dict[str, Any] = {}
-        if self.brake is not None and self.brake.inertia > 0.0 and not slides:
-            changes["rotor_inertia"] = motor.rotor_inertia + self.brake.inertia
+        if brake is not None and brake.inertia > 0.0:
+            changes["rotor_inertia"] = motor.rotor_inertia + brake.inertia
         voltage = None if self.supply is None else self.supply.min_voltage
         if voltage is not None:
             if motor.kind == "dc":
@@ -173,7 +179,12 @@ class AxisTask(Task, Duty):
                 changes["dc_voltage"] = voltage
             elif motor.limits is not None:
                 changes["limits"] = motor.limits.model_copy(update={"max_voltage": voltage})
-        return motor.model_copy(update=changes) if changes else motor
+        motor = motor.model_copy(update=changes) if changes else motor
+        return (
+            motor
+            if self.amplifier is None or self.amplifier.peak_current is None
+            else _up_to(motor, self.amplifier.peak_current)
+        )
 
     @model_validator(mode="after")
     def _window_and_time(self) -> Self:
@@ -204,6 +215,17 @@ class AxisTask(Task, Duty):
                 raise ValueError(
                     f"task.{key}: is of the rest between moves, and controller.reference has no moves; leave it out"
                 )
+
+
+def _up_to(motor: Motor, current: float) -> Motor:
+    """A motor whose largest current is that of its amplifier [A], if its own is not less."""
+    if motor.winding is not None:
+        own = motor.winding.max_current or math.inf
+        limit = {"max_current_rms": min(own, current), "max_current_peak": None}
+        return motor.model_copy(update={"winding": motor.winding.model_copy(update=limit)})
+    limits = motor.limits or MotorLimits()
+    own = limits.max_current or math.inf
+    return motor.model_copy(update={"limits": limits.model_copy(update={"max_current": min(own, current)})})
 
 
 def reference_of(scenario: DriveScenario) -> PositionReference:

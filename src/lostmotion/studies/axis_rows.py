@@ -40,7 +40,7 @@ from ..sizing.required_motion import (
     required_motion,
 )
 from ..sizing.stages import DIRECT, Stage, at_input, together
-from ..sizing.supply import amplifier_current, electrical_power, returned, supply_rules
+from ..sizing.supply import amplifier_rules, effective_current, electrical_power, returned, supply_rules
 from ..worker_threads import thread_pool
 from .axis import FEWEST, REPEATS, AxisTask, reference_of
 from .axis_columns import COLUMNS, change, duty_cycle_of, last_cycle, row_of
@@ -141,8 +141,6 @@ class Axes:
                 rate = task.emergency_stop * (1.0 if stage is None else stage[0].ratio())
                 findings.append(emergency_stop(demand.motion, g, rate))
             findings += output_bearing(g, task.radial_force, task.axial_force)
-        if task.brake is not None or (task.hold_without_power and (task.gravity is not None or task.rise)):
-            findings.append(holding_brake(demand, task.brake, None if task.linear is None else self.motion()))
         if task.max_lost_motion is not None:
             findings.append(lost_motion(demand.whole, task.max_lost_motion, slides=task.linear is not None))
         return demand, findings
@@ -155,13 +153,13 @@ class Axes:
     def judged(self, row: np.ndarray) -> list[Finding] | InputError:
         """Findings for a pair before any run, or the error of a record that lacks data for a run."""
         gearbox, motor = self.gearbox(row), self.motor(row)
-        lacking = [str(error) for error in (gearbox, motor) if isinstance(error, InputError)]
+        lacking = list(dict.fromkeys(str(error) for error in (gearbox, motor) if isinstance(error, InputError)))
         if lacking:
             return InputError("; ".join(lacking))
         assert not isinstance(gearbox, InputError)
         assert not isinstance(motor, InputError)
         demand, findings = gearbox
-        findings, lacking = self._chosen(row, findings)
+        findings, lacking = self._chosen(row, [*findings, *self._braked(row, demand)])
         if motor.copper_loss() is None and (of := self._electrical()) is not None:
             lacking.append(
                 f"the sheet of the motor lacks its winding, which select for {of} needs; take mechanical_energy"
@@ -174,6 +172,16 @@ class Axes:
         if slides:
             found += self._attraction(row)
         return self._under_task([*findings, *found, *self._supplied(demand, motor)], motor)
+
+    def _braked(self, row: np.ndarray, demand: InputDemand) -> list[Finding]:
+        """The rule of the holding brake, where the load has to be held or a brake is given."""
+        task = self.task
+        if task.brake is None and not (task.hold_without_power and (task.gravity is not None or task.rise)):
+            return []
+        brake = (
+            None if self.study.slides_itself(row) and not (task.brake and task.brake.force) else self.study.brake(row)
+        )
+        return [holding_brake(demand, brake, None if task.linear is None else self.motion())]
 
     def _attraction(self, row: np.ndarray) -> list[Finding]:
         """Not judged: the friction that the attraction of a linear motor causes on a guide of unknown friction."""
@@ -214,12 +222,13 @@ class Axes:
 
     def _supplied(self, demand: InputDemand, motor: Motor) -> list[Finding]:
         """The rules of supply and amplifier."""
-        supply = self.task.supply
+        supply, amplifier, found = self.task.supply, self.task.amplifier_of_task(), list[Finding]()
+        if amplifier is not None:
+            current = effective_current(motor, demand.motor_torque(motor), demand.speed)
+            motion, bus = demand.motion, None if supply is None else supply.start()
+            found += amplifier_rules(motion.time, current, motion.cycle, amplifier, bus)
         if supply is None:
-            return []
-        found = []
-        if supply.continuous_current is not None:
-            found.append(amplifier_current(demand, motor, supply.continuous_current))
+            return found
         if supply.voltage_limit is not None or supply.capacitance is not None:
             power = electrical_power(demand, motor)
             unknown = bool(np.isnan(power).any())

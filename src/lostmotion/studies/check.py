@@ -38,7 +38,7 @@ def columns_of(findings: Iterable[Finding], columns: Mapping[str, float | str] =
     row, findings = dict(columns), list(findings)
     for finding in findings:
         column = f"{USE}{finding.rule}"
-        if finding.use is not None:
+        if finding.use is not None and column in row:  # studies have no columns for rules of tasks
             before = float(row[column])
             row[column] = finding.use if math.isnan(before) else max(before, finding.use)
     wrong = [f for f in findings if f.verdict == "warning"]

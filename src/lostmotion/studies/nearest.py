@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from typing import Any
 
@@ -210,5 +211,10 @@ def not_judged(ranked: list[Candidate]) -> list[Lacking]:
     groups: dict[str, list[str]] = {}
     for c in ranked:
         if NO_DATA in c.violated:
-            groups.setdefault(c.why, []).append(c.name)
+            groups.setdefault(_without_names(c.why), []).append(c.name)
     return [Lacking(text, tuple(names)) for text, names in sorted(groups.items(), key=lambda pair: -len(pair[1]))]
+
+
+def _without_names(text: str) -> str:
+    """Reason of records that lack data, without their names."""
+    return re.sub(r"brake of [a-z0-9.-]+", "brake of the motor", re.sub(r" from (\"[^\"]*\"|'[^']*')", "", text))

@@ -28,6 +28,7 @@ _RECORD_KEYS = {
     for table in RECORDS
     if table not in ("gears", "motors")
 }
+_RECORD_KEYS["actuator"] = re.compile("(actuator)")  # of a task
 # Of keys that hold beside the name of a record: the part.
 _CONDITION = re.compile(
     "|".join(

@@ -8,18 +8,20 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
+from ..data_sheets.components import built_in_brake
 from ..data_sheets.records import Sheet, find
 from ..errors import InputError
 from ..inputs.part import Part
 from ..inputs.quantities import Whole
 from ..inputs.validation import listed
+from ..model.duty import HoldingBrake
 from ..model.motor import Motor
 from ..simulation.drive_scenario import DriveScenario, short_form
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario
 from ..simulation.units_of_keys import unit_in, unit_of_key
 from ..sizing.stages import stage_of, together
-from ..sizing.whole_drives import WHOLE, whole_drive
+from ..sizing.whole_drives import LINEAR, WHOLE, whole_drive
 from .axis import FEWEST, AxisTask, axis_scenario, with_scale_alone
 from .axis_columns import COLUMNS as AXIS_COLUMNS
 from .axis_columns import unit_of_column
@@ -275,7 +277,7 @@ class Study(Part):
     def slides_itself(self, row: np.ndarray) -> bool:
         """Whether the drive of a row of a task is a linear motor, which needs no stage."""
         whole = self.whole_drive(row)
-        return whole is not None and whole[0] == "linear_motor"
+        return whole is not None and whole[0] in LINEAR
 
     def part_key(self, kind: str, row: np.ndarray) -> tuple[Any, ...]:
         """Column of a row that determines its ``"gearbox"`` or its ``"motor"``."""
@@ -304,8 +306,26 @@ class Study(Part):
                 self.kept[key] = stage_of(linear.kind, {"from": names[0], **linear.stage} if names else linear.stage)
             else:
                 found = getattr(self.scenario_with(dict(key[1:])), kind)
-                self.kept[key] = self._under(self.axis, found) if kind == "motor" and self.axis is not None else found
+                motor = kind == "motor" and self.axis is not None
+                self.kept[key] = self._under(self.axis, found, self.brake(row)) if motor else found  # type: ignore[arg-type]
         return self.kept[key]
+
+    def brake(self, row: np.ndarray) -> HoldingBrake | None:
+        """The holding brake of a row of a task.
+
+        Raises
+        ------
+        InputError
+            It is that of the motor, and the catalogue has none.
+        """
+        assert self.axis is not None
+        brake = self.axis.brake
+        if brake is None or not brake.of_the_motor:
+            return brake
+        record = next((r for kind, r in self.records(row).items() if kind in ("motor", *WHOLE)), None)
+        if record is None:
+            raise InputError('task.brake: "of the motor" needs the record of a motor; give torque and inertia')
+        return HoldingBrake(**built_in_brake(record.name))
 
     def _keep_whole(self, kind: str, k: int, row: np.ndarray) -> None:
         """Keeps motor and gearbox of a whole drive."""
@@ -314,9 +334,9 @@ class Study(Part):
         beside, friction = task.whole.get(kind, {}), 0.0 if task.linear is None else task.linear.guide_friction
         motor, gearbox = whole_drive(kind, str(self.vary[k].value(row[k])), beside, friction or 0.0)
         self.kept[self.part_key("gearbox", row)] = gearbox
-        self.kept[self.part_key("motor", row)] = task.fed(motor, slides=kind == "linear_motor")
+        self.kept[self.part_key("motor", row)] = task.fed(motor, None if kind == "linear_motor" else self.brake(row))
 
-    def _under(self, task: AxisTask, motor: Motor) -> Motor:
+    def _under(self, task: AxisTask, motor: Motor, brake: HoldingBrake | None) -> Motor:
         """A motor as the supply of a task feeds it.
 
         Raises
@@ -327,7 +347,7 @@ class Study(Part):
         if task.current is not None and motor.kind != "torque_source":
             values = {"motor": motor.model_dump(), "controller.current": task.current.model_dump()}
             self.drive.replace(**values)
-        return task.fed(motor)
+        return task.fed(motor, brake)
 
     def records(self, row: np.ndarray) -> dict[str, Sheet]:
         """Data sheets of the parts of a row of a task that are records, by their kinds.
@@ -407,9 +427,13 @@ class Study(Part):
 
     def _grids(self) -> list[list[int]]:
         """Places in `vary` that are combined with each other: all, or of a task those of pairs, then each kind of whole drive."""
-        whole = [k for k, v in enumerate(self.vary) if self.axis is not None and v.all_keys[0] in WHOLE]
-        pairs = [k for k in range(len(self.vary)) if k not in whole]
-        return ([pairs] if self.axis is None or self.axis.pairs else []) + [[k] for k in whole]
+        places = {k: v.all_keys[0] for k, v in enumerate(self.vary)}
+        if self.axis is None:
+            return [list(places)]
+        pairs = [k for k, key in places.items() if key not in WHOLE]
+        stages = [k for k, key in places.items() if key == self.axis.stage_kind]
+        whole = [[*(() if key in LINEAR else stages), k] for k, key in places.items() if key in WHOLE]
+        return ([pairs] if self.axis.pairs else []) + whole
 
     def _size(self, grid: list[int]) -> int:
         """Number of combinations of a grid."""

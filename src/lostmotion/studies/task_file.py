@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..control.controller import AnyCurrent
+from ..data_sheets.components import find_accessories, use_accessories
 from ..data_sheets.records import find
 from ..errors import InputError
 from ..inputs.arguments import checked
@@ -30,6 +31,7 @@ from .records import kind_of_record, names_that_fit
 from .select import Selection
 from .study import Study
 
+PLAIN = tuple(key for key in Task.model_fields if key not in ("supply", "amplifier", "brake"))
 TABLES = (
     "title",
     "task",
@@ -110,6 +112,7 @@ def task_of(tables: dict[str, Any], directory: Path = Path()) -> Study:
     for key in ("task", "load" if linear is None else "slide", "controller"):
         if not isinstance(tables.get(key), dict):
             raise InputError(f"key {key}: must be a table [{key}]; add it")
+    tables = {**tables, "task": use_accessories(tables["task"])}
     given = tables["task"]
     if linear is not None:
         tables = {**tables, **in_translation(tables)}
@@ -128,7 +131,7 @@ def task_of(tables: dict[str, Any], directory: Path = Path()) -> Study:
         "controller": controller,
         "motor": _table(tables, "motor"),
         "gearbox": _table(tables, "gearbox"),
-        "task": {key: value for key, value in tables["task"].items() if key in Task.model_fields and key != "supply"},
+        "task": {key: value for key, value in tables["task"].items() if key in PLAIN},
         "simulation": {"duration": task.cycle, "sample_interval": time},
     }
     if pairs:
@@ -197,7 +200,7 @@ def _relative(tables: dict[str, Any], directory: Path) -> dict[str, Any]:
         if isinstance(name, str) and is_in_file(name):
             beside = table if isinstance(table, dict) else {}
             out[kind] = {**beside, "from": str(directory.resolve() / name)}
-    return out
+    return find_accessories(out, directory.resolve())
 
 
 def _torque_sources(written: dict[str, Any], vary: list[Any]) -> bool:
@@ -206,7 +209,9 @@ def _torque_sources(written: dict[str, Any], vary: list[Any]) -> bool:
     from ..data_sheets.motor_sheet import TORQUE_SOURCE, MotorSheet
 
     whole = [entry for entry in vary if isinstance(entry, dict) and entry.get("key") in WHOLE]
-    if any(find(name, entry["key"]).level() == FORCE_SOURCE for entry in whole for name in _names(entry)):
+    if any(
+        find(name, entry["key"]).level() in (FORCE_SOURCE, TORQUE_SOURCE) for entry in whole for name in _names(entry)
+    ):
         return True
     varied = [entry for entry in vary if isinstance(entry, dict) and str(entry.get("key")).split(".")[0] == "motor"]
     names = [name for entry in varied if kind_of_record(str(entry["key"])) for name in _names(entry)]
@@ -421,7 +426,12 @@ def _beside_whole(tables: dict[str, Any]) -> dict[str, dict[str, Any]]:
 def _has_pairs(tables: dict[str, Any], vary: list[Any]) -> bool:
     """Whether a task has pairs of motor and gearbox among its candidates, and not whole drives alone."""
     keys = [str(entry.get("key")).split(".")[0] for entry in vary if isinstance(entry, dict)]
-    return not set(keys) & set(WHOLE) or bool({*keys, *tables} & {"motor", "gearbox", *STAGES})
+    if not set(keys) & set(WHOLE) or {*keys, *tables} & {"motor", "gearbox"}:
+        return True
+    stage = next((kind for kind in STAGES if kind in {*keys, *tables}), None)
+    if stage is not None and "actuator" not in keys:
+        raise InputError(f"key {stage}: linear motors need none; add candidates of motor, or leave it out")
+    return False
 
 
 def _need_scale(controller: dict[str, Any], vary: list[Any]) -> None:

@@ -1,0 +1,101 @@
+"""The data sheet of an actuator: a motor and its gearbox in one, rated at the output."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from ..inputs.quantities import Inertia, Number, Positive, Speed, Torque, Voltage, Whole
+from ..model.motor import Motor, MotorLimits
+from .gearbox_sheet import GearboxSheet
+from .loss_data import Efficiency, EfficiencyPoint, LossData
+from .sheet import Record
+
+
+class ActuatorSheet(Record):
+    """Data sheet of a quasi-direct-drive actuator: a flat motor with a planetary gearbox of few stages.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> sheet = lm.data_sheets.ActuatorSheet(name="my-actuator", ratio=9, rated_output_torque="9 N*m", rated_output_speed="200 rpm")
+    >>> sheet.missing()
+    {'rotor_inertia': "see the manufacturer's data sheet"}
+    """
+
+    kind: Literal["quasi_direct"] = "quasi_direct"
+    ratio: Annotated[Number, Positive]
+    rotor_inertia: Annotated[Inertia, Positive] | None = None
+    """at the motor; with that of the gearbox where the sheet has it"""
+    rated_output_torque: Annotated[Torque, Positive] | None = None
+    """continuous"""
+    peak_output_torque: Annotated[Torque, Positive] | None = None
+    rated_output_speed: Annotated[Speed, Positive] | None = None
+    no_load_output_speed: Annotated[Speed, Positive] | None = None
+    efficiency: Efficiency | None = None
+    """efficiency of the gearbox at rated torque and speed; left out, the estimate for planetary gearboxes"""
+    pole_pairs: Annotated[Whole, Field(gt=0)] | None = None
+    rated_voltage: Annotated[Voltage, Positive] | None = None
+
+    def missing(self) -> dict[str, str]:
+        """Data that a run requires and the record lacks."""
+        need = {
+            "rotor_inertia": self.rotor_inertia,
+            "rated_output_torque": self.rated_output_torque,
+            "rated_output_speed": self.rated_output_speed or self.no_load_output_speed,
+        }
+        return {key: f"see {self.where(key)}" for key, value in need.items() if value is None}
+
+    def level(self) -> str | None:
+        """Level of a run with these data: ``"torque source"``, or None."""
+        return None if self.missing() else "torque source"
+
+    def assumptions(self) -> tuple[str, ...]:
+        """Assumptions of a run beyond the data, one sentence each."""
+        if self.missing():
+            return ()
+        said = (
+            f"{self.name} runs as a torque source behind a rigid gearbox without backlash: voltage, current and lost motion are not judged.",
+            f"The inertia of the gearbox of {self.name} and the friction of its motor are taken as 0.",
+        )
+        return (*said, *self.gearbox_sheet().assumptions())
+
+    def gearbox_sheet(self) -> GearboxSheet:
+        """The sheet of its gearbox."""
+        speed = self.rated_output_speed or self.no_load_output_speed
+        assert speed is not None
+        losses = LossData()
+        if self.efficiency is not None:
+            losses = LossData(efficiency=(EfficiencyPoint(input_speed=self.ratio * speed, efficiency=self.efficiency),))
+        return GearboxSheet(
+            name=self.name,
+            kind="planetary",
+            ratio=self.ratio,
+            inertia=0.0,
+            rigid=True,
+            rated_input_speed=self.ratio * speed,
+            rated_output_torque=self.rated_output_torque,
+            peak_output_torque=self.peak_output_torque,
+            losses=losses,
+        )
+
+    def motor(self) -> Motor:
+        """Its motor: the torques at the output through the ratio and the efficiency at rated load."""
+        estimate = self.gearbox_sheet().loss_estimate()
+        share = self.efficiency if estimate is None else estimate.efficiency
+        assert share is not None
+        assert self.rated_output_torque is not None
+        per_output = 1.0 / (self.ratio * share)
+        fastest = self.no_load_output_speed or self.rated_output_speed
+        assert fastest is not None
+        torque, peak = per_output * self.rated_output_torque, self.peak_output_torque
+        return Motor(
+            kind="torque_source",
+            rotor_inertia=self.rotor_inertia,  # type: ignore[arg-type]  # not missing
+            rated_torque=torque,
+            limits=MotorLimits(
+                continuous_torque=torque,
+                peak_torque=None if peak is None else per_output * peak,
+                max_speed=self.ratio * fastest,
+            ),
+            note=" ".join(filter(None, [self.note, *self.assumptions()])),
+        )
