@@ -171,7 +171,7 @@ def test_all_linear_motors_where_none_is_named():
         ({"linear_motor": {"mas": "1 kg"}}, "linear_motor.mas"),
         ({"slide": {"mass": "5 kg", "friction_coefficient": -0.1}}, "friction_coefficient"),
         ({"task": {"cycle": "1.5 s", "brake": {"force": "60 N", "inertia": 1.0}}}, "leave the inertia out"),
-        ({"task": {"cycle": "1.5 s", "brake": {"inertia": 1.0}}}, "needs torque, or force"),
+        ({"task": {"cycle": "1.5 s", "brake": {"inertia": 1.0}}}, "needs torque, force of a brake"),
     ],
 )  # fmt: skip
 def test_bad_tasks_of_linear_motors_are_refused(change: dict[str, Any], says: str):
