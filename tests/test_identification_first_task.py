@@ -87,7 +87,7 @@ def test_what_is_in_doubt_is_said(logs: Path) -> None:
         "# Header: share is 1, 0.5 (in 2 of 3 logs)",
         "is not a number; it is left out",
         "# Doubt: c.txt: its commas are read as decimal commas",
-        "# Doubt: channel carriage speed has the units 'rad/s', '' in different logs",
+        "# Doubt: channel carriage speed has no unit in c.txt, so that it is read in SI there",
         "# Doubt: channel force is in 2 of 3 logs; the others cannot be used",
         "# Doubt: sample times differ between logs: 10 to 20 ms",
         "force [N]: 200 to 400, in 2 of them",

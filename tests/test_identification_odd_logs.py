@@ -45,10 +45,10 @@ COUNT = 5
 SPOILED = 2
 
 
-def arm_task(directory: Path, seed: int = 0) -> Identification:
+def arm_task(directory: Path, seed: int = 0, truth: dict[str, float] = TRUTH) -> Identification:
     (directory / "arm.toml").write_text(ARM)
     draw = np.random.default_rng(seed)
-    away = {name: float(value * draw.uniform(0.8, 1.25)) for name, value in TRUTH.items()}
+    away = {name: float(value * draw.uniform(0.8, 1.25)) for name, value in truth.items()}
     return Identification(
         scenario="arm.toml",
         logs={"files": ["*.csv"]},
@@ -68,7 +68,7 @@ def arm_task(directory: Path, seed: int = 0) -> Identification:
     )
 
 
-def arm_logs(rig: Rig, seed: int) -> list[Log]:
+def arm_logs(rig: Rig, seed: int, truth: dict[str, float] = TRUTH) -> list[Log]:
     draw = np.random.default_rng(seed)
     time = 5e-3 * np.arange(400)
     found = []
@@ -76,7 +76,7 @@ def arm_logs(rig: Rig, seed: int) -> list[Log]:
         a, b, f = draw.uniform(0.05, 0.12), draw.uniform(0.02, 0.05), draw.uniform(0.7, 2.0)
         torque = a * np.sin(2 * np.pi * f * time + k) + b * np.sin(2 * np.pi * 2.7 * f * time)
         plan = Log(f"{k}.csv", time, {"torque": Channel(torque)})
-        found.append(virtual_log(rig, plan, TRUTH, noise={"angle": NOISE}, seed=seed + k))
+        found.append(virtual_log(rig, plan, truth, noise={"angle": NOISE}, seed=seed + k))
     return found
 
 
@@ -119,6 +119,7 @@ FAULTS: dict[str, tuple[Callable[[Log], Log], str]] = {
     "slow sensor": (lambda log: changed(log, "angle", lambda x: held(x, 20)), "of its samples only"),
     "late sensor": (lambda log: changed(log, "angle", lambda x: late(x, 8)), "angle is [34][90].?[0-9]? ms late"),
     "late command": (lambda log: changed(log, "torque", lambda x: late(x, 10)), "the inputs are 50 ms late"),
+    "fast clock": (lambda log: replace(log, time=1.03 * log.time), "its clock runs 3 % too fast"),
     "offset": (lambda log: changed(log, "angle", lambda x: x + 0.3), "has an offset of 0."),
 }
 
@@ -143,6 +144,24 @@ def test_a_spoiled_log_is_named_with_its_fault_and_left_out(tmp_path: Path, faul
     for name, value in TRUTH.items():
         i = result.intervals[name]
         assert abs(value - result.values[name]) < 1.5 * (i.high - i.low), name  # six standard deviations
+
+
+def test_signs_that_the_log_does_not_distinguish_are_both_named(tmp_path: Path) -> None:
+    """From rest, a motion with the opposite torque is the opposite motion."""
+    (odd,) = identified(tmp_path, 1, FAULTS["sign of the command"][0]).odd
+    assert "angle has the opposite sign, or torque has the opposite sign" in odd.text
+
+
+def test_a_channel_of_another_kind_is_refused_without_a_factor(tmp_path: Path) -> None:
+    task = arm_task(tmp_path)
+    rig = Rig(task, tmp_path)
+    log = arm_logs(rig, 0)[0]
+    log = replace(log, channels=log.channels | {"torque": Channel(log.channels["torque"].values, "A")})
+    with pytest.raises(InputError, match=r"inputs.drive_command: channel torque is in A, and drive_command is in N\*m"):
+        prepared(task, log, rig.units)
+    scaled = task.inputs["drive_command"].model_copy(update={"scale": 0.08})
+    scaled = type(scaled).model_validate(scaled.model_dump())
+    assert prepared(task.model_copy(update={"inputs": {"drive_command": scaled}}), log, rig.units).log.duration > 1.0
 
 
 @pytest.mark.parametrize("seed", range(4))

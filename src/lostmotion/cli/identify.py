@@ -145,7 +145,7 @@ def _print_summary(result: IdentificationResult) -> None:
         print(
             f"Left out, since they cannot be used, are {len(result.left_out)} of {len(result.left_out) + len(result.logs)} logs:"
         )
-        _print_some([f"  {name}: {why}" for name, why in result.left_out.items()])
+        _print_some([f"  {name}: {why.removeprefix(f'{name}: ')}" for name, why in result.left_out.items()])
     if result.notes:
         print("Notes on the logs:")
         _print_some([f"  {name}: {note}" for name, notes in result.notes.items() for note in notes])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -47,8 +48,13 @@ class Measuring:
     def __init__(self, task: Identification, log: Prepared, known: Mapping[str, Any], rates: Sequence[str]) -> None:
         self._log, self._channels = log, task.measured
         self._numbers = {name: numbers_of(m, known) for name, m in task.measured.items()}
-        self._grid = _grid(log, task.fit.sample_interval)
+        self._interval = task.fit.sample_interval
         self._rates = rates
+
+    @cached_property
+    def _grid(self) -> np.ndarray:
+        """Instants behind channels with a filter, at equal distances."""
+        return _grid(self._log, self._interval)
 
     def probes(self) -> list[Probe]:
         """Variables that a run must record: for each channel its variable and, if it exists, its rate."""

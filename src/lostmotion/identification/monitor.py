@@ -237,7 +237,7 @@ def monitor_logs(rig: Rig, logs: Sequence[Prepared], *, notify: Notify | None = 
     estimates = _in_units_of_baseline(estimates, count)
     free = list(estimator.reference.free)
     return MonitorResult(
-        rig.task, estimates, _watched(rig.task, estimates, free), dict(estimator.reference.values), left_out
+        rig.task, estimates, watched(rig.task, estimates, free), dict(estimator.reference.values), left_out
     )
 
 
@@ -410,7 +410,8 @@ def _in_units_of_baseline(estimates: list[LogEstimate], baseline: int) -> list[L
     return found
 
 
-def _watched(task: Identification, estimates: list[LogEstimate], free: list[str]) -> dict[str, Watched]:
+def watched(task: Identification, estimates: list[LogEstimate], free: list[str]) -> dict[str, Watched]:
+    """Trend and alarms of each watched value over the estimates of logs, in their order."""
     names = [name for name in free if not task.monitor.watch or name in task.monitor.watch]
     rate = task.monitor.false_alarms / (len(names) + 1)
     found = {}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,11 +19,13 @@ from ..inputs.validation import listed
 from ..simulation.scenario_files import find_scenario, load
 from ..simulation.train_scenario import TrainScenario, in_long_form
 from .logs import Log
-from .prepare import channel_unit
+from .prepare import SAME, channel_unit
 from .readers import ENDINGS, read_log
 from .screening import screened
 
 MOST_LOGS = 2000
+RATE = 2e-3  # by which the sample time of a log may differ from that of most
+SAMPLE = re.compile(r", such as '.*' in line \d+")  # in notes: differs from log to log
 MOST_LINES = 40  # of doubts of one kind
 COMMANDS = ("goal", "command", "cmd", "reference", "ref", "setpoint", "target", "desired", "demand", "set")
 QUANTITIES = {
@@ -32,7 +35,6 @@ QUANTITIES = {
     "A": ("current",),
     "V": ("voltage", "volts", "volt"),
 }
-SAME = {"m": "rad", "m/s": "rad/s", "N": "N*m"}  # of linear axes
 PLACEHOLDER = "RIG.toml"
 SOUGHT = ("inertia", "rotor_inertia", "viscous_friction", "friction_torque")  # keys of shafts and motors
 
@@ -42,13 +44,22 @@ class _Seen:
     """A channel in all logs that have it."""
 
     name: str
-    units: list[str] = field(default_factory=list)
-    """units as in the files, each once"""
+    units: dict[str, list[str]] = field(default_factory=dict)
+    """units as in the files, with the names of the logs that have each"""
     logs: int = 0
     low: float = math.inf
     high: float = -math.inf
     noise: list[float] = field(default_factory=list)
     """standard deviation of what differs between neighbours, of each log"""
+
+    @property
+    def unit(self) -> str:
+        """Unit of most logs."""
+        return max(self.units, key=lambda unit: len(self.units[unit])) if self.units else ""
+
+    def factor(self, unit: str) -> float:
+        """Factor from a unit of the files to the usual one; 1 where one of them is not known."""
+        return _factor(unit) / _factor(self.unit) if unit else 1.0
 
     @property
     def words(self) -> list[str]:
@@ -64,7 +75,7 @@ class _Seen:
     def quantity(self) -> str:
         """SI unit by the unit in the files, else by its name; empty if neither tells."""
         try:
-            unit = channel_unit("", self.units[0], "", "")[1] if self.units and self.units[0] else ""
+            unit = channel_unit("", self.unit, "", "")[1] if self.unit else ""
         except InputError:
             unit = ""
         unit = SAME.get(unit, unit)
@@ -172,9 +183,11 @@ def _channels(logs: Sequence[Log]) -> list[_Seen]:
         for name, channel in log.channels.items():
             own = found.setdefault(name, _Seen(name))
             own.logs += 1
-            if channel.unit not in own.units:
-                own.units.append(channel.unit)
-            x = channel.values[np.isfinite(channel.values)]
+            own.units.setdefault(channel.unit, []).append(log.name)
+    for log in logs:
+        for name, channel in log.channels.items():
+            own = found[name]
+            x = own.factor(channel.unit) * channel.values[np.isfinite(channel.values)]
             if len(x):
                 own.low, own.high = min(own.low, float(x.min())), max(own.high, float(x.max()))
             if len(x) > 3:
@@ -209,17 +222,33 @@ def _doubts(
         except InputError as problem:
             found = [problem.reason]
         for note in found:
-            notes.setdefault(note, []).append(path.name)
+            notes.setdefault(SAMPLE.sub("", note), []).append(path.name)
     doubts = [f"{names[0]}{f' and {len(names) - 1} more' if len(names) > 1 else ''}: {n}" for n, names in notes.items()]
     for c in seen:
         if len(c.units) > 1:
-            doubts.append(f"channel {c.name} has the units {listed(repr(unit) for unit in c.units)} in different logs")
+            doubts += [_about_units(c, unit, names) for unit, names in c.units.items() if unit != c.unit]
         if c.logs < len(logs) and c in (*measured, *inputs):
             doubts.append(f"channel {c.name} is in {c.logs} of {len(logs)} logs; the others cannot be used")
-    steps = np.array([log.interval for _, log in logs if len(log.time) > 1])
-    if len(steps) and steps.max() > 1.05 * steps.min():
-        doubts.append(f"sample times differ between logs: {1e3 * steps.min():.4g} to {1e3 * steps.max():.4g} ms")
-    return doubts
+    return doubts + _about_rates([log for _, log in logs if len(log.time) > 1])
+
+
+def _about_units(c: _Seen, unit: str, names: Sequence[str]) -> str:
+    """Reading of the logs that have another unit than most."""
+    some = f"{', '.join(names[:3])}{f' and {len(names) - 3} more' if len(names) > 3 else ''}"
+    if not unit:
+        return f"channel {c.name} has no unit in {some}, so that it is read in SI there; in most logs it is in {c.unit}"
+    return f"channel {c.name} is in {unit} in {some}, in most logs in {c.unit or 'no unit'}; each is converted to SI by its own unit"
+
+
+def _about_rates(logs: Sequence[Log]) -> list[str]:
+    """Logs whose mean sample time is another than that of most: another rate, or a clock that runs fast or slow."""
+    steps = np.array([log.interval for log in logs])
+    other = [log for log, step in zip(logs, steps, strict=True) if abs(step / np.median(steps) - 1.0) > RATE]
+    if not other:
+        return []
+    some = f"{other[0].name}{f' and {len(other) - 1} more' if len(other) > 1 else ''}"
+    text = f"sample times differ between logs: {1e3 * steps.min():.4g} to {1e3 * steps.max():.4g} ms"
+    return [f"{text}; not as in most: {some} (another rate, or a clock that runs fast or slow)"]
 
 
 # --- lines of the file ---
@@ -285,7 +314,7 @@ def _range(values: np.ndarray) -> str:
 def _channel_lines(seen: Sequence[_Seen], count: int) -> list[str]:
     lines = ["", f"# Channels, in {count} log{'' if count == 1 else 's'}:"]
     for c in seen:
-        unit = c.units[0] or "no unit"
+        unit = c.unit or "no unit"
         some = f", in {c.logs} of them" if c.logs < count else ""
         lines.append(_comment(f"  {c.name} [{unit}]: {c.low:.4g} to {c.high:.4g}{some}"))
     return lines
@@ -301,7 +330,7 @@ def _keyed(names: Iterable[str]) -> list[str]:
 
 
 def _about_unit(c: _Seen) -> list[str]:
-    if c.units[0]:
+    if c.unit:
         return []
     return [
         f'# Doubt: its files name no unit, so that it is read in SI{f" ({c.quantity})" if c.quantity else ""}; else: unit = "..."'
@@ -329,6 +358,11 @@ def _input_lines(inputs: Sequence[_Seen], scenario: TrainScenario | None) -> lis
             continue
         name = fits[0] if fits else f"MOTOR{k + 1 if k else ''}{wanted}"
         lines += [f"[inputs.{name}]", f"channel = {_text(c.name)}", *_about_unit(c)]
+        if name.endswith("_command") and c.quantity in ("A", "V"):
+            what, factor = ("torque", "torque_constant") if c.quantity == "A" else ("voltage", "1/rated_voltage")
+            lines.append(
+                f'# Doubt: it is in {c.quantity}, and a command is a multiple of the rated {what}; give scale = "...", such as {factor}'
+            )
         if len(fits) > 1:
             lines.append(_comment(f"Doubt: it may act as {listed(fits[1:])} just as well"))
         lines.append("")
@@ -356,7 +390,7 @@ def _measured_lines(measured: Sequence[_Seen], scenario: TrainScenario | None) -
             lines.append(_comment(f"Doubt: it may be that of another shaft: {listed(shafts[:-1])}"))
         if len(measured) > 1:
             noise = float(np.median(c.noise)) if c.noise else 0.0
-            factor = _factor(c)
+            factor = _factor(c.unit)
             deviation = factor * (noise or 1e-3 * (c.high - c.low) or 1.0)
             lines += [
                 f"deviation = {deviation:.3g}",
@@ -366,9 +400,9 @@ def _measured_lines(measured: Sequence[_Seen], scenario: TrainScenario | None) -
     return lines
 
 
-def _factor(c: _Seen) -> float:
+def _factor(unit: str) -> float:
     try:
-        return channel_unit("", c.units[0], "", "")[0]
+        return channel_unit("", unit, "", "")[0]
     except InputError:
         return 1.0
 

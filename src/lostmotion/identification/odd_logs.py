@@ -1,14 +1,15 @@
 """Logs that disagree with the others, and the fault that explains each.
 
-A log whose residuals are several times those of the other logs is set aside, and the model is fitted to the rest. Faults that logs
-often have are then undone one by one: a reversed sign, a wrong unit, a counter that wraps, a delay, a frozen or a slow channel. A
-fault explains a log if undoing it brings the residuals down to those of the other logs. Such a log is left out of the fit; one
+A log whose residuals are several times those of the other logs is set aside, and the model is fitted to the rest. Common faults are
+then undone one by one: a reversed sign, a wrong unit, a counter that wraps, a delay, a clock of another rate, a frozen or a slow
+channel. A fault explains a log if undoing it brings the residuals down to those of the other logs. Such a log is left out of the fit; one
 that no fault explains stays in it, since the model may be what is wrong.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -30,8 +31,11 @@ FEWEST = 3  # logs, of which one can disagree with the others
 FEW = 8  # logs, up to which each is left out in turn if the residuals are not noise
 SHARE = 3  # at most one of as many logs is set aside at once
 ROUNDS = 3
+ALIKE = 1.02  # times the smallest residuals, up to which faults explain a log alike: all of them are named
 TRIED = 3  # faults whose nuisances are fitted, from the one with the smallest residuals on
 SHIFTS = 100  # sample intervals, by which a channel may be late or early
+RATES = (1e-2, 1e-3, 1e-4)  # steps of the grids in which the rate of a clock is sought
+SHIFT = re.compile(r" ms (late|early)")  # faults that late inputs may explain better
 NAMED_FACTORS = {
     1e-3: "1000 times too large, as mm read as m",
     1e3: "1000 times too small, as m read as mm",
@@ -85,7 +89,7 @@ class OddLog:
         return f"{self.log}: {self.channel}: {size}{many}; {why}"
 
 
-UNEXPLAINED = "no sign, unit, delay, wrap, frozen or slow channel explains it, so that it stays in the fit"
+UNEXPLAINED = "no sign, unit, delay, clock, wrap, frozen or slow channel explains it, so that it stays in the fit"
 
 
 def odd_logs(rig: Rig, engine: Engine, logs: Sequence[Prepared], start: Point, fit: Fit, rung: int) -> list[OddLog]:
@@ -235,7 +239,10 @@ def _fitted(rig: Rig, engine: Engine, logs: Sequence[Prepared], starts: Sequence
 
 
 def _explained(rig: Rig, log: Prepared, sizes: _Sizes) -> tuple[str, np.ndarray]:
-    """(the fault that explains a log, its residuals without it); no fault if none of those tried does."""
+    """(the fault that explains a log, its residuals without it); no fault if none of those tried does.
+
+    Late inputs and clocks take a run for each delay and rate, so that they are tried last, and only if no fault of another kind explains the log.
+    """
     nothing = "", np.array([])
     if any(segment.initial for segment in log.segments):  # its start was taken from the values in question
         return nothing
@@ -244,15 +251,20 @@ def _explained(rig: Rig, log: Prepared, sizes: _Sizes) -> tuple[str, np.ndarray]
     if not tried:
         return nothing
     ratios = sizes.several([mended for _, mended in tried])
+    if not any(r < MENDED and not SHIFT.search(fault) for (fault, _), r in zip(tried, ratios, strict=True)):
+        late = [*_late_inputs(rig, log), *_other_rate(rig, log, sizes)]
+        tried, ratios = tried + late, ratios + sizes.several([mended for _, mended in late])
     order = sorted(range(len(tried)), key=lambda k: ratios[k])[:TRIED]
-    best = nothing
-    least = min(MENDED, before / SUSPECT)
+    found = []
     for k in order:
         fault, mended = tried[k]
         rows, ratio = sizes.of(mended)
-        if ratio < least:
-            best, least = (fault, rows), ratio
-    return best
+        if ratio < min(MENDED, before / SUSPECT):
+            found.append((ratio, fault, rows))
+    if not found:
+        return nothing
+    least, _, rows = min(found, key=lambda f: f[0])
+    return ", or ".join(fault for ratio, fault, _ in found if ratio < ALIKE * least), rows
 
 
 def _faults(rig: Rig, log: Prepared, sizes: _Sizes) -> Iterator[tuple[str, Prepared]]:
@@ -273,7 +285,6 @@ def _faults(rig: Rig, log: Prepared, sizes: _Sizes) -> Iterator[tuple[str, Prepa
     for channel, name in measured.items():
         yield from _recording_faults(rig, log, channel)
         yield from _shifted(rig, log, sizes, channel, name)
-    yield from _late_inputs(rig, log)
 
 
 def _ratios(rig: Rig, log: Prepared, sizes: _Sizes) -> Mapping[float, str]:
@@ -341,6 +352,18 @@ def _late_inputs(rig: Rig, log: Prepared) -> Iterator[tuple[str, Prepared]]:
         moved = {i.channel: _later(log.time, log.log.values(i.channel), late) for i in rig.task.inputs.values()}
         kept = {name: np.where(np.isfinite(x), x, log.log.values(name)) for name, x in moved.items()}
         yield f"the inputs are {1e3 * late:.3g} ms late", log.changed(rig.task, kept)
+
+
+def _other_rate(rig: Rig, log: Prepared, sizes: _Sizes) -> Iterator[tuple[str, Prepared]]:
+    """The log by a clock that runs faster or slower: the best rate of a search on grids that become finer."""
+    rate = 1.0
+    for step in RATES:
+        rates = [rate + step * k for k in range(-10, 11)]
+        ratios = sizes.several([log.changed(rig.task, {}, time=x * log.log.time) for x in rates])
+        rate = rates[int(np.argmin(ratios))]
+    if abs(rate - 1.0) > RATES[-1]:
+        words = f"its clock runs {abs(100.0 * (1.0 / rate - 1.0)):.2g} % too {'fast' if rate < 1.0 else 'slow'}"
+        yield words, log.changed(rig.task, {}, time=rate * log.log.time)
 
 
 def _later(time: np.ndarray, x: np.ndarray, shift: float) -> np.ndarray:

@@ -16,10 +16,11 @@ from ..units.conversion import si_factor, si_value
 from .formulas import Formula, names_within
 from .logs import Channel, Log
 from .screening import screened
-from .task import FormulaText, Identification
+from .task import FormulaText, Identification, InputChannel, MeasuredChannel
 
 DEFAULT = "taken from logs.header: "  # how a note on such a value begins
 KINDS = ("rad", "rad/s", "N*m", "A", "V", "N", "m", "m/s", "s", "K", "rad/s^2", "m/s^2", "W", "Pa")
+SAME = {"m": "rad", "m/s": "rad/s", "N": "N*m"}  # a linear axis may be written with shafts
 
 
 @dataclass(frozen=True)
@@ -235,6 +236,7 @@ def _in_si(task: Identification, log: Log, units: Mapping[str, str]) -> Log:
         found = channel_unit(written, log.channels[channel].unit, kind, f"{log.name}: {where}")
         if known.setdefault(channel, found)[0] != found[0]:
             raise InputError(f"{log.name}: {where}: channel {channel} has another unit elsewhere in the task; give one")
+    _refuse_other_kinds(task, log, known, units)
     named = _named(task)
     channels = {}
     for name, c in log.channels.items():
@@ -249,6 +251,28 @@ def _in_si(task: Identification, log: Log, units: Mapping[str, str]) -> Log:
         factor, unit = known.get(name, (1.0, c.unit))
         channels[name] = c if factor == 1.0 and unit == c.unit else Channel(c.values * factor, unit)
     return replace(log, channels=channels)
+
+
+def _refuse_other_kinds(
+    task: Identification, log: Log, known: Mapping[str, tuple[float, str]], units: Mapping[str, str]
+) -> None:
+    """Refuses a channel of another kind than what it acts as or is compared with, unless a factor is given."""
+    both: list[tuple[str, str, str, InputChannel | MeasuredChannel]] = []
+    both += [("inputs", n, n, i) for n, i in task.inputs.items() if not n.endswith("_given_speed")]
+    both += [("measured", n, m.variable, m) for n, m in task.measured.items()]
+    for table, name, variable, entry in both:
+        unit, wanted = known[entry.channel][1], units.get(variable, "")
+        if (
+            unit
+            and wanted
+            and SAME.get(unit, unit) != SAME.get(wanted, wanted)
+            and "scale" not in entry.model_fields_set
+        ):
+            of_rig = "a multiple of the rated torque or voltage" if wanted == "1" else f"in {wanted}"
+            raise InputError(
+                f"{log.name}: {table}.{name}: channel {entry.channel} is in {unit}, and {variable} is {of_rig}; give a scale that "
+                f'turns one into the other, such as scale = "torque_constant" of a current'
+            )
 
 
 def _switches(task: Identification, log: Log) -> list[str]:

@@ -35,7 +35,10 @@ class Progress:
                 self._kept = {}  # of another program, or cut off: the work begins anew
 
     def of(
-        self, task: Identification, logs: Sequence[Prepared], others: Mapping[str, tuple[Point, list[Point]]]
+        self,
+        task: Identification,
+        logs: Sequence[Prepared],
+        others: Mapping[str, tuple[Point, list[Point]]] | None = None,
     ) -> Models:
         """Models of these logs; ``others``: values of models of almost the same logs, by name."""
         digest = hashlib.sha256(task.model_dump_json().encode())
@@ -43,7 +46,7 @@ class Progress:
             digest.update(repr((log.name, log.held_out, len(log.time))).encode())
             for values in (log.time, *log.inputs.values(), *log.measured.values()):
                 digest.update(values.tobytes())
-        return Models(self, digest.hexdigest(), others)
+        return Models(self, digest.hexdigest(), others or {})
 
     def names(self) -> list[str]:
         """Names of the models that are kept."""

@@ -164,6 +164,10 @@ class Rig:
         for name in self.scenario.signals():
             if name.endswith("_given_speed"):
                 units[name] = units[name.replace("_given_speed", "_speed")]
+        for name, m in self.scenario.motors.items():
+            units.setdefault(f"{name}_command", "1")
+            if m.kind == "torque_source" and m.rated_torque == 1.0:  # a torque is its own multiple of 1 N m
+                units[f"{name}_command"] = units.get(f"{name}_torque", "N*m")
         for name, c in self.scenario.axes().items():
             motor, position = self.scenario.sliding()[self.scenario.prefix(name)]
             slides = position and c.reference.kind != "torque"
