@@ -36,7 +36,7 @@ html_theme = "furo"
 html_title = f"lostmotion {release}"
 html_static_path = ["_static"]
 html_css_files = ["pages.css"]
-exclude_patterns = ["_build"]
+exclude_patterns = ["_build", "jupyter_execute"]
 html_extra_path = ["_generated/extra"]
 html_show_sourcelink = True
 autodoc_typehints = "description"
@@ -59,6 +59,13 @@ def display_math(self: HTML5Translator, node: nodes.math_block) -> None:
     raise nodes.SkipNode
 
 
+def keep_colons(_app: Sphinx, what: str, _name: str, _item: object, _options: object, lines: list[str]) -> None:
+    """Napoleon takes what stands before a colon in the first line of an attribute's text for its type."""
+    if what in ("attribute", "data", "property"):
+        lines.insert(0, "")
+
+
 def setup(app: Sphinx) -> None:
+    app.connect("autodoc-process-docstring", keep_colons, priority=400)  # Napoleon's is 500.
     # Formulas as MathML: the pages need no script from elsewhere.
     app.add_html_math_renderer("mathml", (inline_math, None), (display_math, None))

@@ -13,6 +13,8 @@ from lostmotion.reports.looks import FIRST, MUTED, SECOND
 from lostmotion.reports.panels import Curve, Panel
 
 MRAD = 1e3
+OPPOSITE: dict[str, Any] = {"color": MUTED, "linestyle": "--"}
+POINT: dict[str, Any] = {"linestyle": "none", "marker": "o"}
 
 
 def _curves(data: Any, name: str, label: str, factor: float, style: dict[str, Any]) -> Curve:
@@ -37,24 +39,17 @@ def certificates(out: Path, scenario: lm.TrainScenario) -> None:
     """The map from break-away to break-away, with and without static friction."""
     without = scenario.replace(**{"shafts.table.breakaway_torque": None})
     both = {"static friction 8 N·m": (scenario, FIRST), "no more than in motion, 5 N·m": (without, SECOND)}
-    figure = plots.Picture(figsize=(7.0, 4.2))
-    axes = figure.subplots()
+    top = 20.0
+    curves = [Curve("equal and opposite", np.array([0.0, top]), np.array([0.0, -top]), OPPOSITE)]
     for name, (one, style) in both.items():
         certificate = lm.hunting_certificate(one)
         assert certificate.map is not None
-        axes.plot(MRAD * certificate.map["error"], MRAD * certificate.map["image"], label=name, **style)
-        for point in certificate.fixed_points:
-            axes.plot(MRAD * point.amplitude, -MRAD * point.amplitude, "o", color=style["color"])
-    top = 20.0
-    axes.plot([0.0, top], [0.0, -top], "--", color=MUTED, label="equal and opposite")
-    axes.set(
-        xlim=(0.0, top),
-        ylim=(-10.0, 4.0),
-        xlabel="error at the break-away [mrad]",
-        ylabel="error left by the slip [mrad]",
-    )
-    axes.legend()
-    figure.savefig(out / "hunting-certificate.png", dpi=100, metadata={"Software": None})
+        curves.append(Curve(name, MRAD * certificate.map["error"], MRAD * certificate.map["image"], style))
+        cycles = MRAD * np.array([point.amplitude for point in certificate.fixed_points])
+        curves.append(Curve("limit cycle", cycles, -cycles, POINT | {"color": style["color"]}, "_"))
+    labels = ("error at the break-away [mrad]", "error left by the slip [mrad]")
+    panel = Panel("From break-away to break-away", *labels, tuple(curves), x_range=(0.0, top), y_range=(-10.0, 4.0))
+    plots.draw([panel], 1, (7.0, 4.2)).savefig(out / "hunting-certificate.png", dpi=100, metadata={"Software": None})
 
 
 def maps(out: Path, scenario: lm.TrainScenario) -> None:

@@ -130,6 +130,8 @@ def test_every_slider_stands_at_a_value_of_the_scenario_that_can_be_used(name: s
         assert slider["unit"] in {unit for units in UNITS.values() for unit, _, _ in units}
         if "needs" not in slider:
             assert scenario.replace(**{key: slider["value"]}) == scenario, key
+    places = [(slider["group"], slider["label"]) for slider in found.values()]
+    assert len(set(places)) == len(places), name
     present = [key for key, slider in found.items() if "needs" not in slider]
     for key in present[::5]:  # each of them is slow to check
         for end in ("min", "max"):

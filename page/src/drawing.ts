@@ -1,8 +1,8 @@
-/** The train as a drawing that moves: shafts as discs, and each gear as a tooth in its gap. */
+/** The train as a drawing that moves: shafts as discs, slides as carriages, and each gear as a tooth in its gap. */
 import type { Run } from "./core";
 import type { Description, GearView, ShaftView } from "./description";
 import { svg } from "./dom";
-import { largest } from "./extent";
+import { extent, largest } from "./extent";
 import { angles, unitsOf, words } from "./kinematics";
 import { format, shown, SLIDING, TURNING } from "./units";
 
@@ -11,7 +11,9 @@ const MIDDLE = 92;
 const TOOTH = 13; // half its width
 const REACH = 44; // of the largest twist
 const FRAME = 1 / 60;
-const SLIDE_TURN = 2 * Math.PI * 10; // a slide is drawn as a disc that turns once in 100 mm
+const TRAVEL = 40; // of a carriage to both sides
+const LOOKS = 300; // samples by which its travel is found
+const ROUNDING = 1e-9; // of the largest speed: at rest, no speed is shown
 
 /** Shows a sample; pace: how much of a second of the drive passes in a second of the user. */
 type Mover = (k: number, pace: number) => void;
@@ -40,7 +42,7 @@ export class Drawing {
         this.parts.push(mesh(gear, number, x));
         x += MESH;
       });
-      this.parts.push(disc(shaft, x));
+      this.parts.push(shaft.slide ? carriage(shaft, x) : disc(shaft, x));
       x += DISC;
     });
     this.root.setAttribute("viewBox", `0 0 ${x} ${HEIGHT}`);
@@ -66,28 +68,78 @@ function disc(shaft: ShaftView, x: number): Part {
   const turning = svg("g", { class: "turning" }, spokes, mark);
   const smear = svg("path", { class: "smear" });
   const lock = svg("path", { class: "lock", d: "M-9 0h18v13h-18z M-5.5 0v-5a5.5 5.5 0 0 1 11 0v5" });
-  const speed = svg("text", { x: cx, y: HEIGHT - 26, class: "value" });
   const place = svg("g", { transform: `translate(${cx} ${cy})` });
   place.append(svg("circle", { r: radius, class: motor ? "rotor" : "load" }), smear, turning, lock);
   lock.setAttribute("transform", `translate(${radius - 2} ${radius - 10})`);
   const group = svg("g", {});
   if (motor) group.append(svg("rect", { x: cx - 47, y: cy - 47, width: 94, height: 94, rx: 10, class: "housing" }));
-  group.append(place, svg("text", { x: cx, y: HEIGHT - 44, class: "name" }, words(name)), speed);
+  const told = speedBelow(shaft, cx, lock);
+  group.append(place, ...told.texts);
   const mover = (d: Description, run: Run): Mover => {
     const speeds = run.values.get(shaft.speed);
-    const contact = shaft.contact === null ? undefined : run.values.get(shaft.contact);
-    const unit = shown((shaft.slide ? SLIDING : TURNING).speed, speeds ? largest(speeds) : 0);
+    const tell = told.mover(run);
     return (k, pace) => {
-      const turns = shaft.slide ? SLIDE_TURN : 1;
-      const angle = (angles(d, run, k).get(name) ?? 0) * turns;
-      const sweep = (speeds?.[k] ?? 0) * turns * pace * FRAME * 4;
+      const angle = angles(d, run, k).get(name) ?? 0;
+      const sweep = (speeds?.[k] ?? 0) * pace * FRAME * 4;
       turning.setAttribute("transform", `rotate(${(angle * 180) / Math.PI})`);
       smear.setAttribute("d", Math.abs(sweep) > 0.6 ? arc(angle, sweep, radius - 9) : "");
-      lock.style.display = contact?.[k] === 0 ? "" : "none";
-      speed.textContent = speeds ? `${format(speeds[k]! / unit.factor, 3)} ${unit.unit}` : "";
+      tell(k);
     };
   };
   return { element: group, mover };
+}
+
+/** A slide on its rail; its travel in the run fills the rail. */
+function carriage(shaft: ShaftView, x: number): Part {
+  const [cx, cy] = [x + DISC / 2, MIDDLE];
+  const lock = svg("path", {
+    class: "lock",
+    d: "M-9 0h18v13h-18z M-5.5 0v-5a5.5 5.5 0 0 1 11 0v5",
+    transform: "translate(0 -44)",
+  });
+  const ends = [-1, 1].map((side) => svg("line", { x1: side * 70, x2: side * 70, y1: 4, y2: 34, class: "rail" }));
+  const marks = Array.from({ length: 9 }, (_, k) => (k - 4) * (TRAVEL / 4));
+  const scale = svg("path", { class: "rail", d: marks.map((at) => `M${at} 31v6`).join("") });
+  const moving = svg("g", {}, svg("rect", { x: -28, y: -22, width: 56, height: 44, rx: 5, class: "load" }));
+  moving.append(svg("path", { class: "pointer", d: "M0 31l-6 -9h12z" }), lock);
+  const place = svg("g", { transform: `translate(${cx} ${cy})` });
+  place.append(svg("rect", { x: -70, y: 24, width: 140, height: 7, class: "rack" }), ...ends, scale, moving);
+  const told = speedBelow(shaft, cx, lock);
+  const mover = (d: Description, run: Run): Mover => {
+    const at = (k: number): number => angles(d, run, k).get(shaft.name) ?? 0;
+    const count = run.values.get(shaft.speed)?.length ?? 1;
+    const some = Array.from({ length: LOOKS }, (_, j) => at(Math.round(((count - 1) * j) / (LOOKS - 1))));
+    const [low, high] = extent([some]);
+    const share = high > low ? (2 * TRAVEL) / (high - low) : 0;
+    const tell = told.mover(run);
+    return (k) => {
+      moving.setAttribute("transform", `translate(${(at(k) - 0.5 * (low + high)) * share} 0)`);
+      tell(k);
+    };
+  };
+  return { element: svg("g", {}, place, ...told.texts), mover };
+}
+
+/** Name and speed below a shaft or a slide, and the lock of one that is stuck. */
+function speedBelow(
+  shaft: ShaftView,
+  x: number,
+  lock: SVGElement,
+): { texts: SVGElement[]; mover: (run: Run) => (k: number) => void } {
+  const speed = svg("text", { x, y: HEIGHT - 26, class: "value" });
+  const texts = [svg("text", { x, y: HEIGHT - 44, class: "name" }, words(shaft.name)), speed];
+  const mover = (run: Run): ((k: number) => void) => {
+    const speeds = run.values.get(shaft.speed);
+    const contact = shaft.contact === null ? undefined : run.values.get(shaft.contact);
+    const most = speeds ? largest(speeds) : 0;
+    const unit = shown((shaft.slide ? SLIDING : TURNING).speed, most);
+    return (k) => {
+      lock.style.display = contact?.[k] === 0 ? "" : "none";
+      const now = speeds && Math.abs(speeds[k]!) > ROUNDING * most ? speeds[k]! : 0;
+      speed.textContent = speeds ? `${format(now / unit.factor, 3)} ${unit.unit}` : "";
+    };
+  };
+  return { texts, mover };
 }
 
 /** The tooth of the input between two flanks of the output, each on a spring: enlarged. */

@@ -347,7 +347,9 @@ export class Plot {
         ? axis.names.flatMap((_, k) => (axis.names!.length <= NAMES ? [k] : []))
         : axis.logarithmic
           ? logarithmicTicks(low, high)
-          : ticks(low / s.factor, high / s.factor, count, ANGLE.test(axis.label + axis.unit)).map((v) => v * s.factor);
+          : ticks(low / s.factor, high / s.factor, count, ANGLE.test(axis.label + axis.unit), axis.label === "log").map(
+              (v) => v * s.factor,
+            );
     for (const v of at(this.yRange, y, sy, Math.max(2, this.height / 42))) {
       const top = Math.round(this.toY(v)) + 0.5;
       c.moveTo(MARGIN.left, top);

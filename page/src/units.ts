@@ -35,14 +35,15 @@ export function format(value: number, digits = 4): string {
   return written.replace("-", "−");
 }
 
-/** Round values within [low, high], about `count` of them, at most a third more. */
-export function ticks(low: number, high: number, count: number, degrees = false): number[] {
+/** Round values within [low, high], about `count` of them, at most a third more; whole ones, where what is counted has no halves. */
+export function ticks(low: number, high: number, count: number, degrees = false, whole = false): number[] {
   const span = high - low;
   if (!(span > 0) || !Number.isFinite(span)) return [low];
   const raw = span / Math.max(1, count);
   const power = 10 ** Math.floor(Math.log10(raw));
   const round = [1, 2, 5, 10].map((f) => f * power);
-  const step = (degrees && raw > 12 ? [15, 30, 45, 90, 180, 360, 720] : round).find((s) => s >= 0.75 * raw) ?? 1440;
+  const found = (degrees && raw > 12 ? [15, 30, 45, 90, 180, 360, 720] : round).find((s) => s >= 0.75 * raw) ?? 1440;
+  const step = whole ? Math.max(found, 1) : found;
   const first = Math.ceil(low / step - 1e-9);
   const last = Math.floor(high / step + 1e-9);
   return Array.from({ length: last - first + 1 }, (_, k) => Number(((first + k) * step).toPrecision(12)));

@@ -167,6 +167,22 @@ test("it plays by itself, but not where little motion is wanted", async () => {
   await page.close();
 });
 
+test("a slide runs along its rail as far as the run takes it", async () => {
+  const { page } = await open("slide");
+  const offset = (): Promise<number> =>
+    page.evaluate(() => {
+      const moving = document.querySelector(".pointer")!.parentElement!;
+      return Number(/translate\((\S+) /.exec(moving.getAttribute("transform")!)![1]);
+    });
+  const scrubber = page.locator("#player input");
+  await scrubber.focus();
+  await page.keyboard.press("Home");
+  expect(await offset()).toBeCloseTo(-40, 0); // The axis begins at one end of its travel.
+  await page.keyboard.press("End");
+  expect(await offset()).toBeCloseTo(40, 0); // After the first move it is at the other.
+  await page.close();
+});
+
 test("lines of one chart differ without colour, too", async () => {
   const { page } = await open("worm");
   const looks = await page.evaluate(() =>

@@ -5,6 +5,7 @@ python pages.py DIRECTORY
 
 import json
 import math
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,15 @@ PAGES = {
         "hunting-with-backlash",
         {"controller.position.gain": 8.0, "controller.reference.moves.0.to": 0.6, "controller.reference.speed": 0.9},
     ),
+}
+EXAMPLES = Path(__file__).parents[2] / "examples"
+# Page -> the commands that write it into a directory of its own.
+COMMANDS: dict[str, list[list[str]]] = {
+    "rig": [["rig", "paper-gearbox", "-o", "rig"]],
+    "track": [["track", "tracking-loss-map", "-o", "track"]],
+    "study": [["study", str(EXAMPLES / "tolerance.toml"), "-o", "runs"], ["study", "show", "runs", "-o", "study"]],
+    "monitor": [["monitor", str(EXAMPLES / "cycloidal" / "baseline.toml"), "-o", "monitor"]],
+    "identified": [["identify", str(EXAMPLES / "cycloidal" / "baseline.toml"), "-o", "identified"]],
 }
 # Instants at which Python says what stands still [s].
 INSTANTS = {"drive": (0.0, 0.05, 0.6667, 0.9), "worm": (0.05, 0.31, 1.4), "axis": (0.0101, 0.8003, 2.5003)}
@@ -113,12 +123,24 @@ def write_reports(directory: Path) -> None:
     (directory / "charts.json").write_text(json.dumps(numbers))
 
 
+def write_by_commands(directory: Path) -> None:
+    """Reports of the commands, as a user gets them."""
+    for page, commands in COMMANDS.items():
+        for command in commands:
+            subprocess.run(
+                [sys.executable, "-m", "lostmotion", *command], cwd=directory, check=True, capture_output=True
+            )
+        (directory / page / f"{page}.html").rename(directory / f"{page}.html")
+
+
 def main(directory: Path) -> None:
     """For each page NAME.html and NAME.json."""
     directory.mkdir(parents=True, exist_ok=True)
     write_reports(directory)
+    write_by_commands(directory)
     # So long that its beginning is shown before the whole is there.
     write_page(directory / "long.html", lm.load("joint-under-gravity", {"simulation.duration": 30.0}))
+    write_page(directory / "slide.html", lm.load("ball-screw-axis", {"simulation.duration": 0.5}))
     for page, (name, changes) in PAGES.items():
         scenario = lm.load(name)
         write_page(directory / f"{page}.html", scenario)

@@ -38,6 +38,11 @@ test.each([
   ["run", "light", 390],
   ["check", "dark", 800],
   ["response", "light", 390],
+  ["rig", "dark", 390],
+  ["track", "light", 390],
+  ["study", "dark", 800],
+  ["monitor", "light", 390],
+  ["identified", "dark", 390],
 ] as const)("the report %s has no barrier that axe finds (%s, %i pixels)", async (name, colorScheme, width) => {
   const { page, seen } = await open(name, { colorScheme, viewport: { width, height: 900 } });
   expect(await barriers(page)).toEqual([]);

@@ -23,6 +23,7 @@ test("ticks are round and within the range", () => {
   expect(ticks(-0.3, 1.1, 5)).toEqual([0, 0.5, 1]);
   expect(ticks(0, 2, 4)).toEqual([0, 0.5, 1, 1.5, 2]);
   expect(ticks(3, 3, 4)).toEqual([3]);
+  expect(ticks(0, 2, 6, false, true)).toEqual([0, 1, 2]);
   expect(ticks(-0.43, 0.43, 4)).toEqual([-0.4, -0.2, 0, 0.2, 0.4]);
   expect(logarithmicTicks(0.5, 20)).toEqual([0.5, 1, 2, 5, 10, 20]);
 });

@@ -127,7 +127,7 @@ def _sliders(scenario: Scenario, values: list[tuple[str, float]], closed: str | 
     parameters = sliders.of_parameters(values, usual, views, units)
     found = [*_signal_sliders(scenario), *_reference_sliders(scenario), *parameters]
     return [
-        *sliders.ordered(found),
+        *sliders.told_apart(sliders.ordered(found)),
         sliders.duration(scenario.simulation.duration, scenario.simulation.sample_interval),
     ]
 

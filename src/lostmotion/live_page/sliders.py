@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ..model.signals import TimeFunction
@@ -254,6 +255,28 @@ def duration(value: float, sample_interval: float) -> Slider:
     """Duration of the run."""
     reach = Range(max(value / 5.0, sample_interval), 5.0 * value, logarithmic=True)
     return Slider("simulation.duration", "Run", "duration", "s", value, reach, "duration")
+
+
+# A motor and its shaft may have one name.
+KINDS = {
+    "motors": "motor",
+    "shafts": "shaft",
+    "slides": "slide",
+    "gears": "gear",
+    "brakes": "brake",
+    "clutches": "clutch",
+}
+
+
+def told_apart(found: list[Slider]) -> list[Slider]:
+    """The sliders, those of equal labels in one group with the kind of their elements."""
+    labels = Counter((s.group, s.label) for s in found)
+
+    def kind(slider: Slider) -> str:
+        table, *_ = slider.key.split(".")
+        return KINDS.get(table, table.removesuffix("s"))
+
+    return [replace(s, label=f"{s.label}, {kind(s)}") if labels[s.group, s.label] > 1 else s for s in found]
 
 
 def ordered(found: Iterable[Slider]) -> list[Slider]:

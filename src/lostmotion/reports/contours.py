@@ -23,14 +23,18 @@ class Contour:
     """point at which the value is written"""
 
 
-def ticks(low: float, high: float, count: float, degrees: bool = False) -> list[float]:
-    """Round values within an interval, about so many of them; of angles in degrees, parts and multiples of a right angle."""
+def ticks(low: float, high: float, count: float, degrees: bool = False, whole: bool = False) -> list[float]:
+    """Round values within an interval, about so many of them; of angles in degrees, parts and multiples of a right angle.
+
+    Whole values, where what is counted has no halves.
+    """
     span = high - low
     if not (span > 0.0 and math.isfinite(span)):
         return [low]
     power = 10.0 ** math.floor(math.log10(span / count))
     steps = (15.0, 30.0, 45.0, 90.0, 180.0, 360.0, 720.0) if degrees and span > 12 * count else ()
     width = next(f for f in (*steps, *(g * power for g in (1, 2, 5, 10))) if f >= 0.75 * span / count)
+    width = max(width, 1.0) if whole else width
     return [
         float(f"{k * width:.12g}") for k in range(math.ceil(low / width - 1e-9), math.floor(high / width + 1e-9) + 1)
     ]

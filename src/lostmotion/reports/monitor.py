@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from .pages import table_csv, write_report
 from .panels import Curve, Group, Mark, Panel
 
 VALUES: dict[str, Any] = {"color": PALETTE["first"], "linestyle": "none", "marker": "o", "markersize": 5.0}
-ENDS: dict[str, Any] = {"color": PALETTE["first"], "linestyle": "-", "linewidth": 0.7, "alpha": 0.6}
+INTERVAL: dict[str, Any] = {"color": PALETTE["first"], "linestyle": "-", "linewidth": 1.2, "alpha": 0.6}
 LIMIT: dict[str, Any] = {"color": PALETTE["second"], "linestyle": "--", "linewidth": 1.5}
 EVIDENCE: dict[str, Any] = {"color": PALETTE["first"], "linestyle": "-", "linewidth": 1.6}
 LEAST = 1e-4  # evidence, below which it is not drawn
@@ -155,22 +156,19 @@ def _trend(result: MonitorResult, w: Watched) -> Panel:
     else:
         unit = si_factor(w.unit)
         y = np.array([e.values[w.name] for e in logs]) / unit
-        low, high = (np.array([getattr(e.intervals[w.name], end) for e in logs]) / unit for end in ("low", "high"))
-        curves = [
-            Curve("value", at, y, VALUES),
-            Curve("low", at, low, ENDS, "_"),
-            Curve("high", at, high, ENDS, "95 %"),
-        ]
+        intervals = [e.intervals[w.name] for e in logs]
+        ends = np.array([[i.low / unit, i.high / unit, math.nan] for i in intervals]).ravel()
+        curves = [Curve("value", at, y, VALUES), Curve("interval", np.repeat(at, 3), ends, INTERVAL, "95 %")]
         label = f"{w.name} [{printed(w.unit) or '-'}]"
-    ends = np.array([at.min(), at.max()]) if len(at) else np.zeros(0)
-    curves += [Curve(f"limit {x:g}", ends, np.full(len(ends), x), LIMIT) for x in _limits(result, w)]
+    first, last = min(e.at for e in result.logs), max(e.at for e in result.logs)
+    span = np.array([first, last]) + 0.02 * (last - first) * np.array([-1.0, 1.0])
+    curves += [Curve(f"limit {x:g}", span, np.full(2, x), LIMIT) for x in _limits(result, w)]
     marks: tuple[Mark, ...] = ()
     if w.begins is not None:
         k = w.logs.index(w.begins)
         marks = (Mark(float(at[k]), float(y[k]), result.logs[w.begins].log, VALUES),)
-    whole = [e.at for e in result.logs]
-    span = (min(whole), max(whole)) if len(at) == 1 and len(whole) > 1 else None
-    return Panel(w.name, place, label, tuple(curves), x_range=span, marks=marks)
+    x_range = (float(span[0]), float(span[1])) if last > first else None
+    return Panel(w.name, place, label, tuple(curves), x_range=x_range, marks=marks)
 
 
 def _evidence(result: MonitorResult, w: Watched) -> Panel:

@@ -21,6 +21,7 @@ PRACTICAL = {
     "degC": ("°C", 1.0),
     "ohm": ("Ω", 1.0),
 }
+PRINTED = (("*", "·"), ("^2", "²"), ("^3", "³"))
 
 
 # Units of charts and summaries, where they are not SI, and those of small values such as twists and errors.
@@ -30,8 +31,10 @@ CHARTED_SMALL = {"rad": ("mrad", 1e3), "m": ("µm", 1e6)}
 
 
 def printed(unit: str) -> str:
-    """An SI unit as pages, charts and tables print it: N·m."""
-    return unit.replace("*", "·")
+    """An SI unit as pages, charts and tables print it: N·m, m/s²."""
+    for written, shown in PRINTED:
+        unit = unit.replace(written, shown)
+    return unit
 
 
 def charted(unit: str, *, small: bool = False) -> tuple[str, float]:
