@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "lostmotion/batch/drive_batch.hpp"
+#include "lostmotion/batch/exact_batch.hpp"
 #include "train.hpp"
 
 namespace lostmotion::binding {
@@ -11,21 +12,34 @@ namespace lostmotion::binding {
 using BatchInput = nb::ndarray<const double, nb::numpy, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using BatchMask = nb::ndarray<const bool, nb::numpy, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
-inline batch::Input batch_input(const BatchInput& values, const batch::DriveBatch& b) {
+template <class Batch>
+batch::Input batch_input(const BatchInput& values, const Batch& b) {
     if (values.shape(0) != 1 && values.shape(0) != b.size()) throw nb::type_error("an input of other drives");
     return {values.data(), values.shape(0) != 1 || b.size() == 1};
 }
 
-inline void step_batch(batch::DriveBatch& b, const BatchInput& command, const BatchInput& load_torque,
-                       unsigned threads) {
-    const batch::Input first = batch_input(command, b), second = batch_input(load_torque, b);
+// step() without the lock of the interpreter.
+template <class Step>
+void step_batch(Step&& step) {
     batch::Failure failure;
     {
         nb::gil_scoped_release release;
-        failure = b.step(first, second, threads);
+        failure = step();
     }
     if (!failure.text.empty())
         throw SolverError("drive " + std::to_string(failure.drive) + " of the batch: " + failure.text);
+}
+
+template <class Batch>
+void restore_batch(Batch& b, const typename Batch::Snapshot& s) {
+    if (s.of != &b) throw nb::type_error("a snapshot of another batch");
+    b.restore(s);
+}
+
+// One after the other, as rows of an array of the batch itself.
+template <class Batch>
+auto batch_rows(Batch& b, double* rows, std::size_t n) {
+    return nb::ndarray<nb::numpy, double, nb::ndim<2>>(rows, {n, b.size()}, nb::find(b));
 }
 
 template <class Read>
@@ -42,7 +56,74 @@ Array read_contacts(const batch::DriveBatch& b, Read&& read) {
     return numbers(modes, [](std::int8_t m) { return m; });
 }
 
+inline Scenario batch_scenario(const TrainDescription& train, const BoundControl& control) {
+    Scenario s;
+    s.train = train.train;
+    s.control = control_of(control);
+    s.references_given = true;
+    const model::Assembly a(s.train);
+    s.start.resize(static_cast<std::size_t>(a.layout().states));
+    s.hysteresis_capacities.resize(s.train.gears.size());
+    if (const std::string error = check_control(a, s.control); !error.empty()) throw nb::value_error(error.c_str());
+    return s;
+}
+
+inline void bind_exact_batch(nb::module_& m) {
+    using B = batch::ExactBatch;
+    nb::class_<B::Snapshot>(m, "ExactBatchSnapshot");
+    nb::class_<B>(m, "ExactBatch")
+        .def(
+            "__init__",
+            [](B* self, const std::vector<const TrainDescription*>& trains, const std::vector<BoundControl>& controls,
+               const std::vector<int>& kind_of, double step) {
+                std::vector<Scenario> kinds;
+                for (std::size_t k = 0; k < trains.size(); ++k)
+                    kinds.push_back(batch_scenario(*trains[k], controls[k]));
+                new (self) B(kinds, kind_of, step);
+            },
+            "trains"_a, "controls"_a, "kind_of"_a, "step"_a)
+        .def(
+            "step",
+            [](B& b, const std::vector<BatchInput>& inputs, const std::optional<BatchInput>& speed,
+               const std::optional<BatchInput>& angle, const std::optional<BatchInput>& acceleration,
+               unsigned threads) {
+                std::vector<batch::Input> given;
+                for (const BatchInput& input : inputs) given.push_back(batch_input(input, b));
+                std::optional<B::Motion> motion;
+                if (speed) motion.emplace(B::Motion{batch_input(*speed, b), {}, {}});
+                if (speed && angle) motion->angle = batch_input(*angle, b);
+                if (speed && acceleration) motion->acceleration = batch_input(*acceleration, b);
+                step_batch([&] { return b.step(given, motion, threads); });
+            },
+            "inputs"_a, "speed"_a.none(), "angle"_a.none(), "acceleration"_a.none(), "threads"_a)
+        .def(
+            "reset",
+            [](B& b, const std::optional<BatchMask>& which, const Values& start) {
+                if (which && which->shape(0) != b.size()) throw nb::type_error("a mask of other drives");
+                if (start.shape(0) != b.size() || start.shape(1) != b.states().size() + 1)
+                    throw nb::type_error("states of other drives");
+                const std::string wrong = b.reset(which ? which->data() : nullptr, start.data());
+                if (!wrong.empty()) throw nb::value_error(wrong.c_str());
+            },
+            "which"_a.none(), "start"_a)
+        .def_prop_ro("inputs", &B::inputs)
+        .def_prop_ro("states", &B::states)
+        .def_prop_ro("variables",
+                     [](const B& b) {
+                         std::vector<std::string> names;
+                         for (const Variable& v : b.variables()) names.push_back(v.name);
+                         return names;
+                     })
+        .def_prop_ro(
+            "values", [](B& b) { return batch_rows(b, b.values(), b.variables().size()); },
+            "The values of all drives, by variable; each step writes them anew.")
+        .def("snapshot", &B::snapshot)
+        .def("restore", &restore_batch<B>, "snapshot"_a)
+        .def_prop_ro("memory", &B::memory, "Bytes, without what the solvers keep of the regimes.");
+}
+
 inline void bind_batches(nb::module_& m) {
+    bind_exact_batch(m);
     using B = batch::DriveBatch;
     nb::class_<B::Snapshot>(m, "BatchSnapshot");
     nb::class_<B>(m, "DriveBatch")
@@ -65,7 +146,13 @@ inline void bind_batches(nb::module_& m) {
         .def_static(
             "error", [](const TrainDescription& t) { return B::error(t.train); }, "train"_a,
             "What keeps a train from being stepped in a batch, or nothing.")
-        .def("step", &step_batch, "command"_a, "load_torque"_a, "threads"_a)
+        .def(
+            "step",
+            [](B& b, const BatchInput& command, const BatchInput& load_torque, unsigned threads) {
+                const batch::Input first = batch_input(command, b), second = batch_input(load_torque, b);
+                step_batch([&] { return b.step(first, second, threads); });
+            },
+            "command"_a, "load_torque"_a, "threads"_a)
         .def(
             "reset",
             [](B& b, const std::optional<BatchMask>& which, const std::optional<Values>& start) {
@@ -76,11 +163,7 @@ inline void bind_batches(nb::module_& m) {
             },
             "which"_a.none(), "start"_a.none())
         .def_prop_ro(
-            "states",
-            [](B& b) {
-                return nb::ndarray<nb::numpy, double, nb::ndim<2>>(b.states(), {batch::D::states, b.size()},
-                                                                   nb::find(b));
-            },
+            "states", [](B& b) { return batch_rows(b, b.states(), batch::D::states); },
             "The values of all drives, by state; each step writes them anew.")
         .def("output_torque", [](const B& b) { return read_batch(b, [&](double* out) { b.read_output_torque(out); }); })
         .def("motor_torque", [](const B& b) { return read_batch(b, [&](double* out) { b.read_motor_torque(out); }); })
@@ -89,13 +172,7 @@ inline void bind_batches(nb::module_& m) {
         .def("twist_contact",
              [](const B& b) { return read_contacts(b, [&](std::int8_t* out) { b.read_twist_contact(out); }); })
         .def("snapshot", &B::snapshot)
-        .def(
-            "restore",
-            [](B& b, const B::Snapshot& s) {
-                if (s.of != &b) throw nb::type_error("a snapshot of another batch");
-                b.restore(s);
-            },
-            "snapshot"_a)
+        .def("restore", &restore_batch<B>, "snapshot"_a)
         .def_prop_ro("counts",
                      [](const B& b) {
                          const batch::Counts& c = b.counts();

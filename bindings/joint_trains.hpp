@@ -28,8 +28,15 @@ inline void check(Status status, JointTrains& t) {
     if (status != Status::done) check(status, *t.joints()[t.failed_joint()].train);
 }
 
+// A copy of all trains, with where the next step begins its search.
+struct JointSnapshot {
+    std::vector<TrainSimulation::Snapshot> trains;
+    std::vector<JointTrains::Guess> guesses;
+};
+
 inline void bind_joint_trains(nb::module_& m) {
     using T = JointTrains;
+    nb::class_<JointSnapshot>(m, "JointSnapshot");
     m.def("joint_rows", [] { return std::vector<std::string>(joint_rows.begin(), joint_rows.end()); });
     nb::class_<T>(m, "JointTrains")
         .def(
@@ -37,9 +44,9 @@ inline void bind_joint_trains(nb::module_& m) {
             [](T* self, const std::vector<TrainSimulation*>& trains, const std::vector<int>& shafts) {
                 std::vector<T::Joint> joints;
                 for (std::size_t k = 0; k < trains.size(); ++k) {
-                    if (!T::suits(*trains[k], shafts[k]))
-                        throw nb::value_error("a load shaft without load torque, or whose angle is no state");
-                    joints.push_back({trains[k], shafts[k]});
+                    const std::optional<LoadShaft> shaft = trains[k]->load_shaft(shafts[k]);
+                    if (!shaft) throw nb::value_error("a load shaft without load torque, or whose angle is no state");
+                    joints.push_back({trains[k], *shaft});
                 }
                 new (self) T(std::move(joints));
             },
@@ -62,6 +69,27 @@ inline void bind_joint_trains(nb::module_& m) {
                 for (std::size_t k = 0; k < guesses.size(); ++k) t.set_guess(k, {guesses[k].first, guesses[k].second});
             },
             "guesses"_a, "Load torque [N m] and mean acceleration [rad/s^2] of each joint.")
+        .def("snapshot",
+             [](const T& t) {
+                 const std::size_t n = t.joints().size();
+                 JointSnapshot to{std::vector<TrainSimulation::Snapshot>(n), {}};
+                 for (std::size_t k = 0; k < n; ++k) {
+                     t.joints()[k].train->save(to.trains[k]);
+                     to.guesses.push_back(t.guess(k));
+                 }
+                 return to;
+             })
+        .def(
+            "restore",
+            [](T& t, const JointSnapshot& from) {
+                check_size(from.trains, t.joints().size());
+                for (std::size_t k = 0; k < from.trains.size(); ++k) {
+                    if (!t.joints()[k].train->restore(from.trains[k]))
+                        throw nb::type_error("a snapshot of other joints");
+                    t.set_guess(k, from.guesses[k]);
+                }
+            },
+            "snapshot"_a)
         .def(
             "set_reference",
             [](T& t, std::size_t joint, double value, double rate) {

@@ -32,7 +32,9 @@ inline void check(Status status, TrainSimulation& s) {
     check_train_run(report, s.assembly());
 }
 
-inline void advance(TrainSimulation& s, double interval, const Numbers& begin, const Numbers& end) {
+// step(begin, end) without the lock of the interpreter.
+template <class Step>
+void advance(TrainSimulation& s, const Numbers& begin, const Numbers& end, Step&& step) {
     const auto n = static_cast<std::size_t>(s.assembly().layout().inputs);
     check_size(begin, n);
     check_size(end, n);
@@ -40,7 +42,7 @@ inline void advance(TrainSimulation& s, double interval, const Numbers& begin, c
     Status status;
     {
         nb::gil_scoped_release release;
-        status = s.advance(interval, begin, end);
+        status = step();
     }
     check(status, s);
 }
@@ -61,6 +63,7 @@ inline Numbers read(TrainSimulation& s) {
 
 inline void bind_stepping(nb::module_& m) {
     using S = TrainSimulation;
+    nb::class_<S::Snapshot>(m, "SimulationSnapshot");
     nb::class_<S>(m, "Simulation")
         .def(
             "__init__",
@@ -71,7 +74,38 @@ inline void bind_stepping(nb::module_& m) {
                 new (self) S(t.train, step, control, input_sines(sines));
             },
             "train"_a, "step"_a, "control"_a, "sines"_a, nb::keep_alive<1, 4>())
-        .def("advance", &advance, "interval"_a, "begin"_a, "end"_a)
+        .def(
+            "advance",
+            [](S& s, double interval, const Numbers& begin, const Numbers& end) {
+                advance(s, begin, end, [&] { return s.advance(interval, begin, end); });
+            },
+            "interval"_a, "begin"_a, "end"_a)
+        .def(
+            "answer",
+            [](S& s, double interval, const Numbers& begin, const Numbers& end, int shaft) {
+                const std::optional<LoadShaft> load = s.load_shaft(shaft);
+                if (!load) throw nb::type_error("a shaft without load torque, or whose angle is no state");
+                LoadAnswer out;
+                advance(s, begin, end, [&] { return s.answer(interval, begin, end, *load, out); });
+                return std::make_tuple(load->inertia, out.acceleration, out.compliance);
+            },
+            "interval"_a, "begin"_a, "end"_a, "shaft"_a,
+            "Advances; returns inertia and mean acceleration of a shaft, and -da/dM of its load torque M.")
+        .def(
+            "answers", [](const S& s, int shaft) { return s.load_shaft(shaft).has_value(); }, "shaft"_a,
+            "Whether a shaft is one of answer().")
+        .def("snapshot",
+             [](const S& s) {
+                 S::Snapshot to;
+                 s.save(to);
+                 return to;
+             })
+        .def(
+            "restore",
+            [](S& s, const S::Snapshot& from) {
+                if (!s.restore(from)) throw nb::type_error("a snapshot of another simulation");
+            },
+            "snapshot"_a)
         .def("read", &read)
         .def(
             "explain", [](S& s) { return explain_point(s.assembly(), point_now(s)); },

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
+from lostmotion.simulation.exact_batches import controlled
 from lostmotion.simulation.variables import STATES
 
 STEP = 1e-3
@@ -289,3 +290,142 @@ def test_a_drive_that_cannot_go_on_stays_and_is_named() -> None:
     assert np.isfinite(batch["twist"]).all()
     batch.reset(np.array([False, True, False]))
     batch.step(0.1)
+
+
+# --- controllers and given motions ---
+
+
+def positioned(generator: np.random.Generator) -> lm.Drive:
+    """A drive of random parameters that the controller of a shipped scenario can hold."""
+    drive = lm.load("position-axis").drive()
+    backlash = float(generator.uniform(0.2e-3, 1e-3))
+    stiffness = lm.model.TorsionCurve(slopes=[float(generator.uniform(2e4, 5e4))], backlash=backlash)
+    load = lm.Load(inertia=drive.load.inertia * float(generator.uniform(0.6, 1.4)), friction_torque=0.2)
+    return drive.model_copy(
+        update={"load": load, "gearbox": drive.gearbox.model_copy(update={"stiffness": stiffness, "hysteresis": None})}
+    )
+
+
+def test_controllers_act_at_their_instants_as_on_a_drive_alone() -> None:
+    generator = np.random.default_rng(11)
+    drives = [positioned(generator) for _ in range(12)]
+    controller = lm.load("position-axis").controller
+    assert controller is not None
+    targets = generator.uniform(-0.02, 0.02, 12)
+    batch = lm.SimulationBatch(drives, STEP, controllers=controller)
+    for _ in range(1000):
+        batch.step(targets)
+    for k, drive in enumerate(drives):
+        hold = controller.model_copy(update={"reference": lm.PositionReference(mean=float(targets[k]))})
+        alone = lm.Simulation(controlled(drive, hold), step=STEP)
+        for _ in range(1000):
+            alone.advance(STEP)
+        assert batch["load_angle"][k] == pytest.approx(alone["load_angle"], abs=1e-6)
+        assert batch["load_speed"][k] == pytest.approx(alone["load_speed"], abs=1e-5)
+        assert batch["torque_reference"][k] == pytest.approx(alone["torque_reference"], abs=1e-6)
+    assert np.abs(batch["load_angle"] - targets).max() < 2e-3
+    assert batch.counts["general"] == batch.counts["steps"] == 12000
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_neither_threads_nor_order_change_a_bit_under_controllers(threads: int) -> None:
+    generator = np.random.default_rng(12)
+    drives = [positioned(generator) for _ in range(4)] * 40
+    controller = lm.load("position-axis").controller
+    targets = generator.uniform(-0.02, 0.02, (40, len(drives)))
+    one = run(lm.SimulationBatch(drives, STEP, controllers=controller, threads=1), targets)
+    order = generator.permutation(len(drives))
+    other = lm.SimulationBatch([drives[k] for k in order], STEP, controllers=controller, threads=threads)
+    before = other.snapshot()
+    assert np.array_equal(run(other, targets[:, order]), one[:, :, order])
+    other.restore(before)
+    assert np.array_equal(run(other, targets[:, order]), one[:, :, order])
+
+
+def test_what_varies_leaves_the_controller_as_it_was_tuned() -> None:
+    drive, controller = lm.load("position-axis").drive(), lm.load("position-axis").controller
+    assert controller is not None
+    inertias = drive.load.inertia * np.array([0.5, 1.0])
+    batch = lm.SimulationBatch(drive, STEP, vary={"load.inertia": inertias}, controllers=controller)
+    tuned = lm.SimulationBatch(drive, STEP, count=1, controllers=[controller])
+    for _ in range(50):
+        batch.step(0.01)
+        tuned.step(0.01)
+    assert batch["load_angle"][1] == tuned["load_angle"][0]
+    assert batch["load_angle"][0] != tuned["load_angle"][0]
+
+
+def test_a_given_motion_takes_the_torque_of_newtons_law() -> None:
+    rigid = simple_drive().model_copy(
+        update={
+            "motor": lm.Motor(kind="torque_source", rotor_inertia=1e-4),
+            "gearbox": lm.Gearbox(
+                ratio=50,
+                stiffness=lm.model.Rigid(),
+                losses=lm.model.ConstantEfficiency(efficiency=1.0),
+                rated_input_speed=400.0,
+                rated_output_torque=50.0,
+            ),
+        }
+    )
+    batch = lm.SimulationBatch(rigid, STEP, count=3, given_motion=True)
+    acceleration = np.array([0.0, 2.0, -5.0])
+    for k in range(1, 11):
+        batch.step(0.1, motion={"speed": acceleration * k * STEP})
+    # (J + i^2 J_M) a = i M + drive torque
+    assert batch["load_drive_torque"] == pytest.approx((1.0 + 2500 * 1e-4) * acceleration - 50 * 0.1, rel=1e-12)
+    assert batch["load_angle"] == pytest.approx(0.5 * acceleration * 0.01**2, rel=1e-12, abs=1e-18)
+    with pytest.raises(lm.InputError, match="load_torque: does not act on a load whose motion is given"):
+        batch.step(0.1, 1.0, motion={"speed": 0.0})
+    with pytest.raises(lm.InputError, match=r"motion\.speed: is missing"):
+        batch.step(0.1, motion={"angle": 0.0})
+    with pytest.raises(lm.InputError, match=r"motion\.sped: is not known; did you mean speed"):
+        batch.step(0.1, motion={"sped": 0.0})
+    with pytest.raises(lm.InputError, match="motion: is missing"):
+        batch.step(0.1)
+
+
+def test_a_given_motion_moves_each_drive_as_alone() -> None:
+    generator = np.random.default_rng(13)
+    drives = [random_drive(generator) for _ in range(8)]
+    batch = lm.SimulationBatch(drives, STEP, given_motion=True)
+    batch.reset(initial={"load_speed": 0.2, "load_angle": 0.1})
+    alone = [
+        lm.Simulation(
+            drive.train(),
+            step=STEP,
+            loaded=[],
+            given=["load"],
+            initial=lm.TrainInitial(speeds={"load": 0.2}, angles={"load": 0.1}),
+        )
+        for drive in drives
+    ]
+    for k in range(1, 201):
+        speed, angle = 0.2 * np.cos(9 * k * STEP), 0.1 + 0.2 / 9 * np.sin(9 * k * STEP)
+        batch.step(0.1, motion={"speed": speed, "angle": angle})
+        for one in alone:
+            one.advance(STEP, motor_command=0.1, motion={"load": {"speed": speed, "angle": angle}})
+    for k, one in enumerate(alone):
+        for name in ("motor_speed", "load_angle", "load_drive_torque", "gearbox_twist"):
+            assert batch[name][k] == one[name], name
+        assert batch["twist"][k] == one["gearbox_twist"]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"controllers": "position"}, "must be a Controller, or a list"),
+        ({"controllers": [lm.load("position-axis").controller]}, "controllers: there are 1 for 2 drives"),
+        ({"controllers": [1, 2]}, "controllers: 1 must be a Controller"),
+        (
+            {"controllers": lm.load("speed-axis", {"controller.law": True, "controller.speed": None}).controller},
+            "a law of your own is for",
+        ),
+    ],
+)
+def test_controllers_that_a_batch_does_not_run_are_refused(options: dict[str, object], message: str) -> None:
+    with pytest.raises(lm.InputError, match=message) as raised:
+        lm.SimulationBatch(lm.load("position-axis").drive(), STEP, count=2, **options)  # type: ignore[arg-type]
+    assert "\n" not in str(raised.value)
+    with pytest.raises(lm.InputError, match="motion: is for a batch with given_motion=True"):
+        lm.SimulationBatch(simple_drive(), STEP, count=2).step(0.1, motion={"speed": 1.0})

@@ -61,7 +61,7 @@ def library() -> c.CDLL:
     if not LIBRARY.exists():
         subprocess.run(["make", "c-library"], cwd=ROOT, check=True)
     lib = c.CDLL(str(LIBRARY))
-    for name in ("lm_train_new", "lm_simulation_new"):
+    for name in ("lm_train_new", "lm_simulation_new", "lm_snapshot_new"):
         getattr(lib, name).restype = c.c_void_p
     for name in ("train_error", "error", "name", "unit", "meaning", "parameter_key", "parameter_unit"):
         getattr(lib, f"lm_{name}").restype = c.c_char_p
@@ -223,19 +223,46 @@ def worm(library: c.CDLL) -> Simulation:
     return Train(library, lm.load("worm-lowering")).simulation(1e-3)
 
 
-def test_stepping_from_a_kept_state_repeats_bit_for_bit(worm: Simulation) -> None:
+@pytest.mark.parametrize("way", ["state", "snapshot"])
+def test_stepping_from_a_kept_state_repeats_bit_for_bit(worm: Simulation, library: c.CDLL, way: str) -> None:
     inputs = [-0.15 if name == "motor_command" else 20.0 for name in worm.names(INPUTS)]
     for _ in range(200):
         assert worm.advance(1e-3, inputs) == OK, worm.error()
-    kept = worm.state()
+    kept, snapshot = worm.state(), c.c_void_p(worm.lib.lm_snapshot_new(worm.handle))
     for _ in range(300):
         assert worm.advance(1e-3, inputs) == OK
     first = worm.read()
-    assert worm.lib.lm_set_state(worm.handle, kept) == OK
+    if way == "state":
+        assert worm.lib.lm_set_state(worm.handle, kept) == OK
+    else:
+        assert worm.lib.lm_snapshot_restore(worm.handle, snapshot) == OK
+        other = Train(library, lm.load("two-link-arm-frozen")).simulation(1e-3)
+        assert library.lm_snapshot_restore(other.handle, snapshot) in (OK, INVALID)  # by the kernels
+    worm.lib.lm_snapshot_free(snapshot)
     for _ in range(300):
         assert worm.advance(1e-3, inputs) == OK
     assert np.array_equal(first, worm.read())
     assert worm.lib.lm_time(worm.handle) == pytest.approx(0.5, abs=1e-12)
+
+
+class Answer(c.Structure):
+    _fields_ = (("torque", c.c_double), ("derivative", c.c_double), ("acceleration", c.c_double))
+
+
+def test_a_load_gets_the_answer_of_python(worm: Simulation) -> None:
+    alone = lm.Simulation(lm.load("worm-lowering"), step=1e-3, initial=lm.TrainInitial())
+    answer = Answer()
+    for k in range(200):
+        load = {"motor_command": -0.15, "drum_load_torque": 20.0 - 0.01 * k}
+        inputs = doubles([load[name] for name in worm.names(INPUTS)])
+        status = worm.lib.lm_advance_answer(worm.handle, c.c_double(1e-3), inputs, inputs, b"drum", c.byref(answer))
+        assert status == OK, worm.error()
+        expected = alone.answer(1e-3, shaft="drum", **load)
+        assert (answer.torque, answer.acceleration) == (expected.torque, expected.acceleration)
+        assert answer.derivative == expected.derivative
+    wrong = worm.lib.lm_advance_answer(worm.handle, c.c_double(1e-3), inputs, inputs, b"dru", c.byref(answer))
+    assert wrong == INVALID
+    assert worm.error().startswith("the shaft 'dru' has no load torque of its own")
 
 
 def test_clutches_freewheels_and_torques_over_an_angle_have_the_bits_of_python(library: c.CDLL) -> None:

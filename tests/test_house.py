@@ -83,8 +83,9 @@ CORE_LAYERS = [
     {"elements"},
     {"model"},
     {"simulation"},
-    {"analysis", "batch"},
+    {"analysis"},
     {"scenario"},
+    {"batch"},
 ]
 
 

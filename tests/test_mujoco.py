@@ -111,18 +111,25 @@ def test_a_tip_presses_against_a_wall_as_with_short_steps(stiffness: float, gap:
 # --- states and wrong use ---
 
 
-def test_a_state_brings_robot_and_drives_back() -> None:
+def test_states_and_snapshots_bring_robot_and_drives_back() -> None:
     arm = robot(2e-3, drive(gap=1e-3, friction=0.01))
     for _ in range(20):
         arm.step([0.2, 0.1])
-    kept = arm.state
+    kept, copied = arm.state, arm.snapshot()
     runs = []
-    for _ in range(2):
-        arm.state = kept
+    for again in (None, kept, copied, kept):
+        if again is copied:
+            arm.restore(copied)
+        elif again is not None:
+            arm.state = kept
         for _ in range(30):
             arm.step([-0.1, 0.2])
         runs.append([*arm.data.qpos, *arm["motor_speed"], *arm["twist"]])
-    assert runs[0] == runs[1]
+    assert runs[1:] == runs[:1] * 3
+    other = robot(2e-3, drive())
+    for wrong in (kept, other.snapshot()):
+        with pytest.raises(lm.InputError, match="is none of this robot; between robots, use state"):
+            arm.restore(wrong)
     arm.reset()
     assert arm.data.time == 0.0
     assert arm["motor_speed"].tolist() == [0.0, 0.0]

@@ -287,6 +287,18 @@ typedef struct {
  * and speeds do not jump. */
 LM_API int lm_advance_motion(lm_simulation* simulation, double interval, const double* begin, const double* end,
                              const lm_motion* motions, size_t n);
+/* The same as lm_advance, with the answer of a shaft to its load torque, such as "load" of a drive: what a multibody
+ * engine asks of an actuator. The mean torque is exactly J a + M, with the shaft's inertia J and the mean load torque
+ * M. Commands of controllers at sample instants within the interval count as constant in the derivative. LM_INVALID:
+ * no load torque acts on the shaft, its angle follows from no state, a mass matrix joins it to others, or inputs follow
+ * signals. */
+typedef struct {
+    double torque;       /* mean torque of the train on its inertia and load [N m] */
+    double derivative;   /* of the torque by the acceleration [kg m2]; -INFINITY: dry friction holds the shaft */
+    double acceleration; /* mean [rad/s^2] */
+} lm_answer;
+LM_API int lm_advance_answer(lm_simulation* simulation, double interval, const double* begin, const double* end,
+                             const char* shaft, lm_answer* answer);
 /* The same as lm_scenario_set_interrupt, for lm_advance, lm_advance_motion and lm_run. */
 LM_API void lm_set_interrupt(lm_simulation* simulation, int (*interrupted)(void*), void* context);
 LM_API double lm_time(const lm_simulation* simulation);
@@ -304,6 +316,14 @@ LM_API int lm_read(lm_simulation* simulation, double* variables);
 LM_API size_t lm_state_size(const lm_simulation* simulation);
 LM_API int lm_get_state(const lm_simulation* simulation, double* state);
 LM_API int lm_set_state(lm_simulation* simulation, const double* state);
+
+/* The same as a copy in memory, which takes a small part of that time. lm_snapshot_restore refuses those of a
+ * simulation of another kernel; it must be one of the same train and controllers. */
+typedef struct lm_snapshot lm_snapshot;
+LM_API lm_snapshot* lm_snapshot_new(const lm_simulation* simulation);
+LM_API void lm_snapshot_save(lm_snapshot* snapshot, const lm_simulation* simulation);
+LM_API int lm_snapshot_restore(lm_simulation* simulation, const lm_snapshot* snapshot);
+LM_API void lm_snapshot_free(lm_snapshot* snapshot);
 
 /* Derivatives in the present regime: of the rates of the states and of the variables, in the direction (states,
  * inputs). A direction or a result may be NULL. */

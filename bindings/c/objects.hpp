@@ -47,5 +47,9 @@ struct lm_simulation {
     Asked asked;
 };
 
+struct lm_snapshot {
+    lostmotion::TrainSimulation::Snapshot of;
+};
+
 // A signal, or what is wrong with it.
 std::string read_signal(const lm_signal& from, lostmotion::Signal& to);

@@ -65,6 +65,14 @@ bool is_moved(const lm::ScenarioSimulation& s, const std::string& input,
     return std::ranges::any_of(courses, [&](const auto& c) { return s.names().inputs[c.shaft.speed_input] == input; });
 }
 
+// What is wrong with an interval and its inputs, or nothing.
+std::string check_interval(const lm::ScenarioSimulation& s, double interval, const double* begin, const double* end) {
+    const std::size_t n = s.names().inputs.size();
+    if (!(std::isfinite(interval) && interval > 0.0 && s.time() + interval > s.time()))
+        return "the interval must be > 0, finite and longer than the rounding of the time";
+    return n > 0 && !(finite(begin, n) && finite(end, n)) ? "an input is missing or not finite" : "";
+}
+
 bool same_variables(const lm::Variables& a, const lm::Variables& b) {
     return std::equal(a.all().begin(), a.all().end(), b.all().begin(), b.all().end(),
                       [](const lm::Variable& x, const lm::Variable& y) { return x.name == y.name; });
@@ -153,10 +161,8 @@ int lm_advance_motion(lm_simulation* simulation, double interval, const double* 
                       const lm_motion* motions, size_t n_motions) {
     lm::ScenarioSimulation& s = simulation->simulation;
     const std::size_t n = s.names().inputs.size();
-    const double time = s.time();
-    if (!(std::isfinite(interval) && interval > 0.0 && time + interval > time))
-        return simulation->failed("the interval must be > 0, finite and longer than the rounding of the time");
-    if (n > 0 && !(finite(begin, n) && finite(end, n))) return simulation->failed("an input is missing or not finite");
+    if (std::string wrong = check_interval(s, interval, begin, end); !wrong.empty())
+        return simulation->failed(std::move(wrong));
     std::vector<lm::ScenarioSimulation::GivenCourse> courses;
     for (std::size_t k = 0; k < n_motions; ++k) {
         std::string wrong;
@@ -174,6 +180,29 @@ int lm_advance_motion(lm_simulation* simulation, double interval, const double* 
     const std::span<const double> first(begin, n), last(end, n);
     return simulation->ended(courses.empty() ? s.advance(interval, first, last)
                                              : s.advance(interval, first, last, courses));
+}
+int lm_advance_answer(lm_simulation* simulation, double interval, const double* begin, const double* end,
+                      const char* shaft, lm_answer* answer) {
+    lm::ScenarioSimulation& s = simulation->simulation;
+    std::string wrong = check_interval(s, interval, begin, end);
+    const auto& shafts = s.train().assembly().train().shafts;
+    const std::string name = shaft == nullptr ? "" : shaft;
+    const auto found = std::ranges::find(shafts, name, &lm::model::Shaft::name);
+    const auto load =
+        found == shafts.end() ? std::nullopt : s.train().load_shaft(static_cast<int>(found - shafts.begin()));
+    if (wrong.empty() && s.follows_signals()) wrong = "an input follows its signal; give all inputs";
+    if (wrong.empty() && !load)
+        wrong = "the shaft '" + name +
+                "' has no load torque of its own: there is none, none acts on it, or a mass matrix joins it to others";
+    if (!wrong.empty()) return simulation->failed(std::move(wrong));
+    s.with([&](auto& in) { in.set_interrupt(Asked::ask, &simulation->asked); });
+    const std::size_t n = s.names().inputs.size(), input = s.input_of(load->load);
+    lm::LoadAnswer out;
+    const int status = simulation->ended(s.answer(interval, {begin, n}, {end, n}, *load, out));
+    if (status == LM_OK)
+        *answer = {load->inertia * out.acceleration + 0.5 * (begin[input] + end[input]),
+                   load->inertia - 1.0 / out.compliance, out.acceleration};
+    return status;
 }
 void lm_set_interrupt(lm_simulation* simulation, int (*interrupted)(void*), void* context) {
     simulation->asked = {interrupted, context};
@@ -232,6 +261,20 @@ int lm_set_state(lm_simulation* simulation, const double* state) {
         return simulation->failed("these numbers are not those of a state of this simulation");
     return LM_OK;
 }
+
+lm_snapshot* lm_snapshot_new(const lm_simulation* simulation) {
+    auto* made = new lm_snapshot;
+    lm_snapshot_save(made, simulation);
+    return made;
+}
+void lm_snapshot_save(lm_snapshot* snapshot, const lm_simulation* simulation) {
+    simulation->simulation.train().save(snapshot->of);
+}
+int lm_snapshot_restore(lm_simulation* simulation, const lm_snapshot* snapshot) {
+    return simulation->simulation.restore(snapshot->of) ? int(LM_OK)
+                                                        : simulation->failed("the snapshot is of another simulation");
+}
+void lm_snapshot_free(lm_snapshot* snapshot) { delete snapshot; }
 
 int lm_directional_derivative(lm_simulation* simulation, const double* states, const double* inputs, double* rates,
                               double* variables) {

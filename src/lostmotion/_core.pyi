@@ -256,10 +256,25 @@ def explain_at(train: Train, inputs: Sequence[Signal], start: Mapping[str, float
 
 def linearize_at(train: Train, inputs: Sequence[Signal], start: Mapping[str, float], hysteresis_capacities: Mapping[str, float], time: float) -> tuple[Any, ...]: ...
 
+class SimulationSnapshot:
+    pass
+
 class Simulation:
     def __init__(self, train: Train, step: float, control: tuple[float, Sequence[tuple[Axis, int, int, int, int]]], sines: Sequence[tuple[int, float, float, float]]) -> None: ...
 
     def advance(self, interval: float, begin: Sequence[float], end: Sequence[float]) -> None: ...
+
+    def answer(self, interval: float, begin: Sequence[float], end: Sequence[float], shaft: int) -> tuple[float, float, float]:
+        """
+        Advances; returns inertia and mean acceleration of a shaft, and -da/dM of its load torque M.
+        """
+
+    def answers(self, shaft: int) -> bool:
+        """Whether a shaft is one of answer()."""
+
+    def snapshot(self) -> SimulationSnapshot: ...
+
+    def restore(self, snapshot: SimulationSnapshot) -> None: ...
 
     def read(self) -> list[float]: ...
 
@@ -289,6 +304,9 @@ class MotionCourse:
 
     def acceleration(self, time: float) -> float: ...
 
+class JointSnapshot:
+    pass
+
 def joint_rows() -> list[str]: ...
 
 class JointTrains:
@@ -300,6 +318,10 @@ class JointTrains:
 
     def set_guesses(self, guesses: Sequence[tuple[float, float]]) -> None:
         """Load torque [N m] and mean acceleration [rad/s^2] of each joint."""
+
+    def snapshot(self) -> JointSnapshot: ...
+
+    def restore(self, snapshot: JointSnapshot) -> None: ...
 
     def set_reference(self, joint: int, value: float, rate: float) -> None: ...
 
@@ -314,6 +336,37 @@ class JointTrains:
 
     @property
     def unsettled(self) -> int: ...
+
+class ExactBatchSnapshot:
+    pass
+
+class ExactBatch:
+    def __init__(self, trains: Sequence[Train], controls: Sequence[tuple[float, Sequence[tuple[Axis, int, int, int, int]]]], kind_of: Sequence[int], step: float) -> None: ...
+
+    def step(self, inputs: Sequence[Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]], speed: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)] | None, angle: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)] | None, acceleration: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)] | None, threads: int) -> None: ...
+
+    def reset(self, which: Annotated[NDArray[numpy.bool_], dict(shape=(None,), order='C', device='cpu', writable=False)] | None, start: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> None: ...
+
+    @property
+    def inputs(self) -> list[str]: ...
+
+    @property
+    def states(self) -> list[str]: ...
+
+    @property
+    def variables(self) -> list[str]: ...
+
+    @property
+    def values(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None))]:
+        """The values of all drives, by variable; each step writes them anew."""
+
+    def snapshot(self) -> ExactBatchSnapshot: ...
+
+    def restore(self, snapshot: ExactBatchSnapshot) -> None: ...
+
+    @property
+    def memory(self) -> int:
+        """Bytes, without what the solvers keep of the regimes."""
 
 class BatchSnapshot:
     pass

@@ -11,7 +11,6 @@ namespace lostmotion::batch {
 namespace {
 
 constexpr std::size_t most_solvers = 64;  // that a thread keeps
-constexpr std::size_t at_a_time = 64;     // drives that a thread takes
 constexpr std::size_t ahead = 4;          // drives whose tables are fetched
 
 }  // namespace
@@ -57,52 +56,6 @@ struct DriveBatch::Worker {
     }
 };
 
-// Threads that wait for work.
-struct DriveBatch::Team {
-    using Task = std::function<void(std::size_t)>;  // of the number of the thread
-
-    explicit Team(std::size_t threads) {
-        for (std::size_t k = 1; k < threads; ++k)
-            members.emplace_back([this, k](const std::stop_token& stop) {
-                long seen = 0;
-                while (true) {
-                    std::unique_lock lock(mutex);
-                    begin.wait(lock, [&] { return round != seen || stop.stop_requested(); });
-                    if (stop.stop_requested()) return;
-                    seen = round;
-                    lock.unlock();
-                    (*task)(k);
-                    lock.lock();
-                    if (--working == 0) done.notify_one();
-                }
-            });
-    }
-    ~Team() {
-        for (std::jthread& m : members) m.request_stop();
-        const std::lock_guard lock(mutex);
-        begin.notify_all();
-    }
-    void run(const Task& work) {
-        {
-            const std::lock_guard lock(mutex);
-            task = &work;
-            working = members.size();
-            ++round;
-        }
-        begin.notify_all();
-        work(0);
-        std::unique_lock lock(mutex);
-        done.wait(lock, [&] { return working == 0; });
-    }
-
-    std::mutex mutex;
-    std::condition_variable begin, done;
-    const Task* task = nullptr;
-    std::size_t working = 0;
-    long round = 0;
-    std::vector<std::jthread> members;
-};
-
 std::string DriveBatch::error(const model::Train& train) {
     const TrainRun run(train);
     if (!run.error().empty()) return run.error();
@@ -124,7 +77,6 @@ DriveBatch::DriveBatch(Models models, std::vector<int> model_of, double step)
       rated_input_speed_(models_.place("gearbox.rated_input_speed")) {}
 
 DriveBatch::~DriveBatch() {
-    team_.reset();
     for (std::atomic<RegimeTable*>& first : tables_)
         for (RegimeTable* t = first; t != nullptr;) RegimeTable::Free{}(std::exchange(t, t->next));
 }
@@ -147,28 +99,14 @@ RegimeTable* DriveBatch::table(std::size_t model, const Label& label, Worker& wo
 }
 
 Failure DriveBatch::step(const Input& command, const Input& load_torque, unsigned threads) {
-    const std::size_t n = drives_.size();
-    const std::size_t tasks = (n + at_a_time - 1) / at_a_time;
-    const std::size_t wanted = std::max<std::size_t>(1, std::min<std::size_t>(threads, tasks));
-    while (workers_.size() < wanted) workers_.push_back(std::make_unique<Worker>());
-    if (wanted == 1) {
-        step_range(0, n, command, load_torque, *workers_[0]);
-    } else {
-        if (!team_ || team_->members.size() + 1 != wanted) {
-            team_.reset();
-            team_ = std::make_unique<Team>(wanted);
-        }
-        std::atomic<std::size_t> next{0};
-        team_->run([&](std::size_t who) {
-            for (std::size_t t = next++; t < tasks; t = next++)
-                step_range(t * at_a_time, std::min(n, (t + 1) * at_a_time), command, load_torque, *workers_[who]);
-        });
-    }
+    while (workers_.size() < Team::needed(size(), threads)) workers_.push_back(std::make_unique<Worker>());
+    team_.share(size(), threads, [&](std::size_t begin, std::size_t end, std::size_t who) {
+        step_range(begin, end, command, load_torque, *workers_[who]);
+    });
     Failure first;
     for (const auto& w : workers_) {
         counts_ += std::exchange(w->counts, {});
-        Failure failure = std::exchange(w->failure, {});
-        if (!failure.text.empty() && (first.text.empty() || failure.drive < first.drive)) first = std::move(failure);
+        first.add(std::exchange(w->failure, {}));
     }
     return first;
 }
@@ -270,9 +208,8 @@ bool DriveBatch::solve(std::size_t k, const Inputs& u, Worker& worker) {
             s.restore(from);
             const Status status = s.advance(step_, u, u);
             if (status != Status::done) {
-                if (worker.failure.text.empty() || k < worker.failure.drive)
-                    worker.failure = {k, train_status_text(simulation.assembly(), status, s.time(), s.stopped_at(),
-                                                           s.too_many_guards())};
+                worker.failure.add({k, train_status_text(simulation.assembly(), status, s.time(), s.stopped_at(),
+                                                         s.too_many_guards())});
                 return false;
             }
             const auto& to = s.snapshot();

@@ -10,16 +10,15 @@
 #pragma once
 
 #include <atomic>
-#include <condition_variable>
-#include <functional>
+#include <memory>
 #include <mutex>
-#include <span>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "../simulation/train_stepping.hpp"
+#include "input.hpp"
 #include "regime_table.hpp"
+#include "team.hpp"
 
 namespace lostmotion::batch {
 
@@ -66,18 +65,6 @@ struct alignas(64) DriveState {
 };
 static_assert(sizeof(DriveState) == 64);
 
-// A value for all drives, or one for each.
-struct Input {
-    const double* values;
-    bool each;
-    double operator[](std::size_t k) const { return values[each ? k : 0]; }
-};
-
-struct Failure {
-    std::size_t drive = 0;
-    std::string text;  // empty: there is none
-};
-
 class DriveBatch {
  public:
     // model_of: of each drive its model. step: [s].
@@ -119,7 +106,6 @@ class DriveBatch {
 
  private:
     struct Worker;
-    struct Team;
 
     void step_range(std::size_t begin, std::size_t end, const Input& command, const Input& load_torque, Worker& worker);
     bool solve(std::size_t k, const Inputs& u, Worker& worker);
@@ -141,7 +127,7 @@ class DriveBatch {
     int rated_output_torque_, rated_input_speed_;    // places of these keys
     std::mutex adding_;
     std::vector<std::unique_ptr<Worker>> workers_;
-    std::unique_ptr<Team> team_;
+    Team team_;
     Counts counts_;
 };
 

@@ -67,6 +67,16 @@ auto ScenarioSimulation::advance(double interval, std::span<const double> begin,
     });
 }
 
+auto ScenarioSimulation::answer(double interval, std::span<const double> begin, std::span<const double> end,
+                                const LoadShaft& shaft, LoadAnswer& out) -> Status {
+    set_references(begin, end, interval);
+    for (std::size_t k = 0; k < free_.size(); ++k) {
+        begin_[free_[k]] = begin[k];
+        end_[free_[k]] = end[k];
+    }
+    return train_.answer(interval, begin_, end_, shaft, out);
+}
+
 std::optional<ScenarioSimulation::GivenShaft> ScenarioSimulation::given_shaft(const std::string& name) const {
     const auto input = [&](const std::string& of) {
         return static_cast<std::size_t>(std::ranges::find(names_.inputs, name + of) - names_.inputs.begin());
@@ -221,6 +231,12 @@ bool ScenarioSimulation::set_state(const double* from) {
     });
     follow_signals(time(), accumulated);
     return true;
+}
+
+bool ScenarioSimulation::restore(const TrainSimulation::Snapshot& from) {
+    const bool well = train_.restore(from);
+    if (well) follow_signals(time(), accumulated);
+    return well;
 }
 
 double ScenarioSimulation::Played::line(double time) const {

@@ -60,6 +60,11 @@ class ScenarioSimulation {
     // How many inputs the solver has, those of controllers among them, and which of them is the k-th of the names.
     std::size_t solver_inputs() const { return begin_.size(); }
     std::size_t solver_input(std::size_t k) const { return free_[k]; }
+    // The other way round.
+    std::size_t input_of(int solver_input) const {
+        return static_cast<std::size_t>(std::ranges::find(free_, static_cast<std::size_t>(solver_input)) -
+                                        free_.begin());
+    }
     std::size_t free_inputs() const { return free_.size(); }
     // The present value of an input that follows its signal in the scenario; NaN of one that is given.
     double played_input(std::size_t k) const;
@@ -74,6 +79,7 @@ class ScenarioSimulation {
         return train_.with(use);
     }
     TrainSimulation& train() { return train_; }
+    const TrainSimulation& train() const { return train_; }
 
     double time() const {
         return with([](const auto& s) { return s.time(); });
@@ -90,6 +96,10 @@ class ScenarioSimulation {
     // Each input of names().inputs runs in a straight line from its first to its second value, or follows its signal,
     // at the breakpoints of which the interval is divided.
     Status advance(double interval, std::span<const double> begin, std::span<const double> end);
+    // The same without signals, with the answer of a shaft to its load torque.
+    Status answer(double interval, std::span<const double> begin, std::span<const double> end, const LoadShaft& shaft,
+                  LoadAnswer& out);
+    bool follows_signals() const { return !played_.empty(); }
     // A shaft whose motion is given: its inputs among the names, and its variables.
     struct GivenShaft {
         std::size_t speed_input, acceleration_input;
@@ -135,6 +145,9 @@ class ScenarioSimulation {
 
     // All variables at the present instant, with the inputs at their last values.
     Status read(double* out);
+
+    // False: the snapshot is not one of such a simulation.
+    bool restore(const TrainSimulation::Snapshot& from);
 
     // Another scenario of the same elements, at the present state: the contacts are found anew.
     void go_on_from(const ScenarioSimulation& before);

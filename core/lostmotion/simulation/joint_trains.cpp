@@ -5,40 +5,9 @@
 
 namespace lostmotion {
 
-namespace {
-
-// The place of the angle of a shaft among the states of the layout, or nowhere.
-int angle_of(const model::Assembly& a, int shaft) {
-    const model::Places& places = a.places();
-    if (const int state = places.shafts[static_cast<std::size_t>(shaft)].angle; state != model::nowhere) return state;
-    for (std::size_t part = 0; part < places.last_shaft.size(); ++part)
-        if (places.last_shaft[part] == shaft) return a.layout().coupled + static_cast<int>(part);
-    return model::nowhere;
-}
-
-}  // namespace
-
-bool JointTrains::suits(const TrainSimulation& train, int shaft) {
-    const model::Assembly& a = train.assembly();
-    const bool loaded = a.places().shafts[static_cast<std::size_t>(shaft)].load != model::nowhere;
-    return loaded && angle_of(a, shaft) != model::nowhere;
-}
-
 JointTrains::JointTrains(std::vector<Joint> joints) : joints_(std::move(joints)) {
     const std::size_t n = joints_.size();
-    for (Joint& j : joints_) {
-        const model::Assembly& a = j.train->assembly();
-        const model::Layout& layout = a.layout();
-        const auto& shaft = a.places().shafts[static_cast<std::size_t>(j.shaft)];
-        const int angle = angle_of(a, j.shaft);
-        j.speed_state = shaft.speed;
-        j.angle_state = j.train->with([&]<class S>(const S&) {
-            return angle < layout.coupled ? angle : angle - layout.coupled + static_cast<int>(S::D::coupled);
-        });
-        j.load = shaft.load;
-        j.inputs.assign(static_cast<std::size_t>(layout.inputs), 0.0);
-        inertia_.push_back(a.train().shafts[static_cast<std::size_t>(j.shaft)].inertia);
-    }
+    for (Joint& j : joints_) j.inputs.assign(static_cast<std::size_t>(j.train->assembly().layout().inputs), 0.0);
     answer_.resize(n);
     residual_.resize(n);
     best_torque_.resize(n);
@@ -53,44 +22,32 @@ JointTrains::JointTrains(std::vector<Joint> joints) : joints_(std::move(joints))
 
 auto JointTrains::guess(std::size_t joint) const -> Guess {
     const Joint& j = joints_[joint];
-    return {j.inputs[static_cast<std::size_t>(j.load)], answer_[joint].acceleration};
+    return {j.inputs[static_cast<std::size_t>(j.shaft.load)], answer_[joint].acceleration};
 }
 
 void JointTrains::set_guess(std::size_t joint, const Guess& g) {
     Joint& j = joints_[joint];
-    j.inputs[static_cast<std::size_t>(j.load)] = g.torque;
+    j.inputs[static_cast<std::size_t>(j.shaft.load)] = g.torque;
     answer_[joint].acceleration = g.acceleration;
 }
 
 void JointTrains::read() {
     for (Joint& j : joints_)
         j.train->with([&](const auto& s) {
-            j.speed = s.snapshot().x[j.speed_state];
-            j.angle = s.snapshot().x[j.angle_state];
+            j.speed = s.snapshot().x[j.shaft.speed_state];
+            j.angle = s.snapshot().x[j.shaft.angle_state];
         });
 }
 
-Status JointTrains::respond(std::size_t joint, double interval, double slope, Answer& answer) {
-    Joint& j = joints_[joint];
+Status JointTrains::respond(std::size_t joint, double interval, double slope) {
+    const Joint& j = joints_[joint];
     ++evaluations_;
-    return j.train->with([&]<class S>(S& s) {
-        InputsOf<typename S::D> begin{}, end{};
-        std::copy(j.inputs.begin(), j.inputs.end(), begin.begin());
-        end = begin;
-        begin[j.load] -= 0.5 * interval * slope;
-        end[j.load] += 0.5 * interval * slope;
-        const double before = s.snapshot().x[j.speed_state];
-        const Status status = s.respond(interval, begin, end, j.load);
-        if (status != Status::done) {
-            failed_ = joint;
-            return status;
-        }
-        const double after = s.snapshot().x[j.speed_state];
-        answer.acceleration = (after - before) / interval;
-        answer.rounding = 0x1p-52 * std::fmax(std::fabs(before), std::fabs(after)) / interval;
-        answer.compliance = std::fmax(0.0, -s.response()[j.speed_state] / interval);
-        return status;
-    });
+    begin_inputs_ = end_inputs_ = j.inputs;
+    begin_inputs_[static_cast<std::size_t>(j.shaft.load)] -= 0.5 * interval * slope;
+    end_inputs_[static_cast<std::size_t>(j.shaft.load)] += 0.5 * interval * slope;
+    const Status status = j.train->answer(interval, begin_inputs_, end_inputs_, j.shaft, answer_[joint]);
+    if (status != Status::done) failed_ = joint;
+    return status;
 }
 
 // The linear equations of Newton's method, by elimination with row pivoting; the residuals become the changes.
@@ -98,8 +55,8 @@ bool JointTrains::solve() {
     const std::size_t n = joints_.size();
     for (std::size_t r = 0; r < n; ++r)
         for (std::size_t c = 0; c < n; ++c)
-            matrix_[r * n + c] =
-                (r == c ? 1.0 : 0.0) + (mass_[r * n + c] - (r == c ? inertia_[r] : 0.0)) * answer_[c].compliance;
+            matrix_[r * n + c] = (r == c ? 1.0 : 0.0) +
+                                 (mass_[r * n + c] - (r == c ? joints_[r].shaft.inertia : 0.0)) * answer_[c].compliance;
     change_ = residual_;
     for (std::size_t k = 0; k < n; ++k) {
         std::size_t pivot = k;
@@ -132,16 +89,15 @@ Status JointTrains::substep(double interval) {
     for (int iteration = 0;; ++iteration) {
         for (std::size_t k = 0; k < n; ++k) {
             if (iteration > 0) joints_[k].train->with([](auto& s) { s.go_back(); });
-            if (const Status status = respond(k, interval, slope_[k], answer_[k]); status != Status::done)
-                return status;
+            if (const Status status = respond(k, interval, slope_[k]); status != Status::done) return status;
         }
         double worst = 0.0;  // over what rounding leaves
         bool settled = true;
         for (std::size_t r = 0; r < n; ++r) {
-            const double load = joints_[r].inputs[static_cast<std::size_t>(joints_[r].load)];
+            const double load = joints_[r].inputs[static_cast<std::size_t>(joints_[r].shaft.load)];
             double sum = -force_[r] - load, size = std::fabs(force_[r]) + std::fabs(load), rounding = 0.0;
             for (std::size_t c = 0; c < n; ++c) {
-                const double coupled = mass_[r * n + c] - (r == c ? inertia_[r] : 0.0);
+                const double coupled = mass_[r * n + c] - (r == c ? joints_[r].shaft.inertia : 0.0);
                 sum += coupled * answer_[c].acceleration;
                 size += std::fabs(coupled * answer_[c].acceleration);
                 rounding += std::fabs(coupled) * answer_[c].rounding;
@@ -159,7 +115,7 @@ Status JointTrains::substep(double interval) {
             share *= 0.5;  // a switching lies between: less of the last change
         } else {
             for (std::size_t k = 0; k < n; ++k)
-                best_torque_[k] = joints_[k].inputs[static_cast<std::size_t>(joints_[k].load)];
+                best_torque_[k] = joints_[k].inputs[static_cast<std::size_t>(joints_[k].shaft.load)];
             best = worst;
             share = 1.0;
             if (!solve()) {
@@ -168,12 +124,13 @@ Status JointTrains::substep(double interval) {
             }
         }
         for (std::size_t k = 0; k < n; ++k)
-            joints_[k].inputs[static_cast<std::size_t>(joints_[k].load)] = best_torque_[k] + share * change_[k];
+            joints_[k].inputs[static_cast<std::size_t>(joints_[k].shaft.load)] = best_torque_[k] + share * change_[k];
     }
     for (std::size_t k = 0; k < n; ++k) {
         Joint& j = joints_[k];
         j.compliance = answer_[k].compliance;
-        j.torque += inertia_[k] * answer_[k].acceleration + j.inputs[static_cast<std::size_t>(j.load)];
+        j.torque +=
+            joints_[k].shaft.inertia * answer_[k].acceleration + j.inputs[static_cast<std::size_t>(j.shaft.load)];
     }
     return Status::done;
 }

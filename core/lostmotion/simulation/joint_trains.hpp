@@ -2,7 +2,7 @@
 //
 // The load shaft of each train carries a nominal inertia J_i and a load torque L_i that is constant over a substep.
 // With its mean acceleration a_i, the mean torque that the train gives to the joint is, by its momentum and exactly,
-//     tau_i = J_i a_i + L_i.
+//     tau_i = J_i a_i + L_i,    dtau_i/da_i = J_i - 1/c_i.
 // The engine asks for M a = f + tau, so that the load torques have to be
 //     L = (M - J) a(L) - f.
 // Newton's method solves that with the exact derivatives c_i = -da_i/dL_i >= 0 (torque_response.hpp):
@@ -24,19 +24,15 @@ class JointTrains {
  public:
     struct Joint {
         TrainSimulation* train;
-        int shaft;                        // the load shaft, which has a load torque and whose angle is a state
+        LoadShaft shaft;
         std::vector<double> inputs = {};  // the last of all inputs of the train
         double torque = 0.0;              // mean torque on the joint over the last step [N m]
         double speed = 0.0, angle = 0.0;  // of the joint, now [rad/s, rad]
         double acceleration = 0.0;        // mean over the last step [rad/s^2]
         double compliance = 0.0;          // c_i of the last substep [1/(kg m2)]
-        int speed_state = -1, angle_state = -1, load = -1;  // in the kernel, and the input
     };
 
-    // Whether a shaft can be the load of a joint: it has a load torque, and its angle is a state.
-    static bool suits(const TrainSimulation& train, int shaft);
-
-    // The trains must stay and fulfil suits().
+    // The trains must stay.
     explicit JointTrains(std::vector<Joint> joints);
 
     const std::vector<Joint>& joints() const { return joints_; }
@@ -65,21 +61,17 @@ class JointTrains {
     std::size_t unsettled() const { return unsettled_; }  // substeps in which Newton's method has not come to its end
 
  private:
-    struct Answer {
-        double acceleration, compliance;
-        double rounding;  // of the acceleration [rad/s^2], which is a difference of speeds
-    };
     static constexpr int most_iterations = 30;
 
     // slope: of the load torque [N m/s], around its mean.
-    Status respond(std::size_t joint, double interval, double slope, Answer& answer);
+    Status respond(std::size_t joint, double interval, double slope);
     Status substep(double interval);
     bool solve();
 
     std::vector<Joint> joints_;
-    std::vector<double> inertia_;
-    std::vector<Answer> answer_;
-    std::vector<double> mass_, force_, slope_;  // of a substep
+    std::vector<LoadAnswer> answer_;
+    std::vector<double> begin_inputs_, end_inputs_;  // of a joint
+    std::vector<double> mass_, force_, slope_;       // of a substep
     std::vector<double> residual_, best_torque_, change_, matrix_, begin_speed_;
     std::size_t failed_ = 0, evaluations_ = 0, unsettled_ = 0;
 };

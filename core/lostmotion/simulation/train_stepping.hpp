@@ -80,6 +80,20 @@ std::vector<double> TrainSimulationIn<D>::values() {
     return TrainReader<D>(Own::model, r, Base::snapshot().memory)(Base::snapshot().x, Base::inputs());
 }
 
+// A shaft with a load torque whose angle is a state.
+struct LoadShaft {
+    int speed_state, angle_state;  // in the kernel
+    int load;                      // its load torque, among the inputs
+    double inertia;                // [kg m^2]
+};
+
+// How a train answers a load torque M over an interval.
+struct LoadAnswer {
+    double acceleration = 0.0;  // mean a of the shaft [rad/s^2]
+    double rounding = 0.0;      // of it, which is a difference of speeds
+    double compliance = 0.0;    // -da/dM >= 0 [1/(kg m^2)], M shifted all over the interval; 0: the shaft is held
+};
+
 class TrainSimulation {
  public:
     // The train must have passed the check, and its controllers theirs.
@@ -102,18 +116,37 @@ class TrainSimulation {
     }
     // Each input runs in a straight line from its first to its second value.
     Status advance(double interval, std::span<const double> begin, std::span<const double> end);
+    // Nothing: the shaft has no load torque, its angle is no state, or a mass matrix joins it to others.
+    std::optional<LoadShaft> load_shaft(int shaft) const;
+    // advance(), with the answer of a shaft to its load torque.
+    Status answer(double interval, std::span<const double> begin, std::span<const double> end, const LoadShaft& shaft,
+                  LoadAnswer& out);
     // To t = 0, with the contacts still to be found. Returns what is wrong with the start, or nothing.
     std::string reset(const TrainStart& start);
 
  private:
     template <class... D>
-    using In = std::variant<std::unique_ptr<TrainSimulationIn<D>>...>;
+    struct Kernels {
+        using Simulations = std::variant<std::unique_ptr<TrainSimulationIn<D>>...>;
+        using Snapshots = std::variant<typename TrainSimulationIn<D>::Snapshot...>;
+    };
+    using Built =
+        std::conditional_t<built == Kernel::all, Kernels<model::Least, model::Narrow, model::Middle, model::Wide>,
+                           std::conditional_t<built == Kernel::drive_and_wide, Kernels<model::Least, model::Wide>,
+                                              Kernels<model::Widest>>>;
 
+ public:
+    // A copy of the state, for this simulation or one of the same train and controllers.
+    using Snapshot = typename Built::Snapshots;
+    void save(Snapshot& to) const {
+        with([&](const auto& s) { to = s.snapshot(); });
+    }
+    // False: the snapshot is that of another kernel.
+    bool restore(const Snapshot& from);
+
+ private:
     TrainRun run_;
-    std::conditional_t<
-        built == Kernel::all, In<model::Least, model::Narrow, model::Middle, model::Wide>,
-        std::conditional_t<built == Kernel::drive_and_wide, In<model::Least, model::Wide>, In<model::Widest>>>
-        in_;
+    typename Built::Simulations in_;
 };
 
 // Compiled once for each kernel, by core/kernels.

@@ -1,4 +1,5 @@
 from .actuated import Actuated as Actuated
+from .actuated import ActuatedSnapshot as ActuatedSnapshot
 from .actuated import ActuatedState as ActuatedState
 from .actuated import attach as attach
 from .reduction import Reduction as Reduction

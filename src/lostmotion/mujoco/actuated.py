@@ -21,9 +21,9 @@ from ..model.drive import Drive
 from ..model.load import Load
 from ..model.motor import Motor
 from ..model.train import DriveTrain
-from ..simulation.drive_scenario import DriveScenario, LoadTable
+from ..simulation.drive_scenario import DriveScenario
+from ..simulation.exact_batches import controlled
 from ..simulation.joint_trains import Driven, JointDrive, JointTrains, joint_drive
-from ..simulation.scenario import SimulationTable
 from ..simulation.shipped import shipped_scenarios
 from ..simulation.sources import load_drive
 from .joints import joint_id
@@ -48,6 +48,13 @@ class ActuatedState:
     course: tuple[Any, ...] = field(repr=False)
 
 
+@dataclass(frozen=True)
+class ActuatedSnapshot(ActuatedState):
+    """Copy of a state in memory, as `Actuated.snapshot` returns it. It cannot be pickled; an `ActuatedState` can."""
+
+    of: Actuated = field(repr=False)
+
+
 class Actuated:
     """A robot of MuJoCo whose joints are turned by exact drives. `attach` makes it.
 
@@ -68,6 +75,7 @@ class Actuated:
         import mujoco
 
         self._mj = mujoco
+        self._kind = mujoco.mjtState.mjSTATE_INTEGRATION
         self.model = model
         self.data = mujoco.MjData(model)
         self.joints: tuple[str, ...] = tuple(given)
@@ -362,17 +370,42 @@ class Actuated:
 
     @property
     def state(self) -> ActuatedState:
-        """The whole state; set it to return to it."""
-        kind = self._mj.mjtState.mjSTATE_INTEGRATION
-        values = np.zeros(self._mj.mj_stateSize(self.model, kind))
-        self._mj.mj_getState(self.model, self.data, values, kind)
-        course = self._acceleration, self._before, self._contact, self._last  # never changed in place
-        return ActuatedState(values, self._trains.state, course)
+        """The whole state; set it to return to it. `snapshot` is faster, for this object alone."""
+        return ActuatedState(self._robot_state(), self._trains.state, self._course())
 
     @state.setter
     def state(self, state: ActuatedState) -> None:
-        self._mj.mj_setState(self.model, self.data, state.mujoco, self._mj.mjtState.mjSTATE_INTEGRATION)
         self._trains.state = state.drives
+        self._restore_robot(state)
+
+    def snapshot(self) -> ActuatedSnapshot:
+        """Copy of the whole state in memory, which `restore` returns to to the last bit."""
+        return ActuatedSnapshot(self._robot_state(), self._trains.snapshot(), self._course(), self)
+
+    def restore(self, snapshot: ActuatedSnapshot) -> None:
+        """Return to the state of a snapshot of this object.
+
+        Raises
+        ------
+        InputError
+            The snapshot is that of another one.
+        """
+        if not isinstance(snapshot, ActuatedSnapshot) or snapshot.of is not self:
+            raise InputError(f"snapshot: {shown(snapshot)} is none of this robot; between robots, use state")
+        self._trains.restore(snapshot.drives)
+        self._restore_robot(snapshot)
+
+    def _robot_state(self) -> np.ndarray:
+        values = np.zeros(self._mj.mj_stateSize(self.model, self._kind))
+        self._mj.mj_getState(self.model, self.data, values, self._kind)
+        return values
+
+    def _course(self) -> tuple[Any, ...]:
+        """Arrays that the next step predicts from; none is changed in place."""
+        return self._acceleration, self._before, self._contact, self._last
+
+    def _restore_robot(self, state: ActuatedState) -> None:
+        self._mj.mj_setState(self.model, self.data, state.mujoco, self._kind)
         self._acceleration, self._before, self._contact, self._last = state.course
 
 
@@ -402,13 +435,7 @@ def drive_of_joint(joint: str, given: Any, controller: Controller | None) -> Dri
         raise InputError(
             f"joint {joint!r}: controllers are for drives; give a Drive, or a scenario with its controller"
         )
-    return DriveScenario(
-        motor=given.motor,
-        gearbox=given.gearbox,
-        load=LoadTable(**given.load.model_dump()),
-        controller=controller,
-        simulation=SimulationTable(duration=1.0, sample_interval=1e-3),
-    )
+    return controlled(given, controller)
 
 
 def _named(joint: str, name: str) -> Drive | DriveScenario:

@@ -5,6 +5,8 @@ from .explanation import Explanation as Explanation
 from .explanation import MotorState as MotorState
 from .results import RunArrays as RunArrays
 from .results import scenario_of as scenario_of
+from .simulation_answers import LoadAnswer as LoadAnswer
+from .simulation_answers import SimulationSnapshot as SimulationSnapshot
 from .simulation_state import SimulationState as SimulationState
 from .train_tables import ShaftTable as ShaftTable
 from .train_tables import SlideTable as SlideTable

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..control.controller import Controller
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.limits import check_free
@@ -17,6 +18,8 @@ from ..inputs.quantities import Count, Time
 from ..inputs.validation import did_you_mean, listed, shown
 from ..model.drive import Drive
 from ..model.torsion import Rigid, TorsionCurve
+from .exact_batches import ExactBatch
+from .given_motion import UNITS
 from .stepping_parts import MAX_INTERVAL, MIN_INTERVAL
 from .variables import STATES
 
@@ -65,6 +68,11 @@ class SimulationBatch:
         Seed of the generator that these functions get.
     threads
         Number of threads; default: one for each processor. Results do not depend on it.
+    controllers
+        A sampled controller for all motors, or one for each, which runs at its own sample instants within the steps. It
+        is tuned to the drives of `drives`, not to what varies.
+    given_motion
+        Whether the motion of the loads is given to `step`, as by a multibody engine.
 
     Raises
     ------
@@ -88,7 +96,8 @@ class SimulationBatch:
     Notes
     -----
     Each step is exact, whatever its length: `switchings` within it are located to rounding. A drive does not know of the
-    others, so its results do not depend on their number, on their order or on `threads`, to the last bit.
+    others, so its results do not depend on their number, on their order or on `threads`, to the last bit. Drives with
+    controllers or a given motion are stepped by the solver of `Simulation`.
     """
 
     @checked
@@ -101,6 +110,8 @@ class SimulationBatch:
         vary: Mapping[str, Any] | None = None,
         seed: int = 0,
         threads: Count | None = None,
+        controllers: Controller | Sequence[Controller] | None = None,
+        given_motion: bool = False,
     ) -> None:
         if not MIN_INTERVAL <= step <= MAX_INTERVAL:
             raise InputError(f"step {step} s must lie between {MIN_INTERVAL:g} s and {MAX_INTERVAL:g} s")
@@ -116,30 +127,48 @@ class SimulationBatch:
             one, several = drives[0], list(drives)
         if several is not None and (count is not None or vary):
             raise InputError("count and vary: are for one drive; in a list each drive has its own parameters")
-        own = _Own([], np.zeros((1, 0)), -1)
         if several is None:
             self._count = _count_of(count, vary or {})
             check_free(DRIVE_BYTES * self._count, f"count: {self._count:.3g} drives", "take several batches")
-            own = _own_parameters(one, vary or {}, self._count, np.random.default_rng(seed))
-            bases, models = [one], np.zeros(self._count, dtype=int)
-            values = own.values
+        else:
+            self._count = len(several)
+        generator = np.random.default_rng(seed)
+        self._core: Any
+        self._exact: ExactBatch | None = None
+        self._controlled, self._given = controllers is not None, given_motion
+        if self._controlled or given_motion:
+            each = several or _each_drive(one, vary or {}, self._count, generator)
+            pairs = None if controllers is None else _pairs(controllers, several or [one] * self._count)
+            self._exact = self._core = ExactBatch(each, pairs, given_motion, step)
+            bases, self._states = each, self._exact.variables
+        else:
+            bases = self._tabulate([one] if several is None else several, vary or {}, generator)
+            self._states = dict(zip(STATES, self._core.states, strict=True))
+        self._rigid = any(isinstance(drive.gearbox.stiffness, Rigid) for drive in bases)
+        self._time = np.zeros(self._count)
+
+    def _tabulate(self, drives: list[Drive], vary: Mapping[str, Any], generator: np.random.Generator) -> list[Drive]:
+        """Make the core that steps by tables; the drives that differ."""
+        own = _Own([], np.zeros((1, 0)), -1)
+        if vary or len(drives) != self._count:
+            own = _own_parameters(drives[0], vary, self._count, generator)
+            bases, models, values = drives, np.zeros(self._count, dtype=int), own.values
             if own.keys or own.breaks >= 0:
                 values, models = np.unique(own.values, axis=0, return_inverse=True)
             base = [0] * len(values)
         else:
-            self._count = len(several)
             numbers: dict[Drive, int] = {}
-            models = np.array([numbers.setdefault(drive, len(numbers)) for drive in several])
+            models = np.array([numbers.setdefault(drive, len(numbers)) for drive in drives])
             bases, base, values = list(numbers), list(range(len(numbers))), np.zeros((len(numbers), 0))
         cores = [drive.core() for drive in bases]
         for core in cores:
             if problem := _core.DriveBatch.error(core):
                 raise InputError(f"drives: one {problem}; use lm.Simulation for it")
         places = models.reshape(-1).tolist()
-        self._core = _core.DriveBatch(cores, base, own.keys, own.breaks, np.ascontiguousarray(values), places, step)
-        self._rigid = any(isinstance(drive.gearbox.stiffness, Rigid) for drive in bases)
-        self._time = np.zeros(self._count)
-        self._states = dict(zip(STATES, self._core.states, strict=True))
+        self._core = _core.DriveBatch(
+            cores, base, own.keys, own.breaks, np.ascontiguousarray(values), places, self._step
+        )
+        return bases
 
     def __len__(self) -> int:
         return self._count
@@ -168,27 +197,55 @@ class SimulationBatch:
         return dict(zip(("steps", "with_events", "general", "switchings"), self._core.counts, strict=True))
 
     @checked
-    def step(self, command: Any, load_torque: Any = 0.0) -> None:
+    def step(self, command: Any, load_torque: Any = 0.0, *, motion: Mapping[str, Any] | None = None) -> None:
         """Advance all drives by one step.
 
         Parameters
         ----------
         command
             Command of the motor, as of `simulate`: share of the rated voltage, or of a torque source of its rated torque; a number, or an
-            array with a number for each drive.
+            array with a number for each drive. With `controllers` their reference: position [rad], speed [rad/s] or torque [N·m].
         load_torque
             Torque [N·m] that the load takes, in the same way.
+        motion
+            With `given_motion`, of the loads at the end of the step: ``speed`` [rad/s], and if wanted ``angle`` [rad] and ``acceleration``
+            [rad/s²], each a number or an array. The course within the step is that of `Simulation.advance`. The torque
+            that this takes is the variable ``load_drive_torque``.
 
         Raises
         ------
         InputError
-            An argument has another shape, or is not finite.
+            An argument has another shape, or is not finite; the motion is missing, or not to be given.
         SolverError
             The motion of a drive has no continuation. That drive stays where it was; all others are advanced.
         """
         inputs = _numbers("command", command, self._count), _numbers("load_torque", load_torque, self._count)
-        self._core.step(*inputs, self._threads)
+        if self._exact is None:
+            if motion is not None:
+                raise InputError("motion: is for a batch with given_motion=True")
+            self._core.step(*inputs, self._threads)
+        else:
+            self._exact.step(*inputs, self._motion_of(motion, inputs[1]), self._threads)
         self._time += self._step
+
+    def _motion_of(self, motion: Mapping[str, Any] | None, load_torque: np.ndarray) -> dict[str, np.ndarray]:
+        """The given motion, checked."""
+        if not self._given:
+            if motion is not None:
+                raise InputError("motion: is for a batch with given_motion=True")
+            return {}
+        if motion is None:
+            raise InputError('motion: is missing; give the speed at the end of the step, motion={"speed": ...}')
+        if load_torque.any():
+            raise InputError("load_torque: does not act on a load whose motion is given; leave it out")
+        for key in motion:
+            if key not in UNITS:
+                raise InputError(
+                    f"motion.{key}: is not known; {did_you_mean(key, UNITS, f'there are {listed(UNITS)}')}"
+                )
+        if "speed" not in motion:
+            raise InputError("motion.speed: is missing; give the speed at the end of the step [rad/s]")
+        return {key: _numbers(f"motion.{key}", value, self._count) for key, value in motion.items()}
 
     @checked
     def reset(self, which: Any = None, initial: Mapping[str, Any] | None = None) -> None:
@@ -215,19 +272,20 @@ class SimulationBatch:
                     f"which: {shown(which)} must be an array of {self._count} Booleans, one for each drive"
                 )
             mask = np.ascontiguousarray(mask)
-        start = None
-        if initial:
-            start = np.zeros((self._count, len(STATES)))
-            for name, value in initial.items():
-                if name not in STATES:
-                    known = f"the states are {listed(STATES)}"
-                    raise InputError(f"initial.{name}: is no state; {did_you_mean(name, STATES, known)}")
-                start[:, STATES.index(name)] = _numbers(f"initial.{name}", value, self._count)
-                if self._rigid and name != "load_angle" and start[:, STATES.index(name)].any():
-                    raise InputError(
-                        f"initial.{name}: a rigid gearbox begins at rest in a batch; give load_angle alone"
-                    )
-        self._core.reset(mask, start)
+        values = {}
+        for name, value in (initial or {}).items():
+            if name not in STATES:
+                known = f"the states are {listed(STATES)}"
+                raise InputError(f"initial.{name}: is no state; {did_you_mean(name, STATES, known)}")
+            values[name] = np.broadcast_to(_numbers(f"initial.{name}", value, self._count), (self._count,))
+            if self._rigid and name != "load_angle" and values[name].any():
+                raise InputError(f"initial.{name}: a rigid gearbox begins at rest in a batch; give load_angle alone")
+        if self._exact is not None:
+            self._exact.reset(mask, values)
+        else:
+            zero = np.zeros(self._count)
+            start = np.column_stack([values.get(name, zero) for name in STATES]) if values else None
+            self._core.reset(mask, start)
         self._time[slice(None) if mask is None else mask] = 0.0
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -235,13 +293,14 @@ class SimulationBatch:
 
         The states ``motor_speed``, ``load_speed``, ``twist`` and ``load_angle`` are the memory that each step writes anew; it
         exports DLPack, so that ``torch.from_dlpack(batch["twist"])`` copies nothing. Copy it to keep it. ``motor_torque``,
-        ``output_torque``, ``input_contact`` and ``twist_contact`` are new arrays.
+        ``output_torque``, ``input_contact`` and ``twist_contact`` are new arrays. With controllers or a given motion all
+        result variables are such memory, among them what the controllers show.
         """
-        if name in _READERS:
+        if self._exact is None and name in _READERS:
             return getattr(self._core, name)()  # type: ignore[no-any-return]
         if name in self._states:
-            return self._states[name]  # type: ignore[no-any-return]
-        known = listed(dict.fromkeys((*STATES, *_READERS)))
+            return self._states[name]
+        known = listed(dict.fromkeys((*self._states, *_READERS)))
         raise InputError(f"{shown(name)} is no variable of a batch; the variables are {known}")
 
     def snapshot(self) -> BatchState:
@@ -274,6 +333,31 @@ class _Own:
     """breaks of each torsion curve; -1: it does not vary"""
 
 
+def _each_drive(drive: Drive, vary: Mapping[str, Any], count: int, generator: np.random.Generator) -> list[Drive]:
+    """The drives of a batch one by one."""
+    if not vary:
+        return [drive] * count
+    columns = _columns(drive, vary, count, generator)
+    return [_changed(drive, {key: float(column[k]) for key, column in columns.items()}) for k in range(count)]
+
+
+def _pairs(controllers: Controller | Sequence[Controller], drives: Sequence[Drive]) -> list[tuple[Drive, Controller]]:
+    """Each controller with the drive that it is bound to.
+
+    Raises
+    ------
+    InputError
+        There are others than drives, or one calls functions of the user's own.
+    """
+    each = [controllers] * len(drives) if isinstance(controllers, Controller) else list(controllers)
+    if len(each) != len(drives):
+        raise InputError(f"controllers: there are {len(each)} for {len(drives)} drives; give one for all, or for each")
+    for one in each:
+        if one.law:
+            raise InputError("controllers: a law of your own is for lm.Simulation; give position and speed loops")
+    return list(zip(drives, each, strict=True))
+
+
 def _count_of(count: int | None, vary: Mapping[str, Any]) -> int:
     """Number of drives, from the arrays if it is not given."""
     sizes = {key: np.shape(value)[0] for key, value in vary.items() if not callable(value) and np.ndim(value) == 1}
@@ -287,8 +371,10 @@ def _count_of(count: int | None, vary: Mapping[str, Any]) -> int:
     return count
 
 
-def _own_parameters(drive: Drive, vary: Mapping[str, Any], count: int, generator: np.random.Generator) -> _Own:
-    """The values of what varies, checked."""
+def _columns(
+    drive: Drive, vary: Mapping[str, Any], count: int, generator: np.random.Generator
+) -> dict[str, np.ndarray]:
+    """The values of what varies by key, checked."""
     columns = {}
     for key, value in vary.items():
         if key not in KEYS:
@@ -302,6 +388,12 @@ def _own_parameters(drive: Drive, vary: Mapping[str, Any], count: int, generator
         columns[key] = np.broadcast_to(_numbers(f"vary.{key}", column, count), (count,))
     for pick in (np.min, np.max):
         _changed(drive, {key: float(pick(column)) for key, column in columns.items()})
+    return columns
+
+
+def _own_parameters(drive: Drive, vary: Mapping[str, Any], count: int, generator: np.random.Generator) -> _Own:
+    """Values of what varies, as the core takes them."""
+    columns = _columns(drive, vary, count, generator)
     own = [column for key, column in columns.items() if key != BACKLASH]
     breaks = -1
     if BACKLASH in columns:

@@ -222,6 +222,15 @@ class JointTrains:
         self.guesses = guesses
         self.read()
 
+    def snapshot(self) -> _core.JointSnapshot:
+        """Copy of the state of all drives in memory, with `guesses`."""
+        return self._core.snapshot()
+
+    def restore(self, snapshot: _core.JointSnapshot) -> None:
+        """Return to a snapshot of these drives."""
+        self._core.restore(snapshot)
+        self.read()
+
     def place(self, angles: Sequence[float], speeds: Sequence[float], held: Mapping[int, float]) -> None:
         """Put the joints at angles [rad] and speeds [rad/s], all meshes at rest.
 

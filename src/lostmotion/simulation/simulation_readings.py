@@ -35,6 +35,8 @@ class SimulationReadings:
     _core: Any
     _turn: threading.RLock
     _train: DriveTrain
+    _loaded: tuple[str, ...]
+    _given: tuple[str, ...]
     _controllers: dict[str, Controller]
     _signals: dict[str, int]
     """places of the signals of controllers"""
@@ -44,6 +46,16 @@ class SimulationReadings:
 
     def _idle(self) -> Any:
         raise NotImplementedError
+
+    @property
+    def loaded(self) -> tuple[str, ...]:
+        """Names of the shafts of a train that a load torque may act on."""
+        return self._loaded
+
+    @property
+    def given(self) -> tuple[str, ...]:
+        """Names of the shafts of a train whose motion `advance` is given."""
+        return self._given
 
     def _add_signals(self, scenario: Scenario | None) -> None:
         """Add the signals of controllers, and the torque of a winding in place of the straight line that drives the mechanics."""

@@ -24,26 +24,21 @@ from ..model.train import DriveTrain
 from .drive_scenario import Initial, capacities_of, state_of
 from .given_motion import SLIDE_UNITS, UNITS, motion_given
 from .scenario import Scenario
-from .simulation_readings import Derived, SimulationReadings
+from .simulation_answers import SimulationAnswers
+from .simulation_readings import Derived
 from .simulation_state import SimulationState
 from .step_bound import StepBound
-from .stepping_parts import MAX_INTERVAL, MIN_INTERVAL, ends_of, masses_given, no_input, no_interval, parts
+from .stepping_parts import GIVE, MAX_INTERVAL, MIN_INTERVAL, Ramp, ends_of, masses_given, no_input, no_interval, parts
 from .train_state import start_values
 from .train_tables import TrainInitial
-from .train_variables import (
-    train_variables,
-)
+from .train_variables import train_variables
 from .variables import VARIABLES, Variable
 from .windings import bounded, coarser
 
 INPUTS_OF_STATE = 4  # where the core's state of a simulation has the last values of its inputs
 
-_GIVE: Any = object()  # in place of what has no default
 
-Ramp = float | str | tuple[float | str, float | str]
-
-
-class Simulation(SimulationReadings):
+class Simulation(SimulationAnswers):
     """A drive or a train that is advanced interval by interval.
 
     Parameters
@@ -261,16 +256,6 @@ class Simulation(SimulationReadings):
         return self._drive
 
     @property
-    def loaded(self) -> tuple[str, ...]:
-        """Names of the shafts of a train that a load torque may act on."""
-        return self._loaded
-
-    @property
-    def given(self) -> tuple[str, ...]:
-        """Names of the shafts of a train whose motion `advance` is given."""
-        return self._given
-
-    @property
     def inputs(self) -> tuple[str, ...]:
         """Names of what is given to `advance`."""
         return tuple(self._input_places)
@@ -291,7 +276,7 @@ class Simulation(SimulationReadings):
     def advance(
         self,
         interval: float | str,
-        command: Ramp = _GIVE,
+        command: Ramp = GIVE,
         load_torque: Ramp = 0.0,
         *,
         motion: Any = None,
@@ -326,9 +311,21 @@ class Simulation(SimulationReadings):
         SolverError
             The motion has no continuation; the message names the contact. The state stays as it was.
         """
+        begin, end = self._begin_and_end(command, load_torque, inputs)
+        if mass_matrix is not None:
+            self._step_with_masses(interval, begin, end, motion, mass_matrix)
+        elif motion or self._motions:
+            self._step_with_motions(interval, begin, end, motion or {})
+        else:
+            self._step(interval, begin, end)
+
+    def _begin_and_end(
+        self, command: Ramp, load_torque: Ramp, inputs: dict[str, Ramp]
+    ) -> tuple[list[float], list[float]]:
+        """The inputs of the core at the begin and the end of an interval."""
         if self._short:
             inputs = self._of_drive(command, load_torque, inputs)
-        elif command is not _GIVE or ends_of("load_torque", load_torque, "N*m") != (0.0, 0.0):
+        elif command is not GIVE or ends_of("load_torque", load_torque, "N*m") != (0.0, 0.0):
             raise InputError(f"a train takes its inputs by name: {', '.join(self._input_places)}")
         places, begin, end = self._input_places, [0.0] * self._inputs, [0.0] * self._inputs
         for name, value in inputs.items():
@@ -341,12 +338,7 @@ class Simulation(SimulationReadings):
                 raise InputError(f"{name} {shown(value)} is a share, and 1 is the full torque; give at most that")
         if missing := [name for name in self._required if name not in inputs]:
             raise InputError(f"{', '.join(sorted(missing))}: missing; all commands and references are to be given")
-        if mass_matrix is not None:
-            self._step_with_masses(interval, begin, end, motion, mass_matrix)
-        elif motion or self._motions:
-            self._step_with_motions(interval, begin, end, motion or {})
-        else:
-            self._step(interval, begin, end)
+        return begin, end
 
     def _step_with_masses(self, interval: Any, begin: list[float], end: list[float], motion: Any, given: Any) -> None:
         """With other mass matrices from the beginning of the interval on."""
@@ -400,18 +392,18 @@ class Simulation(SimulationReadings):
                             speed, acceleration = self._motions[name]
                             row[speed], row[acceleration] = course.speed(t), course.acceleration(t)
                         rows.append(row)
-                    self._step(t1 - t0, *rows)
+                    self._step(t1 - t0, rows[0], rows[1])
             except (InputError, _core.SolverError):
                 self.state = before
                 raise
 
     def _of_drive(self, command: Ramp, load_torque: Ramp, others: dict[str, Ramp]) -> dict[str, Ramp]:
         """The inputs of a drive by name."""
-        if others or (command is _GIVE and not self._controllers):
+        if others or (command is GIVE and not self._controllers):
             raise misfit("Simulation.advance", ("interval", "command", "load_torque"), others, lacks("command"))
         if not self._controllers:
             return {"command": command, "load_torque": load_torque}
-        if command is not _GIVE:
+        if command is not GIVE:
             raise InputError("command: the controller of the scenario turns the motor; leave it out")
         return {"load_torque": load_torque}
 
@@ -424,18 +416,22 @@ class Simulation(SimulationReadings):
         """The sines by the numbers of their inputs, with a phase of 0."""
         return [(k, *self._sines[name], 0.0) for k, name in enumerate(names) if name in self._sines]
 
-    def _step(self, interval: Any, *values: Any) -> None:
+    def _step(self, interval: Any, begin: list[float], end: list[float], shaft: int | None = None) -> Any:
+        """Advance the core. With the number of a shaft, return its inertia, mean acceleration and compliance."""
         interval = interval if type(interval) is float else argument("interval", interval, "s")
         with self._turn:
             time = self._idle().time()
             if not MIN_INTERVAL <= interval <= MAX_INTERVAL or time + interval == time:
                 raise no_interval(self.time, interval)
             before = None if self._bound is None else self._bound.coarse.state
-            self._stepping = True
+            self._stepping, answer = True, None
             try:
                 if self._bound is not None:
-                    self._bound.coarse._core.advance(interval, *values)
-                self._core.advance(interval, *values)
+                    self._bound.coarse._core.advance(interval, begin, end)
+                if shaft is None:
+                    self._core.advance(interval, begin, end)
+                else:
+                    answer = self._core.answer(interval, begin, end, shaft)
             except _core.SolverError:
                 if self._bound is not None and before is not None:
                     self._bound.coarse.state = before
@@ -446,6 +442,7 @@ class Simulation(SimulationReadings):
                 self._stepping = False
             if self._bound is not None:
                 self._bound.see(self)
+        return answer
 
     def _idle(self) -> Any:
         """The core, which must not be read or changed by what it calls itself within a step."""

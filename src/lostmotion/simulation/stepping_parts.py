@@ -18,6 +18,10 @@ from .train_ports import given_train
 from .train_scenario import TrainScenario
 from .train_tables import TrainInitial
 
+GIVE: Any = object()  # in place of what has no default
+
+Ramp = float | str | tuple[float | str, float | str]
+
 MIN_INTERVAL, MAX_INTERVAL = 1e-12, 1e12
 """Of a step [s]: below, it is lost in the rounding of the time; above, in that of a motion's phase."""
 
