@@ -59,6 +59,8 @@ def shaped(
     else:
         values = np.append((goal[:-1, None] + np.outer(np.diff(goal), share)).ravel(), goal[-1])
         before, after = values[:-1], values[1:]
+    if math.isinf(acceleration) and filter_time <= 0.0:
+        return fine, _ramps(float(goal[0]), after, rate * np.diff(fine)), count
     course = np.empty(len(fine))
     course[0] = filtered = y = float(goal[0])
     speed = 0.0
@@ -68,6 +70,16 @@ def shaped(
         y += h * speed
         course[k + 1] = y
     return fine, course, count
+
+
+def _ramps(start: float, goals: np.ndarray, most: np.ndarray) -> np.ndarray:
+    """Course that moves to the goal of each step by the largest change of that step, at most."""
+    course, y = [start], start
+    for goal, change in zip(goals.tolist(), most.tolist(), strict=True):
+        distance = goal - y
+        y = goal if -change <= distance <= change else y + math.copysign(change, distance)
+        course.append(y)
+    return np.array(course)
 
 
 def _filtered(state: float, x: float, x_1: float, h: float, filter_time: float) -> float:

@@ -1,9 +1,9 @@
 """Logs that disagree with the others, and the fault that explains each.
 
 A log whose residuals are several times those of the other logs is set aside, and the model is fitted to the rest. Common faults are
-then undone one by one: a reversed sign, a wrong unit, a counter that wraps, a delay, a clock of another rate, a frozen or a slow
-channel. A fault explains a log if undoing it brings the residuals down to those of the other logs. Such a log is left out of the fit; one
-that no fault explains stays in it, since the model may be what is wrong.
+then undone one by one: signs, units, delays, clocks of another rate, counters that wrap, frozen and slow channels. A fault explains
+a log if undoing it brings the residuals down to those of the other logs. Such a log is left out of the fit; one that no fault explains
+stays in it, since the model may be what is wrong.
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ ROUNDS = 3
 ALIKE = 1.02  # times the smallest residuals, up to which faults explain a log alike: all of them are named
 TRIED = 3  # faults whose nuisances are fitted, from the one with the smallest residuals on
 SHIFTS = 100  # sample intervals, by which a channel may be late or early
+SEARCHED = 12  # logs, from the worst on, for which delays of the inputs and rates of the clock are searched
 RATES = (1e-2, 1e-3, 1e-4)  # steps of the grids in which the rate of a clock is sought
 SHIFT = re.compile(r" ms (late|early)")  # faults that late inputs may explain better
 NAMED_FACTORS = {
@@ -115,10 +116,12 @@ def odd_logs(rig: Rig, engine: Engine, logs: Sequence[Prepared], start: Point, f
     agreeing, point = _agreeing(rig, engine, train, start, fit, rung)
     sizes = _Sizes(rig, engine, agreeing, point, rung)
     found = []
-    for log, (rows, ratio) in zip(logs, sizes.of_each(logs), strict=True):
+    seen = sizes.of_each(logs)
+    worst = sorted((ratio for _, ratio in seen), reverse=True)[:SEARCHED]
+    for log, (rows, ratio) in zip(logs, seen, strict=True):
         if not ratio > SUSPECT:
             continue
-        fault, mended = _explained(rig, log, sizes)
+        fault, mended = _explained(rig, log, sizes, search_times=ratio >= worst[-1])
         if fault or ratio > ODD:
             k = int(np.argmax(np.nan_to_num(rows / sizes.median, nan=np.inf)))
             channel = list(rig.task.measured)[k]
@@ -238,7 +241,7 @@ def _fitted(rig: Rig, engine: Engine, logs: Sequence[Prepared], starts: Sequence
     return best
 
 
-def _explained(rig: Rig, log: Prepared, sizes: _Sizes) -> tuple[str, np.ndarray]:
+def _explained(rig: Rig, log: Prepared, sizes: _Sizes, *, search_times: bool) -> tuple[str, np.ndarray]:
     """(the fault that explains a log, its residuals without it); no fault if none of those tried does.
 
     Late inputs and clocks take a run for each delay and rate, so that they are tried last, and only if no fault of another kind explains the log.
@@ -251,7 +254,9 @@ def _explained(rig: Rig, log: Prepared, sizes: _Sizes) -> tuple[str, np.ndarray]
     if not tried:
         return nothing
     ratios = sizes.several([mended for _, mended in tried])
-    if not any(r < MENDED and not SHIFT.search(fault) for (fault, _), r in zip(tried, ratios, strict=True)):
+    if search_times and not any(
+        r < MENDED and not SHIFT.search(fault) for (fault, _), r in zip(tried, ratios, strict=True)
+    ):
         late = [*_late_inputs(rig, log), *_other_rate(rig, log, sizes)]
         tried, ratios = tried + late, ratios + sizes.several([mended for _, mended in late])
     order = sorted(range(len(tried)), key=lambda k: ratios[k])[:TRIED]
