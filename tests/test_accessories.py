@@ -132,6 +132,17 @@ def test_the_drive_check_judges_a_brake_and_an_amplifier():
     assert {f.rule for f in lm.check_drive(plain)}.isdisjoint({"holding_brake", "amplifier_current"})
 
 
+def test_the_drive_check_of_an_axis_names_the_keys_of_its_file():
+    """A file with [axis] knows neither motors.motor nor screws.screw; it takes a task."""
+    findings = lm.check_drive(lm.load("ball-screw-axis", {"task.amplifier": {"continuous_current": "5 A"}}))
+    said = " ".join(f.remark for f in findings)
+    assert "axis.motor.limits.torque_constant" in said
+    assert "axis.screw.dynamic_capacity" in said
+    assert "motors." not in said
+    assert "screws." not in said
+    assert next(f for f in findings if f.rule == "amplifier_current").verdict == "unknown"
+
+
 # --- amplifiers ---
 
 

@@ -3,6 +3,7 @@
 import math
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -78,6 +79,44 @@ def task() -> Study:
 @pytest.fixture(scope="module")
 def result(task: Study) -> Any:
     return lm.select(task)
+
+
+def test_a_killed_selection_resumes_where_it_was(tmp_path: Path):
+    """1500 pairs that the rules refuse, in three chunks: those that were written are not computed again."""
+    file = tmp_path / "task.toml"
+    ratios = ", ".join(f"{3.0 + 0.02 * k:.2f}" for k in range(1500))
+    moves = "[{ to = 1.2, dwell = 0.1 }, { to = 0.0 }]"
+    file.write_text(
+        f"""[task]
+cycle = "1 s"
+max_inertia_ratio = 1e-9
+[load]
+inertia = {J}
+[controller]
+reference = {{ kind = "position", speed = {SPEED}, acceleration = {ACCELERATION}, moves = {moves} }}
+[motor]
+from = "maxon-ec-i-52-606793"
+[gearbox]
+from = "bonfiglioli-tr060-2-36"
+[[vary]]
+key = "gearbox.ratio"
+values = [{ratios}]
+"""
+    )
+    directory = tmp_path / "rows"
+    process = subprocess.Popen(
+        [sys.executable, "-m", "lostmotion", "select", str(file), "-o", str(directory)], stdout=subprocess.DEVNULL
+    )
+    while not list(directory.glob("part-*.parquet")) and process.poll() is None:
+        time.sleep(0.01)
+    process.kill()
+    process.wait()
+    kept = {p.name: p.stat().st_mtime_ns for p in directory.glob("part-*.parquet")}
+    assert 1 <= len(kept) < 3
+    again = lm.select(file, directory)
+    assert again.sizes["pair"] == 1500
+    assert {p.name: p.stat().st_mtime_ns for p in directory.glob("part-*.parquet")}.items() >= kept.items()
+    assert again.equals(lm.select(file))
 
 
 # --- rules against closed forms ---

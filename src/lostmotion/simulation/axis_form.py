@@ -15,7 +15,7 @@ from .train_scenario import TrainScenario, train_from_tables, train_schema
 
 DRIVES = {"screw": "screws", "rack": "racks", "belt": "belts"}
 MOTOR, SLIDE, GEARBOX = "motor", "slide", "gearbox"  # names in the long form; the drive is called after its kind
-BESIDE = ("title", "command", "controller", "initial", "simulation")
+BESIDE = ("title", "task", "command", "controller", "initial", "simulation")
 
 
 def is_axis(tables: Mapping[str, Any]) -> bool:
@@ -32,21 +32,25 @@ def axis_from_tables(tables: Mapping[str, Any]) -> TrainScenario:
         A value cannot be used.
     """
     try:
-        return train_from_tables(long_form(tables))
+        return train_from_tables(long_form(tables)).as_axis()
     except InputError as error:
-        text = str(error)
-        for short, long in DRIVES.items():
-            text = text.replace(f"{long}.{short}", f"axis.{short}").replace(f"shafts.{short}", f"axis.{short}")
-        for long, short in (
-            (f"controllers.{MOTOR}", "controller"),
-            (f"command.{MOTOR}", "command"),
-            (f"motors.{MOTOR}", "axis.motor"),
-            (f"gears.{GEARBOX}.gearbox", "axis.gearbox.from"),
-            (f"gears.{GEARBOX}", "axis.gearbox"),
-            (f"slides.{SLIDE}", "axis.slide"),
-        ):
-            text = text.replace(long, short)
-        raise InputError(text) from None
+        raise InputError(in_keys_of_axes(str(error))) from None
+
+
+def in_keys_of_axes(text: str) -> str:
+    """Text whose keys of the long form are those of this form."""
+    for short, long in DRIVES.items():
+        text = text.replace(f"{long}.{short}", f"axis.{short}").replace(f"shafts.{short}", f"axis.{short}")
+    for long, short in (
+        (f"controllers.{MOTOR}", "controller"),
+        (f"command.{MOTOR}", "command"),
+        (f"motors.{MOTOR}", "axis.motor"),
+        (f"gears.{GEARBOX}.gearbox", "axis.gearbox.from"),
+        (f"gears.{GEARBOX}", "axis.gearbox"),
+        (f"slides.{SLIDE}", "axis.slide"),
+    ):
+        text = text.replace(long, short)
+    return text
 
 
 def long_form(tables: Mapping[str, Any]) -> dict[str, Any]:
@@ -103,7 +107,7 @@ def long_form(tables: Mapping[str, Any]) -> dict[str, Any]:
     for short, in_long in (("controller", "controllers"), ("command", "command")):
         if short in tables:
             long[in_long] = {MOTOR: _on_slide(tables[short]) if short == "controller" else tables[short]}
-    return {**{key: tables[key] for key in ("title", "initial", "simulation") if key in tables}, **long}
+    return {**{key: tables[key] for key in ("title", "task", "initial", "simulation") if key in tables}, **long}
 
 
 def _on_slide(controller: Any) -> Any:
@@ -143,7 +147,7 @@ def axis_schema() -> dict[str, Any]:
         "additionalProperties": False,
         "description": "A motor, a gearbox if there is one, one of screw, rack and belt, and the slide that it moves.",
     }
-    beside = {key: long[key] for key in ("title", "initial", "simulation", "base")}
+    beside = {key: long[key] for key in ("title", "task", "initial", "simulation", "base")}
     beside["command"] = long["command"]["additionalProperties"]
     beside["controller"] = long["controllers"]["additionalProperties"]
     return {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Iterator, Mapping
-from functools import cache, lru_cache
+from functools import cache, cached_property, lru_cache
 from typing import Any, ClassVar, Self, cast
 
 from pydantic import Field, model_validator
@@ -163,6 +163,16 @@ class TrainScenario(TrainChecks):
 
     def gear_key(self, name: str) -> str:
         return f"{self.kind_of(name)}s.{name}"
+
+    def as_axis(self) -> Self:
+        """The same, marked as written in the short form of a linear axis."""
+        self.__dict__["is_axis"] = True  # no field: an axis equals its long form
+        return self
+
+    @cached_property
+    def is_axis(self) -> bool:
+        """Whether it was written in the short form of a linear axis."""
+        return False
 
     def motor_key(self, name: str) -> str:
         return f"{'linear_motors' if name in self.linear_motors else 'motors'}.{name}"

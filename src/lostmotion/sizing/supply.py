@@ -129,7 +129,7 @@ def supply_rules(back: Returned | None, supply: Bus) -> list[Finding]:
 
 
 def amplifier_rules(
-    time: np.ndarray, current: np.ndarray, cycle: float, amplifier: Amplifier, bus: float | None
+    time: np.ndarray, current: np.ndarray, cycle: float, amplifier: Amplifier, bus: float | None, where: str = "motor"
 ) -> list[Finding]:
     """Rules of an amplifier: rms and largest current, the longest time above the continuous one, and the voltage of the bus.
 
@@ -141,10 +141,12 @@ def amplifier_rules(
         Current of the motor over the cycle [A], as the data sheet of the amplifier counts it; NaN where it is not known.
     bus
         Largest voltage of the DC bus before energy returns [V].
+    where
+        Table of the motor.
     """
     what, continuous = "current, rms over the cycle", amplifier.continuous_current
     if np.isnan(current).any():
-        found = [missing("amplifier_current", what, "motor.limits.torque_constant")]
+        found = [missing("amplifier_current", what, f"{where}.limits.torque_constant")]
     else:
         square = integral(time, current**2) / cycle
         found = [
@@ -170,13 +172,13 @@ def amplifier_rules(
 
 
 def amplifier_of_a_run(
-    result: RunArrays, motor: Motor, torque: np.ndarray, speed: np.ndarray, task: TrainTask
+    result: RunArrays, motor: Motor, torque: np.ndarray, speed: np.ndarray, task: TrainTask, where: str = "motor"
 ) -> list[Finding]:
     """The rules of an amplifier for a run, over the cycle of the task, or repeated without a pause."""
     assert task.amplifier is not None
     time, bus = result.time, None if task.supply is None else task.supply.start()
     current = effective_current(motor, torque, speed)
-    return amplifier_rules(time, current, task.cycle or float(time[-1] - time[0]), task.amplifier, bus)
+    return amplifier_rules(time, current, task.cycle or float(time[-1] - time[0]), task.amplifier, bus, where)
 
 
 def longest_above(time: np.ndarray, values: np.ndarray, limit: float) -> float:

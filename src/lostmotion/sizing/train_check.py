@@ -67,7 +67,7 @@ def _amplifier(scenario: TrainScenario, result: RunArrays) -> list[Finding]:
         return [Finding("amplifier_current", "amplifier", "not judged", "unknown", remark)]
     ((name, motor),) = train.motors.items()
     torque, speed = result[train.motor_torque_of(name)], result[f"{motor.shaft}_speed"]
-    return amplifier_of_a_run(result, motor, torque, speed, scenario.task)
+    return amplifier_of_a_run(result, motor, torque, speed, scenario.task, scenario.key_of("motors", name))
 
 
 def _named(name: str, findings: list[Finding]) -> list[Finding]:
