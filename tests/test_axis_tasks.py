@@ -97,6 +97,26 @@ def at(motion: Any, time: float, values: np.ndarray) -> float:
     return float(np.interp(time, motion.time, values))
 
 
+@pytest.mark.parametrize("slides", [False, True])
+def test_a_measured_motion_comes_from_a_file(tmp_path, slides: bool):
+    """A cosine of 45 degrees, or of 45 mm, sampled 100 times: its acceleration is A (2 pi/T)^2 at the turning points."""
+    rows = [f"{0.02 * k:.2f},{45.0 * (1.0 - math.cos(0.02 * math.pi * k))}" for k in range(101)]
+    (tmp_path / "profile.csv").write_text("\n".join([f"time [s],position [{'mm' if slides else 'deg'}]", *rows]))
+    load = '[slide]\nmass = 2\n[screw]\nlead = "10 mm"\nefficiency = 0.9' if slides else "[load]\ninertia = 2"
+    given = '[motor]\nfrom = "maxon-ec-i-52-606793"\n'
+    given += "" if slides else '[gearbox]\nfrom = "bonfiglioli-tr060-2-36"\n'
+    file = tmp_path / "task.toml"
+    file.write_text(
+        f'[task]\ncycle = "2 s"\n{load}\n[controller.reference]\nkind = "position"\n{given}[[vary]]\nkey = "motor.rotor_inertia"\nvalues = [1e-5]\n'.replace(
+            'kind = "position"\n', 'kind = "position"\nsamples = { file = "profile.csv", interpolation = "cubic" }\n'
+        )
+    )
+    motion = Axes(lm.studies.load_task(file)).motion()
+    amplitude = 0.045 if slides else math.radians(45.0)
+    assert motion.position.max() == pytest.approx(2.0 * amplitude, rel=1e-4)
+    assert at(motion, 1.0, motion.torque) == pytest.approx(-2.0 * amplitude * math.pi**2, rel=2e-3)
+
+
 # --- demands by hand ---
 
 

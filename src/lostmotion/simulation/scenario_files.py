@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -156,7 +156,7 @@ def _read(path: Path, including: tuple[Path, ...]) -> dict[str, Any]:
         raise InputError(f"{path}: key base: leads back to this file; break the circle")
     if len(including) > MAX_BASES:
         raise InputError(f"{path}: key base: is the base of {MAX_BASES} files after one another; join some of them")
-    _read_series(data, path, ())
+    read_series_files(data, path, units_of_series)
     _find_records(data, path.parent)
     if "base" not in data:
         return data
@@ -219,19 +219,35 @@ def _find_records(data: dict[str, Any], directory: Path) -> None:
             element[key] = str(directory / record)
 
 
-def _read_series(data: dict[str, Any], path: Path, keys: tuple[str, ...], kinds: tuple[str, ...] = ()) -> None:
-    """Puts the points of `samples.file`, a CSV file beside the scenario, in its place.
+def read_series_files(
+    data: dict[str, Any],
+    path: Path,
+    units_at: Callable[[tuple[str, ...]], list[str]],
+    keys: tuple[str, ...] = (),
+    kinds: tuple[str, ...] = (),
+) -> None:
+    """Puts the points of `samples.file`, a CSV file beside the scenario or task of a path, in its place.
 
-    `kinds` are the keys with the kind of each table that says it, which its units may depend on.
+    Parameters
+    ----------
+    units_at
+        SI units that values may have at keys, with the kind of each table that says it, which its units may depend on.
+    keys, kinds
+        The keys of `data`, without and with those kinds.
+
+    Raises
+    ------
+    InputError
+        A file cannot be used.
     """
     for key, value in data.items():
         if not isinstance(value, dict):
             continue
         where, place = (*keys, key), (*kinds, key, *[str(value[k]) for k in ("kind",) if k in value])
         if key != "samples" or "file" not in value:
-            _read_series(value, path, where, place)
+            read_series_files(value, path, units_at, where, place)
             continue
-        units = _units_of_series(place)
+        units = units_at(place)
         if not units or (len(units) > 1 and place != where):
             continue  # there is no such key, or no such kind: refused when the scenario is made
         name = value.pop("file")
@@ -249,7 +265,7 @@ def _read_series(data: dict[str, Any], path: Path, keys: tuple[str, ...], kinds:
 
 
 @cache
-def _units_of_series(place: tuple[str, ...]) -> list[str]:
+def units_of_series(place: tuple[str, ...]) -> list[str]:
     """The SI units that the values of a series at these keys of a scenario may have."""
     _, nodes = follow(file_schema(), (*place, "values"))
     return sorted({unit for node in nodes if (unit := unit_in_schema(node)) is not None})

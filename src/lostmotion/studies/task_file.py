@@ -22,6 +22,7 @@ from ..model.task import Task
 from ..reproducible import sin
 from ..simulation.drive_scenario import from_tables
 from ..simulation.linear_units import in_si, of_slides
+from ..simulation.scenario_files import read_series_files, units_of_series
 from ..simulation.train_scenario import train_schema
 from ..sizing.stages import DIRECT, STAGES, stage_of
 from ..sizing.whole_drives import BESIDE, LINEAR, WHOLE
@@ -91,10 +92,20 @@ def load_task(path: str | Path) -> Study:
     """
     path = Path(path)
     try:
-        return task_of(read_toml(path, "a task"), path.parent)
+        tables = read_toml(path, "a task")
+        read_series_files(tables, path, _units_on_a_slide if "slide" in tables else units_of_series)
+        return task_of(tables, path.parent)
     except InputError as error:
         text = str(error)
-        raise error if text.startswith(f"{path}:") else InputError(f"{path}: {text}") from None
+        text = f"key {text.removeprefix('the study ')}" if text.startswith("the study controller") else text
+        raise error if str(error).startswith(f"{path}:") else InputError(f"{path}: {text}") from None
+
+
+def _units_on_a_slide(place: tuple[str, ...]) -> list[str]:
+    """SI units of the values of a series at keys of a task with a slide."""
+    if place == ("slide", "force", "samples"):
+        return ["N"]
+    return [of_slides(unit, positions=True, forces=True) for unit in units_of_series(place)]
 
 
 def task_of(tables: dict[str, Any], directory: Path = Path()) -> Study:
