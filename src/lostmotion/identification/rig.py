@@ -309,9 +309,9 @@ def _value(node: Any, values: Mapping[str, Any], key: str) -> Any:
         return {k: _value(x, values, f"{key}.{k}") for k, x in node.items()}
     if not isinstance(node, Formula):
         return node
+    if node.names == {node.text} and node.text not in values:  # a word, such as the kind of a stiffness
+        return node.text
     try:
         return node.value(values)
     except ValueError as problem:
-        if node.names == {node.text}:  # a word, such as the kind of a stiffness
-            return node.text
         raise InputError(f"key set.{key}: {problem}") from None
