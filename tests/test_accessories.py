@@ -79,6 +79,24 @@ def test_actuators_stand_beside_pairs_and_run():
     assert 0.0 < float(own["motor_torque_rms"]) < 9.0 / (9.0 * 0.97)
 
 
+def test_other_threads_may_add_parts_while_the_range_of_losses_is_judged():
+    """As where several pairs are judged at once: the parts that are kept grow while they are read."""
+
+    class Growing(dict[Any, Any]):
+        def items(self) -> Any:
+            for pair in super().items():
+                self[("other", len(self))] = None
+                yield pair
+
+    study = task_of(ARM)
+    axes, row = Axes(study), study.parameters(0, 1)[0]
+    axes.judged(row)
+    study._kept = Growing(study._kept)
+    with pytest.raises(RuntimeError):
+        list(study.kept.items())
+    assert "holds" in axes.verdict_at_ends(row, ())
+
+
 def test_a_printed_efficiency_and_values_beside():
     study = task_of({**ARM, "actuator": {"efficiency": 0.8, "rotor_inertia": "1e-4 kg m^2"}})
     assert study.part("gearbox", np.array([0.0])).loss_range is None

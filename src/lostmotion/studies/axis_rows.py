@@ -275,8 +275,9 @@ class Axes:
 
         def make() -> Axes:
             study = self.study.model_copy()
-            kept = {k: v for k, v in self.study.kept.items() if k[0] in ("motor", "checked", "motion", "stage motion")}
-            kept |= {k: v for k, v in self.study.kept.items() if k[0] == self.task.stage_kind}
+            shared = ("motor", "checked", "motion", "stage motion", self.task.stage_kind)
+            # Other threads add to what is kept: a copy is made at once, and not while it changes.
+            kept = {k: v for k, v in dict(self.study.kept).items() if k[0] in shared}
             study._kept = kept | {key: self.study.part("gearbox", row).with_losses(factor)}
             return Axes(study)
 
