@@ -205,6 +205,14 @@ inline void bind_control(nb::module_& m) {
         "Of each part of controllers, or of drive trains, its parameters: key, kind, symbol, unit, meaning, range "
         "(above, from on, up to), whether it is needed, default.");
     m.def(
+        "reference_blocks",
+        [] {
+            std::vector<std::tuple<std::string, std::string, std::string>> blocks;
+            each_reference_block([&](const auto& b) { blocks.emplace_back(b.key, b.part, b.meaning); });
+            return blocks;
+        },
+        "Of each block that shapes the reference: its table in a controller, its class, and what the table is.");
+    m.def(
         "encoder_step",
         [](const nb::dict& fields) {
             Encoder e;

@@ -2,8 +2,10 @@
 #pragma once
 
 #include "arrays.hpp"
+#include "fields.hpp"
 #include "lostmotion/kernel/inputs.hpp"
 #include "lostmotion/parts/gear.hpp"
+#include "lostmotion/parts/stiffness_curve.hpp"
 
 namespace lostmotion::binding {
 
@@ -11,7 +13,27 @@ inline void bind_curves(nb::module_& m) {
     using Vector = std::vector<double>;
     nb::class_<TorsionCurve>(m, "TorsionCurve")
         .def(nb::init<Vector, Vector>(), "breaks"_a, "slopes"_a)
+        .def(
+            "__init__",
+            [](TorsionCurve* self, const nb::dict& stiffness) {
+                StiffnessCurve s;
+                NamedFields f(stiffness);
+                s.describe(f);
+                f.refuse_unknown();
+                new (self) TorsionCurve(s.curve());
+            },
+            "stiffness"_a, nb::sig("def __init__(self, stiffness: dict[str, typing.Any]) -> None"))
+        .def_prop_ro("odd", &TorsionCurve::odd)
+        .def_prop_ro("pieces", &TorsionCurve::pieces)
+        .def(
+            "side",
+            [](const TorsionCurve& c, bool forward) {
+                TorsionCurve::Side side = forward ? c.forward() : c.backward();
+                return std::pair(std::move(side.breaks), std::move(side.slopes));
+            },
+            "forward"_a, "Twists [rad] > 0 at which the slope changes, and the slopes [N m/rad], outwards.")
         .def("torque", &TorsionCurve::torque, "twist"_a)
+        .def("twist", &TorsionCurve::twist, "torque"_a)
         .def("energy", nb::overload_cast<double>(&TorsionCurve::energy, nb::const_), "twist"_a);
     nb::class_<LossMap>(m, "LossMap")
         .def(nb::init<Vector, Vector, Vector>(), "speeds"_a, "loads"_a, "values"_a)

@@ -52,6 +52,7 @@ class NamedFields {
         wrong(name, "is " + given + ", which is none of its names");
     }
     void list(const char* name, std::vector<double>& v, Range = Range::any) { take(name, v); }
+    void list(const Field& field, std::vector<double>& v) { take(field.key, v); }
     template <class Curve>
     void curve(const char* name, Curve& v) {
         take(name, v);
@@ -120,13 +121,12 @@ class NamedFields {
 
 // Of each parameter that a scenario file may have: key, symbol, unit, meaning, range (above, from on, up to), whether
 // it is needed, and its default, None where it is left out.
-class DescribedFields {
+class DescribedFields : public FieldVisitor {
  public:
-    static constexpr bool reads = false;
-    using Range = lostmotion::Range;
-
     nb::list rows;
 
+    using FieldVisitor::flag;
+    using FieldVisitor::number;
     void number(const Field& field, double v) { add(field, "number", limits(field.range), nb::float_(v)); }
     void pair(const Field& field, const std::array<double, 2>& v) {
         add(field, "pair", limits(field.range), nb::make_tuple(v[0], v[1]));
@@ -138,18 +138,9 @@ class DescribedFields {
     void flag(const Field& field, bool v) {
         add(field, "flag", nb::make_tuple(nb::none(), nb::none(), nb::none()), nb::bool_(v));
     }
-    // What is a part of its own in scenario files, or follows from others.
-    void number(const char*, double, Range = Range::any) {}
-    template <class Enum>
-    void choice(const char*, Enum, std::initializer_list<const char*>) {}
-    template <class Value>
-    void flag(const char*, Value) {}
-    template <class Curve>
-    void curve(const char*, const Curve&) {}
-    template <class Curve>
-    void curve_if(const char*, bool, const Curve&) {}
-    template <class T, class Use>
-    void optional(const char*, const std::optional<T>&, const T&, Use&&) {}
+    void list(const Field& field, const std::vector<double>& v) {
+        add(field, "list", limits(field.range), nb::tuple(nb::cast(v)));
+    }
 
  private:
     static nb::tuple limits(Range range) {

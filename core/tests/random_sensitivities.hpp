@@ -73,7 +73,7 @@ inline std::vector<Knob> knobs(const RandomCase& c) {
             add("efficiency" + number(g), [g](RandomCase& x) -> double& { return x.train.gears[g].law.efficiency; });
         if (!c.train.gears[g].rigid()) {
             const TorsionCurve curve = c.train.gears[g].law.curve;
-            const int last = curve.outermost_piece();
+            const int last = curve.last_piece();
             std::vector<double> edges, slopes;
             for (int k = 0; k <= last; ++k) slopes.push_back(curve.slope(k));
             for (int k = 0; k < last; ++k) edges.push_back(curve.upper(k));

@@ -23,7 +23,7 @@ struct CurvePiece {
 
 inline std::vector<CurvePiece> curve_pieces(const TorsionCurve& curve) {
     std::vector<CurvePiece> pieces;
-    const int n = curve.outermost_piece();
+    const int n = curve.last_piece();
     Quad offset = 0;
     for (int k = 0; k <= n; ++k) {
         if (k > 0) offset += (Quad(curve.slope(k - 1)) - Quad(curve.slope(k))) * Quad(curve.lower(k));

@@ -53,9 +53,26 @@ def arctangent(a: numpy.typing.NDArray[numpy.float64], b: numpy.typing.NDArray[n
 def power(a: numpy.typing.NDArray[numpy.float64], b: numpy.typing.NDArray[numpy.float64]) -> numpy.typing.NDArray[numpy.float64]: ...
 
 class TorsionCurve:
+    @overload
     def __init__(self, breaks: Sequence[float], slopes: Sequence[float]) -> None: ...
 
+    @overload
+    def __init__(self, stiffness: dict[str, Any]) -> None: ...
+
+    @property
+    def odd(self) -> bool: ...
+
+    @property
+    def pieces(self) -> int: ...
+
+    def side(self, forward: bool) -> tuple[list[float], list[float]]:
+        """
+        Twists [rad] > 0 at which the slope changes, and the slopes [N m/rad], outwards.
+        """
+
     def torque(self, twist: float) -> float: ...
+
+    def twist(self, torque: float) -> float: ...
 
     def energy(self, twist: float) -> float: ...
 
@@ -72,6 +89,11 @@ class Signal:
 def described_tables(of_controllers: bool) -> dict[str, list[tuple[str, str, str, str, str, tuple[float | None, float | None, float | None], bool, Any]]]:
     """
     Of each part of controllers, or of drive trains, its parameters: key, kind, symbol, unit, meaning, range (above, from on, up to), whether it is needed, default.
+    """
+
+def reference_blocks() -> list[tuple[str, str, str]]:
+    """
+    Of each block that shapes the reference: its table in a controller, its class, and what the table is.
     """
 
 def encoder_step(fields: dict[str, Any]) -> float: ...

@@ -2,12 +2,6 @@
 
 namespace lostmotion {
 
-int piece_at(const TorsionCurve& curve, double torque) {
-    int k = 0;
-    while (k < curve.outermost_piece() && curve.torque(curve.upper(k)) < std::fabs(torque)) ++k;
-    return torque < 0.0 ? -k : k;
-}
-
 model::Key key_of(const model::Assembly& a, const SteadyMotion& motion) {
     using namespace model;
     const Train& t = a.train();
@@ -28,7 +22,7 @@ model::Key key_of(const model::Assembly& a, const SteadyMotion& motion) {
         set(p.shafts[s].friction_piece, t.shafts[s].friction.piece(motion.speed[s]));
     for (std::size_t g = 0; g < t.gears.size(); ++g) {
         const Gear& gear = t.gears[g];
-        if (!gear.rigid()) set(p.gears[g].piece, piece_at(gear.law.curve, motion.torque[g]));
+        if (!gear.rigid()) set(p.gears[g].piece, gear.law.curve.piece_at(motion.torque[g]));
         if (!gear.has_dry_losses()) continue;
         const double w = motion.speed[static_cast<std::size_t>(gear.input)];
         const double mu = sign(w) * gear.sense() * motion.torque[g] / gear.rated_torque();

@@ -24,9 +24,6 @@ struct SteadyRegime {
     bool determined = true;           // false: no motion or several (rigid gears jam)
 };
 
-// Piece of a torsion curve in which it has this torque; of two, the inner one.
-int piece_at(const TorsionCurve& curve, double torque);
-
 model::Key key_of(const model::Assembly& a, const SteadyMotion& motion);
 
 // The train must have passed the check.

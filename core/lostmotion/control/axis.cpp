@@ -1,5 +1,7 @@
 #include "axis.hpp"
 
+#include <numeric>
+
 namespace lostmotion::control {
 
 void Axis::place(double sample_time) {
@@ -28,6 +30,10 @@ void Axis::place(double sample_time) {
     own_law.place(slots);
     camera.place(slots);
     if (camera.present) tracker.place(slots);
+    // At each sample of the controller, however the loops divide them.
+    shaped_every_ = std::gcd(std::gcd(position_schedule.every, position_schedule.phase),
+                             std::gcd(speed_schedule.every, current_schedule.every));
+    shaper.place(slots, sample_time * shaped_every_);
     slots_ = slots.count();
 }
 
@@ -48,6 +54,10 @@ void Axis::start(const Sampled& y, double sample_time, double* slot) const {
     show_model(slot);
     if (two_encoders)
         slot[blended] = position_sensor.scale * position_sensor.encoder.reading(y.position_angle) - angle / ratio;
+    const double followed = mode == position_mode ? angle / ratio + slot[blended]
+                            : mode == speed_mode  ? speed_sensor.scale * y.speed / ratio
+                                                  : y.motor_torque;
+    shaper.start(followed, slot);
     if (camera.present) {
         slot[position_angle] =
             two_encoders ? position_sensor.scale * position_sensor.encoder.reading(y.position_angle) : 0.0;
@@ -66,6 +76,7 @@ bool Axis::step(std::int64_t sample, double sample_time, const Sampled& y, doubl
     slot[speed_angle] = speed_sensor.scale * speed_sensor.encoder(y.speed_angle, slot);
     if (two_encoders) slot[position_angle] = position_sensor.scale * position_sensor.encoder(y.position_angle, slot);
     if (camera.present) watch(sample, sample_time, y, slot);
+    if (shaper.present() && sample % shaped_every_ == 0) shaper.step(unshaped(time, slot), slot);
     if (speed_schedule.due(sample)) {
         const double T = sample_time * speed_schedule.every;
         const double acts = voltage_at_limit(slot) == 0.0 ? slot[torque_reference] : y.motor_torque;
@@ -85,7 +96,7 @@ bool Axis::step(std::int64_t sample, double sample_time, const Sampled& y, doubl
         if (mode != torque_mode && !firmware.present && speed_schedule.due(sample))
             run_speed_loop(time, sample_time * speed_schedule.every, torque_range(y, slot), slot);
         if (mode == torque_mode) {
-            const double asked = reference.at(time).value;  // field orientation limits it by itself
+            const double asked = wanted(time, slot).value;  // field orientation limits it by itself
             slot[torque_reference] = field_orientation ? asked : torque_range(y, slot)(asked);
         }
         if (field_orientation) {

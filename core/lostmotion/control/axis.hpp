@@ -27,6 +27,7 @@
 #include "load_observer.hpp"
 #include "own_law.hpp"
 #include "position_loop.hpp"
+#include "reference_blocks.hpp"
 #include "speed_estimate.hpp"
 #include "speed_loop.hpp"
 #include "tracker.hpp"
@@ -135,6 +136,7 @@ class Axis {
     Reference reference;  // with a camera the direction of the target, which only the camera sees
     Camera camera;
     Tracker tracker;            // of what the camera sees; the loops follow it
+    ReferenceShaper shaper;     // of what the loops follow
     double ratio = 1.0;         // turns of the motor for one of the reference's shaft
     double rated_torque = 1.0;  // [N m] of command 1, without a current loop
     double torque_limit = std::numeric_limits<double>::infinity();  // [N m] at the largest current
@@ -214,9 +216,12 @@ class Axis {
     // The same by any limit of the torque.
     double at_limit(const double* slot) const;
 
+    ReferencePoint unshaped(double time, const double* slot) const {
+        return camera.present ? tracker.at(time, slot) : reference.at(time);
+    }
     // What the loops follow.
     ReferencePoint wanted(double time, const double* slot) const {
-        return camera.present ? tracker.at(time, slot) : reference.at(time);
+        return shaper.present() ? shaper.output(slot) : unshaped(time, slot);
     }
     // Of the reference's shaft, without blending.
     double line_of_sight(double speed_encoder, const double* slot) const {
@@ -242,6 +247,7 @@ class Axis {
     double position(double* slot) const;
 
     double position_share_ = 1.0;  // taken over at a sample of the position loop
+    int shaped_every_ = 1;         // samples
     int slots_ = 0, course_ = 0, energy_ = 0;
 };
 

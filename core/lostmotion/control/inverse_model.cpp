@@ -35,12 +35,6 @@ void InverseModel::adapt(const Known& by, double error, double sample_time, doub
     of_friction(slot[first_ + 1], error, by.way, sample_time);
 }
 
-double InverseModel::inverse(double torque) const {
-    const double T = std::fabs(torque);
-    if (T == 0.0) return 0.0;
-    int k = 0;
-    while (k < curve.outermost_piece() && curve.torque(curve.upper(k)) < T) ++k;
-    return std::copysign((T - curve.offset(k)) / curve.slope(k), torque);
-}
+double InverseModel::inverse(double torque) const { return curve.twist(torque); }
 
 }  // namespace lostmotion::control

@@ -13,6 +13,7 @@ Axis affine(Axis a, Loop outermost, double sample_time) {
                                                         : Axis::torque_mode;
     if (mode != a.mode) {
         a.feedforward = {};
+        a.shaper = {};
         a.ratio = 1.0;
     }
     a.mode = mode;

@@ -31,10 +31,8 @@ class DamperBetweenShafts final : public CouplingElement {
  public:
     explicit DamperBetweenShafts(const Damper& law) : CouplingElement(law.name, law.input, law.output), law_(law) {}
 
-    const char* piecewise_law() const override {
-        return law_.drag.outermost_piece() > 0 ? "piece of the drag" : nullptr;
-    }
-    int pieces() const override { return law_.drag.outermost_piece() + 1; }
+    const char* piecewise_law() const override { return law_.drag.pieces() > 1 ? "piece of the drag" : nullptr; }
+    int pieces() const override { return law_.drag.pieces(); }
     const char* loss() const override { return "damper"; }
 
     Row torque(const Between& shafts, const Key& key) const override {

@@ -17,8 +17,8 @@ class DragOnShaft final : public ShaftElement {
     DragOnShaft(const std::string& shaft_name, int shaft, TorsionCurve curve)
         : ShaftElement(shaft_name, shaft), curve_(std::move(curve)) {}
 
-    const char* piecewise_law() const override { return curve_.outermost_piece() > 0 ? "piece of the drag" : nullptr; }
-    int pieces() const override { return curve_.outermost_piece() + 1; }
+    const char* piecewise_law() const override { return curve_.pieces() > 1 ? "piece of the drag" : nullptr; }
+    int pieces() const override { return curve_.pieces(); }
     const char* loss() const override { return "drag"; }
 
     bool acts_at_rest() const override { return false; }

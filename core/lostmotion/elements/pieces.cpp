@@ -4,12 +4,12 @@ namespace lostmotion::model {
 
 void add_piece_guards(const Terms& terms, const Row& variable, const TorsionCurve& curve, int branch, const Key& key,
                       std::vector<Guard>& guards) {
-    const int k = branch == nowhere ? 0 : key.branch[branch], last = curve.outermost_piece();
+    const int k = branch == nowhere ? 0 : key.branch[branch];
     const auto add = [&](const Row& form, int neighbour) {
         guards.push_back({.form = form, .kind = Guard::edge, .branch = branch, .neighbour = neighbour});
     };
-    if (k < last) add(terms.one(curve.upper(k)) - variable, k + 1);
-    if (k > -last) add(variable - terms.one(curve.lower(k)), k - 1);
+    if (k < curve.last_piece()) add(terms.one(curve.upper(k)) - variable, k + 1);
+    if (k > curve.first_piece()) add(variable - terms.one(curve.lower(k)), k - 1);
 }
 
 void add_piece_guards(const Terms& terms, const Row& angle, const PeriodicCurve& curve, int turn, int branch,

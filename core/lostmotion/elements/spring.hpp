@@ -31,10 +31,8 @@ class SpringOnShaft final : public ShaftElement {
  public:
     explicit SpringOnShaft(const Spring& law) : ShaftElement(law.name, law.shaft), law_(law) {}
 
-    const char* piecewise_law() const override {
-        return law_.curve.outermost_piece() > 0 ? "piece of the spring" : nullptr;
-    }
-    int pieces() const override { return law_.curve.outermost_piece() + 1; }
+    const char* piecewise_law() const override { return law_.curve.pieces() > 1 ? "piece of the spring" : nullptr; }
+    int pieces() const override { return law_.curve.pieces(); }
     bool over_angle() const override { return true; }
     bool drives() const override { return true; }
     const char* source() const override { return "spring"; }

@@ -88,8 +88,7 @@ Fault TrainCheck::controllers() const {
             c.D.size() != m || c.back_calculation.size() != n)
             return name + "has matrices that do not fit its states and signals";
         if (!(c.limit > 0.0)) return name + "has a limit that is not above 0";
-        if (Fault error = too_fine(name + "with its curve ", c.curve.outermost_piece() + 1); !error.empty())
-            return error;
+        if (Fault error = too_fine(name + "with its curve ", c.curve.pieces()); !error.empty()) return error;
         for (const LinearController::Signal& s : c.signals)
             if (!exists(s.shaft)) return name + "takes the angle or speed of a shaft that the train does not have";
         if (!exists(c.compared.shaft)) return name + "compares with a shaft that the train does not have";
@@ -135,7 +134,7 @@ Fault TrainCheck::elements() const {
     if (!error.empty()) return error;
     for (std::size_t s = 0; s < train_.shafts.size(); ++s) {
         const DryFriction& f = train_.shafts[s].friction;
-        const int drag = 2 * train_.shafts[s].drag.outermost_piece() + 1;
+        const int drag = train_.shafts[s].drag.pieces();
         for (const auto& [what, pieces] : {std::pair{"with its friction ", f.pieces()}, {"with its drag ", drag}})
             if (Fault fine = too_fine(shaft(static_cast<int>(s)) + what, pieces); !fine.empty()) return fine;
         if (f.speeds.size() != f.torques.size() || (!f.speeds.empty() && f.speeds[0] != 0.0))

@@ -232,10 +232,10 @@ void RegimeGuards::add_twist_pieces(int gear) {
     const TorsionCurve& curve = g.law.curve;
     const int piece = regime_.key.branch[p.piece];
     const int slip = p.contact == nowhere ? 0 : regime_.key.modes[p.contact];
-    if (piece < curve.outermost_piece())
+    if (piece < curve.last_piece())
         add(terms_.one(curve.upper(piece)) - terms_.state(p.twist), Guard::edge, p.contact, p.piece, piece + 1).behind =
             slip < 0;
-    if (piece > -curve.outermost_piece())
+    if (piece > curve.first_piece())
         add(terms_.state(p.twist) - terms_.one(curve.lower(piece)), Guard::edge, p.contact, p.piece, piece - 1).behind =
             slip > 0;
     if (p.flanks == nowhere || piece == 0) return;

@@ -1,7 +1,6 @@
 // The drive of the paper as a train, and its parameters by their keys in scenario files.
 #pragma once
 
-#include <initializer_list>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -33,10 +32,8 @@ struct Parameter {
 };
 
 // The parameters of a train in the short form that are single numbers, as its parts describe them.
-class ParameterFinder {
+class ParameterFinder : public FieldVisitor {
  public:
-    static constexpr bool reads = false;
-
     std::vector<Parameter> found;
 
     template <class Part>
@@ -44,18 +41,8 @@ class ParameterFinder {
         table_ = table;
         part.describe(*this);
     }
-    void number(const char*, double, Range = Range::any) {}
+    using FieldVisitor::number;
     void number(const Field& field, double& v) { found.push_back({table_ + '.' + field.key, field.unit, &v}); }
-    template <class Enum>
-    void choice(const char*, Enum, std::initializer_list<const char*>) {}
-    template <class Value>
-    void flag(const Field&, Value) {}
-    template <class... Other>
-    void optional(Other&&...) {}
-    template <class... Other>
-    void curve(Other&&...) {}
-    template <class... Other>
-    void curve_if(Other&&...) {}
 
  private:
     std::string table_;

@@ -4,6 +4,8 @@
 // The value that a new structure has is its default, or, where a key may be left out, what stands for that.
 #pragma once
 
+#include <initializer_list>
+
 namespace lostmotion {
 
 // What a number may be; all but `limit`, `limit_or_zero` and `bound` are finite.
@@ -29,6 +31,38 @@ struct Field {
     Range range = Range::any;
     Given given = Given::has_default;
     const char* meaning = "";
+};
+
+// A visitor of fields that takes none. Others derive from it and take some.
+class FieldVisitor {
+ public:
+    static constexpr bool reads = false;
+
+    bool well() const { return true; }
+    template <class Value>
+    void number(const Field&, Value&) {}
+    template <class Value>
+    void pair(const Field&, Value&) {}
+    template <class Value>
+    void integer(const Field&, Value&, long long, long long) {}
+    template <class Value>
+    void flag(const Field&, Value&) {}
+    template <class Value>
+    void list(const Field&, Value&) {}
+
+    // What is a part of its own in scenario files, or follows from others.
+    template <class... Other>
+    void number(const char*, Other&&...) {}
+    template <class... Other>
+    void flag(const char*, Other&&...) {}
+    template <class Enum>
+    void choice(const char*, Enum, std::initializer_list<const char*>) {}
+    template <class... Other>
+    void optional(Other&&...) {}
+    template <class... Other>
+    void curve(Other&&...) {}
+    template <class... Other>
+    void curve_if(Other&&...) {}
 };
 
 }  // namespace lostmotion

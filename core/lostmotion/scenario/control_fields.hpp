@@ -136,6 +136,9 @@ void describe(F& f, Axis& a) {
     });
     f.each("reference_filters", a.speed_filters, [&](DiscreteSystem& s) { describe(f, s); });
     f.each("torque_filters", a.torque_filters, [&](DiscreteSystem& s) { describe(f, s); });
+    a.shaper.each([&]<class Block>(std::optional<Block>& block) {
+        f.optional(Block::key, block, Block{}, [&](Block& b) { b.describe(f); });
+    });
     if constexpr (F::reads) {
         if (!f.well()) return;
         if (a.ratio == 0.0) f.wrong("ratio", "must not be 0");
@@ -161,6 +164,7 @@ void each_table(Use&& use) {
     use("Encoder", [](auto& f) { Encoder().describe(f); });
     use("Camera", [](auto& f) { Camera().describe(f); });
     use("Tracker", [](auto& f) { Tracker().describe(f); });
+    each_reference_block([&](auto block) { use(block.part, [&](auto& f) { block.describe(f); }); });
 }
 
 }  // namespace control

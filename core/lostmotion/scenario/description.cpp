@@ -2,6 +2,48 @@
 
 namespace lostmotion {
 
+namespace {
+
+// The keys of a part.
+class KeySum : public FieldVisitor {
+ public:
+    explicit KeySum(Checksum& sum) : sum_(sum) {}
+
+    using FieldVisitor::flag;
+    using FieldVisitor::number;
+    void number(const Field& field, double) { add(field); }
+    void pair(const Field& field, const std::array<double, 2>&) { add(field); }
+    template <class Integer>
+    void integer(const Field& field, Integer, long long, long long) {
+        add(field);
+    }
+    void flag(const Field& field, bool) { add(field); }
+    void list(const Field& field, const std::vector<double>&) { add(field); }
+
+ private:
+    void add(const Field& field) { sum_.add(std::string_view(field.key)); }
+
+    Checksum& sum_;
+};
+
+}  // namespace
+
+double ScenarioDescription::version() {
+    static const double of_keys = [] {
+        Checksum sum;
+        sum.add(layout);
+        const auto add = [&](const char* part, auto&& describe_part) {
+            sum.add(std::string_view(part));
+            KeySum keys(sum);
+            describe_part(keys);
+        };
+        model::each_table(add);
+        control::each_table(add);
+        return static_cast<double>(sum.value());
+    }();
+    return of_keys;
+}
+
 std::string ParameterRange::refuses(double v) const {
     const auto must = [v](const char* be, double limit) {
         char text[96];
@@ -23,7 +65,7 @@ std::vector<double> ScenarioDescription::write(Scenario scenario, std::vector<Sc
 std::vector<double> ScenarioDescription::write(const std::vector<double>& body,
                                                std::vector<ScenarioParameter> parameters) {
     FieldWriter f;
-    f.numbers = {mark, version, 0.0, static_cast<double>(body.size())};
+    f.numbers = {mark, version(), 0.0, static_cast<double>(body.size())};
     f.numbers.insert(f.numbers.end(), body.begin(), body.end());
     describe(f, parameters, body.size());
     f.numbers[2] = checksum(f.numbers);
@@ -105,7 +147,7 @@ void ScenarioDescription::play(std::vector<bool> played) {
 
 std::string ScenarioDescription::read(std::span<const double> numbers) {
     if (numbers.size() < head || numbers[0] != mark) return "these numbers are no description of a scenario";
-    if (numbers[1] != version) return "the description is of another version; write it anew";
+    if (numbers[1] != version()) return "the description is of another version; write it anew";
     const double count = numbers[head - 1];
     if (!(count >= 1.0 && count <= static_cast<double>(numbers.size() - head)) || count != std::floor(count))
         return "the description is cut off";

@@ -83,6 +83,7 @@ class FieldWriter {
     }
     void text(const char*, const std::string& v);
     void list(const char*, const std::vector<double>& v, Range = Range::any);
+    void list(const Field& field, const std::vector<double>& v) { list(field.key, v); }
     template <class T, class Use>
     void each(const char*, std::vector<T>& v, Use&& use) {
         numbers.push_back(static_cast<double>(v.size()));
@@ -165,6 +166,7 @@ class FieldReader {
     }
     void text(const char* name, std::string& v);
     void list(const char* name, std::vector<double>& v, Range range = Range::any);
+    void list(const Field& field, std::vector<double>& v) { list(field.key, v, field.range); }
     template <class T, class Use>
     void each(const char* name, std::vector<T>& v, Use&& use) {
         const std::size_t n = length(name);

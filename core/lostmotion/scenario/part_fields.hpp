@@ -3,6 +3,7 @@
 
 #include "../kernel/inputs.hpp"
 #include "../model/train.hpp"
+#include "../parts/stiffness_curve.hpp"
 #include "fields.hpp"
 
 namespace lostmotion {
@@ -13,17 +14,19 @@ bool rising(const std::vector<double>& v);
 
 template <class F>
 void describe(F& f, TorsionCurve& curve) {
-    std::vector<double> breaks, slopes;
-    for (int k = 0; k < curve.outermost_piece(); ++k) breaks.push_back(curve.upper(k));
-    for (int k = 0; k <= curve.outermost_piece(); ++k) slopes.push_back(curve.slope(k));
-    f.list("breaks", breaks, Range::positive);
-    f.list("slopes", slopes);
-    if constexpr (F::reads) {
-        if (f.well() && slopes.size() != breaks.size() + 1) f.wrong("slopes", "must be one more than breaks");
-        if (f.well() && !rising(breaks)) f.wrong("breaks", "must rise");
-        if (f.well() && breaks.size() > max_pieces) f.wrong("breaks", "are too many");
-        if (f.well()) curve = TorsionCurve(std::move(breaks), std::move(slopes));
+    TorsionCurve::Side forward = curve.forward(), backward = curve.backward();
+    for (TorsionCurve::Side* side : {&forward, &backward}) {
+        f.list("breaks", side->breaks, Range::positive);
+        f.list("slopes", side->slopes);
+        if constexpr (F::reads) {
+            if (f.well() && side->slopes.size() != side->breaks.size() + 1)
+                f.wrong("slopes", "must be one more than breaks");
+            if (f.well() && !rising(side->breaks)) f.wrong("breaks", "must rise");
+            if (f.well() && side->breaks.size() > max_pieces) f.wrong("breaks", "are too many");
+        }
     }
+    if constexpr (F::reads)
+        if (f.well()) curve = TorsionCurve(forward, backward);
 }
 
 // As it was given, without what extends it.
@@ -215,6 +218,7 @@ void each_table(Use&& use) {
         g.describe(f);
     });
     use("Commanded", [](auto& f) { Brake().describe(f); });
+    use("TorsionCurve", [](auto& f) { StiffnessCurve().describe(f); });
     use("Damper", [](auto& f) { Damper().describe(f); });
     use("Spring", [](auto& f) { Spring().describe(f); });
 }

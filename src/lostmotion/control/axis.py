@@ -12,7 +12,7 @@ from typing import Any
 
 from .. import _core
 from ..errors import InputError
-from ..inputs.described import Described
+from ..inputs.described import Described, ReferenceBlocks
 from ..inputs.validation import did_you_mean, shown
 from ..model.motor import Motor, MotorLaw
 from ..model.train import DriveTrain
@@ -96,6 +96,7 @@ class _Place:
                 **({} if c.speed is None else self._speed(c.speed)),
                 **self._current(c.delay * samples),
                 "camera": self._camera(samples),
+                **{key: part.core_fields() for key in ReferenceBlocks.model_fields if (part := getattr(c, key))},
             }
         )
         return out

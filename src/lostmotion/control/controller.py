@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from ..inputs.part import Part
+from ..inputs.described import ReferenceBlocks
 from ..inputs.quantities import NotNegative, Positive, Switch, Time, Whole
 from .camera import Camera, Tracker
 from .continuous import ContinuousController
@@ -31,7 +31,7 @@ AnyCurrent = Annotated[
 ]
 
 
-class Controller(Part):
+class Controller(ReferenceBlocks):
     """Cascade of position, speed and current loop, each at its own sample time; what is left out is not there.
 
     At each sample instant the encoders are read, the loops that are due are computed, the outermost first, and what the innermost
@@ -117,6 +117,11 @@ class Controller(Part):
         if self.feedforward != Feedforward() and self.speed is None:
             raise ValueError("has a feedforward, which the speed loop adds, but no speed loop; leave it out")
         self._check_camera()
+        blocks = [key for key in ReferenceBlocks.model_fields if getattr(self, key) is not None]
+        if blocks and self.position is not None and self.position.reference_delay > 0.0:
+            raise ValueError(
+                f"has {blocks[0]} and position.reference_delay, which takes the reference as it is given; leave one out"
+            )
         if self.inverse_model is not None:
             if self.speed is None:
                 raise ValueError("has an inverse_model, which the speed loop adds, but no speed loop; leave it out")

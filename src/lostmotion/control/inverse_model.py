@@ -100,7 +100,7 @@ class InverseModel(InverseModelFields):
     def _twist(self, gear: Gear) -> dict[str, Any] | None:
         if isinstance(gear.stiffness, Rigid):
             return None
-        if gear.stiffness.pieces()[1][0] == 0.0 and self.twist_rate is None:
+        if gear.stiffness.has_gap and self.twist_rate is None:
             raise InputError(
                 "inverse_model: lacks twist_rate; the gear has a gap, and the motor needs a speed to pass it with"
             )

@@ -117,7 +117,7 @@ def mesh_damping(gearbox: Gearbox) -> float:
     """Mesh damping of the gear on the rig [N·m·s/rad]: its own, or 5 % of critical on the first stiffness; 0 if rigid."""
     if gearbox.mesh_damping > 0.0:
         return gearbox.mesh_damping
-    slopes = [k for k in gearbox.stiffness.pieces()[1] if k > 0.0] if gearbox.stiffness.kind != "rigid" else []
+    slopes = [k for k in gearbox.stiffness.all_slopes() if k > 0.0] if gearbox.stiffness.kind != "rigid" else []
     if not slopes:
         return 0.0
     motor, load = (factor * gearbox.inertia * gearbox.ratio**2 for factor in (2.0, LOAD_INERTIA))

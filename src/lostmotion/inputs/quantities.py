@@ -75,6 +75,9 @@ class Limit:
         return schema  # type: ignore[no-any-return]
 
 
+MAX_ENTRIES = 100
+"""of a list of numbers that the core describes"""
+
 Positive = Limit(gt=0.0)
 NotNegative = Limit(ge=0.0)
 

@@ -106,5 +106,4 @@ def _laws(gear: Any) -> dict[str, Any]:
 
 def _open(curve: TorsionCurve) -> float:
     """The twist over which a curve carries nothing [rad], both ways."""
-    breaks, slopes = curve.pieces()
-    return 2.0 * breaks[0] if slopes[0] == 0.0 else 0.0
+    return 2.0 * curve.core().side(forward=True)[0][0] if curve.has_gap else 0.0

@@ -85,7 +85,7 @@ class Transmission(TransmissionFields):
     def _compliance_fits(self) -> Self:
         hysteresis = self.hysteresis is not None and self.hysteresis.efficiency < 1.0
         rigid = isinstance(self.stiffness, Rigid)
-        backlash = not isinstance(self.stiffness, Rigid) and self.stiffness.pieces()[1][0] == 0.0
+        backlash = not isinstance(self.stiffness, Rigid) and self.stiffness.has_gap
         if hysteresis and rigid:
             raise ValueError("has hysteresis but is rigid; leave hysteresis out or give it a stiffness")
         if self.mesh_stiffness is not None and rigid:

@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 from .. import _core
 from ..inputs.part import Part
 from ..inputs.quantities import (
+    MAX_ENTRIES,
     Angle,
     AxialStiffness,
     Density,
@@ -34,7 +35,7 @@ from ..reproducible import arctan
 from .angle_torques import AngleCurve, ErrorCurve, ErrorHarmonic, Harmonic
 from .gear import Gear
 from .losses import ConstantEfficiency, MeshEfficiency
-from .torsion import MAX_PIECES, Hysteresis, LinearStiffness, Rigid, TorsionCurve, check_segments
+from .torsion import Hysteresis, LinearStiffness, Rigid, TorsionCurve, check_segments
 
 STEEL = 7850.0  # [kg/m^3]
 ELASTIC_MODULUS = 206e9  # of steel [Pa]
@@ -46,7 +47,7 @@ Mounting = Literal["fixed-free", "supported-supported", "fixed-supported", "fixe
 class StiffnessCurve(Part):
     """Force over deflection: odd, continuous, piecewise linear, as the nut, the screw and its bearings give way together."""
 
-    slopes: tuple[Annotated[AxialStiffness, NotNegative], ...] = Field(min_length=1, max_length=MAX_PIECES)
+    slopes: tuple[Annotated[AxialStiffness, NotNegative], ...] = Field(min_length=1, max_length=MAX_ENTRIES)
     """slopes of the segments, from deflection 0 outwards"""
     breaks: tuple[Annotated[Length, Positive], ...] = ()
     """deflections at which the slope changes; one fewer than slopes"""

@@ -1,13 +1,14 @@
 """The torsion of a gearbox: stiffness, backlash and hysteresis."""
 
 import itertools
-import math
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from .. import _core
+from ..errors import InputError
 from ..inputs.breakpoints import check_apart
+from ..inputs.described import TorsionCurveFields
 from ..inputs.part import Part
 from ..inputs.quantities import (
     Angle,
@@ -16,11 +17,8 @@ from ..inputs.quantities import (
     Number,
     Positive,
     Stiffness,
-    Torque,
     argument,
 )
-
-MAX_PIECES = 100  # of a torsion curve, on each side
 
 
 def check_segments(slopes: tuple[float, ...], breaks: tuple[float, ...], what: str) -> None:
@@ -35,8 +33,51 @@ def check_segments(slopes: tuple[float, ...], breaks: tuple[float, ...], what: s
         raise ValueError(f"ends with slope 0; the last segment must carry {what}")
 
 
-class TorsionCurve(Part):
-    """Torque against twist (eq. 14): odd, continuous, piecewise linear.
+class Elastic(Part):
+    """Base of stiffnesses: a torque over the twist."""
+
+    def core(self) -> _core.TorsionCurve:
+        """The curve of the solver."""
+        raise NotImplementedError
+
+    def torque(self, twist: float) -> float:
+        """P(d) [N·m] at the twist [rad]."""
+        return self.core().torque(argument("twist", twist, "rad"))
+
+    @property
+    def has_gap(self) -> bool:
+        """Whether it has no torque about twist 0."""
+        return self.core().side(forward=True)[1][0] == 0.0
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether one stiffness holds for all twists."""
+        return self.core().pieces == 1
+
+    def all_slopes(self) -> list[float]:
+        """Slopes of the segments [N·m/rad], at positive twists outwards, then at negative ones."""
+        curve = self.core()
+        return [slope for forward in (True, False) for slope in curve.side(forward)[1]]
+
+    def pieces(self) -> tuple[list[float], list[float]]:
+        """(breaks [rad], slopes [N·m/rad]) of one direction, for what takes both as the same.
+
+        Raises
+        ------
+        InputError
+            They are not.
+        """
+        curve = self.core()
+        if not curve.odd:
+            raise InputError(
+                "differs between the two directions of twist, and here one curve is taken for both; make them the same",
+                keys=("stiffness",),
+            )
+        return curve.side(forward=True)
+
+
+class TorsionCurve(TorsionCurveFields, Elastic):
+    """Torque against twist (eq. 14): continuous, piecewise linear.
 
     `backlash` (total gap at the output) and `preload` change the given segments. A gap of half the backlash comes
     before the first segment. Segments below the preload torque are left out, since two flanks are pressed together
@@ -50,12 +91,6 @@ class TorsionCurve(Part):
     """
 
     kind: Literal["curve"] = "curve"
-    slopes: tuple[Annotated[Stiffness, NotNegative], ...] = Field(min_length=1, max_length=MAX_PIECES)
-    """slopes of the segments, from twist 0 outwards"""
-    breaks: tuple[Annotated[Angle, Positive], ...] = ()
-    """breakpoints: twists at which the slope changes; one fewer than slopes"""
-    backlash: Annotated[Angle, NotNegative] = 0.0
-    preload: Annotated[Torque, NotNegative] = 0.0
 
     @model_validator(mode="after")
     def _is_a_curve(self) -> Self:
@@ -64,42 +99,27 @@ class TorsionCurve(Part):
             raise ValueError("has backlash and preload; a preload removes the backlash, so give only one")
         return self
 
-    def pieces(self) -> tuple[list[float], list[float]]:
-        """(breaks [rad], slopes [N·m/rad]) with backlash and preload worked in."""
-        breaks, slopes = list(self.breaks), list(self.slopes)
-        if self.backlash > 0.0:
-            gap = 0.5 * self.backlash
-            return [gap, *(gap + b for b in breaks)], [0.0, *slopes]
-        if self.preload > 0.0:
-            torque, previous = 0.0, 0.0
-            for k, b in enumerate([*breaks, math.inf]):
-                rise = slopes[k] * (b - previous)
-                if torque + rise >= self.preload:
-                    start = previous + (self.preload - torque) / slopes[k] if slopes[k] > 0.0 else b
-                    return [x - start for x in breaks[k:] if x > start], slopes[k if b > start else k + 1 :]
-                torque, previous = torque + rise, b
-        return breaks, slopes
-
     def core(self) -> _core.TorsionCurve:
-        return _core.TorsionCurve(*self.pieces())
+        """The curve of the solver."""
+        return _core.TorsionCurve(self.core_fields())
 
-    def torque(self, twist: float) -> float:
-        """P(d) [N·m] at the twist [rad]."""
-        return self.core().torque(argument("twist", twist, "rad"))
+    def closed(self) -> Self:
+        """The same without its gap."""
+        first = next(k for k, slope in enumerate(self.slopes) if slope > 0.0)
+        gap = self.breaks[first - 1] if first else 0.0
+        own = {"slopes": self.slopes[first:], "breaks": tuple(b - gap for b in self.breaks[first:]), "backlash": 0.0}
+        return self.model_copy(update=own)
 
 
-class LinearStiffness(Part):
+class LinearStiffness(Elastic):
     """One stiffness for all twists (5a)."""
 
     kind: Literal["linear"] = "linear"
     stiffness: Annotated[Stiffness, Positive]
 
-    def pieces(self) -> tuple[list[float], list[float]]:
-        """(breaks [rad], slopes [N·m/rad]): no break, one slope."""
-        return [], [self.stiffness]
-
     def core(self) -> _core.TorsionCurve:
-        return _core.TorsionCurve(*self.pieces())
+        """The curve of the solver."""
+        return _core.TorsionCurve([], [self.stiffness])
 
 
 class Rigid(Part):

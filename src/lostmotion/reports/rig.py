@@ -119,7 +119,7 @@ def _torsion_rows(report: RigReport) -> list[tuple[str, str]]:
     loop = report.loops[0]
     # Without their cause, what is measured is rounding.
     hysteresis = g.hysteresis is not None and g.hysteresis.efficiency < 1.0
-    backlash = g.stiffness.pieces()[1][0] == 0.0
+    backlash = g.stiffness.has_gap
     width = (
         practical(loop.width, "rad", 4) if hysteresis or backlash else "none: neither hysteresis nor backlash is given"
     )

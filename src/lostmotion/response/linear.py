@@ -398,7 +398,7 @@ def _why_several_regimes(drive: Drive) -> str:
         "dry friction": m.friction_torque > 0.0 or drive.load.friction_torque > 0.0,
         "a loss map": not isinstance(g.losses, ConstantEfficiency),
         "hysteresis": g.hysteresis is not None and g.hysteresis.efficiency < 1.0,
-        "a torsion curve of several pieces": not isinstance(g.stiffness, Rigid) and len(g.stiffness.pieces()[1]) > 1,
+        "a torsion curve of several pieces": not isinstance(g.stiffness, Rigid) and not g.stiffness.is_linear,
         "a voltage limit": m.command_limit is not None,
         "a mesh stiffness over the angle": g.mesh_stiffness is not None,
     }
@@ -411,7 +411,7 @@ def _why_several_regimes_of(train: DriveTrain, core: _core.Train) -> str:
     rigid = {f"{train.twist_of(name)}_contact" for name, g in train.gears.items() if isinstance(g.stiffness, Rigid)}
     dry = [name for name in core.contact_names() if name not in rigid]
     limits = any(m.command_limit is not None or m.torque_limit is not None for m in motors)
-    curves = any(not isinstance(g.stiffness, Rigid) and len(g.stiffness.pieces()[1]) > 1 for g in gears)
+    curves = any(not isinstance(g.stiffness, Rigid) and not g.stiffness.is_linear for g in gears)
     reasons = {
         f"dry contacts: {', '.join(dry)}": bool(dry),
         "a torsion curve of several pieces": curves,
@@ -419,7 +419,7 @@ def _why_several_regimes_of(train: DriveTrain, core: _core.Train) -> str:
         "drag over speed": any(s.drag is not None for s in shafts)
         or any(d.drag is not None for d in train.dampers.values()),
         "a torque over an angle": bool(train.gravity or train.angle_torques),
-        "a spring of several pieces": any(len(s.stiffness.pieces()[1]) > 1 for s in train.springs.values()),
+        "a spring of several pieces": any(not s.stiffness.is_linear for s in train.springs.values()),
         "a transmission error": any(g.transmission_error is not None for g in gears),
         "a mesh stiffness over the angle": any(g.mesh_stiffness is not None for g in gears),
     }

@@ -153,14 +153,14 @@ def _others(train: Any) -> Any:
         if isinstance(gear.stiffness, Rigid):
             if gear.stiffness.strikes:
                 yield f"backlash of {name}"
-        elif len(gear.stiffness.pieces()[1]) > 1:
+        elif not gear.stiffness.is_linear:
             yield f"several segments of {name}"
         if gear.housing is not None:
             yield f"the housing of {name}, which turns"
         if gear.transmission_error is not None:
             yield f"transmission error of {name}"
     for name, spring in train.springs.items():
-        if len(spring.stiffness.pieces()[1]) > 1:
+        if not spring.stiffness.is_linear:
             yield f"several segments of {name}"
     for name, damper in train.dampers.items():
         if damper.drag is not None:

@@ -54,21 +54,18 @@ def frictions(axis: Axis) -> tuple[float, float]:
 
 
 def secant(gear: Gear | Gearbox) -> float:
-    """Stiffness of a gear up to its rated torque, without its gap [N·m/rad]; without a rated torque that of its last piece."""
+    """Stiffness of a gear up to its rated torque, without its gap [N·m/rad]; without a rated torque that of its last piece.
+
+    Of two directions that differ, that of the softer one.
+    """
     if isinstance(gear.stiffness, Rigid):
         return math.inf
-    breaks, slopes = gear.stiffness.pieces()
-    if gear.rated_output_torque is None:
-        return slopes[-1]
-    left, twist, before = gear.rated_output_torque, 0.0, 0.0
-    for slope, end in zip(slopes, [*breaks, math.inf], strict=True):
-        width, before = end - before, end
-        if slope == 0.0:
-            continue
-        if slope * width >= left:
-            return gear.rated_output_torque / (twist + left / slope)
-        twist, left = twist + width, left - slope * width
-    return slopes[-1]
+    curve, T = gear.stiffness.core(), gear.rated_output_torque
+    sides = [curve.side(forward) for forward in (True, False)]
+    if T is None:
+        return min(slopes[-1] for _, slopes in sides)
+    gap = sides[0][0][0] if gear.stiffness.has_gap else 0.0
+    return T / (max(curve.twist(T), -curve.twist(-T)) - gap)
 
 
 def two_inertias(axis: Axis) -> TwoInertias:

@@ -379,12 +379,9 @@ def without_backlash(scenario: TrainScenario) -> TrainScenario | None:
 
     def change(gear: Any) -> Any:
         stiffness = gear.stiffness
-        if not isinstance(stiffness, TorsionCurve) or stiffness.pieces()[1][0] > 0.0:
+        if not isinstance(stiffness, TorsionCurve) or not stiffness.has_gap:
             return gear
-        breaks, slopes = stiffness.pieces()
-        gap = breaks[0]
-        closed = TorsionCurve(slopes=tuple(slopes[1:]), breaks=tuple(b - gap for b in breaks[1:]))
-        return gear.model_copy(update={"stiffness": closed})
+        return gear.model_copy(update={"stiffness": stiffness.closed()})
 
     return _changed_all(scenario, "gears", change)
 

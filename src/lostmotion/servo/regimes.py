@@ -17,7 +17,7 @@ from ..errors import InputError, need
 from ..inputs.validation import shown
 from ..model.gear import Gear
 from ..model.signals import ForceSignal, TorqueSignal
-from ..model.torsion import Rigid
+from ..model.torsion import Elastic, Rigid
 from ..response.linear import LinearModel, train_model
 from ..simulation.needs import need_free_motion
 from ..simulation.scenario import Scenario
@@ -101,7 +101,7 @@ class Axis:
         for name, gear in train.gears.items():
             i = turns(train, self.motor_shaft, gear.output)
             if i is not None and not isinstance(gear.stiffness, Rigid):
-                found[name] = gear.stiffness.pieces()[1][-1] / i**2
+                found[name] = _last_slope(gear.stiffness) / i**2
         return min(found, key=lambda name: found[name]) if found else None
 
 
@@ -213,21 +213,26 @@ def _points(axis: Axis) -> Iterator[tuple[str, str, TrainInitial, dict[str, int]
     if main is None:
         yield "rigid", f"all gears rigid, {moving}", TrainInitial(speeds=_speeds(axis, v, SLIP)), {}
         return
-    breaks, slopes = train.gears[main].stiffness.pieces()  # type: ignore[union-attr]
+    curve = train.gears[main].stiffness.core()  # type: ignore[union-attr]
+    breaks, slopes = curve.side(forward=True)
     bends = train.twist_of(main).removeprefix(f"{main}_")
     twists = {name: _last(gear) for name, gear in train.gears.items() if not isinstance(gear.stiffness, Rigid)}
     first = 1 if slopes[0] == 0.0 and len(slopes) > 1 else 0
     edges = [0.0, *breaks, BEYOND * _last(train.gears[main])]
-    pieces = {"gap": 0} if first else {}
-    pieces |= (
-        {"first stiffness": first, "last stiffness": len(slopes) - 1}
-        if len(slopes) > first + 1
-        else {"stiffness": first}
-    )
-    for name, k in pieces.items():
-        what = f"{main} with {_stiffness(train, main, slopes[k])}" if slopes[k] else f"{main} within its gap"
-        state = TrainInitial(speeds=_speeds(axis, v, SLIP), twists=twists | {main: 0.5 * (edges[k] + edges[k + 1])})
-        yield name, f"{what}, {moving}", state, {}
+    if first:
+        state = TrainInitial(speeds=_speeds(axis, v, SLIP), twists=twists | {main: 0.5 * (edges[0] + edges[1])})
+        yield "gap", f"{main} within its gap, {moving}", state, {}
+    for forward in (True,) if curve.odd else (True, False):
+        ends, of = curve.side(forward)
+        ends = [0.0, *ends, edges[-1]]
+        pieces = (
+            {"first stiffness": first, "last stiffness": len(of) - 1} if len(of) > first + 1 else {"stiffness": first}
+        )
+        for name, k in pieces.items():
+            twist = 0.5 * (ends[k] + ends[k + 1])
+            state = TrainInitial(speeds=_speeds(axis, v, SLIP), twists=twists | {main: twist if forward else -twist})
+            where = "" if forward else " backward"
+            yield f"{name}{where}", f"{main} with {_stiffness(train, main, of[k])}{where}, {moving}", state, {}
     within = 0.5 * (edges[first] + edges[first + 1])
     at = twists | {main: within}
     hysteresis = train.gears[main].hysteresis
@@ -260,9 +265,14 @@ def _stiffness(train: DriveTrain, gear: str, value: float) -> str:
     return f"{1e-6 * value:.5g} N/µm" if train.is_slide(train.gears[gear].output) else f"{value:.5g} N·m/rad"
 
 
+def _last_slope(stiffness: Elastic) -> float:
+    """Slope of the last piece [N·m/rad], of two directions that differ the smaller one."""
+    return min(stiffness.core().side(forward)[1][-1] for forward in (True, False))
+
+
 def _last(gear: Gear) -> float:
     """A twist at the beginning of the last piece of a gear [rad]; of a linear one that of a small torque."""
-    breaks, slopes = gear.stiffness.pieces()  # type: ignore[union-attr]
+    breaks, slopes = gear.stiffness.core().side(forward=True)  # type: ignore[union-attr]
     return breaks[-1] if breaks else 1e-3 * (gear.rated_output_torque or 1.0) / slopes[-1]
 
 

@@ -401,6 +401,7 @@ def _own_parameters(drive: Drive, vary: Mapping[str, Any], count: int, generator
         assert isinstance(curve, TorsionCurve)
         if columns[BACKLASH].min() <= 0.0:
             raise InputError(f"vary.{BACKLASH}: {columns[BACKLASH].min():g} rad must be above 0, for each drive")
+        curve.pieces()  # both directions are the same
         half = 0.5 * columns[BACKLASH]
         own += [half, *(half + b for b in curve.breaks), *(np.full(count, s) for s in (0.0, *curve.slopes))]
         breaks = 1 + len(curve.breaks)

@@ -12,6 +12,7 @@ from .. import _core
 from ..errors import InputError
 from ..model.drive import Drive
 from ..model.load import Load
+from ..model.torsion import Elastic
 from ..model.train import DriveTrain
 from .drive_scenario import DriveScenario, Initial
 from .simulation_state import SimulationState
@@ -50,10 +51,9 @@ class JointDrive:
             inertia[gear.input] += gear.inertia
         square = 0.0
         for gear in self.train.gears.values():
-            _, slopes = gear.stiffness.pieces() if hasattr(gear.stiffness, "pieces") else ([], [])
-            if slopes:
+            if isinstance(gear.stiffness, Elastic):
                 inner = inertia[gear.input] * gear.ratio * gear.ratio
-                square += max(slopes) * (1.0 / inner + 1.0 / inertia[gear.output])
+                square += max(gear.stiffness.all_slopes()) * (1.0 / inner + 1.0 / inertia[gear.output])
         return math.sqrt(square)
 
     @property
@@ -273,16 +273,7 @@ def _twist_under(drive: JointDrive, torque: float) -> tuple[float, float]:
     if isinstance(drive.drive, DriveTrain):
         return 0.0, 0.0
     gear = drive.train.gears["gearbox"]
-    if not hasattr(gear.stiffness, "pieces"):
+    if not isinstance(gear.stiffness, Elastic):
         return 0.0, 0.0
-    breaks, slopes = gear.stiffness.pieces()
-    twist, carried, size = 0.0, 0.0, abs(torque)
-    for k, slope in enumerate(slopes):
-        end = breaks[k] if k < len(breaks) else math.inf
-        if slope > 0.0 and carried + slope * (end - twist) >= size:
-            twist += (size - carried) / slope
-            break
-        carried += slope * (end - twist)
-        twist = end
-    capacity = 0.0 if gear.hysteresis is None else 0.5 * (1.0 - gear.hysteresis.efficiency) * size
-    return math.copysign(twist, torque), capacity
+    capacity = 0.0 if gear.hysteresis is None else 0.5 * (1.0 - gear.hysteresis.efficiency) * abs(torque)
+    return gear.stiffness.core().twist(torque), capacity

@@ -49,7 +49,7 @@ def resonances(scenario: DriveScenario) -> list[tuple[str, float, float]]:
     """(segment, resonance, anti-resonance) [Hz] of the softest and the stiffest segment of the torsion curve."""
     g = scenario.gearbox
     J_1 = g.ratio**2 * (scenario.motor.rotor_inertia + g.inertia)
-    slopes = [] if isinstance(g.stiffness, Rigid) else [k for k in g.stiffness.pieces()[1] if k > 0.0]
+    slopes = [] if isinstance(g.stiffness, Rigid) else [k for k in g.stiffness.all_slopes() if k > 0.0]
     pieces = {"softest": min(slopes, default=0.0), "stiffest": max(slopes, default=0.0)}
     return [
         (

@@ -74,30 +74,21 @@ class TestRig:
         self.gearbox = gearbox = gearbox.forward()
         self.rigid = isinstance(gearbox.stiffness, Rigid)
         """without a twist"""
-        self.breaks: tuple[float, ...] = ()
-        self.slopes: tuple[float, ...] = ()
-        if not isinstance(gearbox.stiffness, Rigid):
-            self.breaks, self.slopes = map(tuple, gearbox.stiffness.pieces())
         self.load = self._load()
 
     def _load(self) -> Load:
         """Damped critically on the gearbox; on a rigid one, where nothing swings, small beside the input shaft."""
-        if self.rigid:
+        stiffness = self.gearbox.stiffness
+        if isinstance(stiffness, Rigid):
             return Load(inertia=RIGID_LOAD * (self.gearbox.inertia or 1.0) * self.gearbox.ratio**2)
-        k = max(self.slopes)
+        k = max(stiffness.all_slopes())
         omega = 2.0 * np.pi * RIG_FREQUENCY
         return Load(inertia=k / omega**2, viscous_friction=2.0 * k / omega)
 
     def _twist_at(self, torque: float) -> float:
         """Twist of the torsion curve at this torque, for a start without transient."""
-        if self.rigid:
-            return 0.0
-        rest, previous = abs(torque), 0.0
-        for b, slope in zip([*self.breaks, np.inf], self.slopes, strict=True):
-            if slope > 0.0 and rest <= slope * (b - previous):
-                return float(np.copysign(previous + rest / slope, torque))
-            rest, previous = rest - slope * (b - previous), b
-        raise AssertionError("the last piece has no end")
+        stiffness = self.gearbox.stiffness
+        return 0.0 if isinstance(stiffness, Rigid) else stiffness.core().twist(torque)
 
     @staticmethod
     def _run(drive: Drive, **surroundings: Any) -> RunArrays:

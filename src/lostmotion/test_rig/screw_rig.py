@@ -66,7 +66,7 @@ class ScrewRig:
         self._inertia = gear.inertia
         self.rigid = isinstance(gear.stiffness, Rigid)
         """without any deflection"""
-        self._k = 0.0 if isinstance(gear.stiffness, Rigid) else max(gear.stiffness.pieces()[1])
+        self._k = 0.0 if isinstance(gear.stiffness, Rigid) else max(gear.stiffness.all_slopes())
         omega = 2.0 * np.pi * RIG_FREQUENCY
         self._mass = LIGHT if self.rigid else self._k / omega**2
         self._damping = 0.0 if self.rigid else 2.0 * self._k / omega
