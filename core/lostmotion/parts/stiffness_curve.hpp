@@ -11,7 +11,7 @@ namespace lostmotion {
 
 struct StiffnessCurve {
     std::vector<double> slopes, breaks;
-    double backlash = 0.0, preload = 0.0;
+    double backlash = 0.0, preload = 0.0, backward = 1.0;
 
     template <class Fields>
     void describe(Fields& f) {
@@ -27,9 +27,16 @@ struct StiffnessCurve {
         f.number({"preload", "", "N*m", Range::not_negative, Given::has_default,
                   "torque that presses two flanks together: segments below it are left out"},
                  preload);
+        f.number({"backward", "", "", Range::positive, Given::has_default,
+                  "stiffness at negative twists over that at positive ones"},
+                 backward);
     }
 
-    TorsionCurve curve() const { return {side(slopes), side(slopes)}; }
+    TorsionCurve curve() const {
+        std::vector<double> backwards = slopes;
+        for (double& k : backwards) k *= backward;
+        return {side(slopes), side(backwards)};
+    }
 
  private:
     TorsionCurve::Side side(const std::vector<double>& of) const {
