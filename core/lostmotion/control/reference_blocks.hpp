@@ -19,8 +19,38 @@
 
 namespace lostmotion::control {
 
+// First-order lag tau y' = u - y, exact for an input that is held from sample to sample.
+struct ReferenceFilter {
+    static constexpr const char *part = "ReferenceFilter", *key = "reference_filter",
+                                *meaning = "First-order filter of the reference, before the loops.";
+
+    double time_constant = 1.0;
+
+    template <class Fields>
+    void describe(Fields& f) {
+        f.number({"time_constant", "tau", "s", Range::positive, Given::needed, "tau of tau y' = u - y"}, time_constant);
+    }
+    void place(Slots& slots, double sample_time) {
+        first_ = slots.take(1);
+        share_ = share_of(sample_time, time_constant);
+    }
+    void start(double value, double* slot) const { slot[first_] = value; }
+    ReferencePoint operator()(const ReferencePoint& in, double* slot) const {
+        ReferencePoint out{slot[first_]};
+        out.rate = (in.value - out.value) / time_constant;
+        out.acceleration = (in.rate - out.rate) / time_constant;
+        out.jerk = (in.acceleration - out.acceleration) / time_constant;
+        slot[first_] += share_ * (in.value - out.value);
+        return out;
+    }
+
+ private:
+    double share_ = 1.0;  // of the difference, at a sample
+    int first_ = 0;
+};
+
 // In the order in which they act.
-using ReferenceBlocks = std::tuple<>;
+using ReferenceBlocks = std::tuple<ReferenceFilter>;
 
 // The blocks of a controller, as far as it has them.
 class ReferenceShaper {
