@@ -251,6 +251,7 @@ STATED = {
     "the gain of the position loop": r""" "gain",\s*"K_v" """,
     "the gain of the speed loop": r""" "gain",\s*"k_p" """,
     "the gain of the current loop": r""" "gain",\s*"g" """,
+    "the stiffness backward": r""" "backward",\s*"" """,
     # sliders and campaigns use its key
     "mesh_damping": r""" "mesh_damping",\s*"[^"]*",\s*"|^\s+mesh_damping: |def_\w+\("mesh_damping" """,
 } | {
@@ -262,6 +263,7 @@ STATED = {
         "weakening_voltage",
         "tracking_index",
         "speed_bandwidth",
+        "reference_filter",
     )
 }
 
