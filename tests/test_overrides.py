@@ -60,6 +60,7 @@ OTHER = {
     "gearbox.stiffness.breaks": ["0.3 mrad", "2 mrad"],
     "gearbox.stiffness.backlash": "1 arcmin",
     "gearbox.stiffness.preload": "1 Nm",
+    "gearbox.stiffness.backward": 1.5,
     "gearbox.hysteresis.efficiency": 0.8,
     "gearbox.losses.kind": "constant_efficiency",
     "gearbox.losses.speeds": [0, 1],
