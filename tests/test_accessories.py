@@ -4,6 +4,7 @@ import math
 from pathlib import Path
 from typing import Any
 
+import jsonschema
 import numpy as np
 import pytest
 
@@ -11,6 +12,7 @@ import lostmotion as lm
 from lostmotion.model.angle_torques import STANDARD_GRAVITY as G
 from lostmotion.model.duty import Amplifier
 from lostmotion.reports.listing import list_records, record_text, template
+from lostmotion.simulation.drive_scenario import json_schema
 from lostmotion.sizing.supply import amplifier_rules, longest_above
 from lostmotion.studies.axis_rows import Axes
 from lostmotion.studies.nearest import not_judged
@@ -159,6 +161,15 @@ def test_the_drive_check_of_an_axis_names_the_keys_of_its_file():
     assert "motors." not in said
     assert "screws." not in said
     assert next(f for f in findings if f.rule == "amplifier_current").verdict == "unknown"
+
+
+@pytest.mark.parametrize(
+    ("brake", "valid"), [("of the motor", True), ({"from": "x"}, True), ({"torque": 1.0}, True), (3, False)]
+)
+def test_the_schema_for_editors_takes_a_brake_by_name(brake: Any, valid: bool):
+    schema = json_schema()
+    table = {"properties": {"task": schema["properties"]["task"]}, "$defs": schema["$defs"]}
+    assert jsonschema.Draft202012Validator(table).is_valid({"task": {"brake": brake}}) == valid
 
 
 # --- amplifiers ---

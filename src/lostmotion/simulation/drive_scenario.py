@@ -26,7 +26,7 @@ from ..model.task import Task
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
 from .keys import set_values
-from .scenario import BASE, RECORD_NAME, Scenario, SimulationTable, check_on_reference
+from .scenario import BASE, RECORD_NAME, Scenario, SimulationTable, check_on_reference, with_accessories
 from .variables import STATES, VARIABLES, Variable, add_efficiency
 
 
@@ -348,7 +348,7 @@ def from_tables(tables: Mapping[str, Any]) -> DriveScenario:
 
 def json_schema() -> dict[str, Any]:
     """JSON Schema of scenario files, for editors."""
-    schema = DriveScenario.model_json_schema()
+    schema = with_accessories(DriveScenario.model_json_schema())
     schema["properties"]["base"] = BASE
     schema["required"] = []  # with a base, none
     for table in ("gearbox", "motor"):

@@ -15,6 +15,7 @@ from ..control.axis import NO_LAWS, Bound, core_control
 from ..control.continuous import ContinuousController
 from ..control.controller import Controller
 from ..control.law import Law
+from ..data_sheets.components import ACCESSORIES
 from ..inputs.kept import kept
 from ..inputs.part import Part
 from ..inputs.quantities import Positive, Time
@@ -30,6 +31,17 @@ LONG_TABLES = ("shafts", "slides", *LinearElements.model_fields)  # of which one
 # In the JSON Schema of files, beside what a scenario has.
 BASE = {"type": "string", "description": "scenario file that this one changes"}
 RECORD_NAME = {"type": "string", "description": "name of a record of the catalogue, or a file with one (.toml)"}
+
+
+def with_accessories(schema: dict[str, Any]) -> dict[str, Any]:
+    """A JSON Schema in which brake and amplifier of a task may name a record."""
+    from_record = {"type": "object", "properties": {"from": RECORD_NAME}, "required": ["from"]}
+    for task in ("Task", "TrainTask"):
+        properties = schema["$defs"].get(task, {}).get("properties", {})
+        for key in ACCESSORIES:
+            if key in properties:
+                properties[key]["anyOf"] += [RECORD_NAME, from_record]
+    return schema
 
 
 def check_on_reference(initial: Any, controllers: Mapping[str, Controller], keys: Sequence[str]) -> None:

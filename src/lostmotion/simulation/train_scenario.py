@@ -28,7 +28,7 @@ from ..model.train import DriveTrain, Elements
 from .given_motion import MotionDerivative
 from .keys import set_values
 from .linear_units import in_si
-from .scenario import BASE, RECORD_NAME, Scenario, SimulationTable, check_on_reference
+from .scenario import BASE, RECORD_NAME, Scenario, SimulationTable, check_on_reference, with_accessories
 from .train_checks import TrainChecks
 from .train_state import angles_at_start, start_values
 from .train_tables import LINEAR_INITIAL, ShaftTable, SlideTable, TrainInitial
@@ -456,7 +456,7 @@ def train_schema() -> dict[str, Any]:
 
 
 def _make_train_schema() -> dict[str, Any]:
-    schema = TrainScenario.model_json_schema()
+    schema = with_accessories(TrainScenario.model_json_schema())
     schema["properties"] = {key: schema["properties"][key] for key in ("title", "shafts", "slides")} | schema[
         "properties"
     ]
