@@ -236,7 +236,7 @@ def many(count: int = 250) -> list[Row]:
         subprocess.run(command, cwd=home, check=True, capture_output=True)
         wall = time.perf_counter() - begin
         used = resource.getrusage(resource.RUSAGE_CHILDREN)
-        page = (home / "out" / "identify.html").stat().st_size
+        page = (home / "out" / "identified.html").stat().st_size
     processor = used.ru_utime + used.ru_stime - before.ru_utime - before.ru_stime
     return [
         (f"{count} logs of 6 s, whole sequence and page", f"{wall:.0f} s, {processor:.0f} s of processor", "120 s"),
