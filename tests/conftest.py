@@ -101,6 +101,7 @@ SLOW = {
     "test_fmu_exchange.py": "Model Exchange by CVODE against the exact run",
     "test_fmu_played.py": "signals that an FMU plays, in both interfaces and versions",
     "test_hunting_axes.py": "random axes whose certificates are checked by long runs",
+    "test_sampled_hunting_axes.py": "random sampled axes whose certificates are checked by long runs",
     "test_identification.py": "whole fits: the intervals contain the values put in",
     "test_identification_campaign.py": "a gearbox found from the logs of its own virtual rig",
     "test_identification_cycloidal.py": "measured logs with published values",

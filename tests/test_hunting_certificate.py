@@ -131,9 +131,13 @@ def test_what_is_not_decided_is_named(changes: dict[str, Any], reason: str) -> N
     assert reason in certificate.reason
 
 
-def test_a_sampled_controller_and_a_wrong_error_are_refused() -> None:
-    with pytest.raises(lm.InputError, match="0 continuous and 1 sampled controllers"):
-        lm.hunting_certificate(lm.load("position-axis"))
+def test_other_controllers_and_a_wrong_error_are_refused() -> None:
+    with pytest.raises(
+        lm.InputError, match=r"reference\.kind: speed; the certificate is that of a position controller"
+    ):
+        lm.hunting_certificate(lm.load("speed-axis"))
+    with pytest.raises(lm.InputError, match="the scenario has no controller"):
+        lm.hunting_certificate(lm.load("step-to-standstill"))
     with pytest.raises(lm.InputError, match="largest_error: -1"):
         lm.hunting_certificate(lm.load("hunting-with-static-friction"), largest_error=-1.0)
     assert (

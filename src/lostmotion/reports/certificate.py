@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..servo.certificate import HuntingCertificate
+from ..servo.certificate import HuntingCertificate, certified_in_words
 from ..units.practical import practical
 from .looks import FAINT, look
 from .page import Headline, Prose, Report, Table
@@ -24,13 +24,18 @@ COMPUTED = (
     "intervals of errors, in floating point, widened by its rounding.",
     "It holds for starts at rest in which all but the integrator has settled, with the errors that are given.",
 )
+SAMPLED = "Shown by sets of states that contain every angle within a step of the encoder, and every instant of the break-away within a sample."
+WITHOUT_STEPS = (
+    "The error that a slip leaves, with an encoder without steps. Where the curve crosses the line of equal and opposite errors there is a "
+    "limit cycle; the band in the table holds with the steps."
+)
 STATES = {"hunts": "bad", "does not hunt": "good", "not decided": "open"}
 
 
 def certificate_rows(certificate: HuntingCertificate) -> list[tuple[str, str]]:
     """Verdict, limit cycles and errors, as (what, value)."""
     unit = "rad" if certificate.map is None else str(certificate.map["error"].attrs["units"])
-    rows = [("axis", certificate.verdict + (f": {certificate.reason}" if certificate.reason else ""))]
+    rows = [("axis", certified_in_words(certificate))]
     for point in certificate.fixed_points:
         kind = "stable" if point.stable else "unstable"
         rows.append(("limit cycle", f"±{practical(point.amplitude, unit)}, {1.0 / point.period:.4g} Hz, {kind}"))
@@ -70,6 +75,13 @@ def map_panel(certificate: HuntingCertificate) -> Panel | None:
         marks=marks,
         level=0.0,
     )
+
+
+def certificate_parts(certificate: HuntingCertificate) -> list[Table | Group]:
+    """The certificate as parts of the report of a sampled axis."""
+    panel = map_panel(certificate)
+    table = Table("Certificate of hunting", ("quantity", "value"), certificate_rows(certificate), SAMPLED)
+    return [table, *([Group("hunting", "From break-away to break-away", WITHOUT_STEPS, (panel,), 1)] if panel else [])]
 
 
 def certificate_report(name: str, title: str, certificate: HuntingCertificate) -> Report:

@@ -12,6 +12,7 @@ import numpy as np
 from ..servo.commission import LoopSheet, ServoReport, decibels
 from ..servo.motion import LimitCycle, StepResponse
 from ..units.practical import charted
+from .certificate import certificate_parts
 from .looks import FAINT, look
 from .page import Headline, Prose, Report, Table
 from .pages import table_csv, write_report
@@ -279,6 +280,7 @@ def servo_report(name: str, report: ServoReport) -> Report:
             Table("Regimes", ("regime", "what it is"), [list(pair) for pair in report.regimes.items()]),
             Table("Steps and motion", ("quantity", "value"), steps_and_motion),
             *([_cycle_table(report, cycle)] if cycle is not None and cycle.without else []),
+            *([] if report.certificate is None else certificate_parts(report.certificate)),
             loops,
             *([steps] if report.steps else []),
             *_stiffness_group(report),

@@ -9,8 +9,9 @@ settled state of unit error with a contact torque of 0, and `p` that of a contac
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,6 +23,9 @@ from ..simulation.train_scenario import TrainScenario
 from ..simulation.train_tables import TrainInitial
 from .limit_cycle import Loop
 from .linear import LinearModel, train_model
+
+if TYPE_CHECKING:
+    from ..model.train import DriveTrain
 
 SLIP_SPEED = 1e-9  # [rad/s] or [m/s], at which the matrices of the slip are taken
 LINEAR = ("shafts", "motors", "gears", "springs", "dampers", "mass_matrices")
@@ -97,7 +101,9 @@ def stick_slip(scenario: TrainScenario) -> StickSlip:
     motor, loop = _motor(scenario), Loop.of(scenario)
     if scenario.continuous()[motor].firmware is not None:
         raise UndecidableError(f"the firmware of {motor} is no linear law")
-    shaft, breakaway = _contact(loop)
+    if reasons := list(others(scenario.train())):
+        raise UndecidableError(f"the slip is not one linear regime: it has {', '.join(reasons)}")
+    shaft, breakaway = only_contact(scenario.train(), loop.core, loop.start, loop.capacities)
     still, forward, reverse = (_model(loop, shaft, way * SLIP_SPEED) for way in (0.0, 1.0, -1.0))
     if not np.allclose(forward.A, reverse.A, rtol=NONE, atol=0.0):
         raise UndecidableError("it slips forward otherwise than in reverse")
@@ -121,13 +127,18 @@ def _motor(scenario: TrainScenario) -> str:
     return motor
 
 
-def _contact(loop: Loop) -> tuple[str, float]:
-    """Shaft of the only dry contact, and the torque that it holds."""
-    train = loop.scenario.train()
-    if reasons := list(_others(train)):
-        raise UndecidableError(f"the slip is not one linear regime: it has {', '.join(reasons)}")
-    zeros = [_core.Signal([(0.0, 0.0, 0.0)], []) for _ in loop.core.input_names()]
-    _, contacts, _ = _core.explain_at(loop.core, zeros, loop.start, loop.capacities, 0.0)
+def only_contact(
+    train: DriveTrain, core: _core.Train, start: Mapping[str, float], capacities: Mapping[str, float]
+) -> tuple[str, float]:
+    """Shaft of the only dry contact, and the torque that it holds.
+
+    Raises
+    ------
+    UndecidableError
+        There is none, or there are several.
+    """
+    zeros = [_core.Signal([(0.0, 0.0, 0.0)], []) for _ in core.input_names()]
+    _, contacts, _ = _core.explain_at(core, zeros, start, capacities, 0.0)
     dry = [(name, ahead, back) for name, _, _, _, ahead, back, _ in contacts if math.isfinite(ahead)]
     if not dry:
         raise UndecidableError("it has no dry contact that could stick")
@@ -142,7 +153,7 @@ def _contact(loop: Loop) -> tuple[str, float]:
     return shaft, ahead
 
 
-def _others(train: Any) -> Any:
+def others(train: DriveTrain) -> Iterator[str]:
     """Elements with which a slip is more than one linear regime."""
     for name, shaft in train.shafts.items():
         if shaft.friction()[2]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -15,14 +16,20 @@ from ..inputs.validation import shown
 from ..response.hunting_proof import Certainty, Proof, prove
 from ..response.limit_cycle import SAMPLES, Loop
 from ..response.return_map import Image, Transients, image
+from ..response.standstill import moving_input
 from ..response.stick_slip import AtRestError, StickSlip, UndecidableError, stick_slip
 from ..simulation.scenario import Scenario
 from ..simulation.train_scenario import TrainScenario, in_long_form
+from .motion import at_rest
+from .regimes import Axis, axis_of
+from .sampled_proof import map_without_steps, prove_sampled, reached_by_run
+from .sampled_slip import SampledSlip, sampled_slip
 
 if TYPE_CHECKING:
     import xarray
 
 POINTS = 121  # of the map
+SAMPLED_POINTS = 33  # of that of a sampled controller
 SHOWN = 4.0  # times the largest limit cycle, up to which it is drawn
 SECANTS = 12
 STEP = 1e-4  # relative, of the derivative at a fixed point
@@ -61,9 +68,9 @@ class HuntingCertificate:
     """contact that sticks; empty where there is no map"""
     map: xarray.Dataset | None
     """``image`` over ``error``: the error left after a slip that begins with an error; ``slip_time`` and ``stuck_time`` [s]; without
-    the errors whose slips are more than one linear regime"""
+    the errors whose slips are more than one linear regime; of a sampled controller ``image`` about a band, without encoder steps"""
     fixed_points: tuple[FixedPoint, ...]
-    """limit cycles, those without stability among them"""
+    """limit cycles, those without stability among them; none of a sampled controller"""
     largest_error: float
     """largest starting error for which the verdict is shown"""
     band: tuple[float, float] | None
@@ -78,11 +85,19 @@ class HuntingCertificate:
     def __repr__(self) -> str:
         if self.verdict != "hunts":
             return f"{self.verdict}: {self.reason}"
+        if self.reason:
+            return f"hunts: {self.reason}"
         cycles = [
             f"{'stable' if p.stable else 'unstable'} limit cycle of {1.0 / p.period:.6g} Hz" for p in self.fixed_points
         ]
         band = "" if self.band is None else f", errors from {self.band[0]:.4g} to {self.band[1]:.4g} are never left"
-        return f"hunts: {', '.join(cycles) or 'no symmetric limit cycle'}{band}"
+        none = "a limit cycle" if self.band is not None else "no symmetric limit cycle"
+        return f"hunts: {', '.join(cycles) or none}{band}"
+
+
+def certified_in_words(certificate: HuntingCertificate) -> str:
+    """Verdict with its reason."""
+    return certificate.verdict + (f": {certificate.reason}" if certificate.reason else "")
 
 
 @checked
@@ -95,11 +110,16 @@ def hunting_certificate(scenario: Scenario, *, largest_error: float | str | None
     intervals of errors. *Hunts* means that it maps a band of errors without rest into itself. *Does not hunt* means
     that each slip reduces its error. The bounds are computed in floating point and widened by what that may round.
 
+    With a sampled controller, sets of states are followed from sample to sample. They contain each angle within a step
+    of the encoder, and each instant of the break-away within a sample. *Hunts* also means that no reading of the
+    encoder is the reference, so that the integrator never stops.
+
     Parameters
     ----------
     scenario : Scenario
-        With one continuous position controller, one dry contact with a constant friction in motion, and no other contacts or
-        segments. Its inputs must come to rest.
+        With one position controller, one dry contact with a constant friction in motion, and no other contacts or
+        segments. A sampled controller needs rigid gears, one encoder, and a current loop of kind ideal or first_order.
+        Its inputs must come to rest.
     largest_error : float or str, optional
         Largest starting error [rad] or [m] that is examined. Default: the travel of the reference.
 
@@ -112,7 +132,7 @@ def hunting_certificate(scenario: Scenario, *, largest_error: float | str | None
     Raises
     ------
     InputError
-        The controller is no continuous position controller, or an input never comes to rest.
+        There is no position controller, there are several, or an input never comes to rest.
 
     Examples
     --------
@@ -122,11 +142,16 @@ def hunting_certificate(scenario: Scenario, *, largest_error: float | str | None
     ('hunts', 5.762)
     """
     train = in_long_form(scenario)
-    loop = Loop.of(train)
     if largest_error is not None:
         largest_error = argument("largest_error", largest_error, _unit(train))
         if not largest_error > 0.0:
             raise InputError(f"largest_error: {shown(largest_error)} must be greater than 0")
+    if not train.axes() and not train.continuous():
+        raise InputError("hunting_certificate: the scenario has no controller; add one with a position loop")
+    if train.axes() and not train.continuous():
+        axis = axis_of(train)
+        return certified(axis, lambda: at_rest(axis).verdict == "at rest", largest_error)
+    loop = Loop.of(train)
     try:
         of = stick_slip(train)
     except UndecidableError as why:
@@ -162,9 +187,82 @@ def _without_map(verdict: Certainty, reason: str) -> HuntingCertificate:
     return HuntingCertificate(verdict, reason, "", None, (), none, None, (), none, none)
 
 
+def certified(axis: Axis, rests: Callable[[], bool], largest_error: float | None = None) -> HuntingCertificate:
+    """Certificate of an axis with a sampled controller.
+
+    Parameters
+    ----------
+    rests
+        Whether the run of the scenario comes to rest.
+
+    Raises
+    ------
+    InputError
+        An input never comes to rest.
+    """
+    train, kind = axis.scenario, axis.controller.reference.kind
+    if kind != "position":
+        raise InputError(
+            f"controllers.{axis.motor}.reference.kind: {kind}; the certificate is that of a position controller"
+        )
+    if name := moving_input(train):
+        raise InputError(
+            f"{name}: never comes to rest; leave out sines and last slopes, since hunting is what a loop does by itself"
+        )
+    try:
+        of = sampled_slip(axis)
+        proof = prove_sampled(of, largest_error or _sampled_travel(axis))
+    except UndecidableError as why:
+        return _without_map("not decided", str(why))
+    except AtRestError as why:
+        if rests():
+            return _without_map("does not hunt", str(why))
+        return _without_map("not decided", f"{why}, but the run of the scenario is not seen to come to rest")
+    verdict, reason = proof.verdict, proof.reason
+    reached = math.nan if verdict == "not decided" else reached_by_run(axis, of, proof.largest)
+    if verdict == "does not hunt" and not abs(reached) <= proof.largest:
+        verdict = "not decided"
+        reason = f"from errors up to {proof.largest:.4g} it does not hunt, but the run of the scenario is not seen to reach them"
+    return HuntingCertificate(
+        verdict=verdict,
+        reason=reason,
+        contact=of.contact,
+        map=_sampled_map(of, proof, train),
+        fixed_points=(),
+        largest_error=proof.largest,
+        band=proof.band,
+        ranges=proof.ranges,
+        factor=proof.factor,
+        reached=reached,
+    )
+
+
+def _sampled_travel(axis: Axis) -> float:
+    """Largest distance of the reference from where it begins; 1 where it never moves."""
+    times = np.linspace(0.0, axis.controller.reference.duration, 2001)
+    return float(np.abs(np.append(axis.controller.reference.at(times)[0], 0.0)).max()) or 1.0
+
+
+def _sampled_map(of: SampledSlip, proof: Proof, train: TrainScenario) -> xarray.Dataset | None:
+    """Error left by a slip without the steps of the encoder, about a band; None without one."""
+    import xarray as xr
+
+    if proof.band is None:
+        return None
+    unit, errors = _unit(train), np.linspace(0.25 * proof.band[0], 1.5 * proof.band[1], SAMPLED_POINTS)
+    image = map_without_steps(of, errors)
+    shown = np.isfinite(image)
+    about = {"units": unit, "long_name": "error left after the slip"}
+    return xr.Dataset(
+        {"image": ("error", image[shown], about)},
+        coords={"error": ("error", errors[shown], {"units": unit, "long_name": "error at the break-away"})},
+        attrs={"contact": of.contact, "verdict": proof.verdict},
+    )
+
+
 def _unit(train: TrainScenario) -> str:
     """Unit of the error of the only controller."""
-    shafts = [c.shaft for c in train.continuous().values()]
+    shafts = [c.shaft for c in train.continuous().values()] + [c.shaft for c in train.axes().values()]
     return train.train().angle_unit((shafts or [None])[0] or list(train.train().shafts)[-1])
 
 

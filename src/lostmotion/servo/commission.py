@@ -12,8 +12,10 @@ import numpy as np
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Angle
+from ..response.standstill import moving_input
 from ..simulation.scenario import Scenario
 from ..units.practical import practical
+from .certificate import HuntingCertificate, certified, certified_in_words
 from .margins import Bandwidth, Instability, Margins, bandwidth_of, frequencies, instability, margins
 from .motion import (
     STEPPED,
@@ -102,6 +104,8 @@ class ServoReport:
     stiffness: tuple[Stiffness, ...]
     limit_cycle: LimitCycle | None
     """None without a position loop"""
+    certificate: HuntingCertificate | None = None
+    """proof of whether a stuck contact hunts; None without a position loop, or if an input never comes to rest"""
     motor_unit: str = "rad"
     """motor unit of the motor's angle; m of a linear motor"""
     load_unit: str = "rad"
@@ -131,7 +135,10 @@ class ServoReport:
             weakest = min(self.stiffness, key=lambda s: s.least[0])
             least, at = weakest.least
             rows.append(("stiffness", f"at least {weakest.shown(least)}, at {at:.3g} Hz ({weakest.regime})"))
-        return [*rows, ("at rest", self.rest())]
+        rows.append(("at rest", self.rest()))
+        if self.certificate is not None:
+            rows.append(("certificate", certified_in_words(self.certificate)))
+        return rows
 
     def _regimes(self) -> str:
         names = ", ".join(self.regimes)
@@ -270,6 +277,9 @@ def commission(
     stiffness = tuple(_stiffness(axis, regime) for regime in points) if axis.loops[-1] == "position" else ()
     cycle = limit_cycle(axis)
     progress()
+    certificate = None
+    if cycle is not None and not moving_input(axis.scenario) and not scenario.continuous():
+        certificate = certified(axis, lambda: cycle.whole.verdict == "at rest")
     return ServoReport(
         scenario=scenario,
         motor=axis.motor,
@@ -281,6 +291,7 @@ def commission(
         settling=tuple(settling(axis, followed, wide)),
         stiffness=stiffness,
         limit_cycle=cycle,
+        certificate=certificate,
         motor_unit=axis.train.angle_unit(axis.motor_shaft),
         load_unit=axis.train.angle_unit(axis.shaft),
     )

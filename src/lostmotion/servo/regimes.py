@@ -190,13 +190,14 @@ def regimes(axis: Axis) -> list[Regime]:
     """The regimes that an axis is commissioned in: each characteristic piece of its main gear, and what may stick in it."""
     found: list[Regime] = []
     for name, meaning, state, wanted in _points(axis):
-        model = _model(axis, state)
+        model = model_at(axis, state)
         if all(model.contacts.get(contact) == mode for contact, mode in wanted.items()):
             found.append(Regime.of(axis, name, meaning, model))
     return found
 
 
-def _model(axis: Axis, state: TrainInitial) -> LinearModel:
+def model_at(axis: Axis, state: TrainInitial) -> LinearModel:
+    """The linear model of the regime of a state."""
     scenario = axis.scenario
     core = scenario.core()
     values, capacities = start_values(axis.train, state), state.of_all("hysteresis_capacities")

@@ -1,0 +1,360 @@
+"""Sets of states under a sampled controller with a quantised encoder, followed from break-away until all has settled.
+
+A set is a box of unknowns: ``z = centre + G x``, every ``x`` between -1 and 1. From sample to sample it moves exactly,
+as slip, stuck interval and controller are affine. Where a box contains several readings of the encoder, or both ends
+and goes on, it is divided. Both parts keep what the division along the largest unknown cannot separate, so that no
+state is lost. What stops is collected by its reading, and goes on as one box around all of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from ..response.stick_slip import UndecidableError
+from .sampled_slip import SampledSlip
+
+UNKNOWNS = (
+    3  # of a start: error, angle within the encoder step, torque within the ramp of a sample; others are added by stops
+)
+ROUNDING = 1e-12  # relative
+BOXES = 20_000  # at most at once
+TICKS = 20_000  # of a slip
+GENERATIONS = 200  # of stops without settling
+CELLS = 8  # of an encoder step, in which stops are collected
+
+
+@dataclass
+class Boxes:
+    """Boxes of states after the same sample."""
+
+    centre: np.ndarray
+    spread: np.ndarray
+    """(box, state, unknown)"""
+    mode: np.ndarray
+    """1, 0 or -1: slips forward, is stuck, slips in reverse"""
+    waited: np.ndarray
+    """ticks for which it has been stuck"""
+    origin: np.ndarray
+    """number of the start"""
+    read: np.ndarray
+    """last reading, in steps"""
+    before: np.ndarray
+    """the one before"""
+    came: np.ndarray
+    """direction of the slip that has just ended"""
+
+    def __len__(self) -> int:
+        return len(self.centre)
+
+    def take(self, which: np.ndarray) -> Boxes:
+        """Copies of some of them."""
+        return Boxes(*(getattr(self, f.name)[which].copy() for f in fields(self)))
+
+    @classmethod
+    def joined(cls, parts: Sequence[Boxes]) -> Boxes:
+        """All of them together."""
+        return cls(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)))
+
+    @classmethod
+    def around(cls, low: np.ndarray, high: np.ndarray, origin: np.ndarray, read: np.ndarray) -> Boxes:
+        """Stuck boxes between least and largest values."""
+        n, none = low.shape[1], np.zeros(len(low), int)
+        spread = np.zeros((len(low), n, UNKNOWNS + n))
+        spread[:, np.arange(n), UNKNOWNS + np.arange(n)] = 0.5 * (high - low)
+        return cls(0.5 * (low + high), spread, none, none.copy(), origin, read, read.copy(), none.copy())
+
+    def range_of(self, row: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Least and largest values of an output."""
+        middle = self.centre @ row
+        half = np.abs(np.einsum("i,bik->bk", row, self.spread)).sum(axis=1) * (1.0 + ROUNDING)
+        half = half + ROUNDING * (np.abs(self.centre) @ np.abs(row))
+        return middle - half, middle + half
+
+    def ends(self) -> tuple[np.ndarray, np.ndarray]:
+        """Least and largest values of all states."""
+        half = np.abs(self.spread).sum(axis=2)
+        return self.centre - half, self.centre + half
+
+    def moved(self, matrix: np.ndarray, add: np.ndarray | None = None) -> Boxes:
+        """Boxes of the states that a matrix makes of them."""
+        centre = self.centre @ matrix.T
+        return replace(
+            self.take(np.arange(len(self))), centre=centre if add is None else centre + add, spread=matrix @ self.spread
+        )
+
+    def widen(self, state: int, low: np.ndarray, high: np.ndarray) -> None:
+        """Add an unknown between two values to a state; those that stops have added are merged before."""
+        n = self.centre.shape[1]
+        merged = np.abs(self.spread[:, :, UNKNOWNS:]).sum(axis=2)
+        self.spread[:, :, UNKNOWNS:] = 0.0
+        self.spread[:, np.arange(n), UNKNOWNS + np.arange(n)] = merged
+        self.centre[:, state] += 0.5 * (low + high)
+        self.spread[:, state, UNKNOWNS + state] += 0.5 * (high - low)
+
+    def clip(self, which: np.ndarray, row: np.ndarray, bound: np.ndarray, side: np.ndarray) -> None:
+        """Reduce boxes to where an output is above (1) or below (-1) a bound, as far as the largest unknown decides on it."""
+        if not len(which):
+            return
+        centre, spread, count = self.centre[which], self.spread[which], np.arange(len(which))
+        parts = np.einsum("i,bik->bk", row, spread)
+        largest = np.argmax(np.abs(parts), axis=1)
+        size = np.abs(parts[count, largest])
+        others = (np.abs(parts).sum(axis=1) - size) * (1.0 + ROUNDING) + ROUNDING * (np.abs(centre) @ np.abs(row))
+        least = np.where(size > 0.0, (side * (bound - centre @ row) - others) / np.where(size > 0.0, size, 1.0), -1.0)
+        least = np.clip(least, -1.0, 1.0)
+        column = spread[count, :, largest] * (side * np.sign(parts[count, largest]))[:, None]
+        self.centre[which] = centre + column * (0.5 * (1.0 + least))[:, None]
+        spread[count, :, largest] = column * (0.5 * (1.0 - least))[:, None]
+        self.spread[which] = spread
+
+
+@dataclass(frozen=True)
+class Settled:
+    """Stuck states in which all but the integrator has settled, by origin."""
+
+    origin: np.ndarray
+    read: np.ndarray
+    """reading less that at the break-away, in steps"""
+    angle: np.ndarray
+    """least and largest angle of the contact's shaft, from the middle of the step of the break-away (box, 2)"""
+
+
+def starts(of: SampledSlip, reading: tuple[float, float], cells: int, parts: int) -> list[tuple[int, Boxes]]:
+    """Settled states at the break-away forward for readings between two, less the reference, by the tick of a frame."""
+    n, ramp, half = len(of.held), of.ramp, 0.5 * of.step
+    middle, off = 0.5 * (reading[0] + reading[1]), 0.5 * (reading[1] - reading[0])
+    found = []
+    for tick, (z, b, rises) in enumerate(zip(ramp.z, ramp.b, ramp.rises, strict=True)):
+        here = []
+        inc = max(rises * reading[0], rises * reading[1])
+        if inc <= 0.0 and of.lag == 0.0:
+            continue
+        for k, w in np.ndindex(cells, parts):
+            spread = np.zeros((n, UNKNOWNS + n))
+            # With a lag it breaks away at any instant of the tick that begins here.
+            torque = of.breakaway + abs(inc) * ((w + 0.5) / parts - (1.0 if of.lag else 0.0))
+            centre = z * middle + b * torque
+            spread[:, 0], spread[:, 2] = z * off, b * abs(inc) * 0.5 / parts
+            centre[0], spread[0] = half * ((2 * k + 1) / cells - 1.0), 0.0
+            centre[1], spread[1], spread[0, 1] = 0.0, 0.0, half / cells
+            slips = np.array([0 if of.lag else 1])
+            none, read = np.zeros(1, int), np.zeros(1)
+            here.append(Boxes(centre[None], spread[None], slips, none, none, read, read, none))
+        found.append((tick, Boxes.joined(here)))
+    return found
+
+
+class Flow:
+    """Follows boxes until all has settled."""
+
+    def __init__(self, of: SampledSlip, fast: float = math.inf) -> None:
+        self.of = of
+        self.fast = fast
+        self.passed: list[tuple[Boxes, int]] = []
+        """forward slips faster than that, with their tick"""
+        self.settled: list[Settled] = []
+        self._stopped: dict[tuple[Any, ...], tuple[np.ndarray, np.ndarray]] = {}
+
+    def follow(self, boxes: Boxes, phase: int) -> Settled:
+        """From states after the sample at a tick of the frame.
+
+        Raises
+        ------
+        UndecidableError
+            The boxes become too many, or a limit of the controller may act.
+        """
+        work = [(boxes, phase)]
+        for _ in range(GENERATIONS):
+            for some, tick in work:
+                self._until_stopped(some, tick)
+            work = self._collected()
+            if not work:
+                if not (found := self.settled):
+                    none = np.zeros(0)
+                    return Settled(none.astype(int), none, np.zeros((0, 2)))
+                return Settled(*(np.concatenate([getattr(s, f.name) for s in found]) for f in fields(Settled)))
+        raise UndecidableError("a slip breaks away again before the stuck interval has settled, and does not end")
+
+    def _collected(self) -> list[tuple[Boxes, int]]:
+        """One box around all that has stopped with the same readings."""
+        work = []
+        for tick in {key[0] for key in self._stopped}:
+            here = {key: ends for key, ends in self._stopped.items() if key[0] == tick}
+            low, high = (np.array([ends[k] for ends in here.values()]) for k in (0, 1))
+            boxes = Boxes.around(low, high, np.array([key[1] for key in here]), np.array([key[2] for key in here]))
+            boxes.mode = np.array([key[3] for key in here])
+            work.append((boxes, tick))
+        self._stopped = {}
+        return work
+
+    def _until_stopped(self, boxes: Boxes, tick: int) -> None:
+        for _ in range(TICKS):
+            if not len(boxes):
+                return
+            if len(boxes) > BOXES:
+                break
+            boxes = self._propagated(boxes)
+            tick = (tick + 1) % self.of.frame
+            boxes = self._sampled(boxes, tick)
+            self._within_limits(boxes)
+            done = (boxes.mode == 0) & (boxes.waited >= self.of.ramp.ticks)
+            if done.any():
+                one = boxes.take(done)
+                angle = np.stack(one.range_of(np.eye(len(self.of.held))[0]), axis=1)
+                self.settled.append(Settled(one.origin, one.read, angle))
+            stopped = (boxes.came != 0) & ~done
+            self._collect(boxes.take(stopped), tick)
+            fast = (boxes.mode > 0) & (boxes.range_of(np.eye(len(self.of.held))[1])[0] > self.fast) & ~stopped
+            if fast.any():
+                self.passed.append((boxes.take(fast), tick))
+            boxes = boxes.take(~done & ~stopped & ~fast)
+        raise UndecidableError("the slip passes too many readings of the encoder to follow them one by one")
+
+    def _collect(self, boxes: Boxes, tick: int) -> None:
+        low, high = boxes.ends()
+        for k in range(len(boxes)):
+            cell = math.floor(CELLS * boxes.centre[k, 0] / (self.of.step or math.inf))
+            key = (tick, int(boxes.origin[k]), float(boxes.read[k]), int(boxes.mode[k]), float(boxes.before[k]), cell)
+            least, most = self._stopped.get(key, (low[k], high[k]))
+            self._stopped[key] = np.minimum(least, low[k]), np.maximum(most, high[k])
+
+    def _within_limits(self, boxes: Boxes) -> None:
+        for row, limit in self.of.limited:
+            low, high = boxes.range_of(row)
+            if len(boxes) and max(-low.min(), high.max()) >= limit:
+                raise UndecidableError("the limit of the controller may act")
+
+    # --- between samples ---
+
+    def _propagated(self, boxes: Boxes) -> Boxes:
+        of, parts = self.of, []
+        boxes.came[:] = 0
+        stuck, moving = boxes.take(boxes.mode == 0), boxes.take(boxes.mode != 0)
+        if len(stuck):
+            after = stuck.moved(of.stuck)
+            after.waited += 1
+            parts += [after] if of.lag == 0.0 else self._freed_within(stuck, after)
+        if len(moving):
+            parts += self._slipped(moving)
+        return Boxes.joined(parts)
+
+    def _slipped(self, boxes: Boxes) -> list[Boxes]:
+        """Boxes that go on slipping over a tick, and those that stop in it."""
+        of, way = self.of, boxes.mode
+        after = boxes.moved(of.slip, way[:, None] * of.push)
+        speed = np.eye(len(of.held))[1]
+        first, last = _along(way, *boxes.range_of(speed)), _along(way, *after.range_of(speed))
+        bend = self._bend(boxes, first)
+        sure, going = last[0] > bend, last[1] > 0.0  # the speed is not below 0 at first, or it had stopped before
+        unsure = np.flatnonzero(going & ~sure)
+        after.clip(unsure, speed, np.zeros(len(unsure)), way[unsure])
+        stops = boxes.take(np.arange(len(boxes)))
+        stops.clip(unsure, of.slip[1], way[unsure] * (bend[unsure] - of.push[1]), -way[unsure])
+        stopped = np.flatnonzero(~sure)
+        if not len(stopped):
+            return [after]
+        first_speed = _along(way, *stops.range_of(speed))[1]
+        top = np.where(last[1] <= first_speed, np.maximum(first_speed, 0.0), np.maximum(last[1], 0.0)) + bend
+        return [after.take(going), *self._stopped_within(stops.take(stopped), (top * of.tick)[stopped])]
+
+    def _stopped_within(self, boxes: Boxes, most: np.ndarray) -> list[Boxes]:
+        """Stuck from an instant of a tick on, up to which the shaft turns by no more than this."""
+        way = boxes.mode
+        boxes.centre[:, 1], boxes.spread[:, 1] = 0.0, 0.0
+        boxes.widen(0, np.minimum(way * most, 0.0), np.maximum(way * most, 0.0))
+        after = boxes.moved(self.of.stuck)
+        after.came, after.mode = way.copy(), 0 * way
+        after.waited[:] = 0
+        return self._freed_within(boxes, after)
+
+    def _bend(self, boxes: Boxes, first: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+        """By how much the speed may be below that at both ends of a tick: with a torque that is held it has its least value at one."""
+        of = self.of
+        if of.lag == 0.0:
+            return np.zeros(len(boxes))
+        torque = np.maximum(*(np.abs(boxes.range_of(row)).max(axis=0) for row in (of.held, of.command)))
+        change = np.abs(boxes.range_of(of.command - of.held)).max(axis=0) / of.lag
+        push = (torque + of.sliding) / of.inertia
+        rate = push + abs(of.viscous) * (np.abs(first).max(axis=0) + of.tick * push)
+        return np.asarray(0.125 * of.tick**2 * (change / of.inertia + abs(of.viscous) * rate))
+
+    def _freed_within(self, before: Boxes, after: Boxes) -> list[Boxes]:
+        """Boxes that stay stuck over a tick, or the rest of one, and those that break away; the torque is monotonic within a tick."""
+        of = self.of
+        one, two = before.range_of(of.held), after.range_of(of.held)
+        stays = (two[0] < of.breakaway) & (two[1] > -of.breakaway)
+        parts = [after.take(stays)]
+        for way in (1, -1):
+            top = np.maximum(_along(way, *one)[1], _along(way, *two)[1])
+            frees = top >= of.breakaway * (1.0 - ROUNDING)
+            some, speed = after.take(frees), of.tick * np.maximum(top[frees] - of.sliding, 0.0) / of.inertia
+            some.mode[:], some.waited[:] = way, 0
+            for state, most in ((1, speed), (0, speed * of.tick)):
+                some.widen(state, np.minimum(way * most, 0.0), np.maximum(way * most, 0.0))
+            parts.append(some)
+        return parts
+
+    # --- at a sample ---
+
+    def _sampled(self, boxes: Boxes, tick: int) -> Boxes:
+        of = self.of
+        matrix, column = of.samples[tick]
+        if of.step == 0.0:
+            after = boxes.moved(matrix + np.outer(column, of.reading))
+        else:
+            boxes, read = self._divided(boxes)
+            after = boxes.moved(matrix, np.outer(read * of.quantum, column))
+            after.before, after.read = after.read, read
+        return after if of.lag > 0.0 else self._freed(after)
+
+    def _divided(self, boxes: Boxes) -> tuple[Boxes, np.ndarray]:
+        """Boxes with one reading each, in steps. In a slip the readings go one way; a stuck contact keeps its reading."""
+        row = np.eye(len(self.of.held))[0] / self.of.step
+        low, high = (np.floor(x + 0.5) for x in boxes.range_of(row))
+        way = np.where(boxes.mode != 0, boxes.mode, boxes.came)
+        low = np.where(way >= 0, np.maximum(low, boxes.read), low)
+        high = np.maximum(np.where(way <= 0, np.minimum(high, boxes.read), high), low)
+        while len(several := np.flatnonzero(high > low)):
+            if len(boxes) + len(several) > BOXES:
+                raise UndecidableError("the slip passes too many readings of the encoder to follow them one by one")
+            middle = np.floor(boxes.centre[several] @ row) + 0.5
+            border = np.clip(middle, low[several] + 0.5, high[several] - 0.5)
+            above, here = boxes.take(several), np.arange(len(several))
+            above.clip(here, row, border, np.ones(len(several)))
+            boxes.clip(several, row, border, -np.ones(len(several)))
+            boxes = Boxes.joined([boxes, above])
+            low, high = np.append(low, border + 0.5), np.append(high, high[several])
+            high[several] = border - 0.5
+            least, most = (np.floor(x + 0.5) for x in boxes.range_of(row))
+            low, high = (
+                np.where(low < high, np.clip(least, low, high), low),
+                np.where(low < high, np.clip(most, low, high), high),
+            )
+        return boxes, low
+
+    def _freed(self, boxes: Boxes) -> Boxes:
+        """With a torque that follows at once, a contact breaks away at the sample."""
+        of = self.of
+        for way in (1, -1):
+            low, high = _along(way, *boxes.range_of(of.held))
+            may = (boxes.mode == 0) & (high >= of.breakaway * (1.0 - ROUNDING))
+            must = may & (low > of.breakaway)
+            boxes.mode[must], boxes.waited[must] = way, 0
+            both = np.flatnonzero(may & ~must)
+            if len(both):
+                freed, sides = boxes.take(both), np.full(len(both), way)
+                freed.mode[:], freed.waited[:] = way, 0
+                freed.clip(np.arange(len(both)), of.held, sides * of.breakaway, sides)
+                boxes.clip(both, of.held, sides * of.breakaway, -sides)
+                boxes = Boxes.joined([boxes, freed])
+        return boxes
+
+
+def _along(way: Any, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Least and largest values in a direction."""
+    return np.minimum(way * low, way * high), np.maximum(way * low, way * high)
