@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 CORE_SOURCES := $(wildcard core/lostmotion/*/*.[ch]pp core/kernels/*.[ch]pp)
-FORMATTED := $(CORE_SOURCES) $(wildcard core/tests/*.[ch]pp bindings/*.[ch]pp bindings/c/*.[ch] bindings/c/*.[ch]pp bindings/fmu/*.[ch]pp examples/*.c benchmarks/*.[ch]pp)
+FORMATTED := $(CORE_SOURCES) $(wildcard core/tests/*.[ch]pp bindings/*.[ch]pp bindings/c/*.[ch] bindings/c/*.[ch]pp bindings/fmu/*.[ch]pp bindings/mujoco/*.cpp examples/*.c benchmarks/*.[ch]pp)
 SOURCES := $(CORE_SOURCES) $(wildcard bindings/*.[ch]pp) CMakeLists.txt
 # One build tree for the extension, the C library, the library of FMUs and the tests of the core.
 TREE := build/native
@@ -65,6 +65,13 @@ fmu-library: $(VENV)/built
 	$(BUILD) --target lostmotion_fmu
 	mkdir -p $(PACKAGE)/fmu_libraries && cp -r $(TREE)/fmu/* $(PACKAGE)/fmu_libraries/
 	$(BIN)/python bindings/fmu/sources.py $(PACKAGE)/fmu_libraries/sources
+
+# The actuator plugin of MuJoCo, where its Python package is installed.
+.PHONY: mujoco-plugin
+mujoco-plugin: $(VENV)/built
+	@$(CMAKE) $(TREE) -DLOSTMOTION_MUJOCO="$$($(BIN)/python -c 'import mujoco, pathlib; print(pathlib.Path(mujoco.__file__).parent)')" >build/mujoco.log
+	$(BUILD) --target lostmotion_mujoco
+	mkdir -p $(PACKAGE)/mujoco/plugin_library && cp $(TREE)/lostmotion_mujoco.* $(PACKAGE)/mujoco/plugin_library/
 
 # The same library as WebAssembly, and as the libraries of FMUs for all platforms, by the Zig compiler.
 .PHONY: wasm fmu

@@ -26,8 +26,8 @@ IN_THE_LONG_FORM = {
 """names of variables of a drive whose load has a given motion"""
 
 
-def controlled(drive: Drive, controller: Controller) -> DriveScenario:
-    """Return a drive under a controller; the duration is of no use."""
+def controlled(drive: Drive, controller: Controller | None) -> DriveScenario:
+    """Return a drive as a scenario, with the controller if there is one; its duration is of no use."""
     return DriveScenario(
         motor=drive.motor,
         gearbox=drive.gearbox,

@@ -1,0 +1,307 @@
+// An actuator plugin of MuJoCo: a drive that turns a hinge. It loads into the stock library by mj_loadPluginLibrary.
+//
+// The joint needs the inertia A that the drive has at the joint through a closed mesh as its armature, since a plugin
+// cannot change the armature from step to step. The drives of a model are solved together: with the inertia matrix S of
+// the robot at their joints, the other joints free, and all forces f there but contacts, both at the begin of the step,
+//     S a = f + tau(a),
+// where tau is the mean torque of the drives over the step (joint_trains.hpp). With the forces F = tau + A a the
+// engine, which solves (S + A) a = f + F, finds the same acceleration; it is of first order, since S and f are
+// constant. After the step each train is advanced again, against the load torque for which its load has the speed that
+// the engine has found: with a contact it is another one. Newton's method finds the load torque by its exact
+// derivative.
+//
+// plugin_state: the whole state of the train, then its load torque and the speed of the joint at the begin of the step.
+#include <mujoco/mujoco.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "lostmotion/scenario/description.hpp"
+#include "lostmotion/scenario/simulation.hpp"
+#include "lostmotion/simulation/joint_trains.hpp"
+
+namespace lm = lostmotion;
+
+namespace {
+
+constexpr const char* attributes[] = {"scenario"};
+constexpr int most_iterations = 8;
+
+// One line that ends the compilation of the model, or the step.
+[[noreturn]] void fail(const mjModel* m, int instance, const std::string& sentence) {
+    const char* name = mj_id2name(m, mjOBJ_PLUGIN, instance);
+    mju_error("lostmotion.drive %s: %s", name == nullptr ? "" : name, sentence.c_str());
+    std::abort();  // not reached
+}
+
+std::vector<double> numbers_of(const std::string& path) {
+    std::vector<double> numbers;
+    if (std::FILE* file = std::fopen(path.c_str(), "rb"); file != nullptr) {
+        double buffer[512];
+        while (const std::size_t n = std::fread(buffer, sizeof buffer[0], 512, file))
+            numbers.insert(numbers.end(), buffer, buffer + n);
+        std::fclose(file);
+    }
+    return numbers;
+}
+
+lm::Scenario scenario_of(const mjModel* m, int instance) {
+    const char* path = mj_getPluginConfig(m, instance, "scenario");
+    if (path == nullptr || path[0] == '\0')
+        fail(m, instance, "the key scenario is missing; give the file that lostmotion.mujoco.write_drive has written");
+    const lm::ScenarioDescription description(numbers_of(path));
+    if (!description.error().empty())
+        fail(m, instance, "scenario " + std::string(path) + ": is no file of lostmotion.mujoco.write_drive");
+    lm::Scenario s = description.scenario();
+    if (!s.train.short_form) fail(m, instance, "scenario " + std::string(path) + ": is no drive in the short form");
+    s.references_given = true;
+    return s;
+}
+
+// The drives of a model.
+struct Drive;
+struct Group {
+    std::vector<int> instances;
+    std::vector<Drive*> drives;
+    std::unique_ptr<lm::JointTrains> trains;
+    std::vector<double> whole, force, zero_matrix, zero, unit, column, free;
+};
+
+struct Drive {
+    Drive(const lm::Scenario& scenario, double step) : simulation(scenario, step) {
+        shaft = *simulation.train().load_shaft(scenario.train.gears[0].output);
+        inputs.resize(simulation.names().inputs.size());
+        load = simulation.input_of(shaft.load);
+        const auto& motor = scenario.train.motors[0].law;
+        const bool torque_source = motor.kind == lm::Motor::torque_source && scenario.control.axes.empty();
+        controlled = !scenario.control.axes.empty();
+        scale = torque_source ? 1.0 / motor.rated_torque : 1.0;
+    }
+    double speed() const {
+        return simulation.with([&](const auto& s) { return s.snapshot().x[shaft.speed_state]; });
+    }
+    lm::ScenarioSimulation simulation;
+    lm::LoadShaft shaft;
+    std::vector<double> inputs;
+    std::size_t load = 0;
+    double scale = 1.0;  // from the control of MuJoCo to the command
+    int actuator = -1, dof = -1;
+    bool controlled = false;
+    double armature = 0.0;         // A
+    std::unique_ptr<Group> group;  // of the first drive of a model
+    std::size_t numbers = 0;
+    lm::LoadAnswer answer;
+};
+
+Drive& drive_of(const mjData* d, int instance) { return *reinterpret_cast<Drive*>(d->plugin_data[instance]); }
+
+int state_size(const mjModel* m, int instance) {
+    const lm::ScenarioSimulation simulation(scenario_of(m, instance), m->opt.timestep);
+    return static_cast<int>(simulation.state_size()) + 2;
+}
+
+int init(const mjModel* m, mjData* d, int instance) {
+    int actuator = -1, count = 0;
+    for (int k = 0; k < m->nu; ++k)
+        if (m->actuator_plugin[k] == instance) {
+            actuator = k;
+            ++count;
+        }
+    if (count != 1) fail(m, instance, "must be the plugin of one actuator, and is that of " + std::to_string(count));
+    const int joint = m->actuator_trnid[2 * actuator];
+    if (m->actuator_trntype[actuator] != mjTRN_JOINT || m->jnt_type[joint] != mjJNT_HINGE)
+        fail(m, instance, "must turn a hinge; give joint");
+    if (m->actuator_gear[6 * actuator] != 1.0) fail(m, instance, "the actuator has a gear; the drive has its own");
+    if (m->opt.integrator == mjINT_RK4) fail(m, instance, "needs another integrator than RK4");
+    lm::Scenario scenario = scenario_of(m, instance);
+    const int dof = m->jnt_dofadr[joint];
+    const auto& gear = scenario.train.gears[0].law;
+    const double armature = gear.ratio * gear.ratio * (scenario.train.motors[0].law.rotor_inertia + gear.inertia);
+    const double given = m->dof_armature[dof];
+    if (!(std::fabs(given - armature) <= 1e-3 * armature)) {
+        char line[160];
+        std::snprintf(line, sizeof line, "the joint has the armature %.6g; give it %.6g, the inertia of the drive",
+                      given, armature);
+        fail(m, instance, line);
+    }
+    const double whole = 1.0 / m->dof_invweight0[dof];
+    scenario.train.shafts[static_cast<std::size_t>(scenario.train.gears[0].output)].inertia = whole - given;
+    auto made = std::make_unique<Drive>(scenario, m->opt.timestep);
+    made->actuator = actuator;
+    made->dof = dof;
+    made->armature = given;
+    made->numbers = made->simulation.state_size();
+    d->plugin_data[instance] = reinterpret_cast<uintptr_t>(made.release());
+    return 0;
+}
+
+void destroy(mjData* d, int instance) {
+    delete reinterpret_cast<Drive*>(d->plugin_data[instance]);
+    d->plugin_data[instance] = 0;
+}
+
+// At rest or, with a speed of the joint, with closed meshes.
+void place(Drive& drive, double* state, double speed) {
+    const auto& names = drive.simulation.names();
+    std::vector<double> x(names.states.size());
+    const double ratio = drive.simulation.train().assembly().train().gears[0].law.ratio;
+    for (std::size_t k = 0; k < x.size(); ++k)
+        x[k] = names.states[k] == "load_speed" ? speed : names.states[k] == "motor_speed" ? ratio * speed : 0.0;
+    drive.simulation.reset(x, std::vector<double>(names.capacities.size()));
+    drive.simulation.get_state(state);
+    state[drive.numbers] = 0.0;
+    state[drive.numbers + 1] = speed;
+}
+
+void reset(const mjModel*, mjtNum* state, void* data, int) { place(*static_cast<Drive*>(data), state, 0.0); }
+
+// Advances the drive from its state, against the load torque that solves an equation. equation(L, answer): its residual
+// over what rounding leaves, and the change of L by Newton's method; 0 where nothing can be done.
+template <class Equation>
+void solve(const mjModel* m, const mjData* d, int instance, double load, Equation&& equation) {
+    Drive& drive = drive_of(d, instance);
+    std::ranges::fill(drive.inputs, drive.scale * d->ctrl[drive.actuator]);
+    for (int n = 0;; ++n) {
+        if (!drive.simulation.set_state(d->plugin_state + m->plugin_stateadr[instance]))
+            fail(m, instance, "plugin_state is not that of this drive");
+        drive.inputs[drive.load] = load;
+        const lm::Status status =
+            drive.simulation.answer(m->opt.timestep, drive.inputs, drive.inputs, drive.shaft, drive.answer);
+        if (status != lm::Status::done) fail(m, instance, drive.simulation.text(status));
+        const auto [residual, change] = equation(load, drive.answer);
+        if (std::fabs(residual) <= 1e-11 || change == 0.0 || n == most_iterations) return;
+        load += change;
+    }
+}
+
+// The inverse of a symmetric positive definite matrix, in its place.
+void invert(std::vector<double>& a, std::size_t n) {
+    for (std::size_t k = 0; k < n; ++k) {
+        const double pivot = 1.0 / a[k * n + k];
+        a[k * n + k] = 1.0;
+        for (std::size_t c = 0; c < n; ++c) a[k * n + c] *= pivot;
+        for (std::size_t r = 0; r < n; ++r) {
+            if (r == k) continue;
+            const double factor = a[r * n + k];
+            a[r * n + k] = 0.0;
+            for (std::size_t c = 0; c < n; ++c) a[r * n + c] -= factor * a[k * n + c];
+        }
+    }
+}
+
+// The drives of the model of an instance, if it is the first of them; made when they are first needed.
+Group* group_of(const mjModel* m, const mjData* d, int instance) {
+    for (int k = 0; k < instance; ++k)
+        if (m->plugin[k] == m->plugin[instance]) return nullptr;
+    Drive& first = drive_of(d, instance);
+    if (first.group) return first.group.get();
+    auto group = std::make_unique<Group>();
+    std::vector<lm::JointTrains::Joint> joints;
+    for (int k = instance; k < m->nplugin; ++k)
+        if (m->plugin[k] == m->plugin[instance]) {
+            group->instances.push_back(k);
+            group->drives.push_back(&drive_of(d, k));
+            joints.push_back({&group->drives.back()->simulation.train(), group->drives.back()->shaft});
+        }
+    group->trains = std::make_unique<lm::JointTrains>(std::move(joints));
+    const std::size_t n = group->drives.size();
+    group->whole.resize(n * n);
+    group->zero_matrix.resize(n * n);
+    group->force.resize(n);
+    group->zero.resize(n);
+    group->unit.resize(static_cast<std::size_t>(m->nv));
+    group->column = group->free = group->unit;
+    first.group = std::move(group);
+    return first.group.get();
+}
+
+void compute(const mjModel* m, mjData* d, int instance, int) {
+    Group* group = group_of(m, d, instance);
+    if (group == nullptr) return;
+    const std::size_t n = group->drives.size();
+    const auto at = [&](const std::vector<double>& v, std::size_t k) {
+        return v[static_cast<std::size_t>(group->drives[k]->dof)];
+    };
+    for (std::size_t k = 0; k < n; ++k) {
+        Drive& drive = *group->drives[k];
+        double* state = d->plugin_state + m->plugin_stateadr[group->instances[k]];
+        // The speed has been changed from outside.
+        if (d->qvel[drive.dof] != state[drive.numbers + 1]) place(drive, state, d->qvel[drive.dof]);
+        if (!drive.simulation.set_state(state)) fail(m, group->instances[k], "plugin_state is not that of this drive");
+        const double control = drive.scale * d->ctrl[drive.actuator];
+        std::ranges::fill(group->trains->inputs(k), control);
+        if (drive.controlled) drive.simulation.with([&](auto& s) { s.set_reference(0, control, 0.0); });
+        group->trains->set_guess(k, {state[drive.numbers], 0.0});
+        group->unit[static_cast<std::size_t>(drive.dof)] = 1.0;
+        mj_solveM(m, d, group->column.data(), group->unit.data(), 1);
+        group->unit[static_cast<std::size_t>(drive.dof)] = 0.0;
+        for (std::size_t r = 0; r < n; ++r) group->whole[r * n + k] = at(group->column, r);
+    }
+    invert(group->whole, n);  // S + A
+    std::vector<double>& free = group->free;
+    std::ranges::fill(free, 0.0);
+    for (int b = 1; b < m->nbody; ++b) {
+        const double* applied = d->xfrc_applied + 6 * b;
+        if (std::any_of(applied, applied + 6, [](double x) { return x != 0.0; }))
+            mj_applyFT(m, d, applied, applied + 3, d->xipos + 3 * b, b, free.data());
+    }
+    for (std::size_t k = 0; k < free.size(); ++k) free[k] += d->qfrc_applied[k] + d->qfrc_passive[k] - d->qfrc_bias[k];
+    mj_solveM(m, d, group->column.data(), free.data(), 1);
+    for (std::size_t r = 0; r < n; ++r) {
+        group->force[r] = 0.0;
+        for (std::size_t c = 0; c < n; ++c) group->force[r] += group->whole[r * n + c] * at(group->column, c);
+    }
+    for (std::size_t k = 0; k < n; ++k) group->whole[k * n + k] -= group->drives[k]->armature;
+    group->trains->read();
+    const lm::Status status =
+        group->trains->step(m->opt.timestep, 1, {group->whole, group->force, group->zero_matrix, group->zero});
+    if (status != lm::Status::done) {
+        const std::size_t k = group->trains->failed_joint();
+        fail(m, group->instances[k], group->drives[k]->simulation.text(status));
+    }
+    for (std::size_t k = 0; k < n; ++k) {
+        const Drive& drive = *group->drives[k];
+        const auto& joint = group->trains->joints()[k];
+        d->actuator_force[drive.actuator] = joint.torque + drive.armature * joint.acceleration;
+        d->plugin_state[m->plugin_stateadr[group->instances[k]] + static_cast<int>(drive.numbers)] =
+            group->trains->guess(k).torque;
+    }
+}
+
+void advance(const mjModel* m, mjData* d, int instance) {
+    Drive& drive = drive_of(d, instance);
+    double* state = d->plugin_state + m->plugin_stateadr[instance];
+    const double speed = d->qvel[drive.dof], before = state[drive.numbers + 1];
+    double load = state[drive.numbers];
+    solve(m, d, instance, load, [&](double tried, const lm::LoadAnswer& a) {
+        load = tried;
+        const double off = drive.speed() - speed;
+        return std::pair(off / (std::fabs(speed) + std::fabs(before) + 1e-9),
+                         a.compliance > 0.0 ? off / (m->opt.timestep * a.compliance) : 0.0);
+    });
+    drive.simulation.get_state(state);
+    state[drive.numbers] = load;
+    state[drive.numbers + 1] = speed;
+}
+
+}  // namespace
+
+mjPLUGIN_LIB_INIT(lostmotion) {
+    mjpPlugin plugin;
+    mjp_defaultPlugin(&plugin);
+    plugin.name = "lostmotion.drive";
+    plugin.capabilityflags = mjPLUGIN_ACTUATOR;
+    plugin.nattribute = 1;
+    plugin.attributes = attributes;
+    plugin.nstate = state_size;
+    plugin.init = init;
+    plugin.destroy = destroy;
+    plugin.reset = reset;
+    plugin.compute = compute;
+    plugin.advance = advance;
+    mjp_registerPlugin(&plugin);
+}

@@ -1,0 +1,90 @@
+"""The actuator plugin of MuJoCo, for models that are stepped by MuJoCo itself."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from ..control.controller import Controller
+from ..errors import InputError, need
+from ..inputs.arguments import checked
+from ..inputs.validation import shown
+from ..model.drive import Drive
+from ..portable.checkout import made_here
+from ..portable.descriptions import description
+from ..simulation.drive_scenario import DriveScenario
+from ..simulation.exact_batches import controlled
+from ..simulation.joint_trains import joint_drive
+from .actuated import drive_of_joint
+
+LIBRARY = Path(__file__).parent / "plugin_library"
+
+
+@checked
+def load_plugin() -> Path:
+    """Load the plugin ``lostmotion.drive`` into MuJoCo, so that models may contain it.
+
+    Returns
+    -------
+    Path
+        The library, which other programs load by ``mj_loadPluginLibrary``.
+
+    Raises
+    ------
+    InputError
+        There is no library for this platform.
+    MissingLibraryError
+        MuJoCo is not installed.
+    """
+    need("mujoco", "lostmotion.mujoco", "mujoco")
+    import mujoco
+
+    made_here("mujoco-plugin", LIBRARY.glob("lostmotion_mujoco.*"), "the plugin of MuJoCo")
+    found = next(LIBRARY.glob("lostmotion_mujoco.*"), None)
+    if found is None:
+        raise InputError(f"{LIBRARY}: has no plugin of MuJoCo; build it in a checkout by `make mujoco-plugin`")
+    mujoco.mj_loadPluginLibrary(str(found))
+    return found
+
+
+@checked
+def write_drive(drive: Any, path: str | Path, *, controller: Controller | None = None) -> str:
+    """Write a drive to a file for the plugin, and return the MJCF that uses it.
+
+    Parameters
+    ----------
+    drive
+        As of `attach`: a drive, a scenario or its name, or a gearbox of the catalogue. Trains are for `attach`.
+    path
+        Of the file.
+    controller
+        A sampled controller of the motor.
+
+    Returns
+    -------
+    str
+        Armature of the joint, and the actuator, with JOINT in place of the name of the joint.
+
+    Raises
+    ------
+    InputError
+        The drive is a train, or has a controller with a law of your own.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> print(lm.mujoco.write_drive("schaeffler-rt1-h-20-100", "elbow.drive"))
+    <joint name="JOINT" armature="..."/>
+    <plugin joint="JOINT" plugin="lostmotion.drive"><config key="scenario" value="elbow.drive"/></plugin>
+    """
+    given = drive_of_joint(str(path), drive, controller)
+    if not isinstance(given, Drive | DriveScenario):
+        raise InputError(f"drive: {shown(drive)} is a train; use lostmotion.mujoco.attach")
+    scenario = given if isinstance(given, DriveScenario) else controlled(given, None)
+    armature = joint_drive(str(path), given, scenario.load.inertia, 1e-3).reflected_inertia
+    numbers = description(scenario, parameters=False)
+    numbers.astype("<f8").tofile(path)
+    return (
+        f'<joint name="JOINT" armature="{armature:.9g}"/>\n'
+        f'<plugin joint="JOINT" plugin="lostmotion.drive"><config key="scenario" value="{path}"/></plugin>'
+    )

@@ -1,0 +1,99 @@
+"""The actuator plugin of MuJoCo: against `lm.mujoco.attach`, with states of mjData, and wrong use."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lostmotion as lm
+
+mujoco = pytest.importorskip("mujoco", reason='pip install "lostmotion[mujoco]"')
+
+from robot_arm import ARM, RATIO, ROTOR, drive, motor_torques, robot  # noqa: E402  (it needs MuJoCo)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def plugin() -> Path:
+    return lm.mujoco.load_plugin()
+
+
+def arm(step: float, given: lm.Drive, where: Path, *, armature: float = ROTOR * RATIO**2, key: str = "") -> Any:
+    """The arm of the tests of `attach`, its drives as plugins."""
+    file = where / "drive"
+    lm.mujoco.write_drive(given, file)
+    text = ARM.format(step=step, world="", tip="").replace('type="hinge"', f'type="hinge" armature="{armature!r}"')
+    config = f'<config key="scenario" value="{key or file}"/>'
+    actuators = "".join(
+        f'<plugin name="{joint}" joint="{joint}" plugin="lostmotion.drive">{config}</plugin>'
+        for joint in ("shoulder", "elbow")
+    )
+    extension = '<extension><plugin plugin="lostmotion.drive"/></extension>'
+    text = text.replace("<worldbody>", extension + "<worldbody>", 1)
+    return mujoco.MjModel.from_xml_string(text.replace("</mujoco>", f"<actuator>{actuators}</actuator></mujoco>"))
+
+
+def swing(model: Any, duration: float) -> np.ndarray:
+    data, step = mujoco.MjData(model), model.opt.timestep
+    for k in range(round(duration / step)):
+        data.ctrl[:] = motor_torques((k + 0.5) * step)
+        mujoco.mj_step(model, data)
+    return data.qpos.copy()
+
+
+@pytest.mark.parametrize("given", [drive(), drive(gap=1e-3), drive(friction=0.02, hysteresis=0.9)])
+def test_the_plugin_moves_an_arm_as_attach_does_to_first_order(given: lm.Drive, tmp_path: Path) -> None:
+    exact = robot(2.5e-4, given)
+    for k in range(1200):
+        exact.step(motor_torques((k + 0.5) * 2.5e-4))
+    errors = [np.abs(swing(arm(step, given, tmp_path), 0.3) - exact.data.qpos).max() for step in (2e-3, 1e-3, 5e-4)]
+    assert np.abs(exact.data.qpos).max() > 0.05
+    assert errors[1] < 5e-3
+    assert errors[0] / errors[2] > 0.7 * 4.0
+
+
+def test_a_copy_of_the_data_goes_on_with_the_same_bits(tmp_path: Path) -> None:
+    model = arm(1e-3, drive(gap=1e-3, friction=0.01), tmp_path)
+    data = mujoco.MjData(model)
+    data.ctrl[:] = 0.1, 0.05
+    mujoco.mj_step(model, data, 50)
+    kind = mujoco.mjtState.mjSTATE_INTEGRATION
+    kept, copied = np.zeros(mujoco.mj_stateSize(model, kind)), mujoco.MjData(model)
+    mujoco.mj_getState(model, data, kept, kind)
+    mujoco.mj_copyData(copied, model, data)
+    mujoco.mj_step(model, data, 50)
+    end = [data.qpos.tolist(), data.plugin_state.tolist()]
+    mujoco.mj_step(model, copied, 50)
+    assert [copied.qpos.tolist(), copied.plugin_state.tolist()] == end
+    mujoco.mj_setState(model, data, kept, kind)
+    mujoco.mj_step(model, data, 50)
+    assert [data.qpos.tolist(), data.plugin_state.tolist()] == end
+    mujoco.mj_resetData(model, data)
+    data.ctrl[:] = 0.1, 0.05
+    mujoco.mj_step(model, data, 100)
+    assert [data.qpos.tolist(), data.plugin_state.tolist()] == end
+
+
+def test_an_arm_that_friction_holds_does_not_creep(tmp_path: Path) -> None:
+    model = arm(2e-3, drive(friction=0.3, bearing=0.5), tmp_path)
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 5000)  # the springs take up the weight, and the bearings damp their swing
+    settled = data.qpos.copy()
+    assert np.abs(settled).min() > 1e-4
+    mujoco.mj_step(model, data, 1000)
+    assert np.abs(data.qpos - settled).max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"armature": 0.0}, "lostmotion.drive .*: the joint has the armature 0; give it 0.1, the inertia of the drive"),
+        ({"key": "/no/such"}, "scenario /no/such: is no file of lostmotion.mujoco.write_drive"),
+    ],
+)
+def test_a_wrong_configuration_ends_in_one_clear_line(options: dict[str, Any], message: str, tmp_path: Path) -> None:
+    with pytest.raises((mujoco.FatalError, ValueError), match=message) as raised:
+        mujoco.MjData(arm(1e-3, drive(), tmp_path, **options))
+    assert "\n" not in str(raised.value).strip()
