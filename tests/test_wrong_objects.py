@@ -169,6 +169,8 @@ if mujoco is not None:
     CALLS |= {
         "attach": (lm.mujoco.attach, {"model": ROBOT, "drives": {"elbow": SCENARIO}, "controllers": None, "replace": True, "substeps": None}),
         "from_mjcf": (lm.mujoco.from_mjcf, {"model": ROBOT, "joint": "elbow", "ratio": 100.0}),
+        "load_plugin": (lm.mujoco.load_plugin, {}),
+        "write_drive": (lm.mujoco.write_drive, {"drive": SCENARIO, "path": "elbow.drive", "controller": None}),
         "reduce": (lm.mujoco.reduce, {"drive": SCENARIO, "amplitude": 0.5, "frequency": 1.0, "load_torque": 0.0}),
     }  # fmt: skip
 SLOW = {

@@ -35,6 +35,12 @@ def load_plugin() -> Path:
         There is no library for this platform.
     MissingLibraryError
         MuJoCo is not installed.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> lm.mujoco.load_plugin().stem
+    'lostmotion_mujoco'
     """
     need("mujoco", "lostmotion.mujoco", "mujoco")
     import mujoco
@@ -72,10 +78,12 @@ def write_drive(drive: Any, path: str | Path, *, controller: Controller | None =
 
     Examples
     --------
+    >>> import tempfile
     >>> import lostmotion as lm
-    >>> print(lm.mujoco.write_drive("schaeffler-rt1-h-20-100", "elbow.drive"))
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     print(lm.mujoco.write_drive("schaeffler-rt1-h-20-100", f"{directory}/elbow.drive"))
     <joint name="JOINT" armature="..."/>
-    <plugin joint="JOINT" plugin="lostmotion.drive"><config key="scenario" value="elbow.drive"/></plugin>
+    <plugin joint="JOINT" plugin="lostmotion.drive"><config key="scenario" value=".../elbow.drive"/></plugin>
     """
     given = drive_of_joint(str(path), drive, controller)
     if not isinstance(given, Drive | DriveScenario):
@@ -83,7 +91,10 @@ def write_drive(drive: Any, path: str | Path, *, controller: Controller | None =
     scenario = given if isinstance(given, DriveScenario) else controlled(given, None)
     armature = joint_drive(str(path), given, scenario.load.inertia, 1e-3).reflected_inertia
     numbers = description(scenario, parameters=False)
-    numbers.astype("<f8").tofile(path)
+    try:
+        numbers.astype("<f8").tofile(path)
+    except OSError as problem:
+        raise InputError(f"{path}: cannot be written: {problem.strerror}") from None
     return (
         f'<joint name="JOINT" armature="{armature:.9g}"/>\n'
         f'<plugin joint="JOINT" plugin="lostmotion.drive"><config key="scenario" value="{path}"/></plugin>'
