@@ -56,13 +56,15 @@ class _Place:
             return default
         if shaft not in self.train.shafts:
             meant = did_you_mean(shaft, self.train.shafts, f"the shafts are {', '.join(self.train.shafts)}")
-            raise InputError(f"{key}: {shown(shaft)} is no shaft; {meant}")
+            raise InputError(f"{shown(shaft)} is no shaft; {meant}", keys=(key,))
         return shaft
 
     def ratio(self, start: str, end: str, key: str) -> float:
         i = turns(self.train, start, end)
         if i is None:
-            raise InputError(f"{key}: no gear leads from the shaft {start} to {end}; name a shaft that the motor turns")
+            raise InputError(
+                f"no gear leads from the shaft {start} to {end}; name a shaft that the motor turns", keys=(key,)
+            )
         return i
 
     def encoder_shaft(self, key: str) -> str:
@@ -76,7 +78,7 @@ class _Place:
             for key, there in (("camera", c.camera), ("reference.target", getattr(c.reference, "target", None))):
                 if there is not None:
                     raise InputError(
-                        f"{key}: gives an angle, and {self.shaft} is a slide; leave it out, or name a shaft"
+                        f"gives an angle, and {self.shaft} is a slide; leave it out, or name a shaft", keys=(key,)
                     )
         out = _core.Axis()
         out.set_reference(c.reference.pieces(), c.reference.sine_list())
@@ -107,7 +109,9 @@ class _Place:
         if c.phase > 0.0:
             phase = whole_multiple(c.phase, c.sample_time, "phase") * samples
             if phase >= out["position_schedule"]["every"]:
-                raise InputError(f"phase: {c.phase:g} s is not below the sample time of the position loop; take less")
+                raise InputError(
+                    f"{c.phase:g} s is not below the sample time of the position loop; take less", keys=("phase",)
+                )
             out["position_schedule"]["phase"] = phase
         return out
 
@@ -120,7 +124,7 @@ class _Place:
         try:
             encoder.check_shaft(slides=self.train.is_slide(shaft))
         except InputError as problem:
-            raise InputError(f"{key}.{problem}") from None
+            raise problem.inside(key) from None
         scale = self.ratio(target, shaft, f"{key}.shaft")
         return {**encoder.core_fields(), "scale": scale, "delay": encoder.delay * samples}
 
@@ -136,7 +140,7 @@ class _Place:
                 try:
                     out[key].append(core_filter(f, c.loop_time("speed")))
                 except InputError as problem:
-                    raise InputError(f"speed.{key}[{k}]: {problem}") from None
+                    raise InputError(str(problem), keys=(f"speed.{key}[{k}]",)) from None
         if c.inverse_model is not None:
             on_motor = self.encoder_shaft("encoder" if c.position_encoder is None else "position_encoder") != self.shaft
             fields = c.inverse_model.solver_fields(self.train, self.name, self.shaft, on_motor=on_motor)
@@ -164,7 +168,8 @@ class _Place:
         keys = ("rated_torque", "rated_speed", "armature_voltage_constant", "electrical_time_constant", "command_limit")
         if m.electrical_time_constant is None or m.armature_voltage_constant is None or m.rated_speed is None:
             raise InputError(
-                'current.kind: "pi" needs a motor with a winding, and this one is a torque source; take "ideal" or "first_order"'
+                '"pi" needs a motor with a winding, and this one is a torque source; take "ideal" or "first_order"',
+                keys=("current.kind",),
             )
         return {key: getattr(m, key) for key in keys}
 
@@ -172,17 +177,20 @@ class _Place:
         m = self.motor
         if m.kind != "synchronous" or m.winding is None:
             raise InputError(
-                f'current.kind: "field_oriented" needs a motor of kind "synchronous", and this one is a {m.kind}; take "pi", "ideal" or "first_order"'
+                f'"field_oriented" needs a motor of kind "synchronous", and this one is a {m.kind}; take "pi", "ideal" or "first_order"',
+                keys=("current.kind",),
             )
         if m.winding.max_current is None:
             raise InputError(
-                'current.kind: "field_oriented" needs the largest current; give motor.winding.max_current_rms or max_current_peak'
+                '"field_oriented" needs the largest current; give motor.winding.max_current_rms or max_current_peak',
+                keys=("current.kind",),
             )
         phase, current = m.winding.phase_values(), math.sqrt(2.0) * m.winding.max_current
         if (phase.inductance_d - phase.inductance_q) * current >= phase.flux_linkage:
             raise InputError(
-                'current.kind: "field_oriented": L_d - L_q times the largest current must be below the flux linkage; exchange '
-                "inductance_d and inductance_q, or lower the largest current"
+                '"field_oriented": L_d - L_q times the largest current must be below the flux linkage; exchange '
+                "inductance_d and inductance_q, or lower the largest current",
+                keys=("current.kind",),
             )
         c = self.controller
         times = {"sample_time": c.loop_time("current"), "delay_time": c.delay * c.sample_time}
@@ -237,7 +245,7 @@ def core_control(
             encoders = shafts.index(position), shafts.index(speed)
             axes.append((axis, list(train.motors).index(name), *encoders, shafts.index(place.shaft)))
         except InputError as problem:
-            raise InputError(f"key {key.format(name)}{problem}") from None
+            raise problem.inside(key.format(name).removesuffix(".")) from None
     return base, axes
 
 
@@ -296,5 +304,5 @@ def check_torques(controllers: Mapping[str, Controller], torques: Mapping[str, f
         if torques.get(name, 0.0) != 0.0 and TORQUE_SOURCE in (driven(controller) or ()):
             begins = "no current" if kind == "field_oriented" else "the torque that the controller asks for"
             raise InputError(
-                f'key {key.format(name)}: with current.kind = "{kind}" a run begins with {begins}; leave it out'
+                f'with current.kind = "{kind}" a run begins with {begins}; leave it out', keys=(key.format(name),)
             )

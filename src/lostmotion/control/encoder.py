@@ -57,17 +57,18 @@ class Encoder(EncoderFields):
         """
         if not slides and self.grating_period is not None:
             raise InputError(
-                "grating_period: is that of a linear scale, and this encoder is on a shaft; give lines or bits"
+                "is that of a linear scale, and this encoder is on a shaft; give lines or bits",
+                keys=("grating_period",),
             )
         if slides:
             keys = ("lines", "error_periods", *(() if self.grating_period is not None else ("bits",)))
             for key in keys:
                 if getattr(self, key) is not None:
                     raise InputError(
-                        f"{key}: counts a turn, and this encoder is on a slide; give grating_period, or resolution"
+                        "counts a turn, and this encoder is on a slide; give grating_period, or resolution", keys=(key,)
                     )
             if self.error > 0.0 and self.grating_period is None:
-                raise InputError("error: has no period; give grating_period in place of resolution")
+                raise InputError("has no period; give grating_period in place of resolution", keys=("error",))
 
     @property
     def step(self) -> float:

@@ -69,9 +69,12 @@ class InverseModel(InverseModelFields):
             Not one gear alone joins the two shafts, or a gap has no rate.
         """
         gear = self._gear(train, train.motors[motor].shaft, shaft)
-        train.refuse_coupled(
-            (gear.input, gear.output), "an inverse model takes each inertia by itself; leave inverse_model out"
-        )
+        try:
+            train.refuse_coupled(
+                (gear.input, gear.output), "an inverse model takes each inertia by itself; leave inverse_model out"
+            )
+        except InputError as problem:
+            raise InputError(str(problem), keys=("inverse_model",)) from None
         here, there, m = train.shafts[gear.input], train.shafts[gear.output], train.motors[motor]
         laws = {key: getattr(self, key) for key in ("loss_adaptation", "friction_adaptation", "load_observer")}
         own = {
@@ -83,8 +86,9 @@ class InverseModel(InverseModelFields):
             low, high = self.friction_adaptation.limits
             if not low <= own["friction_torque"] <= high:
                 raise InputError(
-                    f"inverse_model.friction_adaptation.limits: {[low, high]} N*m leave out the friction of the drive, "
-                    f"{own['friction_torque']:g} N*m; widen them, or give friction_torque"
+                    f"{[low, high]} N*m leave out the friction of the drive, "
+                    f"{own['friction_torque']:g} N*m; widen them, or give friction_torque",
+                    keys=("inverse_model.friction_adaptation.limits",),
                 )
         losses = self._losses(gear)
         return own | {
@@ -102,7 +106,8 @@ class InverseModel(InverseModelFields):
             return None
         if gear.stiffness.has_gap and self.twist_rate is None:
             raise InputError(
-                "inverse_model: lacks twist_rate; the gear has a gap, and the motor needs a speed to pass it with"
+                "lacks twist_rate; the gear has a gap, and the motor needs a speed to pass it with",
+                keys=("inverse_model",),
             )
         return {"curve": gear.stiffness.core()}
 
@@ -110,8 +115,9 @@ class InverseModel(InverseModelFields):
         between = [g for g in train.gears.values() if {g.input, g.output} & {motor_shaft, shaft}]
         if len(between) != 1 or (between[0].input, between[0].output) != (motor_shaft, shaft):
             raise InputError(
-                f"inverse_model: takes one gear from the shaft {motor_shaft} to {shaft} and no other at either; "
-                "take feedforward for other trains"
+                f"takes one gear from the shaft {motor_shaft} to {shaft} and no other at either; "
+                "take feedforward for other trains",
+                keys=("inverse_model",),
             )
         return between[0]
 

@@ -21,6 +21,7 @@ def whole_multiple(time: float, base: float, key: str) -> int:
     if samples < 1 or samples > MAX_SAMPLES or not math.isclose(samples * base, time, rel_tol=1e-9):
         near = max(1, min(samples, MAX_SAMPLES)) * base
         raise InputError(
-            f"{key}: {time:g} s is no whole multiple of the sample time {base:g} s; take {near:g} s, or another sample time"
+            f"{time:g} s is no whole multiple of the sample time {base:g} s; take {near:g} s, or another sample time",
+            keys=(key,),
         )
     return samples

@@ -44,7 +44,7 @@ def linear_table(kind: str, reference: str, changes: Mapping[str, Any], where: s
     known = {*type(record).PART.model_fields, *conditions}
     for key in changes:
         if key not in known:
-            raise InputError(f"key {where}.{shortened(key)}: {unknown_key(key, known)}")
+            raise InputError(unknown_key(key, known), keys=(f"{where}.{shortened(key)}",))
     values = record.values()
     own = {key: value for key, value in changes.items() if key not in conditions}
     values = _without_replaced(record, values, own) | own

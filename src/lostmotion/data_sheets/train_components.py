@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from ..errors import InputError
@@ -29,7 +29,7 @@ RECORD_KINDS = {table: "gearbox" if table == "gears" else table.removesuffix("s"
 CONDITIONS: dict[str, type[Part]] = {"gears": Conditions, "screws": ScrewConditions}
 
 
-def use_train_records(data: dict[str, Any]) -> None:
+def use_train_records(data: dict[str, Any], written: Callable[[str], str] = str) -> None:
     """Puts the values of a record in place of the key that names it, such as `gears.NAME.gearbox` and `screws.NAME.from`.
 
     Raises
@@ -41,7 +41,7 @@ def use_train_records(data: dict[str, Any]) -> None:
         data["task"] = use_accessories(data["task"])
     for table in RECORDS:
         if isinstance(data.get(table), dict):
-            data[table] = {name: _with_record(table, name, value) for name, value in data[table].items()}
+            data[table] = {name: _with_record(table, name, value, written) for name, value in data[table].items()}
 
 
 def without_record(table: str, element: Mapping[str, Any]) -> dict[str, Any]:
@@ -49,24 +49,25 @@ def without_record(table: str, element: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in element.items() if key in RECORDS[table][1]}
 
 
-def _with_record(table: str, name: str, element: Any) -> Any:
+def _with_record(table: str, name: str, element: Any, written: Callable[[str], str]) -> Any:
     if not isinstance(element, dict):
         return element
     key = RECORDS[table][0]
-    where = f"{table}.{name}"
+    where, from_key = written(f"{table}.{name}"), written(f"{table}.{name}.{key}")
     if key not in element:
         for condition in CONDITIONS[table].model_fields if table in CONDITIONS else ():
             if condition in element:
-                raise InputError(f"key {where}.{condition}: acts on a record; give {where}.{key}, or leave it out")
+                raise InputError(f"acts on a record; give {from_key}, or leave it out", keys=(f"{where}.{condition}",))
         return element
     record = element[key]
     if not isinstance(record, str):
-        raise InputError(f"key {where}.{key}: {shown(record)} must be the name of a record, or of a file with one")
+        raise InputError(f"{shown(record)} must be the name of a record, or of a file with one", keys=(from_key,))
     try:
         values, kept = _values(table, record, element, where)
     except InputError as error:
-        text = str(error)
-        raise InputError(text if text.startswith("key ") else f"key {where}.{key}: {text}") from None
+        raise (
+            error if error.problems[0].keys and not error.where else InputError(str(error), keys=(from_key,))
+        ) from None
     return values | kept
 
 

@@ -133,7 +133,7 @@ class DriveTrain(TrainElements):
         for name, mass in self.mass_matrices.items():
             for one, other, _ in mass.couples():
                 if one in shafts or other in shafts:
-                    raise InputError(f"key mass_matrices.{name}: couples {other} and {one}; {what}")
+                    raise InputError(f"couples {other} and {one}; {what}", keys=(f"mass_matrices.{name}",))
 
     def inertia_couplings(self) -> list[tuple[str, str, float]]:
         """(one, other, entry) of all that mass matrices couple, each pair once."""
@@ -213,7 +213,8 @@ class DriveTrain(TrainElements):
             raise InputError(unknown[0] + (f"; and {len(unknown) - 1} more" if len(unknown) > 1 else ""))
         if twice := [name for name in self.gravity if name in self.angle_torques]:
             raise InputError(
-                f"keys gravity.{twice[0]}, angle_torques.{twice[0]}: have the same name; rename one of them"
+                "have the same name; rename one of them",
+                keys=(f"gravity.{twice[0]}", f"angle_torques.{twice[0]}"),
             )
         self.check(self.core(self.shafts))
         return self

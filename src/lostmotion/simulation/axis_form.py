@@ -5,16 +5,29 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from copy import deepcopy
+from functools import partial
 from typing import Any
 
 from ..errors import InputError
 from ..inputs.validation import did_you_mean, shown
 from .drive_scenario import json_schema
+from .keys import renamed
 from .scenario import RECORD_NAME
 from .train_scenario import TrainScenario, train_from_tables, train_schema
 
 DRIVES = {"screw": "screws", "rack": "racks", "belt": "belts"}
 MOTOR, SLIDE, GEARBOX = "motor", "slide", "gearbox"  # names in the long form; the drive is called after its kind
+# Keys of the long form that such a scenario is checked by, and those of its file.
+KEYS = {
+    **{f"{long}.{short}": f"axis.{short}" for short, long in DRIVES.items()},
+    **{f"shafts.{short}": f"axis.{short}" for short in DRIVES},
+    f"controllers.{MOTOR}": "controller",
+    f"command.{MOTOR}": "command",
+    f"motors.{MOTOR}": "axis.motor",
+    f"gears.{GEARBOX}.gearbox": "axis.gearbox.from",
+    f"gears.{GEARBOX}": "axis.gearbox",
+    f"slides.{SLIDE}": "axis.slide",
+}
 BESIDE = ("title", "task", "command", "controller", "initial", "simulation")
 
 
@@ -31,24 +44,12 @@ def axis_from_tables(tables: Mapping[str, Any]) -> TrainScenario:
     InputError
         A value cannot be used.
     """
-    try:
-        return train_from_tables(long_form(tables)).as_axis()
-    except InputError as error:
-        raise InputError(in_keys_of_axes(str(error))) from None
+    return train_from_tables(long_form(tables), partial(renamed, names=KEYS)).as_axis()
 
 
 def in_keys_of_axes(text: str) -> str:
     """Text whose keys of the long form are those of this form."""
-    for short, long in DRIVES.items():
-        text = text.replace(f"{long}.{short}", f"axis.{short}").replace(f"shafts.{short}", f"axis.{short}")
-    for long, short in (
-        (f"controllers.{MOTOR}", "controller"),
-        (f"command.{MOTOR}", "command"),
-        (f"motors.{MOTOR}", "axis.motor"),
-        (f"gears.{GEARBOX}.gearbox", "axis.gearbox.from"),
-        (f"gears.{GEARBOX}", "axis.gearbox"),
-        (f"slides.{SLIDE}", "axis.slide"),
-    ):
+    for long, short in KEYS.items():
         text = text.replace(long, short)
     return text
 
@@ -64,17 +65,17 @@ def long_form(tables: Mapping[str, Any]) -> dict[str, Any]:
     for key in tables:
         if key not in ("axis", *BESIDE):
             meant = did_you_mean(key, ("axis", *BESIDE), f"beside [axis] there may be {', '.join(BESIDE)}")
-            raise InputError(f"key {key}: is not allowed beside [axis]; {meant}")
+            raise InputError(f"is not allowed beside [axis]; {meant}", keys=(key,))
     axis = tables["axis"]
     parts = (MOTOR, GEARBOX, *DRIVES, SLIDE)
     all_parts = f"they are {', '.join(parts)}"
     if not isinstance(axis, Mapping):
-        raise InputError(f"key axis: {shown(axis)} must be a table with {', '.join(parts)}")
+        raise InputError(f"{shown(axis)} must be a table with {', '.join(parts)}", keys=("axis",))
     for key, value in axis.items():
         if key not in parts:
-            raise InputError(f"key axis.{key}: is no part of an axis; {did_you_mean(key, parts, all_parts)}")
+            raise InputError(f"is no part of an axis; {did_you_mean(key, parts, all_parts)}", keys=(f"axis.{key}",))
         if not isinstance(value, Mapping | str) or (isinstance(value, str) and key == SLIDE):
-            raise InputError(f"key axis.{key}: {shown(value)} must be a table")
+            raise InputError(f"{shown(value)} must be a table", keys=(f"axis.{key}",))
     given = [kind for kind in DRIVES if kind in axis]
     if len(given) != 1:
         what = (
@@ -82,12 +83,15 @@ def long_form(tables: Mapping[str, Any]) -> dict[str, Any]:
             if given
             else f"lacks what moves the slide; add one of {', '.join(DRIVES)}"
         )
-        raise InputError(f"key axis: {what}")
+        raise InputError(what, keys=("axis",))
     for key in (MOTOR, SLIDE):
         if key not in axis:
-            raise InputError(f"key axis.{key}: is missing; add it")
+            raise InputError("is missing; add it", keys=(f"axis.{key}",))
     if "controller" in tables and "command" in tables:
-        raise InputError("keys command, controller: both turn the motor; leave one of them out")
+        raise InputError(
+            "both turn the motor; leave one of them out",
+            keys=("command", "controller"),
+        )
     (kind,) = given
     table = {key: {"from": value} if isinstance(value, str) else dict(value) for key, value in axis.items()}
     shaft = MOTOR

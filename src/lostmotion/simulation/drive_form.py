@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from ..errors import InputError
 from .drive_scenario import from_tables
+from .keys import renamed
 from .scenario import Scenario
 from .train_scenario import TrainScenario, in_long_form
 
@@ -56,10 +58,7 @@ def drive_from_tables(tables: Mapping[str, Any]) -> Scenario:
     try:
         return TrainScenario(**drive)
     except InputError as error:
-        text = str(error)
-        for long, short in KEYS.items():
-            text = text.replace(long, short)
-        raise InputError(text) from None
+        raise error.with_keys(partial(renamed, names=KEYS)) from None
 
 
 def _table(tables: Mapping[str, Any], key: str) -> Mapping[str, Any]:

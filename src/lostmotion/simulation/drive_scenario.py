@@ -105,15 +105,17 @@ class DriveScenario(Scenario):
         for key in ("speed", "motion"):
             if isinstance(load, Mapping) and key in load:
                 raise InputError(
-                    f"key load.{key}: a given motion requires a drive train; read the file by lm.load, or make a TrainScenario with "
-                    f'shafts={{"load": ...}}'
+                    "a given motion requires a drive train; read the file by lm.load, or make a TrainScenario with "
+                    'shafts={"load": ...}',
+                    keys=(f"load.{key}",),
                 )
         if isinstance(controller, ContinuousController) or (
             isinstance(controller, Mapping) and controller.get("kind") == "continuous"
         ):
             raise InputError(
-                "key controller.kind: a continuous controller requires a drive train; read the file by lm.load, or make a "
-                'TrainScenario with controllers={"motor": ...}'
+                "a continuous controller requires a drive train; read the file by lm.load, or make a "
+                'TrainScenario with controllers={"motor": ...}',
+                keys=("controller.kind",),
             )
         return data
 
@@ -133,7 +135,10 @@ class DriveScenario(Scenario):
         if drive.motor.kind == "torque_source" and start.motor_torque != 0.0:
             raise ValueError("has initial.motor_torque, but a torque source has no such state; use command")
         if self.controller is not None and self.command != CommandSignal():
-            raise InputError("keys command, controller: both turn the motor; leave one of them out")
+            raise InputError(
+                "both turn the motor; leave one of them out",
+                keys=("command", "controller"),
+            )
         check_torques(self.axes(), {"motor": start.motor_torque}, "initial.motor_torque")
         self.control()
         return self

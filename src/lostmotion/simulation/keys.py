@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from ..data_sheets.components import as_torque_source, at_voltage
@@ -158,3 +158,17 @@ def list_index(entries: Sequence[Any], part: str) -> int:
         count = f"{len(entries)} entr{'y' if len(entries) == 1 else 'ies'}"
         raise ValueError(f"there is no entry {part}; the list has {count}, numbered from 0")
     return int(part)
+
+
+def renamed(key: str, names: Mapping[str, str]) -> str:
+    """A dotted key in which a table, or a value, has another name.
+
+    Parameters
+    ----------
+    names
+        By the dotted keys that are replaced, the first that fits.
+    """
+    for old, new in names.items():
+        if key == old or key.startswith(f"{old}."):
+            return new + key.removeprefix(old)
+    return key

@@ -32,20 +32,24 @@ class TrainChecks(Scenario, LinearElements):
 
     def _check_shafts(self) -> None:
         if not self.shafts and not self.slides:
-            raise InputError("key shafts: there is neither a shaft nor a slide; add [shafts.NAME] or [slides.NAME]")
+            raise InputError(
+                "there is neither a shaft nor a slide; add [shafts.NAME] or [slides.NAME]", keys=("shafts",)
+            )
         for name, shaft in self.shafts.items():
             if shaft.domain != "rotation":
                 raise InputError(
-                    f"key shafts.{name}.domain: is translation; write the slide as [slides.{name}], with its mass"
+                    f"is translation; write the slide as [slides.{name}], with its mass",
+                    keys=(f"shafts.{name}.domain",),
                 )
         self.check_places(self.shafts, self.slides)
         for name, mass in self.mass_matrices.items():
             for slide in mass.shafts:
                 if slide in self.slides and self.slides[slide].inclination != 0.0:
                     raise InputError(
-                        f"keys mass_matrices.{name}, slides.{slide}.inclination: the weight of a slide follows from its mass, "
+                        "the weight of a slide follows from its mass, "
                         "which the matrix holds; leave the inclination out and give the weight in slides."
-                        f"{slide}.force"
+                        f"{slide}.force",
+                        keys=(f"mass_matrices.{name}", f"slides.{slide}.inclination"),
                     )
         for key, linear in LINEAR_INITIAL.items():
             of_slides = self.linear_drives() if key in ("twists", "hysteresis_capacities") else self.slides
@@ -58,7 +62,7 @@ class TrainChecks(Scenario, LinearElements):
                             else "is none that moves along a straight line"
                         )
                         raise InputError(
-                            f"key initial.{given}.{name}: {shown(name)} {what}; give initial.{other}.{name}"
+                            f"{shown(name)} {what}; give initial.{other}.{name}", keys=(f"initial.{given}.{name}",)
                         )
 
     def _check_given(self) -> None:
@@ -66,33 +70,35 @@ class TrainChecks(Scenario, LinearElements):
             key, shaft = self.given_key(name), self._tables()[name]
             if shaft.speed is not None and shaft.motion is not None:
                 raise InputError(
-                    f"keys {key.removesuffix('.motion')}.speed, {key}: both give the motion; leave one out"
+                    "both give the motion; leave one out",
+                    keys=(f"{key.removesuffix('.motion')}.speed", key),
                 )
             if name in self.initial.of_all("speeds"):
                 how = "moves" if name in self.slides else "turns"
                 raise InputError(
-                    f"keys {key}, {self.initial_key('speeds', name)}: both say how fast the {self._kind(name)} {how} at t = 0; "
-                    "leave the initial speed out"
+                    f"both say how fast the {self._kind(name)} {how} at t = 0; leave the initial speed out",
+                    keys=(key, self.initial_key("speeds", name)),
                 )
             if shaft.motion is None:
                 continue
             if name in self.initial.of_all("angles"):
                 raise InputError(
-                    f"keys {key}, {self.initial_key('angles', name)}: both say where the {self._kind(name)} is at t = 0; leave "
-                    "the initial one out"
+                    f"both say where the {self._kind(name)} is at t = 0; leave the initial one out",
+                    keys=(key, self.initial_key("angles", name)),
                 )
             try:
                 check_continuous(shaft.motion, "m" if name in self.slides else "rad")
             except ValueError as problem:
-                raise InputError(f"key {key}: {problem}") from None
+                raise InputError(str(problem), keys=(key,)) from None
 
     def _check_massless(self, massless: Collection[str]) -> None:
         for key in ("speeds", "slide_speeds"):
             for name in getattr(self.initial, key):
                 if name in massless:
                     raise InputError(
-                        f"key initial.{key}.{name}: {name} has no inertia, and its speed follows from the torques on it; leave "
-                        "it out, or give an inertia"
+                        f"{name} has no inertia, and its speed follows from the torques on it; leave "
+                        "it out, or give an inertia",
+                        keys=(f"initial.{key}.{name}",),
                     )
         train = self.train()
         for motor, controller in self.axes().items():
@@ -100,7 +106,7 @@ class TrainChecks(Scenario, LinearElements):
             for name in {train.motors[motor].shaft, self.controlled(motor), *filter(None, encoders)}:
                 if name in massless:
                     raise InputError(
-                        f"key controllers.{motor}: measures or turns {name}, which has no inertia; give it one"
+                        f"measures or turns {name}, which has no inertia; give it one", keys=(f"controllers.{motor}",)
                     )
 
     def _check_controllers(self) -> None:
@@ -108,9 +114,10 @@ class TrainChecks(Scenario, LinearElements):
         for name in self.controllers:
             if name not in motors:
                 meant = did_you_mean(name, motors, f"the motors are {', '.join(motors) or 'none'}")
-                raise InputError(f"key controllers.{name}: is no motor of this train; {meant}")
+                raise InputError(f"is no motor of this train; {meant}", keys=(f"controllers.{name}",))
             if name in self.command:
                 raise InputError(
-                    f"keys command.{name}, controllers.{name}: both turn the same motor; leave one of them out"
+                    "both turn the same motor; leave one of them out",
+                    keys=(f"command.{name}", f"controllers.{name}"),
                 )
         check_torques(self.axes(), self.initial.motor_torques, "initial.motor_torques.{}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import cache, cached_property, lru_cache
 from typing import Any, ClassVar, Self, cast
 
@@ -87,16 +87,19 @@ class TrainScenario(TrainChecks):
         for name in self.command:
             if name not in known:
                 meant = did_you_mean(name, known, f"those with a command are {', '.join(known) or 'none'}")
-                raise InputError(f"key command.{name}: is no motor, brake or friction clutch of this train; {meant}")
+                raise InputError(
+                    f"is no motor, brake or friction clutch of this train; {meant}", keys=(f"command.{name}",)
+                )
         idle = [f"command.{name}" for name in known if name not in self.command and name not in train.motors]
         if idle:
-            keys = f"key {idle[0]}: is" if len(idle) == 1 else f"keys {', '.join(idle)}: are"
-            raise InputError(f"{keys} missing; add a number from 0 (open) to 1 (full torque), or a signal")
+            verb = "is" if len(idle) == 1 else "are"
+            reason = f"{verb} missing; add a number from 0 (open) to 1 (full torque), or a signal"
+            raise InputError(reason, keys=tuple(idle))
         for name in known:
             try:
                 self._acting(name)
             except ValueError as problem:
-                raise InputError(f"key command.{name}: {problem}") from None
+                raise InputError(str(problem), keys=(f"command.{name}",)) from None
         self.start()
         self.control()
         return self
@@ -278,7 +281,7 @@ class TrainScenario(TrainChecks):
             if name not in known:
                 meant = did_you_mean(name, known, f"they are {', '.join(known) or 'none'}")
                 raise InputError(
-                    f"key initial.controller_states.{name}: is no state of a controller of this train; {meant}"
+                    f"is no state of a controller of this train; {meant}", keys=(f"initial.controller_states.{name}",)
                 )
         return values | initial.controller_states
 
@@ -431,8 +434,13 @@ def _core_train(
     return core
 
 
-def train_from_tables(tables: Mapping[str, Any]) -> TrainScenario:
+def train_from_tables(tables: Mapping[str, Any], written: Callable[[str], str] = str) -> TrainScenario:
     """The scenario of such tables.
+
+    Parameters
+    ----------
+    written
+        Key in the file for a key of the tables, for messages.
 
     Raises
     ------
@@ -440,8 +448,11 @@ def train_from_tables(tables: Mapping[str, Any]) -> TrainScenario:
         A record is unknown or lacks what a run needs; a value cannot be used.
     """
     data = dict(tables)
-    use_train_records(data)
-    return TrainScenario(**data)
+    use_train_records(data, written)
+    try:
+        return TrainScenario(**data)
+    except InputError as error:
+        raise error.with_keys(written) from None
 
 
 @cache

@@ -36,7 +36,7 @@ def start_values(train: DriveTrain, initial: Any) -> dict[str, float]:
     _check("hysteresis_capacities", initial.hysteresis_capacities, lossy, "gear with hysteresis")
     _check("hysteresis_forces", initial.hysteresis_forces, lossy, "screw, rack or belt with hysteresis")
     if problem := train.core(()).check_start([speeds.get(name, 0.0) for name in train.shafts]):
-        raise InputError(f"key initial.speeds: {problem}")
+        raise InputError(str(problem), keys=("initial.speeds",))
     _check_flanks(train, speeds, twists)
     values = {f"{name}_speed": v for name, v in speeds.items()}
     values |= {train.angle_of(s): v for s, v in angles_at_start(train, initial.of_all("angles"), twists).items()}
@@ -55,8 +55,9 @@ def _check_flanks(train: DriveTrain, speeds: Mapping[str, float], twists: Mappin
         speed = (speeds.get(gear.input, 0.0) - housing) / gear.ratio - (speeds.get(gear.output, 0.0) - housing)
         if abs(twist) > reach or (abs(twist) == reach and twist * speed > 0.0):
             raise InputError(
-                f"key initial.twists.{name}: the flanks begin {'beyond' if abs(twist) > reach else 'with an impact at'} the end of "
-                f"their gap, {reach:g} rad; give a twist inside it"
+                f"the flanks begin {'beyond' if abs(twist) > reach else 'with an impact at'} the end of "
+                f"their gap, {reach:g} rad; give a twist inside it",
+                keys=(f"initial.twists.{name}",),
             )
 
 
@@ -65,7 +66,7 @@ def _check(key: str, given: Iterable[str], known: Iterable[str], what: str) -> N
     for name in given:
         if name not in known:
             meant = did_you_mean(name, known, f"there are {', '.join(known)}" if known else "there is none")
-            raise InputError(f"key initial.{key}.{name}: is no {what} of this train; {meant}")
+            raise InputError(f"is no {what} of this train; {meant}", keys=(f"initial.{key}.{name}",))
 
 
 def angles_at_start(train: DriveTrain, given: Mapping[str, float], twists: Mapping[str, float]) -> dict[str, float]:
@@ -102,7 +103,8 @@ def angles_at_start(train: DriveTrain, given: Mapping[str, float], twists: Mappi
                 key = "positions" if train.is_slide(two) else "angles"
                 a, b = (f"{given[s]} {train.angle_unit(s)}" for s in (two, one))
                 raise InputError(
-                    f"key initial.{key}.{two}: {a} does not fit {one} = {b} through the gear {name} and its twist; give one of them"
+                    f"{a} does not fit {one} = {b} through the gear {name} and its twist; give one of them",
+                    keys=(f"initial.{key}.{two}",),
                 )
     return angles
 
