@@ -187,7 +187,7 @@ class HoldingBrake(Part):
 
 
 class Amplifier(Part):
-    """Amplifier that feeds the motor. Of a motor with a winding currents are effective values of a phase."""
+    """Amplifier that feeds the motor. Currents of a motor with a winding are effective values of a phase."""
 
     continuous_current: Annotated[Current, Positive]
     """rms over the cycle"""

@@ -101,7 +101,7 @@ def current_voltage_power(
     m: Motor, command: np.ndarray, torque: np.ndarray, speed: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Current [A], voltage [V] and electrical power [W] of a motor at command, torque [N·m] and speed [rad/s]; NaN where its data
-    do not tell. Of a motor with a winding current and voltage are amplitudes of a phase."""
+    do not tell. Current and voltage of a motor with a winding are amplitudes of a phase."""
     unknown = np.full_like(torque, np.nan)
     if m.winding is not None:
         phase = m.winding.phase_values()

@@ -97,8 +97,7 @@ def load_task(path: str | Path) -> Study:
         return task_of(tables, path.parent)
     except InputError as error:
         text = str(error)
-        text = f"key {text.removeprefix('the study ')}" if text.startswith("the study controller") else text
-        raise error if str(error).startswith(f"{path}:") else InputError(f"{path}: {text}") from None
+        raise error if text.startswith(f"{path}:") else InputError(f"{path}: {text}") from None
 
 
 def _units_on_a_slide(place: tuple[str, ...]) -> list[str]:
