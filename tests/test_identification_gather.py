@@ -130,19 +130,19 @@ def test_a_log_that_cannot_be_used_is_left_out_and_the_others_are_not(what: str,
 NOTED: dict[str, tuple[dict[str, Any], str]] = {
     "a time that is infinite": (
         changed(lambda log: log["entries"][5].update(timestamp=float("inf"))),
-        "dropped 1 samples without a time",
+        "dropped 1 sample without a time",
     ),
     "a time of 400 digits": (
         changed(lambda log: log["entries"][5].update(timestamp=10**400)),
-        "dropped 1 samples without a time",
+        "dropped 1 sample without a time",
     ),
     "a value beyond all": (
         changed(lambda log: log["entries"][5].update(position=1e300)),
-        "the residuals of 1 samples in which position is not a number are left out",
+        "the residuals of 1 sample in which position is not a number are left out",
     ),
     "a switch of nothing": (
         changed(lambda log: log["entries"][7].update(torque_enable=None)),
-        "dropped 1 samples in which torque_enable is not a number",
+        "dropped 1 sample in which torque_enable is not a number",
     ),
     "times in ms": (each(timestamp=lambda k: 10.0 * k), "its samples are 10 s apart; times are read in s"),
     "a header with a parameter's name": (servo_log(resistance=99.0), "resistance is known of the log, and a parameter"),

@@ -525,15 +525,15 @@ SCREENED: dict[str, tuple[Log, str]] = {
     ),
     "repeated time": (
         log_of(changed(TIME, 50, TIME[49])),
-        "dropped 1 samples with the time stamp of the sample before",
+        "dropped 1 sample with the time stamp of the sample before",
     ),
-    "time goes back": (log_of(changed(TIME, 50, 0.2)), "dropped 1 samples whose time goes back"),
-    "time is not a number": (log_of(changed(TIME, 50, np.nan)), "dropped 1 samples without a time"),
+    "time goes back": (log_of(changed(TIME, 50, 0.2)), "dropped 1 sample whose time goes back"),
+    "time is not a number": (log_of(changed(TIME, 50, np.nan)), "dropped 1 sample without a time"),
     "coarse clock": (
         log_of(np.floor(TIME / 0.04 + 1e-9) * 0.04),
         "the clock moves in steps of 0.04 s with 4.0 samples each",
     ),
-    "pause": (log_of(np.where(TIME > 1.0, TIME + 0.5, TIME)), "1 pauses in the samples, the longest of 0.51 s"),
+    "pause": (log_of(np.where(TIME > 1.0, TIME + 0.5, TIME)), "1 pause in the samples, the longest of 0.51 s"),
     "values missing": (
         log_of(position=changed(ANGLE, slice(20, 25), np.nan)),
         "the residuals of 5 samples in which position is not a number are left out; inputs keep these samples",

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..units.conversion import si_factor, si_value
+from ..units.practical import counted
 from .formulas import Formula, names_within
 from .logs import Channel, Log
 from .screening import screened
@@ -200,7 +201,7 @@ def prepared(
             f"{log.name}: lasts {log.duration:.4g} s, and logs.first and logs.last leave {keep.sum()} samples of it"
         )
     if not keep.all():
-        log = log.only(keep, f"{np.sum(~keep)} samples before logs.first or after logs.last are left out")
+        log = log.only(keep, f"{counted(np.sum(~keep), 'sample')} before logs.first or after logs.last are left out")
     origin = origin or {}
     for name in origin.keys() & header.keys():
         log = log.noted(f"{name} in its header counts, in place of that of its own file")

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import InputError
+from ..units.practical import counted
 from .logs import Log
 
 GLITCH = 8.0  # times the usual change between samples (99th percentile), there and back within two samples
@@ -68,7 +69,7 @@ def _rising(log: Log) -> Log:
     """Time stamps that rise: those not finite or going back are dropped, those of a coarse clock spread."""
     finite = np.isfinite(log.time)
     if not finite.all():
-        log = log.only(finite, f"dropped {np.sum(~finite)} samples without a time")
+        log = log.only(finite, f"dropped {counted(np.sum(~finite), 'sample')} without a time")
     if len(log.time) < 10:
         raise InputError(f"has times in {len(log.time)} samples only; 10 at least are needed", where=log.name)
     step = np.diff(log.time)
@@ -84,7 +85,7 @@ def _rising(log: Log) -> Log:
             )
         log = log.only(
             kept,
-            f"dropped {np.sum(~kept)} samples whose time goes back, the first near {log.time[int(np.argmax(back))]:.6g} s",
+            f"dropped {counted(int(np.sum(~kept)), 'sample')} whose time goes back, the first near {log.time[int(np.argmax(back))]:.6g} s",
         )
     same = np.diff(log.time) == 0.0
     share = float(np.mean(same))
@@ -94,12 +95,12 @@ def _rising(log: Log) -> Log:
         return _spread(log)
     if same.any():
         kept = np.concatenate([[True], ~same])
-        log = log.only(kept, f"dropped {np.sum(same)} samples with the time stamp of the sample before")
+        log = log.only(kept, f"dropped {counted(np.sum(same), 'sample')} with the time stamp of the sample before")
     long = np.diff(log.time) > PAUSE * np.median(np.diff(log.time))
     if long.any():
         k = int(np.argmax(np.diff(log.time)))
         log = log.noted(
-            f"{np.sum(long)} pauses in the samples, the longest of {np.diff(log.time)[k]:.4g} s at {log.time[k]:.4g} s"
+            f"{counted(np.sum(long), 'pause')} in the samples, the longest of {np.diff(log.time)[k]:.4g} s at {log.time[k]:.4g} s"
         )
     return log
 
@@ -150,7 +151,9 @@ def _numbers(log: Log, measured: list[str], inputs: list[str]) -> Log:
                 where=log.name,
             )
         if bad.any():
-            log = _without(log, name, bad, name in inputs, f"{np.sum(bad)} samples in which {name} is not a number")
+            log = _without(
+                log, name, bad, name in inputs, f"{counted(np.sum(bad), 'sample')} in which {name} is not a number"
+            )
     return log
 
 

@@ -37,6 +37,11 @@ def printed(unit: str) -> str:
     return unit
 
 
+def counted(number: int, noun: str) -> str:
+    """A number of things as text: 1 sample, 2 samples."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
 def charted(unit: str, *, small: bool = False) -> tuple[str, float]:
     """Unit of a chart or a summary for an SI unit, and how many of them one is."""
     found = CHARTED_SMALL.get(unit) if small else None
