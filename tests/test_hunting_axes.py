@@ -15,6 +15,23 @@ SLIPS = 30  # that a run of an axis which hunts has at least
 ROUNDING = 1e-9  # of the largest error, with which a run ends a slip that creeps to rest
 
 
+def geared(
+    inertia: float, load: dict[str, Any], gear: dict[str, Any], controller: dict[str, Any], w: float
+) -> lm.TrainScenario:
+    """A torque source on a shaft of this inertia, as the load feels it, and the load behind a gear; w: poles of the axis [1/s]."""
+    ratio, breakaway = gear["ratio"], load["breakaway_torque"]
+    own = inertia / ratio**2
+    motor = {"kind": "torque_source", "shaft": "motor", "rotor_inertia": 1e-3 * own, "rated_torque": breakaway / ratio}
+    ratings = {"rated_input_speed": 300.0, "rated_output_torque": 10.0 * breakaway}
+    return lm.TrainScenario(
+        shafts={"motor": {"inertia": own}, "load": load},
+        motors={"m": motor},
+        gears={"gear": {"input": "motor", "output": "load"} | ratings | gear},
+        controllers={"m": controller},
+        simulation={"duration": 100.0 / w, "sample_interval": 0.05 / w},
+    )
+
+
 def random_axis(rng: random.Random) -> lm.TrainScenario:
     """Motor and load with a rigid or soft gear, friction at the load, a PID by the poles of the rigid axis."""
 
@@ -36,11 +53,7 @@ def random_axis(rng: random.Random) -> lm.TrainScenario:
     if rng.random() < 0.5:
         load["viscous_friction"] = log(0.01, 0.5) * k_d
     gear: dict[str, Any] = {
-        "input": "motor",
-        "output": "load",
         "ratio": ratio,
-        "rated_input_speed": 300.0,
-        "rated_output_torque": 10.0 * breakaway,
         "losses": {"kind": "constant_efficiency", "efficiency": rng.choice([1.0, 0.9])},
         "stiffness": {"kind": "rigid"},
     }
@@ -66,19 +79,7 @@ def random_axis(rng: random.Random) -> lm.TrainScenario:
         controller["current"] = {"kind": "first_order", "time_constant": log(0.002, 0.05) / w}
     if k_i > 0.0 and rng.random() < 0.5:
         controller["anti_windup_time"] = log(0.3, 5.0) / w
-    motor = {
-        "kind": "torque_source",
-        "shaft": "motor",
-        "rotor_inertia": 1e-3 * share * inertia / ratio**2,
-        "rated_torque": breakaway / ratio,
-    }
-    return lm.TrainScenario(
-        shafts={"motor": {"inertia": share * inertia / ratio**2}, "load": load},
-        motors={"m": motor},
-        gears={"gear": gear},
-        controllers={"m": controller},
-        simulation={"duration": 100.0 / w, "sample_interval": 0.05 / w},
-    )
+    return geared(share * inertia, load, gear, controller, w)
 
 
 def stable_axis(rng: random.Random) -> lm.TrainScenario:

@@ -11,6 +11,7 @@ import lostmotion as lm
 from lostmotion.servo.margins import instability
 from lostmotion.servo.regimes import axis_of, regimes
 from lostmotion.servo.sampled_slip import sampled_slip
+from test_hunting_axes import geared
 
 AXES = 3  # of the test; the script takes 500
 SLIPS = 12  # that a run of an axis which hunts has about
@@ -60,28 +61,9 @@ def random_axis(rng: random.Random) -> lm.TrainScenario:
     }
     if rng.random() < 0.5:
         load["viscous_friction"] = log(rng, 0.01, 0.5) * k_d
-    gear = {
-        "input": "motor",
-        "output": "load",
-        "ratio": ratio,
-        "rated_input_speed": 300.0,
-        "rated_output_torque": 10.0 * breakaway,
-        "losses": {"kind": "constant_efficiency", "efficiency": 1.0},
-        "stiffness": {"kind": "rigid"},
-    }
-    motor = {
-        "kind": "torque_source",
-        "shaft": "motor",
-        "rotor_inertia": 1e-3 * share * inertia / ratio**2,
-        "rated_torque": breakaway / ratio,
-    }
-    return lm.TrainScenario(
-        shafts={"motor": {"inertia": share * inertia / ratio**2}, "load": load},
-        motors={"m": motor},
-        gears={"gear": gear},
-        controllers={"m": controller},
-        simulation={"duration": 100.0 / w, "sample_interval": 0.05 / w},
-    )
+    losses = {"kind": "constant_efficiency", "efficiency": 1.0}
+    gear = {"ratio": ratio, "losses": losses, "stiffness": {"kind": "rigid"}}
+    return geared(share * inertia, load, gear, controller, w)
 
 
 def stable_axis(rng: random.Random) -> lm.TrainScenario:
