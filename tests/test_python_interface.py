@@ -110,7 +110,7 @@ def test_representations_are_short_and_name_the_drive() -> None:
 def test_notebooks_show_every_value_with_its_unit(path) -> None:
     page = lm.load(path)._repr_html_()
     assert "<td>rotor_inertia</td>" in page
-    assert "<td>kg·m^2</td>" in page
+    assert "<td>kg·m²</td>" in page
     assert "E_C: 1 is rated voltage" not in page  # a table has its own rows, not its description
     assert page.count("<table>") == page.count("</table>") > 5
 

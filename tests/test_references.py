@@ -334,7 +334,7 @@ def test_a_series_of_a_reference_is_read_from_a_file_in_the_unit_of_its_kind(tmp
 
     def reference(**table: object) -> object:
         data = {"controller": {"reference": table}}
-        scenario_files._read_series(data, tmp_path / "s.toml", ())
+        scenario_files.read_series_files(data, tmp_path / "s.toml", scenario_files.units_of_series)
         return Tables(**data["controller"]).reference
 
     found = reference(kind="position", samples={"file": "points.csv", "interpolation": "cubic"})
