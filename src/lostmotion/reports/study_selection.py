@@ -103,7 +103,7 @@ def _verdict(
     dear = [p for p in costs if math.isfinite(p.gain) and p.gain > 0.0]
     if dear:
         p = max(dear, key=lambda price: price.gain)
-        lines.append(f"Without the limit {p.limit} the best would be {100.0 * p.gain:.1f} % better.")
+        lines.append(f"Without the limit {p.limit} the best would be {100.0 * p.gain:.3g} % better.")
     return Headline("good" if fitting else "bad", tuple(lines))
 
 
@@ -160,7 +160,7 @@ def _costs_table(table: pa.Table, costs: list[Price], objective: str) -> Table:
         found = p.best is not None and p.alone
         best = p.best.name if p.best is not None and p.alone else "not run" if p.alone else "nothing more fits"
         value = f"{p.best.values[objective]:.5g}" if p.best is not None and found else ""
-        gain = f"{100.0 * p.gain:.1f} %" if found and math.isfinite(p.gain) else ""
+        gain = (f"{100.0 * p.gain:.3g} %" if p.gain > 0.0 else "as now") if found and math.isfinite(p.gain) else ""
         rows.append([p.limit, str(p.excludes), str(p.alone), _share(p.opens), best, value, gain])
     header = (
         "limit",
@@ -268,7 +268,7 @@ def _costs(table: pa.Table, costs: list[Price], objective: str) -> list[str]:
         if p.best is not None and p.alone:
             best = f"{p.best.name}, {labelled(table, objective)} {p.best.values[objective]:.5g}"
             if math.isfinite(p.gain):
-                best += f" ({100.0 * p.gain:.1f} % better)" if p.gain > 0.0 else " (as now)"
+                best += f" ({100.0 * p.gain:.3g} % better)" if p.gain > 0.0 else " (as now)"
         if math.isfinite(p.opens):
             best += f"; {_share(p.opens)} more of the limit opens the first"
         lines.append(f"  {p.limit.ljust(width)}{p.excludes:>10}{p.alone:>16}  {best}")
