@@ -62,7 +62,7 @@ def display_math(self: HTML5Translator, node: nodes.math_block) -> None:
 def keep_colons(_app: Sphinx, what: str, _name: str, _item: object, _options: object, lines: list[str]) -> None:
     """Napoleon takes what stands before a colon in the first line of an attribute's text for its type."""
     if what in ("attribute", "data", "property"):
-        lines.insert(0, "")
+        lines[:0] = ["..", ""]  # an empty comment
 
 
 def setup(app: Sphinx) -> None:
