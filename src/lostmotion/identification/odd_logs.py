@@ -9,7 +9,6 @@ stays in it, since the model may be what is wrong.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -36,7 +35,6 @@ TRIED = 3  # faults whose nuisances are fitted, from the one with the smallest r
 SHIFTS = 100  # sample intervals, by which a channel may be late or early
 SEARCHED = 12  # logs, from the worst on, for which delays of the inputs and rates of the clock are searched
 RATES = (1e-2, 1e-3, 1e-4)  # steps of the grids in which the rate of a clock is sought
-SHIFT = re.compile(r" ms (late|early)")  # faults that late inputs may explain better
 NAMED_FACTORS = {
     1e-3: "1000 times too large, as mm read as m",
     1e3: "1000 times too small, as m read as mm",
@@ -250,13 +248,13 @@ def _explained(rig: Rig, log: Prepared, sizes: _Sizes, *, search_times: bool) ->
     if any(segment.initial for segment in log.segments):  # its start was taken from the values in question
         return nothing
     before = sizes.of(log)[1]
-    tried = list(_faults(rig, log, sizes))
+    runs = _runs(rig, log, sizes)
+    other = list(_faults(rig, log, sizes, runs))
+    tried = [*other, *_late_channels(rig, log, runs)]  # late inputs may explain the latter better
     if not tried:
         return nothing
     ratios = sizes.several([mended for _, mended in tried])
-    if search_times and not any(
-        r < MENDED and not SHIFT.search(fault) for (fault, _), r in zip(tried, ratios, strict=True)
-    ):
+    if search_times and not any(r < MENDED for r in ratios[: len(other)]):
         late = [*_late_inputs(rig, log), *_other_rate(rig, log, sizes)]
         tried, ratios = tried + late, ratios + sizes.several([mended for _, mended in late])
     order = sorted(range(len(tried)), key=lambda k: ratios[k])[:TRIED]
@@ -272,10 +270,10 @@ def _explained(rig: Rig, log: Prepared, sizes: _Sizes, *, search_times: bool) ->
     return ", or ".join(fault for ratio, fault, _ in found if ratio < ALIKE * least), rows
 
 
-def _faults(rig: Rig, log: Prepared, sizes: _Sizes) -> Iterator[tuple[str, Prepared]]:
-    """(fault, the log with it undone)."""
+def _faults(rig: Rig, log: Prepared, sizes: _Sizes, runs: Mapping[str, np.ndarray]) -> Iterator[tuple[str, Prepared]]:
+    """(fault, the log with it undone), but for what is late or early."""
     task = rig.task
-    measured = {m.channel: name for name, m in task.measured.items()}
+    measured = [m.channel for m in task.measured.values()]
     inputs = [i.channel for i in task.inputs.values()]
     factors = {**NAMED_FACTORS, **_ratios(rig, log, sizes)}
     for channel in dict.fromkeys([*measured, *inputs]):
@@ -287,9 +285,10 @@ def _faults(rig: Rig, log: Prepared, sizes: _Sizes) -> Iterator[tuple[str, Prepa
             yield f"{channel} is {words}", log.changed(task, {channel: factor * x})
     for factor, words in ((1e-3, "in ms, read as s"), (1e3, "in s, read as ms")):
         yield f"times are {words}", log.changed(task, {}, time=factor * log.log.time)
-    for channel, name in measured.items():
+    for channel in dict.fromkeys(measured):
         yield from _recording_faults(rig, log, channel)
-        yield from _shifted(rig, log, sizes, channel, name)
+        if channel in runs:
+            yield from _displaced(rig, log, channel, runs[channel])
 
 
 def _ratios(rig: Rig, log: Prepared, sizes: _Sizes) -> Mapping[float, str]:
@@ -319,22 +318,39 @@ def _recording_faults(rig: Rig, log: Prepared, channel: str) -> Iterator[tuple[s
         yield text, log.changed(rig.task, {channel: np.where(fresh, x, np.nan)})
 
 
-def _shifted(rig: Rig, log: Prepared, sizes: _Sizes, channel: str, name: str) -> Iterator[tuple[str, Prepared]]:
-    """A measured channel with an offset, or late or early, by the values with the smallest residuals."""
-    row = list(rig.task.measured).index(name)
-    residuals = (sizes.engine.residuals([log], sizes.point, sizes.rung)[0] / log.weight)[row]
+def _runs(rig: Rig, log: Prepared, sizes: _Sizes) -> dict[str, np.ndarray]:
+    """Measured channels as the model has them, those with a run and enough samples."""
+    found = {}
+    residuals = sizes.engine.residuals([log], sizes.point, sizes.rung)[0] / log.weight
+    for m, row in zip(rig.task.measured.values(), residuals, strict=True):
+        x = log.log.values(m.channel)
+        if np.isfinite(row).all() and np.isfinite(x).sum() >= 10:
+            found[m.channel] = np.asarray(x - row)
+    return found
+
+
+def _displaced(rig: Rig, log: Prepared, channel: str, run: np.ndarray) -> Iterator[tuple[str, Prepared]]:
+    """A measured channel with an offset, or by a counter that wraps."""
     x = log.log.values(channel)
     there = np.isfinite(x)
-    if not np.isfinite(residuals).all() or there.sum() < 10:
-        return
-    offset = float(np.mean(residuals[there]))
+    offset = float(np.mean((x - run)[there]))
     yield f"{channel} has an offset of {offset:.4g}", log.changed(rig.task, {channel: x - offset})
-    step, run = log.log.interval, x - residuals
     if (period := wrapped_by(x)) is not None:
         whole = np.full(len(x), np.nan)
         whole[there] = np.unwrap(x[there], period=period)
         whole += period * np.round(np.nanmean(run - whole) / period)
         yield f"{channel} jumps by {period:.6g}, as a counter that wraps", log.changed(rig.task, {channel: whole})
+
+
+def _late_channels(rig: Rig, log: Prepared, runs: Mapping[str, np.ndarray]) -> Iterator[tuple[str, Prepared]]:
+    """Each measured channel late or early, and all of them by as much."""
+    for channel, run in runs.items():
+        yield from _late(rig, log, channel, run)
+
+
+def _late(rig: Rig, log: Prepared, channel: str, run: np.ndarray) -> Iterator[tuple[str, Prepared]]:
+    """A measured channel late or early, by the time with the smallest residuals."""
+    step, x = log.log.interval, log.log.values(channel)
     most = min(SHIFTS, len(x) // 4)
 
     def size(shift: float) -> float:
