@@ -146,9 +146,9 @@ def hunting_certificate(scenario: Scenario, *, largest_error: float | str | None
         largest_error = argument("largest_error", largest_error, _unit(train))
         if not largest_error > 0.0:
             raise InputError(f"largest_error: {shown(largest_error)} must be greater than 0")
-    if not train.axes() and not train.continuous():
-        raise InputError("hunting_certificate: the scenario has no controller; add one with a position loop")
-    if train.axes() and not train.continuous():
+    if not train.continuous():
+        if not train.axes():
+            raise InputError("hunting_certificate: the scenario has no controller; add one with a position loop")
         axis = axis_of(train)
         return certified(axis, lambda: at_rest(axis).verdict == "at rest", largest_error)
     loop = Loop.of(train)

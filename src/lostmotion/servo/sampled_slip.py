@@ -49,7 +49,7 @@ class SampledSlip:
     breakaway: float
     """T_S"""
     lag: float
-    """time constant of the torque [s]; 0: the torque is that of the controller"""
+    """time constant of the torque [s]; 0: the torque follows the controller at once"""
     step: float
     """q, resolution of the encoder at the contact's shaft; 0 for an ideal one"""
     offset: float
@@ -85,6 +85,11 @@ class SampledSlip:
         row = np.zeros(len(self.held))
         row[0] = self.ratio
         return row
+
+    @cached_property
+    def linear(self) -> tuple[np.ndarray, ...]:
+        """For each tick of a frame, matrix of the state with an encoder without steps."""
+        return tuple(matrix + np.outer(column, self.reading) for matrix, column in self.samples)
 
     @property
     def quantum(self) -> float:

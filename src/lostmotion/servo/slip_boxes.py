@@ -9,7 +9,7 @@ state is lost. What stops is collected by its reading, and goes on as one box ar
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -26,6 +26,11 @@ BOXES = 20_000  # at most at once
 TICKS = 20_000  # of a slip
 GENERATIONS = 200  # of stops without settling
 CELLS = 8  # of an encoder step, in which stops are collected
+
+
+def quiet(_row: np.ndarray) -> float:
+    """No effect of readings beside what is in the boxes."""
+    return 0.0
 
 
 @dataclass
@@ -201,7 +206,7 @@ class Flow:
             boxes = self._propagated(boxes)
             tick = (tick + 1) % self.of.frame
             boxes = self._sampled(boxes, tick)
-            self._within_limits(boxes)
+            need_within_limits(self.of, boxes)
             done = (boxes.mode == 0) & (boxes.waited >= self.of.ramp.ticks)
             if done.any():
                 one = boxes.take(done)
@@ -223,12 +228,6 @@ class Flow:
             least, most = self._stopped.get(key, (low[k], high[k]))
             self._stopped[key] = np.minimum(least, low[k]), np.maximum(most, high[k])
 
-    def _within_limits(self, boxes: Boxes) -> None:
-        for row, limit in self.of.limited:
-            low, high = boxes.range_of(row)
-            if len(boxes) and max(-low.min(), high.max()) >= limit:
-                raise UndecidableError("the limit of the controller may act")
-
     # --- between samples ---
 
     def _propagated(self, boxes: Boxes) -> Boxes:
@@ -248,8 +247,8 @@ class Flow:
         of, way = self.of, boxes.mode
         after = boxes.moved(of.slip, way[:, None] * of.push)
         speed = np.eye(len(of.held))[1]
-        first, last = _along(way, *boxes.range_of(speed)), _along(way, *after.range_of(speed))
-        bend = self._bend(boxes, first)
+        last = _along(way, *after.range_of(speed))
+        bend = bend_of(of, boxes)
         sure, going = last[0] > bend, last[1] > 0.0  # the speed is not below 0 at first, or it had stopped before
         unsure = np.flatnonzero(going & ~sure)
         after.clip(unsure, speed, np.zeros(len(unsure)), way[unsure])
@@ -272,17 +271,6 @@ class Flow:
         after.waited[:] = 0
         return self._freed_within(boxes, after)
 
-    def _bend(self, boxes: Boxes, first: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-        """By how much the speed may be below that at both ends of a tick: with a torque that is held it has its least value at one."""
-        of = self.of
-        if of.lag == 0.0:
-            return np.zeros(len(boxes))
-        torque = np.maximum(*(np.abs(boxes.range_of(row)).max(axis=0) for row in (of.held, of.command)))
-        change = np.abs(boxes.range_of(of.command - of.held)).max(axis=0) / of.lag
-        push = (torque + of.sliding) / of.inertia
-        rate = push + abs(of.viscous) * (np.abs(first).max(axis=0) + of.tick * push)
-        return np.asarray(0.125 * of.tick**2 * (change / of.inertia + abs(of.viscous) * rate))
-
     def _freed_within(self, before: Boxes, after: Boxes) -> list[Boxes]:
         """Boxes that stay stuck over a tick, or the rest of one, and those that break away; the torque is monotonic within a tick."""
         of = self.of
@@ -303,10 +291,10 @@ class Flow:
 
     def _sampled(self, boxes: Boxes, tick: int) -> Boxes:
         of = self.of
-        matrix, column = of.samples[tick]
         if of.step == 0.0:
-            after = boxes.moved(matrix + np.outer(column, of.reading))
+            after = boxes.moved(of.linear[tick])
         else:
+            matrix, column = of.samples[tick]
             boxes, read = self._divided(boxes)
             after = boxes.moved(matrix, np.outer(read * of.quantum, column))
             after.before, after.read = after.read, read
@@ -353,6 +341,38 @@ class Flow:
                 boxes.clip(both, of.held, sides * of.breakaway, -sides)
                 boxes = Boxes.joined([boxes, freed])
         return boxes
+
+
+def bend_of(of: SampledSlip, boxes: Boxes, noise: Callable[[np.ndarray], Any] = quiet) -> np.ndarray:
+    """By how much the speed may be below that at both ends of a tick: with a torque that is held it has its least value at one.
+
+    Parameters
+    ----------
+    noise
+        Largest effect of readings on an output, beside what is in the boxes.
+    """
+    if of.lag == 0.0:
+        return np.zeros(len(boxes))
+
+    def most(row: np.ndarray) -> np.ndarray:
+        return np.asarray(np.abs(boxes.range_of(row)).max(axis=0) + noise(row))
+
+    push = (np.maximum(most(of.held), most(of.command)) + of.sliding) / of.inertia
+    rate = push + abs(of.viscous) * (most(np.eye(len(of.held))[1]) + of.tick * push)
+    change = most(of.command - of.held) / (of.lag * of.inertia)
+    return np.asarray(0.125 * of.tick**2 * (change + abs(of.viscous) * rate))
+
+
+def need_within_limits(of: SampledSlip, boxes: Boxes, noise: Callable[[np.ndarray], Any] = quiet) -> None:
+    """Refuses boxes in which a limit of the controller may act.
+
+    Raises
+    ------
+    UndecidableError
+    """
+    for row, limit in of.limited:
+        if len(boxes) and (np.abs(boxes.range_of(row)).max(axis=0) + noise(row)).max() >= limit:
+            raise UndecidableError("the limit of the controller may act")
 
 
 def _along(way: Any, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

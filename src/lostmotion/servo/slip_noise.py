@@ -12,7 +12,7 @@ import numpy as np
 
 from ..response.stick_slip import UndecidableError
 from .sampled_slip import SampledSlip
-from .slip_boxes import Boxes
+from .slip_boxes import Boxes, bend_of, need_within_limits
 
 LONGEST = 3000  # ticks of a slip
 SETTLING = 600  # ticks of a stuck interval that are looked at
@@ -39,17 +39,11 @@ class Noise:
         self.columns = np.column_stack([matrix @ self.columns, new])
 
 
-def _linear(of: SampledSlip, tick: int) -> np.ndarray:
-    """Matrix of a sample with an encoder without steps."""
-    matrix, column = of.samples[tick % of.frame]
-    return np.asarray(matrix + np.outer(column, of.reading))
-
-
 def loudest(of: SampledSlip) -> float:
     """Largest speed that the readings of a long slip can take or add."""
     noise = Noise(of)
     for tick in range(1, LONGEST):
-        noise.sample(_linear(of, tick) @ of.slip, of.samples[tick % of.frame][1])
+        noise.sample(of.linear[tick % of.frame] @ of.slip, of.samples[tick % of.frame][1])
         if tick > of.frame and np.abs(noise.columns[:, 0]).max() <= 1e-3 * np.abs(noise.columns).max():
             break
     return float(noise.on(of.slip[1]))
@@ -70,7 +64,7 @@ def finish(of: SampledSlip, boxes: Boxes, tick: int) -> tuple[np.ndarray, np.nda
         after = boxes.moved(of.slip, of.push)
         first, last = boxes.range_of(speed), after.range_of(speed)
         loud = float(noise.on(of.slip[1]))
-        bend = _bend(of, boxes, noise) if of.lag > 0.0 else np.zeros(len(boxes))
+        bend = bend_of(of, boxes, noise.on)
         may = last[0] - loud <= bend
         if may.any():
             most = np.maximum(np.maximum(first[1], last[1]), 0.0) + max(loud, float(noise.on(speed))) + bend
@@ -85,26 +79,11 @@ def finish(of: SampledSlip, boxes: Boxes, tick: int) -> tuple[np.ndarray, np.nda
         if not len(boxes):
             return low, high
         tick = (tick + 1) % of.frame
-        matrix = _linear(of, tick)
+        matrix = of.linear[tick]
         boxes = boxes.moved(matrix)
         noise.sample(matrix @ of.slip, of.samples[tick][1])
-        _within_limits(of, boxes, noise)
+        need_within_limits(of, boxes, noise.on)
     raise UndecidableError("a slip is not shown to end")
-
-
-def _bend(of: SampledSlip, boxes: Boxes, noise: Noise) -> np.ndarray:
-    rows = (of.held, of.command, of.command - of.held)
-    held, asked, rest = (np.abs(boxes.range_of(row)).max(axis=0) + noise.on(row) for row in rows)
-    push = (np.maximum(held, asked) + of.sliding) / of.inertia
-    speed = np.abs(boxes.range_of(np.eye(len(of.held))[1])).max(axis=0) + noise.on(np.eye(len(of.held))[1])
-    rate = push + abs(of.viscous) * (speed + of.tick * push)
-    return np.asarray(0.125 * of.tick**2 * (rest / (of.lag * of.inertia) + abs(of.viscous) * rate))
-
-
-def _within_limits(of: SampledSlip, boxes: Boxes, noise: Noise) -> None:
-    for row, limit in of.limited:
-        if (np.abs(boxes.range_of(row)).max(axis=0) + noise.on(row)).max() >= limit:
-            raise UndecidableError("the limit of the controller may act")
 
 
 def _stays_stuck(of: SampledSlip, boxes: Boxes, noise: Noise, turned: np.ndarray, tick: int) -> None:
@@ -126,7 +105,7 @@ def _held_rows(of: SampledSlip, tick: int) -> tuple[np.ndarray, np.ndarray]:
     matrix[1] = 0.0
     rows, readings = [of.held @ matrix], [0.0]
     for k in range(1, of.ramp.ticks + 1):
-        one = _linear(of, tick + k) @ of.stuck
+        one = of.linear[(tick + k) % of.frame] @ of.stuck
         matrix, constant = one @ matrix, one @ constant + of.samples[(tick + k) % of.frame][1]
         rows.append(of.held @ matrix)
         readings.append(abs(float(of.held @ constant)) * READING * abs(of.quantum))
