@@ -19,7 +19,7 @@ from ..inputs.validation import did_you_mean, listed, shown
 from ..model.drive import Drive
 from ..model.torsion import Rigid, TorsionCurve
 from .exact_batches import ExactBatch
-from .given_motion import UNITS
+from .given_motion import check_motion
 from .stepping_parts import MAX_INTERVAL, MIN_INTERVAL
 from .variables import STATES
 
@@ -238,13 +238,7 @@ class SimulationBatch:
             raise InputError('motion: is missing; give the speed at the end of the step, motion={"speed": ...}')
         if load_torque.any():
             raise InputError("load_torque: does not act on a load whose motion is given; leave it out")
-        for key in motion:
-            if key not in UNITS:
-                raise InputError(
-                    f"motion.{key}: is not known; {did_you_mean(key, UNITS, f'there are {listed(UNITS)}')}"
-                )
-        if "speed" not in motion:
-            raise InputError("motion.speed: is missing; give the speed at the end of the step [rad/s]")
+        check_motion("motion", motion)
         return {key: _numbers(f"motion.{key}", value, self._count) for key, value in motion.items()}
 
     @checked

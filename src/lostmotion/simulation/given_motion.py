@@ -72,17 +72,24 @@ def motion_given(name: str, values: Any, units: Mapping[str, str] = UNITS) -> di
     InputError
         There is no speed among it, or something else.
     """
+    check_motion(f"motion.{name}", values, units)
+    return {key: argument(f"motion.{name}.{key}", value, units[key]) for key, value in values.items()}
+
+
+def check_motion(where: str, values: Any, units: Mapping[str, str] = UNITS) -> None:
+    """Refuse what names no motion.
+
+    Raises
+    ------
+    InputError
+        There is no speed among it, or something else.
+    """
     if not isinstance(values, Mapping):
         raise InputError(
-            f'motion.{name}: {shown(values)} must name what is given, such as {{"speed": 2.0, "acceleration": 0.0}}'
+            f'{where}: {shown(values)} must name what is given, such as {{"speed": 2.0, "acceleration": 0.0}}'
         )
     for key in values:
         if key not in units:
-            raise InputError(
-                f"motion.{name}.{key}: is not known; {did_you_mean(key, units, f'there are {list(units)}')}"
-            )
+            raise InputError(f"{where}.{key}: is not known; {did_you_mean(key, units, f'there are {list(units)}')}")
     if "speed" not in values:
-        raise InputError(
-            f"motion.{name}.speed: is missing; give the speed at the end of the interval [{units['speed']}]"
-        )
-    return {key: argument(f"motion.{name}.{key}", value, units[key]) for key, value in values.items()}
+        raise InputError(f"{where}.speed: is missing; give the speed at the end of the interval [{units['speed']}]")
