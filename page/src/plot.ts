@@ -39,6 +39,8 @@ export interface Axis {
   range?: [number, number];
   /** of the values 0, 1, 2, ... */
   names?: string[];
+  /** counts what has no halves */
+  whole?: boolean;
 }
 
 /** A point that is named, with a line from it to another y. */
@@ -347,7 +349,7 @@ export class Plot {
         ? axis.names.flatMap((_, k) => (axis.names!.length <= NAMES ? [k] : []))
         : axis.logarithmic
           ? logarithmicTicks(low, high)
-          : ticks(low / s.factor, high / s.factor, count, ANGLE.test(axis.label + axis.unit), axis.label === "log").map(
+          : ticks(low / s.factor, high / s.factor, count, ANGLE.test(axis.label + axis.unit), axis.whole).map(
               (v) => v * s.factor,
             );
     for (const v of at(this.yRange, y, sy, Math.max(2, this.height / 42))) {

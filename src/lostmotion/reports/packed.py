@@ -83,7 +83,9 @@ def _panel(panel: Panel, pack: Packed) -> dict[str, Any]:
     positive = any(np.any(np.asarray(curve.y) > 0.0) for curve in panel.curves) or panel.ground is not None
     out: dict[str, Any] = {
         "kind": "lines",
-        "x": axis(panel.x_label, panel.log_x, panel.x_range) | ({"names": panel.x_names} if panel.x_names else {}),
+        "x": axis(panel.x_label, panel.log_x, panel.x_range)
+        | ({"names": panel.x_names} if panel.x_names else {})
+        | ({"whole": True} if panel.whole_x else {}),
         "y": axis(panel.y_label, panel.log_y and positive, panel.y_range),
         "lines": [_curve(curve, pack, panel.max_points) for curve in panel.curves],
         "spans": [[float(low), float(high)] for low, high in panel.shaded],

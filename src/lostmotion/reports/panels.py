@@ -76,6 +76,11 @@ class Panel:
     x_names: tuple[str, ...] = ()  # of the values 0, 1, 2, ... of x
     max_points: int = 4_000  # of a curve on a page; longer ones as the extremes of their neighbours
 
+    @property
+    def whole_x(self) -> bool:
+        """Whether x is the number of a log, which has no halves."""
+        return self.x_label == "log"
+
     def contours(self) -> list[Contour]:
         """Contours of the map."""
         if (g := self.ground) is None:

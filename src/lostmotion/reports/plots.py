@@ -26,7 +26,7 @@ HALO = (withStroke(linewidth=2.0, foreground=COLOURS["surface"]),)  # so that te
 KEY_LINE = 0.18  # height of a line of a key [inch]
 MAX_NAMES = 24  # along an axis; of more, every second, third, ...
 LEGEND_ROWS = 2  # of a legend above a panel; a longer one is in the panel
-HALF_TURN = 180.0  # [deg]; axes over less have decimal ticks
+DEGREES = 60.0  # from which on an axis in degrees has ticks at parts of a right angle
 
 # Decorates what makes or draws figures; the looks of the user's figures stay as they are.
 in_our_looks = mpl.rc_context(MATPLOTLIB)
@@ -135,9 +135,9 @@ def _panel(axes: Any, panel: Panel) -> None:
     if panel.log_y and (panel.ground or any(np.any(np.asarray(curve.y) > 0.0) for curve in panel.curves)):
         axes.set_yscale("log")
     axes.set(xlabel=panel.x_label, ylabel=panel.y_label)
-    if "[deg" in panel.y_label and not panel.log_y and abs(np.subtract(*axes.get_ylim())) > HALF_TURN:
+    if "[deg" in panel.y_label and not panel.log_y and abs(np.subtract(*axes.get_ylim())) > DEGREES:
         axes.yaxis.set_major_locator(MaxNLocator(steps=[1, 1.5, 3, 4.5, 9, 10]))
-    if panel.x_label == "log":  # the number of a log
+    if panel.whole_x:
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     if panel.x_names:
         shown = range(0, len(panel.x_names), -(-len(panel.x_names) // MAX_NAMES))

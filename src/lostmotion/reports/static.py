@@ -95,9 +95,7 @@ def _frame(panel: Panel, x: tuple[float, float], y: tuple[float, float], to_x: S
         texts.append(f'<text class="tick end" x="{LEFT - 5}" y="{at}" dy="4">{_shown(v)}</text>')
     places = [float(k) for k in range(len(panel.x_names))] if len(panel.x_names) <= NAMES else []
     for v in (
-        places
-        if panel.x_names
-        else (_logarithmic_ticks(*x) if panel.log_x else ticks(*x, 6, whole=panel.x_label == "log"))
+        places if panel.x_names else (_logarithmic_ticks(*x) if panel.log_x else ticks(*x, 6, whole=panel.whole_x))
     ):
         at = f"{float(to_x(v)):.1f}"
         lines.append(f"M{at} {TOP}V{HEIGHT - BOTTOM}")
