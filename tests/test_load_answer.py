@@ -85,7 +85,7 @@ def test_the_derivative_is_that_of_differences_through_switchings(seed: int) -> 
         low, high = beside
         if ends != [end, end] or math.isinf(found.derivative) or high.acceleration == low.acceleration:
             continue
-        # Of the differences on both sides, those that the same switchings lie in agree.
+        # Without other switchings between them, the differences on both sides agree.
         if not math.isclose(low.derivative, high.derivative, rel_tol=1e-3):
             continue
         difference = (high.torque - low.torque) / (high.acceleration - low.acceleration)

@@ -10,7 +10,7 @@ namespace lostmotion {
 // Ticks, delays and schedules that differ beside the value of a parameter have no derivative.
 bool acts_at_the_same_instants(const Control& a, const Control& b);
 
-// Of the controllers of a run.
+// Refuses what has no derivative among the controllers of a run.
 DerivativeFault check_derivatives(const Control& control, const std::vector<Variation>& variations);
 
 // Runs of one train, each with its derivatives, by the exact solver. What their regimes are is found once for all.

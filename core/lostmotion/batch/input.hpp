@@ -1,4 +1,4 @@
-// What a step of a batch is given, and what it reports.
+// Inputs of a step of a batch, and the failure that it may report.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +18,7 @@ struct Failure {
     std::size_t drive = 0;
     std::string text;  // empty: there is none
 
-    // Keeps that of the drive with the smaller number.
+    // Keeps the failure of the drive with the smaller number.
     void add(Failure other) {
         if (!other.text.empty() && (text.empty() || other.drive < drive)) *this = std::move(other);
     }

@@ -21,7 +21,7 @@ class TorsionCurve {
     TorsionCurve() : TorsionCurve({}, {1.0}) {}
     TorsionCurve(std::vector<double> breaks, std::vector<double> slopes)
         : TorsionCurve(Side{breaks, slopes}, Side{breaks, slopes}) {}
-    // Where the slope changes at twist 0, piece 0 begins there.
+    // If the slope changes at twist 0, piece 0 begins there.
     TorsionCurve(const Side& forward, const Side& backward) {
         const bool bends = forward.slopes[0] != backward.slopes[0];
         for (std::size_t k = backward.breaks.size(); k > 0; --k) edges_.push_back(-backward.breaks[k - 1]);

@@ -52,7 +52,7 @@ struct ScenarioParameter {
 class ScenarioDescription {
  public:
     static constexpr double mark = 19533.0;
-    // Of the numbers: it changes with every parameter that the core describes, and else by hand, in `layout`.
+    // This version of the numbers changes with every parameter that the core describes, and else by hand, in `layout`.
     static double version();
     static constexpr std::size_t head = 4;
 

@@ -25,7 +25,7 @@ class ActuatorSheet(Record):
     kind: Literal["quasi_direct"] = "quasi_direct"
     ratio: Annotated[Number, Positive]
     rotor_inertia: Annotated[Inertia, Positive] | None = None
-    """at the motor; with that of the gearbox where the sheet has it"""
+    """inertia of the rotor, and of the gearbox where the sheet adds it, at the motor"""
     rated_output_torque: Annotated[Torque, Positive] | None = None
     """continuous"""
     peak_output_torque: Annotated[Torque, Positive] | None = None

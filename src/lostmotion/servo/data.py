@@ -56,7 +56,7 @@ def frictions(axis: Axis) -> tuple[float, float]:
 def secant(gear: Gear | Gearbox) -> float:
     """Stiffness of a gear up to its rated torque, without its gap [N·m/rad]; without a rated torque that of its last piece.
 
-    Of two directions that differ, that of the softer one.
+    If the directions differ, the softer one counts.
     """
     if isinstance(gear.stiffness, Rigid):
         return math.inf

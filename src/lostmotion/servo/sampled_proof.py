@@ -1,7 +1,7 @@
 """Whether a stuck contact hunts under a sampled controller: a proof by sets of states from break-away to break-away.
 
 An encoder with steps makes three cases. If no reading is the reference, the integrator never stops, and nothing can
-rest. If ``T_S = T_C`` and a reading is the reference, the errors fall step by step: it is enough that each slip from
+rest. If ``T_S = T_C`` and a reading is the reference, the errors fall step by step. It is enough that each slip from
 the last few readings ends nearer to the reference. If ``T_S > T_C``, a band of errors that is mapped into itself is
 never left, as with a continuous controller.
 """

@@ -23,7 +23,7 @@ GIVE: Any = object()  # in place of what has no default
 Ramp = float | str | tuple[float | str, float | str]
 
 MIN_INTERVAL, MAX_INTERVAL = 1e-12, 1e12
-"""Of a step [s]: below, it is lost in the rounding of the time; above, in that of a motion's phase."""
+"""limits of a step [s]: a shorter one is lost in the rounding of the time, a longer one in the rounding of a motion's phase"""
 
 
 def parts(

@@ -316,7 +316,7 @@ class Study(Part):
         Raises
         ------
         InputError
-            It is that of the motor, and the catalogue has none.
+            The task wants the brake of the motor, and the catalogue has none.
         """
         assert self.axis is not None
         brake = self.axis.brake
