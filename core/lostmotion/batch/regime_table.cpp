@@ -136,6 +136,11 @@ RegimeTable::Owned tabulate(const model::Assembly& assembly, const Label& label,
     out.plain = true;
     details.at_rest = r.at_rest;
     for (std::size_t k = 0; k < D::coupled; ++k) out.rate.set(k, r.rate[k]);
+    for (int k = 0; k < D::coupled; ++k) {
+        double sum = 0.0;
+        for (int c = 0; c < D::coupled; ++c) sum += std::fabs(rates.rate(k, c)) * scale[c] / scale[k];
+        out.norm = std::fmax(out.norm, sum);
+    }
     out.series_step = std::ldexp(h, -std::max(0, halvings - series_doublings));
     const IntegralOf<D> whole = flow.integral(h);
     out.G = whole.coupled;

@@ -10,6 +10,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <memory>
@@ -35,7 +36,12 @@ struct Label {
     std::array<std::int8_t, 4> modes{};
     std::array<std::int16_t, max_branches> branch{};
 
-    friend bool operator==(const Label&, const Label&) = default;
+    // Without a call of memcmp, which takes longer than that.
+    friend bool operator==(const Label& a, const Label& b) {
+        using Words = std::array<std::uint64_t, 2>;
+        const Words v = std::bit_cast<Words>(a), w = std::bit_cast<Words>(b);
+        return v[0] == w[0] && v[1] == w[1];
+    }
     static Label of(const model::Key& key) {
         Label l;
         for (std::size_t c = 0; c < D::contacts; ++c) l.modes[c] = key.modes[c];
@@ -121,6 +127,7 @@ struct alignas(64) RegimeTable {
     std::unique_ptr<RegimeDetails> details = std::make_unique<RegimeDetails>();
     double angle_coefficient = 0.0;
     double series_step = 0.0;  // [s], in which the series of the motion converges fast
+    double norm = 0.0;         // |A| [1/s] in scaled units
     // False: the general solver makes all steps that begin in this regime or come into it. Then only the forms of the
     // torques are set.
     bool plain = false;

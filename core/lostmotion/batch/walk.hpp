@@ -46,7 +46,30 @@ class Walk {
     int switchings() const { return switchings_; }
 
  private:
-    static constexpr int degree = 23;  // 2^24/24! is below rounding
+    static constexpr int most_degree = 23;
+    // |A| s up to which a series of each degree d has all terms above rounding: (|A| s)^d = (d + 1)!/2^56.
+    static constexpr std::array<double, most_degree> reach = [] {
+        std::array<double, most_degree> out{};
+        double factorial = 0x1p-56;
+        for (int d = 1; d < most_degree; ++d) {
+            factorial *= d + 1;
+            double low = 0.0, high = 4.0;
+            for (int n = 0; n < 60; ++n) {
+                const double middle = 0.5 * (low + high);
+                double power = 1.0;
+                for (int k = 0; k < d; ++k) power *= middle;
+                (power < factorial ? low : high) = middle;
+            }
+            out[static_cast<std::size_t>(d)] = low;
+        }
+        return out;
+    }();
+    static constexpr int least_degree = 4;
+    static constexpr std::array<double, most_degree + 2> inverse = [] {
+        std::array<double, most_degree + 2> out{};
+        for (std::size_t k = 1; k < out.size(); ++k) out[k] = 1.0 / static_cast<double>(k);
+        return out;
+    }();
     static constexpr int most_switchings = 40, most_halvings = 60, longest_walk = 16;
     static constexpr double doubt = 1e-9;     // of a value over the sum of the magnitudes of its terms
     static constexpr double on_zero = 1e-12;  // the same, where a guard begins on zero
@@ -54,7 +77,15 @@ class Walk {
 
     enum class Verdict { yes, no, unsure };
     enum class Way { done, fired, unsure };
-    using Series = std::array<Four, degree + 1>;
+    // Terms of a series in the share of its time; those beyond the degree are not set.
+    template <class Term>
+    struct Series {
+        std::array<Term, most_degree + 1> term;
+        std::size_t degree;
+        Term& operator[](std::size_t k) { return term[k]; }
+        const Term& operator[](std::size_t k) const { return term[k]; }
+    };
+    using Course = Series<Four>;
     struct Crossing {
         int guard = -1;
         double at = 2.0;
@@ -62,10 +93,9 @@ class Walk {
     };
 
     Way advance(double& left, int& fired);
-    bool see(const RegimeTable& r, const Series& y, double s, bool fresh, Crossing& first, bool& halve) const;
-    Verdict judge(const std::array<double, degree + 1>& c, double size, double rate_size, bool fresh, double& at,
-                  bool& halve) const;
-    void move(const Series& y, double s, double at);
+    bool see(const RegimeTable& r, const Course& y, double s, bool fresh, Crossing& first, bool& halve) const;
+    Verdict judge(const Series<double>& c, double size, double rate_size, bool fresh, double& at, bool& halve) const;
+    void move(const Course& y, double s, double at);
 
     bool resolve(int fired, bool jump);
     Verdict accept(Label next, unsigned moving, int by_value);
@@ -105,11 +135,12 @@ inline Walk::Way Walk::advance(double& left, int& fired) {
     for (bool fresh = true; left > 0.0; fresh = false) {
         double s = std::min(r.series_step, left);
         const Four rate = r.rate.of_state(x_) + r.rate.constant(memory_, u_);
-        Series y;
+        Course y;
+        y.degree = least_degree;
+        while (y.degree < most_degree && r.norm * s > reach[y.degree]) ++y.degree;
         y[0] = x_;
         y[1] = s * rate;
-        for (int k = 2; k <= degree; ++k)
-            y[static_cast<std::size_t>(k)] = (s / k) * r.rate.of_state(y[static_cast<std::size_t>(k - 1)]);
+        for (std::size_t k = 2; k <= y.degree; ++k) y[k] = (s * inverse[k]) * r.rate.of_state(y[k - 1]);
         Crossing first;
         while (true) {
             bool halve = false;
@@ -119,8 +150,8 @@ inline Walk::Way Walk::advance(double& left, int& fired) {
             if (++halvings > most_halvings) return Way::unsure;
             s *= 0.5;
             double share = 1.0;
-            for (Four& term : y) {
-                term = share * term;
+            for (std::size_t k = 0; k <= y.degree; ++k) {
+                y[k] = share * y[k];
                 share *= 0.5;
             }
         }
@@ -138,37 +169,39 @@ inline Walk::Way Walk::advance(double& left, int& fired) {
 }
 
 // To the share `at` of the time of the series.
-inline void Walk::move(const Series& y, double s, double at) {
+inline void Walk::move(const Course& y, double s, double at) {
     const RegimeTable& r = *r_;
-    Four x = y[degree];
+    Four x = y[y.degree];
     const auto w = static_cast<int>(r.angle_speed);
-    double angle = y[degree][w] / (degree + 1);
-    for (int k = degree - 1; k >= 0; --k) {
-        const Four& term = y[static_cast<std::size_t>(k)];
+    double angle = x[w] * inverse[y.degree + 1];
+    for (std::size_t k = y.degree; k-- > 0;) {
+        const Four& term = y[k];
         x = at * x + term;
-        angle = at * angle + term[w] / (k + 1);
+        angle = at * angle + term[w] * inverse[k + 1];
     }
     x_ = x;
     angle_ += r.angle_coefficient * (s * (at * angle));
 }
 
 // What the guards do over the series. False: not certain.
-inline bool Walk::see(const RegimeTable& r, const Series& y, double s, bool fresh, Crossing& first, bool& halve) const {
+inline bool Walk::see(const RegimeTable& r, const Course& y, double s, bool fresh, Crossing& first, bool& halve) const {
     for (int b = 0; b < r.n_blocks; ++b) {
         const Forms& form = r.guards(b).form;
-        Series g;
+        Course g;
+        g.degree = y.degree;
         g[0] = form.of_state(y[0]) + form.constant(memory_, u_);
-        for (std::size_t k = 1; k <= degree; ++k) g[k] = form.of_state(y[k]);
+        for (std::size_t k = 1; k <= g.degree; ++k) g[k] = form.of_state(y[k]);
         Four tail = absolute(g[4]);
-        for (std::size_t k = 5; k <= degree; ++k) tail = tail + absolute(g[k]);
+        for (std::size_t k = 5; k <= g.degree; ++k) tail = tail + absolute(g[k]);
         // Bernstein coefficients of the cubic.
         const Four b1 = g[0] + (1.0 / 3.0) * g[1], b2 = b1 + (1.0 / 3.0) * (g[1] + g[2]),
                    b3 = (g[0] + g[1]) + (g[2] + g[3]);
         unsigned doubtful = ~above(least_of(least_of(g[0], b1), least_of(b2, b3)), tail) & 15u;
         for (; doubtful != 0; doubtful &= doubtful - 1) {
             const int lane = std::countr_zero(doubtful), guard = 4 * b + lane;
-            std::array<double, degree + 1> c;
-            for (std::size_t k = 0; k <= degree; ++k) c[k] = g[k][lane];
+            Series<double> c;
+            c.degree = g.degree;
+            for (std::size_t k = 0; k <= c.degree; ++k) c[k] = g[k][lane];
             const Four size_of_x = absolute(y[0]);
             const double size = form.magnitude(size_of_x, memory_, u_)[lane];
             double rate_size = 0.0;
@@ -191,10 +224,10 @@ inline bool Walk::see(const RegimeTable& r, const Series& y, double s, bool fres
 }
 
 // Does a guard with these coefficients over 0..1 stay positive? No: it falls through zero once, there.
-inline Walk::Verdict Walk::judge(const std::array<double, degree + 1>& c, double size, double rate_size, bool fresh,
-                                 double& at, bool& halve) const {
+inline Walk::Verdict Walk::judge(const Series<double>& c, double size, double rate_size, bool fresh, double& at,
+                                 bool& halve) const {
     double tail = 0.0, slope_tail = 0.0, end = 0.0;
-    for (std::size_t k = degree; k >= 4; --k) {
+    for (std::size_t k = c.degree; k >= 4; --k) {
         tail += std::fabs(c[k]);
         slope_tail += static_cast<double>(k) * std::fabs(c[k]);
         end += c[k];
@@ -223,19 +256,23 @@ inline Walk::Verdict Walk::judge(const std::array<double, degree + 1>& c, double
         return Verdict::yes;
     }
     if (end >= 0.0) return Verdict::yes;
-    // Newton's method within the bracket that the zero lies in.
+    // Newton's method within the bracket that the zero lies in. Steps shrink quadratically: once short, one more is
+    // enough.
     double low = 0.0, high = 1.0, t = c[0] / (c[0] - end);
+    bool last = false;
     for (int n = 0; n < 60; ++n) {
-        double value = c[degree], slope = 0.0;
-        for (std::size_t k = degree; k-- > 0;) {
+        double value = c[c.degree], slope = 0.0;
+        for (std::size_t k = c.degree; k-- > 0;) {
             slope = slope * t + value;
             value = value * t + c[k];
         }
         (value > 0.0 ? low : high) = t;
-        const double before = t;
-        t -= value / slope;
-        if (!(t > low && t < high)) t = 0.5 * (low + high);
-        if (std::fabs(t - before) <= 4e-16 * t) break;
+        const double next = t - value / slope;
+        const bool close = std::fabs(next - t) <= 1e-9, inside = next > low && next < high;
+        if (close && !inside) break;
+        t = inside ? next : 0.5 * (low + high);
+        if (close && last) break;
+        last = close;
     }
     at = t;
     return Verdict::no;
