@@ -76,10 +76,7 @@ DriveBatch::DriveBatch(Models models, std::vector<int> model_of, double step)
       rated_output_torque_(models_.place("gearbox.rated_output_torque")),
       rated_input_speed_(models_.place("gearbox.rated_input_speed")) {}
 
-DriveBatch::~DriveBatch() {
-    for (std::atomic<RegimeTable*>& first : tables_)
-        for (RegimeTable* t = first; t != nullptr;) RegimeTable::Free{}(std::exchange(t, t->next));
-}
+DriveBatch::~DriveBatch() = default;
 
 RegimeTable* DriveBatch::find(std::size_t model, const Label& label) const {
     RegimeTable* t = tables_[model].load(std::memory_order_acquire);
@@ -90,12 +87,12 @@ RegimeTable* DriveBatch::find(std::size_t model, const Label& label) const {
 // Two threads may make the same table, with the same numbers; the first one stays.
 RegimeTable* DriveBatch::table(std::size_t model, const Label& label, Worker& worker) {
     if (RegimeTable* known = find(model, label)) return known;
-    RegimeTable::Owned made = tabulate(worker.solver(models_, model, step_).assembly(), label, step_);
+    const Tabulated made = tabulate(worker.solver(models_, model, step_).assembly(), label, step_);
     const std::lock_guard lock(adding_);
     if (RegimeTable* known = find(model, label)) return known;
-    made->next = tables_[model].load(std::memory_order_relaxed);
-    tables_[model].store(made.get(), std::memory_order_release);
-    return made.release();
+    RegimeTable* added = store_.add(made, tables_[model].load(std::memory_order_relaxed));
+    tables_[model].store(added, std::memory_order_release);
+    return added;
 }
 
 Failure DriveBatch::step(const Input& command, const Input& load_torque, unsigned threads) {
@@ -109,6 +106,17 @@ Failure DriveBatch::step(const Input& command, const Input& load_torque, unsigne
         first.add(std::exchange(w->failure, {}));
     }
     return first;
+}
+
+// Fetches what the drives that follow read into the cache: tables, and after them what these share.
+[[gnu::always_inline]] inline void DriveBatch::fetch(std::size_t k, std::size_t end) const {
+    const auto lines = [](const void* from, std::size_t bytes) ALWAYS_INLINE {
+        for (std::size_t at = 0; at < bytes; at += 64) __builtin_prefetch(static_cast<const char*>(from) + at);
+    };
+    if (k + 2 * ahead < end && drives_[k + 2 * ahead].regime != nullptr)
+        lines(drives_[k + 2 * ahead].regime, sizeof(RegimeTable) + 2 * sizeof(Column));
+    if (k + ahead < end && drives_[k + ahead].regime != nullptr && drives_[k + ahead].regime->plain())
+        lines(drives_[k + ahead].regime->shared, sizeof(SharedTable) + 6 * sizeof(Column));
 }
 
 void DriveBatch::step_range(std::size_t begin, std::size_t end, const Input& command, const Input& load_torque,
@@ -140,26 +148,28 @@ void DriveBatch::step_range(std::size_t begin, std::size_t end, const Input& com
         DriveState& d = drives_[k];
         const Inputs u{command[k], load_torque[k]};
         const RegimeTable* r = d.regime;
-        if (k + ahead < end && drives_[k + ahead].regime != nullptr) drives_[k + ahead].regime->prefetch();
+        fetch(k, end);
         ++worker.counts.steps;
         bool done = false;
-        if (r != nullptr && r->plain) [[likely]] {
+        if (r != nullptr && r->plain()) [[likely]] {
             const Four x = Four::load(d.x.data());
-            const Four rate = r->rate.of_state(x) + r->rate.constant(d.memory, u);
-            const Four to = x + r->G * rate, size = absolute(rate);
+            const SharedTable& t = *r->shared;
+            const Forms rates = r->rates();
+            const Four rate = rates.of_state(x) + rates.constant(d.memory, u);
+            const Four to = x + t.G * rate, size = absolute(rate);
             bool clear = true;
-            for (int b = 0; b < r->n_blocks; ++b) {
-                const GuardBlock& g = r->guards(b);
-                const Four constant = g.form.constant(d.memory, u);
-                const Four first = constant + g.form.of_state(x), last = constant + g.form.of_state(to);
+            for (int b = 0; b < t.n_blocks; ++b) {
+                const Forms g = r->guards(b);
+                const Four constant = g.constant(d.memory, u);
+                const Four first = constant + g.of_state(x), last = constant + g.of_state(to);
                 const Four apart = sum_in_fours<D::coupled>(
-                    [&](auto j) ALWAYS_INLINE { return size.template spread<j>() * load<D>(g.departure[j]); });
+                    [&](auto j) ALWAYS_INLINE { return size.template spread<j>() * t.departure(b, j); });
                 clear = clear && above(least_of(first, last), apart) == 15u;
             }
             if (clear) [[likely]] {
                 const double angle = d.x[D::coupled] +
-                                     r->angle_coefficient * (h * d.x[static_cast<std::size_t>(r->angle_speed)]) +
-                                     (load<D>(r->angle) * rate).sum();
+                                     t.angle_coefficient * (h * d.x[static_cast<std::size_t>(t.angle_speed)]) +
+                                     (load<D>(t.angle) * rate).sum();
                 to.store(d.x.data());
                 d.x[D::coupled] = angle;
                 done = true;
@@ -238,13 +248,17 @@ void DriveBatch::restore(const Snapshot& s) {
     for (std::size_t k = 0; k < drives_.size(); ++k) show(k);
 }
 
-void DriveBatch::read(double* out, model::PackedForm<D> RegimeDetails::* form) const {
+void DriveBatch::read(double* out, RegimeDetails::Coefficients RegimeDetails::* form,
+                      double RegimeTable::* constant) const {
     for (std::size_t k = 0; k < drives_.size(); ++k) {
         const DriveState& d = drives_[k];
+        out[k] = 0.0;
+        if (d.regime == nullptr) continue;
         StateOf<D> x;
         std::ranges::copy(d.x, x.begin());
-        out[k] =
-            d.regime == nullptr ? 0.0 : lostmotion::evaluate<D>((*d.regime->details).*form, x, d.memory, inputs_[k]);
+        model::PackedForm<D> of{(*d.regime->details).*form};
+        of.c[D::one] = (*d.regime).*constant;
+        out[k] = lostmotion::evaluate<D>(of, x, d.memory, inputs_[k]);
     }
 }
 
@@ -260,9 +274,7 @@ std::size_t DriveBatch::memory() const {
     std::size_t bytes =
         drives_.size() * (sizeof(DriveState) + sizeof(Inputs) + sizeof(int) + D::states * sizeof(double));
     bytes += models_.size() * (models_.width() * sizeof(double) + sizeof(int) + sizeof(tables_[0]));
-    for (const auto& first : tables_)
-        for (const RegimeTable* t = first; t != nullptr; t = t->next) bytes += t->size();
-    return bytes;
+    return bytes + store_.memory();
 }
 
 }  // namespace lostmotion::batch

@@ -86,8 +86,10 @@ class DriveBatch {
 
     // Of each state the values of all drives, one state after the other.
     double* states() { return states_.data(); }
-    void read_output_torque(double* out) const { read(out, &RegimeDetails::output_torque); }
-    void read_motor_torque(double* out) const { read(out, &RegimeDetails::motor_torque); }
+    void read_output_torque(double* out) const {
+        read(out, &RegimeDetails::output_torque, &RegimeTable::output_torque);
+    }
+    void read_motor_torque(double* out) const { read(out, &RegimeDetails::motor_torque, &RegimeTable::motor_torque); }
     // The modes of a contact: 0 stuck, +1 or -1 slipping, also where there is none.
     void read_input_contact(std::int8_t* out) const { read_contact(out, &RegimeDetails::input_contact); }
     void read_twist_contact(std::int8_t* out) const { read_contact(out, &RegimeDetails::twist_contact); }
@@ -108,13 +110,14 @@ class DriveBatch {
     struct Worker;
 
     void step_range(std::size_t begin, std::size_t end, const Input& command, const Input& load_torque, Worker& worker);
+    void fetch(std::size_t k, std::size_t end) const;
     bool solve(std::size_t k, const Inputs& u, Worker& worker);
     RegimeTable* find(std::size_t model, const Label& label) const;
     RegimeTable* table(std::size_t model, const Label& label, Worker& worker);
     void show(std::size_t k) {
         for (std::size_t s = 0; s < D::states; ++s) states_[s * drives_.size() + k] = drives_[k].x[s];
     }
-    void read(double* out, model::PackedForm<D> RegimeDetails::* form) const;
+    void read(double* out, RegimeDetails::Coefficients RegimeDetails::* form, double RegimeTable::* constant) const;
     void read_contact(std::int8_t* out, std::int8_t RegimeDetails::* contact) const;
 
     Models models_;
@@ -123,6 +126,7 @@ class DriveBatch {
     std::vector<DriveState> drives_;
     std::vector<Inputs> inputs_;  // of the last step
     std::vector<double> states_;
+    TableStore store_;
     std::vector<std::atomic<RegimeTable*>> tables_;  // of each model
     int rated_output_torque_, rated_input_speed_;    // places of these keys
     std::mutex adding_;

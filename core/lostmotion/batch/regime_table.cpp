@@ -1,6 +1,14 @@
 #include "regime_table.hpp"
 
+#ifdef __linux__
+#include <sys/mman.h>
+#endif
+
 #include <algorithm>
+#include <cstring>
+#include <limits>
+#include <span>
+#include <utility>
 
 #include "../kernel/propagator.hpp"
 
@@ -39,12 +47,17 @@ bool can_fall(const model::PackedGuard<D>& guard) {
     return !guard.behind && std::ranges::any_of(guard.form.c, [](double c) { return c != 0.0; });
 }
 
+float rounded_up(double v) {
+    const auto f = static_cast<float>(v);
+    return static_cast<double>(f) < v ? std::nextafterf(f, std::numeric_limits<float>::infinity()) : f;
+}
+
 // R of each guard.
-void set_departures(const model::PackedRegime<D>& r, Propagator<D>& flow, double h, int halvings, RegimeTable& out) {
+void set_departures(const model::PackedRegime<D>& r, Propagator<D>& flow, double h, int halvings, Tabulated& out) {
     const int samples = 1 << halvings;
     const double d = h / samples;
     const Matrix &A = flow.rates().rate, over_part = flow.integral(d).coupled, change = A * over_part;
-    const Matrix bound = secant_bound(A, d), &end = out.G;
+    const Matrix bound = secant_bound(A, d), &end = out.shared.G;
     std::array<Four, D::guards> before{}, most{};
     Matrix G;
     for (int j = 0; j < samples; ++j) {
@@ -62,9 +75,14 @@ void set_departures(const model::PackedRegime<D>& r, Propagator<D>& flow, double
         }
         G = next;
     }
-    for (int g = 0; g < r.n_guards; ++g)
-        for (int k = 0; k < D::coupled; ++k)
-            out.guards(g / 4).departure[k][g % 4] = can_fall(r.guards[g]) ? most[g][k] : 0.0;
+    for (int g = 0; g < r.n_guards; ++g) {
+        if (!can_fall(r.guards[g])) continue;
+        SharedTable::Departure R;
+        Column* place = out.block(g / 4) + D::coupled;
+        std::memcpy(&R, place, sizeof R);
+        for (int k = 0; k < D::coupled; ++k) R[k][g % 4] = rounded_up(most[g][k]);
+        std::memcpy(place, &R, sizeof R);
+    }
 }
 
 // The speeds that change once each of the moving contacts comes to rest.
@@ -103,16 +121,19 @@ bool is_plain(const model::PackedRegime<D>& r) {
 
 }  // namespace
 
-RegimeTable::Owned tabulate(const model::Assembly& assembly, const Label& label, double h) {
+Tabulated tabulate(const model::Assembly& assembly, const Label& label, double h) {
     const model::Regime rows = assembly.build(label.key());
     const model::PackedRegime<D> r = model::pack<D>(rows, assembly);
-    RegimeTable::Owned made = RegimeTable::make(r.n_guards);
-    RegimeTable& out = *made;
-    out.label = label;
-    RegimeDetails& details = *out.details;
-    const model::Layout& n = assembly.layout();
-    if (!rows.motor_torque.empty()) details.motor_torque = model::pack<D>(rows.motor_torque[0], n);
-    details.output_torque = r.output_torque[0];
+    Tabulated out;
+    out.table.label = label;
+    RegimeDetails& details = out.details;
+    const auto torque = [](const model::PackedForm<D>& form, RegimeDetails::Coefficients& to, double& constant) {
+        to = form.c;
+        constant = std::exchange(to[D::one], 0.0);
+    };
+    if (!rows.motor_torque.empty())
+        torque(model::pack<D>(rows.motor_torque[0], assembly.layout()), details.motor_torque, out.table.motor_torque);
+    torque(r.output_torque[0], details.output_torque, out.table.output_torque);
     const model::Gear& gear = assembly.train().gears[0];
     const model::GearPlace& place = assembly.places().gears[0];
     const model::ShaftPlace& input = assembly.places().shafts[static_cast<std::size_t>(gear.input)];
@@ -123,7 +144,7 @@ RegimeTable::Owned tabulate(const model::Assembly& assembly, const Label& label,
     details.cell = static_cast<std::int8_t>(place.cell);
     details.cell_back = static_cast<std::int8_t>(place.cell_back);
     if (gear.law.has_hysteresis()) details.hysteresis = 0.5 * (1.0 - gear.law.hysteresis_efficiency);
-    if (!is_plain(r)) return made;
+    if (!is_plain(r)) return out;
     const LinearRatesOf<D> rates(r.rate);
     State scale;
     scale.fill(1.0);
@@ -132,35 +153,124 @@ RegimeTable::Owned tabulate(const model::Assembly& assembly, const Label& label,
     Propagator<D> flow;
     flow.prepare(rates, constant_inputs, scale);
     const int halvings = flow.level_of(h);
-    if (!flow.resolved() || halvings > most_halvings) return made;
-    out.plain = true;
+    if (!flow.resolved() || halvings > most_halvings) return out;
     details.at_rest = r.at_rest;
-    for (std::size_t k = 0; k < D::coupled; ++k) out.rate.set(k, r.rate[k]);
+    SharedTable& shared = out.shared;
     for (int k = 0; k < D::coupled; ++k) {
         double sum = 0.0;
         for (int c = 0; c < D::coupled; ++c) sum += std::fabs(rates.rate(k, c)) * scale[c] / scale[k];
-        out.norm = std::fmax(out.norm, sum);
+        shared.norm = std::fmax(shared.norm, sum);
     }
-    out.series_step = std::ldexp(h, -std::max(0, halvings - series_doublings));
+    shared.series_step = std::ldexp(h, -std::max(0, halvings - series_doublings));
     const IntegralOf<D> whole = flow.integral(h);
-    out.G = whole.coupled;
-    out.angle = whole.angle[0];
-    out.angle_speed = static_cast<std::int8_t>(rates.angle_speed[0]);
-    out.angle_coefficient = rates.angle_coefficient[0];
-    for (int g = 0; g < 4 * out.n_blocks; ++g) {
-        if (g < r.n_guards && can_fall(r.guards[g]))
-            out.guards(g / 4).form.set(g % 4, r.guards[g].form);
-        else
-            out.guards(g / 4).form.one[g % 4] = 1.0;
-        if (g >= r.n_guards) continue;
-        const model::PackedGuard<D>& guard = r.guards[g];
-        details.mark[static_cast<std::size_t>(g)] = {guard.kind, static_cast<std::int8_t>(guard.contact),
-                                                     static_cast<std::int8_t>(guard.branch),
-                                                     static_cast<std::int16_t>(guard.neighbour)};
+    shared.G = whole.coupled;
+    shared.angle = whole.angle[0];
+    shared.angle_speed = static_cast<std::int8_t>(rates.angle_speed[0]);
+    shared.angle_coefficient = rates.angle_coefficient[0];
+    shared.state = rates.rate.column;
+    shared.input = rates.input_column;
+    shared.n_blocks = static_cast<std::int8_t>((r.n_guards + 3) / 4);
+    const auto guards = std::span(r.guards).first(static_cast<std::size_t>(r.n_guards));
+    const auto depends = [](const model::PackedForm<D>& f, int first, int count) {
+        return std::any_of(f.c.begin() + first, f.c.begin() + first + count, [](double c) { return c != 0.0; });
+    };
+    const auto by_memory = [&](const model::PackedForm<D>& f) { return depends(f, D::first_memory, D::memory); };
+    out.table.by_memory = std::ranges::any_of(r.rate, by_memory);
+    for (const auto& g : guards) {
+        out.table.by_memory = out.table.by_memory || by_memory(g.form);
+        shared.guards_by_input = shared.guards_by_input || depends(g.form, D::first_input, D::inputs);
+    }
+    const auto blocks = static_cast<std::size_t>(shared.n_blocks);
+    out.blocks.resize(blocks * shared.block_columns());
+    out.own.resize((1 + blocks) * out.table.own_columns());
+    const auto set_own = [&](std::size_t forms, std::size_t row, const model::PackedForm<D>& f) {
+        Column* own = out.own.data() + forms * out.table.own_columns();
+        own[0][row] = f.c[D::one];
+        for (std::size_t k = 0; out.table.by_memory && k < D::memory; ++k) own[1 + k][row] = f.c[D::first_memory + k];
+    };
+    for (std::size_t k = 0; k < D::coupled; ++k) set_own(0, k, r.rate[k]);
+    details.mark.resize(guards.size());
+    for (std::size_t g = 0; g < 4 * blocks; ++g) {
+        if (g < guards.size())
+            details.mark[g] = {guards[g].kind, static_cast<std::int8_t>(guards[g].contact),
+                               static_cast<std::int8_t>(guards[g].branch),
+                               static_cast<std::int16_t>(guards[g].neighbour)};
+        if (g >= guards.size() || !can_fall(guards[g])) {
+            out.own[(1 + g / 4) * out.table.own_columns()][g % 4] = 1.0;
+            continue;
+        }
+        const auto& form = guards[g].form;
+        set_own(1 + g / 4, g % 4, form);
+        const auto varies = [](int term) { return term < D::coupled || term >= D::first_input; };
+        double sign = 0.0;
+        for (int term = 0; term < D::terms && sign == 0.0; ++term)
+            if (varies(term) && form.c[term] != 0.0) sign = form.c[term] < 0.0 ? -1.0 : 1.0;
+        if (sign < 0.0) out.table.signs[g / 4] |= static_cast<std::uint8_t>(1u << g % 4);
+        Column* to = out.block(static_cast<int>(g / 4));
+        for (std::size_t k = 0; k < D::coupled; ++k) to[k][g % 4] = sign * form.c[k] + 0.0;
+        to += D::coupled + SharedTable::departure_columns;
+        for (std::size_t k = 0; shared.guards_by_input && k < D::inputs; ++k)
+            to[k][g % 4] = sign * form.c[D::first_input + k] + 0.0;
     }
     set_departures(r, flow, h, std::max(halvings, fewest_halvings), out);
     set_stops(assembly, r, details);
-    return made;
+    // No zero has a sign, so that what is equal has the same bits.
+    const auto plain_zeros = [](auto& columns) {
+        for (Column& c : columns)
+            for (double& v : c) v += 0.0;
+    };
+    plain_zeros(shared.state);
+    plain_zeros(shared.input);
+    plain_zeros(shared.G.column);
+    return out;
+}
+
+void* TableStore::take(std::size_t bytes) {
+    bytes = (bytes + line - 1) / line * line;
+    if (used_ + bytes > length_) {
+        length_ = std::max(std::min(2 * length_, longest_chunk), bytes);
+        chunks_.emplace_back(static_cast<std::byte*>(::operator new(length_, std::align_val_t{longest_chunk})));
+#ifdef __linux__
+        // Large pages, where the system has some: tables of one drive lie far apart.
+        if (length_ == longest_chunk) ::madvise(chunks_.back().get(), length_, MADV_HUGEPAGE);
+#endif
+        used_ = 0;
+    }
+    memory_ += bytes;
+    return chunks_.back().get() + std::exchange(used_, used_ + bytes);
+}
+
+// Only the last ones are looked through: those of drives that differ in nothing that is kept here.
+const RegimeDetails* TableStore::same(const RegimeDetails& details) {
+    for (std::size_t k = details_.size(); k > 0 && k + recent > details_.size(); --k)
+        if (*details_[k - 1] == details) return details_[k - 1].get();
+    memory_ += details.size();
+    return details_.emplace_back(std::make_unique<const RegimeDetails>(details)).get();
+}
+
+const SharedTable* TableStore::same(const Tabulated& made, const RegimeTable* others) {
+    const std::size_t more = made.blocks.size() * sizeof(Column);
+    for (; others != nullptr; others = others->next)
+        if (const SharedTable* s = others->shared; s != nullptr && s->size() == made.shared.size() &&
+                                                   std::memcmp(s, &made.shared, sizeof *s) == 0 &&
+                                                   std::memcmp(s + 1, made.blocks.data(), more) == 0)
+            return s;
+    auto* s = static_cast<SharedTable*>(take(sizeof(SharedTable) + more));
+    std::memcpy(static_cast<void*>(s), &made.shared, sizeof *s);
+    std::memcpy(static_cast<void*>(s + 1), made.blocks.data(), more);
+    return s;
+}
+
+RegimeTable* TableStore::add(const Tabulated& made, RegimeTable* others) {
+    RegimeTable table = made.table;
+    table.details = same(made.details);
+    if (!made.own.empty()) table.shared = same(made, others);
+    table.next = others;
+    const std::size_t more = made.own.size() * sizeof(Column);
+    auto* t = static_cast<RegimeTable*>(take(sizeof table + more));
+    std::memcpy(static_cast<void*>(t), &table, sizeof table);
+    if (more > 0) std::memcpy(static_cast<void*>(t + 1), made.own.data(), more);
+    return t;
 }
 
 }  // namespace lostmotion::batch

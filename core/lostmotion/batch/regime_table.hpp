@@ -15,6 +15,7 @@
 #include <cstdint>
 #include <memory>
 #include <new>
+#include <vector>
 
 #include "../model/pack.hpp"
 #include "../model/system.hpp"
@@ -56,27 +57,25 @@ struct Label {
     }
 };
 
-// Coefficients of four linear forms side by side.
+// Four linear forms side by side. Of regimes that are mirror images the coefficients of states and inputs are the same
+// but for the sign of each form; what is constant while states and inputs change is the regime's own.
 struct Forms {
-    std::array<Column, D::coupled> state{};
-    Column one{};
-    std::array<Column, D::memory> memory{};
-    std::array<Column, D::inputs> input{};
+    const Column* state;  // by coupled state
+    const Column* input;  // by input; nullptr: none depends on them
+    const Column* own;    // for 1 and, if it depends on it, for the memory
+    bool by_memory;
+    const Column* sign;
 
-    void set(std::size_t row, const model::PackedForm<D>& f) {
-        for (std::size_t k = 0; k < D::coupled; ++k) state[k][row] = f.c[k];
-        one[row] = f.c[D::one];
-        for (std::size_t k = 0; k < D::memory; ++k) memory[k][row] = f.c[D::first_memory + k];
-        for (std::size_t k = 0; k < D::inputs; ++k) input[k][row] = f.c[D::first_input + k];
-    }
     // The part that is constant while memory and inputs are.
     [[gnu::always_inline]] Four constant(const Memory& m, const Inputs& u) const {
-        return (load<D>(one) + (m[0] * load<D>(memory[0]) + m[1] * load<D>(memory[1]))) +
-               (u[0] * load<D>(input[0]) + u[1] * load<D>(input[1]));
+        Four sum = load<D>(own[0]);
+        if (by_memory) sum = sum + (m[0] * load<D>(own[1]) + m[1] * load<D>(own[2]));
+        if (input != nullptr) sum = sum + load<D>(*sign) * (u[0] * load<D>(input[0]) + u[1] * load<D>(input[1]));
+        return sum;
     }
     [[gnu::always_inline]] Four of_state(const Four& x) const {
-        return sum_in_fours<D::coupled>([&](auto k)
-                                            ALWAYS_INLINE { return x.template spread<k>() * load<D>(state[k]); });
+        return load<D>(*sign) * sum_in_fours<D::coupled>(
+                                    [&](auto k) ALWAYS_INLINE { return x.template spread<k>() * load<D>(state[k]); });
     }
     // Sums of the magnitudes of the terms.
     Four magnitude_of_state(const Four& size) const {
@@ -84,31 +83,30 @@ struct Forms {
             [&](auto k) { return size.template spread<k>() * absolute(load<D>(state[k])); });
     }
     Four magnitude(const Four& size, const Memory& m, const Inputs& u) const {
-        Four sum = absolute(load<D>(one)) + magnitude_of_state(size);
-        for (std::size_t k = 0; k < D::memory; ++k) sum = sum + std::fabs(m[k]) * absolute(load<D>(memory[k]));
-        for (std::size_t k = 0; k < D::inputs; ++k) sum = sum + std::fabs(u[k]) * absolute(load<D>(input[k]));
+        Four sum = absolute(load<D>(own[0])) + magnitude_of_state(size);
+        for (std::size_t k = 0; by_memory && k < D::memory; ++k)
+            sum = sum + std::fabs(m[k]) * absolute(load<D>(own[1 + k]));
+        for (std::size_t k = 0; input != nullptr && k < D::inputs; ++k)
+            sum = sum + std::fabs(u[k]) * absolute(load<D>(input[k]));
         return sum;
     }
 };
 
-// Guards, four at a time, with the rows of R.
-struct GuardBlock {
-    Forms form;
-    std::array<Column, D::coupled> departure{};
-};
-
-// What only events and readers need of a regime.
+// What only events and readers need of a regime. Those of other drives are often the same.
 struct RegimeDetails {
     struct Mark {
         std::uint8_t kind = model::Guard::outside;
         std::int8_t contact = -1, branch = -1;
         std::int16_t neighbour = 0;
+        friend bool operator==(const Mark&, const Mark&) = default;
     };
     // Which speed a shaft has once a contact has come to rest: none, or a multiple of another's.
     struct Stop {
         std::int8_t state = -1, other = -1;  // state: -1 if the shaft goes on
         double share = 0.0;
+        friend bool operator==(const Stop&, const Stop&) = default;
     };
+    using Coefficients = std::array<double, D::terms>;
 
     std::array<bool, D::contacts> at_rest{};
     std::array<bool, D::contacts> stops_alone{};  // whether no other contact comes to rest with this one
@@ -116,62 +114,116 @@ struct RegimeDetails {
     std::int8_t input_contact = -1, twist_contact = -1, twist = -1, input_speed = -1, cell = -1, cell_back = -1;
     double hysteresis = 0.0;  // of (16): a turning point sets the capacity to this times |P|
     std::array<std::array<Stop, 2>, D::contacts> stops{};  // by the contact that comes to rest
-    model::PackedForm<D> motor_torque{}, output_torque{};
-    std::unique_ptr<Mark[]> mark;  // of each guard
+    Coefficients motor_torque{}, output_torque{};          // but that for 1
+    std::vector<Mark> mark;                                // of each guard
+
+    friend bool operator==(const RegimeDetails&, const RegimeDetails&) = default;
+    std::size_t size() const { return sizeof *this + mark.size() * sizeof(Mark); }
 };
 
-// All that a step without event reads lies in one row: this, then the guards.
-struct alignas(64) RegimeTable {
-    Label label;
-    RegimeTable* next = nullptr;  // of the same drive
-    std::unique_ptr<RegimeDetails> details = std::make_unique<RegimeDetails>();
+// What regimes share that are mirror images: this, then for each four guards the coefficients of the states, the rows
+// of R in single precision, rounded up, and, if there are some, the coefficients of the inputs.
+struct alignas(64) SharedTable {
     double angle_coefficient = 0.0;
     double series_step = 0.0;  // [s], in which the series of the motion converges fast
     double norm = 0.0;         // |A| [1/s] in scaled units
-    // False: the general solver makes all steps that begin in this regime or come into it. Then only the forms of the
-    // torques are set.
-    bool plain = false;
-    std::int8_t n_guards, n_blocks, angle_speed = 0;
-    Forms rate;  // of the coupled states
+    std::int8_t angle_speed = 0, n_blocks = 0;
+    bool guards_by_input = false;
+    std::array<Column, D::coupled> state{};  // of the rates of the coupled states
+    std::array<Column, D::inputs> input{};
     MatrixOf<D> G;
     Column angle{};  // per x', what the angle gains in a step beyond h times its speed
 
-    struct Free {
-        void operator()(RegimeTable* t) const {
-            t->~RegimeTable();
-            ::operator delete(static_cast<void*>(t), std::align_val_t{alignof(RegimeTable)});
-        }
-    };
-    using Owned = std::unique_ptr<RegimeTable, Free>;
-    static Owned make(int guards) {
-        const int blocks = (guards + 3) / 4;
-        void* room = ::operator new(sizeof(RegimeTable) + static_cast<std::size_t>(blocks) * sizeof(GuardBlock),
-                                    std::align_val_t{alignof(RegimeTable)});
-        return Owned(new (room) RegimeTable(guards, blocks));
+    using Departure = std::array<std::array<float, D::coupled>, D::coupled>;
+    static constexpr std::size_t departure_columns = sizeof(Departure) / sizeof(Column);
+    std::size_t block_columns() const {
+        return D::coupled + departure_columns + (guards_by_input ? std::size_t{D::inputs} : 0);
     }
-    GuardBlock& guards(int block) { return reinterpret_cast<GuardBlock*>(this + 1)[block]; }
-    const GuardBlock& guards(int block) const { return reinterpret_cast<const GuardBlock*>(this + 1)[block]; }
-    // Fetches what a step reads into the cache.
-    [[gnu::always_inline]] void prefetch() const {
-        const char* row = reinterpret_cast<const char*>(this);
-        for (std::size_t k = 0; k < sizeof(RegimeTable) + sizeof(GuardBlock); k += 64) __builtin_prefetch(row + k);
-    }
-    // Bytes that it takes.
     std::size_t size() const {
-        return sizeof(RegimeTable) + sizeof(RegimeDetails) + static_cast<std::size_t>(n_blocks) * sizeof(GuardBlock) +
-               static_cast<std::size_t>(n_guards) * sizeof(RegimeDetails::Mark);
+        return sizeof *this + static_cast<std::size_t>(n_blocks) * block_columns() * sizeof(Column);
+    }
+    const Column* block(int b) const {
+        return reinterpret_cast<const Column*>(this + 1) + static_cast<std::size_t>(b) * block_columns();
+    }
+    // The k-th column of R.
+    [[gnu::always_inline]] Four departure(int b, std::size_t k) const {
+        const auto& of = reinterpret_cast<const Departure*>(block(b) + D::coupled)[0][k];
+        return Four::of({of[0], of[1], of[2], of[3]});
+    }
+};
+
+// A regime: this, then what is its own of the rates and of each four guards.
+struct alignas(64) RegimeTable {
+    static constexpr int max_blocks = (D::guards + 3) / 4;
+    using Signs = std::array<std::uint8_t, max_blocks>;
+
+    Label label;
+    RegimeTable* next = nullptr;  // of the same drive
+    // nullptr: the general solver makes all steps that begin in this regime or come into it.
+    const SharedTable* shared = nullptr;
+    const RegimeDetails* details = nullptr;
+    double motor_torque = 0.0, output_torque = 0.0;  // the coefficients for 1
+    Signs signs{};                                   // of the guards, four to a number; a bit is a minus
+    bool by_memory = false;
+
+    bool plain() const { return shared != nullptr; }
+    std::size_t own_columns() const { return by_memory ? 1 + std::size_t{D::memory} : 1; }
+    const Column* own() const { return reinterpret_cast<const Column*>(this + 1); }
+    [[gnu::always_inline]] Forms rates() const {
+        return {shared->state.data(), shared->input.data(), own(), by_memory, &sign_of[0]};
+    }
+    [[gnu::always_inline]] Forms guards(int b) const {
+        const Column* block = shared->block(b);
+        const Column* inputs = shared->guards_by_input ? block + D::coupled + SharedTable::departure_columns : nullptr;
+        const auto k = static_cast<std::size_t>(b);
+        return {block, inputs, own() + (1 + k) * own_columns(), by_memory, &sign_of[signs[k]]};
     }
 
  private:
-    RegimeTable(int guards, int blocks)
-        : n_guards(static_cast<std::int8_t>(guards)), n_blocks(static_cast<std::int8_t>(blocks)) {
-        for (int b = 0; b < blocks; ++b) new (&this->guards(b)) GuardBlock{};
-        details->mark = std::make_unique<RegimeDetails::Mark[]>(static_cast<std::size_t>(guards));
-    }
+    // By the bits of four signs.
+    static constexpr std::array<Column, 16> sign_of = [] {
+        std::array<Column, 16> out{};
+        for (std::size_t bits = 0; bits < 16; ++bits)
+            for (std::size_t k = 0; k < 4; ++k) out[bits][k] = (bits >> k & 1) != 0 ? -1.0 : 1.0;
+        return out;
+    }();
 };
-static_assert(sizeof(RegimeTable) % alignof(GuardBlock) == 0);
+static_assert(sizeof(RegimeTable) == 64 && D::coupled == 4);
+
+// A table as it is made, before what others have is shared.
+struct Tabulated {
+    RegimeTable table;
+    RegimeDetails details;
+    std::vector<Column> own;
+    SharedTable shared;
+    std::vector<Column> blocks;  // of the shared part
+
+    Column* block(int b) { return blocks.data() + static_cast<std::size_t>(b) * shared.block_columns(); }
+};
+
+// The memory that tables lie in: chunks that stay.
+class TableStore {
+ public:
+    // A table for a drive that has had these, the last one first.
+    RegimeTable* add(const Tabulated& made, RegimeTable* others);
+    // Bytes in use.
+    std::size_t memory() const { return memory_; }
+
+ private:
+    void* take(std::size_t bytes);
+    const RegimeDetails* same(const RegimeDetails& details);
+    const SharedTable* same(const Tabulated& made, const RegimeTable* others);
+
+    static constexpr std::size_t line = 64, longest_chunk = std::size_t{1} << 21, recent = 64;
+    struct Free {
+        void operator()(std::byte* chunk) const { ::operator delete(chunk, std::align_val_t{longest_chunk}); }
+    };
+    std::vector<std::unique_ptr<std::byte, Free>> chunks_;
+    std::size_t length_ = std::size_t{1} << 13, used_ = length_, memory_ = 0;
+    std::vector<std::unique_ptr<const RegimeDetails>> details_;
+};
 
 // The table of a regime for steps of h [s].
-RegimeTable::Owned tabulate(const model::Assembly& assembly, const Label& label, double h);
+Tabulated tabulate(const model::Assembly& assembly, const Label& label, double h);
 
 }  // namespace lostmotion::batch

@@ -101,7 +101,7 @@ class Walk {
     Verdict accept(Label next, unsigned moving, int by_value);
     Verdict verify(const RegimeTable& q, unsigned moving, int by_value, bool lasting, int& violated) const;
     Verdict departs(const RegimeTable& q, const Forms& form, int lane) const;
-    double evaluate(const model::PackedForm<D>& f) const;
+    double output_torque() const;
     void stop(const RegimeDetails& old, int contact);
 
     Regimes& regimes_;
@@ -131,16 +131,17 @@ inline bool Walk::over(double h) {
 // Within the regime, to the next guard that falls or to the end.
 inline Walk::Way Walk::advance(double& left, int& fired) {
     const RegimeTable& r = *r_;
+    const Forms rates = r.rates();
     int halvings = 0;
     for (bool fresh = true; left > 0.0; fresh = false) {
-        double s = std::min(r.series_step, left);
-        const Four rate = r.rate.of_state(x_) + r.rate.constant(memory_, u_);
+        double s = std::min(r.shared->series_step, left);
+        const Four rate = rates.of_state(x_) + rates.constant(memory_, u_);
         Course y;
         y.degree = least_degree;
-        while (y.degree < most_degree && r.norm * s > reach[y.degree]) ++y.degree;
+        while (y.degree < most_degree && r.shared->norm * s > reach[y.degree]) ++y.degree;
         y[0] = x_;
         y[1] = s * rate;
-        for (std::size_t k = 2; k <= y.degree; ++k) y[k] = (s * inverse[k]) * r.rate.of_state(y[k - 1]);
+        for (std::size_t k = 2; k <= y.degree; ++k) y[k] = (s * inverse[k]) * rates.of_state(y[k - 1]);
         Crossing first;
         while (true) {
             bool halve = false;
@@ -172,7 +173,7 @@ inline Walk::Way Walk::advance(double& left, int& fired) {
 inline void Walk::move(const Course& y, double s, double at) {
     const RegimeTable& r = *r_;
     Four x = y[y.degree];
-    const auto w = static_cast<int>(r.angle_speed);
+    const auto w = static_cast<int>(r.shared->angle_speed);
     double angle = x[w] * inverse[y.degree + 1];
     for (std::size_t k = y.degree; k-- > 0;) {
         const Four& term = y[k];
@@ -180,13 +181,13 @@ inline void Walk::move(const Course& y, double s, double at) {
         angle = at * angle + term[w] * inverse[k + 1];
     }
     x_ = x;
-    angle_ += r.angle_coefficient * (s * (at * angle));
+    angle_ += r.shared->angle_coefficient * (s * (at * angle));
 }
 
 // What the guards do over the series. False: not certain.
 inline bool Walk::see(const RegimeTable& r, const Course& y, double s, bool fresh, Crossing& first, bool& halve) const {
-    for (int b = 0; b < r.n_blocks; ++b) {
-        const Forms& form = r.guards(b).form;
+    for (int b = 0; b < r.shared->n_blocks; ++b) {
+        const Forms form = r.guards(b);
         Course g;
         g.degree = y.degree;
         g[0] = form.of_state(y[0]) + form.constant(memory_, u_);
@@ -206,7 +207,7 @@ inline bool Walk::see(const RegimeTable& r, const Course& y, double s, bool fres
             const double size = form.magnitude(size_of_x, memory_, u_)[lane];
             double rate_size = 0.0;
             if (c[0] <= on_zero * size)
-                rate_size = s * form.magnitude_of_state(r.rate.magnitude(size_of_x, memory_, u_))[lane];
+                rate_size = s * form.magnitude_of_state(r.rates().magnitude(size_of_x, memory_, u_))[lane];
             double at = 0.0;
             const Verdict v = judge(c, size, rate_size, fresh, at, halve);
             if (v == Verdict::unsure) return false;
@@ -278,10 +279,12 @@ inline Walk::Verdict Walk::judge(const Series<double>& c, double size, double ra
     return Verdict::no;
 }
 
-inline double Walk::evaluate(const model::PackedForm<D>& f) const {
+inline double Walk::output_torque() const {
     StateOf<D> x{};
     x_.store(x.data());
-    return lostmotion::evaluate<D>(f, x, memory_, u_);
+    model::PackedForm<D> form{r_->details->output_torque};
+    form.c[D::one] = r_->output_torque;
+    return lostmotion::evaluate<D>(form, x, memory_, u_);
 }
 
 // A contact has come to rest: its speed is zero to the last bit, and a turning point sets the hysteresis (16).
@@ -289,8 +292,8 @@ inline void Walk::stop(const RegimeDetails& old, int contact) {
     for (const RegimeDetails::Stop& s : old.stops[static_cast<std::size_t>(contact)])
         if (s.state >= 0) x_.set(s.state, s.other < 0 ? 0.0 : s.share * x_[s.other]);
     if (contact != old.twist_contact || old.hysteresis == 0.0) return;
-    const auto& T_2 = old.output_torque.c;
-    memory_[0] = old.hysteresis * std::fabs(T_2[static_cast<std::size_t>(old.twist)] * x_[old.twist] + T_2[D::one]);
+    const double stiffness = old.output_torque[static_cast<std::size_t>(old.twist)];
+    memory_[0] = old.hysteresis * std::fabs(stiffness * x_[old.twist] + r_->output_torque);
 }
 
 // Finds the regime that follows where a guard has fallen, or, after the inputs have jumped, is below zero.
@@ -303,7 +306,7 @@ inline bool Walk::resolve(int fired, bool jump) {
     unsigned moving = 0;
     for (unsigned c = 0; c < D::contacts; ++c)
         if (!old.at_rest[c]) moving |= 1u << c;
-    const double T_2 = old.cell < 0 ? 0.0 : evaluate(old.output_torque);
+    const double T_2 = old.cell < 0 ? 0.0 : output_torque();
     const auto relocate = [&](Label& l) {
         if (old.cell >= 0) regimes_.locate_losses(l, old, T_2, x_[old.input_speed]);
     };
@@ -339,7 +342,7 @@ inline bool Walk::resolve(int fired, bool jump) {
 inline Walk::Verdict Walk::accept(Label next, unsigned moving, int by_value) {
     for (int n = 0; n < longest_walk; ++n) {
         RegimeTable* q = regimes_.at(next);
-        if (!q->plain) return Verdict::unsure;
+        if (!q->plain()) return Verdict::unsure;
         int violated = -1;
         const Verdict v = verify(*q, moving, by_value, false, violated);
         if (v == Verdict::yes) r_ = q;
@@ -354,12 +357,13 @@ inline Walk::Verdict Walk::accept(Label next, unsigned moving, int by_value) {
 
 // Does a guard that is zero rise from there, by its first or second derivative?
 inline Walk::Verdict Walk::departs(const RegimeTable& q, const Forms& form, int lane) const {
-    const Four rate = q.rate.of_state(x_) + q.rate.constant(memory_, u_);
-    const Four size = q.rate.magnitude(absolute(x_), memory_, u_);
+    const Forms rates = q.rates();
+    const Four rate = rates.of_state(x_) + rates.constant(memory_, u_);
+    const Four size = rates.magnitude(absolute(x_), memory_, u_);
     const double first = form.of_state(rate)[lane], of_first = form.magnitude_of_state(size)[lane];
     if (std::fabs(first) > doubt * of_first) return first > 0.0 ? Verdict::yes : Verdict::no;
-    const double next = form.of_state(q.rate.of_state(rate))[lane],
-                 of_next = form.magnitude_of_state(q.rate.magnitude_of_state(size))[lane];
+    const double next = form.of_state(rates.of_state(rate))[lane],
+                 of_next = form.magnitude_of_state(rates.magnitude_of_state(size))[lane];
     return next > doubt * of_next ? Verdict::yes : Verdict::unsure;
 }
 
@@ -377,8 +381,8 @@ inline Walk::Verdict Walk::verify(const RegimeTable& q, unsigned moving, int by_
     violated = -1;
     bool sure = true, by_contact = false;
     int contacts_violated = 0;
-    for (int b = 0; b < q.n_blocks; ++b) {
-        const Forms& form = q.guards(b).form;
+    for (int b = 0; b < q.shared->n_blocks; ++b) {
+        const Forms form = q.guards(b);
         const Four value = form.of_state(x_) + form.constant(memory_, u_),
                    near = doubt * form.magnitude(size_of_x, memory_, u_);
         unsigned doubtful = ~above(value, near) & 15u;
