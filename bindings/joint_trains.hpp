@@ -1,7 +1,7 @@
 // Trains as the actuators of the joints of a multibody engine.
 #pragma once
 
-#include "lostmotion/simulation/joint_trains.hpp"
+#include "lostmotion/simulation/robot_step.hpp"
 #include "stepping.hpp"
 
 namespace lostmotion::binding {
@@ -11,7 +11,8 @@ inline constexpr std::array<const char*, 5> joint_rows{"angle", "speed", "accele
 
 using JointValues = nb::ndarray<double, nb::numpy, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using JointVector = nb::ndarray<const double, nb::numpy, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using JointMatrix = nb::ndarray<const double, nb::numpy, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using EngineVector = nb::ndarray<double, nb::numpy, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using EngineIndices = nb::ndarray<const std::int32_t, nb::numpy, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
 inline void write_joints(const JointTrains& t, JointValues& out) {
     const std::size_t n = t.joints().size();
@@ -41,20 +42,25 @@ inline void bind_joint_trains(nb::module_& m) {
     nb::class_<T>(m, "JointTrains")
         .def(
             "__init__",
-            [](T* self, const std::vector<TrainSimulation*>& trains, const std::vector<int>& shafts) {
+            [](T* self, const std::vector<TrainSimulation*>& trains, const std::vector<int>& shafts,
+               const std::vector<int>& commands, const std::vector<double>& scales) {
                 std::vector<T::Joint> joints;
                 for (std::size_t k = 0; k < trains.size(); ++k) {
                     const std::optional<LoadShaft> shaft = trains[k]->load_shaft(shafts[k]);
                     if (!shaft) throw nb::value_error("a load shaft without load torque, or whose angle is no state");
-                    joints.push_back({trains[k], *shaft});
+                    joints.push_back({trains[k], *shaft, commands[k], scales[k]});
                 }
                 new (self) T(std::move(joints));
             },
-            "trains"_a, "shafts"_a, nb::keep_alive<1, 2>())
+            "trains"_a, "shafts"_a, "commands"_a, "scales"_a, nb::keep_alive<1, 2>(),
+            "commands: the place of each among the inputs; -1: a controller has a reference in its place.")
         .def(
-            "set_input",
-            [](T& t, std::size_t joint, std::size_t input, double value) { t.inputs(joint)[input] = value; }, "joint"_a,
-            "input"_a, "value"_a)
+            "set_commands",
+            [](T& t, const std::vector<double>& values) {
+                check_size(values, t.joints().size());
+                t.set_commands(values);
+            },
+            "values"_a)
         .def("guesses",
              [](const T& t) {
                  std::vector<std::pair<double, double>> out;
@@ -90,28 +96,6 @@ inline void bind_joint_trains(nb::module_& m) {
                 }
             },
             "snapshot"_a)
-        .def(
-            "set_reference",
-            [](T& t, std::size_t joint, double value, double rate) {
-                t.joints()[joint].train->with([&](auto& s) { s.set_reference(0, value, rate); });
-            },
-            "joint"_a, "value"_a, "rate"_a)
-        .def(
-            "step",
-            [](T& t, double interval, int substeps, JointMatrix mass, JointVector force, JointMatrix mass_rate,
-               JointVector force_rate, JointValues out) {
-                const std::size_t n = t.joints().size();
-                for (const JointMatrix& m : {mass, mass_rate})
-                    if (m.shape(0) != n || m.shape(1) != n) throw nb::type_error("a mass matrix of other joints");
-                for (const JointVector& f : {force, force_rate})
-                    if (f.shape(0) != n) throw nb::type_error("forces of other joints");
-                check(t.step(
-                          interval, substeps,
-                          {{mass.data(), n * n}, {force.data(), n}, {mass_rate.data(), n * n}, {force_rate.data(), n}}),
-                      t);
-                write_joints(t, out);
-            },
-            "interval"_a, "substeps"_a, "mass"_a, "force"_a, "mass_rate"_a, "force_rate"_a, "out"_a)
         .def("go_back", &T::go_back)
         .def(
             "read",
@@ -122,6 +106,98 @@ inline void bind_joint_trains(nb::module_& m) {
             "out"_a)
         .def_prop_ro("evaluations", &T::evaluations)
         .def_prop_ro("unsettled", &T::unsettled);
+
+    using R = RobotStep;
+    const auto vector = [](const auto& v) { return std::span(v.data(), v.size()); };
+    const auto row = [](std::span<double> v) {
+        return nb::ndarray<nb::numpy, double, nb::ndim<1>>(v.data(), {v.size()});
+    };
+    const auto square = [](std::span<double> v, std::size_t n) {
+        return nb::ndarray<nb::numpy, double, nb::ndim<2>>(v.data(), {n, n});
+    };
+    constexpr auto with_owner = nb::rv_policy::reference_internal;
+    nb::class_<R>(m, "RobotStep")
+        .def(
+            "__init__",
+            [=](R* self, T& trains, EngineVector position, EngineVector speed, EngineVector acceleration,
+                EngineVector warmstart, EngineVector force, EngineVector matrix, EngineIndices row_length,
+                EngineIndices row_begin, EngineIndices column, std::vector<double> damping,
+                std::vector<std::size_t> trained, std::vector<std::size_t> others, std::vector<std::size_t> place,
+                std::vector<std::size_t> place_of_speed) {
+                new (self) R(trains,
+                             {vector(position), vector(speed), vector(acceleration), vector(warmstart), vector(force),
+                              vector(matrix), vector(row_length), vector(row_begin), vector(column), std::move(damping),
+                              std::move(trained), std::move(others), std::move(place), std::move(place_of_speed)});
+            },
+            "trains"_a, "position"_a.noconvert(), "speed"_a.noconvert(), "acceleration"_a.noconvert(),
+            "warmstart"_a.noconvert(), "force"_a.noconvert(), "matrix"_a.noconvert(), "row_length"_a.noconvert(),
+            "row_begin"_a.noconvert(), "column"_a.noconvert(), "damping"_a, "trained"_a, "others"_a, "place"_a,
+            "place_of_speed"_a, nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>(),
+            nb::keep_alive<1, 5>(), nb::keep_alive<1, 6>(), nb::keep_alive<1, 7>(), nb::keep_alive<1, 8>(),
+            nb::keep_alive<1, 9>(), nb::keep_alive<1, 10>(), nb::keep_alive<1, 11>(),
+            "Of the arrays of an engine; see core/lostmotion/simulation/robot_step.hpp.")
+        .def(
+            "begin",
+            [](R& r, double interval) {
+                const int away = r.away();
+                if (away < 0) r.begin(interval);
+                return away;
+            },
+            "interval"_a, "The first joint that is not where its train is, or -1: then positions are at the middle.")
+        .def(
+            "predict_speed", [](R& r, double interval) { r.speed_at_middle(interval); }, "interval"_a)
+        .def(
+            "set_speed",
+            [=](R& r, double interval, JointVector acceleration) { r.speed_at_middle(interval, vector(acceleration)); },
+            "interval"_a, "acceleration"_a)
+        .def(
+            "take", [=](R& r, double interval, JointVector acceleration) { r.take(interval, vector(acceleration)); },
+            "interval"_a, "acceleration"_a)
+        .def(
+            "advance",
+            [](R& r, T& t, double interval, int substeps, JointValues out) {
+                check(r.advance(interval, substeps), t);
+                write_joints(t, out);
+            },
+            "trains"_a, "interval"_a, "substeps"_a, "out"_a)
+        .def(
+            "advance_under",
+            [=](R& r, T& t, double interval, int substeps, JointVector force, JointValues out) {
+                check(r.advance(interval, substeps, vector(force), false), t);
+                write_joints(t, out);
+            },
+            "trains"_a, "interval"_a, "substeps"_a, "force"_a, "out"_a)
+        .def("restore", &R::restore)
+        .def(
+            "integrate",
+            [=](R& r, double interval, JointVector acceleration) { r.integrate(interval, vector(acceleration)); },
+            "interval"_a, "acceleration"_a)
+        .def(
+            "finish", [=](R& r, JointVector acceleration) { r.finish(vector(acceleration)); }, "acceleration"_a)
+        .def_prop_rw(
+            "course",
+            [](const R& r) {
+                const R::Course& c = r.course();
+                return std::make_tuple(c.acceleration, c.before, c.inertia, c.force, c.smooth);
+            },
+            [](R& r,
+               std::tuple<std::vector<double>, std::vector<double>, std::vector<double>, std::vector<double>, bool> c) {
+                R::Course to{std::get<0>(c), std::get<1>(c), std::get<2>(c), std::get<3>(c), std::get<4>(c)};
+                if (to.acceleration.size() != r.acceleration().size() || to.before.size() != r.acceleration().size() ||
+                    to.inertia.size() != r.inertia().size() || to.force.size() != r.course().force.size())
+                    throw nb::type_error("the course of another robot");
+                r.set_course(std::move(to));
+            },
+            "What the next step predicts from.")
+        .def_prop_ro(
+            "motion", [=](R& r) { return row(r.motion()); }, with_owner)
+        .def_prop_ro(
+            "acceleration", [=](R& r) { return row(r.acceleration()); }, with_owner)
+        .def_prop_ro(
+            "force", [=](R& r) { return row(r.force()); }, with_owner)
+        .def_prop_ro(
+            "mass", [=](R& r) { return square(r.mass(), r.force().size()); }, with_owner)
+        .def_prop_ro("inertia", [=](R& r) { return square(r.inertia(), r.course().force.size()); }, with_owner);
 }
 
 }  // namespace lostmotion::binding

@@ -20,6 +20,16 @@ JointTrains::JointTrains(std::vector<Joint> joints) : joints_(std::move(joints))
     read();
 }
 
+void JointTrains::set_commands(std::span<const double> values) {
+    for (std::size_t k = 0; k < joints_.size(); ++k) {
+        Joint& j = joints_[k];
+        if (j.command < 0)
+            j.train->with([&](auto& s) { s.set_reference(0, values[k], 0.0); });
+        else
+            j.inputs[static_cast<std::size_t>(j.command)] = values[k] * j.command_scale;
+    }
+}
+
 auto JointTrains::guess(std::size_t joint) const -> Guess {
     const Joint& j = joints_[joint];
     return {j.inputs[static_cast<std::size_t>(j.shaft.load)], answer_[joint].acceleration};

@@ -25,6 +25,8 @@ class JointTrains {
     struct Joint {
         TrainSimulation* train;
         LoadShaft shaft;
+        int command = -1;  // place of the command among the inputs; -1: a controller has a reference in its place
+        double command_scale = 1.0;
         std::vector<double> inputs = {};  // the last of all inputs of the train
         double torque = 0.0;              // mean torque on the joint over the last step [N m]
         double speed = 0.0, angle = 0.0;  // of the joint, now [rad/s, rad]
@@ -37,6 +39,9 @@ class JointTrains {
 
     const std::vector<Joint>& joints() const { return joints_; }
     std::span<double> inputs(std::size_t joint) { return joints_[joint].inputs; }
+
+    // Of each joint, until it is set anew.
+    void set_commands(std::span<const double> values);
 
     // Load torque [N m] and mean acceleration [rad/s^2] of the last substep, where the next one begins its search.
     struct Guess {

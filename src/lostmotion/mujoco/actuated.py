@@ -82,7 +82,6 @@ class Actuated:
         ids = [joint_id(model, name) for name in given]
         self._dofs = np.array([model.jnt_dofadr[j] for j in ids])
         self._addresses = np.array([model.jnt_qposadr[j] for j in ids])
-        self._others = np.array([k for k in range(model.nv) if k not in set(self._dofs)], dtype=int)
         step = float(model.opt.timestep)
         mujoco.mj_forward(model, self.data)
         mass = np.zeros((model.nv, model.nv))
@@ -106,16 +105,27 @@ class Actuated:
         model.dof_armature[self._dofs] = [d.reflected_inertia for d in made]
         mujoco.mj_setConst(model, self.data)
         model.dof_armature[self._dofs] = 0.0
-        self._mass = mass
-        self._zero_rates = np.zeros((len(ids), len(ids))), np.zeros(len(ids))
         self._rows = np.repeat(np.arange(model.nv), model.M_rownnz)
-        self._acceleration = self._before = np.zeros(model.nv)
         self._contact = np.zeros(model.nv)
-        self._last: tuple[np.ndarray, np.ndarray] | None = None
-        self._damping = model.dof_damping.copy().reshape(model.nv, -1)[:, 0]
-        self._damped = bool(self._damping.any())
         self._among_drives = np.ix_(self._dofs, self._dofs)
+        self._turning = model.nq != model.nv  # positions of balls and free bodies are no integrals of speeds
+        self._robot = self._core_robot()
+        # Views of what it computes.
+        self._mass, self._own, self._mean = self._robot.mass, self._robot.inertia, self._robot.acceleration
+        self._no_contact = np.zeros(model.nv)
         self.reset()
+
+    def _core_robot(self) -> Any:
+        m, d = self.model, self.data
+        return self._trains.robot(
+            *(d.qpos, d.qvel, d.qacc, d.qacc_warmstart, d.qfrc_smooth, d.M),
+            *(m.M_rownnz, m.M_rowadr, m.M_colind),
+            m.dof_damping.reshape(m.nv, -1)[:, 0].tolist(),
+            self._dofs.tolist(),
+            [k for k in range(m.nv) if k not in set(self._dofs)],
+            self._addresses.tolist(),
+            [] if self._turning else list(range(m.nv)),
+        )
 
     def __repr__(self) -> str:
         return f"Actuated({listed(self.joints)}; {self.substeps} substeps, at {self.data.time:.6g} s)"
@@ -192,19 +202,16 @@ class Actuated:
         carried = {k: -float(f) for k, f in enumerate(force)} if held else {}
         self._trains.place(d.qpos[self._addresses].tolist(), d.qvel[self._dofs].tolist(), carried)
         self._trains.guesses = [(-float(f), 0.0) for f in force]
-        self._acceleration, self._before = np.zeros(m.nv), np.zeros(m.nv)
-        self._last = None
+        n, zero = len(self.joints), [0.0] * m.nv
+        self._robot.course = zero, zero, [0.0] * (n * n), [0.0] * n, False
         self._contact = d.qfrc_constraint.copy()
 
-    def _check_place(self) -> None:
-        q, v = self.data.qpos[self._addresses], self.data.qvel[self._dofs]
-        away = (q != self._trains.angle) | (v != self._trains.speed)
-        if away.any():
-            k = int(np.flatnonzero(away)[0])
-            raise InputError(
-                f"joint {self.joints[k]!r}: data has it at {q[k]:.6g} rad, {v[k]:.6g} rad/s, its drive at {self._trains.angle[k]:.6g} rad, "
-                f"{self._trains.speed[k]:.6g} rad/s; call follow() after data has been changed"
-            )
+    def _away(self, k: int) -> InputError:
+        q, v = self.data.qpos[self._addresses[k]], self.data.qvel[self._dofs[k]]
+        return InputError(
+            f"joint {self.joints[k]!r}: data has it at {q:.6g} rad, {v:.6g} rad/s, its drive at {self._trains.angle[k]:.6g} rad, "
+            f"{self._trains.speed[k]:.6g} rad/s; call follow() after data has been changed"
+        )
 
     def step(self, ctrl: Mapping[str, float] | Sequence[float] | np.ndarray | None = None) -> None:
         """Advance robot and drives by the timestep of the model.
@@ -224,86 +231,44 @@ class Actuated:
             The motion of a drive has no continuation.
         """
         self._trains.set_commands(self._controls(ctrl))
-        self._check_place()
-        mj, m, d, h = self._mj, self.model, self.data, float(self.model.opt.timestep)
-        q, v, begin = d.qpos.copy(), d.qvel.copy(), d.time
-        acceleration = self._acceleration
+        mj, m, d, robot, h = self._mj, self.model, self.data, self._robot, self.model.opt.timestep
+        if (away := robot.begin(h)) >= 0:
+            raise self._away(away)
+        begin = d.time
         # Mass matrix and forces at the middle of the step.
-        ahead = acceleration + 0.75 * (acceleration - self._before)
-        mj.mj_integratePos(m, d.qpos, v + 0.25 * h * ahead, 0.5 * h)
-        d.time = begin + 0.5 * h
-        mj.mj_fwdPosition(m, d)
         try:
+            if self._turning:
+                mj.mj_integratePos(m, d.qpos, robot.motion, 0.5 * h)
+            d.time = begin + 0.5 * h
+            mj.mj_fwdPosition(m, d)
             if d.nefc == 0:
-                d.qvel[:] = v + 0.5 * h * ahead
-                acceleration = self._solve(h, ahead)
-                self._contact = np.zeros(m.nv)
+                robot.predict_speed(h)
+                self._compute_forces()
+                self._trains.advance(robot, h, self.substeps)
+                acceleration, self._contact = self._mean, self._no_contact
             else:
                 # The mean acceleration is not smooth here, so it is found in passes and not from that of the steps before.
                 acceleration = np.zeros(m.nv)
                 for again in range(CONTACT_PASSES):
                     if again:
                         self._trains.go_back()
-                    d.qvel[:] = v + 0.5 * h * acceleration
+                    robot.set_speed(h, acceleration)
                     acceleration = self._solve_with_contact(h, acceleration)
-        finally:
-            d.qpos[:], d.qvel[:], d.time = q, v, begin
-        end = v + h * acceleration
-        end[self._dofs] = self._trains.speed
-        mj.mj_integratePos(m, d.qpos, 0.5 * (v + end), h)
-        d.qpos[self._addresses] = self._trains.angle
-        d.qvel[:] = end
-        d.qacc[:] = d.qacc_warmstart[:] = acceleration
+        except BaseException:
+            robot.restore()
+            d.time = begin
+            raise
+        robot.integrate(h, acceleration)
+        if self._turning:
+            mj.mj_integratePos(m, d.qpos, robot.motion, h)
+        robot.finish(acceleration)
         d.time = begin + h
-        self._before, self._acceleration = self._acceleration, acceleration
 
-    def _forces(self, h: float, acceleration: np.ndarray) -> np.ndarray:
-        """Forces [N·m] at the middle of the step beside those of drives and contacts; the inertia matrix goes to `_mass`."""
-        mj, m, d = self._mj, self.model, self.data
-        mj.mj_fwdVelocity(m, d)
-        mj.mj_fwdActuation(m, d)
-        mj.mj_fwdAcceleration(m, d)
-        mj.mj_fullM(m, d, self._mass)
-        force: np.ndarray = d.qfrc_smooth.copy()
-        # Viscous friction of joints without a drive, at the mean of the speeds at both ends.
-        if self._damped:
-            force += 0.5 * h * self._damping * acceleration
-            self._mass[np.diag_indices_from(self._mass)] += 0.5 * h * self._damping
-        return force
-
-    def _solve(self, h: float, acceleration: np.ndarray) -> np.ndarray:
-        """Advance the drives over the step; the mean acceleration of all joints."""
-        force = self._forces(h, acceleration)
-        self._eliminate()
-        return self._advance(h, force, smooth=True)
-
-    def _eliminate(self) -> None:
-        """Joints without a drive follow from the others."""
-        dofs, others, mass = self._dofs, self._others, self._mass
-        if others.size:
-            self._inverse = np.linalg.inv(mass[np.ix_(others, others)])
-            self._across = mass[np.ix_(dofs, others)]
-            self._own = mass[self._among_drives] - self._across @ self._inverse @ self._across.T
-        else:
-            self._own = mass[self._among_drives]
-
-    def _advance(self, h: float, force: np.ndarray, *, smooth: bool) -> np.ndarray:
-        """Advance the drives under forces at the middle of the step; the mean acceleration of all joints."""
-        dofs, others = self._dofs, self._others
-        acting = force[dofs] - self._across @ (self._inverse @ force[others]) if others.size else force[dofs]
-        mass_rate, force_rate = self._zero_rates
-        if smooth:  # in straight lines through the middles of this step and the one before
-            if self._last is not None:
-                mass_rate, force_rate = (self._own - self._last[0]) / h, (acting - self._last[1]) / h
-            self._last = self._own, acting
-        else:
-            self._last = None
-        self._trains.step(h, self.substeps, self._own, acting, mass_rate, force_rate)
-        out = np.empty(self.model.nv)
-        out[dofs] = self._trains.acceleration
-        if others.size:
-            out[others] = self._inverse @ (force[others] - self._across.T @ out[dofs])
-        return out
+    def _compute_forces(self) -> None:
+        """Forces [N·m] beside those of drives and contacts."""
+        self._mj.mj_fwdVelocity(self.model, self.data)
+        self._mj.mj_fwdActuation(self.model, self.data)
+        self._mj.mj_fwdAcceleration(self.model, self.data)
 
     def _solve_with_contact(self, h: float, acceleration: np.ndarray) -> np.ndarray:
         """The same with contacts, limits and equalities: MuJoCo's solver finds their forces.
@@ -315,14 +280,16 @@ class Actuated:
         follows the force.
         """
         mj, m, d, dofs = self._mj, self.model, self.data, self._dofs
-        force = self._forces(h, acceleration)
-        self._eliminate()
+        self._compute_forces()
+        self._robot.take(h, acceleration)
+        force = self._robot.force
         guesses = self._trains.guesses
 
         angle, speed = self._trains.angle.copy(), self._trains.speed.copy()
 
         def tried(change: np.ndarray) -> np.ndarray:
-            out = self._advance(h, change, smooth=False)
+            self._trains.advance(self._robot, h, self.substeps, change)
+            out = self._mean.copy()
             out[dofs] = 2.0 * (self._trains.angle - angle - h * speed) / (h * h)
             self._trains.go_back()
             self._trains.guesses = guesses
@@ -347,7 +314,8 @@ class Actuated:
         d.qfrc_smooth[:] = self._mass @ free
         mj.mj_fwdConstraint(m, d)
         self._contact = d.qfrc_constraint.copy()
-        return self._advance(h, force + self._contact, smooth=False)
+        self._trains.advance(self._robot, h, self.substeps, force + self._contact)
+        return self._mean
 
     def _controls(self, ctrl: Any) -> list[float]:
         if ctrl is None:
@@ -401,12 +369,12 @@ class Actuated:
         return values
 
     def _course(self) -> tuple[Any, ...]:
-        """Arrays that the next step predicts from; none is changed in place."""
-        return self._acceleration, self._before, self._contact, self._last
+        """What the next step predicts from; nothing of it is changed in place."""
+        return self._robot.course, self._contact
 
     def _restore_robot(self, state: ActuatedState) -> None:
         self._mj.mj_setState(self.model, self.data, state.mujoco, self._kind)
-        self._acceleration, self._before, self._contact, self._last = state.course
+        self._robot.course, self._contact = state.course
 
 
 def _substeps(drives: Sequence[JointDrive], step: float) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -151,7 +152,10 @@ class JointTrains:
     def __init__(self, drives: Sequence[JointDrive]) -> None:
         self.drives = tuple(drives)
         self._core = _core.JointTrains(
-            [d.simulation._core for d in self.drives], [list(d.train.shafts).index(d.shaft) for d in self.drives]
+            [d.simulation._core for d in self.drives],
+            [list(d.train.shafts).index(d.shaft) for d in self.drives],
+            [-1 if d.command is None else d.command for d in self.drives],
+            [d.command_scale for d in self.drives],
         )
         self._values = np.zeros((len(ROWS), len(self.drives)))
         self.read()
@@ -167,23 +171,18 @@ class JointTrains:
 
     def set_commands(self, ctrl: Sequence[float]) -> None:
         """Commands of the motors; of a joint with a controller its reference."""
-        for k, (drive, value) in enumerate(zip(self.drives, ctrl, strict=True)):
-            if drive.command is None:
-                self._core.set_reference(k, value, 0.0)
-            else:
-                self._core.set_input(k, drive.command, value * drive.command_scale)
+        self._core.set_commands(ctrl)
 
-    def step(
-        self,
-        interval: float,
-        substeps: int,
-        mass: np.ndarray,
-        force: np.ndarray,
-        mass_rate: np.ndarray,
-        force_rate: np.ndarray,
-    ) -> None:
-        """Advance by `interval` [s]: M a = f + tau, with mass [kg·m²] and force [N·m] at its middle and their rates."""
-        self._core.step(interval, substeps, mass, force, mass_rate, force_rate, self._values)
+    def robot(self, *arrays: Any) -> _core.RobotStep:
+        """Steps of a robot with the arrays of its engine, in the order of `_core.RobotStep`."""
+        return _core.RobotStep(self._core, *arrays)
+
+    def advance(self, robot: _core.RobotStep, interval: float, substeps: int, force: np.ndarray | None = None) -> None:
+        """Advance under these forces [N·m] at the middle of the interval [s]; without, by what the robot takes from its engine."""
+        if force is None:
+            robot.advance(self._core, interval, substeps, self._values)
+        else:
+            robot.advance_under(self._core, interval, substeps, force, self._values)
 
     def go_back(self) -> None:
         """To where the last step began."""
