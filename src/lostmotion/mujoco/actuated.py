@@ -111,7 +111,9 @@ class Actuated:
         self._turning = model.nq != model.nv  # positions of balls and free bodies are no integrals of speeds
         self._robot = self._core_robot()
         # Views of what it computes.
-        self._mass, self._own, self._mean = self._robot.mass, self._robot.inertia, self._robot.acceleration
+        self._mass: np.ndarray = self._robot.mass
+        self._own: np.ndarray = self._robot.inertia
+        self._mean: np.ndarray = self._robot.acceleration
         self._no_contact = np.zeros(model.nv)
         self.reset()
 
