@@ -371,7 +371,7 @@ class Actuated:
         return values
 
     def _course(self) -> tuple[Any, ...]:
-        """What the next step predicts from; nothing of it is changed in place."""
+        """Accelerations, matrices and forces that the next step predicts from; none is changed in place."""
         return self._robot.course, self._contact
 
     def _restore_robot(self, state: ActuatedState) -> None:
