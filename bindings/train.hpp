@@ -4,6 +4,7 @@
 #include <nanobind/stl/optional.h>
 
 #include <algorithm>
+#include <exception>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -316,6 +317,41 @@ inline nb::dict run(const TrainDescription& description, const std::vector<Signa
     return out;
 }
 
+// The same under controllers, some channels of it alone, into out: channels x samples. enough: called at the sample
+// `pause`, up to which all is written; true ends the run there.
+inline std::size_t run_into(const Room& out, const TrainDescription& description, const std::vector<Signal>& inputs,
+                            const Named& start, const Named& capacities, double duration, double interval,
+                            const BoundControl& bound, const std::vector<int>& channels, std::size_t pause,
+                            const nb::callable& enough) {
+    const SharedRun& run = *description.run();
+    TrainOptions options = train_options(duration, interval, out.shape(1), false, 0);
+    if (channels.size() != out.shape(0) || pause >= options.samples) throw nb::value_error("too little room");
+    options.interrupted = poll_signals;
+    options.control = control_of(bound);
+    options.channels = channels;
+    options.pause = pause;
+    std::exception_ptr raised;
+    options.enough = [&] {
+        nb::gil_scoped_acquire hold;
+        try {
+            return nb::cast<bool>(enough());
+        } catch (...) {
+            raised = std::current_exception();
+            return true;
+        }
+    };
+    TrainReport report;
+    {
+        nb::gil_scoped_release release;
+        std::unique_ptr<AnyWorkspace> workspace = run.take();
+        report = run.run(inputs, {start, capacities}, options, out.data(), workspace);
+        run.give_back(std::move(workspace));
+    }
+    if (raised) std::rethrow_exception(raised);
+    check_train_run(report, run.assembly());
+    return report.switching_count;
+}
+
 // Each case: train, inputs, start, hysteresis capacities. fields, values: of one case, what differs from run to run,
 // runs x fields. Of each run the text of its error, empty if it has none; switchings; the energies; and the samples, or
 // what is kept of them.
@@ -437,6 +473,13 @@ inline void bind_train(nb::module_& m) {
                   "duration: float, interval: float, samples: int, energy: bool, tolerance: float, max_switchings: "
                   "int, control: tuple[float, "
                   "collections.abc.Sequence[tuple[Axis, int, int, int, int]]]) -> dict[str, typing.Any]"));
+    m.def("run_into", &run_into, "out"_a, "train"_a, "inputs"_a, "start"_a, "hysteresis_capacities"_a, "duration"_a,
+          "interval"_a, "control"_a, "channels"_a, "pause"_a, "enough"_a,
+          nb::sig("def run_into(out: numpy.typing.NDArray[numpy.float64], train: Train, inputs: "
+                  "collections.abc.Sequence[Signal], start: collections.abc.Mapping[str, float], "
+                  "hysteresis_capacities: collections.abc.Mapping[str, float], duration: float, interval: float, "
+                  "control: tuple[float, collections.abc.Sequence[tuple[Axis, int, int, int, int]]], channels: "
+                  "collections.abc.Sequence[int], pause: int, enough: collections.abc.Callable[[], bool]) -> int"));
     m.def("run_batch", &run_batch, "cases"_a, "fields"_a, "values"_a, "duration"_a, "interval"_a, "samples"_a,
           "energies"_a, "channels"_a, "kept"_a, "threads"_a, "progress"_a = nb::none(),
           nb::sig("def run_batch(cases: collections.abc.Sequence[tuple[Train, collections.abc.Sequence[Signal], "

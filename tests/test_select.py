@@ -18,7 +18,8 @@ from lostmotion.simulation.run import run
 from lostmotion.sizing.duty_cycle import DutyCycle
 from lostmotion.sizing.required_motion import check_motor, input_demand, required_motion
 from lostmotion.studies.axis import repeated
-from lostmotion.studies.axis_columns import COLUMNS, last_cycle
+from lostmotion.studies.axis_columns import COLUMNS
+from lostmotion.studies.axis_scenario import last_cycle
 from lostmotion.studies.axis_electrical import Electrical
 from lostmotion.studies.study import Study
 from lostmotion.studies.task_file import task_of
@@ -386,10 +387,8 @@ def test_rows_are_kept_and_the_best_come_first(task: Study, result: Any, tmp_pat
 
 
 def test_the_last_cycle_has_both_of_its_ends():
-    class Result:
-        time = np.linspace(0.0, 3.0, 31)
-
-    assert list(Result.time[last_cycle(Result, 3)][[0, -1]]) == pytest.approx([2.0, 3.0])  # type: ignore[arg-type]
+    time = np.linspace(0.0, 3.0, 31)
+    assert list(time[last_cycle(len(time), 3)][[0, -1]]) == pytest.approx([2.0, 3.0])
 
 
 # --- what is refused ---

@@ -291,6 +291,9 @@ struct RunRequest {
     void* interrupted_context = nullptr;
     Control control;                // nothing: the inputs alone act
     double* control_out = nullptr;  // (axes x signals) x samples, as ControlRecord
+    // Of a run under controllers, the sample at which the observer may end it; 0: none. Up to there the run is the one
+    // that ends there, and it goes on as if there was no pause.
+    std::size_t pause = 0;
 };
 
 // From a start to the end of the run, open loop or under the controllers of the request. make_loop(laws): these in the
@@ -311,6 +314,11 @@ Status run_recorded(Solver& solver, const StartOf<typename Solver::D>& start, co
                          request.control.signals(), request.control_out);
     const Status begun = run.begin(start.x, start.memory, observer);
     if (begun != Status::done) return begun;
+    if (request.pause > 0) {
+        const double time = static_cast<double>(request.pause) * request.sample_interval;
+        const Status s = run.advance(time, observer, &record);
+        if (s != Status::done || observer.enough()) return s;
+    }
     if (const Status s = run.advance(request.duration, observer, &record); s != Status::done) return s;
     const Status ended = run.show_end(observer);
     observer.finish(loop);

@@ -60,6 +60,8 @@ class SamplerOf : public Observer<System> {
         }
         return s.last || n_pieces_ == max_pieces ? write() : true;
     }
+    // The sample `next` and those behind it are written again.
+    void go_back_to(std::size_t next) { next_ = next; }
     // Writes what has been collected. Only needed if the last segment has not come.
     bool write() {
         // Every piece is a chain of steps that wait for one another, so it pays to have several at hand.

@@ -122,6 +122,10 @@ class TrainRecorder final : public Observer<model::TrainSystem<D>> {
         return (!options_.energy || meter_.segment(s)) && sampler_.segment(s);
     }
     bool flush() override { return sampler_.write(); }
+    bool enough() override {
+        sampler_.go_back_to(options_.pause);  // of a run that goes on, it is that behind the tick
+        return options_.enough && options_.enough();
+    }
     bool wants_switching() const override { return watcher_ != nullptr || keeps_switching(); }
     void tick(const ClosedLoop<D>& loop, const ControlCourse& course, const StateOf<D>& x,
               const typename D::Memory& memory) override {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <map>
 #include <optional>
@@ -35,6 +36,7 @@ struct TrainStart {
 struct TrainOptions : RunRequest {
     std::vector<double> instants;              // to record [s], ascending; exact solver, without control_out
     std::optional<std::vector<int>> channels;  // to record, by their place among TrainRun::channels(); left out, all
+    std::function<bool()> enough;              // whether the samples up to the pause, which is written, suffice
     double tolerance = 0.0;                    // relative, of the adaptive solver; 0: the exact one
 
     SampleTimes times() const { return {sample_interval, instants.empty() ? samples : instants.size(), instants}; }

@@ -37,6 +37,8 @@ class Observer {
     virtual void tick(const ClosedLoop<D>&, const ControlCourse&, const StateOf<D>&, const typename D::Memory&) {}
     // What has been seen but not yet read must be read: the inputs change. False ends the run.
     virtual bool flush() { return true; }
+    // At the pause of a run under controllers, before the tick there: whether the run ends.
+    virtual bool enough() { return false; }
     // Controllers, at the end of a run.
     virtual void finish(const ClosedLoop<D>&) {}
 };

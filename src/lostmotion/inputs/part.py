@@ -72,6 +72,10 @@ class Part(BaseModel):
             return super().model_copy(deep=deep)
         return type(self)(**({name: getattr(self, name) for name in self.model_fields_set} | dict(update)))
 
+    def unchecked(self, **changes: Any) -> Self:
+        """A copy with changes that are known to be valid, in a small part of the time of `model_copy`."""
+        return super().model_copy(update=changes)
+
     @classmethod
     def model_validate_json(cls, json_data: str | bytes | bytearray, **options: Any) -> Self:
         """Make the part from JSON, as the constructor does."""

@@ -6,6 +6,7 @@ from typing import Self
 from pydantic import model_validator
 
 from .. import _core
+from ..inputs.kept import kept
 from ..inputs.part import Part
 from .gear import Gear
 from .gearbox import Gearbox
@@ -73,12 +74,10 @@ class Drive(Part):
 
     def train(self) -> DriveTrain:
         """The same drive as a train: shafts `motor` and `load`, joined by the gear `gearbox`, and on the first the motor `motor`."""
-        load = Shaft(**{name: getattr(self.load, name) for name in Load.model_fields})
-        values = {name: getattr(self.motor, name) for name in Motor.model_fields}
         return DriveTrain(
-            shafts={"motor": Shaft(), "load": load},
-            motors={"motor": ShaftMotor(shaft="motor", **values)},
-            gears={"gearbox": Gear.of(self.gearbox, input="motor", output="load")},
+            shafts={"motor": Shaft(), "load": _load_shaft(self.load)},
+            motors={"motor": _motor_on_shaft(self.motor)},
+            gears={"gearbox": _gear(self.gearbox)},
         )
 
     def named_train(self) -> NamedDrive:
@@ -98,6 +97,21 @@ class Drive(Part):
         gearbox, losses = self.gearbox, self.gearbox.losses
         least = 1.0 + losses.core().least_slope_over_load() if isinstance(losses, LossMap) else 1.0 / losses.efficiency
         return self.motor.rotor_inertia + gearbox.inertia + least * self.load.inertia / (gearbox.ratio * gearbox.ratio)
+
+
+@kept
+def _load_shaft(load: Load) -> Shaft:
+    return Shaft(**{name: getattr(load, name) for name in Load.model_fields})
+
+
+@kept
+def _motor_on_shaft(motor: Motor) -> ShaftMotor:
+    return ShaftMotor(shaft="motor", **{name: getattr(motor, name) for name in Motor.model_fields})
+
+
+@kept
+def _gear(gearbox: Gearbox) -> Gear:
+    return Gear.of(gearbox, input="motor", output="load")
 
 
 @lru_cache(maxsize=16)  # each keeps the regimes of its runs, a few megabytes

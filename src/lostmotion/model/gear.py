@@ -5,6 +5,7 @@ from typing import Annotated, Any, Self
 from pydantic import Field, model_validator
 
 from ..errors import InputError
+from ..inputs.kept import kept
 from .angle_torques import TransmissionError
 from .couplings import BetweenShafts
 from .gearbox import Gearbox, Transmission
@@ -47,6 +48,7 @@ class Gear(Transmission, BetweenShafts):
                     raise ValueError(f"lacks {key}, by which the loss map is scaled; add it")
         return self
 
+    @kept
     def core_fields(self) -> dict[str, Any]:
         """Fields for the core, in SI units, without those that are None."""
         error = self.transmission_error

@@ -121,6 +121,16 @@ class DriveScenario(Scenario):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
+        self.check()
+        return self
+
+    def check(self) -> None:
+        """Refuse parts that do not fit together.
+
+        Raises
+        ------
+        ValueError
+        """
         drive = self.drive()
         check_on_reference(self.initial, self.axes(), ("load_angle", "load_speed", "motor_speed"))
         start = self.begin()
@@ -141,7 +151,6 @@ class DriveScenario(Scenario):
             )
         check_torques(self.axes(), {"motor": start.motor_torque}, "initial.motor_torque")
         self.control()
-        return self
 
     def axes(self) -> dict[str, Controller]:
         return {} if self.controller is None else {"motor": self.controller}

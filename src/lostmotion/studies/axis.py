@@ -1,5 +1,6 @@
 """Task of an axis, and the scenario of one motor and gearbox for it: tuned by rule, its cycle repeated."""
 
+import itertools
 import math
 from functools import lru_cache
 from typing import Annotated, Any, Literal, Self
@@ -7,11 +8,9 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from ..control.controller import AnyCurrent, Controller
-from ..control.loops import Feedforward, FirstOrderCurrent, SampledCurrent
+from ..control.controller import AnyCurrent
 from ..control.references import Move, PositionReference
 from ..control.sample_times import whole_multiple
-from ..control.tuning import TwoInertias, suited
 from ..inputs.part import Part
 from ..inputs.quantities import (
     Acceleration,
@@ -29,20 +28,17 @@ from ..inputs.quantities import (
 )
 from ..inputs.validation import unknown_key
 from ..model.duty import Amplifier, Duty, HoldingBrake, Supply
-from ..model.gearbox import Gearbox
 from ..model.motor import Motor, MotorLimits
-from ..model.signals import Samples, TimeFunction, TorqueSignal
+from ..model.signals import TimeFunction, TorqueSignal
 from ..model.task import Task
-from ..servo.data import lag_sum, secant
-from ..simulation.drive_scenario import DriveScenario, Initial, LoadTable
-from ..simulation.scenario import SimulationTable
+from ..simulation.drive_scenario import DriveScenario
 from ..sizing.finding import SOURCES
 from ..sizing.motion_check import INERTIA_RATIO
-from ..sizing.required_motion import duty_torque, required_motion
 from .select import Bound
 
 REPEATS = 0.01  # relative difference of two cycles, within which the motion repeats
 FEWEST = 2  # cycles
+ONE_WAY = "is the difference between moves in both directions, and all moves of controller.reference go one way"
 WHOLE = 1e-9  # relative, within which periods fit into a cycle
 
 # What a task asks for, and the column that it limits.
@@ -215,6 +211,15 @@ class AxisTask(Task, Duty):
                 raise ValueError(
                     f"task.{key}: is of the rest between moves, and controller.reference has no moves; leave it out"
                 )
+        if self.max_reversal_error is not None and not turns_back(reference):
+            raise ValueError(f"task.max_reversal_error: {ONE_WAY}; leave it out")
+
+
+def turns_back(reference: PositionReference) -> bool:
+    """Whether its moves go in both directions."""
+    positions = [reference.start, *(move.to for move in reference.moves)]
+    steps = [b - a for a, b in itertools.pairwise(positions)]
+    return bool(steps) and min(steps) < 0.0 < max(steps)
 
 
 def _up_to(motor: Motor, current: float) -> Motor:
@@ -311,103 +316,3 @@ def repeated_torque(torque: TorqueSignal, cycle: float, count: int) -> TorqueSig
     if torque.samples is None:
         return torque
     return torque.model_copy(update={"samples": _tiled(torque.samples, cycle, count, 0.0, "load.torque")})
-
-
-def load_torque_of(base: DriveScenario, task: AxisTask) -> TorqueSignal:
-    """The load torque of one cycle: that of the base, with what the duty of the task adds along the reference."""
-    if not task.anything:
-        return base.load.torque
-    duty = Duty(gravity=task.gravity, payload=task.payload, process=task.process)
-    return _duty_torque(reference_of(base), base.load, task.cycle, duty, task.rise)
-
-
-@lru_cache(maxsize=32)
-def _duty_torque(
-    reference: PositionReference, load: LoadTable, cycle: float, duty: Duty, rise: float | None
-) -> TorqueSignal:
-    times, torques = duty_torque(required_motion(reference, load, cycle, duty, rise), load)
-    return TorqueSignal(samples=Samples(times=tuple(times.tolist()), values=tuple(torques.tolist())))
-
-
-def axis_scenario(base: DriveScenario, motor: Motor, gearbox: Gearbox, task: AxisTask, count: int) -> DriveScenario:
-    """The base with a motor, a gearbox and gains by rule for them, over so many cycles, from rest where the reference begins.
-
-    Raises
-    ------
-    InputError
-        The parts do not fit together.
-    """
-    reference, cycle = reference_of(base), task.cycle
-    controller = tuned(base, motor, gearbox, task.current)
-    torque = load_torque_of(base, task)
-    return base.model_copy(
-        update={
-            "motor": motor,
-            "gearbox": gearbox,
-            "controller": controller.model_copy(update={"reference": repeated(reference, cycle, count)}),
-            "load": base.load.model_copy(update={"torque": repeated_torque(torque, cycle, count)}),
-            "simulation": SimulationTable(duration=count * cycle, sample_interval=controller.sample_time),
-            "initial": Initial(load_angle=float(reference.at(0.0)[0])),
-        }
-    )
-
-
-def with_scale_alone(base: DriveScenario) -> DriveScenario:
-    """The base with the scale of its slide as the only encoder, as with a linear motor."""
-    controller = base.controller
-    assert controller is not None
-    assert controller.position_encoder is not None
-    scale = controller.position_encoder.model_copy(update={"shaft": None})
-    return base.model_copy(update={"controller": controller.model_copy(update={"encoder": scale})})
-
-
-def current_loop(controller: Controller, wanted: AnyCurrent | None, motor: Motor) -> AnyCurrent:
-    """The current loop of a task for a motor: of a torque source, whose winding is not known, a lag as long as that of a sampled loop.
-
-    A closed loop g/(z (z - 1)) lags by T/g at low frequency, the delay of its output included.
-    """
-    found = controller.current if wanted is None else wanted
-    if motor.kind != "torque_source" or not isinstance(found, SampledCurrent):
-        return found
-    lag = (found.sample_time or controller.sample_time) / found.gain - controller.delay * controller.sample_time
-    return FirstOrderCurrent(kind="first_order", time_constant=max(lag, 0.5 * controller.sample_time))
-
-
-def tuned(base: DriveScenario, motor: Motor, g: Gearbox, current: AnyCurrent | None = None) -> Controller:
-    """Controller of the base with gains by rule for a motor, a gearbox and its load. The torque of their inertia is
-    fed forward. `current` is its current loop, if not that of the base."""
-    assert base.controller is not None
-    controller = base.controller
-    controller = controller.model_copy(update={"current": current_loop(controller, current, motor)})
-    assert controller.position is not None
-    assert controller.speed is not None
-    J_M, J_L = motor.rotor_inertia + g.inertia, base.load.inertia / g.ratio**2
-    drive = TwoInertias(J_M, J_L, secant(g) / g.ratio**2)
-    gains = suited(drive, lag_sum(controller), controller.loop_time("position"))
-    feedforward = controller.feedforward
-    if feedforward == Feedforward():
-        feedforward = Feedforward(inertia=J_M + J_L)
-    speed: dict[str, Any] = {
-        "gain": gains.speed.gain,
-        "integral_gain": gains.speed.integral_gain,
-        "integral_time": None,
-    }
-    if controller.speed.torque_limit is None:
-        speed["torque_limit"] = torque_limit(motor)
-    return controller.model_copy(
-        update={
-            "position": controller.position.model_copy(update={"gain": gains.position}),
-            "speed": controller.speed.model_copy(update=speed),
-            "feedforward": feedforward,
-        }
-    )
-
-
-def torque_limit(motor: Motor) -> float | None:
-    """By the largest current, or the peak torque if that is less [N·m]; None where neither is given."""
-    limits, found = motor.limits, [motor.largest_torque]
-    if limits is not None and limits.peak_torque is not None:
-        found.append(limits.peak_torque)
-    if limits is not None and limits.max_current is not None and limits.torque_constant is not None:
-        found.append(limits.max_current * limits.torque_constant)
-    return None if math.isinf(min(found)) else min(found)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -13,8 +15,8 @@ from ..simulation.results import RunArrays
 from ..sizing.duty_cycle import DutyCycle
 from ..sizing.motor_check import rms_rise
 from ..sizing.thermal import TwoBodies
-from .axis import AxisTask, reference_of
 from .axis_electrical import Electrical
+from .axis_scenario import Cycles, last_cycle
 
 COLUMNS = {
     "current_peak": ("A", "largest current of the motor; of a synchronous one amplitude of a phase"),
@@ -92,20 +94,29 @@ def rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values[:-1] ** 2)))
 
 
-def last_cycle(result: RunArrays, count: int, back: int = 1) -> slice:
-    """The samples of the last of so many cycles, both ends included; `back` = 2 for the one before."""
-    each = (len(result.time) - 1) // count
-    return slice((count - back) * each, (count - back + 1) * each + 1)
-
-
 def change(result: RunArrays, count: int) -> float:
     """By how much the last two cycles differ in rms torque and rms twist, and in the mean distance from the reference."""
-    last, before = last_cycle(result, count), last_cycle(result, count, 2)
+    last, before = (last_cycle(len(result.time), count, back) for back in (1, 2))
     found = 0.0
     for name in ("motor_torque", "twist", "load_speed"):
         a, b = rms(result[name][last]), rms(result[name][before])
         found = max(found, abs(a - b) / max(a, b, math.ulp(0.0)))
     return found
+
+
+@dataclass(frozen=True)
+class Repeated:
+    """Run of a candidate that repeats, or has as many cycles as the task permits."""
+
+    scenario: DriveScenario
+    cycles: Cycles
+    result: RunArrays
+    change: float
+
+    @cached_property
+    def duty(self) -> DutyCycle:
+        """The last cycle as the rules of the drive check take it."""
+        return duty_cycle_of(self.result, self.cycles.last, self.cycles.task.cycle)
 
 
 def duty_cycle_of(result: RunArrays, cycle: slice, period: float) -> DutyCycle:
@@ -136,15 +147,12 @@ def temperatures_of(motor: Motor, time: np.ndarray, square: np.ndarray, ambient:
     return math.nan if rise is None else ambient + rise, math.nan
 
 
-def row_of(
-    scenario: DriveScenario, task: AxisTask, result: RunArrays, count: int, *, slides: bool = False
-) -> dict[str, float]:
+def row_of(run: Repeated, *, slides: bool = False) -> dict[str, float]:
     """The columns of one run; `slides`: of a linear motor, which has no torque, no input shaft and no ratio of inertias."""
-    here = last_cycle(result, count)
+    scenario, result, here, duty = run.scenario, run.result, run.cycles.last, run.duty
     time = result.time[here]
-    duty = duty_cycle_of(result, here, task.cycle)
     e = Electrical.of(scenario, result, here)
-    winding, case = temperatures_of(scenario.motor, time, e.heating_square, task.ambient_temperature)
+    winding, case = temperatures_of(scenario.motor, time, e.heating_square, run.cycles.task.ambient_temperature)
     g, torque = scenario.gearbox, result["motor_torque"][here]
     power = torque * result["motor_speed"][here]
     given = 0.5 * (power[1:] + power[:-1]) * np.diff(time)
@@ -152,7 +160,7 @@ def row_of(
     assert controller is not None
     assert controller.position is not None
     assert controller.speed is not None
-    error = result["load_angle"] - reference_of(scenario).at(result.time)[0]
+    error = result["load_angle"][here] - run.cycles.position
     peak, mean = float(np.abs(torque).max()), math.sqrt(float(e.torque_square.mean()))
     columns = {
         "current_peak": float(np.abs(e.current).max()),
@@ -168,17 +176,17 @@ def row_of(
         "input_speed_peak": duty.peak_input_speed,
         "input_speed_mean": duty.mean_input_speed(),
         "inertia_ratio": scenario.load.inertia / (g.ratio**2 * (scenario.motor.rotor_inertia + g.inertia)),
-        "tracking_error_peak": float(np.abs(error[here]).max()),
-        "tracking_error_rms": rms(error[here]),
-        **_at_rest(scenario, task, time, error[here], count),
+        "tracking_error_peak": float(np.abs(error).max()),
+        "tracking_error_rms": rms(error),
+        **_at_rest(run.cycles, error),
         "energy": float(np.maximum(e.energy, 0.0).sum()),
         "energy_returned": float(-np.minimum(e.energy, 0.0).sum()),
         "mechanical_energy": float(np.maximum(given, 0.0).sum()),
         "position_gain": controller.position.gain,
         "speed_gain": controller.speed.gain,
         "integral_gain": controller.speed.k_i,
-        "cycles": float(count),
-        "change": change(result, count),
+        "cycles": float(run.cycles.count),
+        "change": run.change,
     }
     if not slides:
         return columns
@@ -186,29 +194,18 @@ def row_of(
     return {name: value for name, value in columns.items() if name not in OF_ROTARY_MOTORS} | forces
 
 
-def _at_rest(
-    scenario: DriveScenario, task: AxisTask, time: np.ndarray, error: np.ndarray, count: int
-) -> dict[str, float]:
+def _at_rest(cycles: Cycles, error: np.ndarray) -> dict[str, float]:
     """Settling time and reversal error, from the rests after the moves of the last cycle."""
-    reference = reference_of(scenario)
-    window = task.settling_window
+    window, time = cycles.task.settling_window, cycles.time[cycles.last]
     ends: dict[float, list[float]] = {1.0: [], -1.0: []}
-    settling = [0.0] if reference.moves and window is not None else [math.nan]
-    moves = len(reference.moves) // count
-    positions = [reference.start, *(move.to for move in reference.moves)]
-    intervals = reference.intervals()
-    for k in range(len(positions) - 1 - moves, len(positions) - 1):
-        end = intervals[k][1]
-        following = intervals[k + 1][0] if k + 1 < len(intervals) else time[-1]
-        rest = (time >= end) & (time <= following)
-        if not rest.any() or positions[k + 1] == positions[k]:
-            continue
-        ends[math.copysign(1.0, positions[k + 1] - positions[k])].append(float(error[rest][-1]))
+    settling = [0.0] if cycles.reference.moves and window is not None else [math.nan]
+    for direction, end, rest in cycles.rests:
+        ends[direction].append(float(error[rest][-1]))
         if window is not None:
             outside = np.flatnonzero(np.abs(error[rest]) > window)
             if len(outside):
-                stays = outside[-1] + 1 < int(rest.sum())
-                settling.append(float(time[rest][outside[-1] + 1] - end) if stays else math.inf)
+                stays = rest.start + outside[-1] + 1
+                settling.append(float(time[stays] - end) if stays < rest.stop else math.inf)
     both = ends[1.0] and ends[-1.0]
     reversal = abs(float(np.mean(ends[1.0]) - np.mean(ends[-1.0]))) if both else math.nan
     return {"reversal_error": reversal, "settling_time": max(settling)}

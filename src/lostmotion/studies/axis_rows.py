@@ -14,8 +14,6 @@ from ..errors import InputError
 from ..model.gearbox import Gearbox
 from ..model.motor import Motor
 from ..simulation.drive_scenario import DriveScenario
-from ..simulation.results import RunArrays
-from ..simulation.run import run
 from ..sizing.axis_rules import (
     derated,
     emergency_stop,
@@ -42,8 +40,9 @@ from ..sizing.required_motion import (
 from ..sizing.stages import DIRECT, Stage, at_input, together
 from ..sizing.supply import amplifier_rules, effective_current, electrical_power, returned, supply_rules
 from ..worker_threads import thread_pool
-from .axis import FEWEST, REPEATS, AxisTask, reference_of
-from .axis_columns import COLUMNS, change, duty_cycle_of, last_cycle, row_of
+from .axis import AxisTask, reference_of
+from .axis_columns import COLUMNS, Repeated, row_of
+from .axis_run import until_it_repeats
 from .check import ESTIMATED, columns_of
 from .check import TASK_COLUMNS as CHECKS
 from .choice import CHOICE, lacks, value_of
@@ -313,31 +312,19 @@ class Axes:
         InputError, SolverError
             It cannot be run.
         """
-        scenario, result, count = self.until_it_repeats(row)
-        columns = row_of(scenario, self.task, result, count, slides=self.study.slides_itself(row))
-        found = self._after_run(row, scenario, result, count, columns["winding_temperature"])
+        made = until_it_repeats(self.study, row)
+        columns = row_of(made, slides=self.study.slides_itself(row))
+        found = self._after_run(row, made, columns["winding_temperature"])
         chosen = {column: value for column, (value, _) in self.choice(row).items()}
-        return columns_of(found, CHECKS) | columns | chosen, int(result.attrs["switching_count"])
+        return columns_of(found, CHECKS) | columns | chosen, int(made.result.attrs["switching_count"])
 
-    def until_it_repeats(self, row: np.ndarray) -> tuple[DriveScenario, RunArrays, int]:
-        """Runs twice as many cycles again and again, until the last two agree, or there are as many as the task permits."""
-        count = FEWEST
-        while True:
-            scenario = self.study.axis_at(row, count)
-            result = run(scenario, energy=False)
-            if count >= self.task.max_cycles or change(result, count) <= REPEATS:
-                return scenario, result, count
-            count = min(2 * count, self.task.max_cycles)
-
-    def _after_run(
-        self, row: np.ndarray, scenario: DriveScenario, result: RunArrays, count: int, winding: float
-    ) -> list[Finding]:
+    def _after_run(self, row: np.ndarray, made: Repeated, winding: float) -> list[Finding]:
         """The same rules, of the cycle that was run, and the temperature of its winding [°C]; those that only the required motion
         has are of that."""
-        here, task, slides = last_cycle(result, count), self.task, self.study.slides_itself(row)
-        duty, g, m = duty_cycle_of(result, here, task.cycle), scenario.gearbox, scenario.motor
+        here, task, slides, result = made.cycles.last, self.task, self.study.slides_itself(row), made.result
+        duty, g, m = made.duty, made.scenario.gearbox, made.scenario.motor
         command, torque, speed = (result[name][here] for name in ("command", "motor_torque", "motor_speed"))
-        command = command_of_run(m, scenario.controller, command, torque, speed)
+        command = command_of_run(m, made.scenario.controller, command, torque, speed)
         oriented = oriented_amplitudes(result, "motor")
         of_motor = [
             largest_speed(m, duty.peak_input_speed, slides=slides),

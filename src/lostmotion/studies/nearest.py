@@ -20,6 +20,8 @@ from .study import Study
 SLOWEST = 10.0  # times as long as the cycle of the task, the longest that is tried
 STEPS = 12  # halvings: the factor is found to 0.3 % at most
 FITS = "fits if"  # begins what is said of a cycle that fits
+AT_ANY_TIME = (*CHOICE, "inertia_ratio", "lost_motion", "output_bearing", "holding_brake", "amplifier_voltage")
+"""limits of what does not depend on the time of the cycle"""
 TRIES = (1.02, 1.05, 1.1, 1.2, 1.5, 2.0, 3.0)  # factors for a candidate whose run violates a limit
 DIGITS = 100.0  # of a factor: it is rounded up to hundredths
 
@@ -134,8 +136,8 @@ def _slowed_signal(signal: Any, factor: float) -> Any:
 
 def _tried(study: Study, miss: Miss) -> Miss:
     """With the least factor by which the cycle has to be longer, if there is one, and what rules and run say of it."""
-    if set(miss.lacks) & set(CHOICE):
-        return Miss(miss.candidate, miss.lacks, None, "a slower cycle does not change its parts")
+    if same := [limit for limit in miss.lacks if limit in AT_ANY_TIME]:
+        return Miss(miss.candidate, miss.lacks, None, f"a slower cycle does not change {' and '.join(same)}")
     row = study.parameters(miss.candidate.run, miss.candidate.run + 1)[0]
     try:
         if miss.candidate.ran:

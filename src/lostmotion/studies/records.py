@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from ..data_sheets.train_components import CONDITIONS, RECORD_KINDS, RECORDS, wi
 from ..errors import InputError
 from ..inputs.schema import unit_in_schema
 from ..inputs.toml_files import is_in_file
-from ..inputs.validation import listed, shown
+from ..inputs.validation import did_you_mean, listed, shown
 from ..simulation.scenario import Scenario
 from ..simulation.scenario_files import scenario_from
 from ..simulation.units_of_keys import in_si
@@ -108,19 +108,45 @@ def names_that_fit(table: str, wanted: Mapping[str, Any]) -> list[str]:
             raise ValueError(f"has catalogue.{key} = {shown(value)}: {error}") from None
         if not bounds[key][0] <= bounds[key][1]:
             raise ValueError(f"has catalogue.{key} = {shown(value)}, which is reversed; the least value comes first")
-    found = []
-    for record in catalogue():
-        if not isinstance(record, KINDS[table]) or (record.illustrative and "name" not in wanted):
-            continue
-        texts = all(fnmatchcase(str(getattr(record, k)), v) for k, v in wanted.items() if _is_text(k))
-        numbers = {key: getattr(record, key) for key in bounds}
-        if texts and all(x is not None and bounds[k][0] <= x <= bounds[k][1] for k, x in numbers.items()):
-            found.append(record.name)
+    records = [r for r in catalogue() if isinstance(r, KINDS[table]) and (not r.illustrative or "name" in wanted)]
+
+    def fits(record: Any, key: str) -> bool:
+        value = getattr(record, key)
+        if _is_text(key):
+            return fnmatchcase(str(value).lower(), wanted[key].lower())
+        return value is not None and bounds[key][0] <= value <= bounds[key][1]
+
+    found = [record.name for record in records if all(fits(record, key) for key in wanted)]
     if not found:
         raise ValueError(
-            f"has a catalogue filter that no {table.replace('_', ' ')} fits; `lostmotion catalogue` lists them"
+            _why_none_fits(table, wanted, {key: [fits(r, key) for r in records] for key in wanted}, records)
         )
     return found
+
+
+def _why_none_fits(
+    table: str, wanted: Mapping[str, Any], fits: Mapping[str, list[bool]], records: Sequence[Any]
+) -> str:
+    """Which condition of a filter lets nothing through, or how many records fit without each of them."""
+    name = table.replace("_", " ")
+    for key in wanted:
+        if any(fits[key]):
+            continue
+        values = [value for r in records if (value := getattr(r, key)) is not None]
+        if _is_text(key):
+            names = sorted({value for value in values if value})
+            there = did_you_mean(str(wanted[key]), names, f"there are {', '.join(names)}")
+        elif values:
+            unit = unit_in_schema(KINDS[table].model_json_schema()["properties"][key])
+            there = f"they go from {min(values):.4g} to {max(values):.4g}{'' if unit in ('', '1') else f' {unit}'}"
+        else:
+            there = "no record has it"
+        return f"has catalogue.{key} = {shown(wanted[key])}, which no {name} of the catalogue has; {there}"
+    rest = {
+        key: sum(all(f[k] for other, f in fits.items() if other != key) for k in range(len(records))) for key in wanted
+    }
+    without = ", ".join(f"{count} without {key}" for key, count in rest.items() if count) or "leave two of them out"
+    return f"has a catalogue filter that no {name} fits: {without}; `lostmotion catalogue` lists them"
 
 
 def _is_text(key: str) -> bool:

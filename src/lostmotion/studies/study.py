@@ -22,9 +22,10 @@ from ..simulation.train_scenario import TrainScenario
 from ..simulation.units_of_keys import unit_in, unit_of_key
 from ..sizing.stages import stage_of, together
 from ..sizing.whole_drives import LINEAR, WHOLE, whole_drive
-from .axis import FEWEST, AxisTask, axis_scenario, with_scale_alone
+from .axis import FEWEST, ONE_WAY, AxisTask, reference_of, turns_back
 from .axis_columns import COLUMNS as AXIS_COLUMNS
 from .axis_columns import unit_of_column
+from .axis_scenario import axis_scenario, with_scale_alone
 from .check import ESTIMATED
 from .design import unit_cube
 from .expressions import Expression, read_expression
@@ -224,6 +225,14 @@ class Study(Part):
             if column not in units:
                 raise ValueError(f"select: {column!r} is no column of numbers; they are {listed(units)}")
         check_bounds(select, units)
+        if self.axis is not None:
+            reference = reference_of(self.drive)
+            if "reversal_error" in select.named() and not turns_back(reference):
+                raise ValueError(f"select: reversal_error {ONE_WAY}; leave it out")
+            if "settling_time" in select.named() and (self.axis.settling_window is None or not reference.moves):
+                raise ValueError(
+                    "select: settling_time needs task.settling_window, and moves; add them, or leave it out"
+                )
 
     @property
     def tables(self) -> dict[str, Any]:
@@ -262,12 +271,21 @@ class Study(Part):
         """
         motor, gearbox = self.part("motor", row), self.part("gearbox", row)
         assert self.axis is not None
-        base = self.drive
-        if self.slides_itself(row):
-            base = with_scale_alone(base)
-        elif self.axis.linear is not None:
-            gearbox = together(gearbox, self.part("stage", row))
-        return axis_scenario(base, motor, gearbox, self.axis, cycles)
+        if self.axis.linear is not None and not self.slides_itself(row):
+            gearbox = self._with_stage(gearbox, row)
+        return axis_scenario(self.base_of(row), motor, gearbox, self.axis, cycles)
+
+    def base_of(self, row: np.ndarray) -> DriveScenario:
+        """The base of a row of a task: of a linear motor with the scale alone."""
+        return with_scale_alone(self.drive) if self.slides_itself(row) else self.drive
+
+    def _with_stage(self, gearbox: Any, row: np.ndarray) -> Any:
+        """A gearbox and the stage of a row behind it as one, made once."""
+        assert self.axis is not None
+        keys = self.part_key("gearbox", row), self.part_key(str(self.axis.stage_kind), row)
+        if keys not in self.kept:
+            self.kept[keys] = together(gearbox, self.part("stage", row))
+        return self.kept[keys]
 
     def whole_drive(self, row: np.ndarray) -> tuple[str, int] | None:
         """Key and place in `vary` of the whole drive of a row of a task; None of a pair of motor and gearbox."""

@@ -1,0 +1,84 @@
+"""Run of a candidate of a task: its cycle again and again, until two of them agree."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .. import _core
+from ..control.axis import driven
+from ..simulation.drive_scenario import DriveScenario
+from ..simulation.results import RunArrays
+from ..simulation.run import BYTES_PER_VALUE, check_memory, run
+from ..simulation.windings import oriented
+from .axis import FEWEST, REPEATS
+from .axis_columns import Repeated, change
+from .axis_scenario import Cycles, begins_alike, cycles_of, over
+
+if TYPE_CHECKING:
+    from .study import Study
+
+VARIABLES = ("command", "motor_torque", "motor_speed", "output_torque", "load_angle", "load_speed", "twist")
+"""of which the columns of a task are made"""
+
+
+def until_it_repeats(study: Study, row: np.ndarray) -> Repeated:
+    """Runs twice as many cycles again and again, until the last two agree, or there are as many as the task permits.
+
+    A longer run goes on where the shorter one ends, if both begin alike: the result is that of a run of its own.
+    """
+    task, count, base = study.axis, FEWEST, study.base_of(row)
+    assert task is not None
+    while True:
+        most = min(2 * count, task.max_cycles)
+        shorter, longer = (cycles_of(base, task, n) for n in (count, most))
+        scenario = study.axis_at(row, most)
+        if most > count and begins_alike(shorter, longer) and not any(oriented(scenario)):
+            result = _run(scenario, shorter, longer)
+            if len(result.time) > shorter.simulation.samples:
+                count = most
+        else:
+            scenario = study.axis_at(row, count)
+            result = run(scenario, energy=False)
+        apart = change(result, count)
+        if count >= task.max_cycles or apart <= REPEATS:
+            cycles = cycles_of(base, task, count)
+            return Repeated(over(scenario, cycles), cycles, result, apart)
+        count = min(2 * count, task.max_cycles)
+
+
+def _run(scenario: DriveScenario, shorter: Cycles, longer: Cycles) -> RunArrays:
+    """Run of the shorter cycles if the last two of them agree, else of the longer ones, which are those of the scenario."""
+    samples = shorter.simulation.samples
+    check_memory(len(longer.time), BYTES_PER_VALUE * len(VARIABLES))
+    values = np.empty((len(VARIABLES), len(longer.time)))
+
+    def until(end: int, **attributes: int) -> RunArrays:
+        named = {name: row[:end] for name, row in zip(VARIABLES, values, strict=True)}
+        return RunArrays(longer.time[:end], named, attributes, scenario)
+
+    stopped = False
+
+    def enough() -> bool:
+        nonlocal stopped
+        stopped = change(until(samples), shorter.count) <= REPEATS
+        return stopped
+
+    train = scenario.train().core(("load",), {"motor": driven(scenario.axes()["motor"])})
+    train.short_form = True
+    signals, numbers = scenario.signals(), {name: k for k, (name, *_) in enumerate(train.channels())}
+    switchings = _core.run_into(
+        values,
+        train,
+        [signals[name].core() for name in train.input_names()],
+        scenario.start(),
+        scenario.capacities(),
+        longer.simulation.duration,
+        longer.simulation.sample_interval,
+        scenario.control(),
+        [numbers[name] for name in VARIABLES],
+        samples - 1,
+        enough,
+    )
+    return until(samples if stopped else len(longer.time), switching_count=switchings)
