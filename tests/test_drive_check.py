@@ -74,8 +74,8 @@ def test_means_are_those_of_the_maker_s_worked_example():
     time = np.repeat(ends, 2)[1:-1]
     speed, torque = (np.repeat([p[k] for p in pattern], 2) for k in (1, 2))
     cycle = DutyCycle(time, speed * RPM, torque, torque, 0.0, 3.9)
-    assert cycle.mean_output_torque() == pytest.approx(319.0, abs=1.0)
-    assert cycle.mean_input_speed() / RPM == pytest.approx(12.0, abs=0.05)
+    assert cycle.mean_output_torque == pytest.approx(319.0, abs=1.0)
+    assert cycle.mean_input_speed / RPM == pytest.approx(12.0, abs=0.05)
 
 
 def test_heat_and_loads_do_not_depend_on_how_long_the_run_rests_afterwards():
@@ -115,10 +115,10 @@ def test_holding_a_load_heats_even_at_rest():
         **{"command.mean": 0.3, "load.torque": 15.0, "task.hold_without_power": False, "motor.friction_torque": 1e-3},
     )
     cycle = duty_cycle(lm.simulate(scenario), 100.0)
-    assert cycle.rms_motor_torque() == pytest.approx(0.3, rel=0.01)
+    assert cycle.rms_motor_torque == pytest.approx(0.3, rel=0.01)
     at_rest = duty_cycle(lm.simulate(move(1.0, command=0.0)), None)
     assert not at_rest.moves
-    assert at_rest.rms_motor_torque() == at_rest.mean_output_torque() == 0.0
+    assert at_rest.rms_motor_torque == at_rest.mean_output_torque == 0.0
     assert "at rest" in str(at_rest)
 
 
@@ -128,7 +128,7 @@ def test_the_reversal_of_a_sine_is_no_rest():
     cycle = duty_cycle(lm.simulate(move(1.0, command=sine)), None)  # ends at zero speed, at the largest torque
     assert cycle.holding_torque is None
     assert cycle.duration == pytest.approx(1.0)
-    assert cycle.rms_motor_torque() == pytest.approx(0.5 / math.sqrt(2.0), rel=1e-3)
+    assert cycle.rms_motor_torque == pytest.approx(0.5 / math.sqrt(2.0), rel=1e-3)
     # Nor is a shaft that sticks at each reversal, while the torque on it rises.
     small = duty_cycle(lm.simulate(lm.load(ROOT / "scenarios" / "paper-2dof-nl-small.toml")), None)
     assert small.duration == 2.0

@@ -19,8 +19,8 @@ from lostmotion.sizing.duty_cycle import DutyCycle
 from lostmotion.sizing.required_motion import check_motor, input_demand, required_motion
 from lostmotion.studies.axis import repeated
 from lostmotion.studies.axis_columns import COLUMNS
-from lostmotion.studies.axis_scenario import last_cycle
 from lostmotion.studies.axis_electrical import Electrical
+from lostmotion.studies.axis_scenario import last_cycle
 from lostmotion.studies.study import Study
 from lostmotion.studies.task_file import task_of
 
@@ -66,6 +66,9 @@ TABLES: dict[str, Any] = {
         {"key": "motor", "values": ["maxon-ec-i-52-606793", "faulhaber-3242g024bx4"]},
     ],
 }
+
+
+ONE_WAY = TABLES["controller"] | {"reference": TABLES["controller"]["reference"] | {"moves": [{"to": DISTANCE}]}}
 
 
 def changed(**tables: Any) -> dict[str, Any]:
@@ -151,7 +154,7 @@ def motor_torques() -> list[float]:
 
 def test_rms_torque_of_trapezoidal_moves(demand: Any):
     by_hand = math.sqrt(2 * sum(t * T**2 for (t, _, _), T in zip(phases(), motor_torques(), strict=True)) / CYCLE)
-    found = demand.cycle(demand.motor_torque(MOTOR)).rms_motor_torque()
+    found = demand.cycle(demand.motor_torque(MOTOR)).rms_motor_torque
     assert found == pytest.approx(by_hand, rel=1e-7)
 
 
@@ -159,8 +162,8 @@ def test_cubic_mean_of_trapezoidal_moves(demand: Any):
     turned = sum(t * w for t, w, _ in phases())
     by_hand = (sum(t * w * abs(T) ** 3 for t, w, T in phases()) / turned) ** (1 / 3)
     cycle: DutyCycle = demand.cycle(demand.motor_torque(MOTOR))
-    assert cycle.mean_output_torque() == pytest.approx(by_hand, rel=1e-7)
-    assert cycle.mean_input_speed() == pytest.approx(2 * RATIO * DISTANCE / CYCLE, rel=1e-7)
+    assert cycle.mean_output_torque == pytest.approx(by_hand, rel=1e-7)
+    assert cycle.mean_input_speed == pytest.approx(2 * RATIO * DISTANCE / CYCLE, rel=1e-7)
 
 
 def test_peak_current_voltage_and_inertia_ratio(demand: Any):
@@ -327,7 +330,7 @@ def test_the_run_takes_about_what_the_rules_require(task: Study, result: Any):
         parameters = task.parameters(int(row["run"]), int(row["run"]) + 1)[0]
         motion = required_motion(repeated(task.scenario.controller.reference, CYCLE, 1), task.scenario.load, CYCLE)
         found = input_demand(motion, task.part("gearbox", parameters))
-        rms = found.cycle(found.motor_torque(task.part("motor", parameters))).rms_motor_torque()
+        rms = found.cycle(found.motor_torque(task.part("motor", parameters))).rms_motor_torque
         assert float(row["motor_torque_rms"]) == pytest.approx(rms, rel=0.1)
 
 
@@ -416,6 +419,12 @@ def test_the_last_cycle_has_both_of_its_ends():
         ({"vary": [{"key": "load.inertia", "values": [1.0]}]}, "of a task motor and gearbox vary|lacks|motor"),
         ({"vary": [{"key": "gearbox", "values": ["schaefler-rt1-h-20-100"]}]}, "did you mean schaeffler"),
         ({"select": {"objectives": {"beauty": "least"}}}, "'beauty' is no column of numbers"),
+        ({"select": {"objectives": {"reversal_error": "least"}}, "controller": ONE_WAY}, "moves .* go one way"),
+        ({"task": {"cycle": "1 s", "max_reversal_error": "1 deg"}, "controller": ONE_WAY}, "moves .* go one way"),
+        (
+            {"task": {"cycle": "1 s"}, "select": {"objectives": {"settling_time": "least"}}},
+            "needs task.settling_window",
+        ),
         ({"select": 3}, "key select"),
     ],
 )

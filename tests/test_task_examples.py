@@ -207,7 +207,7 @@ def test_the_pair_of_an_example_fits(name: str):
     assert bool(pair["fits"]), str(pair["why"].values)
     row = study.parameters(int(pair["run"]), int(pair["run"]) + 1)[0]
     demand, _ = Axes(study).gearbox(row)
-    of_rules = demand.cycle(demand.motor_torque(study.part("motor", row))).rms_motor_torque()
+    of_rules = demand.cycle(demand.motor_torque(study.part("motor", row))).rms_motor_torque
     assert float(pair["motor_torque_rms"]) == pytest.approx(of_rules, rel=0.25)
 
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..studies.axis_rows import NO_DATA
+from ..studies.axis_rows import HOLDS, NO_DATA
 from ..studies.check import ESTIMATED
 from ..studies.choice import CHOICE
-from ..studies.nearest import Lacking, Miss, misses, not_judged
+from ..studies.nearest import Lacking, Miss, misses, not_judged, rules_not_judged
 from ..studies.select import TASK_SHARES, USE, Selection
 from ..studies.selection import NOT_RUN, Candidate, Price, candidates, pareto_front, prices
 from ..studies.study import Study
@@ -27,7 +27,10 @@ if TYPE_CHECKING:
 
 PARETO = "Each point is a candidate; point at it to read its name and values. The list below names the numbered ones."
 NEAREST = 5  # candidates that do not fit, for which a slower cycle is sought
-MAX_LINES = 6  # lines of each list that are printed; selection.csv has all
+MAX_LINES = 6  # lines of each list that are printed; the page has all
+RECORDS_LACK = "Not judged, since a record lacks what a run needs:"
+RULES_LACK = "Rules that are not judged, for want of a datum:"
+ALL = "on the page and in its selection.csv"
 MAX_ROWS = 25  # of a table on the page
 
 
@@ -62,9 +65,15 @@ def show_selection(table: pa.Table, study: Study) -> Shown:
         for p in costs
     ]
     near = misses(study, ranked, NEAREST) if study.axis is not None else []
-    unknown = not_judged(ranked)
+    unknown, rules = not_judged(ranked), rules_not_judged(ranked)
     told = _misses(near) if near else _misfits(ranked)
-    lines = [*_ranking(table, ranked, front, select), *_costs(table, costs, objective), *told, *_unknown(unknown)]
+    lines = [
+        *_ranking(table, ranked, front, select),
+        *_costs(table, costs, objective),
+        *told,
+        *_unknown(unknown, RECORDS_LACK),
+        *_unknown(rules, RULES_LACK),
+    ]
     several = len(select.objectives) > 1 and any(all(map(math.isfinite, c.values.values())) for c in ranked)
     chart = [Group("pareto", "", PARETO, (pareto_panel(table, ranked, front, select),), 1)] if several else []
     return Shown(
@@ -76,7 +85,8 @@ def show_selection(table: pa.Table, study: Study) -> Shown:
             *([_costs_table(table, costs, objective)] if costs else []),
             *_miss_tables(near),
             *_misfit_tables(ranked),
-            *_unknown_tables(unknown),
+            *_unknown_tables(unknown, "Not judged: data that are missing"),
+            *_unknown_tables(rules, "Rules that are not judged: data that are missing"),
         ),
         tables={"selection.csv": _selection_csv(table, study, ranked, front), "limits.csv": table_csv(header, rows)},
     )
@@ -139,6 +149,12 @@ def _ranking_tables(table: pa.Table, ranked: list[Candidate], front: list[Candid
 def _estimated(candidate: Candidate) -> str:
     text = candidate.estimated
     return text if text.startswith("holds") else f"is {text}"
+
+
+def _in_short(candidate: Candidate) -> str:
+    """The same, of those that fit: at the ends of the range of the kind."""
+    holds = candidate.estimated == HOLDS
+    return f"losses estimated, the verdict {'holds' if holds else _estimated(candidate)}"
 
 
 def _why(candidate: Candidate) -> str:
@@ -249,10 +265,10 @@ def _ranking(table: pa.Table, ranked: list[Candidate], front: list[Candidate], s
         notes = ["Pareto front"] if len(select.objectives) > 1 and c.run in on_front else []
         notes += [f"tightest: {c.tightest}"] if c.tightest else []
         notes += [f"not judged: {c.not_judged}"] if c.not_judged else []
-        notes += [f"losses estimated, the verdict {_estimated(c)}"] if c.estimated else []
+        notes += [_in_short(c)] if c.estimated else []
         lines.append(f"  {c.name.ljust(width)}{values}" + (f"  ({'; '.join(notes)})" if notes else ""))
     if len(fitting) > MAX_LINES:
-        lines.append(f"  and {len(fitting) - MAX_LINES} more, see selection.csv")
+        lines.append(f"  and {len(fitting) - MAX_LINES} more, {ALL}")
     return lines
 
 
@@ -269,6 +285,8 @@ def _costs(table: pa.Table, costs: list[Price], objective: str) -> list[str]:
             best = f"{p.best.name}, {labelled(table, objective)} {p.best.values[objective]:.5g}"
             if math.isfinite(p.gain):
                 best += f" ({100.0 * p.gain:.3g} % better)" if p.gain > 0.0 else " (as now)"
+        if math.isfinite(p.rests):
+            best += f"; the load rests at least {_share(p.rests)} beyond the window"
         if math.isfinite(p.opens):
             best += f"; {_share(p.opens)} more of the limit opens the first"
         lines.append(f"  {p.limit.ljust(width)}{p.excludes:>10}{p.alone:>16}  {best}")
@@ -298,27 +316,23 @@ def _miss_tables(near: list[Miss]) -> list[Table]:
     return [Table("Nearest misses", ("candidate", "over its limits by", "with a slower cycle"), rows, note)]
 
 
-def _unknown(groups: list[Lacking]) -> list[str]:
+def _unknown(groups: list[Lacking], title: str) -> list[str]:
     if not groups:
         return []
-    lines = ["Not judged, since a record lacks what a run needs:"]
+    lines = [title]
     lines += [f"  {len(g.candidates)}, such as {g.candidates[0]}: {g.datum}" for g in groups[:MAX_LINES]]
-    return (
-        [*lines, f"  and {len(groups) - MAX_LINES} more reasons, see selection.csv"]
-        if len(groups) > MAX_LINES
-        else lines
-    )
+    return [*lines, f"  and {len(groups) - MAX_LINES} more, on the page"] if len(groups) > MAX_LINES else lines
 
 
-def _unknown_tables(groups: list[Lacking]) -> list[Table]:
+def _unknown_tables(groups: list[Lacking], title: str) -> list[Table]:
     if not groups:
         return []
     rows = [[str(len(g.candidates)), g.candidates[0], g.datum] for g in groups[:MAX_ROWS]]
-    return [Table("Not judged: data that are missing", ("candidates", "such as", "what is missing"), rows)]
+    return [Table(title, ("candidates", "such as", "what is missing"), rows)]
 
 
 def _misfits(ranked: list[Candidate]) -> list[str]:
     out = [c for c in ranked if not c.fits and NO_DATA not in c.violated]
     lines = ["Why the others do not fit:"] if out else []
     lines += [f"  {c.name}: {_why(c)}" for c in out[:MAX_LINES]]
-    return [*lines, f"  and {len(out) - MAX_LINES} more, see selection.csv"] if len(out) > MAX_LINES else lines
+    return [*lines, f"  and {len(out) - MAX_LINES} more, {ALL}"] if len(out) > MAX_LINES else lines

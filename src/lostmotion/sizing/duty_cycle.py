@@ -7,6 +7,7 @@ to repeat without a pause, or after `task.cycle`.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -66,10 +67,12 @@ class DutyCycle:
         """Largest magnitude [rad/s]."""
         return float(self.input_speed.max())
 
+    @cached_property
     def mean_input_speed(self) -> float:
         """Mean of the magnitude over the cycle, pause included [rad/s]."""
         return integral(self.time, self.input_speed) / (self.period or self.duration)
 
+    @cached_property
     def mean_output_torque(self) -> float:
         """Cubic mean of the magnitude, weighted with the input speed [N·m]; 0 where nothing turns."""
         turned = integral(self.time, self.input_speed)
@@ -90,6 +93,7 @@ class DutyCycle:
         pause = [self.time[-1], self.time[0] + self.period]
         return np.append(self.time, pause), np.append(self.motor_torque, [held, held])
 
+    @cached_property
     def rms_motor_torque(self) -> float:
         """Root mean square over the cycle [N·m].
 

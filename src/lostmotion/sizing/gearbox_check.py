@@ -27,7 +27,7 @@ def loads(g: Transmission, peak: float, cycle: DutyCycle, where: str = "gearbox"
         within(
             "average_output_torque",
             "output torque, cubic mean",
-            cycle.mean_output_torque(),
+            cycle.mean_output_torque,
             average or g.rated_output_torque,
             "N·m",
             name,
@@ -70,7 +70,7 @@ def input_speeds(g: Transmission, cycle: DutyCycle, where: str = "gearbox") -> l
         within(
             "average_input_speed",
             "input speed, mean",
-            RPM * cycle.mean_input_speed(),
+            RPM * cycle.mean_input_speed,
             None if average is None else RPM * average,
             "rpm",
             "average input speed" if limits and limits.average_input_speed else "rated input speed",

@@ -53,7 +53,7 @@ def heat(
     rise over it, if it is known already. `slides`: the motor moves a slide, by a force."""
     limits = m.limits
     word, unit = ("force", "N") if slides else ("torque", "N·m")
-    torque = cycle.rms_motor_torque()
+    torque = cycle.rms_motor_torque
     continuous = (
         limits.continuous_torque if limits is not None else None if m.kind == "torque_source" else m.rated_torque
     )

@@ -191,7 +191,7 @@ def check_motor(
     the inertias; None: it is not judged."""
     torque = demand.motor_torque(motor)
     cycle = demand.cycle(torque)
-    rise = rms_rise(motor, cycle.rms_motor_torque(), ambient)
+    rise = rms_rise(motor, cycle.rms_motor_torque, ambient)
     return [
         largest_speed(motor, cycle.peak_input_speed, slides=slides),
         *peak_torque(motor, torque, slides=slides),

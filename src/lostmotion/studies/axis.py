@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 from ..control.controller import AnyCurrent
 from ..control.references import Move, PositionReference
 from ..control.sample_times import whole_multiple
+from ..errors import InputError
 from ..inputs.part import Part
 from ..inputs.quantities import (
     Acceleration,
@@ -198,7 +199,7 @@ class AxisTask(Task, Duty):
 
         Raises
         ------
-        ValueError
+        InputError
             It cannot, or has not.
         """
         reference = reference_of(scenario)
@@ -208,11 +209,12 @@ class AxisTask(Task, Duty):
         repeated_torque(scenario.load.torque, self.cycle, FEWEST)
         for key in ("max_reversal_error", "settling_window"):
             if getattr(self, key) is not None and not reference.moves:
-                raise ValueError(
-                    f"task.{key}: is of the rest between moves, and controller.reference has no moves; leave it out"
+                raise InputError(
+                    "is of the rest between moves, and controller.reference has no moves; leave it out",
+                    keys=(f"task.{key}",),
                 )
         if self.max_reversal_error is not None and not turns_back(reference):
-            raise ValueError(f"task.max_reversal_error: {ONE_WAY}; leave it out")
+            raise InputError(f"{ONE_WAY}; leave it out", keys=("task.max_reversal_error",))
 
 
 def turns_back(reference: PositionReference) -> bool:
@@ -251,12 +253,15 @@ def _periodic(signal: TimeFunction[Any], cycle: float, key: str) -> None:
     """Sees that a signal is made of what can be repeated."""
     for name in ("steps", "ramps", "chirp"):
         if getattr(signal, name, None):
-            raise ValueError(f"{key}.{name}: acts once and cannot be repeated; write the cycle as {key}.samples")
+            raise InputError(
+                f"acts once and cannot be repeated; write the cycle as {key}.samples", keys=(f"{key}.{name}",)
+            )
     for _, frequency, _ in signal.sine_list():
         turns = cycle * frequency
         if round(turns) < 1 or not math.isclose(turns, round(turns), rel_tol=WHOLE):
-            raise ValueError(
-                f"{key}: a sine of {frequency:g} Hz has {turns:.6g} periods in the cycle of {cycle:g} s; take a whole number"
+            raise InputError(
+                f"a sine of {frequency:g} Hz has {turns:.6g} periods in the cycle of {cycle:g} s; take a whole number",
+                keys=(key,),
             )
 
 
@@ -264,7 +269,10 @@ def _tiled(samples: Any, cycle: float, count: int, step: float, key: str) -> dic
     """Points of a cycle, again and again, each time further by `step`."""
     times, values = np.array(samples.times), np.array(samples.values)
     if times[-1] > cycle * (1.0 + WHOLE):
-        raise ValueError(f"{key}.samples: end at {times[-1]:g} s, after the cycle of {cycle:g} s; lengthen task.cycle")
+        raise InputError(
+            f"the last one is at {times[-1]:g} s, after the cycle of {cycle:g} s; lengthen task.cycle",
+            keys=(f"{key}.samples",),
+        )
     again = slice(1 if times[0] == 0.0 and math.isclose(times[-1], cycle, rel_tol=WHOLE) else 0, None)
     all_times = [*times, *(t + k * cycle for k in range(1, count) for t in times[again])]
     all_values = [*values, *(v + k * step for k in range(1, count) for v in values[again])]
@@ -278,7 +286,7 @@ def repeated(reference: PositionReference, cycle: float, count: int) -> Position
 
     Raises
     ------
-    ValueError
+    InputError
         It cannot be repeated, or does not fit into the cycle.
     """
     key = "controller.reference"
@@ -291,7 +299,10 @@ def repeated(reference: PositionReference, cycle: float, count: int) -> Position
         return reference
     begin, end = reference.intervals()[0][0], reference.intervals()[-1][1]
     if end > cycle * (1.0 + WHOLE):
-        raise ValueError(f"{key}.moves: end at {end:.6g} s, after the cycle of {cycle:g} s; lengthen task.cycle")
+        raise InputError(
+            f"the last one ends at {end:.6g} s, after the cycle of {cycle:g} s; lengthen task.cycle",
+            keys=(f"{key}.moves",),
+        )
     dwells = [reference.dwell if move.dwell is None else move.dwell for move in reference.moves]
     dwells[-1] = max(cycle - end, 0.0) + begin
     step = reference.moves[-1].to - reference.start
@@ -309,7 +320,7 @@ def repeated_torque(torque: TorqueSignal, cycle: float, count: int) -> TorqueSig
 
     Raises
     ------
-    ValueError
+    InputError
         It cannot be repeated, or does not fit into the cycle.
     """
     _periodic(torque, cycle, "load.torque")

@@ -38,6 +38,7 @@ COLUMNS = {
     "tracking_error_rms": ("rad", "rms distance of the load from its reference"),
     "reversal_error": ("rad", "load at rest after forward moves less that after backward ones, magnitude"),
     "settling_time": ("s", "longest time after a move until the load stays in the window"),
+    "rest_error": ("rad", "largest distance of the load from the end of its move, at the end of the rest after it"),
     "energy": ("J", "electrical energy taken per cycle, by its mean in each sample time"),
     "energy_returned": ("J", "electrical energy given back per cycle, the same way"),
     "mechanical_energy": (
@@ -62,6 +63,7 @@ OF_LOAD = (
     "tracking_error_peak",
     "tracking_error_rms",
     "reversal_error",
+    "rest_error",
 )
 """columns in units of translation where the load is a slide"""
 
@@ -172,9 +174,9 @@ def row_of(run: Repeated, *, slides: bool = False) -> dict[str, float]:
         "winding_temperature": winding,
         "case_temperature": case,
         "output_torque_peak": float(np.abs(duty.output_torque).max()),
-        "output_torque_mean": duty.mean_output_torque(),
+        "output_torque_mean": duty.mean_output_torque,
         "input_speed_peak": duty.peak_input_speed,
-        "input_speed_mean": duty.mean_input_speed(),
+        "input_speed_mean": duty.mean_input_speed,
         "inertia_ratio": scenario.load.inertia / (g.ratio**2 * (scenario.motor.rotor_inertia + g.inertia)),
         "tracking_error_peak": float(np.abs(error).max()),
         "tracking_error_rms": rms(error),
@@ -195,7 +197,7 @@ def row_of(run: Repeated, *, slides: bool = False) -> dict[str, float]:
 
 
 def _at_rest(cycles: Cycles, error: np.ndarray) -> dict[str, float]:
-    """Settling time and reversal error, from the rests after the moves of the last cycle."""
+    """Settling time, reversal error and error at rest, from the rests after the moves of the last cycle."""
     window, time = cycles.task.settling_window, cycles.time[cycles.last]
     ends: dict[float, list[float]] = {1.0: [], -1.0: []}
     settling = [0.0] if cycles.reference.moves and window is not None else [math.nan]
@@ -208,4 +210,5 @@ def _at_rest(cycles: Cycles, error: np.ndarray) -> dict[str, float]:
                 settling.append(float(time[stays] - end) if stays < rest.stop else math.inf)
     both = ends[1.0] and ends[-1.0]
     reversal = abs(float(np.mean(ends[1.0]) - np.mean(ends[-1.0]))) if both else math.nan
-    return {"reversal_error": reversal, "settling_time": max(settling)}
+    rest = max((abs(x) for found in ends.values() for x in found), default=math.nan)
+    return {"reversal_error": reversal, "settling_time": max(settling), "rest_error": rest}

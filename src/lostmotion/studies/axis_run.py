@@ -26,7 +26,7 @@ VARIABLES = ("command", "motor_torque", "motor_speed", "output_torque", "load_an
 def until_it_repeats(study: Study, row: np.ndarray) -> Repeated:
     """Runs twice as many cycles again and again, until the last two agree, or there are as many as the task permits.
 
-    A longer run goes on where the shorter one ends, if both begin alike: the result is that of a run of its own.
+    If references and loads begin alike, the longer run continues the shorter one, to the same bits.
     """
     task, count, base = study.axis, FEWEST, study.base_of(row)
     assert task is not None

@@ -60,7 +60,7 @@ def axis_scenario(base: DriveScenario, motor: Motor, gearbox: Gearbox, task: Axi
 
 @dataclass(frozen=True, eq=False)
 class Cycles:
-    """What all candidates of a task have in common over so many cycles."""
+    """Reference, load and times over so many cycles of a task, the same for all candidates."""
 
     task: AxisTask
     count: int
@@ -86,7 +86,7 @@ class Cycles:
 
     @cached_property
     def rests(self) -> list[tuple[float, float, slice]]:
-        """Of each rest after a move of the last cycle the direction of the move, where it ends [s], and the samples."""
+        """Rests after the moves of the last cycle: direction and end [s] of the move, and the samples of the rest."""
         time, intervals, moves = self.time[self.last], self.reference.intervals(), self.reference.moves
         positions, found = [self.reference.start, *(move.to for move in moves)], []
         for k in range(len(moves) - len(moves) // self.count, len(moves)):

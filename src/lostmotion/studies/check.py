@@ -16,8 +16,10 @@ COLUMNS: dict[str, float | str] = {f"{USE}{rule}": math.nan for rule in SHARES} 
 """each with what stands in the row of a run that has failed"""
 ESTIMATED = "estimated losses"
 """column of tasks: verdict over the range of estimated losses"""
+MISSING = "missing data"
+"""column of tasks: what the rules that are not judged lack"""
 TASK_COLUMNS: dict[str, float | str] = {f"{USE}{rule}": math.nan for rule in TASK_SHARES} | dict.fromkeys(
-    (*TEXTS, ESTIMATED), ""
+    (*TEXTS, MISSING, ESTIMATED), ""
 )
 """the same of tasks"""
 
@@ -44,5 +46,8 @@ def columns_of(findings: Iterable[Finding], columns: Mapping[str, float | str] =
     wrong = [f for f in findings if f.verdict == "warning"]
     row["violated"] = " ".join(rule for rule in SOURCES if any(f.rule == rule for f in wrong))
     row["why"] = "; ".join(f"{f.what}: {f.value}" + (f" ({f.remark})" if f.remark else "") for f in wrong)
-    row["not judged"] = " ".join(dict.fromkeys(f.rule for f in findings if f.verdict == "unknown"))
+    unknown = [f for f in findings if f.verdict == "unknown"]
+    row["not judged"] = " ".join(dict.fromkeys(f.rule for f in unknown))
+    if MISSING in columns:
+        row[MISSING] = "; ".join(dict.fromkeys(f"{f.rule}: {f.remark}" for f in unknown))
     return row

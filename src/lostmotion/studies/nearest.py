@@ -14,7 +14,7 @@ from ..errors import InputError
 from .axis import AxisTask, reference_of
 from .axis_rows import NO_DATA, Axes
 from .choice import CHOICE
-from .selection import Candidate
+from .selection import WINDOW, Candidate
 from .study import Study
 
 SLOWEST = 10.0  # times as long as the cycle of the task, the longest that is tried
@@ -60,13 +60,16 @@ def misses(study: Study, ranked: list[Candidate], count: int) -> list[Miss]:
     count
         How many of them; for these a slower cycle is sought, and tried by rules and run.
     """
-    found = [
-        Miss(c, {limit: c.over[limit] for limit in c.violated}, None)
-        for c in ranked
-        if not c.fits and all(limit in c.over for limit in c.violated)
-    ]
+    found = [Miss(c, lacks, None) for c in ranked if not c.fits and (lacks := _lacks(c))]
     found.sort(key=lambda miss: (miss.worst, miss.candidate.run))
     return [_tried(study, miss) for miss in found[:count]]
+
+
+def _lacks(candidate: Candidate) -> dict[str, float]:
+    """By limit, by how much it is exceeded; empty if one of these is not a number."""
+    never = WINDOW in candidate.over
+    limits = [WINDOW if never and limit == "settling_time" else limit for limit in candidate.violated]
+    return {x: candidate.over[x] for x in limits} if all(x in candidate.over for x in limits) else {}
 
 
 def slowed(study: Study, factor: float) -> Study:
@@ -136,8 +139,8 @@ def _slowed_signal(signal: Any, factor: float) -> Any:
 
 def _tried(study: Study, miss: Miss) -> Miss:
     """With the least factor by which the cycle has to be longer, if there is one, and what rules and run say of it."""
-    if same := [limit for limit in miss.lacks if limit in AT_ANY_TIME]:
-        return Miss(miss.candidate, miss.lacks, None, f"a slower cycle does not change {' and '.join(same)}")
+    if same := dict.fromkeys("its parts" if limit in CHOICE else limit for limit in miss.lacks if limit in AT_ANY_TIME):
+        return Miss(miss.candidate, miss.lacks, None, f"a slower cycle does not change {', '.join(same)}")
     row = study.parameters(miss.candidate.run, miss.candidate.run + 1)[0]
     try:
         if miss.candidate.ran:
@@ -214,6 +217,19 @@ def not_judged(ranked: list[Candidate]) -> list[Lacking]:
     for c in ranked:
         if NO_DATA in c.violated:
             groups.setdefault(_without_names(c.why), []).append(c.name)
+    return _by_size(groups)
+
+
+def rules_not_judged(ranked: list[Candidate]) -> list[Lacking]:
+    """The rules that are not judged, grouped by the datum that is missing, with the candidates that this concerns."""
+    groups: dict[str, list[str]] = {}
+    for c in ranked:
+        for text in c.missing:
+            groups.setdefault(text, []).append(c.name)
+    return _by_size(groups)
+
+
+def _by_size(groups: dict[str, list[str]]) -> list[Lacking]:
     return [Lacking(text, tuple(names)) for text, names in sorted(groups.items(), key=lambda pair: -len(pair[1]))]
 
 

@@ -127,7 +127,7 @@ def names_that_fit(table: str, wanted: Mapping[str, Any]) -> list[str]:
 def _why_none_fits(
     table: str, wanted: Mapping[str, Any], fits: Mapping[str, list[bool]], records: Sequence[Any]
 ) -> str:
-    """Which condition of a filter lets nothing through, or how many records fit without each of them."""
+    """Condition of a filter that no record meets, or how many records fit without each condition."""
     name = table.replace("_", " ")
     for key in wanted:
         if any(fits[key]):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..units.practical import practical
-from .check import ESTIMATED
+from .check import ESTIMATED, MISSING
 from .choice import CHOICE
 from .records import shown_name
 from .select import TASK_SHARES, USE, Selection
@@ -19,6 +19,8 @@ from .table import unit_of
 if TYPE_CHECKING:
     import pyarrow as pa
 
+WINDOW = "settling_window"
+"""stands for the limit of a settling time that has no end: by how much the load rests beyond the window"""
 NOT_RUN = "cannot be run"
 """stands among the limits of a run that has failed"""
 
@@ -45,6 +47,8 @@ class Candidate:
     """verdict over the range of losses, if the gearbox of a task has estimated ones"""
     choice: dict[str, float] = field(default_factory=dict)
     """mass, length, price and lead time of the pair of a task, as far as they are known"""
+    missing: tuple[str, ...] = ()
+    """rules of a task that are not judged, each with the datum that is missing"""
     over: dict[str, float] = field(default_factory=dict)
     """by limit: by how much it is exceeded, as a share of it, where that is a number"""
 
@@ -69,6 +73,8 @@ class Price:
     """by how much, as a share of it, the limit would have to be relaxed so that one more candidate fits; NaN where it is not known"""
     gain: float
     """by how much the first objective would then be better, as a share of its value now; NaN where there is no such value"""
+    rests: float = math.nan
+    """least distance of a resting load beyond the settling window, as a share of it; NaN if a load settles"""
 
 
 def candidates(table: pa.Table, study: Study) -> list[Candidate]:
@@ -100,29 +106,34 @@ def _candidate(
     row: dict[str, Any], study: Study, select: Selection, bounds: dict[str, tuple[float, float]]
 ) -> Candidate:
     values = {column: float(row[column]) for column in select.objectives}
-    shown = [
-        shown_name(row[v.title]) if v.names is not None else f"{v.title} {row[v.title]:.6g}"
-        for v in study.vary
-        if v.names is not None or math.isfinite(row[v.title])
-    ]
-    name = ", ".join(filter(None, shown)) or "motor and gearbox of the task"
+    name = _name(row, study)
     choice = {column: float(row[column]) for column in CHOICE if math.isfinite(row.get(column, math.nan))}
     if row["error"]:
         return Candidate(row["run"], name, (NOT_RUN,), row["error"], "", values)
     violated, why = row.get("violated", "").split(), [row["why"]] if row.get("why") else []
     over = {rule: use - 1.0 for rule in violated if math.isfinite(use := row.get(f"{USE}{rule}", math.nan))}
+    missing = tuple(filter(None, row.get(MISSING, "").split("; ")))
     if study.axis is not None and math.isnan(row["cycles"]):  # refused before any run
-        unjudged = row["not judged"]
         return Candidate(
-            row["run"], name, tuple(violated), row["why"], unjudged, values, "", False, row[ESTIMATED], choice, over
+            run=row["run"],
+            name=name,
+            violated=tuple(violated),
+            why=row["why"],
+            not_judged=row["not judged"],
+            values=values,
+            ran=False,
+            estimated=row[ESTIMATED],
+            choice=choice,
+            missing=missing,
+            over=over,
         )
-    for column, (low, high) in bounds.items():
-        if not low <= row[column] <= high:
-            violated.append(column)
-            over |= _excess(column, row[column], low, high)
-            unit = study.kept_units.get(column, "") if study.axis is not None else ""
-            found, limit = (practical(x, unit, 6) for x in (row[column], high if row[column] > high else low))
-            why.append(f"{column} {found} is {'above' if row[column] > high else 'below'} {limit}")
+    for column, bound in bounds.items():
+        if bound[0] <= row[column] <= bound[1]:
+            continue
+        found, excess = _beyond(column, row, bound, study)
+        violated.append(column)
+        why.append(found)
+        over |= excess
     for column, value in values.items():
         if math.isnan(value):
             violated.append(column)
@@ -130,20 +141,45 @@ def _candidate(
     uses = {rule: use for rule in TASK_SHARES if math.isfinite(use := row.get(f"{USE}{rule}", math.nan))}
     critical = max(uses, key=lambda rule: uses[rule], default="")
     tightest = f"{critical} {100.0 * uses[critical]:.0f} %" if critical else ""
-    unjudged = row.get("not judged", "")
     return Candidate(
-        row["run"],
-        name,
-        tuple(violated),
-        "; ".join(why),
-        unjudged,
-        values,
-        tightest,
-        True,
-        row.get(ESTIMATED, ""),
-        choice,
-        over,
+        run=row["run"],
+        name=name,
+        violated=tuple(violated),
+        why="; ".join(why),
+        not_judged=row.get("not judged", ""),
+        values=values,
+        tightest=tightest,
+        estimated=row.get(ESTIMATED, ""),
+        choice=choice,
+        missing=missing,
+        over=over,
     )
+
+
+def _name(row: dict[str, Any], study: Study) -> str:
+    """Varied values of a run as text."""
+    shown = [
+        shown_name(row[v.title]) if v.names is not None else f"{v.title} {row[v.title]:.6g}"
+        for v in study.vary
+        if v.names is not None or math.isfinite(row[v.title])
+    ]
+    return ", ".join(filter(None, shown)) or "motor and gearbox of the task"
+
+
+def _beyond(column: str, row: dict[str, Any], bound: tuple[float, float], study: Study) -> tuple[str, dict[str, float]]:
+    """Why a value is beyond its limits, and by how much, as a share of the limit."""
+    value, limit = row[column], bound[1] if row[column] > bound[1] else bound[0]
+    if column == "settling_time" and value == math.inf:
+        assert study.axis is not None
+        window, unit = study.axis.settling_window, study.kept_units["rest_error"]
+        assert window is not None
+        rests, wide = (practical(x, unit, 4) for x in (row["rest_error"], window))
+        why = f"settling_time: the load does not settle before the next move; it rests {rests} off, with a window of {wide}"
+        return why, {WINDOW: row["rest_error"] / window - 1.0}
+    unit = study.kept_units.get(column, "") if study.axis is not None else ""
+    found, most = (practical(x, unit, 6) for x in (value, limit))
+    why = f"{column} {found} is {'above' if value > bound[1] else 'below'} {most}"
+    return why, _excess(column, value, *bound)
 
 
 def _excess(column: str, value: float, low: float, high: float) -> dict[str, float]:
@@ -175,7 +211,9 @@ def prices(ranked: list[Candidate], select: Selection) -> list[Price]:
             gain = better / abs(best.values[objective])
         excluded = sum(limit in c.violated for c in ranked)
         opens = min((c.over.get(limit, math.nan) for c in alone), default=math.nan)
-        out.append(Price(limit, excluded, len(alone), without, opens, gain))
+        rests = [c.over.get(WINDOW, math.nan) for c in alone] if limit == "settling_time" else []
+        least = min(rests) if rests and not any(map(math.isnan, rests)) else math.nan
+        out.append(Price(limit, excluded, len(alone), without, opens, gain, least))
     return sorted(out, key=lambda p: -p.excludes)
 
 

@@ -228,10 +228,10 @@ class Study(Part):
         if self.axis is not None:
             reference = reference_of(self.drive)
             if "reversal_error" in select.named() and not turns_back(reference):
-                raise ValueError(f"select: reversal_error {ONE_WAY}; leave it out")
+                raise InputError(f"reversal_error {ONE_WAY}; leave it out", keys=("select",))
             if "settling_time" in select.named() and (self.axis.settling_window is None or not reference.moves):
-                raise ValueError(
-                    "select: settling_time needs task.settling_window, and moves; add them, or leave it out"
+                raise InputError(
+                    "settling_time needs task.settling_window, and moves; add them, or leave it out", keys=("select",)
                 )
 
     @property

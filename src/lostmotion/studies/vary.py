@@ -11,6 +11,7 @@ from pydantic import BaseModel, Field, model_validator
 
 from ..data_sheets.train_components import RECORDS
 from ..errors import InputError
+from ..inputs.kept import kept
 from ..inputs.named import Named
 from ..inputs.part import Part
 from ..inputs.quantities import Switch
@@ -107,6 +108,7 @@ class Vary(Part):
         return self.keys or (self.key,)
 
     @property
+    @kept
     def names(self) -> tuple[str, ...] | None:
         """The names of records, where it varies these; else None."""
         if not self.values or kind_of_record(self.all_keys[0]) is None:
