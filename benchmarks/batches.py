@@ -243,6 +243,7 @@ def section(report: Report) -> None:
         shared.step(torque)
     spent = (time.process_time() - begin) / 300
     report.add(
+        "",
         f"With {threads} threads, first steps included, a step of all {COUNT} drives takes {1e3 * spent:.1f} ms of processor time.",
         "",
     )
