@@ -185,34 +185,6 @@ std::vector<std::tuple<std::string, std::string, std::string>> signal_names(cons
 inline void bind_control(nb::module_& m) {
     using namespace control;
     m.def(
-        "described_tables",
-        [](bool of_controllers) {
-            nb::dict tables;
-            const auto add = [&](const char* name, auto&& describe_table) {
-                DescribedFields f;
-                describe_table(f);
-                tables[name] = f.rows;
-            };
-            if (of_controllers)
-                control::each_table(add);
-            else
-                model::each_table(add);
-            return tables;
-        },
-        "of_controllers"_a,
-        nb::sig("def described_tables(of_controllers: bool) -> dict[str, list[tuple[str, str, str, str, str, "
-                "tuple[float | None, float | None, float | None], bool, typing.Any]]]"),
-        "Of each part of controllers, or of drive trains, its parameters: key, kind, symbol, unit, meaning, range "
-        "(above, from on, up to), whether it is needed, default.");
-    m.def(
-        "reference_blocks",
-        [] {
-            std::vector<std::tuple<std::string, std::string, std::string>> blocks;
-            each_reference_block([&](const auto& b) { blocks.emplace_back(b.key, b.part, b.meaning); });
-            return blocks;
-        },
-        "Of each block that shapes the reference: its table in a controller, its class, and what the table is.");
-    m.def(
         "encoder_step",
         [](const nb::dict& fields) {
             Encoder e;

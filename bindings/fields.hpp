@@ -1,4 +1,4 @@
-// Parameters by name: what sets them from a dict of Python, and what says what they are.
+// Parameters by name, from a dict of Python.
 #pragma once
 
 #include <initializer_list>
@@ -117,51 +117,6 @@ class NamedFields {
 
     nb::dict values_;
     std::size_t used_ = 0;
-};
-
-// Of each parameter that a scenario file may have: key, symbol, unit, meaning, range (above, from on, up to), whether
-// it is needed, and its default, None where it is left out.
-class DescribedFields : public FieldVisitor {
- public:
-    nb::list rows;
-
-    using FieldVisitor::flag;
-    using FieldVisitor::number;
-    void number(const Field& field, double v) { add(field, "number", limits(field.range), nb::float_(v)); }
-    void pair(const Field& field, const std::array<double, 2>& v) {
-        add(field, "pair", limits(field.range), nb::make_tuple(v[0], v[1]));
-    }
-    template <class Integer>
-    void integer(const Field& field, Integer v, long long low, long long high) {
-        add(field, "integer", nb::make_tuple(nb::none(), low, high), nb::int_(v));
-    }
-    void flag(const Field& field, bool v) {
-        add(field, "flag", nb::make_tuple(nb::none(), nb::none(), nb::none()), nb::bool_(v));
-    }
-    void list(const Field& field, const std::vector<double>& v) {
-        add(field, "list", limits(field.range), nb::tuple(nb::cast(v)));
-    }
-
- private:
-    static nb::tuple limits(Range range) {
-        const nb::object none = nb::none(), zero = nb::float_(0.0), one = nb::float_(1.0);
-        switch (range) {
-            case Range::above_one: return nb::make_tuple(one, none, none);
-            case Range::positive:
-            case Range::limit: return nb::make_tuple(zero, none, none);
-            case Range::not_negative:
-            case Range::limit_or_zero: return nb::make_tuple(none, zero, none);
-            case Range::up_to_one: return nb::make_tuple(zero, none, one);
-            case Range::share: return nb::make_tuple(none, zero, one);
-            default: return nb::make_tuple(none, none, none);
-        }
-    }
-    void add(const Field& field, const char* kind, const nb::tuple& range, const nb::object& value) {
-        if (field.given == Given::none) return;
-        rows.append(nb::make_tuple(field.key, kind, field.symbol, field.unit, field.meaning, range,
-                                   field.given == Given::needed,
-                                   field.given == Given::has_default ? value : nb::none()));
-    }
 };
 
 }  // namespace lostmotion::binding

@@ -1,5 +1,6 @@
 // Thin binding: the core as a Python module.
 #include "batches.hpp"
+#include "described.hpp"
 #include "descriptions.hpp"
 #include "elementary.hpp"
 #include "joint_trains.hpp"
@@ -15,6 +16,7 @@ NB_MODULE(CORE_MODULE, m) {
     bind_names(m);
     bind_elementary(m);
     bind_curves(m);
+    bind_described(m);
     bind_control(m);
     bind_train(m);
     bind_sensitivities(m);

@@ -26,7 +26,7 @@ from c.build import CORE_FLAGS, KERNELS, PLATFORMS, ROOT, fmu, objects, room, zi
 HERE = Path(__file__).resolve().parent
 BUILD = ROOT / "build" / "wheels"
 MODEL = room("analysis", "control", "elements", "model", "scenario", "simulation")
-MODULE = [HERE / f"{name}.cpp" for name in ("module", "elementary")]
+MODULE = [HERE / f"{name}.cpp" for name in ("module", "described", "elementary")]
 LIBRARIES = ROOT / "src" / "lostmotion" / "fmu_libraries"
 PAGES = [ROOT / "src" / "lostmotion" / name for name in ("live_page/page.html", "reports/report.js")]
 # The builds of the core, as in CMakeLists.txt: the processors they are for.

@@ -86,9 +86,9 @@ class LossMap:
 class Signal:
     def __init__(self, breakpoints: Sequence[Sequence[float]], sines: Sequence[Sequence[float]]) -> None: ...
 
-def described_tables(of_controllers: bool) -> dict[str, list[tuple[str, str, str, str, str, tuple[float | None, float | None, float | None], bool, Any]]]:
+def described_tables() -> dict[str, list[tuple[str, str, str, str, str, tuple[float | None, float | None, float | None], bool, Any, tuple[Any, ...]]]]:
     """
-    Of each part of controllers, or of drive trains, its parameters: key, kind, symbol, unit, meaning, range (above, from on, up to), whether it is needed, default.
+    Of each part of scenarios, its parameters: key, kind, symbol, unit, meaning, range (above, from on, up to), whether it is needed, default, and more: of a list the fewest and the most entries, of a table the parts.
     """
 
 def reference_blocks() -> list[tuple[str, str, str]]:

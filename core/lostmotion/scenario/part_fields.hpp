@@ -82,11 +82,14 @@ void describe(F& f, PeriodicCurve& curve) {
 
 }  // namespace model
 
+// Unit of the value of a signal, which its use states.
+inline constexpr const char* of_value = "value";
+
 template <class F>
 void describe(F& f, Sine& s) {
-    f.number("amplitude", s.amplitude);
-    f.number("frequency", s.frequency, Range::positive);
-    f.number("phase", s.phase);
+    f.number({"amplitude", "A", of_value, Range::any, Given::needed, "largest value"}, s.amplitude);
+    f.number({"frequency", "f", "Hz", Range::positive, Given::needed, "periods in a second"}, s.frequency);
+    f.number({"phase", "", "rad", Range::any, Given::has_default, "phase at t = 0"}, s.phase);
 }
 
 template <class F>

@@ -3,13 +3,14 @@
 import itertools
 import math
 from functools import lru_cache
-from typing import Annotated, Any, ClassVar, Generic, Literal, Self, TypeVar
+from typing import Any, ClassVar, Generic, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from ..errors import InputError
-from ..inputs.part import Part
+from ..inputs import described
+from ..inputs.described import A, J, M, S, V
 from ..inputs.quantities import (
     Acceleration,
     Angle,
@@ -18,33 +19,14 @@ from ..inputs.quantities import (
     LinearAcceleration,
     LinearJerk,
     LinearSpeed,
-    NotNegative,
-    Positive,
     Speed,
-    Time,
     Torque,
 )
 from ..inputs.validation import shown
 from ..model.signals import Breakpoint, Samples, TimeFunction, taylor
 from ..reproducible import cos, cubic_spline, sin
 from .profiles import segments
-from .satellites import Satellite
-from .targets import Circle, FlyBy, Star, Track, Weave
-
-V = TypeVar("V")  # the value of the reference, with its unit
-S = TypeVar("S")  # its rate
-A = TypeVar("A")  # its second derivative
-J = TypeVar("J")  # its third derivative
-M = TypeVar("M")  # a move of it
-
-SpeedLimit = Annotated[Speed, Positive]
-AccelerationLimit = Annotated[Acceleration, Positive]
-JerkLimit = Annotated[Jerk, Positive]
-SlideSpeedLimit = Annotated[LinearSpeed, Positive]
-SlideAccelerationLimit = Annotated[LinearAcceleration, Positive]
-SlideJerkLimit = Annotated[LinearJerk, Positive]
-
-Target = Annotated[FlyBy | Weave | Circle | Track | Star | Satellite, Field(discriminator="path")]
+from .satellites import Satellite  # noqa: F401
 
 SHORTEST = 1e-6  # share of a move that the rounding of its instants may be
 
@@ -52,14 +34,11 @@ Piece = tuple[float, float, float, float, float]
 """from a time [s] on: value, and its first, second and third derivative"""
 
 
-class Series(Samples[V], Generic[V]):
+class Series(described.SeriesFields, Samples[V], Generic[V]):
     """A curve through the points given; before the first and after the last the value stays.
 
     In a scenario file, `file = "points.csv"` may stand for times and values, as in a signal.
     """
-
-    interpolation: Literal["linear", "cubic"] = "linear"
-    """straight lines, or a cubic spline: first and second derivative are continuous between the first and the last point"""
 
     def breakpoints(self) -> list[Breakpoint]:
         if self.interpolation == "linear":
@@ -77,12 +56,10 @@ class Series(Samples[V], Generic[V]):
         return self._held([*curve, (self.times[-1], values[-1], 0.0)])
 
 
-class Reference(TimeFunction[V], Generic[V]):
+class Reference(described.ReferenceFields[V], TimeFunction[V], Generic[V]):
     """The sum of all that is given; a bare number is a constant."""
 
     derivatives: ClassVar[int] = 3
-
-    samples: Series[V] | None = None
 
     @model_validator(mode="after")
     def _representable(self) -> Self:
@@ -157,54 +134,31 @@ def _table(reference: Reference[Any]) -> np.ndarray:
     return np.array(reference.pieces()).T
 
 
-class LimitedMove(Part, Generic[V, S, A, J]):
-    """From rest at one position to rest at another, in the shortest time that its limits permit.
-
-    Without a limit of the jerk the speed is trapezoidal.
-    """
-
-    to: V
-    speed: S | None = None
-    """limit; default: the value for all moves"""
-    acceleration: A | None = None
-    """limit, also while it slows down; default: the value for all moves"""
-    jerk: J | None = None
-    """limit; default: the value for all moves"""
-    dwell: Annotated[Time, NotNegative] | None = None
-    """rest after the move; default: the value for all moves"""
-
-
-class Move(LimitedMove[Angle, SpeedLimit, AccelerationLimit, JerkLimit]):
+class LimitedMove(described.LimitedMoveFields[V, S, A, J], Generic[V, S, A, J]):
     """From rest at one position to rest at another, in the shortest time that its limits permit.
 
     Without a limit of the jerk the speed is trapezoidal.
     """
 
 
-class SlideMove(LimitedMove[Length, SlideSpeedLimit, SlideAccelerationLimit, SlideJerkLimit]):
+class Move(LimitedMove[Angle, Speed, Acceleration, Jerk]):
+    """From rest at one position to rest at another, in the shortest time that its limits permit.
+
+    Without a limit of the jerk the speed is trapezoidal.
+    """
+
+
+class SlideMove(LimitedMove[Length, LinearSpeed, LinearAcceleration, LinearJerk]):
     """From rest at one position of a slide to rest at another, in the shortest time that its limits permit.
 
     Without a limit of the jerk the speed is trapezoidal.
     """
 
 
-class MovesReference(Reference[V], Generic[V, S, A, J, M]):
+class MovesReference(described.MovesReferenceFields[V, S, A, J, M], Reference[V], Generic[V, S, A, J, M]):
     """A position over time: the sum of all that is given, or a list of moves."""
 
     kind: Literal["position"] = "position"
-    start: V = 0.0  # type: ignore[assignment]
-    """position before the first move"""
-    begin: Annotated[Time, NotNegative] = 0.0
-    """position at the begin of the first move"""
-    speed: S | None = None
-    """limit of all moves that have none of their own"""
-    acceleration: A | None = None
-    """limit of all moves that have none of their own"""
-    jerk: J | None = None
-    """limit of all moves that have none of their own; without any, their speed is trapezoidal"""
-    dwell: Annotated[Time, NotNegative] = 0.0
-    """rest after each move that has none of its own"""
-    moves: tuple[M, ...] = ()
 
     def _check(self) -> None:
         limits = [key for key in ("speed", "acceleration", "jerk") if getattr(self, key) is not None]
@@ -269,7 +223,7 @@ class MovesReference(Reference[V], Generic[V, S, A, J, M]):
         return max([super().duration, *ends])
 
 
-class PositionReference(MovesReference[Angle, SpeedLimit, AccelerationLimit, JerkLimit, Move]):
+class PositionReference(described.PositionReferenceFields, MovesReference[Angle, Speed, Acceleration, Jerk, Move]):
     """A position [rad] over time: the sum of all that is given, or a list of moves.
 
     Examples
@@ -279,9 +233,6 @@ class PositionReference(MovesReference[Angle, SpeedLimit, AccelerationLimit, Jer
     >>> [round(value, 3) for value in reference.at(0.1)]
     [np.float64(0.025), np.float64(0.5), np.float64(5.0), np.float64(0.0)]
     """
-
-    target: Target | None = None
-    """the angle under which a target in space is seen"""
 
     def _check(self) -> None:
         if self.target is not None and self.moves:
@@ -294,7 +245,7 @@ class PositionReference(MovesReference[Angle, SpeedLimit, AccelerationLimit, Jer
         return super()._pieces()
 
 
-class SlideReference(MovesReference[Length, SlideSpeedLimit, SlideAccelerationLimit, SlideJerkLimit, SlideMove]):
+class SlideReference(MovesReference[Length, LinearSpeed, LinearAcceleration, LinearJerk, SlideMove]):
     """A position [m] of a slide over time: the sum of all that is given, or a list of moves.
 
     Examples

@@ -5,19 +5,17 @@ right; elevation E = atan2(z, sqrt(x^2 + y^2)). All derivatives are those of the
 """
 
 import math
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
-from ..inputs.part import Part
-from ..inputs.quantities import Angle, Frequency, Length, LinearSpeed, NotNegative, Positive, Speed, Time
+from ..inputs import described
 from ..reproducible import arctan2, cos, cubic_spline, sin
 
 ORDER = 4  # coefficients of the series: value to third derivative
 TOLERANCE = 1e-13  # [rad], of a piece of third degree between two instants
 MAX_PIECES = 2_000_000
-SIDEREAL_RATE = 7.292115e-5  # [rad/s], turn of the earth against the stars (IERS Conventions 2010, table 1.2)
 
 Jet = np.ndarray
 """(4, n): Taylor coefficients of a function of time at n instants, value, rate, second/2, third/6"""
@@ -68,14 +66,8 @@ def straight(start: np.ndarray | float, rate: float, t: np.ndarray) -> Jet:
     return out
 
 
-class TargetPath(Part):
+class TargetPath(described.TargetPathFields):
     """Path of a target over time, and the axis that follows it."""
-
-    axis: Literal["traverse", "elevation"]
-    bearing: Angle = 0.0
-    """bearing of the direction y, in which the path is given; it adds to the traverse"""
-    duration: Annotated[Time, Positive] = 60.0
-    """for which the axis follows; after it the reference stays"""
 
     def position(self, t: np.ndarray) -> tuple[Jet, Jet, Jet]:
         """x, y and z [m] at instants [s]."""
@@ -117,17 +109,8 @@ class TargetPath(Part):
         return [*map(tuple, np.vstack([t, found])[:, :-1].T.tolist()), last]
 
 
-class Crossing(TargetPath):
+class Crossing(described.CrossingFields, TargetPath):
     """A straight level path that crosses the bearing at a right angle."""
-
-    distance: Annotated[Length, Positive]
-    """R_0, horizontal, of the point next to the station"""
-    height: Length = 0.0
-    """above the station"""
-    speed: Annotated[LinearSpeed, Positive]
-    crossing_time: Annotated[Time, NotNegative]
-    """when it is next to the station"""
-    heading: Literal["right", "left"] = "right"
 
     def position(self, t: np.ndarray) -> tuple[Jet, Jet, Jet]:
         rate = self.speed if self.heading == "right" else -self.speed
@@ -141,13 +124,10 @@ class FlyBy(Crossing):
     path: Literal["fly_by"]
 
 
-class Weave(Crossing):
+class Weave(described.WeaveFields, Crossing):
     """A path past the station that swings to and fro across its course."""
 
     path: Literal["weave"]
-    width: Annotated[Length, Positive]
-    """amplitude of the swing"""
-    frequency: Annotated[Frequency, Positive]
 
     @model_validator(mode="after")
     def _stays_in_front(self) -> Self:
@@ -163,17 +143,10 @@ class Weave(Crossing):
         return x, y + self.width * sine_and_cosine(omega * t, omega)[0], z
 
 
-class Circle(TargetPath):
+class Circle(described.CircleFields, TargetPath):
     """A level circle at constant speed."""
 
     path: Literal["circle"]
-    distance: Annotated[Length, NotNegative]
-    """distance of its centre, horizontal, along the bearing"""
-    radius: Annotated[Length, Positive]
-    height: Length = 0.0
-    speed: Annotated[LinearSpeed, Positive]
-    start: Angle = 0.0
-    """starting point on the circle, as an angle from the point farthest along the bearing, to the right"""
 
     @model_validator(mode="after")
     def _misses_the_station(self) -> Self:
@@ -187,14 +160,10 @@ class Circle(TargetPath):
         return self.radius * s, straight(self.distance, 0.0, t) + self.radius * c, straight(self.height, 0.0, t)
 
 
-class Track(TargetPath):
+class Track(described.TrackFields, TargetPath):
     """A measured path: a cubic spline through its points, or straight lines."""
 
     path: Literal["track"]
-    times: tuple[Annotated[Time, NotNegative], ...] = Field(min_length=4)
-    x: tuple[Length, ...]
-    y: tuple[Length, ...]
-    z: tuple[Length, ...]
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
@@ -219,16 +188,10 @@ class Track(TargetPath):
         return x, y, z
 
 
-class Star(TargetPath):
+class Star(described.StarFields, TargetPath):
     """A direction fixed among the stars, as the earth turns: without refraction. Traverse is the azimuth less the bearing of y."""
 
     path: Literal["star"]
-    declination: Angle
-    hour_angle: Angle
-    """at the start, west of the meridian"""
-    latitude: Angle
-    rate: Speed = SIDEREAL_RATE
-    """at which the hour angle grows; for the sun 7.2722e-5 rad/s"""
 
     def position(self, t: np.ndarray) -> tuple[Jet, Jet, Jet]:
         s, c = sine_and_cosine(self.hour_angle + self.rate * t, self.rate)

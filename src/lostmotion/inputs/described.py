@@ -1,72 +1,136 @@
 """The parameters of parts as the core describes them: keys, units, ranges, defaults and meanings.
 
-What a part in `model` and `control` adds to them is what the core does not see: tables within, and what must fit together.
-The names for type checkers are in `described.pyi`, which ``make stub`` writes.
+What a part in `model` and `control` adds to them is what the core does not see, such as what must fit together. ``NameFields``
+is the base of the part `Name`. It is made when its name is first used: write ``described.NameFields`` in a class whose
+tables are parts of the same module. The names for type checkers are in `described.pyi`, which ``make stub`` writes.
 """
 
-from typing import Annotated, Any, ClassVar
+from functools import reduce
+from operator import or_
+from typing import Annotated, Any, ClassVar, Generic, Literal, TypeVar
 
 from pydantic import Field, create_model
 
 from .. import _core
 from ..units.conversion import Unit
 from .part import Part
-from .quantities import MAX_ENTRIES, Limit, Switch, Whole
+from .quantities import Limit, Switch, Whole
+
+V = TypeVar("V")  # the value of a signal, with its unit
+S = TypeVar("S")  # its rate
+A = TypeVar("A")  # its second derivative
+J = TypeVar("J")  # its third derivative
+M = TypeVar("M")  # a move of it
+
+OF_VALUE: dict[str, Any] = {"value": V, "value/s": S, "value/s^2": A, "value/s^3": J}
+"""units in terms of the value"""
+TYPES = {"number": "float", "pair": "tuple[float, float]", "integer": "int", "flag": "bool"}
+
+Row = tuple[Any, ...]
+"""key, kind, symbol, unit, meaning, range, whether it is needed, default, and more"""
 
 
 class Described(Part):
-    """A part whose own numbers the core describes."""
+    """A part whose own parameters the core describes."""
 
     described: ClassVar[tuple[str, ...]] = ()
     """keys of these"""
+    core_keys: ClassVar[tuple[str, ...]] = ()
+    """keys of those that are no tables"""
 
     def core_fields(self) -> dict[str, Any]:
         """Fields for the core, in SI units, without those that are None."""
-        keys = (key for base in reversed(type(self).__mro__) for key in vars(base).get("described", ()))
+        keys = (key for base in reversed(type(self).__mro__) for key in vars(base).get("core_keys", ()))
         return {key: getattr(self, key) for key in keys}
 
 
-def _type(kind: str, unit: str, limits: tuple[float | None, float | None, float | None], least_entries: int) -> Any:
+def _is_table(row: Row) -> bool:
+    return row[1] in ("table", "tables")
+
+
+def _part_named(name: str, base: type[Part] = Part) -> Any:
+    """The part of this name that the package has made."""
+    own = (part for part in base.__subclasses__() if part.__name__ == name and part.__module__.startswith("lostmotion"))
+    return next(own, None) or next((p for b in base.__subclasses__() if (p := _part_named(name, b))), None)
+
+
+def _is_generic(part: Any) -> bool:
+    return part is not M and bool(part.__pydantic_generic_metadata__["parameters"])
+
+
+def _table(kind: str, names: tuple[str, ...]) -> tuple[Any, Any]:
+    """Type of a field that is one of some parts, or a list of them, and the default of one."""
+    parts = [M if name == M.__name__ else _part_named(name) for name in names]
+    one: Any = reduce(or_, [part[V] if _is_generic(part) else part for part in parts])
+    if len(parts) > 1:
+        one = Annotated[one, Field(discriminator="kind" if "kind" in parts[0].model_fields else "path")]
+    return (one, parts[0]) if kind == "table" else (tuple[one, ...], tuple)
+
+
+def _type(kind: str, unit: str, limits: tuple[float | None, float | None, float | None], more: tuple[Any, ...]) -> Any:
     above, least, most = limits
+    if kind == "choice":
+        return Literal[*more]
     if kind == "flag":
         return Switch
     if kind == "integer":
         return Annotated[Whole, Field(ge=least, le=most)]
-    number: Any = Annotated[float, Unit(unit)]
+    number: Any = OF_VALUE.get(unit) or Annotated[float, Unit(unit)]
     if limits != (None, None, None):
         number = Annotated[number, Limit(gt=above, ge=least, le=most)]
     if kind == "list":
-        return Annotated[tuple[number, ...], Field(min_length=least_entries, max_length=MAX_ENTRIES)]
+        fewest, largest = more
+        return Annotated[tuple[number, ...], Field(min_length=fewest or None, max_length=largest)]
     return tuple[number, number] if kind == "pair" else number
 
 
-def _part(name: str, rows: list[tuple[Any, ...]]) -> type[Described]:
+def _part(name: str, rows: list[Row]) -> type[Described]:
     fields: dict[str, Any] = {}
-    for key, kind, _, unit, meaning, limits, needed, default in rows:
-        given = _type(kind, unit, limits, int(needed))
+    for row in rows:
+        key, kind, _, unit, meaning, limits, needed, default, more = row
+        if _is_table(row):
+            given, new = _table(kind, more)
+            default = None if default is None else new()
+        else:
+            given = _type(kind, unit, limits, more)
         optional = default is None and not needed
         fields[key] = (
             given | None if optional else given,
             Field(... if needed else default, description=meaning or None),
         )
-    part = create_model(f"{name}Fields", __base__=Described, __module__=__name__, **fields)
+    base = (Described, Generic[variables]) if (variables := tuple(_variables(rows))) else Described
+    part = create_model(f"{name}Fields", __base__=base, __module__=__name__, **fields)
     part.described = tuple(fields)
+    part.core_keys = tuple(row[0] for row in rows if not _is_table(row))
     return part
 
 
-def tables() -> dict[str, list[tuple[Any, ...]]]:
-    """Rows of the parameters of each part: key, kind, symbol, unit, meaning, range, whether it is needed, default."""
-    return _core.described_tables(of_controllers=False) | _core.described_tables(of_controllers=True)
+def _variables(rows: list[Row]) -> dict[Any, str]:
+    """Variables of the types of a table, and their names."""
+    units, inner = {row[3] for row in rows}, {name for row in rows if _is_table(row) for name in row[8]}
+    if any(name != M.__name__ and _is_generic(_part_named(name)) for name in inner):
+        units.add("value")
+    found = {v: v.__name__ for unit, v in OF_VALUE.items() if unit in units}
+    return found | ({M: M.__name__} if M.__name__ in inner else {})
 
 
-globals().update({f"{name}Fields": _part(name, rows) for name, rows in tables().items()})
+TABLES: dict[str, list[Row]] = _core.described_tables()
+"""rows of the parameters of each part"""
+
+
+def __getattr__(name: str) -> Any:
+    rows = TABLES.get(name.removesuffix("Fields"))
+    if rows is None or not name.endswith("Fields"):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    made = globals()[name] = _part(name.removesuffix("Fields"), rows)
+    return made
 
 
 def _reference_blocks() -> type[Part]:
     """Base of controllers, with a table for each block that shapes the reference."""
     blocks: dict[str, Any] = {}
     for key, name, meaning in _core.reference_blocks():
-        part = create_model(name, __base__=globals()[f"{name}Fields"], __module__=__name__, __doc__=meaning)
+        part = create_model(name, __base__=__getattr__(f"{name}Fields"), __module__=__name__, __doc__=meaning)
         globals()[name] = part
         blocks[key] = (part | None, Field(None, description=meaning))
     return create_model("ReferenceBlocks", __base__=Part, __module__=__name__, **blocks)
@@ -75,21 +139,42 @@ def _reference_blocks() -> type[Part]:
 ReferenceBlocks = _reference_blocks()
 
 
+def _stub_type(row: Row) -> str:
+    _, kind, _, unit, _, _, _, _, more = row
+    if kind == "choice":
+        return "Literal[" + ", ".join(f'"{word}"' for word in more) + "]"
+    if _is_table(row):
+        one = " | ".join(f"{n}[V]" if n != M.__name__ and _is_generic(_part_named(n)) else n for n in more)
+    else:
+        one = OF_VALUE[unit].__name__ if unit in OF_VALUE else TYPES.get(kind, "float")
+    return f"tuple[{one}, ...]" if kind in ("list", "tables") else one
+
+
 def stub() -> str:
     """The text of `described.pyi`."""
-    types = {"number": "float", "pair": "tuple[float, float]", "integer": "int", "flag": "bool"}
-    types["list"] = "tuple[float, ...]"
-    lines = ["from typing import Any, ClassVar", "", "from .part import Part", "", "class Described(Part):"]
-    lines += ["    described: ClassVar[tuple[str, ...]]", "    def core_fields(self) -> dict[str, Any]: ..."]
-    for name, rows in tables().items():
-        lines += ["", f"class {name}Fields(Described):"]
-        for key, kind, _, _, _, _, needed, default in rows:
+    inner = {name for rows in TABLES.values() for row in rows if _is_table(row) for name in row[8]} - {M.__name__}
+    homes: dict[str, list[str]] = {}
+    for name in sorted(inner):
+        homes.setdefault(_part_named(name).__module__.removeprefix("lostmotion"), []).append(name)
+    lines = ["from typing import Any, ClassVar, Generic, Literal, TypeVar", ""]
+    lines += [f"from .{home} import {', '.join(names)}" for home, names in sorted(homes.items())]
+    lines += [
+        "from .part import Part",
+        "",
+        *(f'{v.__name__} = TypeVar("{v.__name__}")' for v in (*OF_VALUE.values(), M)),
+    ]
+    lines += ["", "class Described(Part):", "    described: ClassVar[tuple[str, ...]]"]
+    lines += ["    core_keys: ClassVar[tuple[str, ...]]", "    def core_fields(self) -> dict[str, Any]: ..."]
+    for name, rows in TABLES.items():
+        generic = f", Generic[{', '.join(names)}]" if (names := _variables(rows).values()) else ""
+        lines += ["", f"class {name}Fields(Described{generic}):"]
+        for row in rows:
+            key, needed, default = row[0], row[6], row[7]
             optional = " | None" if default is None and not needed else ""
-            lines.append(f"    {key}: {types[kind]}{optional}{'' if needed else ' = ...'}")
+            lines.append(f"    {key}: {_stub_type(row)}{optional}{'' if needed else ' = ...'}")
     blocks = _core.reference_blocks()
     lines += [line for _, name, _ in blocks for line in ("", f"class {name}({name}Fields): ...")]
     lines += ["", f"class ReferenceBlocks(Part):{'' if blocks else ' ...'}"]
     lines += [f"    {key}: {name} | None = ..." for key, name, _ in blocks]
-    return "\n".join(
-        [*lines, "", "def tables() -> dict[str, list[tuple[Any, ...]]]: ...", "def stub() -> str: ...", ""]
-    )
+    lines += ["", "TABLES: dict[str, list[tuple[Any, ...]]]", "", "def stub() -> str: ...", ""]
+    return "\n".join(lines)

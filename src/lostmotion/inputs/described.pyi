@@ -1,9 +1,21 @@
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Generic, Literal, TypeVar
 
+from ..control.references import Series
+from ..control.satellites import Satellite
+from ..control.targets import Circle, FlyBy, Star, Track, Weave
+from ..model.signals import Chirp, Ramp, Samples, Sine, Step
+from ..model.wind import Davenport, Kaimal, VonKarman, WindOfTable
 from .part import Part
+
+V = TypeVar("V")
+S = TypeVar("S")
+A = TypeVar("A")
+J = TypeVar("J")
+M = TypeVar("M")
 
 class Described(Part):
     described: ClassVar[tuple[str, ...]]
+    core_keys: ClassVar[tuple[str, ...]]
     def core_fields(self) -> dict[str, Any]: ...
 
 class ShaftFields(Described):
@@ -46,6 +58,137 @@ class DamperFields(Described):
 
 class SpringFields(Described):
     rest_angle: float = ...
+
+class SineFields(Described, Generic[V]):
+    amplitude: V
+    frequency: float
+    phase: float = ...
+
+class StepFields(Described, Generic[V]):
+    height: V
+    time: float = ...
+
+class RampFields(Described, Generic[V]):
+    rise: V
+    duration: float
+    begin: float = ...
+
+class ChirpFields(Described, Generic[V]):
+    amplitude: V
+    begin_frequency: float
+    end_frequency: float
+    duration: float
+    begin: float = ...
+    points_per_period: int = ...
+
+class SamplesFields(Described, Generic[V]):
+    times: tuple[float, ...]
+    values: tuple[V, ...]
+
+class TimeFunctionFields(Described, Generic[V]):
+    mean: V = ...
+    amplitude: V | None = ...
+    frequency: float | None = ...
+    phase: float = ...
+    sines: tuple[Sine[V], ...] = ...
+    steps: tuple[Step[V], ...] = ...
+    ramps: tuple[Ramp[V], ...] = ...
+
+class SignalFields(Described, Generic[V]):
+    chirp: Chirp[V] | None = ...
+    samples: Samples[V] | None = ...
+
+class TorqueSignalFields(Described):
+    wind: WindOfTable | Davenport | VonKarman | Kaimal | None = ...
+
+class SeriesFields(Described):
+    interpolation: Literal["linear", "cubic"] = ...
+
+class ReferenceFields(Described, Generic[V]):
+    samples: Series[V] | None = ...
+
+class LimitedMoveFields(Described, Generic[V, S, A, J]):
+    to: V
+    speed: S | None = ...
+    acceleration: A | None = ...
+    jerk: J | None = ...
+    dwell: float | None = ...
+
+class MovesReferenceFields(Described, Generic[V, S, A, J, M]):
+    start: V = ...
+    begin: float = ...
+    speed: S | None = ...
+    acceleration: A | None = ...
+    jerk: J | None = ...
+    dwell: float = ...
+    moves: tuple[M, ...] = ...
+
+class PositionReferenceFields(Described):
+    target: FlyBy | Weave | Circle | Track | Star | Satellite | None = ...
+
+class TargetPathFields(Described):
+    axis: Literal["traverse", "elevation"]
+    bearing: float = ...
+    duration: float = ...
+
+class CrossingFields(Described):
+    distance: float
+    height: float = ...
+    speed: float
+    crossing_time: float
+    heading: Literal["right", "left"] = ...
+
+class WeaveFields(Described):
+    width: float
+    frequency: float
+
+class CircleFields(Described):
+    distance: float
+    radius: float
+    height: float = ...
+    speed: float
+    start: float = ...
+
+class TrackFields(Described):
+    times: tuple[float, ...]
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+    z: tuple[float, ...]
+
+class StarFields(Described):
+    declination: float
+    hour_angle: float
+    latitude: float
+    rate: float = ...
+
+class WindFields(Described):
+    duration: float
+    max_frequency: float
+    points_per_period: int = ...
+    seed: int = ...
+
+class WindOfTableFields(Described):
+    frequencies: tuple[float, ...]
+    densities: tuple[float, ...]
+
+class WindOnAreaFields(Described):
+    speed: float
+    drag_coefficient: float
+    area: float
+    lever: float
+    density: float = ...
+
+class DavenportFields(Described):
+    surface_drag: float = ...
+    speed_at_10_m: float | None = ...
+
+class VonKarmanFields(Described):
+    turbulence: float
+    length_scale: float
+
+class KaimalFields(Described):
+    height: float
+    roughness_length: float = ...
 
 class PositionLoopFields(Described):
     gain: float
@@ -156,5 +299,6 @@ class ReferenceFilter(ReferenceFilterFields): ...
 class ReferenceBlocks(Part):
     reference_filter: ReferenceFilter | None = ...
 
-def tables() -> dict[str, list[tuple[Any, ...]]]: ...
+TABLES: dict[str, list[tuple[Any, ...]]]
+
 def stub() -> str: ...

@@ -71,7 +71,8 @@ class Limit:
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         # Into the number itself, behind the reading of units, so that the JSON Schema has it too.
         schema: Any = handler(source)
-        schema["schema"].update({name: value for name, value in vars(self).items() if value is not None})
+        # A type variable has no number yet.
+        schema.get("schema", {}).update({name: value for name, value in vars(self).items() if value is not None})
         return schema  # type: ignore[no-any-return]
 
 

@@ -8,80 +8,56 @@ import math
 from collections import deque
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import Annotated, Any, ClassVar, Generic, Self, TypeVar
+from typing import Any, ClassVar, Generic, Self, TypeVar
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from .. import _core
-from ..inputs.part import Part
+from ..inputs import described
+from ..inputs.described import V
 from ..inputs.quantities import (
-    Angle,
     Force,
-    Frequency,
     LinearSpeed,
-    NotNegative,
     Number,
-    Positive,
     Speed,
-    Time,
     Torque,
-    Whole,
 )
 from ..reproducible import sin, total
 from ..units.scalars import is_number, scalar
-from .wind import AnyWind
+from .wind import Wind  # noqa: F401
 
-V = TypeVar("V")  # the value of the signal, with its unit
 N = TypeVar("N", float, np.ndarray)
 
 Breakpoint = tuple[float, ...]
 """from a time [s] on: value, slope and, of what is not made of straight lines, the second and third derivative"""
 
 
-class Sine(Part, Generic[V]):
+class Sine(described.SineFields[V], Generic[V]):
     """``amplitude * sin(2 pi frequency t + phase)``."""
 
-    amplitude: V
-    frequency: Annotated[Frequency, Positive]
-    phase: Angle = 0.0
 
-
-class Step(Part, Generic[V]):
+class Step(described.StepFields[V], Generic[V]):
     """Adds `height` from `time` on."""
-
-    height: V
-    time: Annotated[Time, NotNegative] = 0.0
 
     def breakpoints(self) -> list[Breakpoint]:
         return [(self.time, float(self.height), 0.0)]  # type: ignore[arg-type]
 
 
-class Ramp(Part, Generic[V]):
+class Ramp(described.RampFields[V], Generic[V]):
     """Rises by `rise` in a straight line within `duration`, from `begin` on, and stays there."""
-
-    rise: V
-    duration: Annotated[Time, Positive]
-    begin: Annotated[Time, NotNegative] = 0.0
 
     def breakpoints(self) -> list[Breakpoint]:
         rise = float(self.rise)  # type: ignore[arg-type]
         return [(self.begin, 0.0, rise / self.duration), (self.begin + self.duration, rise, 0.0)]
 
 
-class Chirp(Part, Generic[V]):
+class Chirp(described.ChirpFields[V], Generic[V]):
     """Sine whose frequency runs in a straight line from one value to another, drawn with straight lines.
 
     The chords depart from the sine by at most ``amplitude * (pi / points_per_period)**2 / 2`` where the frequency is
     highest: 0.12 % with 64 points.
     """
-
-    amplitude: V
-    begin_frequency: Annotated[Frequency, Positive]
-    end_frequency: Annotated[Frequency, Positive]
-    duration: Annotated[Time, Positive]
-    begin: Annotated[Time, NotNegative] = 0.0
-    points_per_period: Annotated[Whole, Field(ge=8, le=1000)] = 64
 
     def breakpoints(self) -> list[Breakpoint]:
         fastest = max(self.begin_frequency, self.end_frequency)
@@ -94,15 +70,12 @@ class Chirp(Part, Generic[V]):
         return [*lines[:-1], (self.begin + self.duration, 0.0, 0.0)]
 
 
-class Samples(Part, Generic[V]):
+class Samples(described.SamplesFields[V], Generic[V]):
     """Straight lines through the points given; before the first and after the last the value stays.
 
     In a scenario file, `file = "points.csv"` may stand for both keys: two columns, time [s] and value. A heading such as
     ``time [ms],torque [Nm]`` gives other units.
     """
-
-    times: tuple[Time, ...]
-    values: tuple[V, ...]
 
     @model_validator(mode="after")
     def _fit_together(self) -> Self:
@@ -126,22 +99,11 @@ class Samples(Part, Generic[V]):
         return points if self.times[0] == 0.0 else [(0.0, points[0][1], 0.0), *points]
 
 
-class TimeFunction(Part, Generic[V]):
+class TimeFunction(described.TimeFunctionFields[V], Generic[V]):
     """The sum of all that is given; a bare number is a constant."""
 
     derivatives: ClassVar[int] = 1
     """derivatives, beside the value, that change at breakpoints; all higher ones are 0 between them"""
-
-    mean: V = 0.0  # type: ignore[assignment]
-    """constant part"""
-    amplitude: V | None = None
-    """amplitude of one sine, with frequency and phase"""
-    frequency: Annotated[Frequency, Positive] | None = None
-    phase: Angle = 0.0
-    sines: tuple[Sine[V], ...] = ()
-    """more sines"""
-    steps: tuple[Step[V], ...] = ()
-    ramps: tuple[Ramp[V], ...] = ()
 
     @model_validator(mode="before")
     @classmethod
@@ -191,11 +153,8 @@ class TimeFunction(Part, Generic[V]):
         return type(self).model_validate, (self.model_dump(exclude_unset=True),)
 
 
-class Signal(TimeFunction[V], Generic[V]):
+class Signal(described.SignalFields[V], TimeFunction[V], Generic[V]):
     """The sum of all that is given; a bare number is a constant."""
-
-    chirp: Chirp[V] | None = None
-    samples: Samples[V] | None = None
 
     def _pieces(self) -> list[list[Breakpoint]]:
         parts: list[Chirp[V] | Samples[V] | None] = [self.chirp, self.samples]
@@ -356,7 +315,7 @@ class AccelerationSignal(Signal[Number]):
         return [(time, slope, 0.0) for time, _, slope in self.speed.breakpoint_list()]
 
 
-class TorqueSignal(Signal[Torque]):
+class TorqueSignal(described.TorqueSignalFields, Signal[Torque]):
     """A torque [N·m] over time: the sum of all that is given.
 
     Examples
@@ -365,8 +324,6 @@ class TorqueSignal(Signal[Torque]):
     >>> lm.TorqueSignal(mean="5 N*m").mean
     5.0
     """
-
-    wind: AnyWind | None = None
 
     def _pieces(self) -> list[list[Breakpoint]]:
         return [*super()._pieces(), *([] if self.wind is None else [self.wind.breakpoints()])]

@@ -1,44 +1,24 @@
 """Wind on a load: a torque with the spectrum of the gusts, seeded, so that it is the same each time."""
 
 import math
-from typing import Annotated, Literal, Self
+from typing import Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
-from ..inputs.part import Part
-from ..inputs.quantities import (
-    Area,
-    Density,
-    Frequency,
-    Length,
-    Limit,
-    LinearSpeed,
-    NotNegative,
-    Number,
-    Positive,
-    Time,
-    TorqueSpectrum,
-    Whole,
-)
+from ..inputs import described
 from ..reproducible import cbrt, cos, exp, fourier_sum, interpolate, log, sin
 
 MAX_POINTS = 2**17
 KARMAN = 0.4
 
 
-class Wind(Part):
+class Wind(described.WindFields):
     """Random torque of a given one-sided spectrum S, made of sines: ``sum of sqrt(2 S(f_k)/D) cos(2 pi f_k t + phase_k)``, f_k = k/D.
 
     The phases are uniform, from the seed (Shinozuka and Deodatis 1991). It repeats after the duration D; its variance is that of the lines of
     the spectrum up to ``max_frequency``, in every realisation. Between its points, ``1/(points_per_period max_frequency)`` apart, it is straight.
     """
-
-    duration: Annotated[Time, Positive]
-    """D, after which it is constant; its lowest frequency is 1/D"""
-    max_frequency: Annotated[Frequency, Positive]
-    points_per_period: Annotated[Whole, Field(ge=4, le=100)] = 16
-    seed: Annotated[Whole, Field(ge=0, le=2**53)] = 0
 
     def spectrum(self, frequency: np.ndarray) -> np.ndarray:
         """S, one-sided [(N m)^2/Hz], at frequencies above 0 [Hz]."""
@@ -82,13 +62,10 @@ class Wind(Part):
         return list(map(tuple, np.column_stack([time, torque, slopes]).tolist()))
 
 
-class WindOfTable(Wind):
+class WindOfTable(described.WindOfTableFields, Wind):
     """A measured spectrum, linear in the logarithms of frequency and density between its points, zero outside."""
 
     kind: Literal["table"]
-    frequencies: tuple[Annotated[Frequency, Positive], ...] = Field(min_length=2)
-    densities: tuple[Annotated[TorqueSpectrum, Positive], ...]
-    """one-sided [(N·m)²/Hz]"""
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
@@ -106,20 +83,11 @@ class WindOfTable(Wind):
         return np.where(inside, exp(interpolate(log(frequency), points, densities)), 0.0)
 
 
-class WindOnArea(Wind):
+class WindOnArea(described.WindOnAreaFields, Wind):
     """Drag on an area with a lever: M = rho c A r (V + v)^2/2, linear in the gusts v, so that S_M = (rho c A r V)^2 S_v.
 
     The gusts over the area are taken as one.
     """
-
-    speed: Annotated[LinearSpeed, Positive]
-    """V, mean over ten minutes, at the height of the load"""
-    drag_coefficient: Annotated[Number, Positive]
-    area: Annotated[Area, Positive]
-    lever: Length
-    """r of the centre of pressure from the axis, against the motion forward"""
-    density: Annotated[Density, Positive] = 1.225
-    """rho of the air"""
 
     def gusts(self, frequency: np.ndarray) -> np.ndarray:
         """S_v, one-sided [(m/s)²/Hz]."""
@@ -133,14 +101,10 @@ class WindOnArea(Wind):
         return per_speed * per_speed * self.gusts(frequency)
 
 
-class Davenport(WindOnArea):
+class Davenport(described.DavenportFields, WindOnArea):
     """f S_v/u*^2 = 4 x^2/(1 + x^2)^(4/3), x = 1200 m f/V_10 (Davenport 1961)."""
 
     kind: Literal["davenport"]
-    surface_drag: Annotated[Number, Limit(gt=0.0, le=0.1)] = 0.005
-    """K = u*^2/V_10^2; 0.005 open country, 0.015 suburbs, 0.05 cities"""
-    speed_at_10_m: Annotated[LinearSpeed, Positive] | None = None
-    """V_10; default: the value at the load"""
 
     def gusts(self, frequency: np.ndarray) -> np.ndarray:
         V = self.speed if self.speed_at_10_m is None else self.speed_at_10_m
@@ -149,14 +113,10 @@ class Davenport(WindOnArea):
         return np.asarray(4.0 * self.surface_drag * V * V * x * x / ((1.0 + x * x) * root) / frequency)
 
 
-class VonKarman(WindOnArea):
+class VonKarman(described.VonKarmanFields, WindOnArea):
     """f S_v/sigma^2 = 4 x/(1 + 70.8 x^2)^(5/6), x = f L/V (von Karman 1948)."""
 
     kind: Literal["von_karman"]
-    turbulence: Annotated[Number, Limit(gt=0.0, le=1.0)]
-    """sigma/V"""
-    length_scale: Annotated[Length, Positive]
-    """L, along the wind"""
 
     def gusts(self, frequency: np.ndarray) -> np.ndarray:
         x = frequency * self.length_scale / self.speed
@@ -166,14 +126,10 @@ class VonKarman(WindOnArea):
         return np.asarray(4.0 * deviation * deviation * x / power / frequency)
 
 
-class Kaimal(WindOnArea):
+class Kaimal(described.KaimalFields, WindOnArea):
     """f S_v/u*^2 = 105 x/(1 + 33 x)^(5/3), x = f z/V, u* = 0.4 V/log(z/z_0) (Kaimal et al. 1972)."""
 
     kind: Literal["kaimal"]
-    height: Annotated[Length, Positive]
-    """z above ground"""
-    roughness_length: Annotated[Length, NotNegative] = 0.03
-    """z_0; 0.03 m open country"""
 
     @model_validator(mode="after")
     def _above_the_roughness(self) -> Self:
@@ -189,6 +145,3 @@ class Kaimal(WindOnArea):
         base = 1.0 + 33.0 * x
         root = cbrt(base)
         return np.asarray(105.0 * friction * friction * x / (base * root * root) / frequency)
-
-
-AnyWind = Annotated[WindOfTable | Davenport | VonKarman | Kaimal, Field(discriminator="kind")]

@@ -1,0 +1,119 @@
+#include "described.hpp"
+
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "lostmotion/scenario/control_fields.hpp"
+#include "lostmotion/scenario/signal_fields.hpp"
+
+namespace lostmotion::binding {
+
+namespace nb = nanobind;
+
+namespace {
+
+// Of each parameter that a scenario file may have: key, kind, symbol, unit, meaning, range (above, from on, up to),
+// whether it is needed, its default, None where it is left out, and more: of a list the fewest and the most entries, of
+// a table the names of the parts that it may be.
+class DescribedFields : public FieldVisitor {
+ public:
+    nb::list rows;
+
+    using FieldVisitor::choice;
+    using FieldVisitor::flag;
+    using FieldVisitor::number;
+    void number(const Field& field, double v) { add(field, "number", limits(field.range), nb::float_(v)); }
+    void number(const Field& field, double v, double most) {
+        const nb::tuple range = limits(field.range);
+        add(field, "number", nb::make_tuple(range[0], range[1], most), nb::float_(v));
+    }
+    void pair(const Field& field, const std::array<double, 2>& v) {
+        add(field, "pair", limits(field.range), nb::make_tuple(v[0], v[1]));
+    }
+    template <class Integer>
+    void integer(const Field& field, Integer v, long long low, long long high) {
+        add(field, "integer", nb::make_tuple(nb::none(), low, high), nb::int_(v));
+    }
+    void flag(const Field& field, bool v) {
+        add(field, "flag", nb::make_tuple(nb::none(), nb::none(), nb::none()), nb::bool_(v));
+    }
+    void list(const Field& field, const std::vector<double>& v) {
+        list(field, v, {field.given == Given::needed ? 1 : 0});
+    }
+    void list(const Field& field, const std::vector<double>& v, Entries entries) {
+        const nb::object most = entries.most == Entries::any ? nb::none() : nb::object(nb::int_(entries.most));
+        add(field, "list", limits(field.range), nb::tuple(nb::cast(v)), nb::make_tuple(entries.fewest, most));
+    }
+    void table(const Field& field, const char* parts) {
+        add(field, "table", limits(Range::any), nb::dict(), parts_of(parts));
+    }
+    // One of several words, by default the first.
+    void choice(const Field& field, const char* words) {
+        const nb::object all = parts_of(words);
+        add(field, "choice", limits(Range::any), all[0], all);
+    }
+    void tables(const Field& field, const char* part) {
+        add(field, "tables", limits(Range::any), nb::make_tuple(), parts_of(part));
+    }
+
+ private:
+    static nb::tuple limits(Range range) {
+        const nb::object none = nb::none(), zero = nb::float_(0.0), one = nb::float_(1.0);
+        switch (range) {
+            case Range::above_one: return nb::make_tuple(one, none, none);
+            case Range::positive:
+            case Range::limit: return nb::make_tuple(zero, none, none);
+            case Range::not_negative:
+            case Range::limit_or_zero: return nb::make_tuple(none, zero, none);
+            case Range::up_to_one: return nb::make_tuple(zero, none, one);
+            case Range::share: return nb::make_tuple(none, zero, one);
+            default: return nb::make_tuple(none, none, none);
+        }
+    }
+    static nb::object parts_of(const char* parts) { return nb::str(parts).attr("split")("|"); }
+    void add(const Field& field, const char* kind, const nb::tuple& range, const nb::object& value,
+             const nb::object& more = nb::make_tuple()) {
+        if (field.given == Given::none) return;
+        rows.append(nb::make_tuple(field.key, kind, field.symbol, field.unit, field.meaning, range,
+                                   field.given == Given::needed, field.given == Given::has_default ? value : nb::none(),
+                                   more));
+    }
+};
+
+}  // namespace
+
+void bind_described(nb::module_& m) {
+    m.def(
+        "described_tables",
+        [] {
+            nb::dict tables;
+            const auto add = [&](const char* name, auto&& describe_table) {
+                DescribedFields f;
+                describe_table(f);
+                tables[name] = f.rows;
+            };
+            model::each_table(add);
+            signals::each_table(add);
+            control::each_table(add);
+            return tables;
+        },
+        nb::sig("def described_tables() -> dict[str, list[tuple[str, str, str, str, str, tuple[float | None, float | "
+                "None, float | None], bool, typing.Any, tuple[typing.Any, ...]]]]"),
+        "Of each part of scenarios, its parameters: key, kind, symbol, unit, meaning, range (above, from on, up to), "
+        "whether it is needed, default, and more: of a list the fewest and the most entries, of a table the parts.");
+    m.def(
+        "reference_blocks",
+        [] {
+            std::vector<std::tuple<std::string, std::string, std::string>> blocks;
+            control::each_reference_block([&](const auto& b) { blocks.emplace_back(b.key, b.part, b.meaning); });
+            return blocks;
+        },
+        "Of each block that shapes the reference: its table in a controller, its class, and what the table is.");
+}
+
+}  // namespace lostmotion::binding
