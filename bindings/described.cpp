@@ -1,19 +1,10 @@
 #include "described.hpp"
 
-#include <nanobind/stl/string.h>
-#include <nanobind/stl/tuple.h>
-#include <nanobind/stl/vector.h>
-
-#include <string>
-#include <tuple>
-#include <vector>
-
+#include "arrays.hpp"
 #include "lostmotion/scenario/control_fields.hpp"
-#include "lostmotion/scenario/signal_fields.hpp"
+#include "lostmotion/scenario/shaft_fields.hpp"
 
 namespace lostmotion::binding {
-
-namespace nb = nanobind;
 
 namespace {
 
@@ -28,10 +19,13 @@ class DescribedFields : public FieldVisitor {
     using FieldVisitor::flag;
     using FieldVisitor::number;
     void number(const Field& field, double v) { add(field, "number", limits(field.range), nb::float_(v)); }
-    void number(const Field& field, double v, double most) {
-        const nb::tuple range = limits(field.range);
-        add(field, "number", nb::make_tuple(range[0], range[1], most), nb::float_(v));
+    void number(const Field& field, double v, double least, double most) {
+        const nb::object above = limits(field.range)[0];
+        add(field, "number", nb::make_tuple(above, above.is_none() ? nb::object(nb::float_(least)) : nb::none(), most),
+            nb::float_(v));
     }
+    // Numbers by the names of elements.
+    void named(const Field& field) { add(field, "named", limits(field.range), nb::dict()); }
     void pair(const Field& field, const std::array<double, 2>& v) {
         add(field, "pair", limits(field.range), nb::make_tuple(v[0], v[1]));
     }
@@ -90,21 +84,28 @@ class DescribedFields : public FieldVisitor {
 void bind_described(nb::module_& m) {
     m.def(
         "described_tables",
-        [] {
+        [](bool of_core) {
             nb::dict tables;
             const auto add = [&](const char* name, auto&& describe_table) {
                 DescribedFields f;
                 describe_table(f);
                 tables[name] = f.rows;
             };
-            model::each_table(add);
-            signals::each_table(add);
-            control::each_table(add);
+            if (of_core) {
+                model::each_table(add);
+                control::each_table(add);
+            } else {
+                signals::each_table(add);
+                signals::each_shaft_table(add);
+            }
             return tables;
         },
-        nb::sig("def described_tables() -> dict[str, list[tuple[str, str, str, str, str, tuple[float | None, float | "
+        "of_core"_a,
+        nb::sig("def described_tables(of_core: bool) -> dict[str, list[tuple[str, str, str, str, str, tuple[float | "
+                "None, float | "
                 "None, float | None], bool, typing.Any, tuple[typing.Any, ...]]]]"),
-        "Of each part of scenarios, its parameters: key, kind, symbol, unit, meaning, range (above, from on, up to), "
+        "Of each part that the core takes by these keys, or of the others that scenario files have, its parameters: "
+        "key, kind, symbol, unit, meaning, range (above, from on, up to), "
         "whether it is needed, default, and more: of a list the fewest and the most entries, of a table the parts.");
     m.def(
         "reference_blocks",

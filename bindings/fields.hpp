@@ -36,6 +36,7 @@ class NamedFields {
         take(field.key, v);
     }
     void flag(const char* name, bool& v) { take(name, v); }
+    void text(const char* name, std::string& v) { take(name, v); }
     void flag(const Field& field, bool& v) { take(field.key, v); }
     template <class Enum>
     void choice(const char* name, Enum& v, std::initializer_list<const char*> names) {

@@ -19,6 +19,7 @@
 #include "lostmotion/analysis/steady_regime.hpp"
 #include "lostmotion/analysis/train_batch.hpp"
 #include "lostmotion/model/train_description.hpp"
+#include "lostmotion/scenario/part_fields.hpp"
 
 namespace lostmotion::binding {
 
@@ -84,25 +85,12 @@ class SharedRun : public TrainRun {
 // As Python describes a train.
 class TrainDescription : public model::TrainDescription {
  public:
-    using Friction = std::tuple<double, double, std::vector<double>, std::vector<double>>;
-
-    void add_shaft(const std::string& name, double inertia, double viscous_friction, const Friction& friction,
-                   const TorsionCurve* drag, bool loaded, bool given_motion) {
+    void add_shaft(const nb::dict& fields) {
         model::Shaft s;
-        s.name = name;
-        s.inertia = inertia;
-        s.viscous_friction = viscous_friction;
-        const auto& [torque, breakaway, speeds, torques] = friction;
-        s.friction = {torque, breakaway, speeds, torques};
-        if (drag != nullptr) s.drag = *drag;
-        s.loaded = loaded;
-        s.given_motion = given_motion;
+        NamedFields named(fields);
+        model::describe(named, s);
+        named.refuse_unknown();
         model::TrainDescription::add_shaft(std::move(s));
-    }
-    void set_domain(const std::string& shaft, const std::string& domain) {
-        for (model::Shaft& s : train.shafts)
-            if (s.name == shaft)
-                s.domain = domain == "translation" ? model::Domain::translation : model::Domain::rotation;
     }
     void add_mass_matrix(const std::string& name, const std::vector<std::string>& shafts,
                          const std::vector<std::vector<double>>& matrix) {
@@ -422,8 +410,8 @@ inline void bind_train(nb::module_& m) {
 
     nb::class_<TrainDescription>(m, "Train", nb::is_weak_referenceable())
         .def(nb::init<>())
-        .def("add_shaft", &TrainDescription::add_shaft, "name"_a, "inertia"_a, "viscous_friction"_a, "friction"_a,
-             "drag"_a.none(), "loaded"_a, "given_motion"_a = false)
+        .def("add_shaft", &TrainDescription::add_shaft, "fields"_a,
+             nb::sig("def add_shaft(self, fields: collections.abc.Mapping[str, typing.Any]) -> None"))
         .def("add_motor", &TrainDescription::add_motor, "name"_a, "shaft"_a, "fields"_a,
              nb::sig("def add_motor(self, name: str, shaft: str, fields: collections.abc.Mapping[str, typing.Any]) -> "
                      "None"))
@@ -434,7 +422,6 @@ inline void bind_train(nb::module_& m) {
              "Inertias [kg m2] of several shafts, in place of their own.")
         .def("with_mass_matrix", &TrainDescription::with_mass_matrix, "name"_a, "matrix"_a,
              "The same train with other numbers in one of its mass matrices.")
-        .def("set_domain", &TrainDescription::set_domain, "shaft"_a, "domain"_a)
         .def("set_housing", &TrainDescription::set_housing, "gear"_a, "shaft"_a)
         .def("add", &TrainDescription::add, "table"_a, "name"_a, "shaft"_a, "fields"_a,
              nb::sig("def add(self, table: str, name: str, shaft: str, fields: collections.abc.Mapping[str, "

@@ -86,9 +86,9 @@ class LossMap:
 class Signal:
     def __init__(self, breakpoints: Sequence[Sequence[float]], sines: Sequence[Sequence[float]]) -> None: ...
 
-def described_tables() -> dict[str, list[tuple[str, str, str, str, str, tuple[float | None, float | None, float | None], bool, Any, tuple[Any, ...]]]]:
+def described_tables(of_core: bool) -> dict[str, list[tuple[str, str, str, str, str, tuple[float | None, float | None, float | None], bool, Any, tuple[Any, ...]]]]:
     """
-    Of each part of scenarios, its parameters: key, kind, symbol, unit, meaning, range (above, from on, up to), whether it is needed, default, and more: of a list the fewest and the most entries, of a table the parts.
+    Of each part that the core takes by these keys, or of the others that scenario files have, its parameters: key, kind, symbol, unit, meaning, range (above, from on, up to), whether it is needed, default, and more: of a list the fewest and the most entries, of a table the parts.
     """
 
 def reference_blocks() -> list[tuple[str, str, str]]:
@@ -202,7 +202,7 @@ def stribeck_curve(friction_torque: float, breakaway_torque: float, stribeck_spe
 class Train:
     def __init__(self) -> None: ...
 
-    def add_shaft(self, name: str, inertia: float, viscous_friction: float, friction: tuple[float, float, Sequence[float], Sequence[float]], drag: TorsionCurve | None, loaded: bool, given_motion: bool = False) -> None: ...
+    def add_shaft(self, fields: Mapping[str, Any]) -> None: ...
 
     def add_motor(self, name: str, shaft: str, fields: Mapping[str, Any]) -> None: ...
 
@@ -213,8 +213,6 @@ class Train:
 
     def with_mass_matrix(self, name: str, matrix: Sequence[Sequence[float]]) -> Train:
         """The same train with other numbers in one of its mass matrices."""
-
-    def set_domain(self, shaft: str, domain: str) -> None: ...
 
     def set_housing(self, gear: str, shaft: str) -> None: ...
 

@@ -128,10 +128,10 @@ void describe(F& f, DryFriction& d) {
 template <class F>
 void describe(F& f, Shaft& s) {
     f.text("name", s.name);
-    f.choice("domain", s.domain, 2);
+    f.choice("domain", s.domain, {"rotation", "translation"});
     s.describe(f);
     f.part("friction", [&] { describe(f, s.friction); });
-    f.part("drag", [&] { describe(f, s.drag); });
+    f.curve("drag", s.drag);
     f.flag("loaded", s.loaded);
     f.flag("given_motion", s.given_motion);
 }

@@ -186,7 +186,7 @@ void each_wind(Use&& use) {
     use("Davenport", [](auto& f) {
         f.number({"surface_drag", "K", "", positive, has_default,
                   "K = u*^2/V_10^2; 0.005 open country, 0.015 suburbs, 0.05 cities"},
-                 0.005, 0.1);
+                 0.005, 0.0, 0.1);
         f.number({"speed_at_10_m", "V_10", "m/s", positive, may_be_left_out, "V_10; default: the value at the load"},
                  0.0);
     });

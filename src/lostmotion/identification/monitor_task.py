@@ -6,10 +6,9 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from ..inputs.named import nothing
+from ..inputs.named import Elements, nothing
 from ..inputs.part import Part
 from ..inputs.quantities import Number, Whole
-from ..model.train import Elements
 
 Limit = float | str | None
 

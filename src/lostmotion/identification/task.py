@@ -11,12 +11,11 @@ from pydantic import Field, model_validator
 
 from ..errors import InputError
 from ..inputs.arguments import checked
-from ..inputs.named import nothing
+from ..inputs.named import Elements, nothing
 from ..inputs.part import Part
 from ..inputs.quantities import NotNegative, Number, Positive, Switch, Time, Whole
 from ..inputs.toml_files import read_toml
 from ..inputs.validation import did_you_mean
-from ..model.train import Elements
 from .formulas import CONSTANTS, FUNCTIONS, Formula
 from .monitor_task import Monitoring
 from .parameters import FreeParameter, in_unit

@@ -13,6 +13,7 @@ from pydantic import Field, create_model
 
 from .. import _core
 from ..units.conversion import Unit
+from .named import Elements, nothing
 from .part import Part
 from .quantities import Limit, Switch, Whole
 
@@ -24,7 +25,7 @@ M = TypeVar("M")  # a move of it
 
 OF_VALUE: dict[str, Any] = {"value": V, "value/s": S, "value/s^2": A, "value/s^3": J}
 """units in terms of the value"""
-TYPES = {"number": "float", "pair": "tuple[float, float]", "integer": "int", "flag": "bool"}
+TYPES = {"pair": "tuple[float, float]", "integer": "int", "flag": "bool", "named": "dict[str, float]"}
 
 Row = tuple[Any, ...]
 """key, kind, symbol, unit, meaning, range, whether it is needed, default, and more"""
@@ -36,7 +37,7 @@ class Described(Part):
     described: ClassVar[tuple[str, ...]] = ()
     """keys of these"""
     core_keys: ClassVar[tuple[str, ...]] = ()
-    """keys of those that are no tables"""
+    """keys of those that the core takes"""
 
     def core_fields(self) -> dict[str, Any]:
         """Fields for the core, in SI units, without those that are None."""
@@ -78,6 +79,8 @@ def _type(kind: str, unit: str, limits: tuple[float | None, float | None, float 
     number: Any = OF_VALUE.get(unit) or Annotated[float, Unit(unit)]
     if limits != (None, None, None):
         number = Annotated[number, Limit(gt=above, ge=least, le=most)]
+    if kind == "named":
+        return Elements[number]
     if kind == "list":
         fewest, largest = more
         return Annotated[tuple[number, ...], Field(min_length=fewest or None, max_length=largest)]
@@ -94,14 +97,15 @@ def _part(name: str, rows: list[Row]) -> type[Described]:
         else:
             given = _type(kind, unit, limits, more)
         optional = default is None and not needed
-        fields[key] = (
-            given | None if optional else given,
-            Field(... if needed else default, description=meaning or None),
-        )
+        text = meaning or None
+        value: Any = Field(... if needed else default, description=text)
+        if kind == "named":
+            value = Field(default_factory=nothing, description=text)
+        fields[key] = (given | None if optional else given, value)
     base = (Described, Generic[variables]) if (variables := tuple(_variables(rows))) else Described
     part = create_model(f"{name}Fields", __base__=base, __module__=__name__, **fields)
     part.described = tuple(fields)
-    part.core_keys = tuple(row[0] for row in rows if not _is_table(row))
+    part.core_keys = part.described if name in OF_CORE else ()
     return part
 
 
@@ -114,7 +118,8 @@ def _variables(rows: list[Row]) -> dict[Any, str]:
     return found | ({M: M.__name__} if M.__name__ in inner else {})
 
 
-TABLES: dict[str, list[Row]] = _core.described_tables()
+OF_CORE: dict[str, list[Row]] = _core.described_tables(of_core=True)
+TABLES = OF_CORE | _core.described_tables(of_core=False)
 """rows of the parameters of each part"""
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import Any, NoReturn, TypeVar
+from typing import Annotated, Any, NoReturn, TypeVar
+
+from pydantic import AfterValidator
 
 from ..errors import InputError
 from .validation import shown
@@ -43,6 +45,10 @@ class Named(dict[str, V]):
 
     __setitem__ = __delitem__ = __ior__ = _refuse
     clear = pop = popitem = setdefault = update = _refuse
+
+
+Elements = Annotated[dict[str, V], AfterValidator(Named)]
+"""by name, in the order of the equations"""
 
 
 def nothing() -> Named[Any]:

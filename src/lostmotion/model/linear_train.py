@@ -6,7 +6,7 @@ from typing import Any
 from pydantic import Field
 
 from ..errors import InputError
-from ..inputs.named import nothing
+from ..inputs.named import Elements, nothing
 from ..inputs.validation import did_you_mean, shown
 from .gear import Gear
 from .linear import LinearDrive, Screw
@@ -14,7 +14,7 @@ from .linear_motor import LinearMotor
 from .motor import ShaftMotor
 from .rack_and_belt import Belt, Rack
 from .shaft import FrictionCurve, Shaft
-from .train import Elements, TrainElements
+from .train import TrainElements
 
 # Tables of what joins a shaft and a slide.
 LINEAR_DRIVES = ("screws", "racks", "belts")

@@ -1,18 +1,9 @@
 """The driven body."""
 
-from typing import Annotated
-
-from ..inputs.part import Part
-from ..inputs.quantities import (
-    Inertia,
-    NotNegative,
-    Positive,
-    Torque,
-    ViscousFriction,
-)
+from ..inputs import described
 
 
-class Load(Part):
+class Load(described.LoadFields):
     """Inertia, friction and torque at the output of the gearbox (3b).
 
     Examples
@@ -24,10 +15,3 @@ class Load(Part):
 
     def __repr__(self) -> str:
         return f"Load({self.inertia:.4g} kg·m²)"
-
-    inertia: Annotated[Inertia, Positive]
-    """J_Z"""
-    viscous_friction: Annotated[ViscousFriction, NotNegative] = 0.0
-    """b_ZR"""
-    friction_torque: Annotated[Torque, NotNegative] = 0.0
-    """dry friction of the bearing"""

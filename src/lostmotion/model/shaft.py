@@ -2,21 +2,13 @@
 
 import itertools
 from functools import lru_cache
-from typing import Annotated, Literal, Self
+from typing import Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from .. import _core
+from ..inputs import described
 from ..inputs.breakpoints import check_apart
-from ..inputs.described import ShaftFields
-from ..inputs.part import Part
-from ..inputs.quantities import (
-    NotNegative,
-    Positive,
-    QuadraticFriction,
-    Speed,
-    Torque,
-)
 
 SHARE = 1e-3  # of the largest value, by which straight lines depart from a smooth law if no error is given
 
@@ -33,12 +25,33 @@ def check_points(speeds: tuple[float, ...], torques: tuple[float, ...], what: st
     check_apart(speeds, "speeds")
 
 
-class FrictionCurve(Part):
-    """Dry friction torque over the magnitude of the speed: straight lines through the points, constant beyond the last."""
+def check_friction(part: Any, force: str, unit: str) -> None:
+    """Refuse dry friction that is stated twice or rises when a shaft or slide breaks away.
 
-    speeds: tuple[Annotated[Speed, NotNegative], ...] = Field(min_length=2, max_length=100)
-    """rising from 0"""
-    torques: tuple[Annotated[Torque, NotNegative], ...]
+    Parameters
+    ----------
+    force
+        In the keys of the part: `torque` or `force`, in the unit given.
+    """
+    slipping, breakaway = getattr(part, f"friction_{force}"), getattr(part, f"breakaway_{force}")
+    if part.friction_curve is not None:
+        for key in (f"friction_{force}", "stribeck_speed"):
+            if getattr(part, key):
+                raise ValueError(f"has {key} and friction_curve, which say the same; give one")
+        slipping = getattr(part.friction_curve, f"{force}s")[0]
+    if breakaway is not None and breakaway < slipping:
+        raise ValueError(
+            f"has breakaway_{force} = {breakaway} {unit}, less than its friction in motion, {slipping} {unit}; "
+            "give at least that, or leave it out"
+        )
+    if part.stribeck_speed is not None and not (breakaway or 0.0) > slipping:
+        raise ValueError(f"has a stribeck_speed, which needs a breakaway_{force} above friction_{force}; give it")
+    if part.friction_error is not None and part.stribeck_speed is None:
+        raise ValueError("has a friction_error, which belongs to stribeck_speed; leave it out")
+
+
+class FrictionCurve(described.FrictionCurveFields):
+    """Dry friction torque over the magnitude of the speed: straight lines through the points, constant beyond the last."""
 
     @model_validator(mode="after")
     def _is_a_curve(self) -> Self:
@@ -46,16 +59,10 @@ class FrictionCurve(Part):
         return self
 
 
-class DragCurve(Part):
+class DragCurve(described.DragCurveFields):
     """Torque against the motion over the magnitude of the speed: straight lines through points."""
 
     kind: Literal["curve"] = "curve"
-    speeds: tuple[Annotated[Speed, NotNegative], ...] = Field(min_length=2, max_length=100)
-    """rising from 0"""
-    torques: tuple[Annotated[Torque, NotNegative], ...]
-    """the first is 0: what holds at rest is friction"""
-    beyond: Literal["extend", "hold"] = "extend"
-    """beyond the last point: the last line goes on, or the last torque stays"""
 
     @model_validator(mode="after")
     def _is_a_curve(self) -> Self:
@@ -78,33 +85,22 @@ class DragCurve(Part):
         return _core.TorsionCurve(list(self.speeds[1:-1]), slopes)
 
 
-class QuadraticDrag(Part):
+class QuadraticDrag(described.QuadraticDragFields):
     """Torque ``coefficient * w * |w|`` of a fan or a pump, by straight lines up to `max_speed`; beyond, the last goes on."""
 
     kind: Literal["quadratic"] = "quadratic"
-    coefficient: Annotated[QuadraticFriction, Positive]
-    max_speed: Annotated[Speed, Positive]
-    error: Annotated[Torque, Positive] | None = None
-    """by which the straight lines depart from the parabola at most; left out, 0.1 % of the torque at max_speed"""
 
     def core(self) -> _core.TorsionCurve:
         top = self.coefficient * self.max_speed * self.max_speed
         return _core.quadratic_drag(self.coefficient, self.max_speed, SHARE * top if self.error is None else self.error)
 
 
-class EddyCurrentDrag(Part):
+class EddyCurrentDrag(described.EddyCurrentDragFields):
     """Torque ``2 peak_torque s/(1 + s^2)`` of an eddy-current brake with ``s = w/critical_speed``, by straight lines; beyond `max_speed` the
     last torque stays.
     """
 
     kind: Literal["eddy_current"]
-    peak_torque: Annotated[Torque, Positive]
-    """at the critical speed"""
-    critical_speed: Annotated[Speed, Positive]
-    max_speed: Annotated[Speed, Positive]
-    """up to which the straight lines follow the law"""
-    error: Annotated[Torque, Positive] | None = None
-    """by which they depart from it at most; left out, 0.1 % of the peak torque"""
 
     @model_validator(mode="after")
     def _takes_few_lines(self) -> Self:
@@ -159,7 +155,7 @@ def _departure(a: float, b: float) -> float:
     return max(abs(f[k] - (f[0] + (f[-1] - f[0]) * k / 32.0)) for k in range(33))
 
 
-class Shaft(ShaftFields):
+class Shaft(described.DragFields, described.DryFrictionFields, described.ShaftFields):
     """A shaft of a drive train. Rotors of motors and inertias of gears on it are added to it.
 
     Examples
@@ -171,17 +167,6 @@ class Shaft(ShaftFields):
 
     domain: Literal["rotation", "translation"] = "rotation"
     """translation: a slide, which scenarios have in the table `slides`; its numbers are in kg, m and N"""
-    friction_torque: Annotated[Torque, NotNegative] = 0.0
-    """T_C, dry friction while it slips"""
-    breakaway_torque: Annotated[Torque, NotNegative] | None = None
-    """T_S, dry friction at rest; left out, the same"""
-    stribeck_speed: Annotated[Speed, Positive] | None = None
-    """w_S: the friction falls from T_S to T_C by `T_C + (T_S - T_C) exp(-(w/w_S)^2)`; left out, at once"""
-    friction_error: Annotated[Torque, Positive] | None = None
-    """by which straight lines depart from that curve at most; left out, 0.1 % of T_S - T_C"""
-    friction_curve: FrictionCurve | None = None
-    """dry friction over speed, in place of friction_torque and stribeck_speed"""
-    drag: Annotated[DragCurve | QuadraticDrag | EddyCurrentDrag, Field(discriminator="kind")] | None = None
 
     def __repr__(self) -> str:
         unit = "kg" if self.domain == "translation" else "kg·m²"
@@ -189,22 +174,14 @@ class Shaft(ShaftFields):
 
     @model_validator(mode="after")
     def _friction_is_clear(self) -> Self:
-        slipping = self.friction_torque
-        if self.friction_curve is not None:
-            for key in ("friction_torque", "stribeck_speed"):
-                if getattr(self, key):
-                    raise ValueError(f"has {key} and friction_curve, which say the same; give one")
-            slipping = self.friction_curve.torques[0]
-        if self.breakaway_torque is not None and self.breakaway_torque < slipping:
-            raise ValueError(
-                f"has breakaway_torque = {self.breakaway_torque} N*m, less than its friction in motion, {slipping} N*m; "
-                "give at least that, or leave it out"
-            )
-        if self.stribeck_speed is not None and not (self.breakaway_torque or 0.0) > slipping:
-            raise ValueError("has a stribeck_speed, which needs a breakaway_torque above friction_torque; give it")
-        if self.friction_error is not None and self.stribeck_speed is None:
-            raise ValueError("has a friction_error, which belongs to stribeck_speed; leave it out")
+        check_friction(self, "torque", "N*m")
         return self
+
+    def core_fields(self) -> dict[str, Any]:
+        """Fields for the core, in SI units."""
+        keys = ("torque", "breakaway_torque", "speeds", "torques")
+        own = {"friction": dict(zip(keys, self.friction(), strict=True)), "domain": self.domain}
+        return super().core_fields() | own | ({} if self.drag is None else {"drag": self.drag.core()})
 
     def friction(self) -> tuple[float, float, list[float], list[float]]:
         """(T_C, T_S, speeds [rad/s], torques [N·m]) of its dry friction; the lists are empty where there is no curve."""

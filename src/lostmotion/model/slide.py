@@ -1,36 +1,19 @@
 """Slides: parts that move along a straight line, their friction and end stops."""
 
-import math
-from typing import Annotated, Self
+from typing import Self
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
-from ..inputs.part import Part
-from ..inputs.quantities import (
-    Angle,
-    AxialStiffness,
-    Force,
-    Length,
-    Limit,
-    LinearSpeed,
-    LinearViscousFriction,
-    Mass,
-    NotNegative,
-    Positive,
-)
+from ..inputs import described
 from ..reproducible import sin
 from .angle_torques import STANDARD_GRAVITY
-from .shaft import FrictionCurve, Shaft, check_points
+from .shaft import FrictionCurve, Shaft, check_friction, check_points
 from .springs import Spring
 from .torsion import TorsionCurve
 
 
-class ForceCurve(Part):
+class ForceCurve(described.ForceCurveFields):
     """Dry friction force over the magnitude of the speed: straight lines through the points, constant beyond the last."""
-
-    speeds: tuple[Annotated[LinearSpeed, NotNegative], ...] = Field(min_length=2, max_length=100)
-    """rising from 0"""
-    forces: tuple[Annotated[Force, NotNegative], ...]
 
     @model_validator(mode="after")
     def _is_a_curve(self) -> Self:
@@ -38,12 +21,8 @@ class ForceCurve(Part):
         return self
 
 
-class EndStops(Part):
+class EndStops(described.EndStopsFields):
     """Elastic stops at both ends of the travel: free between them, a spring beyond."""
-
-    lower: Length
-    upper: Length
-    stiffness: Annotated[AxialStiffness, Positive]
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -57,7 +36,7 @@ class EndStops(Part):
         return Spring(shaft=slide, stiffness=curve, rest_angle=0.5 * (self.lower + self.upper))
 
 
-class Slide(Part):
+class Slide(described.SlideFrictionFields, described.SlideFields):
     """A mass that moves along a straight line: a table, a carriage, a ram. Masses of linear motors on it are added.
 
     Examples
@@ -67,43 +46,12 @@ class Slide(Part):
     196.13299999999998
     """
 
-    mass: Annotated[Mass, NotNegative] = 0.0
-    viscous_friction: Annotated[LinearViscousFriction, NotNegative] = 0.0
-    friction_force: Annotated[Force, NotNegative] = 0.0
-    """dry friction while it slips"""
-    breakaway_force: Annotated[Force, NotNegative] | None = None
-    """dry friction at rest; left out, the same"""
-    stribeck_speed: Annotated[LinearSpeed, Positive] | None = None
-    """v_S: the friction falls from breakaway_force to friction_force by ``exp(-(v/v_S)^2)``; left out, at once"""
-    friction_error: Annotated[Force, Positive] | None = None
-    """by which straight lines depart from that curve at most; left out, 0.1 % of the difference of both forces"""
-    friction_curve: ForceCurve | None = None
-    """dry friction over speed, in place of friction_force and stribeck_speed"""
-    inclination: Annotated[Angle, Limit(ge=-0.5 * math.pi, le=0.5 * math.pi)] = 0.0
-    """inclination of the positive direction above the horizontal; 90 deg: vertical, positive upwards. The weight's share along the slide acts
-    against it"""
-    end_stops: EndStops | None = None
-
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.mass:.4g} kg)"
 
     @model_validator(mode="after")
     def _friction_is_clear(self) -> Self:
-        slipping = self.friction_force
-        if self.friction_curve is not None:
-            for key in ("friction_force", "stribeck_speed"):
-                if getattr(self, key):
-                    raise ValueError(f"has {key} and friction_curve, which say the same; give one")
-            slipping = self.friction_curve.forces[0]
-        if self.breakaway_force is not None and self.breakaway_force < slipping:
-            raise ValueError(
-                f"has breakaway_force = {self.breakaway_force} N, less than its friction in motion, {slipping} N; "
-                "give at least that, or leave it out"
-            )
-        if self.stribeck_speed is not None and not (self.breakaway_force or 0.0) > slipping:
-            raise ValueError("has a stribeck_speed, which needs a breakaway_force above friction_force; give it")
-        if self.friction_error is not None and self.stribeck_speed is None:
-            raise ValueError("has a friction_error, which belongs to stribeck_speed; leave it out")
+        check_friction(self, "force", "N")
         return self
 
     def weight(self, mass: float | None = None) -> float:

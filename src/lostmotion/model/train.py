@@ -1,13 +1,13 @@
 """A drive train: shafts joined by gears, clutches and dampers, turned by motors, held by brakes, as frozen objects in SI units."""
 
 from collections.abc import Collection, Iterator, Mapping
-from typing import Annotated, Any, Self, TypeVar, get_args
+from typing import Any, Self, get_args
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from .. import _core
 from ..errors import InputError
-from ..inputs.named import Named, nothing
+from ..inputs.named import Elements, nothing
 from ..inputs.part import Part
 from ..inputs.validation import did_you_mean, shown
 from .angle_torques import AngleTorque, Gravity
@@ -18,11 +18,6 @@ from .mass_matrix import MassMatrix
 from .motor import MotorLaw, ShaftMotor
 from .shaft import Shaft
 from .springs import Spring
-
-V = TypeVar("V")
-
-Elements = Annotated[dict[str, V], AfterValidator(Named)]
-"""by name, in the order of the equations"""
 
 
 class TrainElements(Part):
@@ -229,10 +224,8 @@ class DriveTrain(TrainElements):
         """
         train = _core.Train()
         for name, s in self.shafts.items():
-            drag = None if s.drag is None else s.drag.core()
-            train.add_shaft(name, s.inertia, s.viscous_friction, s.friction(), drag, name in loaded, name in given)
-            if s.domain != "rotation":
-                train.set_domain(name, s.domain)
+            inputs = {"loaded": name in loaded, "given_motion": name in given}
+            train.add_shaft({"name": name, **s.core_fields(), **inputs})
         for name, mass in self.mass_matrices.items():
             train.add_mass_matrix(name, mass.shafts, mass.matrix)
         for name, m in self.motors.items():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Self
+from typing import Any, Self
 
 from pydantic import ConfigDict, model_validator
 
@@ -13,9 +13,8 @@ from ..control.continuous import ContinuousController
 from ..control.controller import Controller
 from ..data_sheets.components import Conditions, use_records
 from ..errors import InputError
+from ..inputs import described
 from ..inputs.kept import kept, kept_while_used
-from ..inputs.part import Part
-from ..inputs.quantities import Angle, NotNegative, Speed, Switch, Torque
 from ..model.drive import Drive
 from ..model.gearbox import Gearbox, Transmission
 from ..model.load import Load
@@ -37,7 +36,7 @@ class LoadTable(Load):
     """M_Z"""
 
 
-class Initial(Part):
+class Initial(described.InitialFields):
     """State of a drive at t = 0.
 
     Examples
@@ -46,16 +45,6 @@ class Initial(Part):
     >>> lm.Initial(motor_speed="3000 rpm", load_speed="30 rpm").load_speed
     3.141592653589793
     """
-
-    motor_torque: Torque = 0.0
-    motor_speed: Speed = 0.0
-    load_speed: Speed = 0.0
-    twist: Angle = 0.0
-    load_angle: Angle = 0.0
-    hysteresis_capacity: Annotated[Torque, NotNegative] = 0.0
-    """h, which the last turning point before t = 0 left behind"""
-    on_reference: Switch = False
-    """angle and speeds are those of the controller's reference at t = 0"""
 
     def at_rest(self) -> Initial:
         """The same without motion and twist."""

@@ -17,14 +17,14 @@ from ..control.turning import turns
 from ..data_sheets.train_components import CONDITIONS, RECORDS, use_train_records
 from ..errors import InputError
 from ..inputs.kept import kept, kept_while_used
-from ..inputs.named import Named, nothing
+from ..inputs.named import Elements, Named, nothing
 from ..inputs.validation import did_you_mean
 from ..model.motor import MotorLaw
 from ..model.shaft import Shaft
 from ..model.signals import CommandSignal, ForceSignal, Signal
 from ..model.task import TrainTask
 from ..model.torsion import Rigid
-from ..model.train import DriveTrain, Elements
+from ..model.train import DriveTrain
 from .given_motion import MotionDerivative
 from .keys import set_values
 from .linear_units import in_si

@@ -1,0 +1,182 @@
+// Friction, drag, torques over the angle, and initial states of shafts and slides, as scenario files write them.
+#pragma once
+
+#include <numbers>
+
+#include "signal_fields.hpp"
+
+namespace lostmotion::signals {
+
+// Names and units of one kind of motion.
+struct Motion {
+    const char *load, *curve, *slipping, *at_rest, *forces, *force, *speed, *sliding, *stuck, *law, *error;
+};
+inline constexpr Motion rotation{
+    "DryFriction",
+    "FrictionCurve",
+    "friction_torque",
+    "breakaway_torque",
+    "torques",
+    "N*m",
+    "rad/s",
+    "T_C, dry friction while it slips",
+    "T_S, dry friction at rest; left out, the same",
+    "w_S: the friction falls from T_S to T_C by `T_C + (T_S - T_C) exp(-(w/w_S)^2)`; left out, at once",
+    "by which straight lines depart from that curve at most; left out, 0.1 % of T_S - T_C"};
+inline constexpr Motion translation{
+    "SlideFriction",
+    "ForceCurve",
+    "friction_force",
+    "breakaway_force",
+    "forces",
+    "N",
+    "m/s",
+    "dry friction while it slips",
+    "dry friction at rest; left out, the same",
+    "v_S: the friction falls from breakaway_force to friction_force by ``exp(-(v/v_S)^2)``; left out, at once",
+    "by which straight lines depart from that curve at most; left out, 0.1 % of the difference of both forces"};
+
+template <class Use>
+void each_friction(Use&& use, const Motion& m) {
+    use(m.curve, [=](auto& f) {
+        f.list({"speeds", "", m.speed, not_negative, needed, "rising from 0"}, {}, {2});
+        f.list({m.forces, "", m.force, not_negative, needed, "dry friction at each speed"}, {}, {0, Entries::any});
+    });
+    use(m.load, [=](auto& f) {
+        f.number({m.slipping, "T_C", m.force, not_negative, has_default, m.sliding}, 0.0);
+        f.number({m.at_rest, "T_S", m.force, not_negative, may_be_left_out, m.stuck}, 0.0);
+        f.number({"stribeck_speed", "w_S", m.speed, positive, may_be_left_out, m.law}, 0.0);
+        f.number({"friction_error", "", m.force, positive, may_be_left_out, m.error}, 0.0);
+        f.table({"friction_curve", "", "", any, may_be_left_out,
+                 "dry friction over speed, in place of the dry friction while it slips and stribeck_speed"},
+                m.curve);
+    });
+}
+
+template <class Use>
+void each_drag(Use&& use) {
+    const Field max_speed{"max_speed", "", "rad/s", positive, needed, "up to which the straight lines follow the law"};
+    use("DragCurve", [](auto& f) {
+        f.list({"speeds", "", "rad/s", not_negative, needed, "rising from 0"}, {}, {2});
+        f.list({"torques", "", "N*m", not_negative, needed, "the first is 0: what holds at rest is friction"}, {},
+               {0, Entries::any});
+        f.choice({"beyond", "", "", any, has_default,
+                  "beyond the last point: the last line goes on, or the last torque stays"},
+                 "extend|hold");
+    });
+    use("QuadraticDrag", [=](auto& f) {
+        f.number({"coefficient", "c", "N*m*s^2/rad^2", positive, needed, "c of the torque c w |w|"}, 0.0);
+        f.number(max_speed, 0.0);
+        f.number({"error", "", "N*m", positive, may_be_left_out,
+                  "by which the straight lines depart from the parabola at most; left out, 0.1 % of the torque at "
+                  "max_speed"},
+                 0.0);
+    });
+    use("EddyCurrentDrag", [=](auto& f) {
+        f.number({"peak_torque", "", "N*m", positive, needed, "at the critical speed"}, 0.0);
+        f.number({"critical_speed", "", "rad/s", positive, needed, "speed of the largest torque"}, 0.0);
+        f.number(max_speed, 0.0);
+        f.number({"error", "", "N*m", positive, may_be_left_out,
+                  "by which they depart from it at most; left out, 0.1 % of the peak torque"},
+                 0.0);
+    });
+    use("Drag", [](auto& f) {
+        f.table({"drag", "", "", any, may_be_left_out, "torque against the motion over speed"},
+                "DragCurve|QuadraticDrag|EddyCurrentDrag");
+    });
+}
+
+template <class Use>
+void each_slide(Use&& use) {
+    use("EndStops", [](auto& f) {
+        f.number({"lower", "", "m", any, needed, "position of the lower stop"}, 0.0);
+        f.number({"upper", "", "m", any, needed, "position of the upper stop"}, 0.0);
+        f.number({"stiffness", "k", "N/m", positive, needed, "of each stop"}, 0.0);
+    });
+    use("Slide", [](auto& f) {
+        constexpr double upright = 0.5 * std::numbers::pi;
+        f.number({"mass", "m", "kg", not_negative, has_default, "of what moves, without masses of linear motors"}, 0.0);
+        f.number({"viscous_friction", "b", "N*s/m", not_negative, has_default, "against the frame"}, 0.0);
+        f.number({"inclination", "", "rad", any, has_default,
+                  "inclination of the positive direction above the horizontal; 90 deg: vertical, positive upwards. The "
+                  "weight's share along the slide acts against it"},
+                 0.0, -upright, upright);
+        f.table({"end_stops", "", "", any, may_be_left_out, "elastic stops at both ends of the travel"}, "EndStops");
+    });
+    use("Load", [](auto& f) {
+        f.number({"inertia", "J_Z", "kg*m^2", positive, needed, "J_Z"}, 0.0);
+        f.number({"viscous_friction", "b_ZR", "N*m*s/rad", not_negative, has_default, "b_ZR"}, 0.0);
+        f.number({"friction_torque", "", "N*m", not_negative, has_default, "dry friction of the bearing"}, 0.0);
+    });
+    use("ShaftTable", [](auto& f) {
+        f.table({"torque", "M_Z", "", any, may_be_left_out, "M_Z, against its motion; left out, none can act on it"},
+                "TorqueSignal");
+        f.table({"speed", "", "", any, may_be_left_out,
+                 "speed that it has whatever acts on it; the torque that this takes is the variable "
+                 "``NAME_drive_torque``; left out, it moves as the torques let it"},
+                "SpeedSignal");
+        f.table({"motion", "", "", any, may_be_left_out,
+                 "angle that it has whatever acts on it, such as moves, in place of speed"},
+                "PositionReference");
+    });
+    use("SlideTable", [](auto& f) {
+        f.table({"force", "", "", any, may_be_left_out,
+                 "against its motion, beside its weight; left out, none can act on it unless it is inclined"},
+                "ForceSignal");
+        f.table({"speed", "", "", any, may_be_left_out,
+                 "speed that it has whatever acts on it; the force that this takes is the variable "
+                 "``NAME_drive_force``; left out, it moves as the forces let it"},
+                "SlideSpeedSignal");
+        f.table({"motion", "", "", any, may_be_left_out,
+                 "position that it has whatever acts on it, such as moves, in place of speed"},
+                "SlideReference");
+    });
+}
+
+template <class Use>
+void each_initial(Use&& use) {
+    constexpr const char* on_reference = "on_reference";
+    use("Initial", [](auto& f) {
+        f.number({"motor_torque", "M_D", "N*m"}, 0.0);
+        f.number({"motor_speed", "w_M", "rad/s"}, 0.0);
+        f.number({"load_speed", "w", "rad/s"}, 0.0);
+        f.number({"twist", "d", "rad"}, 0.0);
+        f.number({"load_angle", "phi", "rad"}, 0.0);
+        f.number({"hysteresis_capacity", "h", "N*m", not_negative, has_default,
+                  "h, which the last turning point before t = 0 left behind"},
+                 0.0);
+        f.flag({on_reference, "", "", any, has_default,
+                "angle and speeds are those of the controller's reference at t = 0"},
+               false);
+    });
+    use("TrainInitial", [](auto& f) {
+        f.named({"speeds", "", "rad/s", any, has_default, "speeds of shafts"});
+        f.named({"angles", "", "rad", any, has_default, "angles of shafts; those of others follow through the gears"});
+        f.named({"twists", "", "rad", any, has_default, "twists of gears with a stiffness"});
+        f.named({"positions", "", "m", any, has_default, "positions of slides"});
+        f.named({"slide_speeds", "", "m/s", any, has_default, "slide speeds of slides"});
+        f.named({"deflections", "", "m", any, has_default, "deflections of screws, racks and belts with a stiffness"});
+        f.named({"motor_torques", "", "N*m", any, has_default, "motor torques of DC motors"});
+        f.named({"controller_states", "", "", any, has_default,
+                 "states of continuous controllers, by their result variables (SI), such as ``MOTOR_integral``; the "
+                 "filter of a derivative that is left out has settled"});
+        f.named({"hysteresis_capacities", "", "N*m", not_negative, has_default,
+                 "capacities of gears with hysteresis after the last turning point before t = 0"});
+        f.named({"hysteresis_forces", "", "N", not_negative, has_default, "the same of screws, racks and belts"});
+        f.flag({on_reference, "", "", any, has_default,
+                "angles of the shafts of controllers, and the speeds of all that turns with them, are those of their "
+                "references at t = 0"},
+               false);
+    });
+}
+
+template <class Use>
+void each_shaft_table(Use&& use) {
+    each_friction(use, rotation);
+    each_friction(use, translation);
+    each_drag(use);
+    each_slide(use);
+    each_initial(use);
+}
+
+}  // namespace lostmotion::signals
