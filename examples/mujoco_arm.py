@@ -1,7 +1,7 @@
 """A six-axis arm in MuJoCo: ideal gears against strain wave gears of the catalogue, in motion and at rest.
 
 Each motor is held to its reference by a proportional-derivative law on its own encoder, with gravity and inertia fed forward, as
-in a robot. What the gears do between motor and joint no encoder sees. Needs `pip install "lostmotion[mujoco]"`.
+in a robot. What the gears do between motor and joint no encoder sees. With an encoder on the joint and an integrator the axis hunts. Needs `pip install "lostmotion[mujoco]"`.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ AXES = {
     "bend": ("0 -1 0", "0.1 0 0", 0.8, "0.04 0 0", SMALL),
     "flange": ("1 0 0", "0.08 0 0", 0.5, "0.05 0 0", SMALL),
 }
+TARGET = 0.05  # of the pan joint under a position loop [rad]
 POSE = np.array([0.0, 0.6, -0.9, 0.0, -0.4, 0.0])
 
 
@@ -111,6 +112,59 @@ def rest(duration: float) -> float:
     return float(np.abs(robot.data.qpos - POSE).max())
 
 
+def loop_of_the_load(added_backlash: float = 0.0) -> Any:
+    """The pan axis alone, as a scenario: its position loop has an integrator and reads an encoder on the joint."""
+    import mujoco
+
+    model = mujoco.MjModel.from_xml_string(mjcf())
+    data, mass = mujoco.MjData(model), np.zeros((model.nv, model.nv))
+    data.qpos[:] = POSE
+    mujoco.mj_forward(model, data)
+    mujoco.mj_fullM(model, data, mass)
+    inertia, rotor = float(mass[0, 0]), 3e-5
+    box = lm.gearbox(LARGE, added_backlash=added_backlash)
+    box = box.model_copy(update={"hysteresis": lm.model.Hysteresis(efficiency=0.95)})
+    gain = 100.0 * (rotor + box.inertia + inertia / box.ratio**2)  # a speed loop of 100 rad/s
+    return lm.simulation.DriveScenario(
+        motor={"kind": "torque_source", "rotor_inertia": rotor, "friction_torque": 0.01, "rated_torque": 1.0},
+        gearbox=box,
+        load={"inertia": inertia},
+        controller={
+            "sample_time": "250 us",
+            "encoder": {"lines": 2048},
+            "position_encoder": {"shaft": "load", "bits": 20},
+            "reference": {"kind": "position", "steps": [{"time": "0.1 s", "height": TARGET}]},
+            "position": {"gain": 10.0, "integral_gain": 60.0, "sample_time": "1 ms"},
+            "speed": {"gain": gain, "integral_gain": 25.0 * gain, "torque_limit": 1.0},
+            "current": {"kind": "ideal"},
+        },
+        simulation={"duration": 4.0, "sample_interval": 1e-3},
+    )
+
+
+def hunt(duration: float = 8.0, added_backlash: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Instants [s] and the angle of the pan joint [rad] in the arm, with that loop; brakes hold the other motors."""
+    import mujoco
+
+    axis = loop_of_the_load(added_backlash)
+    drives = {name: drive(gearbox, ideal=False, friction=0.5) for name, (*_, gearbox) in AXES.items()}
+    robot = lm.mujoco.attach(mujoco.MjModel.from_xml_string(mjcf()), drives | {"pan": axis})
+    robot.data.qpos[:] = POSE
+    robot.follow(held=True)
+    times, angles = STEP * np.arange(1, round(duration / STEP) + 1), []
+    for t in times:
+        robot.step({"pan": TARGET if t > 0.1 else 0.0})
+        angles.append(float(robot.data.qpos[0]))
+    return times, np.array(angles)
+
+
+def swing(times: np.ndarray, angles: np.ndarray) -> tuple[float, float]:
+    """Amplitude [rad] and frequency [Hz] of the second half of a motion."""
+    last = angles[len(angles) // 2 :] - angles[len(angles) // 2 :].mean()
+    rising = times[len(angles) // 2 :][1:][(last[1:] >= 0.0) & (last[:-1] < 0.0)]
+    return 0.5 * float(np.ptp(last)), (len(rising) - 1) / float(rising[-1] - rising[0])
+
+
 if __name__ == "__main__":
     if importlib.util.find_spec("mujoco") is None:
         print('needs pip install "lostmotion[mujoco]"')
@@ -121,3 +175,9 @@ if __name__ == "__main__":
                 f"{'ideal gears' if ideal else 'strain wave gears'}: the tip is off by up to {1e3 * errors.max():.3f} mm"
             )
         print(f"brakes closed for 2 s: moved by {rest(2.0):g} rad")
+        amplitude, frequency = swing(*hunt())
+        print(f"encoder on the joint: pan swings by {1e3 * amplitude:.3f} mrad at {frequency:.3f} Hz")
+        axis = loop_of_the_load()
+        cycle = lm.servo.limit_cycle(axis)
+        print(f"the axis alone: {cycle}, {1e3 * cycle.amplitudes['load_angle']:.3f} mrad")
+        print(f"certificate of the axis: {lm.hunting_certificate(axis)}")

@@ -143,8 +143,8 @@ def energy(arm: Any, stiffness: float, gap: float) -> float:
     )
 
 
-WALL = '<geom name="wall" type="plane" pos="0.75 0 0" zaxis="-1 0 0" size="2 2 0.1" friction="0"/>'
-TIP = '<geom name="tip" type="sphere" pos="0.4 0 0" size="0.03" mass="0" friction="0"/>'
+WALL = '<geom name="wall" type="plane" pos="0.75 0 0" zaxis="-1 0 0" size="2 2 0.1" condim="1"/>'
+TIP = '<geom name="tip" type="sphere" pos="0.4 0 0" size="0.03" mass="0" condim="1"/>'
 
 
 def force_on_wall(step: float, stiffness: float, gap: float) -> np.ndarray:

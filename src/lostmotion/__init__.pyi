@@ -16,6 +16,7 @@ from . import test_rig as test_rig
 from ._core import SolverError as SolverError
 from .control.controller import Controller as Controller
 from .control.references import PositionReference as PositionReference
+from .data_sheets.components import actuator as actuator
 from .data_sheets.components import gearbox as gearbox
 from .data_sheets.components import motor as motor
 from .data_sheets.records import catalogue as catalogue

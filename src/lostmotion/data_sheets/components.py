@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from ..errors import InputError
 from ..inputs.arguments import RecordName, checked
 from ..inputs.part import Part
-from ..inputs.quantities import Angle, NotNegative, Number, Positive, Temperature, argument
+from ..inputs.quantities import Angle, Inertia, NotNegative, Number, Positive, Temperature, argument
 from ..inputs.schema import keys_within
 from ..inputs.toml_files import is_in_file
 from ..inputs.validation import shortened, shown, unknown_key
@@ -19,6 +19,7 @@ from ..model.motor import DC_KEYS, Motor
 from ..model.torsion import LinearStiffness, TorsionCurve
 
 if TYPE_CHECKING:
+    from .actuator_sheet import ActuatorSheet
     from .gearbox_sheet import GearboxSheet
     from .loss_map_builder import BuiltMap
     from .motor_sheet import MotorSheet
@@ -115,7 +116,7 @@ def _naming(where: str) -> str:
     return "`gearbox`" if where.startswith("gears.") else "`from`"
 
 
-def _given(sheet: GearboxSheet | MotorSheet) -> dict[str, Any]:
+def _given(sheet: GearboxSheet | MotorSheet | ActuatorSheet) -> dict[str, Any]:
     return {name: getattr(sheet, name) for name in sheet.model_fields_set}
 
 
@@ -251,6 +252,52 @@ def motor(name: RecordName, *, voltage_limit: float | None = None) -> Motor:
         return Motor(**table)
     except InputError as error:
         raise InputError(f"motor {name}: {error}") from None
+
+
+@checked
+def actuator(
+    name: RecordName, *, rotor_inertia: Inertia | None = None, efficiency: Number | None = None
+) -> tuple[Motor, Gearbox]:
+    """Return the motor and the gearbox of the record of an actuator.
+
+    Parameters
+    ----------
+    name : str
+        Name of a record in the catalogue, or a file (``.toml``) with one record.
+    rotor_inertia : float, optional
+        Inertia of the rotor [kg·m²] in place of that of the record.
+    efficiency : float, optional
+        Efficiency of the gearbox at rated load, in place of that of the record or of the estimate for its kind.
+
+    Returns
+    -------
+    tuple of Motor and Gearbox
+        A torque source, and a rigid gearbox with a loss map.
+
+    Raises
+    ------
+    InputError
+        There is no such record, or it lacks data that a run requires.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> motor, gearbox = lm.actuator("t-motor-ak80-6")
+    >>> gearbox.ratio, motor.kind
+    (6.0, 'torque_source')
+    """
+    from .actuator_sheet import ActuatorSheet
+    from .records import find
+
+    sheet = find(name, "actuator")
+    assert isinstance(sheet, ActuatorSheet)
+    beside = {"rotor_inertia": rotor_inertia, "efficiency": efficiency}
+    beside = {key: value for key, value in beside.items() if value is not None}
+    if beside:
+        sheet = ActuatorSheet(**_given(sheet) | beside)
+    for key, hint in sheet.missing().items():
+        raise InputError(f"actuator from {shown(name)}: the record lacks {key}, {hint}")
+    return sheet.motor(), gearbox_of(sheet.gearbox_sheet())
 
 
 # Keys of `[motor]` that may close a gap of a record, and the keys of a sheet that say the same.

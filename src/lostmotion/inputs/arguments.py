@@ -192,7 +192,8 @@ def _fits(value: Any, option: str, known: Mapping[str, Any]) -> bool:
             return isinstance(value, Mapping) and all(isinstance(key, str) for key in value)
         case kind if "." in kind:
             library, _, name = kind.partition(".")  # who has one of its objects has imported it
-            return library in sys.modules and isinstance(value, getattr(sys.modules[library], name))
+            loaded = sys.modules.get(library)
+            return loaded is not None and isinstance(value, getattr(loaded, name))
         case kind:
             return isinstance(value, known[kind])
 

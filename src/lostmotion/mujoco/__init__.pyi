@@ -1,7 +1,7 @@
 from .actuated import Actuated as Actuated
 from .actuated import ActuatedSnapshot as ActuatedSnapshot
 from .actuated import ActuatedState as ActuatedState
-from .actuated import attach as attach
+from .attaching import attach as attach
 from .plugin import load_plugin as load_plugin
 from .plugin import write_drive as write_drive
 from .reduction import Reduction as Reduction

@@ -2,37 +2,26 @@
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..control.controller import Controller
-from ..data_sheets.components import gearbox
-from ..data_sheets.records import catalogue
-from ..errors import InputError, need
-from ..inputs.arguments import checked
+from ..errors import InputError
 from ..inputs.validation import did_you_mean, listed, shown
-from ..model.drive import Drive
-from ..model.load import Load
-from ..model.motor import Motor
-from ..model.train import DriveTrain
-from ..simulation.drive_scenario import DriveScenario
-from ..simulation.exact_batches import controlled
 from ..simulation.joint_trains import Driven, JointDrive, JointTrains, joint_drive
-from ..simulation.shipped import shipped_scenarios
-from ..simulation.sources import load_drive
 from .joints import joint_id
 
 if TYPE_CHECKING:
     import mujoco
 
 MAX_SUBSTEPS = 1000
-CONTACT_PASSES = 2
+CONTACT_PASSES = 5
+"""Most solutions of MuJoCo's contact solver in a substep."""
+SETTLED = 1e-6
+"""Largest difference between the speeds [rad/s] at the end of a substep that solver and drives find, over 1 plus the speed."""
 SUBSTEP_PHASE = 0.5
 """Largest natural frequency of a mesh times substep [rad]."""
 STIFFEST = 1e6
@@ -62,7 +51,7 @@ class Actuated:
     ----------
     model, data
         The `mujoco.MjModel` and its `mujoco.MjData`. After `step` position, speed, time and `qacc` (mean over the step) are those
-        at the end; poses of bodies and contacts are those of the middle of the step, and sensors are not evaluated. Call
+        at the end; poses of bodies and contacts are those of the middle of the last substep, and sensors are not evaluated. Call
         ``mujoco.mj_forward(model, data)`` where they are wanted at the end.
     joints
         Names of the joints with a drive, in the order of all arrays.
@@ -102,17 +91,20 @@ class Actuated:
         self._trains = JointTrains(made)
         self._inertias = inertias
         # What contacts feel of a joint at the pose that MuJoCo scales its constraints with.
+        own = model.dof_M0.copy()  # from which MuJoCo takes the inertia of simple bodies
         model.dof_armature[self._dofs] = [d.reflected_inertia for d in made]
         mujoco.mj_setConst(model, self.data)
-        model.dof_armature[self._dofs] = 0.0
+        model.dof_armature[self._dofs], model.dof_M0[:] = 0.0, own
         self._rows = np.repeat(np.arange(model.nv), model.M_rownnz)
         self._contact = np.zeros(model.nv)
-        self._among_drives = np.ix_(self._dofs, self._dofs)
+        self._torque = np.zeros(len(ids))
+        self._unsettled = 0
+        self._dual = model.opt.solver == mujoco.mjtSolver.mjSOL_PGS or model.opt.noslip_iterations > 0
         self._turning = model.nq != model.nv  # positions of balls and free bodies are no integrals of speeds
         self._robot = self._core_robot()
         # Views of what it computes.
         self._mass: np.ndarray = self._robot.mass
-        self._own: np.ndarray = self._robot.inertia
+        self._force: np.ndarray = self._robot.force
         self._mean: np.ndarray = self._robot.acceleration
         self._no_contact = np.zeros(model.nv)
         self.reset()
@@ -158,7 +150,7 @@ class Actuated:
     @property
     def torque(self) -> np.ndarray:
         """Mean torque of each drive on its joint over the last step [N·m]."""
-        return np.array(self._trains.torque)
+        return self._torque.copy()
 
     @property
     def gear_loss(self) -> np.ndarray:
@@ -170,7 +162,7 @@ class Actuated:
     @property
     def counts(self) -> dict[str, int]:
         """Number of advances of drives, and of substeps in which the coupling with the robot was not solved to rounding."""
-        return {"evaluations": self._trains.evaluations, "unsettled": self._trains.unsettled}
+        return {"evaluations": self._trains.evaluations, "unsettled": self._trains.unsettled + self._unsettled}
 
     def reset(self, keyframe: int | None = None, *, held: bool = False) -> None:
         """Go back to t = 0.
@@ -243,25 +235,22 @@ class Actuated:
                 mj.mj_integratePos(m, d.qpos, robot.motion, 0.5 * h)
             d.time = begin + 0.5 * h
             mj.mj_fwdPosition(m, d)
-            if d.nefc == 0:
+            if d.nefc == 0 and not self._contact.any():
                 robot.predict_speed(h)
                 self._compute_forces()
                 self._trains.advance(robot, h, self.substeps)
-                acceleration, self._contact = self._mean, self._no_contact
+                acceleration, place, self._torque = self._mean, None, self._trains.torque.copy()
             else:
-                # The mean acceleration is not smooth here, so it is found in passes and not from that of the steps before.
-                acceleration = np.zeros(m.nv)
-                for again in range(CONTACT_PASSES):
-                    if again:
-                        self._trains.go_back()
-                    robot.set_speed(h, acceleration)
-                    acceleration = self._solve_with_contact(h, acceleration)
+                robot.restore()
+                acceleration, place = self._advance_in_contact(h)
         except BaseException:
             robot.restore()
             d.time = begin
             raise
         robot.integrate(h, acceleration)
-        if self._turning:
+        if place is not None:
+            d.qpos[:] = place
+        elif self._turning:
             mj.mj_integratePos(m, d.qpos, robot.motion, h)
         robot.finish(acceleration)
         d.time = begin + h
@@ -272,51 +261,65 @@ class Actuated:
         self._mj.mj_fwdActuation(self.model, self.data)
         self._mj.mj_fwdAcceleration(self.model, self.data)
 
-    def _solve_with_contact(self, h: float, acceleration: np.ndarray) -> np.ndarray:
-        """The same with contacts, limits and equalities: MuJoCo's solver finds their forces.
+    def _advance_in_contact(self, h: float) -> tuple[np.ndarray, np.ndarray]:
+        """Advance the drives over a step with contacts, limits or equalities; mean acceleration, and positions at the end.
 
-        It is given the inertia matrix that they feel over the step: that of the robot, and that of the drives B =
-        -dtau/da. For that the whole step is made without contact forces, and once for each drive with another torque.
-        This torque is that of the contacts found before, so that B holds between both, whatever switches there. Where
-        a mesh swings within the step, the mean over it is that of the position, 2 (q - q_0 - v_0 h)/h^2, which always
-        follows the force.
+        Poses, contacts and their forces are found anew for each substep of the drives.
+        """
+        substep, torque = h / self.substeps, np.zeros(self._dofs.size)
+        q, first = self.data.qpos.copy(), self.data.qvel.copy()
+        v, contact, begin = first, self._contact, self._trains.snapshot()
+        try:
+            for _ in range(self.substeps):
+                end = v + substep * self._substep_in_contact(substep, q, v)
+                end[self._dofs] = self._trains.speed
+                self._mj.mj_integratePos(self.model, q, 0.5 * (v + end), substep)
+                q[self._addresses] = self._trains.angle
+                v = end
+                torque += self._trains.torque
+        except BaseException:
+            self._trains.restore(begin)
+            self._contact = contact
+            raise
+        self._torque = torque / self.substeps
+        return (v - first) / h, q
+
+    def _substep_in_contact(self, h: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Advance the drives over a substep from positions and speeds; the mean acceleration of all joints.
+
+        MuJoCo's solver finds the forces of the contacts. It is given the inertia matrix that they feel over the substep:
+        that of the robot, and B = -dtau/da of each drive under the forces found before. Where something switches, this
+        is repeated until the drives move as the solver predicts.
         """
         mj, m, d, dofs = self._mj, self.model, self.data, self._dofs
+        d.qpos[:], d.qvel[:] = q, v
+        mj.mj_integratePos(m, d.qpos, v, 0.5 * h)
+        mj.mj_fwdPosition(m, d)
         self._compute_forces()
-        self._robot.take(h, acceleration)
-        force = self._robot.force
-        guesses = self._trains.guesses
-
-        angle, speed = self._trains.angle.copy(), self._trains.speed.copy()
-
-        def tried(change: np.ndarray) -> np.ndarray:
-            self._trains.advance(self._robot, h, self.substeps, change)
-            out = self._mean.copy()
-            out[dofs] = 2.0 * (self._trains.angle - angle - h * speed) / (h * h)
+        self._robot.take(h, self._no_contact)
+        contact = self._contact if d.nefc else self._no_contact
+        self._trains.advance(self._robot, h, 1, self._force + contact)
+        for _ in range(CONTACT_PASSES if d.nefc else 0):
+            # A joint that is held has no compliance: there the solver sees a large inertia.
+            compliance = np.maximum(self._trains.compliance, 1.0 / (STIFFEST * self._inertias.max()))
+            mass = self._mass.copy()
+            mass[dofs, dofs] += 1.0 / compliance - self._inertias
+            d.M[:] = mass[self._rows, m.M_colind]
+            mj.mj_factorM(m, d)
+            if self._dual:  # solvers that take the inertia matrix in the space of the contacts
+                mj.mj_projectConstraint(m, d)
+            d.qfrc_smooth[:] = mass @ self._mean - contact
+            mj.mj_solveM(m, d, d.qacc_smooth[None], d.qfrc_smooth[None])
+            d.qacc_warmstart[:] = self._mean
+            mj.mj_fwdConstraint(m, d)
+            contact = d.qfrc_constraint.copy()
             self._trains.go_back()
-            self._trains.guesses = guesses
-            return out
-
-        free = tried(force)
-        mobility = np.empty((dofs.size, dofs.size))
-        for k, dof in enumerate(dofs):
-            size, more = self._contact[dof], force.copy()
-            if abs(size) < (least := 1e-3 * (1.0 + abs(force[dof]))):
-                size = least
-            more[dof] += size
-            mobility[:, k] = (tried(more) - free)[dofs] / size
-        # A joint that is held has no mobility: there the solver sees a large inertia.
-        values, vectors = np.linalg.eigh(0.5 * (mobility + mobility.T))
-        least_mobility = 1.0 / (STIFFEST * self._inertias.max())
-        stiffness = (vectors / np.maximum(values, least_mobility)) @ vectors.T
-        self._mass[self._among_drives] += stiffness - self._own
-        d.M[:] = self._mass[self._rows, m.M_colind]
-        mj.mj_factorM(m, d)
-        d.qacc_smooth[:] = free
-        d.qfrc_smooth[:] = self._mass @ free
-        mj.mj_fwdConstraint(m, d)
-        self._contact = d.qfrc_constraint.copy()
-        self._trains.advance(self._robot, h, self.substeps, force + self._contact)
+            self._trains.advance(self._robot, h, 1, self._force + contact)
+            if np.abs(self._mean - d.qacc).max() * h <= SETTLED * (1.0 + np.abs(v).max()):
+                break
+        else:
+            self._unsettled += d.nefc > 0
+        self._contact = contact
         return self._mean
 
     def _controls(self, ctrl: Any) -> list[float]:
@@ -382,160 +385,3 @@ class Actuated:
 def _substeps(drives: Sequence[JointDrive], step: float) -> int:
     """So many that the stiffest mesh turns by at most SUBSTEP_PHASE in each."""
     return max(1, *(math.ceil(d.mesh_frequency * step / SUBSTEP_PHASE) for d in drives))
-
-
-def drive_of_joint(joint: str, given: Any, controller: Controller | None) -> Driven:
-    """Return the argument of `attach` for a joint as a drive, a scenario with a controller, or a train.
-
-    Raises
-    ------
-    InputError
-    """
-    if isinstance(given, str | Path):
-        given = _named(joint, str(given))
-    if isinstance(given, DriveScenario) and given.controller is None:
-        given = given.drive()
-    if not isinstance(given, Drive | DriveScenario | DriveTrain):
-        raise InputError(
-            f"joint {joint!r}: {shown(given)} is no drive; give a Drive, a DriveTrain, a scenario, or the name of a gearbox of the catalogue"
-        )
-    if controller is None:
-        return given
-    if not isinstance(given, Drive):
-        raise InputError(
-            f"joint {joint!r}: controllers are for drives; give a Drive, or a scenario with its controller"
-        )
-    return controlled(given, controller)
-
-
-def _named(joint: str, name: str) -> Drive | DriveScenario:
-    """Shipped scenario or scenario file by its name; for a gearbox of the catalogue a drive with an ideal torque source."""
-    if name.endswith(".toml") or name in shipped_scenarios():
-        return load_drive(name)
-    if name not in {record.name for record in catalogue()}:
-        meant = did_you_mean(name, [record.name for record in catalogue()], "`lostmotion catalogue` lists its names")
-        raise InputError(
-            f"joint {joint!r}: {shown(name)} is neither a scenario nor a gearbox of the catalogue; {meant}"
-        )
-    box = gearbox(name)
-    if not box.inertia > 0.0:
-        raise InputError(
-            f"joint {joint!r}: the record {name!r} has no inertia of its input shaft; give lm.Drive(...) with a motor and its rotor_inertia"
-        )
-    motor = Motor(kind="torque_source", rotor_inertia=0.0)
-    return Drive(motor=motor, gearbox=box, load=Load(inertia=1.0))
-
-
-@checked
-def attach(
-    model: mujoco.MjSpec | mujoco.MjModel | str | Path,
-    drives: Mapping[str, Any],
-    controllers: Mapping[str, Controller] | None = None,
-    *,
-    replace: bool = False,
-    substeps: int | None = None,
-) -> Actuated:
-    """Turn joints of a MuJoCo model by exact drives.
-
-    Parameters
-    ----------
-    model
-        A `mujoco.MjSpec`, a `mujoco.MjModel`, or an MJCF file. The drives are attached to a copy.
-    drives
-        By the name of a hinge: a `Drive` or a `DriveTrain`, whose load's inertia the robot takes the place of; a scenario or its
-        name, whose controller then turns the motor; or the name of a gearbox of the catalogue, which an ideal torque source without
-        inertia then turns.
-    controllers
-        By the name of a hinge: a controller for its drive, which acts at its own sample instants within the steps.
-    replace
-        Take the armature, the damping, the friction loss and the actuators off these joints, which describe a drive in MuJoCo
-        and would otherwise count twice.
-    substeps
-        Substeps of the drives within a step; left out, chosen by the natural frequency of the stiffest mesh.
-
-    Returns
-    -------
-    Actuated
-        At the reference pose, with nothing twisted.
-
-    Raises
-    ------
-    InputError
-        A joint is unknown, no hinge, or has an actuator, armature, damping or friction loss (see `replace`); a drive cannot be
-        used; the timestep would take more than 1000 substeps; the model has actuators with states of their own.
-    MissingLibraryError
-        MuJoCo is not installed.
-
-    Examples
-    --------
-    >>> import lostmotion as lm
-    >>> import mujoco
-    >>> body = "<body><joint name='elbow'/><geom size='0.1'/></body>"
-    >>> spec = mujoco.MjSpec.from_string(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
-    >>> arm = lm.mujoco.attach(spec, {"elbow": "schaeffler-rt1-h-20-100"})
-    >>> arm.step({"elbow": 0.2})
-    >>> bool(arm.data.qvel[0] > 0.0)
-    True
-    """
-    need("mujoco", "lostmotion.mujoco", "mujoco")
-    import mujoco
-
-    if isinstance(model, str | Path):
-        if not Path(model).is_file():
-            raise InputError(
-                f"model: {shown(str(model))} is no file; give an MJCF file, a mujoco.MjSpec or a mujoco.MjModel"
-            )
-        try:
-            model = mujoco.MjSpec.from_file(str(model))
-        except ValueError as error:
-            raise InputError(f"{model}: {' '.join(str(error).split())}") from None
-    compiled = model.copy().compile() if isinstance(model, mujoco.MjSpec) else copy.copy(model)
-    if not drives:
-        raise InputError("drives: is empty; name at least one joint")
-    for name in controllers or {}:
-        if name not in drives:
-            raise InputError(f"controllers: joint {shown(name)} has no drive; name it in drives")
-    if compiled.na:
-        raise InputError(
-            "model: has actuators with states of their own (activations), which are not supported; use such without"
-        )
-    if substeps is not None and not 1 <= substeps <= MAX_SUBSTEPS:
-        raise InputError(f"substeps: {shown(substeps)} must lie between 1 and {MAX_SUBSTEPS}")
-    for name in drives:
-        _clear(compiled, name, replace=replace)
-    given = {name: drive_of_joint(name, drive, (controllers or {}).get(name)) for name, drive in drives.items()}
-    return Actuated(compiled, given, substeps)
-
-
-def _clear(model: mujoco.MjModel, name: str, *, replace: bool) -> None:
-    """Remove MuJoCo's own description of the drive of a joint.
-
-    Raises
-    ------
-    InputError
-        There is such a thing, and it is not to be replaced.
-    """
-    import mujoco
-
-    joint = joint_id(model, name)
-    dof = model.jnt_dofadr[joint]
-    kinds = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
-    actuators = [
-        k for k in range(model.nu) if model.actuator_trnid[k, 0] == joint and model.actuator_trntype[k] in kinds
-    ]
-    values = {
-        "armature": model.dof_armature,
-        "damping": model.dof_damping,
-        "frictionloss": model.dof_frictionloss,
-    }
-    own = [key for key, array in values.items() if np.any(array[dof] != 0.0)]
-    own += [f"the actuator {model.actuator(int(k)).name!r}" for k in actuators]
-    if own and not replace:
-        raise InputError(
-            f"joint {name!r}: has {' and '.join(own)}, which would count twice beside its drive; give replace=True, or take it off the model"
-        )
-    for array in values.values():
-        array[dof] = 0.0
-    for k in actuators:  # they stay, so that the numbers of the others do
-        model.actuator_gainprm[k] = 0.0
-        model.actuator_biasprm[k] = 0.0

@@ -15,7 +15,7 @@ from ..portable.descriptions import description
 from ..simulation.drive_scenario import DriveScenario
 from ..simulation.exact_batches import controlled
 from ..simulation.joint_trains import joint_drive
-from .actuated import drive_of_joint
+from .attaching import drive_of_joint
 
 LIBRARY = Path(__file__).parent / "plugin_library"
 

@@ -6,14 +6,11 @@ import math
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from ..data_sheets.actuator_sheet import ActuatorSheet
-from ..data_sheets.components import gearbox_of
+from ..data_sheets.components import actuator
 from ..data_sheets.linear_components import linear_table
 from ..data_sheets.linear_sheets import FORCE_SOURCE, LinearMotorSheet
 from ..data_sheets.records import find
-from ..errors import InputError
 from ..inputs.quantities import Length, Positive
-from ..inputs.validation import shown
 from ..model.gearbox import Gearbox
 from ..model.linear_motor import LinearMotorData
 from ..model.motor import Motor, MotorLimits
@@ -62,13 +59,9 @@ def whole_drive(kind: str, name: str, beside: Mapping[str, Any], guide_friction:
     InputError
         The record lacks what a run needs.
     """
+    if kind == "actuator":
+        return actuator(name, **beside)
     sheet = find(name, kind)
-    if isinstance(sheet, ActuatorSheet):
-        if beside:
-            sheet = ActuatorSheet(**{key: getattr(sheet, key) for key in sheet.model_fields_set} | dict(beside))
-        for key, hint in sheet.missing().items():
-            raise InputError(f"actuator from {shown(name)}: the record lacks {key}, {hint}")
-        return sheet.motor(), gearbox_of(sheet.gearbox_sheet())
     assert isinstance(sheet, LinearMotorSheet)
     data = LinearMotorData(**linear_table(kind, name, beside, kind))
     return force_source(sheet, data, guide_friction), DIRECT
