@@ -225,6 +225,23 @@ def test_a_seed_draws_the_same_drives() -> None:
     assert not np.array_equal(run(batch(2), commands), first)
 
 
+def test_a_drive_of_its_own_takes_less_than_4_kb() -> None:
+    # Regimes that are mirror images share their matrices: 9 regimes have those of 4.
+    generator = np.random.default_rng(9)
+    count = 400
+    batch = lm.SimulationBatch(
+        simple_drive(viscous_friction=2.0),
+        STEP,
+        vary={
+            "gearbox.stiffness.backlash": generator.uniform(0.5e-3, 3e-3, count),
+            "motor.friction_torque": generator.uniform(0.005, 0.03, count),
+            "load.inertia": generator.uniform(0.3, 2.0, count),
+        },
+    )
+    run(batch, random_commands(generator, 500, count))
+    assert batch.memory / count < 4000.0
+
+
 def test_outputs_are_not_copied() -> None:
     batch = lm.SimulationBatch(simple_drive(), STEP, count=4)
     angle = batch["load_angle"]

@@ -172,6 +172,31 @@ def test_joints_without_a_drive_follow_the_inertia_matrix() -> None:
     assert np.abs(arm.data.qpos - exact).max() < 1e-5
 
 
+FLOATING = """
+<mujoco><option timestep="{step}" gravity="0 0 0"/><worldbody><body name="base"><freejoint/>
+  <inertial pos="0 0 0" mass="4" diaginertia="0.05 0.06 0.07"/>
+  <body pos="0.2 0 0"><joint name="elbow" type="hinge" axis="0 -1 0.3"/>
+    <inertial pos="0.3 0.1 0.05" mass="2" diaginertia="0.01 0.03 0.03"/></body>
+</body></worldbody></mujoco>"""
+
+
+def test_a_drive_turns_a_floating_body_without_momentum() -> None:
+    def momentum(step: float) -> float:
+        model = mujoco.MjModel.from_xml_string(FLOATING.format(step=step))
+        arm = lm.mujoco.attach(model, {"elbow": drive(2e4)}, substeps=8)
+        for k in range(round(0.3 / step)):
+            arm.step([0.1 * np.sin(20.0 * (k + 0.5) * step)])
+        mujoco.mj_forward(arm.model, arm.data)
+        mujoco.mj_subtreeVel(arm.model, arm.data)
+        assert abs(arm.data.qvel[6]) > 0.5
+        assert abs(np.linalg.norm(arm.data.qpos[3:7]) - 1.0) < 1e-12
+        return float(np.abs([6.0 * arm.data.subtree_linvel[1], arm.data.subtree_angmom[1]]).max())
+
+    coarse, fine = momentum(2e-3), momentum(1e-3)
+    assert coarse < 1e-4
+    assert fine < coarse / 3.0  # of second order
+
+
 @pytest.mark.parametrize(
     ("drives", "options", "message"),
     [
