@@ -147,10 +147,6 @@ inline void bind_joint_trains(nb::module_& m) {
         .def(
             "predict_speed", [](R& r, double interval) { r.speed_at_middle(interval); }, "interval"_a)
         .def(
-            "set_speed",
-            [=](R& r, double interval, JointVector acceleration) { r.speed_at_middle(interval, vector(acceleration)); },
-            "interval"_a, "acceleration"_a)
-        .def(
             "take", [=](R& r, double interval, JointVector acceleration) { r.take(interval, vector(acceleration)); },
             "interval"_a, "acceleration"_a)
         .def(
@@ -184,7 +180,7 @@ inline void bind_joint_trains(nb::module_& m) {
                std::tuple<std::vector<double>, std::vector<double>, std::vector<double>, std::vector<double>, bool> c) {
                 R::Course to{std::get<0>(c), std::get<1>(c), std::get<2>(c), std::get<3>(c), std::get<4>(c)};
                 if (to.acceleration.size() != r.acceleration().size() || to.before.size() != r.acceleration().size() ||
-                    to.inertia.size() != r.inertia().size() || to.force.size() != r.course().force.size())
+                    to.inertia.size() != r.course().inertia.size() || to.force.size() != r.course().force.size())
                     throw nb::type_error("the course of another robot");
                 r.set_course(std::move(to));
             },
@@ -195,9 +191,7 @@ inline void bind_joint_trains(nb::module_& m) {
             "acceleration", [=](R& r) { return row(r.acceleration()); }, with_owner)
         .def_prop_ro(
             "force", [=](R& r) { return row(r.force()); }, with_owner)
-        .def_prop_ro(
-            "mass", [=](R& r) { return square(r.mass(), r.force().size()); }, with_owner)
-        .def_prop_ro("inertia", [=](R& r) { return square(r.inertia(), r.course().force.size()); }, with_owner);
+        .def_prop_ro("mass", [=](R& r) { return square(r.mass(), r.force().size()); }, with_owner);
 }
 
 }  // namespace lostmotion::binding

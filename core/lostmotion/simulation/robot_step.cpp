@@ -43,8 +43,8 @@ void RobotStep::begin(double h) {
     integrate_positions(0.5 * h);
 }
 
-void RobotStep::speed_at_middle(double h, std::span<const double> acceleration) {
-    for (std::size_t k = 0; k < speed_.size(); ++k) engine_.speed[k] = speed_[k] + 0.5 * h * acceleration[k];
+void RobotStep::speed_at_middle(double h) {
+    for (std::size_t k = 0; k < speed_.size(); ++k) engine_.speed[k] = speed_[k] + 0.5 * h * ahead_[k];
 }
 
 void RobotStep::take(double h, std::span<const double> acceleration) {

@@ -47,9 +47,8 @@ class RobotStep {
     int away() const;
     // Positions to the middle of a step of h [s].
     void begin(double h);
-    // Speeds to the middle of the step, under a mean acceleration; without one, the predicted.
-    void speed_at_middle(double h, std::span<const double> acceleration);
-    void speed_at_middle(double h) { speed_at_middle(h, ahead_); }
+    // Speeds to the middle of the step, under the predicted mean acceleration.
+    void speed_at_middle(double h);
     // Takes inertia matrix and forces from the engine.
     void take(double h, std::span<const double> acceleration);
     // Advances the trains under these forces; the mean accelerations go to acceleration().
@@ -68,7 +67,6 @@ class RobotStep {
     std::span<double> motion() { return motion_; }  // what the positions have to be integrated by
     std::span<double> mass() { return mass_; }
     std::span<double> force() { return force_; }
-    std::span<double> inertia() { return own_; }  // that the trains see
     std::span<double> acceleration() { return acceleration_; }
 
  private:
