@@ -158,6 +158,17 @@ def test_a_free_joint_and_a_missing_library_are_refused(legged: Any, monkeypatch
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(("name", "place"), [("qpos", 2), ("qvel", 1), ("qfrc_applied", 4)])
+def test_a_value_of_the_trunk_that_is_no_number_is_named(legged: Any, name: str, place: int) -> None:
+    robot = legged.robot("quasi-direct")
+    robot.step()
+    getattr(robot.data, name)[place] = math.nan
+    with pytest.raises(lm.InputError, match=rf"data\.{name}: value {place} is nan; give finite numbers"):
+        robot.step()
+    robot.reset()
+    robot.step()
+
+
 def test_a_second_drive_of_a_joint_is_refused() -> None:
     """A dictionary has one drive a joint; the second would be an actuator of the model."""
     text = ARM.format(step=1e-3, world="", tip="").replace(

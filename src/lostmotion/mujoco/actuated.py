@@ -220,7 +220,7 @@ class Actuated:
         Raises
         ------
         InputError
-            Another number of values, an unknown joint, or `data` was changed without `follow`.
+            Another number of values, an unknown joint, `data` was changed without `follow`, or holds a value that is no number.
         SolverError
             The motion of a drive has no continuation.
         """
@@ -246,6 +246,7 @@ class Actuated:
         except BaseException:
             robot.restore()
             d.time = begin
+            self._check_numbers()
             raise
         robot.integrate(h, acceleration)
         if place is not None:
@@ -254,6 +255,14 @@ class Actuated:
             mj.mj_integratePos(m, d.qpos, robot.motion, h)
         robot.finish(acceleration)
         d.time = begin + h
+
+    def _check_numbers(self) -> None:
+        for name in ("qpos", "qvel", "qfrc_applied", "xfrc_applied"):
+            values = getattr(self.data, name).ravel()
+            if (wrong := np.flatnonzero(~np.isfinite(values))).size:
+                raise InputError(
+                    f"data.{name}: value {wrong[0]} is {values[wrong[0]]}; give finite numbers, then follow()"
+                )
 
     def _compute_forces(self) -> None:
         """Forces [N·m] beside those of drives and contacts."""
