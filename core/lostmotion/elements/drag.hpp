@@ -14,8 +14,8 @@ namespace lostmotion::model {
 class DragOnShaft final : public ShaftElement {
  public:
     // curve: [N m] over [rad/s]. Its name is that of the shaft.
-    DragOnShaft(const std::string& shaft_name, int shaft, TorsionCurve curve)
-        : ShaftElement(shaft_name, shaft), curve_(std::move(curve)) {}
+    DragOnShaft(const std::string& shaft_name, int on, TorsionCurve curve)
+        : ShaftElement(shaft_name, on), curve_(std::move(curve)) {}
 
     const char* piecewise_law() const override { return curve_.pieces() > 1 ? "piece of the drag" : nullptr; }
     int pieces() const override { return curve_.pieces(); }

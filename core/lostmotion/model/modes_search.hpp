@@ -257,7 +257,7 @@ Found SwitchedTrain<Sizes>::enumerate(Cache& cache, Now& now, const Event& event
     };
     std::vector<Combination> all;
     all.reserve(27);
-    for (std::uint64_t number = 0; number < combinations(event); ++number) {
+    for (std::uint64_t number = 0; static_cast<double>(number) < combinations(event); ++number) {
         const Key modes = combination(number, event, from);
         all.push_back(
             {modes, contacts() - std::ranges::count(modes.modes.begin(), modes.modes.begin() + contacts(), 0)});

@@ -105,15 +105,15 @@ Status JointTrains::substep(double interval) {
         bool settled = true;
         for (std::size_t r = 0; r < n; ++r) {
             const double load = joints_[r].inputs[static_cast<std::size_t>(joints_[r].shaft.load)];
-            double sum = -force_[r] - load, size = std::fabs(force_[r]) + std::fabs(load), rounding = 0.0;
+            double sum = -force_[r] - load, size = std::fabs(force_[r]) + std::fabs(load), rounded = 0.0;
             for (std::size_t c = 0; c < n; ++c) {
                 const double coupled = mass_[r * n + c] - (r == c ? joints_[r].shaft.inertia : 0.0);
                 sum += coupled * answer_[c].acceleration;
                 size += std::fabs(coupled * answer_[c].acceleration);
-                rounding += std::fabs(coupled) * answer_[c].rounding;
+                rounded += std::fabs(coupled) * answer_[c].rounding;
             }
             residual_[r] = sum;
-            settled = settled && std::fabs(sum) <= 1e-11 * size + 16.0 * rounding;
+            settled = settled && std::fabs(sum) <= 1e-11 * size + 16.0 * rounded;
             worst = std::fmax(worst, std::fabs(sum));
         }
         if (settled) break;

@@ -44,10 +44,10 @@ class PowerIntegral {
     // Every power is a product of two linear forms; all are evaluated at once, as columns.
     class Factors {
      public:
-        void set(int flow, const LinearForm& a, const LinearForm& b) {
-            left.set(flow, a);
-            right.set(flow, b);
-            used_ = std::max(used_, flow + 1);
+        void set(int number, const LinearForm& a, const LinearForm& b) {
+            left.set(number, a);
+            right.set(number, b);
+            used_ = std::max(used_, number + 1);
         }
         // How many there are: up to eight, all.
         int count() const { return N <= 8 ? N : used_; }

@@ -150,8 +150,8 @@ class TrainRun {
     TrainReport reach(const std::vector<Signal>& inputs, const TrainStart& start, const TrainOptions& options,
                       TrainPoint& point) const {
         const auto [x, memory] = in_layout(start);
-        return in_kernel([&, &x = x, &memory = memory]<class D>(const typename TrainReader<D>::Model& model) {
-            return reach_train_in<D>(model, inputs, x, memory, options, point);
+        return in_kernel([&, &states = x, &kept = memory]<class D>(const typename TrainReader<D>::Model& model) {
+            return reach_train_in<D>(model, inputs, states, kept, options, point);
         });
     }
 

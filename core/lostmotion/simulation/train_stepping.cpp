@@ -65,8 +65,8 @@ bool TrainSimulation::restore(const Snapshot& from) {
 std::string TrainSimulation::reset(const TrainStart& start) {
     const auto [x, memory] = run_.in_layout(start);
     if (std::string error = check_start(assembly(), x); !error.empty()) return error;
-    with([&, &x = x, &memory = memory]<class D>(TrainSimulationIn<D>& s) {
-        const auto begin = model::packed_start<D>(assembly().layout(), x, memory);
+    with([&, &states = x, &kept = memory]<class D>(TrainSimulationIn<D>& s) {
+        const auto begin = model::packed_start<D>(assembly().layout(), states, kept);
         typename TrainSimulationIn<D>::Snapshot to;
         to.x = begin.x;
         to.memory = begin.memory;

@@ -226,7 +226,8 @@ inline auto ExactSolver<System>::departs(const Entry& e, const Memory& memory, c
     if (first == 0) return false;
     // value = h^k (derivative_k / k! + what follows), bounded at the far end.
     double lower = derivative[first] * over_factorial[first], power = h;
-    for (int k = first + 1; k < 4; ++k, power *= h) lower += power * std::min(0.0, derivative[k]) * over_factorial[k];
+    for (std::size_t k = first + 1; k < 4; ++k, power *= h)
+        lower += power * std::min(0.0, derivative[k]) * over_factorial[k];
     return lower > power * bounds_.fourth[g] * over_factorial[4];
 }
 

@@ -103,7 +103,7 @@ def _resources(description: np.ndarray, names: str) -> str:
     text = "\n".join(f'    "{_escaped(line)}\\n"' for line in names.splitlines())
     return (
         '#include "lostmotion.hpp"\n\nnamespace lostmotion::fmu {\n\n'
-        "static constexpr double inf = std::numeric_limits<double>::infinity();\n"
+        "[[maybe_unused]] static constexpr double inf = std::numeric_limits<double>::infinity();\n"
         f"const std::vector<double> embedded_scenario = {{\n{numbers}}};\n"
         f"const std::string embedded_names =\n{text};\n\n}}  // namespace lostmotion::fmu\n"
     )
