@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from importlib.util import find_spec
 from typing import NamedTuple
 from unicodedata import category
@@ -91,6 +92,20 @@ class InputError(ValueError):
         """The same error of values that have other keys."""
         problems = [Problem(tuple(map(change, p.keys)), p.reason) for p in self.problems]
         return InputError(where=self.where, problems=problems, more=self.more)
+
+
+@contextmanager
+def inside(table: str) -> Iterator[None]:
+    """Errors of values within a table have its name before their keys.
+
+    Raises
+    ------
+    InputError
+    """
+    try:
+        yield
+    except InputError as error:
+        raise error.inside(table) from None
 
 
 class ArgumentError(InputError, TypeError):

@@ -11,6 +11,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from .. import _core
+from ..errors import InputError
 from ..inputs.part import Part
 from ..inputs.quantities import (
     MAX_ENTRIES,
@@ -281,7 +282,10 @@ class ScrewData(LinearDrive):
                     f"has a lead angle of {math.degrees(g):.4g} deg and a friction angle of {math.degrees(r):.4g} deg; their sum must be below 90 deg"
                 )
         if (self.supported_length is None) != (self.core_diameter is None):
-            raise ValueError("has one of supported_length and core_diameter; the stiffness of the screw needs both")
+            raise InputError(
+                "one of them is missing; the stiffness of the screw needs both",
+                keys=("supported_length", "core_diameter"),
+            )
         series = [k for k in ("nut_stiffness", "bearing_stiffness", "supported_length") if getattr(self, k) is not None]
         for key in ("stiffness", "stiffness_curve"):
             if series and getattr(self, key) is not None:
@@ -291,7 +295,7 @@ class ScrewData(LinearDrive):
                 if getattr(self, key) is not None:
                     raise ValueError(f"has {key}, which belongs to supported_length and core_diameter; add them")
         if (self.diameter is None) != (self.length is None):
-            raise ValueError("has one of diameter and length; the inertia of the screw needs both")
+            raise InputError("one of them is missing; the inertia of the screw needs both", keys=("diameter", "length"))
         if self.diameter is not None and self.inertia > 0.0:
             raise ValueError("has inertia and diameter, which say the same; give one")
         if self.diameter is None and self.density is not None:

@@ -121,25 +121,33 @@ class AxisTask(Task, Duty):
     def _rules_are_known(self) -> Self:
         for rule in self.safety_factors:
             if rule not in SOURCES:
-                raise ValueError(f"has safety_factors.{rule}: {unknown_key(rule, list(SOURCES))}")
+                raise InputError(unknown_key(rule, list(SOURCES)), keys=(f"safety_factors.{rule}",))
         if self.gravity is not None and self.linear is not None:
-            raise ValueError("has gravity, which is of a rotary load; give slide.inclination in its place")
+            raise InputError("is of a rotary load; give slide.inclination in its place", keys=("gravity",))
         for k, payload in enumerate(self.payload):
             if payload.end > self.cycle * (1.0 + WHOLE):
-                raise ValueError(f"has payload[{k}].end = {payload.end:g} s, after its cycle of {self.cycle:g} s")
+                raise InputError(
+                    f"{payload.end:g} s is after its cycle of {self.cycle:g} s; shorten it", keys=(f"payload[{k}].end",)
+                )
             if self.linear is not None and payload.inertia > 0.0:
-                raise ValueError(f"has payload[{k}].inertia, which a slide has no use for; give its mass")
+                raise InputError(
+                    "a slide has no use for it; give the mass of the payload", keys=(f"payload[{k}].inertia",)
+                )
             if self.linear is None and payload.mass > 0.0 and payload.radius is None:
-                raise ValueError(f"has payload[{k}].mass without its radius from the axis; add payload[{k}].radius")
+                raise InputError(
+                    "is missing; give the radius of the payload from the axis", keys=(f"payload[{k}].radius",)
+                )
         if self.amplifier is not None and self.supply is not None and self.supply.continuous_current is not None:
-            raise ValueError("has amplifier and supply.continuous_current, which say the same; leave the latter out")
+            raise InputError("says the same as amplifier; leave it out", keys=("supply.continuous_current",))
         wanted = "torques" if self.linear is None else "forces"
         for k, process in enumerate(self.process):
             if getattr(process, wanted) is None:
                 what = "a rotary load" if self.linear is None else "a slide"
-                raise ValueError(f"has process[{k}] without {wanted}, which {what} needs")
+                raise InputError(f"is missing; {what} needs it", keys=(f"process[{k}].{wanted}",))
             if process.times is not None and process.times[-1] > self.cycle * (1.0 + WHOLE):
-                raise ValueError(f"has process[{k}].times that end after its cycle of {self.cycle:g} s")
+                raise InputError(
+                    f"the last one is after its cycle of {self.cycle:g} s; shorten them", keys=(f"process[{k}].times",)
+                )
         return self
 
     @property
@@ -186,7 +194,7 @@ class AxisTask(Task, Duty):
     @model_validator(mode="after")
     def _window_and_time(self) -> Self:
         if self.max_settling_time is not None and self.settling_window is None:
-            raise ValueError("has max_settling_time but no settling_window; add how near the load must stay")
+            raise InputError("needs settling_window: how near the load must stay; add it", keys=("max_settling_time",))
         return self
 
     def limits(self) -> dict[str, Bound]:

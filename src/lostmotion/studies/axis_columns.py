@@ -210,5 +210,5 @@ def _at_rest(cycles: Cycles, error: np.ndarray) -> dict[str, float]:
                 settling.append(float(time[stays] - end) if stays < rest.stop else math.inf)
     both = ends[1.0] and ends[-1.0]
     reversal = abs(float(np.mean(ends[1.0]) - np.mean(ends[-1.0]))) if both else math.nan
-    rest = max((abs(x) for found in ends.values() for x in found), default=math.nan)
-    return {"reversal_error": reversal, "settling_time": max(settling), "rest_error": rest}
+    off = max((abs(x) for found in ends.values() for x in found), default=math.nan)
+    return {"reversal_error": reversal, "settling_time": max(settling), "rest_error": off}

@@ -77,8 +77,8 @@ def names_that_fit(table: str, wanted: Mapping[str, Any]) -> list[str]:
     table
         The kind of records, such as ``"gearbox"``.
     wanted
-        For each datum of a record a text with ``*`` for anything (``kind``, ``manufacturer``, ``name``), or minimum and maximum. A
-        record that lacks the datum does not fit.
+        For each datum of a record a text in any case with ``*`` for anything (``kind``, ``manufacturer``, ``name``), or minimum and
+        maximum. A record that lacks the datum does not fit.
 
     Raises
     ------

@@ -13,7 +13,7 @@ from ..data_sheets.records import Sheet, find
 from ..errors import InputError
 from ..inputs.part import Part
 from ..inputs.quantities import Whole
-from ..inputs.validation import listed
+from ..inputs.validation import did_you_mean, listed
 from ..model.duty import HoldingBrake
 from ..model.motor import Motor
 from ..simulation.drive_scenario import DriveScenario, short_form
@@ -223,7 +223,8 @@ class Study(Part):
             units |= {f"{USE}{rule}": "1" for rule in (SHARES if self.axis is None else TASK_SHARES)}
         for column in select.named():
             if column not in units:
-                raise ValueError(f"select: {column!r} is no column of numbers; they are {listed(units)}")
+                near = did_you_mean(column, units, f"they are {', '.join(units)}")
+                raise InputError(f"{column!r} is no column of numbers; {near}", keys=("select",))
         check_bounds(select, units)
         if self.axis is not None:
             reference = reference_of(self.drive)

@@ -9,7 +9,7 @@ from typing import Any
 from ..control.controller import AnyCurrent
 from ..data_sheets.components import find_accessories, use_accessories
 from ..data_sheets.records import find
-from ..errors import InputError
+from ..errors import InputError, inside
 from ..inputs.arguments import checked
 from ..inputs.quantities import argument
 from ..inputs.schema import follow, unit_in_schema
@@ -127,7 +127,8 @@ def task_of(tables: dict[str, Any], directory: Path = Path()) -> Study:
     if linear is not None:
         tables = {**tables, **in_translation(tables)}
         given = tables["task"] | {"linear": linear}
-    task = AxisTask(**given)
+    with inside("task"):
+        task = AxisTask(**given)
     controller = _controller(tables["controller"])
     current, controller = _apart(controller)
     vary = _vary(tables, directory)
@@ -153,7 +154,8 @@ def task_of(tables: dict[str, Any], directory: Path = Path()) -> Study:
         raise InputError(f"key select: {shown(select)} must be a table, such as [select]")
     limits = {name: bound.model_dump(exclude_none=True) for name, bound in task.limits().items()}
     usual = OF_TORQUE_SOURCES if _torque_sources(written, vary) else OBJECTIVES
-    chosen = Selection(**{"objectives": usual} | select | {"limits": limits | select.get("limits", {})})
+    with inside("select"):
+        chosen = Selection(**{"objectives": usual} | select | {"limits": limits | select.get("limits", {})})
     return Study(
         title=written["title"],
         scenario=from_tables(written),
@@ -278,7 +280,8 @@ def linear_axis(tables: dict[str, Any]) -> dict[str, Any] | None:
     if not isinstance(stage, dict):
         raise InputError(f"key {kind}: {shown(stage)} must be a table [{kind}], or the name of a record")
     if not _varied(tables, kind):
-        stage_of(kind, stage)
+        with inside(kind):
+            stage_of(kind, stage)
     return {"kind": kind, "stage": dict(stage), **own}
 
 
@@ -385,10 +388,8 @@ def _apart(controller: dict[str, Any]) -> tuple[AnyCurrent | None, dict[str, Any
     if not isinstance(controller["current"], dict):
         return None, controller  # which the scenario refuses
     loop: Any = controller["current"]
-    try:
+    with inside("controller"):
         current = InnerLoop(current=loop).current
-    except InputError as error:
-        raise error.inside("controller") from None
     return current, controller | {"current": {"kind": "ideal"}}
 
 
