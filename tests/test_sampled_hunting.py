@@ -12,6 +12,7 @@ from lostmotion.servo.regimes import axis_of
 from lostmotion.servo.sampled_proof import end_of_slip
 from lostmotion.servo.sampled_slip import sampled_slip
 from lostmotion.servo.slip_noise import loudest
+from lostmotion.servo.slip_pieces import Slips
 
 INERTIA, SLIDING, TICK = 0.5, 2.0, 1e-3
 K_V, K_P, K_I = 5.0, 20.0, 40.0
@@ -92,6 +93,32 @@ def test_with_steps_each_recurrence_ends_within_the_bounds() -> None:
             ends.append(slip_by_hand(error, 3.0, step, rng.uniform(-0.5, 0.5), rng.random()))
         assert least <= min(ends) <= max(ends) <= most
         assert most - least < 3.0 * (max(ends) - min(ends)) + 10.0 * step
+
+
+@pytest.mark.parametrize(("step", "counts", "bounded"), [(2e-4, (1, 6), False), (1e-5, (20, 150), True)])
+def test_each_recurrence_from_a_reading_leaves_one_of_the_errors_that_are_found(
+    step: float, counts: tuple[int, ...], bounded: bool
+) -> None:
+    rng, slips = random.Random(7), Slips(sampled_slip(axis_of(rotor(3.0, step))))
+    for count in counts:
+        found = slips.left(count, bounded=bounded)
+        starts = [(rng.uniform(-0.5, 0.5), rng.random()) for _ in range(60)]
+        ends = {-math.floor(0.5 - slip_by_hand(count * step, 3.0, step, *one) / step) for one in starts}
+        assert ends <= found
+        assert max(found) - min(found) <= max(ends) - min(ends) + (20 if bounded else 1)
+
+
+def test_the_recurrence_stays_within_the_readings_of_a_limit_cycle() -> None:
+    step = 2e-5
+    certificate = lm.hunting_certificate(rotor(3.0, step))
+    assert certificate.verdict == "hunts"
+    assert certificate.band is not None
+    low, high = certificate.band
+    assert high - low < 8.0 * step
+    error = 0.5 * (low + high)
+    for _ in range(10):
+        error = abs(step * round(slip_by_hand(step * round(error / step), 3.0, step, 0.3, 0.7) / step))
+        assert low < error < high
 
 
 def test_from_the_last_readings_the_recurrence_comes_to_rest_at_the_reference() -> None:

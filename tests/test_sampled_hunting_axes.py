@@ -97,11 +97,13 @@ def settled_errors(scenario: lm.TrainScenario, duration: float) -> np.ndarray:
 
 
 def check_band(scenario: lm.TrainScenario, found: Any, told: str) -> int:
-    """Once a settled stuck interval has an error within the band, all that follow have."""
+    """Once a settled stuck interval has an error within the band, all that follow have; the reference is as far from a reading as it was."""
     low, high = found.band
+    of = sampled_slip(axis_of(scenario))
     c, friction, seen = scenario.controllers["m"], scenario.shafts["load"].breakaway_torque, 0
     ratio = scenario.gears["gear"].ratio
-    for error in (low * 1.01, math.sqrt(low * high), high * 0.99):
+    for size in (low * 1.01, math.sqrt(low * high), high * 0.99):
+        error = of.step * (round(size / of.step - of.offset) + of.offset)
         if (
             c.speed.gain * ratio**2 * c.position.gain * error < 0.9 * friction
         ):  # it is stuck until the integrator frees it

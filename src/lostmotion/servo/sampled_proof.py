@@ -1,9 +1,9 @@
 """Whether a stuck contact hunts under a sampled controller: a proof by sets of states from break-away to break-away.
 
 An encoder with steps makes three cases. If no reading is the reference, the integrator never stops, and nothing can
-rest. If ``T_S = T_C`` and a reading is the reference, the errors fall step by step. It is enough that each slip from
-the last few readings ends nearer to the reference. If ``T_S > T_C``, a band of errors that is mapped into itself is
-never left, as with a continuous controller.
+rest. If ``T_S = T_C`` and a reading is the reference, the errors fall step by step. It is enough that all slips from
+the last few readings end at the reference. If ``T_S > T_C``, a band of errors that is mapped into itself is never left,
+as with a continuous controller. A band of few readings is followed reading by reading, a wider one by intervals.
 """
 
 from __future__ import annotations
@@ -22,10 +22,13 @@ from .regimes import Axis
 from .sampled_slip import SampledSlip, never_rests
 from .slip_boxes import Flow, starts
 from .slip_noise import finish, loudest
+from .slip_pieces import Slips
 
 CELLS, PARTS = 4, 2  # of the angle within a step, and of the torque within the ramp of a sample
 LAST = 3  # readings next to the reference that are followed one by one
-FEW = 12  # readings of a limit cycle that are followed one by one
+MOST, MOST_BOUNDED = 30, 80  # readings that are followed one by one, to the end or with bounds
+FARTHEST = 400  # reading of a limit cycle for which that is tried
+AT_REST = "slips from the smallest error may end at the reference"
 BAND = 16  # cells of a band
 ORBIT, KEPT = 24, 8  # slips that lead to where a band is looked for, and of which it encloses the errors
 GROWTHS = 4  # of a band to what it is taken to
@@ -36,15 +39,15 @@ WITHOUT_REST = "no reading of the encoder is the reference, so that the integrat
 
 def prove_sampled(of: SampledSlip, largest: float) -> Proof:
     """Decide for all errors up to one, or for as large a part of them as the bounds allow."""
-    if of.excess > 0.0:
-        found = _band(of)
-    elif of.step == 0.0:
-        found = _share(of, largest)
-    else:
-        found = Proof("not decided", "", 0.0) if never_rests(of) else _by_readings(of, LAST)
-    if found.verdict != "hunts" and never_rests(of):
-        return Proof("hunts", WITHOUT_REST, largest)
-    return found
+    if of.step == 0.0:
+        return _band(of) if of.excess > 0.0 else _share(of, largest)
+    if never_rests(of):
+        found = _band(of) if of.excess > 0.0 else None
+        return found if found and found.verdict == "hunts" else Proof("hunts", WITHOUT_REST, largest)
+    if of.excess == 0.0:
+        return _last_readings(Slips(of))
+    found = _about_orbit(Slips(of))
+    return found if found.verdict != "not decided" or found.reason == AT_REST else _band(of)
 
 
 def end_of_slip(
@@ -93,20 +96,31 @@ def _share(of: SampledSlip, largest: float) -> Proof:
     return Proof("not decided", f"a slip may leave {factor:.4g} of its error", 0.0)
 
 
-def _by_readings(of: SampledSlip, most: int) -> Proof:
-    """Follow slips from each reading next to the reference: to which readings they lead, and whether all lead to the reference."""
-    left: dict[int, set[int]] = {}
-    found = Proof("not decided", "", 0.0)
-    reason = "slips from the last readings of the encoder lead beyond them"
-    for count in range(1, most + 1):
-        try:
-            left[count] = {abs(one) for one in _left(of, count)}
-        except UndecidableError as why:
-            reason = str(why)
+def _last_readings(slips: Slips) -> Proof:
+    """From as many of the readings next to the reference as can be followed."""
+    found = _by_readings(slips, 1, 1)
+    for high in range(2, LAST + 1):
+        if found.verdict != "does not hunt" or (more := _by_readings(slips, 1, high)).verdict == "not decided":
             break
-        if all(one in left or one == 0 for to in left.values() for one in to):
-            found, reason = _decided(of, left), "slips from the last readings of the encoder may return to them"
-    return replace(found, reason=found.reason or reason) if found.verdict != "hunts" else found
+        found = more
+    return found
+
+
+def _by_readings(slips: Slips, low: int, high: int, *, bounded: bool = False) -> Proof:
+    """Follow slips from each reading between two errors in steps, and from those between which they lead."""
+    left: dict[int, set[int]] = {}
+    while high - low < (MOST_BOUNDED if bounded else MOST):
+        try:
+            for count in range(low, high + 1):
+                if count not in left:
+                    left[count] = {abs(one) for one in slips.left(count, bounded=bounded)}
+        except UndecidableError as why:
+            return Proof("not decided", str(why), 0.0)
+        reached = set().union(*left.values()) - {0}
+        low, high = min(reached | {low}), max(reached | {high})
+        if len(left) == high - low + 1:
+            return _decided(slips.of, left)
+    return Proof("not decided", "slips from some readings of the encoder lead beyond them", 0.0)
 
 
 def _decided(of: SampledSlip, left: dict[int, set[int]]) -> Proof:
@@ -117,21 +131,36 @@ def _decided(of: SampledSlip, left: dict[int, set[int]]) -> Proof:
     while less := {one for one in lasting if not left[one] <= lasting}:
         lasting -= less
     top = (max(left) + 0.5) * of.step
-    if ending >= set(left):
+    if ending >= set(left) and min(left) == 1:
         text = f"from each reading of the encoder up to {max(left)} steps from the reference the slips end at the reference"
         return Proof("does not hunt", text, top)
-    if lasting:
+    if lasting and len(lasting) == max(lasting) - min(lasting) + 1:
         band = ((min(lasting) - 0.5) * of.step, (max(lasting) + 0.5) * of.step)
         return Proof("hunts", "", band[1], band=band, ranges=(band,))
-    return Proof("not decided", "", 0.0)
+    return Proof(
+        "not decided", "slips from some readings of the encoder may return to them, or end at the reference", 0.0
+    )
 
 
-def _left(of: SampledSlip, count: int) -> set[int]:
-    """Errors that are left by slips from one, in steps."""
-    error, found = count * of.quantum, set()
-    for tick, boxes in starts(of, (-error, -error), CELLS, PARTS):
-        found |= {count - int(read) for read in Flow(of).follow(boxes, tick).read}
-    return found
+def _about_orbit(slips: Slips) -> Proof:
+    """About the readings that slips from the smallest error lead to."""
+    counts = [1]
+    for _ in range(ORBIT):
+        try:
+            counts.append(abs(slips.one(counts[-1])))
+        except UndecidableError as why:
+            return Proof("not decided", str(why), 0.0)
+        if not counts[-1] or counts[-1] > FARTHEST:
+            break
+    if counts[-1] > FARTHEST:
+        return Proof(
+            "not decided", "its limit cycle has too many readings of the encoder to follow them one by one", 0.0
+        )
+    if counts[-1]:
+        low, high = min(counts[-KEPT:]), max(counts[-KEPT:])
+        found = _by_readings(slips, low, high, bounded=True)
+        return found if found.verdict != "not decided" else _by_readings(slips, low, high)
+    return _by_readings(slips, 1, max(counts)) if max(counts) <= MOST else Proof("not decided", AT_REST, 0.0)
 
 
 # --- with an excess ---
@@ -159,8 +188,7 @@ def _band(of: SampledSlip) -> Proof:
                 return Proof("hunts", "", high, band=(low, high), ranges=((low, high),))
             reason = f"no band of errors about {0.5 * (low + high):.4g} is shown to be taken into itself"
             low, high = min(low, (1.0 - MARGIN) * after[0]), max(high, (1.0 + MARGIN) * after[1])
-    count = math.ceil(1.5 * most / of.step) + 1 if of.step > 0.0 else FEW + 1
-    return Proof("not decided", reason, 0.0) if count > FEW or never_rests(of) else _by_readings(of, count)
+    return Proof("not decided", reason, 0.0)
 
 
 def _images(of: SampledSlip, low: float, high: float, fast: float) -> tuple[float, float]:

@@ -136,7 +136,8 @@ def starts(of: SampledSlip, reading: tuple[float, float], cells: int, parts: int
     found = []
     for tick, (z, b, rises) in enumerate(zip(ramp.z, ramp.b, ramp.rises, strict=True)):
         here = []
-        inc = max(rises * reading[0], rises * reading[1])
+        rise = rises if of.lag == 0.0 else ramp.rises[(tick + 1) % of.frame]
+        inc = max(rise * reading[0], rise * reading[1])
         if inc <= 0.0 and of.lag == 0.0:
             continue
         for k, w in np.ndindex(cells, parts):
@@ -247,7 +248,7 @@ class Flow:
         of, way = self.of, boxes.mode
         after = boxes.moved(of.slip, way[:, None] * of.push)
         speed = np.eye(len(of.held))[1]
-        last = _along(way, *after.range_of(speed))
+        last = along(way, *after.range_of(speed))
         bend = bend_of(of, boxes)
         sure, going = last[0] > bend, last[1] > 0.0  # the speed is not below 0 at first, or it had stopped before
         unsure = np.flatnonzero(going & ~sure)
@@ -257,7 +258,7 @@ class Flow:
         stopped = np.flatnonzero(~sure)
         if not len(stopped):
             return [after]
-        first_speed = _along(way, *stops.range_of(speed))[1]
+        first_speed = along(way, *stops.range_of(speed))[1]
         top = np.where(last[1] <= first_speed, np.maximum(first_speed, 0.0), np.maximum(last[1], 0.0)) + bend
         return [after.take(going), *self._stopped_within(stops.take(stopped), (top * of.tick)[stopped])]
 
@@ -278,7 +279,7 @@ class Flow:
         stays = (two[0] < of.breakaway) & (two[1] > -of.breakaway)
         parts = [after.take(stays)]
         for way in (1, -1):
-            top = np.maximum(_along(way, *one)[1], _along(way, *two)[1])
+            top = np.maximum(along(way, *one)[1], along(way, *two)[1])
             frees = top >= of.breakaway * (1.0 - ROUNDING)
             some, speed = after.take(frees), of.tick * np.maximum(top[frees] - of.sliding, 0.0) / of.inertia
             some.mode[:], some.waited[:] = way, 0
@@ -301,12 +302,9 @@ class Flow:
         return after if of.lag > 0.0 else self._freed(after)
 
     def _divided(self, boxes: Boxes) -> tuple[Boxes, np.ndarray]:
-        """Boxes with one reading each, in steps. In a slip the readings go one way; a stuck contact keeps its reading."""
+        """Boxes with one reading each, in steps."""
         row = np.eye(len(self.of.held))[0] / self.of.step
-        low, high = (np.floor(x + 0.5) for x in boxes.range_of(row))
-        way = np.where(boxes.mode != 0, boxes.mode, boxes.came)
-        low = np.where(way >= 0, np.maximum(low, boxes.read), low)
-        high = np.maximum(np.where(way <= 0, np.minimum(high, boxes.read), high), low)
+        low, high = one_way(boxes, *(np.floor(x + 0.5) for x in boxes.range_of(row)))
         while len(several := np.flatnonzero(high > low)):
             if len(boxes) + len(several) > BOXES:
                 raise UndecidableError("the slip passes too many readings of the encoder to follow them one by one")
@@ -329,7 +327,7 @@ class Flow:
         """With a torque that follows at once, a contact breaks away at the sample."""
         of = self.of
         for way in (1, -1):
-            low, high = _along(way, *boxes.range_of(of.held))
+            low, high = along(way, *boxes.range_of(of.held))
             may = (boxes.mode == 0) & (high >= of.breakaway * (1.0 - ROUNDING))
             must = may & (low > of.breakaway)
             boxes.mode[must], boxes.waited[must] = way, 0
@@ -341,6 +339,13 @@ class Flow:
                 boxes.clip(both, of.held, sides * of.breakaway, -sides)
                 boxes = Boxes.joined([boxes, freed])
         return boxes
+
+
+def one_way(sets: Any, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Least and largest readings, which go one way in a slip, and stay while a contact is stuck; not where it returns within a tick."""
+    way, free = np.where(sets.mode != 0, sets.mode, sets.came), sets.mode * sets.came < 0
+    low = np.where((way >= 0) & ~free, np.maximum(low, sets.read), low)
+    return low, np.maximum(np.where((way <= 0) & ~free, np.minimum(high, sets.read), high), low)
 
 
 def bend_of(of: SampledSlip, boxes: Boxes, noise: Callable[[np.ndarray], Any] = quiet) -> np.ndarray:
@@ -375,6 +380,6 @@ def need_within_limits(of: SampledSlip, boxes: Boxes, noise: Callable[[np.ndarra
             raise UndecidableError("the limit of the controller may act")
 
 
-def _along(way: Any, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def along(way: Any, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Least and largest values in a direction."""
     return np.minimum(way * low, way * high), np.maximum(way * low, way * high)

@@ -60,22 +60,23 @@ def finish(of: SampledSlip, boxes: Boxes, tick: int) -> tuple[np.ndarray, np.nda
     n, count = len(of.held), len(boxes)
     noise, low, high = Noise(of), np.full(count, np.inf), np.full(count, -np.inf)
     alive, angle, speed = np.arange(count), np.eye(n)[0], np.eye(n)[1]
+    passed = np.full(count, np.inf)  # angle of the tick before
     for _ in range(LONGEST):
         after = boxes.moved(of.slip, of.push)
         first, last = boxes.range_of(speed), after.range_of(speed)
         loud = float(noise.on(of.slip[1]))
         bend = bend_of(of, boxes, noise.on)
         may = last[0] - loud <= bend
+        most = of.tick * (np.maximum(np.maximum(first[1], last[1]), 0.0) + max(loud, float(noise.on(speed))) + bend)
         if may.any():
-            most = np.maximum(np.maximum(first[1], last[1]), 0.0) + max(loud, float(noise.on(speed))) + bend
-            some, turned = boxes.take(may), of.tick * most[may]
-            _stays_stuck(of, some, noise, turned, tick)
+            some, turned = boxes.take(may), most[may]
+            _stays_stuck(of, some, noise, turned, passed[may], tick)
             least, top = some.range_of(angle)
             off = float(noise.on(angle))
             low[alive[may]] = np.minimum(low[alive[may]], least - off)
             high[alive[may]] = np.maximum(high[alive[may]], top + off + turned)
         going = last[1] + loud > 0.0
-        boxes, alive = after.take(going), alive[going]
+        boxes, alive, passed = after.take(going), alive[going], most[going]
         if not len(boxes):
             return low, high
         tick = (tick + 1) % of.frame
@@ -86,20 +87,54 @@ def finish(of: SampledSlip, boxes: Boxes, tick: int) -> tuple[np.ndarray, np.nda
     raise UndecidableError("a slip is not shown to end")
 
 
-def _stays_stuck(of: SampledSlip, boxes: Boxes, noise: Noise, turned: np.ndarray, tick: int) -> None:
-    """Refuses stops after which the torque may free the contact before all but the integrator has settled."""
+def _stays_stuck(
+    of: SampledSlip, boxes: Boxes, noise: Noise, turned: np.ndarray, passed: np.ndarray, tick: int
+) -> None:
+    """Refuses stops after which the torque may free the contact before all but the integrator has settled.
+
+    Parameters
+    ----------
+    turned, passed
+        Largest angles from the last sample to the stop, and in the tick before.
+    """
     if of.ramp.ticks > SETTLING:
         raise UndecidableError("the controller settles too slowly while the contact is stuck")
     rows, readings = _held_rows(of, tick)
-    middle = np.abs(boxes.centre @ rows.T)
-    spread = np.abs(np.einsum("in,bnk->bik", rows, boxes.spread)).sum(axis=2)
-    most = middle + spread + noise.on(rows) + np.abs(rows[:, 0]) * turned[:, None] + readings
-    if most.max() >= of.breakaway:
-        raise UndecidableError("the contact may break away again before the stuck interval has settled")
+    spread = np.abs(np.einsum("in,bnk->bik", rows, boxes.spread)).sum(axis=2) + np.abs(rows[:, 0]) * turned[:, None]
+    effects = np.column_stack([rows @ noise.columns, readings])
+    most = READING * abs(of.quantum)
+    falls = np.minimum(np.stack([passed, turned]), 2.0 * most) / (most or 1.0)
+    for way in (1.0, -1.0):
+        torques = way * (boxes.centre @ rows.T) + spread + _one_way(way * effects, falls)
+        if torques.max() >= of.breakaway:
+            raise UndecidableError("the contact may break away again before the stuck interval has settled")
+
+
+def _one_way(effects: np.ndarray, falls: np.ndarray) -> np.ndarray:
+    """Largest sum of effects of readings in a slip forward, (box, row).
+
+    Each reading differs from the angle by ``n``, from -1 to 1. As no reading is below the one before, ``n`` falls by no more than the
+    angle has grown, ``f``. With any ``t`` above 0, ``a n + a' n' <= t f + |a - t| + |a' + t|``, where n' follows n.
+
+    Parameters
+    ----------
+    effects
+        ``a`` of each row and reading, the last being that of the stuck interval.
+    falls
+        ``f`` of each box, from the last but two readings to the last but one, and from there to the last.
+    """
+    kept, total = effects.copy(), np.zeros((falls.shape[1], len(effects)))
+    for k, fall in ((-1, falls[1]), (-2, falls[0])):
+        if kept.shape[1] >= 1 - k:
+            t = np.clip(np.minimum(-kept[:, k], kept[:, k - 1]), 0.0, None)
+            kept[:, k] += t
+            kept[:, k - 1] -= t
+            total += t * fall[:, None]
+    return np.asarray(total + np.abs(kept).sum(axis=1))
 
 
 def _held_rows(of: SampledSlip, tick: int) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of the torque at the samples of a stuck interval over the state before it, and what the constant reading adds at most."""
+    """Rows of the torque at the samples of a stuck interval over the state before it, and the effect of the constant reading."""
     n = len(of.held)
     matrix, constant = np.eye(n), np.zeros(n)
     matrix[1] = 0.0
@@ -108,5 +143,5 @@ def _held_rows(of: SampledSlip, tick: int) -> tuple[np.ndarray, np.ndarray]:
         one = of.linear[(tick + k) % of.frame] @ of.stuck
         matrix, constant = one @ matrix, one @ constant + of.samples[(tick + k) % of.frame][1]
         rows.append(of.held @ matrix)
-        readings.append(abs(float(of.held @ constant)) * READING * abs(of.quantum))
+        readings.append(float(of.held @ constant) * READING * abs(of.quantum))
     return np.array(rows), np.array(readings)
