@@ -67,7 +67,7 @@ def _begins_with(path: Path, text: bytes) -> bool:
         with path.open("rb") as file:
             return file.read(len(text)) == text
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+        raise InputError(f"cannot be read: {error.strerror}", where=str(path)) from None
 
 
 def _mat5_variables(path: Path) -> dict[str, Any]:
@@ -82,7 +82,9 @@ def _mat5_variables(path: Path) -> dict[str, Any]:
     except InputError:
         raise
     except Exception as error:  # the library raises what its parts raise
-        raise InputError(f"{path}: is not a MATLAB file ({reason(error)}); save it with -v7 or -v7.3") from None
+        raise InputError(
+            f"is not a MATLAB file ({reason(error)}); save it with -v7 or -v7.3", where=str(path)
+        ) from None
     return {name: value for name, value in data.items() if not name.startswith("__")}
 
 
@@ -135,7 +137,7 @@ def _hdf5_variables(path: Path, *, matlab: bool) -> tuple[dict[str, Any], dict[s
     except InputError:
         raise
     except Exception as error:  # the library raises what its parts raise
-        raise InputError(f"{path}: is not a {kind} file ({reason(error)})") from None
+        raise InputError(f"is not a {kind} file ({reason(error)})", where=str(path)) from None
     return found, units, attributes
 
 
@@ -183,7 +185,7 @@ def read_parquet_log(path: Path, *, time: str = "") -> Log:
             check_memory(16.0 * len(names) * file.metadata.num_rows, str(path))
             table = file.read(names)
     except (OSError, pa.ArrowException) as error:
-        raise InputError(f"{path}: is not a Parquet file ({reason(error)})") from None
+        raise InputError(f"is not a Parquet file ({reason(error)})", where=str(path)) from None
     units = {f.name: (f.metadata or {}).get(b"unit", b"").decode() for f in schema}
     header = {k.decode(): v.decode() for k, v in (schema.metadata or {}).items() if not k.startswith(b"ARROW")}
     columns: dict[str, Any] = {}
@@ -219,10 +221,10 @@ def read_mdf_log(path: Path, *, time: str = "") -> Log:
         except Exception as error:  # the library raises what its parts raise
             problem = reason(error)
     if problem:
-        raise InputError(f"{path}: is not an MDF file that asammdf reads ({problem})")
+        raise InputError(f"is not an MDF file that asammdf reads ({problem})", where=str(path))
     numbers = [signal for signal in signals if signal.samples.dtype.kind in "biuf" and signal.samples.ndim == 1]
     if not numbers:
-        raise InputError(f"{path}: has no channel of numbers")
+        raise InputError("has no channel of numbers", where=str(path))
     first = next((signal for signal in numbers if signal.name == time), numbers[0])
     clock = np.asarray(first.timestamps, dtype=float)
     channels = {
@@ -262,7 +264,7 @@ def _formulas(path: Path, file: Any) -> Formulas:
                 elif _has_formula(rule):
                     raise ValueError("is a table with a formula in it, which is not supported")
             except ValueError as error:
-                raise InputError(f"{path}: channel {channel.name}: its conversion {error}") from None
+                raise InputError(f"channel {channel.name}: its conversion {error}", where=str(path)) from None
     return found
 
 
@@ -326,7 +328,7 @@ def read_tdms_log(path: Path, *, time: str = "") -> Log:
     except InputError:
         raise
     except Exception as error:  # the library raises what its parts raise
-        raise InputError(f"{path}: is not a TDMS file ({reason(error)})") from None
+        raise InputError(f"is not a TDMS file ({reason(error)})", where=str(path)) from None
     variables |= {name: value for name, value in properties.items() if isinstance(value, int | float | str)}
     log = log_of_variables(path, variables, units, time)
     return log.noted(f"may be cut off or damaged; npTDMS reports: {said[0]}") if said else log
@@ -359,7 +361,7 @@ def log_of_variables(path: Path, variables: Mapping[str, Any], units: Mapping[st
         known = [*vectors, *(column for columns in of_matrix.values() for column in columns)]
         meant = did_you_mean(name or "time", known, f"its vectors are {listed(known) or 'none'}")
         raise InputError(
-            f"{path}: has no vector of the time{f' {name}' if name else ''}; name it with logs.time; {meant}"
+            f"has no vector of the time{f' {name}' if name else ''}; name it with logs.time; {meant}", where=str(path)
         )
     values = clock.astype(float) * {"ns": 1e-9, "us": 1e-6, "ms": 1e-3}.get(units.get(name, ""), 1.0)
     if units.get(name) == "ns":

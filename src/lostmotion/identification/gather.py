@@ -38,7 +38,7 @@ def gathered(rig: Rig, directory: Path) -> tuple[list[Prepared], dict[str, str]]
             origin = {"file": path.name, "folder": path.resolve().parent.name}
             logs.append(prepared(task, replace(read, name=name), rig.units, origin))
         except InputError as problem:
-            left_out[name] = _without(str(problem), path, name)
+            left_out[name] = problem.reason
     known = frozenset().union(*(log.facts for log in logs))
     for log in logs:
         if why := _unlike(rig, log, known):
@@ -81,14 +81,6 @@ def distinct_names(paths: list[Path]) -> list[str]:
         twice = {name for name in names if names.count(name) > 1}
         names = ["/".join(p.parts[-depth:]) if n in twice else n for p, n in zip(paths, names, strict=True)]
     return names
-
-
-def _without(text: str, path: Path, name: str) -> str:
-    """Message of an error without the name of the file."""
-    for known in (str(path), name):
-        if text.startswith(known):
-            text = text.removeprefix(known).lstrip(":, ")
-    return text
 
 
 def _unlike(rig: Rig, log: Prepared, known: frozenset[str]) -> str:

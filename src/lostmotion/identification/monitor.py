@@ -250,7 +250,7 @@ def _in_order(task: Identification, logs: Sequence[Prepared]) -> list[tuple[Prep
         try:
             places.append(number(task.monitor.order, log.facts, "monitor.order"))
         except InputError as error:
-            raise InputError(f"{log.name}: {error}") from None
+            raise InputError(f"{error}", where=log.name) from None
     return sorted(zip(logs, places, strict=True), key=lambda pair: pair[1])
 
 

@@ -46,7 +46,7 @@ def read_numpy_log(path: Path, *, time: str = "") -> Log:
         raise
     except Exception as error:  # of a damaged archive, or a header that is no description of an array
         raise InputError(
-            f"{path}: is not a file of NumPy ({reason(error)}); save it with numpy.save or numpy.savez"
+            f"is not a file of NumPy ({reason(error)}); save it with numpy.save or numpy.savez", where=str(path)
         ) from None
     for name, array in arrays.items():
         for own, values in _fields(name, array).items():
@@ -75,7 +75,7 @@ def _array(path: Path, name: str, file: IO[bytes], size: int) -> np.ndarray:
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     shape, by_columns, kind = read(file, max_header_size=HEADER)
     if kind.hasobject:
-        raise InputError(f"{what}: holds Python objects, which are not read; save arrays of numbers")
+        raise InputError("holds Python objects, which are not read; save arrays of numbers", where=what)
     if any(length < 0 for length in shape):
         raise ValueError(f"its shape is {shape}")
     needed = math.prod(shape) * kind.itemsize

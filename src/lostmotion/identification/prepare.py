@@ -148,7 +148,9 @@ def channel_unit(written: str, of_file: str, unit: str, where: str) -> tuple[flo
             problem = problem or error
     with suppress(ValueError):
         return si_factor(text), "SI"
-    raise InputError(f"{where}: the unit {text!r} is not known ({problem}); write it with measured or inputs ... unit")
+    raise InputError(
+        f"the unit {text!r} is not known ({problem}); write it with measured or inputs ... unit", where=where
+    )
 
 
 def is_unit(text: str) -> bool:
@@ -198,7 +200,7 @@ def prepared(
         keep &= log.time - log.time[0] <= task.logs.last
     if keep.sum() < 10:
         raise InputError(
-            f"{log.name}: lasts {log.duration:.4g} s, and logs.first and logs.last leave {keep.sum()} samples of it"
+            f"lasts {log.duration:.4g} s, and logs.first and logs.last leave {keep.sum()} samples of it", where=log.name
         )
     if not keep.all():
         log = log.only(keep, f"{counted(np.sum(~keep), 'sample')} before logs.first or after logs.last are left out")
@@ -236,7 +238,9 @@ def _in_si(task: Identification, log: Log, units: Mapping[str, str]) -> Log:
         log.values(channel)  # refuses a name that is none
         found = channel_unit(written, log.channels[channel].unit, kind, f"{log.name}: {where}")
         if known.setdefault(channel, found)[0] != found[0]:
-            raise InputError(f"{log.name}: {where}: channel {channel} has another unit elsewhere in the task; give one")
+            raise InputError(
+                f"{where}: channel {channel} has another unit elsewhere in the task; give one", where=log.name
+            )
     _refuse_other_kinds(task, log, known, units)
     named = _named(task)
     channels = {}
@@ -246,8 +250,9 @@ def _in_si(task: Identification, log: Log, units: Mapping[str, str]) -> Log:
                 known[name] = channel_unit("", c.unit, "", "")
         if name not in known and named & {name, *_facts_of(name)}:
             raise InputError(
-                f"{log.name}: channel {name}: the unit {c.unit!r} is not known, and a formula names the channel; "
-                f"give the channel in SI, or with a unit that is known"
+                f"channel {name}: the unit {c.unit!r} is not known, and a formula names the channel; "
+                f"give the channel in SI, or with a unit that is known",
+                where=log.name,
             )
         factor, unit = known.get(name, (1.0, c.unit))
         channels[name] = c if factor == 1.0 and unit == c.unit else Channel(c.values * factor, unit)
@@ -271,8 +276,9 @@ def _refuse_other_kinds(
         ):
             of_rig = "a multiple of the rated torque or voltage" if wanted == "1" else f"in {wanted}"
             raise InputError(
-                f"{log.name}: {table}.{name}: channel {entry.channel} is in {unit}, and {variable} is {of_rig}; give a scale that "
-                f'turns one into the other, such as scale = "torque_constant" of a current'
+                f"{table}.{name}: channel {entry.channel} is in {unit}, and {variable} is {of_rig}; give a scale that "
+                f'turns one into the other, such as scale = "torque_constant" of a current',
+                where=log.name,
             )
 
 
@@ -321,7 +327,7 @@ def _fact(text: Any, facts: Mapping[str, Any], log: Log, key: str) -> Any:
     try:
         return Formula(text).value(facts)
     except ValueError as problem:
-        raise InputError(f"{log.name}: key {key}: {problem}") from None
+        raise InputError(f"key {key}: {problem}", where=log.name) from None
 
 
 def _segments(task: Identification, log: Log, facts: Mapping[str, Any]) -> tuple[Segment, ...]:
@@ -339,7 +345,8 @@ def _weights(task: Identification, log: Log, facts: Mapping[str, Any]) -> np.nda
     if not np.all(found > 0.0):
         k = int(np.argmin(found))
         raise InputError(
-            f"{log.name}: key logs.weight: {task.logs.weight!r} is {found[k]:g} at {log.time[k]:.4g} s; it must be positive"
+            f"key logs.weight: {task.logs.weight!r} is {found[k]:g} at {log.time[k]:.4g} s; it must be positive",
+            where=log.name,
         )
     return found
 
@@ -353,7 +360,7 @@ def _by_sample(text: FormulaText, log: Log, facts: Mapping[str, Any], key: str) 
     distinct, which = np.unique(rows, axis=0, return_inverse=True)
     if len(distinct) > 1000:
         raise InputError(
-            f"{log.name}: key {key}: {text!r} names a channel with {len(distinct)} values; name one that switches"
+            f"key {key}: {text!r} names a channel with {len(distinct)} values; name one that switches", where=log.name
         )
     values = [float(_fact(text, {**facts, **dict(zip(names, row, strict=True))}, log, key)) for row in distinct]
     return np.array(values)[which.ravel()]

@@ -80,17 +80,17 @@ def read_log(path: str | Path, *, time: str = "", decimal: str = "") -> Log:
     if decimal not in ("", ".", ","):
         raise InputError(f'argument decimal: {decimal!r} is neither "." nor ","; leave it out to have it found')
     if path.is_dir():
-        raise InputError(f"{path}: is a directory; name the logs in it")
+        raise InputError("is a directory; name the logs in it", where=str(path))
     if not path.exists():
-        raise InputError(f"{path}: there is no such file; check the name")
+        raise InputError("there is no such file; check the name", where=str(path))
     if not path.is_file():
-        raise InputError(f"{path}: is a device or a pipe; name a file")
+        raise InputError("is a device or a pipe; name a file", where=str(path))
     ending = path.suffix.lower()
     check_memory(path.stat().st_size, str(path))
     if ending == ".json":
         return read_servo_json(path, time=time)
     if ending not in TABLES:
-        raise InputError(f"{path}: is no log by its ending; logs end in {', '.join(ENDINGS)}")
+        raise InputError(f"is no log by its ending; logs end in {', '.join(ENDINGS)}", where=str(path))
     if TABLES[ending] is read_text_log:
         return read_text_log(path, time=time, decimal=decimal)
     return TABLES[ending](path, time=time)

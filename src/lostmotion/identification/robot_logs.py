@@ -77,7 +77,8 @@ def read_mcap_log(path: Path, *, time: str = "") -> Log:
     if not recording.topics:
         kinds = listed(sorted(set(recording.left_out.values()))) or "no message"
         raise InputError(
-            f"{path}: has no topic in JSON or of ROS ({kinds}); record in one of these, or write its topics as CSV"
+            f"has no topic in JSON or of ROS ({kinds}); record in one of these, or write its topics as CSV",
+            where=str(path),
         )
     return _log(path, recording, time)
 
@@ -96,7 +97,7 @@ def read_ros_bag(path: Path, *, time: str = "") -> Log:
     need("rosbags", "Reading bags of ROS", "identify")
     recording = _read_bag(path)
     if not recording.topics:
-        raise InputError(f"{path}: has no message; record it again")
+        raise InputError("has no message; record it again", where=str(path))
     return _log(path, recording, time)
 
 
@@ -109,7 +110,7 @@ def _log(path: Path, recording: Recording, time: str) -> Log:
     stamped = topic not in topics and topic.endswith(STAMP)
     topic = topic.removesuffix(STAMP) if stamped else topic
     if topic not in topics:
-        raise InputError(f"{path}: has no topic {topic}; its topics are {listed(topics)}")
+        raise InputError(f"has no topic {topic}; its topics are {listed(topics)}", where=str(path))
     instants = np.array([at for at, _ in topics[topic]], dtype=np.int64)
     clock = _stamps(path, topic, topics[topic]) if stamped else instants
     long: set[str] = set()
@@ -119,7 +120,7 @@ def _log(path: Path, recording: Recording, time: str) -> Log:
         for name, course in _courses(path, of, rows, long).items()
     }
     if not channels:
-        raise InputError(f"{path}: the messages of {listed(topics)} have no number")
+        raise InputError(f"the messages of {listed(topics)} have no number", where=str(path))
     log = Log(path.name, 1e-9 * (clock - clock[0]), channels, recording.header)
     if recording.left_out:
         kinds = ", ".join(f"{t} ({e})" for t, e in recording.left_out.items())
@@ -164,7 +165,7 @@ def _read_mcap(path: Path) -> Recording:
         raise
     except Exception as error:  # the library raises what its parts raise
         raise InputError(
-            f"{path}: is not an MCAP file that mcap reads ({reason(error)}); if cut off, use `mcap recover`"
+            f"is not an MCAP file that mcap reads ({reason(error)}); if cut off, use `mcap recover`", where=str(path)
         ) from None
     recording.topics = {topic: recording.topics[topic] for topic in sorted(recording.topics, key=lambda t: first[t])}
     return recording
@@ -223,7 +224,8 @@ def _decoder(path: Path, topic: str, encoding: str, schema: Any) -> Callable[[by
         store.get_msgdef(kind)
     except Exception as error:  # of a grammar
         raise InputError(
-            f"{path}: topic {topic}: the definition of {schema.name} cannot be read ({reason(error)}); record it again"
+            f"topic {topic}: the definition of {schema.name} cannot be read ({reason(error)}); record it again",
+            where=str(path),
         ) from None
     decode = store.deserialize_cdr if encoding == "cdr" else store.deserialize_ros1
     return partial(decode, typename=kind)
@@ -307,8 +309,9 @@ def _read_bag(path: Path) -> Recording:
         raise
     except Exception as error:  # the library raises what its parts raise
         raise InputError(
-            f"{path}: is not a bag that rosbags reads ({reason(error)}); if cut off, use `rosbag reindex` or "
-            "`ros2 bag reindex`"
+            f"is not a bag that rosbags reads ({reason(error)}); if cut off, use `rosbag reindex` or "
+            "`ros2 bag reindex`",
+            where=str(path),
         ) from None
     return recording
 
@@ -323,8 +326,9 @@ def _check_definition(path: Path, connection: Any) -> None:
         _types(connection.msgdef.data, connection.msgtype, idl=kind == MessageDefinitionFormat.IDL)
     except Exception as error:  # of a grammar
         raise InputError(
-            f"{path}: topic {connection.topic.strip('/')}: the definition of {connection.msgtype} cannot be read "
-            f"({reason(error)}); record it again"
+            f"topic {connection.topic.strip('/')}: the definition of {connection.msgtype} cannot be read "
+            f"({reason(error)}); record it again",
+            where=str(path),
         ) from None
 
 
@@ -359,7 +363,7 @@ def _decoded(path: Path, topic: str, decode: Callable[[bytes], Any], data: bytes
         return decode(data)
     except Exception as error:  # of what the message is not
         raise InputError(
-            f"{path}: topic {topic}: a message cannot be read ({reason(error)}); record it again"
+            f"topic {topic}: a message cannot be read ({reason(error)}); record it again", where=str(path)
         ) from None
 
 
@@ -371,8 +375,9 @@ def _stamps(path: Path, topic: str, rows: list[tuple[int, Any]]) -> np.ndarray:
         seconds, rest = _member(stamp, "sec"), _member(stamp, "nanosec")
         if not (isinstance(seconds, int) and isinstance(rest, int)):
             raise InputError(
-                f"{path}: topic {topic}: message {k + 1} has no header.stamp with sec and nanosec; "
-                f"give logs.time = {topic!r} for the times of its messages"
+                f"topic {topic}: message {k + 1} has no header.stamp with sec and nanosec; "
+                f"give logs.time = {topic!r} for the times of its messages",
+                where=str(path),
             )
         out[k] = 1_000_000_000 * seconds + rest
     return out
@@ -400,7 +405,8 @@ def _shallow(path: Path, topic: str, message: Any, long: set[str]) -> Iterator[t
         yield from _numbers(message, topic, long)
     except RecursionError:
         raise InputError(
-            f"{path}: topic {topic}: a message has more than {MOST_LEVELS} lists and objects inside of each other"
+            f"topic {topic}: a message has more than {MOST_LEVELS} lists and objects inside of each other",
+            where=str(path),
         ) from None
 
 

@@ -40,20 +40,22 @@ def read_servo_json(path: Path, *, time: str = "") -> Log:
     except InputError:
         raise
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+        raise InputError(f"cannot be read: {error.strerror}", where=str(path)) from None
     except RecursionError:
-        raise InputError(f"{path}: is not a log, its lists are too deep; leave the file out") from None
+        raise InputError("is not a log, its lists are too deep; leave the file out", where=str(path)) from None
     except ValueError as error:  # of the encoding, of JSON, or of a number of thousands of digits
         raise InputError(
-            f"{path}: is not JSON ({reason(error)}); it may have been cut off, record or copy it again"
+            f"is not JSON ({reason(error)}); it may have been cut off, record or copy it again", where=str(path)
         ) from None
     if not isinstance(data, dict) or not isinstance(data.get("entries"), list):
-        raise InputError(f"{path}: has no list entries; a servo log is an object with entries, one for each instant")
+        raise InputError(
+            "has no list entries; a servo log is an object with entries, one for each instant", where=str(path)
+        )
     entries = data["entries"]
     if not entries:
-        raise InputError(f"{path}: key entries: is empty; leave the file out")
+        raise InputError("key entries: is empty; leave the file out", where=str(path))
     if not all(isinstance(entry, dict) for entry in entries):
-        raise InputError(f"{path}: key entries: must be objects, each with a timestamp")
+        raise InputError("key entries: must be objects, each with a timestamp", where=str(path))
     header = {key.replace("-", "_"): as_number(value) for key, value in data.items() if key != "entries"}
     step = header.get("dt")
     if clock in entries[0]:
@@ -62,7 +64,7 @@ def read_servo_json(path: Path, *, time: str = "") -> Log:
         times = step * np.arange(len(entries))
     else:
         raise InputError(
-            f"{path}: entries[0] lacks {clock}; add it to each entry, or the interval dt [s] to the header"
+            f"entries[0] lacks {clock}; add it to each entry, or the interval dt [s] to the header", where=str(path)
         )
     keys = [key for key in entries[0] if key != clock and any(_is_number(entry.get(key)) for entry in entries)]
     channels = {key: Channel(_column(path, entries, key)) for key in keys}
@@ -85,11 +87,11 @@ def _column(path: Path, entries: list[dict[str, Any]], key: str) -> np.ndarray:
     for k, entry in enumerate(entries):
         if key not in entry:
             raise InputError(
-                f"{path}: entries[{k}] lacks {key}, which entries[0] has; remove the entry, or add the value"
+                f"entries[{k}] lacks {key}, which entries[0] has; remove the entry, or add the value", where=str(path)
             )
         value = entry[key]
         if value is not None and not _is_number(value):
-            raise InputError(f"{path}: entries[{k}].{key}: {value!r} is not a number; put one there, or null")
+            raise InputError(f"entries[{k}].{key}: {value!r} is not a number; put one there, or null", where=str(path))
         try:
             out[k] = np.nan if value is None else float(value)
         except OverflowError:

@@ -50,7 +50,9 @@ def read_xlsx_log(path: Path, *, time: str = "") -> Log:
     except InputError:
         raise
     except Exception as error:  # the library raises what its parts raise
-        raise InputError(f"{path}: is not an XLSX file ({reason(error)}); save it as .xlsx again, or as CSV") from None
+        raise InputError(
+            f"is not an XLSX file ({reason(error)}); save it as .xlsx again, or as CSV", where=str(path)
+        ) from None
     return log
 
 
@@ -66,11 +68,11 @@ def _of_book(path: Path, book: Any, clock: str) -> Log:
         try:
             log = table_log(path, _chained(first, rows), _number, comments, clock)
         except UnreadError as problem:
-            raise InputError(f"{path}, sheet {sheet.title}, row {problem.row}: {problem}") from None
+            raise InputError(f"sheet {sheet.title}, row {problem.row}: {problem}", where=str(path)) from None
         others = [s.title for s in book.worksheets if s is not sheet]
         note = f"sheet {sheet.title} is read; left out are {listed(others)}"
         return log.noted(note) if others else log
-    raise InputError(f"{path}: has no sheet with values; save the log in the first sheet")
+    raise InputError("has no sheet with values; save the log in the first sheet", where=str(path))
 
 
 def _chained(first: Row, rows: Iterator[Row]) -> Iterator[Row]:
@@ -154,7 +156,7 @@ class _Part:
             parser.Parse(b"", True)
 
     def _refuse(self, *_: Any) -> None:
-        raise InputError(f"{self.path}: {self.name}: defines entities, which no workbook does; save it again")
+        raise InputError(f"{self.name}: defines entities, which no workbook does; save it again", where=str(self.path))
 
     def _begin(self, tag: str, attributes: dict[str, str]) -> None:
         tag = tag.rpartition(" ")[2]
@@ -166,7 +168,7 @@ class _Part:
             row = int(float(attributes.get("r", self._row + 1)))
             if not self._row < row <= MOST_ROWS:
                 raise InputError(
-                    f"{self.path}: {self.name}: row {row} comes after row {self._row}; save the file again"
+                    f"{self.name}: row {row} comes after row {self._row}; save the file again", where=str(self.path)
                 )
             self._row = row
         elif not self._in_row:
@@ -176,7 +178,9 @@ class _Part:
             self._column = _column(letters) if letters else self._column + 1
             self.cells += 1
             if self._column > MOST_COLUMNS:
-                raise InputError(f"{self.path}: {self.name}: row {self._row} has a cell {letters}; save the file again")
+                raise InputError(
+                    f"{self.name}: row {self._row} has a cell {letters}; save the file again", where=str(self.path)
+                )
             self._formula, self._value = False, attributes.get("t") == "str"
         self._formula = self._formula or tag == "f"
         self._in_value = tag == "v"
@@ -192,8 +196,9 @@ class _Part:
             self.cells += self._column
         elif tag == "c" and self._in_row and self._formula and not self._value:
             raise InputError(
-                f"{self.path}: {self.name}: row {self._row} has a formula without its value; open the file in a spreadsheet "
-                "program, and save it"
+                f"{self.name}: row {self._row} has a formula without its value; open the file in a spreadsheet "
+                "program, and save it",
+                where=str(self.path),
             )
         self._in_value = False
 

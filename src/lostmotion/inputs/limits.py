@@ -73,8 +73,9 @@ def check_memory(needed: float, what: str, default: int = LOG) -> None:
     """
     if needed > (limit := memory_limit(default)):
         raise InputError(
-            f"{what}: needs {shown_size(needed)} of memory or more, and the limit is {shown_size(limit)}; "
-            f"shorten it, or raise the limit with `lostmotion --memory SIZE ...` or {VARIABLE}=SIZE"
+            f"needs {shown_size(needed)} of memory or more, and the limit is {shown_size(limit)}; "
+            f"shorten it, or raise the limit with `lostmotion --memory SIZE ...` or {VARIABLE}=SIZE",
+            where=what,
         )
 
 
@@ -139,5 +140,5 @@ def read_text(path: Path, *, per_byte: float = PER_BYTE, default: int = LOG) -> 
             length = path.stat().st_size
             if length > room:
                 check_memory(per_byte * length, str(path), default)
-            raise InputError(f"{path}: does not end after {shown_size(room)}; name a file that ends")
+            raise InputError(f"does not end after {shown_size(room)}; name a file that ends", where=str(path))
     return content.decode("utf-8-sig")

@@ -23,15 +23,18 @@ def members(path: Path, archive: zipfile.ZipFile, limit: int = LOG) -> dict[str,
     """
     found = archive.infolist()
     if len(found) > MOST:
-        raise InputError(f"{path}: has {len(found)} members; {MOST} at most are read, leave out those that are no data")
+        raise InputError(
+            f"has {len(found)} members; {MOST} at most are read, leave out those that are no data", where=str(path)
+        )
     check_memory(float(sum(member.file_size for member in found)), str(path), limit)
     for member in found:
         if member.flag_bits & ENCRYPTED:
-            raise InputError(f"{path}: {member.filename}: is encrypted; save the file without a password")
+            raise InputError(f"{member.filename}: is encrypted; save the file without a password", where=str(path))
         if member.compress_type not in METHODS:
             raise InputError(
-                f"{path}: {member.filename}: is compressed by a method other than deflate; save it with deflate"
+                f"{member.filename}: is compressed by a method other than deflate; save it with deflate",
+                where=str(path),
             )
     if len({member.filename for member in found}) < len(found):
-        raise InputError(f"{path}: has two members of one name; save it again")
+        raise InputError("has two members of one name; save it again", where=str(path))
     return {member.filename: member for member in found}
