@@ -47,11 +47,9 @@ def axis_from_tables(tables: Mapping[str, Any]) -> TrainScenario:
     return train_from_tables(long_form(tables), partial(renamed, names=KEYS)).as_axis()
 
 
-def in_keys_of_axes(text: str) -> str:
-    """Text whose keys of the long form are those of this form."""
-    for long, short in KEYS.items():
-        text = text.replace(long, short)
-    return text
+def key_in_file(scenario: TrainScenario, key: str) -> str:
+    """A dotted key of the long form as the file of the scenario has it."""
+    return renamed(key, KEYS) if scenario.is_axis else key
 
 
 def long_form(tables: Mapping[str, Any]) -> dict[str, Any]:

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from ..inputs.arguments import checked
-from ..simulation.axis_form import in_keys_of_axes
 from ..simulation.drive_scenario import DriveScenario
 from ..simulation.results import RunArrays
 from ..simulation.run import run
@@ -69,9 +68,7 @@ def check_drive(scenario: Scenario) -> Findings:
 
 def _findings(scenario: Scenario) -> list[Finding]:
     if not isinstance(scenario, DriveScenario):
-        train = in_long_form(scenario)
-        found = check_train(train)
-        return [replace(f, remark=in_keys_of_axes(f.remark)) if train.is_axis else f for f in found]
+        return list(check_train(in_long_form(scenario)))
     result = _finely_sampled(scenario)
     cycle = duty_cycle(result, scenario.task.cycle)
     g, m, task = scenario.gearbox, scenario.motor, scenario.task

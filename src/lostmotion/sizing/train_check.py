@@ -9,6 +9,7 @@ import numpy as np
 
 from ..model.linear import RatedScrew
 from ..model.losses import ConstantEfficiency, LossMap
+from ..simulation.axis_form import key_in_file
 from ..simulation.needs import need_no_impacts
 from ..simulation.results import RunArrays
 from ..simulation.run import run
@@ -44,7 +45,7 @@ def check_train(scenario: TrainScenario) -> tuple[Finding, ...]:
         findings += _named(name, _screw(scenario, name, screw, result))
     powers = {}
     for name in train.motors:
-        judged, powers[scenario.key_of("motors", name)] = _motor(scenario, name, result)
+        judged, powers[key_in_file(scenario, scenario.key_of("motors", name))] = _motor(scenario, name, result)
         findings += judged
     findings += bus_findings(result, powers, scenario.task.supply, scenario.task.cycle)
     findings += _amplifier(scenario, result)
@@ -67,7 +68,8 @@ def _amplifier(scenario: TrainScenario, result: RunArrays) -> list[Finding]:
         return [Finding("amplifier_current", "amplifier", "not judged", "unknown", remark)]
     ((name, motor),) = train.motors.items()
     torque, speed = result[train.motor_torque_of(name)], result[f"{motor.shaft}_speed"]
-    return amplifier_of_a_run(result, motor, torque, speed, scenario.task, scenario.key_of("motors", name))
+    where = key_in_file(scenario, scenario.key_of("motors", name))
+    return amplifier_of_a_run(result, motor, torque, speed, scenario.task, where)
 
 
 def _named(name: str, findings: list[Finding]) -> list[Finding]:
@@ -76,7 +78,7 @@ def _named(name: str, findings: list[Finding]) -> list[Finding]:
 
 def _gear(scenario: TrainScenario, name: str, result: RunArrays) -> list[Finding]:
     train = scenario.train()
-    gear, where = train.gears[name], f"{scenario.kind_of(name)}s.{name}"
+    gear, where = train.gears[name], key_in_file(scenario, f"{scenario.kind_of(name)}s.{name}")
     torque = train.output_torque_of(name)
     cycle = duty_cycle(
         result,
@@ -110,9 +112,10 @@ def _screw(scenario: TrainScenario, name: str, screw: RatedScrew, result: RunArr
     force, speed = result[train.output_torque_of(name)], result[f"{train.gears[name].output}_speed"]
     load = AxialLoad(time, speed, force, scenario.task.cycle or float(time[-1] - time[0]))
     life = screw_life(load, screw)
-    findings = screw_rules(load, screw, None, key=f"screws.{name}")
+    where = key_in_file(scenario, f"screws.{name}")
+    findings = screw_rules(load, screw, None, key=where)
     if life is None:
-        return [missing("screw_life", "life of the screw, L10h", f"screws.{name}.dynamic_capacity"), *findings]
+        return [missing("screw_life", "life of the screw, L10h", f"{where}.dynamic_capacity"), *findings]
     value = "without end" if math.isinf(life) else f"{life / HOUR:.4g} h"
     remark = "no wanted life is given; a task has task.life"
     return [Finding("screw_life", "life of the screw, L10h", value, "unknown", remark), *findings]
@@ -140,12 +143,13 @@ def _load_torques(scenario: TrainScenario, name: str, result: RunArrays) -> list
 def _motor(scenario: TrainScenario, name: str, result: RunArrays) -> tuple[list[Finding], np.ndarray]:
     """Findings, and the power that it takes [W]."""
     train = scenario.train()
-    motor, where = train.motors[name], scenario.key_of("motors", name)
+    motor, key = train.motors[name], scenario.key_of("motors", name)
+    where = key_in_file(scenario, key)
     torque, speed = train.motor_torque_of(name), f"{motor.shaft}_speed"
     cycle = duty_cycle(result, scenario.task.cycle, speed=speed, motor_torque=torque, output_torque=torque)
     command, T, w = (result[key] for key in (f"{name}_command", torque, speed))
     command = command_of_run(motor, scenario.controllers.get(name), command, T, w)
-    oriented = oriented_amplitudes(result, where)
+    oriented = oriented_amplitudes(result, key)
     slides = train.is_slide(motor.shaft)
     findings = [
         largest_speed(motor, float(abs(w).max()), where, slides=slides),
@@ -154,4 +158,4 @@ def _motor(scenario: TrainScenario, name: str, result: RunArrays) -> tuple[list[
         voltage(motor, command, T, w, where, oriented=None if oriented is None else oriented[1]),
         current(motor, T, where),
     ]
-    return _named(name, findings), power_in_run(motor, result, command, torque, speed, where)
+    return _named(name, findings), power_in_run(motor, result, command, torque, speed, key)
