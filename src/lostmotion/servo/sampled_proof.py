@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -42,7 +43,7 @@ def prove_sampled(of: SampledSlip, largest: float) -> Proof:
     if of.step == 0.0:
         return _band(of) if of.excess > 0.0 else _share(of, largest)
     if never_rests(of):
-        found = _band(of) if of.excess > 0.0 else None
+        found = _band(of, WIDER[:1]) if of.excess > 0.0 else None
         return found if found and found.verdict == "hunts" else Proof("hunts", WITHOUT_REST, largest)
     if of.excess == 0.0:
         return _last_readings(Slips(of))
@@ -166,14 +167,14 @@ def _about_orbit(slips: Slips) -> Proof:
 # --- with an excess ---
 
 
-def _band(of: SampledSlip) -> Proof:
+def _band(of: SampledSlip, widths: Sequence[float] = WIDER) -> Proof:
     try:
         errors = _orbit(replace(of, step=0.0))
         fast = loudest(of)
     except UndecidableError as why:
         return Proof("not decided", str(why), 0.0)
     least, most, reason = float(min(errors)), float(max(errors)), ""
-    for wider in WIDER:
+    for wider in widths:
         low, high = least * (1.0 - wider) - of.step, most * (1.0 + wider) + of.step
         for _ in range(GROWTHS):
             if low <= of.step:
