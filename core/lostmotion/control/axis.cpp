@@ -15,7 +15,7 @@ void Axis::place(double sample_time) {
     position_loop.place(slots);
     speed_loop.place(slots);
     firmware.place(slots, sample_time * position_schedule.every);
-    position_share_ = share_of(sample_time * position_schedule.every, blend_time);
+    blend_filter_.place(sample_time * position_schedule.every, blend_time);
     if (current_loop) current_loop->place(slots, sample_time * current_schedule.every);
     if (field_orientation) {
         field_orientation->place(slots);
@@ -263,7 +263,7 @@ bool Axis::run_own_law(double time, const Sampled& y, double& command, double* s
 double Axis::position(double* slot) const {
     const double by_motor = slot[speed_angle] / ratio;
     if (!two_encoders) return by_motor;
-    slot[blended] += position_share_ * (slot[position_angle] - by_motor - slot[blended]);
+    blend_filter_(slot[position_angle] - by_motor, slot[blended]);
     return by_motor + slot[blended];
 }
 

@@ -246,8 +246,8 @@ class Axis {
     // by.
     double position(double* slot) const;
 
-    double position_share_ = 1.0;  // taken over at a sample of the position loop
-    int shaped_every_ = 1;         // samples
+    LowPass blend_filter_;
+    int shaped_every_ = 1;  // samples
     int slots_ = 0, course_ = 0, energy_ = 0;
 };
 

@@ -3,8 +3,8 @@
 namespace lostmotion::control {
 
 double Firmware::followed(double goal, double h, double* slot) const {
-    double *own = slot + first_, &filtered = own[filtered_goal], &limited = own[limited_goal], &rate = own[goal_rate];
-    filtered += goal_share_ * (goal - filtered);
+    double *own = slot + first_, &limited = own[limited_goal], &rate = own[goal_rate];
+    const double filtered = goal_filter_(goal, own[filtered_goal]);
     const double distance = filtered - limited, a = goal_acceleration_limit;
     if (std::isinf(a)) {
         if (std::fabs(distance) <= h * goal_rate_limit) return limited = filtered;

@@ -64,8 +64,8 @@ struct Firmware {
 
     void place(Slots& slots, double sample_time) {
         first_ = slots.take(present ? n_own_slots : 0);
-        share_ = share_of(sample_time, filter_time);
-        goal_share_ = share_of(sample_time, goal_filter_time);
+        angle_filter_.place(sample_time, filter_time);
+        goal_filter_.place(sample_time, goal_filter_time);
     }
     // At rest on its goal.
     void start(double angle, double goal, double* slot) const {
@@ -74,9 +74,7 @@ struct Firmware {
         slot[first_ + filtered_goal] = slot[first_ + limited_goal] = goal;
     }
     // The angle as the firmware sees it.
-    double filtered(double angle, double* slot) const {
-        return slot[first_ + seen_angle] += share_ * (angle - slot[first_ + seen_angle]);
-    }
+    double filtered(double angle, double* slot) const { return angle_filter_(angle, slot[first_ + seen_angle]); }
     // The goal that the loop follows, a sample time h after the last one.
     double followed(double goal, double h, double* slot) const;
 
@@ -91,7 +89,7 @@ struct Firmware {
  private:
     enum OwnSlot : int { seen_angle, filtered_goal, limited_goal, goal_rate, n_own_slots };
 
-    double share_ = 1.0, goal_share_ = 1.0;
+    LowPass angle_filter_, goal_filter_;
     int first_ = 0;
 };
 

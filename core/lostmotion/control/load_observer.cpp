@@ -6,8 +6,8 @@ namespace lostmotion::control {
 
 void LoadObserver::place(Slots& slots, double sample_time) {
     first_ = slots.take(present ? n_slots : 0);
-    input_share_ = share_of(sample_time, input_time);
-    load_share_ = share_of(sample_time, load_time);
+    input_filter_.place(sample_time, input_time);
+    load_filter_.place(sample_time, load_time);
     w_c_ = 2.0 * std::numbers::pi * speed_bandwidth;
 }
 
@@ -30,12 +30,10 @@ void LoadObserver::observe(double M, double w, const InverseModel& model, double
         return;
     }
     const double given = M - model.motor_viscous_friction * w - model.friction_now(slot) * s;
-    x[input] += input_share_ * (given + J_1 * w - x[input]);
-    x[input_torque] = x[input] - J_1 * w;
+    x[input_torque] = input_filter_(given + J_1 * w, x[input]) - J_1 * w;
     const double T_2 = model.losses.output_torque(x[input_torque], s, w, model.loss_factor_now(slot));
     const double left = T_2 - model.load_viscous_friction * phi_rate;
-    x[output] += load_share_ * (left + J_2 * phi_rate - x[output]);
-    x[torque] = x[output] - J_2 * phi_rate;
+    x[torque] = load_filter_(left + J_2 * phi_rate, x[output]) - J_2 * phi_rate;
     x[slope] = model.losses.slope(T_2, s, w);
 }
 

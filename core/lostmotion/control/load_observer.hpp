@@ -43,7 +43,8 @@ struct LoadObserver {
  private:
     enum Slot : int { input, input_torque, output, torque, slope, n_slots };
 
-    double input_share_ = 0.0, load_share_ = 0.0, w_c_ = 0.0;  // of both low passes at a sample, [rad/s]
+    LowPass input_filter_, load_filter_;
+    double w_c_ = 0.0;  // [rad/s]
     int first_ = 0;
 };
 

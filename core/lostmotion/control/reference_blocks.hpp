@@ -19,7 +19,7 @@
 
 namespace lostmotion::control {
 
-// First-order lag tau y' = u - y, exact for an input that is held from sample to sample.
+// Low pass whose output at a sample is its state there, so that its derivatives follow from its input.
 struct ReferenceFilter {
     static constexpr const char *part = "ReferenceFilter", *key = "reference_filter",
                                 *meaning = "First-order filter of the reference, before the loops.";
@@ -32,7 +32,7 @@ struct ReferenceFilter {
     }
     void place(Slots& slots, double sample_time) {
         first_ = slots.take(1);
-        share_ = share_of(sample_time, time_constant);
+        filter_.place(sample_time, time_constant);
     }
     void start(double value, double* slot) const { slot[first_] = value; }
     ReferencePoint operator()(const ReferencePoint& in, double* slot) const {
@@ -40,12 +40,12 @@ struct ReferenceFilter {
         out.rate = (in.value - out.value) / time_constant;
         out.acceleration = (in.rate - out.rate) / time_constant;
         out.jerk = (in.acceleration - out.acceleration) / time_constant;
-        slot[first_] += share_ * (in.value - out.value);
+        filter_(in.value, slot[first_]);
         return out;
     }
 
  private:
-    double share_ = 1.0;  // of the difference, at a sample
+    LowPass filter_;
     int first_ = 0;
 };
 

@@ -17,6 +17,16 @@ class Slots {
 // What a low pass of first order takes over at a sample: 1 - exp(-T/time); all of it without one.
 double share_of(double sample_time, double time);
 
+// Low pass of first order, tau y' = u - y, exact for an input that is held from sample to sample.
+class LowPass {
+ public:
+    void place(double sample_time, double time) { share_ = share_of(sample_time, time); }
+    double operator()(double in, double& kept) const { return kept += share_ * (in - kept); }
+
+ private:
+    double share_ = 1.0;
+};
+
 // The first of some numbers, whose place the others move up to and a new one joins.
 double shifted(double in, double* kept, int count);
 

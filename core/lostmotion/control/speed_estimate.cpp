@@ -6,7 +6,7 @@ namespace lostmotion::control {
 
 void SpeedEstimate::place(Slots& slots, double sample_time) {
     first_ = slots.take(kind == observer ? 2 : 1 + span);
-    smoothing_ = share_of(sample_time, time_constant);
+    filter_.place(sample_time, time_constant);
     w_o_ = 2.0 * std::numbers::pi * bandwidth;
 }
 
@@ -24,10 +24,7 @@ void SpeedEstimate::start(double angle, double speed, double sample_time, double
 double SpeedEstimate::operator()(double angle, double speed, double torque, double sample_time, double* slot) const {
     double* s = slot + first_;
     if (kind == exact) return speed;
-    if (kind == difference) {
-        s[0] += smoothing_ * ((angle - shifted(angle, s + 1, span)) / (sample_time * span) - s[0]);
-        return s[0];
-    }
+    if (kind == difference) return filter_((angle - shifted(angle, s + 1, span)) / (sample_time * span), s[0]);
     // Of this sample what the last ones predict, corrected for the next.
     const double T = sample_time, e = angle - s[0], estimate = s[1];
     const double acceleration = torque / inertia;

@@ -46,7 +46,8 @@ struct SpeedEstimate {
     double operator()(double angle, double speed, double torque, double sample_time, double* slot) const;
 
  private:
-    double smoothing_ = 1.0, w_o_ = 0.0;  // 1 - exp(-T/tau), [rad/s]
+    LowPass filter_;
+    double w_o_ = 0.0;  // [rad/s]
     int first_ = 0;
 };
 
