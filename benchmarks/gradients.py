@@ -34,9 +34,9 @@ KEYS = (
 CHANNELS = ["arm_speed", "arm_angle", "motor_torque"]
 
 
-def arm() -> lm.TrainScenario:
+def arm() -> lm.Scenario:
     """A hobby servo with an arm: 3.5 s under a position loop at 100 Hz."""
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={
             "rotor": {"inertia": 2e-7, "friction_torque": 2e-4},
             "arm": {"inertia": 4e-3, "viscous_friction": 0.02, "friction_torque": 0.05},

@@ -140,7 +140,7 @@ AXIS_TASK = {
 }
 
 
-def axis_logs(scenario: lm.TrainScenario, draw: np.random.Generator) -> list[Log]:
+def axis_logs(scenario: lm.Scenario, draw: np.random.Generator) -> list[Log]:
     """Five logs of 2 s of an axis with Stribeck and quadratic friction, which the model lacks."""
     t = 2e-3 * np.arange(1000)
     found = []

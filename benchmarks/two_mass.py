@@ -43,7 +43,7 @@ def by_motulator(rtol: float | None) -> Any:
     return lambda: simulation._simulation_loop(DURATION, math.inf)
 
 
-def axis(*, torque_source: bool = False) -> lm.TrainScenario:
+def axis(*, torque_source: bool = False) -> lm.Scenario:
     """The same drive under sampled field-oriented control, or its mechanics with the torque as the speed loop asks for it."""
     motor: dict[str, Any] = {"shaft": "motor", "rotor_inertia": J, "rated_torque": TORQUE}
     if torque_source:
@@ -73,7 +73,7 @@ def axis(*, torque_source: bool = False) -> lm.TrainScenario:
     if not torque_source:
         controller["current"] = {"kind": "field_oriented"}
     coupling = {"input": "motor", "output": "load", "ratio": 1.0}
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={"motor": {}, "load": {"inertia": J, "torque": LOAD}},
         motors={"m": motor},
         gears={"shaft": coupling | {"stiffness": {"kind": "linear", "stiffness": STIFFNESS}}},

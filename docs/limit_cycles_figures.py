@@ -21,7 +21,7 @@ def _curves(data: Any, name: str, label: str, factor: float, style: dict[str, An
     return Curve(label, data["time"].to_numpy(), factor * data[name].to_numpy(), style)
 
 
-def run(out: Path, scenario: lm.TrainScenario) -> None:
+def run(out: Path, scenario: lm.Scenario) -> None:
     """From the step on, with and without static friction."""
     without = scenario.replace(**{"shafts.table.breakaway_torque": None})
     both = {"static friction 8 N·m": (scenario, FIRST), "no more than in motion, 5 N·m": (without, SECOND)}
@@ -35,7 +35,7 @@ def run(out: Path, scenario: lm.TrainScenario) -> None:
     plots.draw(panels, 1, (9.0, 5.4)).savefig(out / "hunting-run.png", dpi=100, metadata={"Software": None})
 
 
-def certificates(out: Path, scenario: lm.TrainScenario) -> None:
+def certificates(out: Path, scenario: lm.Scenario) -> None:
     """The map from break-away to break-away, with and without static friction."""
     without = scenario.replace(**{"shafts.table.breakaway_torque": None})
     both = {"static friction 8 N·m": (scenario, FIRST), "no more than in motion, 5 N·m": (without, SECOND)}
@@ -52,7 +52,7 @@ def certificates(out: Path, scenario: lm.TrainScenario) -> None:
     plots.draw([panel], 1, (7.0, 4.2)).savefig(out / "hunting-certificate.png", dpi=100, metadata={"Software": None})
 
 
-def maps(out: Path, scenario: lm.TrainScenario) -> None:
+def maps(out: Path, scenario: lm.Scenario) -> None:
     """Over static friction and integral gain."""
     grid = {
         "controllers.servo.position.integral_gain": np.linspace(4.0, 64.0, 40),
@@ -65,7 +65,7 @@ def maps(out: Path, scenario: lm.TrainScenario) -> None:
 def write(out: Path) -> None:
     """All figures of the page, into a directory."""
     scenario = lm.load("hunting-with-static-friction")
-    assert isinstance(scenario, lm.TrainScenario)
+    assert not scenario.is_drive
     run(out, scenario)
     certificates(out, scenario)
     maps(out, scenario)

@@ -103,7 +103,7 @@ def three_degrees(out: Path) -> None:
 
 def lowering(
     eta_b: float, mass: float, *, stiffness: float = STIFFNESS, damping: float = 0.0, viscous: float = 0.0
-) -> lm.TrainScenario:
+) -> lm.Scenario:
     """A worm that lowers its load at the speed of its own swing; 2 % beside the steady motion."""
     swing = math.sqrt(stiffness / mass)
     speed = LOAD / stiffness * swing * RATIO
@@ -117,7 +117,7 @@ def lowering(
         mesh_damping=damping,
         losses=losses,
     )
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={"worm": {"inertia": WORM, "viscous_friction": viscous}, "drum": {"inertia": mass, "torque": LOAD}},
         motors={"motor": {"shaft": "worm", "kind": "torque_source", "rotor_inertia": 0.0}},
         gears={"gear": gear},
@@ -127,7 +127,7 @@ def lowering(
     )
 
 
-def chatters(scenario: lm.TrainScenario) -> bool:
+def chatters(scenario: lm.Scenario) -> bool:
     """Whether the worm locks, or its mesh swings through zero, in the last tenth of a run."""
     run = lm.simulate(scenario, energy=False)
     stops = lm.switchings_of(run)["cause"].values == "came to rest"
@@ -156,7 +156,7 @@ def growth(eta_b: float, ratio: float, stiffness: float) -> tuple[float, float]:
     small = {"speeds": {"worm": -1e3, "drum": -1e3 / RATIO}, "twists": {"gear": LOAD / stiffness * (1.0 + 1e-6)}}
     times = {"duration": 10.0 / theory, "sample_interval": 0.05 / theory}
     run = lm.simulate(
-        lm.TrainScenario(**scenario.model_dump(exclude={"initial", "simulation"}), initial=small, simulation=times),
+        lm.Scenario(**scenario.model_dump(exclude={"initial", "simulation"}), initial=small, simulation=times),
         energy=False,
     )
     off = np.abs(run["gear_output_torque"].values - LOAD)

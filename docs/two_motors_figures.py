@@ -28,7 +28,7 @@ NAMES = ("first", "second")
 ARCMIN = math.radians(1.0 / 60.0)
 
 
-def ring(losses: tuple[float, float] = (1.0, 1.0), friction: float = 0.0, **changes: Any) -> lm.TrainScenario:
+def ring(losses: tuple[float, float] = (1.0, 1.0), friction: float = 0.0, **changes: Any) -> lm.Scenario:
     """The ring without wind and viscous friction."""
     mesh = {"kind": "mesh_efficiency", "drive_efficiency": losses[0], "backdrive_efficiency": losses[1]}
     bare: dict[str, Any] = {"shafts.ring.viscous_friction": 0.0, "shafts.ring.torque": 0.0}
@@ -45,7 +45,7 @@ def save(panels: list[Panel], columns: int, size: tuple[float, float], out: Path
 # --- lost motion at the ring ---
 
 
-def held(bias: float) -> lm.TrainScenario:
+def held(bias: float) -> lm.Scenario:
     """The ring on held motor shafts under a load torque that swings slowly; the gears are loaded against each other before."""
     twist = HALF_GAP + RATIO * bias / STIFFNESS if bias else 0.0
     data = json.loads(ring(**{"shafts.ring.inertia": 0.5, "shafts.ring.viscous_friction": 100.0}).to_json())
@@ -56,7 +56,7 @@ def held(bias: float) -> lm.TrainScenario:
     data["simulation"] = {"duration": 30.0, "sample_interval": 5e-3}
     for gear in data["gears"].values():
         gear["mesh_damping"] = 100.0
-    return lm.TrainScenario(**data)
+    return lm.Scenario(**data)
 
 
 def lost_motion(out: Path) -> None:
@@ -187,7 +187,7 @@ def bias_needed(out: Path) -> None:
 # --- too small a bias ---
 
 
-def after_step(bias: float, step: float) -> lm.TrainScenario:
+def after_step(bias: float, step: float) -> lm.Scenario:
     """Both motors give `step` more, all at once, at t = 0."""
     twist = HALF_GAP + RATIO * bias / STIFFNESS
     signals = {f"command.{n}_motor": sign * bias + step for n, sign in zip(NAMES, (1.0, -1.0), strict=True)}
@@ -235,7 +235,7 @@ def opening(out: Path) -> None:
 # --- what it costs ---
 
 
-def slewing(bias: float, speed: float) -> lm.TrainScenario:
+def slewing(bias: float, speed: float) -> lm.Scenario:
     """At constant speed, with losses."""
     forward, backward = LOSSY
     balance = bias * (1.0 - forward * backward) / (1.0 + forward * backward)
@@ -283,7 +283,7 @@ def cost(out: Path) -> None:
     )
 
 
-def preloaded(constant: float, per_torque: float, torque: float = 0.2) -> lm.TrainScenario:
+def preloaded(constant: float, per_torque: float, torque: float = 0.2) -> lm.Scenario:
     """A slew: accelerated by `torque` at each motor, braked by it; the bias is constant + per_torque |torque|."""
     steps = ((0.5, 1.0, 1), (1.3, -1.0, 1), (2.5, -1.0, -1), (2.95, 1.0, -1))  # begin [s], way, sign of the torque then
     signals = {}

@@ -14,7 +14,7 @@ import lostmotion as lm
 
 ANGLE, DURATION, INTERVALS, DEGREE = 0.5, 0.4, 40, 3  # [rad], [s], commands, collocation points in each interval
 
-DRIVE = lm.TrainScenario(
+DRIVE = lm.Scenario(
     title="A torque motor, a compliant gearbox and a table",
     shafts={
         "rotor": {"friction_torque": 0.1},
@@ -31,7 +31,7 @@ DRIVE = lm.TrainScenario(
 )
 
 
-def optimal_commands(scenario: lm.TrainScenario, angle: float, duration: float) -> np.ndarray:
+def optimal_commands(scenario: lm.Scenario, angle: float, duration: float) -> np.ndarray:
     """Constant commands over equal intervals, whose sum of squares is least."""
     with tempfile.TemporaryDirectory() as folder:
         lm.export_fmu(scenario, Path(folder) / "drive.fmu")

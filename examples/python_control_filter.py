@@ -16,12 +16,12 @@ def notch(sample_time: float) -> control.TransferFunction:
     return control.sample_system(continuous, sample_time, method="tustin", prewarp_frequency=w)
 
 
-def axis(*filters: object) -> lm.TrainScenario:
+def axis(*filters: object) -> lm.Scenario:
     """The axis with these filters of the torque."""
     return AXIS.replace(**{"controllers.servo.speed.torque_filters": filters})
 
 
-def margins(scenario: lm.TrainScenario) -> tuple[float, float]:
+def margins(scenario: lm.Scenario) -> tuple[float, float]:
     """Least phase margin [deg] and greatest sensitivity of the speed loop in all regimes of the gear."""
     rows = [row.margins for row in lm.commission(scenario).loops if row.loop == "speed"]
     return float(np.degrees(min(m.phase_margin for m in rows))), max(m.sensitivity_peak for m in rows)

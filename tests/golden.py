@@ -56,7 +56,7 @@ def compute() -> Groups:
     for path in sorted((ROOT / "scenarios").glob("*.toml")):
         scenario, name = lm.load(path), path.stem
         groups |= {f"{name}.{what}": values for what, values in of_run(scenario).items()}
-        if isinstance(scenario, lm.TrainScenario) or scenario.controller is not None:
+        if not scenario.is_drive or scenario.controller is not None:
             continue
         s = scenario.command
         if not (s.steps or s.ramps or scenario.load.torque.ramps):
@@ -72,7 +72,7 @@ def compute() -> Groups:
     return groups
 
 
-def of_run(scenario: lm.Scenario | lm.TrainScenario) -> Groups:
+def of_run(scenario: lm.Scenario) -> Groups:
     result = lm.simulate(scenario)
     derived = {v.name for v in lm.simulation.VARIABLES if v.derived}
     switchings = lm.switchings_of(result)
@@ -82,7 +82,7 @@ def of_run(scenario: lm.Scenario | lm.TrainScenario) -> Groups:
         "end_state": json.loads(result.attrs["end_state"]),
         "energy": lm.energy_of(result),
     }
-    gears = scenario.gears.values() if isinstance(scenario, lm.TrainScenario) else (scenario.gearbox,)
+    gears = scenario.gears.values() if not scenario.is_drive else (scenario.gearbox,)
     for gear in gears:
         if isinstance(gear.losses, lm.model.LossMap):  # not of the core; where it differs, all else does
             groups["input"] = {"loss_map": np.ravel(gear.losses.values)}

@@ -12,7 +12,7 @@ import lostmotion as lm
 from lostmotion.model.angle_torques import STANDARD_GRAVITY as G
 from lostmotion.model.duty import Amplifier
 from lostmotion.reports.listing import list_records, record_text, template
-from lostmotion.simulation.drive_scenario import json_schema
+from lostmotion.simulation.drive_tables import drive_schema
 from lostmotion.sizing.supply import amplifier_rules, longest_above
 from lostmotion.studies.axis_rows import Axes
 from lostmotion.studies.nearest import not_judged
@@ -167,7 +167,7 @@ def test_the_drive_check_of_an_axis_names_the_keys_of_its_file():
     ("brake", "valid"), [("of the motor", True), ({"from": "x"}, True), ({"torque": 1.0}, True), (3, False)]
 )
 def test_the_schema_for_editors_takes_a_brake_by_name(brake: Any, valid: bool):
-    schema = json_schema()
+    schema = drive_schema()
     table = {"properties": {"task": schema["properties"]["task"]}, "$defs": schema["$defs"]}
     assert jsonschema.Draft202012Validator(table).is_valid({"task": {"brake": brake}}) == valid
 

@@ -10,7 +10,7 @@ import lostmotion as lm
 from conftest import ROOT
 from lostmotion.model.duty import ArmGravity, Duty, Payload, Process, Supply
 from lostmotion.model.linear import RatedScrew
-from lostmotion.simulation.drive_scenario import LoadTable
+from lostmotion.simulation.drive_tables import LoadTable
 from lostmotion.sizing.axis_rules import (
     derated,
     emergency_stop,
@@ -240,7 +240,7 @@ def test_a_run_has_the_gravity_of_the_long_form():
     scenario = task.axis_at(task.parameters(0, 1)[0], 2)
     short = lm.simulate(scenario, energy=False)
     controller = scenario.controller.model_dump(exclude_none=True)
-    train = lm.TrainScenario(
+    train = lm.Scenario(
         shafts={"motor": {}, "load": {"inertia": 0.8, "friction_torque": 0.2}},
         motors={"motor": scenario.motor.model_dump(exclude_none=True) | {"shaft": "motor"}},
         gears={"gearbox": scenario.gearbox.model_dump(exclude_none=True) | {"input": "motor", "output": "load"}},
@@ -264,7 +264,7 @@ def test_a_slide_runs_as_in_the_long_form():
     controller = scenario.controller.model_dump(exclude_none=True) | {"shaft": "slide"}
     motor = scenario.motor.model_dump(exclude_none=True)
     screw = {k: v for k, v in SLIDE["screw"].items() if k != "drag_torque"}
-    train = lm.TrainScenario(
+    train = lm.Scenario(
         shafts={"motor": {"friction_torque": 0.03}},
         slides={"slide": SLIDE["slide"]},
         motors={"motor": motor | {"shaft": "motor"}},

@@ -74,7 +74,7 @@ def library() -> c.CDLL:
 class Train:
     """A train of the C interface from a scenario in the long form, element by element."""
 
-    def __init__(self, library: c.CDLL, scenario: lm.TrainScenario) -> None:
+    def __init__(self, library: c.CDLL, scenario: lm.Scenario) -> None:
         self.lib, self.train = library, c.c_void_p(library.lm_train_new())
         train = scenario.train()
         for name, s in train.shafts.items():
@@ -267,7 +267,7 @@ def test_a_load_gets_the_answer_of_python(worm: Simulation) -> None:
 
 def test_clutches_freewheels_and_torques_over_an_angle_have_the_bits_of_python(library: c.CDLL) -> None:
     """A motor drives by a clutch, a freewheel and a safety clutch, which slips on the cogging of the last shaft."""
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={
             "a": {"inertia": 0.01},
             "b": {"inertia": 0.02},
@@ -321,7 +321,7 @@ class Motion(c.Structure):
 
 def test_a_given_motion_has_the_bits_of_python(library: c.CDLL) -> None:
     """Angle, speed and acceleration, and two of them; the torque that they take is a variable."""
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={
             "crank": {"inertia": 0.02, "friction_torque": 0.5, "speed": 0.0},
             "lever": {"inertia": 0.3, "friction_torque": 0.2},
@@ -430,7 +430,7 @@ def test_what_is_wrong_is_said_in_one_line(library: c.CDLL, worm: Simulation) ->
 
 def test_a_jam_is_said_as_in_python(library: c.CDLL) -> None:
     """A rigid self-locking worm under a heavy load (drivetrain: effective inertia below zero)."""
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={"worm": {}, "drum": {"inertia": 2.0, "torque": 20.0}},
         motors={"motor": {"shaft": "worm", "kind": "torque_source", "rotor_inertia": 1e-4}},
         gears={

@@ -16,12 +16,10 @@ T = 1e-3
 LAST = slice(-200, -1)  # where the tracker has settled; the tick at the very end is no part of the run
 
 
-def scenario(
-    reference: dict[str, Any], camera: dict[str, Any], tracker: dict[str, Any], **more: Any
-) -> lm.TrainScenario:
+def scenario(reference: dict[str, Any], camera: dict[str, Any], tracker: dict[str, Any], **more: Any) -> lm.Scenario:
     """A shaft that its motor turns directly, under a cascade that hardly matters: the camera sits on it."""
     encoder = more.pop("encoder", {"ideal": True})
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={"table": {"inertia": 1e-3}},
         motors={"m": {"shaft": "table", "kind": "torque_source", "rotor_inertia": 0.0, "rated_torque": 1.0}},
         controllers={
@@ -40,7 +38,7 @@ def scenario(
     )
 
 
-def expected(s: lm.TrainScenario) -> tuple[np.ndarray, np.ndarray]:
+def expected(s: lm.Scenario) -> tuple[np.ndarray, np.ndarray]:
     """What the tracker expects at the ticks [rad], and where the target is."""
     r = lm.simulate(s, energy=False)
     return r["m_position_reference"].values, s.controllers["m"].reference.at(r.time.values)[0]

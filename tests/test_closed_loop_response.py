@@ -17,7 +17,7 @@ from lostmotion.servo.sampled import SampledLoop
 from two_mass import T, two_mass
 
 
-def two_masses(kind: str, **changes: Any) -> lm.TrainScenario:
+def two_masses(kind: str, **changes: Any) -> lm.Scenario:
     """Two masses without friction that is dry: one linear regime."""
     estimate = {"kind": "difference", "time_constant": 2e-4}
     controller: dict[str, Any] = {"reference": {"kind": kind}}
@@ -28,7 +28,7 @@ def two_masses(kind: str, **changes: Any) -> lm.TrainScenario:
     return two_mass(speed, **(controller | changes))
 
 
-def exact_loop(scenario: lm.TrainScenario, loop: str) -> SampledLoop:
+def exact_loop(scenario: lm.Scenario, loop: str) -> SampledLoop:
     axis = axis_of(scenario)
     (regime,) = regimes(axis)
     return SampledLoop(axis, regime, loop, False)
@@ -183,7 +183,7 @@ def test_what_cannot_be_a_source_is_refused() -> None:
 def test_a_law_of_ones_own_has_a_response() -> None:
     """A proportional law on the speed, delayed by a tick, of a rigid inertia: closed form in z."""
     J, gain = 2e-3, 1.2
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={"motor": {}},
         motors={"m": {"shaft": "motor", "kind": "torque_source", "rotor_inertia": J, "rated_torque": 1.0}},
         controllers={

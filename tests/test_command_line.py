@@ -471,7 +471,7 @@ def test_the_length_of_a_run_is_estimated_within_a_factor(scenario: str, changes
 
 def test_the_estimate_sees_a_motion_that_begins_late() -> None:
     """Friction holds 0.1 N·m, the motor gives at most 0.06 until a step of 0.05 lets it move to and fro for most of the run."""
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={"a": {"inertia": 1e-3, "friction_torque": 0.1}},
         motors={"m": {"shaft": "a", "kind": "torque_source", "rotor_inertia": 1e-4, "rated_torque": 1.0}},
         command={"m": {"amplitude": 0.06, "frequency": 5.0, "steps": [{"time": 1e3, "height": 0.05}]}},

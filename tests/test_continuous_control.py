@@ -24,9 +24,9 @@ PID = {"gain": 4.0, "integral_gain": 1.5, "derivative_gain": 0.8}
 M = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-1.5 / J, -4.0 / J, -0.8 / J]])  # of e, e', e'' while it slips
 
 
-def inertia(friction: float, breakaway: float, duration: float, **controller: Any) -> lm.TrainScenario:
+def inertia(friction: float, breakaway: float, duration: float, **controller: Any) -> lm.Scenario:
     """A PID position loop on one inertia with dry friction."""
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={"axis": {"inertia": J, "friction_torque": friction, "breakaway_torque": breakaway}},
         motors={"servo": {"shaft": "axis", "kind": "torque_source", "rated_torque": 1.0, "rotor_inertia": 0.0}},
         controllers={
@@ -141,8 +141,8 @@ LOOP: dict[str, Any] = {
 }
 
 
-def two_masses(duration: float = 2.0, interval: float = 0.05, **controller: Any) -> lm.TrainScenario:
-    return lm.TrainScenario(
+def two_masses(duration: float = 2.0, interval: float = 0.05, **controller: Any) -> lm.Scenario:
+    return lm.Scenario(
         **TWO_MASSES,
         controllers={"servo": LOOP | controller},
         simulation={"duration": duration, "sample_interval": interval},
@@ -244,7 +244,7 @@ def test_limit_and_anti_windup_are_those_of_an_independent_integration(anti_wind
     assert np.abs(run["servo_command"].values).max() <= 0.5 * limit
 
 
-def random_scenario(rng: np.random.Generator) -> lm.TrainScenario:
+def random_scenario(rng: np.random.Generator) -> lm.Scenario:
     """Backlash, friction, static friction, limits, PID and state spaces, at random."""
     tables = json.loads(json.dumps(TWO_MASSES))
     tables["shafts"]["load"]["friction_torque"] = friction = float(rng.uniform(0.0, 1.0))
@@ -279,7 +279,7 @@ def random_scenario(rng: np.random.Generator) -> lm.TrainScenario:
     controller["limit"] = float(rng.uniform(0.5, 3.0))  # so that none grows without bound
     if rng.random() < 0.4:
         controller["current"] = {"kind": "first_order", "time_constant": 0.002}
-    return lm.TrainScenario(
+    return lm.Scenario(
         **tables, controllers={"servo": controller}, simulation={"duration": 2.0, "sample_interval": 0.02}
     )
 
@@ -362,7 +362,7 @@ def play(gain: float) -> tuple[float, float]:
     return X, 2.0 * (first + second)
 
 
-def play_loop(gain: float, small: float) -> lm.TrainScenario:
+def play_loop(gain: float, small: float) -> lm.Scenario:
     """A motor of inertia 1 and viscous friction 1 that takes along, through a play, a load of hardly any inertia.
 
     `small`: viscous friction of the load, of which that of the motor would have a like share less; the load stops within a
@@ -378,7 +378,7 @@ def play_loop(gain: float, small: float) -> lm.TrainScenario:
         "stiffness": {"kind": "curve", "backlash": 1.0, "slopes": [stiffness], "breaks": []},
         "losses": {"kind": "constant_efficiency", "efficiency": 1.0},
     }
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={
             "motor": {"inertia": 1.0, "viscous_friction": 1.0 - small},
             "load": {"inertia": 1e-8 * small, "viscous_friction": small},
@@ -433,7 +433,7 @@ def test_systems_of_scipy_and_python_control_act_as_the_pid_that_they_equal() ->
         "frequency": 0.7,
     }  # the derivative of a step would start the filter
     wanted = lm.simulate(
-        lm.TrainScenario(
+        lm.Scenario(
             **TWO_MASSES,
             controllers={"servo": LOOP | {"position": pid, "reference": reference}},
             initial={"controller_states": {"servo_filter": 0.0}},
@@ -532,12 +532,12 @@ def test_in_the_short_form_it_makes_a_train_of_the_drive(tmp_path: Path) -> None
     path = tmp_path / "short.toml"
     path.write_text(SHORT)
     short, drive = lm.load(path, ["controller.position.gain=30"]), lm.load("paper-2dof-nl-small")
-    assert isinstance(short, lm.TrainScenario)
+    assert not short.is_drive
     controller = tomllib.loads(SHORT)["controller"]
     controller["position"]["gain"] = 30.0
     controller["shaft"] = "load"
     train = drive.drive().train()
-    long = lm.TrainScenario(
+    long = lm.Scenario(
         shafts={name: dict(shaft) for name, shaft in train.shafts.items()},
         motors=train.motors,
         gears=train.gears,

@@ -11,8 +11,8 @@ import lostmotion as lm
 from two_mass import A, B, T, two_mass
 
 
-def scenario(**tables: Any) -> lm.TrainScenario:
-    return lm.TrainScenario(**tables)
+def scenario(**tables: Any) -> lm.Scenario:
+    return lm.Scenario(**tables)
 
 
 def torque_source(**changes: Any) -> dict[str, Any]:

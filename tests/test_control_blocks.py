@@ -133,7 +133,7 @@ def simulated(controller: dict[str, Any], torque: Any = None) -> Any:
     """The same by the solver."""
     base: dict[str, Any] = {"sample_time": T, "encoder": {"lines": 256}, "speed": {"gain": 0.1, "integral_gain": 2.0}}
     return lm.simulate(
-        lm.TrainScenario(
+        lm.Scenario(
             shafts={
                 "motor": {"inertia": J_M, "viscous_friction": B_M},
                 "load": {"inertia": J_L, "viscous_friction": B_L, "torque": torque},
@@ -359,7 +359,7 @@ def test_a_limit_of_the_voltage_does_not_wind_up_the_current_loop() -> None:
     motor = {"shaft": "motor", "rotor_inertia": 0.0, "rated_torque": M_R, "rated_speed": w_R, "rated_voltage": 24.0,
              "electrical_time_constant": tau, "armature_voltage_constant": k_N, "voltage_limit": 24.0 * limit}  # fmt: skip
     result = lm.simulate(
-        lm.TrainScenario(
+        lm.Scenario(
             shafts={"motor": {"inertia": J, "viscous_friction": b}},
             motors={"m": motor},
             controllers={

@@ -115,7 +115,7 @@ def test_the_axis_itself_is_sound(tmp_path) -> None:
     assert abs(float(lm.simulate(lm.load(path))["motor_speed"][-1])) > 1.0
 
 
-def train(**changes: Any) -> lm.TrainScenario:
+def train(**changes: Any) -> lm.Scenario:
     controller = {"sample_time": 1e-3, "reference": {"kind": "speed"}, "encoder": {"bits": 12}, "speed": {"gain": 0.1}}
     tables: dict[str, Any] = {
         "shafts": {"a": {"inertia": 1.0}, "b": {"inertia": 1.0}, "alone": {"inertia": 1.0, "torque": 0.1}},
@@ -124,7 +124,7 @@ def train(**changes: Any) -> lm.TrainScenario:
         "controllers": {"m": controller | {"shaft": "b"} | changes.pop("controller", {})},
         "simulation": {"duration": 0.01, "sample_interval": 1e-3},
     }
-    return lm.TrainScenario(**(tables | changes))
+    return lm.Scenario(**(tables | changes))
 
 
 def test_of_a_train_they_are_refused_by_the_name_of_the_motor() -> None:

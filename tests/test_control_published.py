@@ -24,10 +24,10 @@ MOVES = {"kind": "position", "speed": 0.15, "acceleration": 1.5, "dwell": 0.25, 
 VOLTS = 10.0
 
 
-def emps(resolution: float) -> lm.TrainScenario:
+def emps(resolution: float) -> lm.Scenario:
     p = EMPS
     encoder: dict[str, Any] = {"resolution": resolution} if resolution else {"ideal": True}
-    return lm.TrainScenario(
+    return lm.Scenario(
         slides={"axis": {"mass": p["M"], "viscous_friction": p["F_v"], "friction_force": p["F_c"], "force": p["offset"]}},
         linear_motors={"m": {"slide": "axis", "rated_force": 1.0}},
         controllers={"m": {
@@ -107,13 +107,13 @@ GAIN, INTEGRAL = 2.0 * 0.4 * RIG["J"] * W_A * math.sqrt(5.0 - 4.0 * 0.4**2), RIG
 WANTED = {"kind": "speed", "sines": [{"amplitude": 6.0, "frequency": 12.0}]}
 
 
-def rig() -> lm.TrainScenario:
+def rig() -> lm.Scenario:
     p = RIG
     shafts = {
         name: {"inertia": p["J"], "friction_torque": p["T_C"][k], "breakaway_torque": p["T_S"][k]}
         for k, name in enumerate(("motor", "load"))
     }
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts=shafts,
         motors={"m": {"shaft": "motor", "kind": "torque_source", "rotor_inertia": 0.0, "rated_torque": p["limit"]}},
         gears={"coupling": {
@@ -249,7 +249,7 @@ def test_two_masses_under_motulators_speed_controller_are_those_of_motulator() -
     J_M, J_L, K, C, T, ticks, limit, load = 0.005, 0.005, 700.0, 0.01, 250e-6, 400, 14.0, 5.0
     bandwidth = 2.0 * math.pi * 10.0
     k_p, k_i = 2.0 * bandwidth * (J_M + J_L), bandwidth**2 * (J_M + J_L)
-    axis = lm.TrainScenario(
+    axis = lm.Scenario(
         shafts={"motor": {"inertia": J_M}, "load": {"inertia": J_L, "torque": load}},
         motors={"m": {"shaft": "motor", "kind": "torque_source", "rotor_inertia": 0.0, "rated_torque": limit}},
         gears={"coupling": {"input": "motor", "output": "load", "ratio": 1.0, "mesh_damping": C,

@@ -13,7 +13,6 @@ from scipy import signal
 import lostmotion as lm
 from conftest import ALL_SCENARIOS
 from lostmotion.control.filters import LowPass, Notch, as_filter
-from lostmotion.simulation.train_scenario import in_long_form
 
 SHOWN = ("motor_speed", "load_speed", "load_angle", "twist", "torque_reference", "measured_speed")
 
@@ -113,7 +112,7 @@ def test_a_controlled_run_is_written_and_read_back(axis: lm.Scenario, tmp_path: 
 
 
 def test_the_long_form_of_a_controlled_drive_moves_alike(axis: lm.Scenario) -> None:
-    short, long = lm.simulate(axis), lm.simulate(in_long_form(axis))
+    short, long = lm.simulate(axis), lm.simulate(axis.long())
     for name, other in (("load_speed", "load_speed"), ("torque_reference", "motor_torque_reference")):
         assert np.abs(short[name].to_numpy() - long[other].to_numpy()).max() < 1e-9 * np.abs(short[name]).max()
 
@@ -123,10 +122,10 @@ def test_the_long_form_of_a_controlled_drive_moves_alike(axis: lm.Scenario) -> N
 K, W, LIMIT = 8e-3, 120.0, 0.4  # N m s/rad, rad/s, N m
 
 
-def loop(**changes: Any) -> lm.TrainScenario:
+def loop(**changes: Any) -> lm.Scenario:
     """A proportional speed loop to W, or a law in its place."""
     controller = {"sample_time": 250e-6, "reference": {"kind": "speed", "mean": W}, "encoder": {"lines": 1000}}
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={"motor": {"inertia": 3e-5, "friction_torque": 0.01}},
         motors={"m": {"shaft": "motor", "kind": "torque_source", "rotor_inertia": 0.0, "rated_torque": 0.5}},
         controllers={"m": controller | changes},
@@ -252,7 +251,7 @@ def test_a_filter_in_the_loop_is_lfilter_of_its_input() -> None:
 
 @pytest.mark.parametrize("form", ["short", "long"])
 def test_what_follows_given_commands_refuses_a_controller(axis: lm.Scenario, form: str) -> None:
-    scenario: Any = axis if form == "short" else in_long_form(axis)
+    scenario: Any = axis if form == "short" else axis.long()
     for function in (
         lambda: lm.explain(scenario, 0.1),
         lambda: lm.linearize(scenario, time=0.1),

@@ -20,7 +20,7 @@ SERIES = J_A * J_B / (J_A + J_B)  # inertia that the slip feels
 EXACT = 1e-10
 
 
-def pair(damper: dict[str, Any] | None = None, **tables: Any) -> lm.TrainScenario:
+def pair(damper: dict[str, Any] | None = None, **tables: Any) -> lm.Scenario:
     """Two shafts on a damper, the first with a torque source."""
     base: dict[str, Any] = {
         "shafts": {"a": {"inertia": J_A}, "b": {"inertia": J_B, "torque": 0.0}},
@@ -28,7 +28,7 @@ def pair(damper: dict[str, Any] | None = None, **tables: Any) -> lm.TrainScenari
         "dampers": {"d": {"input": "a", "output": "b", **(damper or {"viscous_friction": D})}},
         "simulation": {"duration": 1.0, "sample_interval": 0.01},
     }
-    return lm.TrainScenario(**base | {name: {**base.get(name, {}), **table} for name, table in tables.items()})
+    return lm.Scenario(**base | {name: {**base.get(name, {}), **table} for name, table in tables.items()})
 
 
 FLUID: dict[str, Any] = {

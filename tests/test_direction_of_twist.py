@@ -29,9 +29,9 @@ def swing(amplitude: float, t: np.ndarray) -> np.ndarray:
     return np.where(turn < one, forward, back)
 
 
-def on_spring() -> lm.TrainScenario:
+def on_spring() -> lm.Scenario:
     curve = {"kind": "curve", "slopes": [f"{K} N*m/rad"], "backward": BACKWARD}
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={"arm": {"inertia": J}},
         springs={"bar": {"shaft": "arm", "stiffness": curve}},
         initial={"angles": {"arm": "0.1 rad"}},

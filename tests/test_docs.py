@@ -15,6 +15,7 @@ import pytest
 import lostmotion as lm
 from conftest import ALL_SCENARIOS, ROOT
 from lostmotion.cli import app as lm_app
+from lostmotion.simulation.train_tables import TrainTables
 
 
 def test_the_tutorial_can_be_followed(tmp_path: Path) -> None:
@@ -240,7 +241,7 @@ def test_generated_pages_name_every_key_and_variable(generate: Any) -> None:
         lm.Freewheel,
         lm.model.Gravity,
     )
-    for key in (*lm.TrainScenario.model_fields, *(key for part in parts for key in part.model_fields)):
+    for key in (*TrainTables.model_fields, *(key for part in parts for key in part.model_fields)):
         assert f"| `{key}` |" in of_trains
     for variable in lm.simulation.VARIABLES:
         assert f"| `{variable.name}` |" in generate.variables()

@@ -15,8 +15,6 @@ from html_pages import Page
 from lostmotion.cli import app
 from lostmotion.data_sheets.records import find
 from lostmotion.paper import paper_scenario
-from lostmotion.simulation.drive_scenario import from_tables
-from lostmotion.simulation.train_scenario import train_from_tables
 from lostmotion.sizing.drive_check import check_drive
 from lostmotion.sizing.duty_cycle import DutyCycle, duty_cycle
 from lostmotion.sizing.finding import RULES, Finding
@@ -193,7 +191,7 @@ def test_a_worm_gear_that_locks_at_rest_may_not_stop_a_moving_load(name: str, sp
         "load": {"inertia": 5.0, "torque": 30.0},
         "initial": {"motor_speed": -speed * ratio, "load_speed": -speed},
     }
-    finding = by_rule(from_tables(tables))["holding"]
+    finding = by_rule(lm.Scenario.model_validate(tables))["holding"]
     assert finding.verdict == verdict
     assert finding.value.startswith("at rest only" if verdict == "warning" else "the load stays at rest")
     assert ("ever faster" in finding.value) is (verdict == "warning")
@@ -417,11 +415,11 @@ def test_the_page_of_a_check_has_the_uses_and_verdicts_of_its_findings(tmp_path:
     assert findings._repr_html_().startswith("<iframe")  # type: ignore[attr-defined]
 
 
-def screw_at(turns: float, **data: object) -> lm.TrainScenario:
+def screw_at(turns: float, **data: object) -> lm.Scenario:
     """A slide with 500 N of friction on a screw of 40 mm lead that turns at a constant speed [1/s], deflected by that force."""
     stiffness = lm.model.RatedScrew(lead=40e-3, **data).gear("motor", "table").stiffness
     deflections = {} if stiffness.kind == "rigid" else {"screw": 500.0 / stiffness.stiffness}
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={"motor": {"inertia": 1e-4, "speed": 2.0 * math.pi * turns}},
         slides={"table": {"mass": 60.0, "friction_force": 500.0}},
         screws={"screw": {"input": "motor", "output": "table", "lead": 40e-3} | data},
@@ -522,10 +520,10 @@ MOTOR = {
 }
 
 
-def axes(later: float = 0.0, cycle: float = 0.5, **supply) -> lm.TrainScenario:
+def axes(later: float = 0.0, cycle: float = 0.5, **supply) -> lm.Scenario:
     """Two axes of 1e-3 kg·m² on one bus, the second one with its motion later."""
     second = {"steps": [{**step, "time": step.get("time", 0.0) + later} for step in AXIS["steps"]]}
-    return train_from_tables(
+    return lm.Scenario.model_validate(
         {
             "shafts": {"x": {"inertia": 5e-4}, "y": {"inertia": 5e-4}},
             "motors": {name: {**MOTOR, "shaft": name} for name in ("x", "y")},

@@ -12,7 +12,6 @@ import pytest
 
 import lostmotion as lm
 from lostmotion.simulation.axis_form import file_schema
-from lostmotion.simulation.scenario_files import scenario_from
 
 MOVES = {"moves": [{"to": "90 deg"}], "speed": "3 rad/s", "acceleration": "20 rad/s^2", "jerk": "800 rad/s^3"}
 FLANKS = {"kind": "rigid", "backlash": "2 mrad", "restitution": 0.4}
@@ -35,9 +34,9 @@ def short(load: dict[str, Any] | None = None, **gearbox: Any) -> dict[str, Any]:
     return SHORT | {"load": SHORT["load"] | (load or {}), "gearbox": SHORT["gearbox"] | gearbox}
 
 
-def long(load: dict[str, Any] | None = None, **gear: Any) -> lm.TrainScenario:
+def long(load: dict[str, Any] | None = None, **gear: Any) -> lm.Scenario:
     rated = {key: value for key, value in SHORT["gearbox"].items() if key != "stiffness"}
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={"motor": {}, "load": SHORT["load"] | (load or {})},
         motors={"motor": {"shaft": "motor", **SHORT["motor"]}},
         gears={"gearbox": {"input": "motor", "output": "load", **rated, "stiffness": SHORT["gearbox"]["stiffness"], **gear}},
@@ -59,7 +58,7 @@ def long(load: dict[str, Any] | None = None, **gear: Any) -> lm.TrainScenario:
 def test_the_short_form_has_the_bits_of_the_long_form(load: dict[str, Any], gearbox: dict[str, Any]) -> None:
     tables = short(load, **gearbox)
     jsonschema.validate(tables, file_schema())
-    one, other = lm.simulate(scenario_from(tables)), lm.simulate(long(load, **gearbox))
+    one, other = lm.simulate(lm.Scenario.model_validate(tables)), lm.simulate(long(load, **gearbox))
     assert list(one) == list(other)
     for name in one:
         assert one[name].values.tobytes() == other[name].values.tobytes(), name
@@ -69,7 +68,7 @@ def test_the_short_form_has_the_bits_of_the_long_form(load: dict[str, Any], gear
 
 def test_the_drive_torque_of_a_given_load_by_hand() -> None:
     """Rigid: (J + i^2 J_m) a + friction + load torque - i M while it turns forward."""
-    result = lm.simulate(scenario_from(short({"motion": MOVES}, stiffness={"kind": "rigid"})))
+    result = lm.simulate(lm.Scenario.model_validate(short({"motion": MOVES}, stiffness={"kind": "rigid"})))
     moving = result["load_speed"].values > 1e-6
     t = result["time"].values[moving]
     expected = (0.02 + 1e-2) * result["load_acceleration"].values[moving] + 0.1 + 0.5
@@ -92,22 +91,24 @@ def test_the_drive_torque_of_a_given_load_by_hand() -> None:
 )  # fmt: skip
 def test_bad_input_is_refused_with_the_keys_of_the_short_form(tables: dict[str, Any], message: str) -> None:
     with pytest.raises(lm.InputError) as refused:
-        scenario_from(tables)
+        lm.Scenario.model_validate(tables)
     assert message in str(refused.value)
 
 
 def test_a_rigid_gear_without_backlash_stays_in_the_short_form() -> None:
     """Also with the values that are left out, as a scenario's own tables have them."""
-    scenario = scenario_from(short(stiffness={"kind": "rigid"}))
-    assert isinstance(scenario, lm.simulation.DriveScenario)
-    assert scenario_from(scenario.model_dump()) == scenario
+    scenario = lm.Scenario.model_validate(short(stiffness={"kind": "rigid"}))
+    assert scenario.is_drive
+    assert lm.Scenario.model_validate(scenario.model_dump()) == scenario
 
 
-def test_the_constructor_names_the_way_to_a_given_motion() -> None:
-    with pytest.raises(lm.InputError, match=r"key load.speed: a given motion requires a drive train; read the file by"):
-        lm.Scenario(**short({"speed": 1.0}))
-    with pytest.raises(lm.InputError, match=r"rigid flanks with backlash, which require a drive train"):
-        lm.Scenario(**short(stiffness=FLANKS))
+def test_the_constructor_reads_what_files_have() -> None:
+    moved = lm.Scenario(**short({"speed": 1.0}))
+    assert moved.given() == ["load"]
+    assert moved.train() == long().train()
+    flanks = lm.Scenario(**short(stiffness=FLANKS))
+    assert list(flanks.gears) == ["gearbox"]
+    assert not flanks.is_drive
 
 
 AXIS = """
@@ -136,7 +137,7 @@ def test_flanks_of_a_rack_strike_as_those_of_the_gear_of_its_ratio(tmp_path: Pat
     path = tmp_path / "axis.toml"
     path.write_text(AXIS.replace("RIGID", "restitution = 0.5").replace("MOVED", ""))
     result = lm.simulate(lm.load(path))
-    gear = lm.TrainScenario(
+    gear = lm.Scenario(
         shafts={"motor": {}, "slide": {"inertia": 20.0, "friction_torque": 10.0}},
         motors={"motor": {"shaft": "motor", "kind": "torque_source", "rotor_inertia": 1e-4, "rated_torque": 1.0}},
         gears={"rack": {"input": "motor", "output": "slide", "ratio": 2.0 * math.pi / 0.1,

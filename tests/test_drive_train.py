@@ -17,8 +17,8 @@ import lostmotion as lm
 from conftest import SCENARIOS, TRAINS
 from lostmotion.inputs.validation import shown
 from lostmotion.simulation.axis_form import file_schema
-from lostmotion.simulation.train_scenario import in_long_form, train_schema
 from lostmotion.simulation.train_state import start_values
+from lostmotion.simulation.train_tables import TrainTables, train_schema
 
 TRAIN: dict[str, Any] = {
     "shafts": {
@@ -43,9 +43,9 @@ TRAIN: dict[str, Any] = {
 }
 
 
-def train(**changes: Any) -> lm.TrainScenario:
+def train(**changes: Any) -> lm.Scenario:
     """The train above with changes by dotted key."""
-    tables = lm.TrainScenario(**copy.deepcopy(TRAIN))
+    tables = lm.Scenario(**copy.deepcopy(TRAIN))
     return tables.replace(**{key.replace("__", "."): value for key, value in changes.items()}) if changes else tables
 
 
@@ -73,7 +73,7 @@ def file(tmp_path: Path) -> Path:
 
 def test_a_file_in_the_long_form_gives_the_train_in_si(file: Path) -> None:
     scenario = lm.load(file)
-    assert isinstance(scenario, lm.TrainScenario)
+    assert not scenario.is_drive
     assert scenario == train()
     assert scenario.shafts["worm"].inertia == pytest.approx(1e-4, rel=1e-14)
     assert list(scenario.train().gears) == ["belt", "worm"]
@@ -164,11 +164,11 @@ def test_rigid_gears_in_a_loop_are_refused_with_their_key() -> None:
     rigid = {"input": "motor", "output": "table", "ratio": 100.0}
     gears = {name: gear | {"stiffness": {"kind": "rigid"}} for name, gear in TRAIN["gears"].items()}
     with pytest.raises(lm.InputError, match=r"^key gears.direct: closes a loop of rigid gears with the same ratio"):
-        lm.TrainScenario(**TRAIN | {"gears": gears | {"direct": rigid}})
+        lm.Scenario(**TRAIN | {"gears": gears | {"direct": rigid}})
     with pytest.raises(
         lm.InputError, match=r"^key gears.direct: closes a loop of rigid gears with another ratio: nothing"
     ):
-        lm.TrainScenario(**TRAIN | {"gears": gears | {"direct": rigid | {"ratio": 90.0}}})
+        lm.Scenario(**TRAIN | {"gears": gears | {"direct": rigid | {"ratio": 90.0}}})
 
 
 def test_rigid_gears_bind_the_speeds_at_the_start() -> None:
@@ -186,11 +186,11 @@ def test_a_rigid_gear_on_a_housing_binds_three_speeds_at_the_start() -> None:
         "simulation": {"duration": 1.0, "sample_interval": 0.1},
     }
     speeds = {"sun": 9.0, "carrier": 3.0, "ring": 1.0}
-    result = lm.simulate(lm.TrainScenario(**tables, initial={"speeds": speeds}))
+    result = lm.simulate(lm.Scenario(**tables, initial={"speeds": speeds}))
     assert {name: float(result[f"{name}_speed"][-1]) for name in speeds} == speeds
     assert {name: float(result[f"{name}_angle"][-1]) for name in speeds} == pytest.approx(speeds, rel=1e-14)
     with pytest.raises(lm.InputError, match=r"on the housing ring = 0.5 rad/s; relative to it their quotient must be"):
-        lm.TrainScenario(**tables, initial={"speeds": speeds | {"ring": 0.5}})
+        lm.Scenario(**tables, initial={"speeds": speeds | {"ring": 0.5}})
 
 
 def test_angles_at_the_start_follow_through_the_gears() -> None:
@@ -210,12 +210,12 @@ def test_gravity_and_a_torque_over_angle_need_names_of_their_own() -> None:
         "angle_torques": {"arm": {"kind": "sine", "shaft": "table", "amplitude": 0.1}},
     }
     with pytest.raises(lm.InputError, match=r"^keys gravity.arm, angle_torques.arm: have the same name; rename one"):
-        lm.TrainScenario(**TRAIN | torques)
+        lm.Scenario(**TRAIN | torques)
 
 
 def test_a_name_that_no_variable_can_have_is_refused() -> None:
     with pytest.raises(lm.InputError, match='key shafts: must not have the name "my shaft"; a name is made of'):
-        lm.TrainScenario(**TRAIN | {"shafts": TRAIN["shafts"] | {"my shaft": {"inertia": 1}}})
+        lm.Scenario(**TRAIN | {"shafts": TRAIN["shafts"] | {"my shaft": {"inertia": 1}}})
 
 
 def test_records_of_the_catalogue_fit_at_any_place(file: Path) -> None:
@@ -268,12 +268,12 @@ def test_a_series_may_load_a_shaft(file: Path) -> None:
 
 
 def test_the_schema_knows_every_table() -> None:
-    assert set(lm.TrainScenario.model_fields) < set(train_schema()["properties"])
+    assert set(TrainTables.model_fields) < set(train_schema()["properties"])
 
 
 def test_the_schema_of_files_holds_all_forms() -> None:
     schema = file_schema()
-    assert [form["title"] for form in schema["anyOf"]] == ["Scenario", "TrainScenario", "Linear axis"]
+    assert [form["title"] for form in schema["anyOf"]] == ["Scenario", "Drive train", "Linear axis"]
     named = set(re.findall(r'"#/\$defs/([^"]*)"', json.dumps(schema)))
     assert named <= set(schema["$defs"])
     assert {"Motor", "train_ShaftMotor"} <= named
@@ -320,7 +320,7 @@ def test_trains_are_immutable_and_survive_pickling() -> None:
         scenario.shafts["more"] = lm.Shaft()  # type: ignore[assignment]
     with pytest.raises(lm.InputError, match="frozen"):
         scenario.shafts.clear()
-    assert lm.TrainScenario.from_json(scenario.to_json()) == scenario
+    assert lm.Scenario.from_json(scenario.to_json()) == scenario
     assert repr(scenario.train()) == "DriveTrain(shafts motor, worm, table; motors m1; gears belt, worm; brakes hold)"
     reversed_shafts = dict(reversed(scenario.train().shafts.items()))
     assert scenario.train().model_copy(update={"shafts": reversed_shafts}) != scenario.train()
@@ -338,16 +338,16 @@ def test_a_drive_is_a_train_of_two_shafts(path: Path) -> None:
     assert (gear.input, gear.output) == ("motor", "load")
     for key in lm.Gearbox.model_fields:
         assert getattr(gear, key) == getattr(drive.gearbox, key)
-    long = in_long_form(lm.load(path))
+    long = lm.load(path).long()
     assert long.train() == of_it
-    assert lm.TrainScenario.from_json(long.to_json()) == long
+    assert lm.Scenario.from_json(long.to_json()) == long
 
 
 @pytest.mark.parametrize("path", TRAINS, ids=lambda p: p.stem)
 def test_shipped_trains_load_and_survive_json(path: Path) -> None:
     scenario = lm.load(path)
-    assert isinstance(scenario, lm.TrainScenario)
-    assert lm.TrainScenario.from_json(scenario.to_json()) == scenario
+    assert not scenario.is_drive
+    assert lm.Scenario.from_json(scenario.to_json()) == scenario
     assert lm.load(path.stem) == scenario
 
 
@@ -382,7 +382,7 @@ SHARED = {
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda p: p.stem)
 def test_the_short_and_the_long_form_give_the_same_bits(path: Path) -> None:
     short = lm.load(path)
-    a, b = lm.simulate(short), lm.simulate(in_long_form(short))
+    a, b = lm.simulate(short), lm.simulate(short.long())
     for name, long_name in SHARED.items():
         if long_name in b or not name.endswith("_contact"):  # a train has no contacts without friction
             assert np.array_equal(a[name].values, b[long_name].values), name

@@ -386,9 +386,9 @@ def test_two_motors_on_one_shaft_share_the_load() -> None:
     assert of_one is not None
     controller = of_one.model_dump(exclude_none=True)
 
-    def train(names: tuple[str, ...], winding: dict[str, Any], gain: float) -> lm.TrainScenario:
+    def train(names: tuple[str, ...], winding: dict[str, Any], gain: float) -> lm.Scenario:
         law = {**controller, "speed": {**controller["speed"], "gain": gain, "torque_limit": 25.0 * gain}}
-        return lm.TrainScenario(
+        return lm.Scenario(
             shafts={"motor": {"inertia": 2e-3, "friction_torque": 0.1}},
             motors={name: {**part, "winding": winding, "shaft": "motor", "rotor_inertia": 0.0} for name in names},
             controllers=dict.fromkeys(names, law),
@@ -562,7 +562,7 @@ def test_the_two_mass_example_of_motulator() -> None:
         u = voltages[round(time / tick)] * np.exp(-1j * angle)
         return u.real, u.imag
 
-    train = lm.TrainScenario(
+    train = lm.Scenario(
         shafts={"motor": {}, "load": {"inertia": 0.005, "torque": {"steps": [{"time": 0.15, "height": 5.0}]}}},
         motors={"m": {
             "shaft": "motor", "kind": "synchronous", "rotor_inertia": 0.005, "rated_torque": 14.0, "dc_voltage": 640.0,

@@ -26,9 +26,9 @@ SERVO: dict[str, Any] = {
 }
 
 
-def axis(controller: dict[str, Any], duration: float = 1.5, **motor: Any) -> lm.TrainScenario:
+def axis(controller: dict[str, Any], duration: float = 1.5, **motor: Any) -> lm.Scenario:
     """An inertia with viscous friction, turned by a servo."""
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={"arm": {"inertia": J, "viscous_friction": B}},
         motors={"servo": {"shaft": "arm", "kind": "torque_source", "rated_torque": 2.0, "rotor_inertia": 0.0} | motor},
         controllers={"servo": controller},
@@ -196,7 +196,7 @@ def test_gears_that_reverse_the_motion_reverse_the_torque() -> None:
     small = SERVO | {"torque_constant": 3.5 / 5.0}
     for make in (continuous, sampled):
         direct = lm.simulate(axis(make(SERVO)))["arm_angle"].values
-        geared = lm.TrainScenario(
+        geared = lm.Scenario(
             shafts={"motor": {}, "arm": {"inertia": J, "viscous_friction": B}},
             motors={"servo": {"shaft": "motor", "kind": "torque_source", "rated_torque": 2.0, "rotor_inertia": 0.0}},
             gears={

@@ -315,7 +315,7 @@ def test_a_jam_ends_in_an_error_with_the_sentence_of_python(tmp_path: Path, monk
     from fmpy.fmi1 import FMICallException
 
     without_parameters(monkeypatch)
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={"worm": {}, "drum": {"inertia": 2.0, "torque": 20.0}},
         motors={"motor": {"shaft": "worm", "kind": "torque_source", "rotor_inertia": 1e-4}},
         gears={

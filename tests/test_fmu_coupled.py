@@ -113,7 +113,7 @@ def test_a_drive_and_a_controller_of_another_tool_move_as_in_the_core(tmp_path: 
 def test_a_drive_in_the_joint_of_a_pendulum_converges_to_the_equations_of_both(tmp_path: Path, builder: Any) -> None:
     """The drive is an actuator of another tool: it has the motion of its output shaft as inputs and returns the torque."""
     motor, flange, ratio, stiffness, damping, torque = 1e-4, 0.02, 50.0, 2000.0, 2.0, 0.2
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={"motor": {"inertia": motor, "torque": -torque}, "joint": {"inertia": flange}},
         gears={
             "gear": {

@@ -234,7 +234,7 @@ def test_directional_derivatives_of_what_a_contact_at_rest_shares(name: str, tmp
         scenario = scenario.replace(**{"command": 6.0, "load.torque": 10.0})
     lm.export_fmu(scenario, tmp_path / "x.fmu")
     model = Model(tmp_path / "x.fmu", tmp_path / "open")
-    drive = not isinstance(scenario, lm.TrainScenario)
+    drive = scenario.is_drive
     outputs = ["input_torque", "loss_coefficient"] if drive else ["worm_gear_input_torque", "worm_contact_torque"]
     contact = "input_contact" if drive else "worm_contact"
     references = [model.reference[o] for o in outputs]

@@ -21,9 +21,9 @@ J, K, W = 0.5, 200.0, 10.0  # crank, spring, resonance of a load of 2 kg m2
 NAMES = ("crank_given_angle", "crank_given_speed", "crank_given_acceleration")
 
 
-def crank() -> lm.TrainScenario:
+def crank() -> lm.Scenario:
     """A crank and a load of 2 kg m2 on a spring."""
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={"crank": {"inertia": J}, "load": {"inertia": 2.0}},
         gears={
             "g": {
@@ -43,7 +43,7 @@ def validate_fmu(path: str) -> list[str]:
     return list(found(path))
 
 
-def slave(tmp_path: Path, scenario: lm.TrainScenario | lm.Scenario, *shafts: str, fmi: int = 2) -> Slave:
+def slave(tmp_path: Path, scenario: lm.Scenario, *shafts: str, fmi: int = 2) -> Slave:
     lm.export_fmu(scenario, tmp_path / "drive.fmu", motion_inputs=shafts, fmi=fmi)
     assert validate_fmu(str(tmp_path / "drive.fmu")) == []
     return Slave(tmp_path / "drive.fmu", tmp_path / "unzipped")
@@ -128,7 +128,7 @@ def test_the_state_of_a_given_motion_goes_back(tmp_path: Path) -> None:
 
 
 def test_a_slide_takes_metres_and_gives_newtons(tmp_path: Path) -> None:
-    s = lm.TrainScenario(
+    s = lm.Scenario(
         shafts={},
         slides={"table": {"mass": "3 kg"}},
         simulation={"duration": 1.0, "sample_interval": 0.01},

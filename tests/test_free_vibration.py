@@ -11,7 +11,7 @@ import lostmotion as lm
 def test_two_shafts_and_a_compliant_gear_vibrate_freely() -> None:
     """No motor and no load torque: d = d0 cos(Omega t) with Omega^2 = k (1/(J_1 i^2) + 1/J_2)."""
     J_1, J_2, i, k, d0 = 2e-3, 0.05, 4.0, 300.0, 0.01
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={"a": {"inertia": J_1}, "b": {"inertia": J_2}},
         gears={"g": {"input": "a", "output": "b", "ratio": i, "stiffness": {"kind": "linear", "stiffness": k}}},
         initial={"twists": {"g": d0}},
@@ -29,7 +29,7 @@ def test_two_shafts_and_a_compliant_gear_vibrate_freely() -> None:
 def test_the_ledger_of_a_free_vibration_has_nothing_that_is_turned_over(ratio: float) -> None:
     """An angular frequency of sqrt(k (1/(J_1 i^2) + 1/J_2)); motion and ledger to rounding."""
     J_1, J_2, k = 1e-3, 5.0, 2000.0
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={"a": {"inertia": J_1}, "b": {"inertia": J_2}},
         gears={"g": {"input": "a", "output": "b", "ratio": ratio, "stiffness": {"kind": "linear", "stiffness": k}}},
         initial={"twists": {"g": 1e-3}},

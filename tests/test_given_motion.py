@@ -26,9 +26,9 @@ CASE: dict[str, Any] = {
 }
 
 
-def scenario(**tables: Any) -> lm.TrainScenario:
+def scenario(**tables: Any) -> lm.Scenario:
     """The case with some of its tables replaced."""
-    return lm.TrainScenario(**(CASE | tables))
+    return lm.Scenario(**(CASE | tables))
 
 
 def test_torque_at_a_crank_with_friction_has_its_closed_form() -> None:
@@ -56,7 +56,7 @@ def test_torque_at_a_crank_with_friction_has_its_closed_form() -> None:
 def test_a_straight_line_of_speed_is_a_matrix_exponential() -> None:
     """Given speed a t on the first of three shafts with springs: scipy's expm of the states with t and 1."""
     a, J, K, c = 3.0, (0.7, 0.2), (40.0, 90.0), 0.03
-    s = lm.TrainScenario(
+    s = lm.Scenario(
         shafts={
             "first": {"speed": {"ramps": [{"rise": 2.0 * a, "duration": 2.0}]}, "inertia": 0.4},
             "second": {"inertia": J[0], "viscous_friction": c},
@@ -94,7 +94,7 @@ def test_a_straight_line_of_speed_is_a_matrix_exponential() -> None:
 
 def test_rigid_gears_move_with_the_shaft_that_drives_them() -> None:
     """All inertias, dampers and frictions are felt there through the ratio; a shaft beside it may have none."""
-    s = lm.TrainScenario(
+    s = lm.Scenario(
         shafts={
             "in": {"inertia": 0.01, "viscous_friction": 0.02},
             "mid": {"inertia": 0.0, "speed": {"mean": 1.0, "amplitude": 3.0, "frequency": 2.0, "phase": 0.4}},
@@ -224,7 +224,7 @@ def test_a_slide_of_given_motion_is_the_shaft_of_the_same_numbers() -> None:
 def test_the_force_at_a_slide_drives_its_screw() -> None:
     """Rigid screw of lead p: force m a + (2 pi/p)^2 J a + friction, at constant acceleration."""
     p = 0.01
-    s = lm.TrainScenario(
+    s = lm.Scenario(
         shafts={"screw": {"inertia": 1e-4}},
         slides={"table": {"mass": 20.0, "friction_force": 30.0, "speed": {"ramps": [{"rise": 1.0, "duration": 0.5}]}}},
         screws={"lead": {"input": "screw", "output": "table", "lead": p}},
@@ -269,7 +269,7 @@ def test_a_motion_that_no_torque_gives_is_refused(crank: Any, initial: Any, says
         scenario(shafts={"crank": {"inertia": 1.0, "motion": MOVES, "speed": 1.0}, "load": {"inertia": 1.0}})
 
 
-def heavy(s: lm.TrainScenario, inertia: float = 1e12) -> lm.TrainScenario:
+def heavy(s: lm.Scenario, inertia: float = 1e12) -> lm.Scenario:
     """The same with an inertia on each of those shafts that a torque turns as the motion is given: that torque is all but exact."""
     data = s.model_dump()
     for name, shaft in data["shafts"].items():
@@ -289,10 +289,10 @@ def heavy(s: lm.TrainScenario, inertia: float = 1e12) -> lm.TrainScenario:
             },
         }
     data["initial"]["speeds"] = dict(s.begin().speeds)
-    return lm.TrainScenario(**data)
+    return lm.Scenario(**data)
 
 
-def random_train(seed: int) -> lm.TrainScenario:
+def random_train(seed: int) -> lm.Scenario:
     """Two to five shafts in a row, one or two of them with a given motion."""
     draw = random.Random(seed)
     names = [f"s{k}" for k in range(draw.randint(2, 5))]
@@ -344,7 +344,7 @@ def random_train(seed: int) -> lm.TrainScenario:
     free = [name for name in names if name not in driven]
     if free and draw.random() < 0.5:
         shafts[draw.choice(free)]["torque"] = {"amplitude": draw.uniform(0.5, 4.0), "frequency": draw.uniform(0.3, 2.0)}
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts=shafts,
         gears=gears,
         clutches=clutches,
@@ -352,7 +352,7 @@ def random_train(seed: int) -> lm.TrainScenario:
     )
 
 
-def random_trains(seeds: range) -> list[lm.TrainScenario]:
+def random_trains(seeds: range) -> list[lm.Scenario]:
     """Those of these that are trains: two shafts of a rigid group cannot both be given."""
     found = []
     for seed in seeds:

@@ -285,7 +285,8 @@ def test_a_parameter_is_stated_in_one_file(name: str) -> None:
 
 
 def test_no_part_states_again_what_the_core_describes() -> None:
-    assert lostmotion.TrainScenario.model_fields  # with it all parts are made
+    assert lostmotion.simulation.TrainTables.model_fields  # with it all parts are made
+    assert lostmotion.simulation.DriveTables.model_fields
     bases = described.Described.__subclasses__()
     assert {base.__name__ for base in bases} == {f"{table}Fields" for table in described.TABLES}
     parts = [part for base in bases for part in base.__subclasses__()]

@@ -8,7 +8,6 @@ import numpy as np
 
 import lostmotion as lm
 from lostmotion.response.limit_cycle import Loop
-from lostmotion.simulation.train_scenario import in_long_form
 
 AXES = 24
 SLIPS = 30  # that a run of an axis which hunts has at least
@@ -17,13 +16,13 @@ ROUNDING = 1e-9  # of the largest error, with which a run ends a slip that creep
 
 def geared(
     inertia: float, load: dict[str, Any], gear: dict[str, Any], controller: dict[str, Any], w: float
-) -> lm.TrainScenario:
+) -> lm.Scenario:
     """A torque source on a shaft of this inertia, as the load feels it, and the load behind a gear; w: poles of the axis [1/s]."""
     ratio, breakaway = gear["ratio"], load["breakaway_torque"]
     own = inertia / ratio**2
     motor = {"kind": "torque_source", "shaft": "motor", "rotor_inertia": 1e-3 * own, "rated_torque": breakaway / ratio}
     ratings = {"rated_input_speed": 300.0, "rated_output_torque": 10.0 * breakaway}
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={"motor": {"inertia": own}, "load": load},
         motors={"m": motor},
         gears={"gear": {"input": "motor", "output": "load"} | ratings | gear},
@@ -32,7 +31,7 @@ def geared(
     )
 
 
-def random_axis(rng: random.Random) -> lm.TrainScenario:
+def random_axis(rng: random.Random) -> lm.Scenario:
     """Motor and load with a rigid or soft gear, friction at the load, a PID by the poles of the rigid axis."""
 
     def log(low: float, high: float) -> float:
@@ -82,7 +81,7 @@ def random_axis(rng: random.Random) -> lm.TrainScenario:
     return geared(share * inertia, load, gear, controller, w)
 
 
-def stable_axis(rng: random.Random) -> lm.TrainScenario:
+def stable_axis(rng: random.Random) -> lm.Scenario:
     """One whose linear loop is stable: it has no poles to the right while the load slips, but for conserved values."""
     while True:
         scenario = random_axis(rng)
@@ -92,10 +91,10 @@ def stable_axis(rng: random.Random) -> lm.TrainScenario:
             return scenario
 
 
-def errors_of(scenario: lm.TrainScenario, duration: float) -> list[float]:
+def errors_of(scenario: lm.Scenario, duration: float) -> list[float]:
     """Errors of the controller at the ends of stuck intervals of an exact run that begin after its step and last for a sample, from the
     first one on in which all but the integrator settles."""
-    loop = Loop.of(in_long_form(scenario))
+    loop = Loop.of(scenario.long())
     run, count = loop.run(duration, 40_000), 40_000
     error = run["values"][loop.channels.index("m_error")]
     names = loop.core.switching_columns()
@@ -113,12 +112,12 @@ def errors_of(scenario: lm.TrainScenario, duration: float) -> list[float]:
     return found
 
 
-def started(scenario: lm.TrainScenario, error: float) -> lm.TrainScenario:
+def started(scenario: lm.Scenario, error: float) -> lm.Scenario:
     """The axis stuck with an error from the start on."""
     return scenario.replace(**{"controllers.m.reference.steps": [{"time": 0.1, "height": error}]})
 
 
-def check_hunts(scenario: lm.TrainScenario, found: Any, told: str) -> None:
+def check_hunts(scenario: lm.Scenario, found: Any, told: str) -> None:
     """Once a settled stuck interval has an error within the band, all that follow have."""
     low, high = found.band
     friction, gain = scenario.shafts["load"].breakaway_torque, scenario.controllers["m"].position.gain
@@ -136,9 +135,9 @@ def check_hunts(scenario: lm.TrainScenario, found: Any, told: str) -> None:
     assert checked >= 3, told
 
 
-def check_rests(scenario: lm.TrainScenario, found: Any, told: str) -> None:
+def check_rests(scenario: lm.Scenario, found: Any, told: str) -> None:
     """The errors of stuck intervals fall by the factor of the certificate, or nothing moves any more."""
-    loop = Loop.of(in_long_form(scenario))
+    loop = Loop.of(scenario.long())
     if math.isnan(found.factor):
         end = loop.run(200.0 * scenario.simulation.duration, 4000)["values"][loop.channels.index("m_error")]
         assert np.ptp(end[-400:]) <= 1e-9 * np.abs(end).max(), told

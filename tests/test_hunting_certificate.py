@@ -16,10 +16,10 @@ INERTIA, K_P, K_I, K_D = 0.5, 50.0, 120.0, 8.0
 SLIDING = 2.0
 
 
-def rotor(breakaway: float, **position: Any) -> lm.TrainScenario:
+def rotor(breakaway: float, **position: Any) -> lm.Scenario:
     """A rotor on its own with dry friction under a PID controller without a filter."""
     gains = {"gain": K_P, "integral_gain": K_I, "derivative_gain": K_D} | position
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={"rotor": {"friction_torque": SLIDING, "breakaway_torque": breakaway}},
         motors={"m": {"kind": "torque_source", "shaft": "rotor", "rotor_inertia": INERTIA, "rated_torque": 10.0}},
         controllers={

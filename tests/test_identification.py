@@ -78,7 +78,7 @@ def test_the_answer_is_a_scenario_and_a_data_sheet(found: IdentificationResult, 
     path = tmp_path / "identified.toml"
     path.write_text(found.scenario_text())
     again = lm.load(path)
-    assert isinstance(again, lm.TrainScenario)
+    assert not again.is_drive
     assert again.motors["servo"].rotor_inertia == pytest.approx(found.values["armature"], rel=1e-12)
     sheet = tmp_path / "gearbox.toml"
     sheet.write_text(found.record_text())
@@ -160,7 +160,7 @@ def test_the_friction_of_a_shaft_has_that_of_its_motor_s_bearings_without_back_e
     duration = 1
     sample_interval = 0.1
     """
-    curve = friction_curve(lm.TrainScenario(**tomllib.loads(text)), "rotor", "friction")
+    curve = friction_curve(lm.Scenario(**tomllib.loads(text)), "rotor", "friction")
     assert curve is not None
     np.testing.assert_allclose(curve.y, 0.3 + 0.01 * curve.x, rtol=1e-12)
 

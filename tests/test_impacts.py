@@ -24,9 +24,9 @@ def pair(
     torques: tuple[Any, Any] = (3.0, 0.0),
     duration: float = 1.0,
     **initial: Any,
-) -> lm.TrainScenario:
+) -> lm.Scenario:
     """Two shafts whose flanks strike; torques that drive them [N·m]."""
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={
             "a": {"inertia": inertias[0], "torque": torques[0]},
             "b": {"inertia": inertias[1], "torque": torques[1]},
@@ -174,7 +174,7 @@ class Reference:
         w[1] += rate / self.ratio * h
 
 
-def random_case(draw: np.random.Generator) -> tuple[lm.TrainScenario, Reference, Vector]:
+def random_case(draw: np.random.Generator) -> tuple[lm.Scenario, Reference, Vector]:
     J = (float(10.0 ** draw.uniform(-2.0, 0.5)), float(10.0 ** draw.uniform(-2.0, 0.5)))
     ratio = float(draw.choice([-5.0, -1.0, 1.0, 2.0, 10.0]))
     backlash = float(10.0 ** draw.uniform(-3.0, -1.0))
@@ -228,7 +228,7 @@ def test_a_thousand_random_cases_against_parabolas() -> None:
     assert impacts > 3000
 
 
-def group(**changes: Any) -> lm.TrainScenario:
+def group(**changes: Any) -> lm.Scenario:
     """Rigid gears on both sides of the flanks, a shaft without inertia among them, friction, a spring and backlash in it behind."""
     tables: dict[str, Any] = {
         "shafts": {
@@ -257,7 +257,7 @@ def group(**changes: Any) -> lm.TrainScenario:
         },
         "simulation": {"duration": 1.0, "sample_interval": 2e-3},
     }
-    return lm.TrainScenario(**(tables | changes))
+    return lm.Scenario(**(tables | changes))
 
 
 def test_both_solvers_agree_on_rigid_groups_with_friction_and_hysteresis() -> None:
@@ -280,7 +280,7 @@ def test_an_impact_keeps_the_momentum_that_a_mass_matrix_gives() -> None:
     """A mass matrix couples the input of the flanks with a third shaft, which an impact sets in motion."""
     M = np.array([[0.5, 0.2], [0.2, 0.3]])
     e, J_b, ratio = 0.5, 2.0, 2.0
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={"a": {}, "c": {"torque": 0.0}, "b": {"inertia": J_b}},
         gears={
             "mesh": {
@@ -311,7 +311,7 @@ def test_an_impact_keeps_the_momentum_that_a_mass_matrix_gives() -> None:
 def test_flanks_in_a_row_strike_at_once_without_a_gain_of_energy() -> None:
     """Three shafts: the second flanks touch when the first strike. Newton's law with all of them, against enumeration."""
     stiffness = {"kind": "rigid", "backlash": 0.02, "restitution": 0.5}
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={"a": {"inertia": 1.0, "torque": 0.0}, "b": {"inertia": 0.5}, "c": {"inertia": 2.0}},
         gears={
             "one": {"input": "a", "output": "b", "ratio": 1.0, "stiffness": stiffness},

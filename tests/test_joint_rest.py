@@ -79,7 +79,7 @@ def test_random_trees_break_away_when_no_torques_between_them_are_consistent(los
     broken = 0
     for seed in range(40):
         train = tree(seed, losses)
-        result = lm.simulate(lm.TrainScenario(**train))
+        result = lm.simulate(lm.Scenario(**train))
         moves = np.nonzero(np.asarray(result["s0_speed"]))[0]
         if moves.size == 0:
             assert min(margin(train, t) for t in np.arange(0.25, 6.0, 0.25)) > -1e-9, seed

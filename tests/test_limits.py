@@ -126,7 +126,7 @@ def test_axes_turn_around_after_a_run_up_at_the_limit(kind: str, mode: str) -> N
     for n in range(20):
         line, T, tau, turn, end = random_axis(rng, kind, mode)
         way = 1.0 if n % 2 else -1.0
-        run = lm.simulate(lm.TrainScenario(**axis(line, kind, mode, T, tau, turn, end, way)), energy=False)
+        run = lm.simulate(lm.Scenario(**axis(line, kind, mode, T, tau, turn, end, way)), energy=False)
         t, w = run["time"].to_numpy(), way * run["rotor_speed"].to_numpy()
         top = line.forward(0.0, turn)
         wanted = np.array([line.forward(0.0, s) if s < turn else line.backward(top, s - turn) for s in t])
@@ -139,7 +139,7 @@ def test_axes_turn_around_after_a_run_up_at_the_limit(kind: str, mode: str) -> N
 def test_a_reversed_torque_reference_is_followed_after_a_run_up_at_the_voltage_limit(way: float) -> None:
     """40 (1 - w/30) N·m at 24 V, 0.32 kg·m²: 23.7 N·m forward, from 0.4 s on 23.7 N·m backward, which need less than 10 V."""
     line = Line(40.0, 40.0 / 30.0, 23.7, 0.32)
-    run = lm.simulate(lm.TrainScenario(**axis(line, "pi", "torque", 5e-4, 1e-4, 0.4, 1.0, way)))
+    run = lm.simulate(lm.Scenario(**axis(line, "pi", "torque", 5e-4, 1e-4, 0.4, 1.0, way)))
     assert float(run["m_torque"].sel(time=0.5, method="nearest")) == pytest.approx(-23.7 * way, rel=1e-6)
     assert float(run["rotor_speed"][-1]) == pytest.approx(way * line.backward(line.forward(0.0, 0.4), 0.6), abs=0.2)
     assert line.backward(line.forward(0.0, 0.4), 0.6) == pytest.approx(-19.2, abs=0.05)
@@ -154,7 +154,7 @@ def test_the_integrator_of_the_position_does_not_wind_up(within: str, way: float
     scenario = axis(line, "pi", "position", T, 1e-3, turn, 0.6, way)
     if within == "speed":
         scenario["controllers"]["m"]["position"]["speed_limit"] = 10.0
-    run = lm.simulate(lm.TrainScenario(**scenario))
+    run = lm.simulate(lm.Scenario(**scenario))
     reference = way * run["m_speed_reference"].to_numpy()
     at = round(turn / T)
     assert reference[at - 1] > 0.0
@@ -168,7 +168,7 @@ def test_an_observer_of_the_speed_stays_right_at_the_voltage_limit(kind: str) ->
     observer = {"kind": "observer", "bandwidth": 10.0, "inertia": 0.004}
     scenario = axis(line, kind, "speed", 2.5e-4, 5e-4, 10.0, 1.0, 1.0)
     scenario["controllers"]["m"]["speed"]["estimate"] = observer
-    run = lm.simulate(lm.TrainScenario(**scenario))
+    run = lm.simulate(lm.Scenario(**scenario))
     error = (run["m_measured_speed"] - run["rotor_speed"]).to_numpy()
     assert float(run["m_torque"].to_numpy()[-1]) < 0.1 * line.stall
     assert np.abs(error).max() < 0.5
@@ -186,7 +186,7 @@ def test_no_integrator_of_a_position_winds_up_on_random_axes(kind: str, within: 
         scenario = axis(line, kind, "position", T, tau, at * T, (at + 20) * T, way)
         if within == "speed":
             scenario["controllers"]["m"]["position"]["speed_limit"] = 0.2 * line.no_load
-        run = lm.simulate(lm.TrainScenario(**scenario), energy=False)
+        run = lm.simulate(lm.Scenario(**scenario), energy=False)
         reference = way * run["m_speed_reference"].to_numpy()
         assert reference[at - 1] > 0.0, (n, line, T, tau)
         assert reference[at + 2] < 0.0, (n, line, T, tau)
@@ -206,7 +206,7 @@ def test_observers_stay_right_at_limits_on_random_axes(kind: str) -> None:
         scenario = axis(line, kind, "speed", T, tau, turn, end, 1.0 if n % 2 else -1.0)
         observer = {"kind": "observer", "bandwidth": 0.02 / max(T, tau), "inertia": line.inertia}
         scenario["controllers"]["m"]["speed"]["estimate"] = observer
-        run = lm.simulate(lm.TrainScenario(**scenario), energy=False)
+        run = lm.simulate(lm.Scenario(**scenario), energy=False)
         error = np.abs(run["m_measured_speed"] - run["rotor_speed"]).to_numpy().max()
         assert error * line.inertia / line.stall < lag(T, tau), (n, line, T, tau)
 
@@ -232,7 +232,7 @@ def test_what_an_inverse_model_adapts_does_not_wind_up_at_a_limit() -> None:
         },
         "simulation": {"duration": 1.0, "sample_interval": 1e-3},
     }  # fmt: skip
-    run = lm.simulate(lm.TrainScenario(**scenario))
+    run = lm.simulate(lm.Scenario(**scenario))
     assert np.abs(np.abs(run["m_torque_reference"].to_numpy()[1:]) - 0.5).max() == 0.0
     estimate = run["m_model_friction_torque"].to_numpy()
     assert np.abs(estimate - 0.1).max() == 0.0
@@ -244,7 +244,7 @@ def test_what_an_inverse_model_adapts_does_not_wind_up_at_a_limit() -> None:
 def continuous(line: Line, controller: dict[str, Any], turn: float, end: float, **more: Any) -> Any:
     """A run of an inertia whose torque source such a controller commands."""
     source = {"shaft": "rotor", "kind": "torque_source", "rotor_inertia": line.inertia, "rated_torque": 0.7}
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={"rotor": {"inertia": 0.0}},
         motors={"m": source | more},
         controllers={"m": {"kind": "continuous"} | controller},
@@ -302,7 +302,7 @@ def run_up(kind: str, mode: str, **more: Any) -> Any:
 
 
 def seen(scenario: dict[str, Any]) -> Any:
-    return lm.simulate(lm.TrainScenario(**scenario), energy=False)
+    return lm.simulate(lm.Scenario(**scenario), energy=False)
 
 
 def largest(run: Any, name: str) -> float:
@@ -370,7 +370,7 @@ def test_a_limit_of_the_voltage_acts(kind: str, mode: str, source: str) -> None:
         if source == "dc":
             scenario["motors"]["m"] = motor(LINE, "pi", TAU)
         with pytest.raises(lm.InputError, match=f'controllers.m.current.kind: "{kind}" needs a motor'):
-            lm.TrainScenario(**scenario)
+            lm.Scenario(**scenario)
         return
     run = seen(scenario)
     share = voltage_share(run)
@@ -435,13 +435,13 @@ def test_limits_act_on_laws_of_your_own() -> None:
     """On a torque the line of the motor, on the voltages of a winding the circle."""
     scenario = run_up("ideal", "torque")
     scenario["controllers"]["m"] |= {"law": True}
-    run = lm.simulate(lm.TrainScenario(**scenario), law=lambda time, *_: 50.0 if time < 0.5 else -50.0)
+    run = lm.simulate(lm.Scenario(**scenario), law=lambda time, *_: 50.0 if time < 0.5 else -50.0)
     share = voltage_share(run)
     assert 0.99 < share.max() < 1.0 + HELD
     assert -1.0 - 2.0 * HELD < share.min() < -0.99
     scenario = run_up("field_oriented", "torque")
     scenario["controllers"]["m"] |= {"law": True}
-    run = lm.simulate(lm.TrainScenario(**scenario), law=lambda *_: (30.0, 40.0))
+    run = lm.simulate(lm.Scenario(**scenario), law=lambda *_: (30.0, 40.0))
     u = np.hypot(run["m_direct_voltage"], run["m_quadrature_voltage"]).to_numpy()
     assert u.max() == pytest.approx(48.0 / math.sqrt(3.0), rel=1e-9)
 

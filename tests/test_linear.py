@@ -18,8 +18,7 @@ from lostmotion.reports.page import render
 from lostmotion.reports.run import summary
 from lostmotion.reports.servo import servo_report
 from lostmotion.simulation.keys import set_values
-from lostmotion.simulation.scenario_files import scenario_from
-from lostmotion.simulation.train_scenario import train_from_tables, train_schema
+from lostmotion.simulation.train_tables import train_schema
 from lostmotion.units.conversion import to_si
 
 SCREW = """
@@ -101,7 +100,7 @@ NAMES = {
 
 
 def screw(**changes):
-    scenario = train_from_tables(tomllib.loads(SCREW))
+    scenario = lm.Scenario.model_validate(tomllib.loads(SCREW))
     return scenario.replace(**changes) if changes else scenario
 
 
@@ -109,7 +108,7 @@ def test_screw_axis_equals_the_rotary_train_bit_for_bit():
     """Of all variables, switching instants and energies: only names and units differ."""
     linear = lm.simulate(screw())
     rotary = lm.simulate(
-        train_from_tables(tomllib.loads(ROTARY)).replace(**{"gears.screw.ratio": 2.0 * math.pi / 0.01})
+        lm.Scenario.model_validate(tomllib.loads(ROTARY)).replace(**{"gears.screw.ratio": 2.0 * math.pi / 0.01})
     )
     assert {NAMES.get(name, name) for name in linear} == set(rotary)
     for name in linear:
@@ -145,7 +144,7 @@ def test_weight_of_an_inclined_slide_is_a_load():
     sloping = screw(**{"slides.table.inclination": "30 deg"})
     assert sloping.loads()["table"].mean == pytest.approx(100.0 + 10.0 * g, rel=1e-15)
     falling = lm.simulate(
-        train_from_tables(
+        lm.Scenario.model_validate(
             tomllib.loads("""
         [slides.ram]
         mass = "3 kg"
@@ -240,7 +239,7 @@ def test_inertia_of_a_screw_follows_from_its_size():
 
 def test_end_stops_hold_the_slide_within_its_travel():
     """Pressed against a stop, the slide comes to rest where the spring carries the force: F/k beyond the stop."""
-    scenario = train_from_tables(
+    scenario = lm.Scenario.model_validate(
         tomllib.loads("""
         [slides.ram]
         mass = "3 kg"
@@ -371,7 +370,7 @@ sample_interval = "1 ms"
 def axis(**changes):
     tables = tomllib.loads(AXIS)
     set_values(tables, changes.items())
-    return scenario_from(tables)
+    return lm.Scenario.model_validate(tables)
 
 
 def test_short_form_of_an_axis_is_a_train():
@@ -385,7 +384,7 @@ def test_short_form_of_an_axis_is_a_train():
     tables |= {"shafts": {"motor": {}}, "slides": {"slide": parts["slide"]}}
     tables |= {"motors": {"motor": {"shaft": "motor", **parts["motor"]}}}
     tables |= {"screws": {"screw": {"input": "motor", "output": "slide", **parts["screw"]}}}
-    assert scenario_from(tables) == short
+    assert lm.Scenario.model_validate(tables) == short
     behind = axis(**{"axis.gearbox": {"ratio": 3.0}})
     assert list(behind.train().shafts) == ["motor", "screw", "slide"]
     assert behind.screws["screw"].input == "screw"

@@ -115,7 +115,7 @@ def test_a_run_is_that_of_the_long_form_and_its_energy_closes():
     scenario = study.axis_at(row, 2)
     short = lm.simulate(scenario, energy=False)
     slide = {"mass": 5.0, "friction_force": 0.01 * (5.0 * G + PULL)}
-    train = lm.TrainScenario(
+    train = lm.Scenario(
         slides={"slide": slide},
         linear_motors={"coil": {"slide": "slide", "mass": COIL, "rated_force": 96.0, "peak_force": 187.0}},
         controllers={"coil": scenario.controller.model_dump(exclude_none=True) | {"shaft": "slide"}

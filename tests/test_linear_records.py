@@ -14,7 +14,7 @@ from lostmotion.data_sheets.records import KINDS, catalogue, find, parse_sheets,
 from lostmotion.data_sheets.train_components import RECORD_KINDS, RECORDS
 from lostmotion.model.train import DriveTrain
 from lostmotion.reports.listing import list_records, record_text, template
-from lostmotion.simulation.train_scenario import TrainScenario
+from lostmotion.simulation.train_tables import TrainTables
 
 LINEAR = {kind: [r for r in catalogue() if table_of(r) == kind] for kind in ("screw", "rack", "belt", "linear_motor")}
 # What the axis decides.
@@ -69,7 +69,7 @@ def test_keys_of_records_are_those_of_the_tables() -> None:
     for table, kind in RECORD_KINDS.items():
         places = set(RECORDS[table][1])
         if kind in LINEAR:
-            element = TrainScenario.model_fields[table].annotation
+            element = TrainTables.model_fields[table].annotation
             assert set(element.__args__[1].model_fields) == places | set(KINDS[kind].PART.model_fields)
 
 

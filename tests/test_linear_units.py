@@ -20,7 +20,6 @@ from lostmotion.live_page.description import describe
 from lostmotion.portable.descriptions import numbers_of
 from lostmotion.portable.parameters import parameters_of
 from lostmotion.simulation.keys import set_values
-from lostmotion.simulation.scenario_files import scenario_from
 
 AXIS = """title = "A slide with a linear motor"
 [slides.table]
@@ -126,7 +125,7 @@ def test_no_variable_of_an_fmu_has_one(tmp_path: Path) -> None:
 
 
 def test_no_text_of_the_live_page_has_one() -> None:
-    page = describe(scenario_from(tomllib.loads(AXIS + LOOPS + RUN)), "axis")
+    page = describe(lm.Scenario.model_validate(tomllib.loads(AXIS + LOOPS + RUN)), "axis")
     texts = dict(strings({key: value for key, value in page.items() if key != "core"}))
     assert {key: text for key, text in texts.items() if rotary_in(text)} == {}
     sliders = {s["key"]: (s["label"], s["unit"]) for s in page["sliders"]}
@@ -147,7 +146,7 @@ def strings(node: Any, key: str = "") -> Iterator[tuple[str, str]]:
 
 def test_what_a_description_for_other_programs_names_has_none() -> None:
     """The C interface lists variables, and keys that it can change: both have units of translation."""
-    scenario = scenario_from(tomllib.loads(AXIS + COMMAND + RUN))
+    scenario = lm.Scenario.model_validate(tomllib.loads(AXIS + COMMAND + RUN))
     parameters = parameters_of(scenario, numbers_of).parameters
     assert len(parameters) > 5
     assert rotary_in("\n".join(f"{p.key} {p.unit}" for p in parameters if "phase" not in p.key)) == []
@@ -171,7 +170,7 @@ def test_messages_about_slides_have_none_but_what_was_given(changes: dict[str, A
     tables = tomllib.loads(AXIS + COMMAND + RUN)
     set_values(tables, changes.items())
     with pytest.raises(InputError) as refused:
-        scenario_from(tables)
+        lm.Scenario.model_validate(tables)
     said = str(refused.value)
     assert message in said
     given = [value for value in changes.values() if isinstance(value, str)]
@@ -191,12 +190,12 @@ def test_speeds_at_the_start_that_do_not_fit_a_rigid_screw_are_named_in_their_un
     with pytest.raises(
         InputError, match=r"motor = 1 rad/s and table = 0.005 m/s do not fit screw, which is rigid; .* in SI"
     ):
-        scenario_from(tables)
+        lm.Scenario.model_validate(tables)
 
 
 def test_a_spectrum_over_revolutions_is_refused_where_nothing_turns() -> None:
     with pytest.raises(InputError, match=r"motor: .drive. moves the slide table, which makes no revolutions"):
-        lm.spectrum(scenario_from(tomllib.loads(AXIS + COMMAND + RUN)))
+        lm.spectrum(lm.Scenario.model_validate(tomllib.loads(AXIS + COMMAND + RUN)))
 
 
 def test_gains_of_a_linear_motor_are_written_in_its_units_beside_the_comments_of_the_file(tmp_path: Path) -> None:

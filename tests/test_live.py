@@ -115,7 +115,7 @@ def test_without_a_built_page_the_remedy_is_named(tmp_path: Path, monkeypatch: p
         lm.live(lm.load("paper-2dof-nl-small", SHORT), height=500)
 
 
-def sliders(scenario: lm.Scenario | lm.TrainScenario) -> dict[str, dict]:  # type: ignore[type-arg]
+def sliders(scenario: lm.Scenario) -> dict[str, dict]:  # type: ignore[type-arg]
     return {s["key"]: s for s in describe(scenario, "n")["sliders"]}
 
 

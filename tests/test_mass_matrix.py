@@ -24,9 +24,9 @@ ARM: dict[str, Any] = {
 }
 
 
-def scenario(**tables: Any) -> lm.TrainScenario:
+def scenario(**tables: Any) -> lm.Scenario:
     """The arm with some of its tables replaced."""
-    return lm.TrainScenario(**(ARM | tables))
+    return lm.Scenario(**(ARM | tables))
 
 
 def test_two_links_move_as_the_matrix_exponential_says() -> None:
@@ -51,7 +51,7 @@ def test_two_links_move_as_the_matrix_exponential_says() -> None:
     )  # springs to the frame are entries of their own
 
 
-def with_diagonals(s: lm.TrainScenario) -> lm.TrainScenario:
+def with_diagonals(s: lm.Scenario) -> lm.Scenario:
     """The inertias of its shafts and the masses of its slides as the diagonal of one matrix."""
     data = s.model_dump()
     inertias = {}
@@ -61,16 +61,16 @@ def with_diagonals(s: lm.TrainScenario) -> lm.TrainScenario:
                 inertias[name] = shaft[key]
                 shaft[key] = 0.0
     data["mass_matrices"] = {"all": {"shafts": list(inertias), "matrix": np.diag(list(inertias.values())).tolist()}}
-    return lm.TrainScenario(**data)
+    return lm.Scenario(**data)
 
 
-LONG = [path for path in SCENARIOS if isinstance(lm.load(path), lm.TrainScenario) and "two-link" not in path.stem]
+LONG = [path for path in SCENARIOS if not lm.load(path).is_drive and "two-link" not in path.stem]
 
 
 @pytest.mark.parametrize("path", LONG, ids=lambda path: path.stem)
 def test_a_diagonal_matrix_has_the_bits_of_uncoupled_shafts(path: Path) -> None:
     s = lm.load(path)
-    if isinstance(s, lm.TrainScenario) and any(c.inverse_model is not None for c in s.axes().values()):
+    if not s.is_drive and any(c.inverse_model is not None for c in s.axes().values()):
         pytest.skip("the law computes with its own model")
     plain, matrix = lm.simulate(s), lm.simulate(with_diagonals(s))  # type: ignore[arg-type]
     assert list(plain) == list(matrix)
@@ -163,10 +163,10 @@ def test_a_matrix_moves_as_the_rigid_differential_that_it_stands_for() -> None:
         own, J, ratio = [spread(r, 0.1, 2.0), spread(r, 0.1, 2.0)], spread(r, 0.1, 2.0), spread(r, 1.3, 4.0)
         c = np.array([1.0 / ratio, 1.0 - 1.0 / ratio])
         matrix = (np.diag(own) + J * np.outer(c, c)).tolist()
-        coupled = lm.TrainScenario(**tables, mass_matrices={"m": {"shafts": ["a", "b"], "matrix": matrix}})
+        coupled = lm.Scenario(**tables, mass_matrices={"m": {"shafts": ["a", "b"], "matrix": matrix}})
         shafts = {n: s | ({"inertia": own[n == "b"]} if n in ("a", "b") else {}) for n, s in tables["shafts"].items()}
         gears = tables["gears"] | {"differential": {"input": "a", "output": "c", "housing": "b", "ratio": ratio}}
-        joined = lm.TrainScenario(**tables | {"shafts": shafts | {"c": {"inertia": J}}, "gears": gears})
+        joined = lm.Scenario(**tables | {"shafts": shafts | {"c": {"inertia": J}}, "gears": gears})
         one, other = lm.simulate(coupled), lm.simulate(joined)
         speeds = [f"{n}_speed" for n in tables["shafts"]]
         # Rounding grows by up to a thousand from switching to switching in runs of this length.
@@ -185,7 +185,7 @@ def test_exact_and_adaptive_solver_agree_on_random_trains_with_coupled_shafts() 
         names = ["a", "b", "c", "d"][:n]
         tables = random_tables(r, names)
         order = r.sample(names, n)
-        s = lm.TrainScenario(**tables, mass_matrices={"m": {"shafts": order, "matrix": random_matrix(r, n)}})
+        s = lm.Scenario(**tables, mass_matrices={"m": {"shafts": order, "matrix": random_matrix(r, n)}})
         exact = lm.simulate(s)
         fine, coarse = (lm.simulate(s, solver="dormand-prince", relative_tolerance=t) for t in (1e-11, 1e-9))
         speeds = [f"{name}_speed" for name in tables["shafts"]]
@@ -244,7 +244,7 @@ def test_rotors_and_gears_add_to_the_diagonal() -> None:
 
 def test_a_cart_and_its_pendulum_take_units_by_domain() -> None:
     """Slide and shaft: kg, kg*m and kg*m^2; the momentum of both stays zero under a torque between frame and pendulum."""
-    s = lm.TrainScenario(
+    s = lm.Scenario(
         shafts={"pendulum": {"torque": -1.0}},
         slides={"cart": {}},
         mass_matrices={
@@ -259,7 +259,7 @@ def test_a_cart_and_its_pendulum_take_units_by_domain() -> None:
     r = lm.simulate(s)
     assert np.allclose(3.0 * r.cart_speed + 0.5 * r.pendulum_speed, 0.0, atol=1e-12)
     with pytest.raises(lm.InputError, match=r"mass_matrices.m.matrix.0.0: .3 kg\*m\^2. has the unit of something else"):
-        lm.TrainScenario(
+        lm.Scenario(
             slides={"cart": {"force": 1.0}},
             mass_matrices={"m": {"shafts": ["cart"], "matrix": [["3 kg*m^2"]]}},
             simulation={"duration": 1.0, "sample_interval": 0.25},
@@ -315,7 +315,7 @@ def test_the_eigenvalue_in_the_message_is_that_of_lapack() -> None:
         M = 0.5 * (A + A.T)
         names = [f"s{k}" for k in range(n)]
         with pytest.raises(lm.InputError, match=f"smallest eigenvalue is {np.linalg.eigvalsh(M)[0]:.6g};"):
-            lm.TrainScenario(
+            lm.Scenario(
                 shafts={name: {"torque": 1.0} for name in names},
                 mass_matrices={"m": {"shafts": names, "matrix": M.tolist()}},
                 simulation={"duration": 1.0, "sample_interval": 0.5},
@@ -373,7 +373,7 @@ def test_freezing_the_pose_has_an_error_of_the_step() -> None:
     errors = []
     for n in (50, 100, 200):
         h = 1.0 / n
-        s = lm.TrainScenario(
+        s = lm.Scenario(
             shafts={"arm": {"torque": 0.0}, "other": {"torque": 0.0}},
             mass_matrices={"m": {"shafts": ["arm", "other"], "matrix": [[2.0, 0.1], [0.1, 1.0]]}},
             initial={"speeds": {"arm": 1.0}},
@@ -414,7 +414,7 @@ def test_a_step_with_no_mass_matrix_is_refused_and_changes_nothing(matrix: Any, 
 
 def test_rules_that_take_one_inertia_alone_refuse_a_coupled_shaft() -> None:
     s = lm.load("position-axis-with-belt")
-    assert isinstance(s, lm.TrainScenario)
+    assert not s.is_drive
     data = s.model_dump()
     last = list(data["shafts"])[-1]
     inertia, data["shafts"][last]["inertia"] = data["shafts"][last]["inertia"], 0.0
@@ -426,4 +426,4 @@ def test_rules_that_take_one_inertia_alone_refuse_a_coupled_shaft() -> None:
     with pytest.raises(
         lm.InputError, match=r"key mass_matrices.m: couples .*; rules for gains take the inertia of one axis alone"
     ):
-        lm.tune(lm.TrainScenario(**data))
+        lm.tune(lm.Scenario(**data))

@@ -17,7 +17,7 @@ SECOND = {"k": 2000.0, "c": 0.5}
 RATIO = 2.0  # of the second stage
 
 
-def chain(inertia: float = 0.0, *, first: dict[str, Any] | None = None, **changes: Any) -> lm.TrainScenario:
+def chain(inertia: float = 0.0, *, first: dict[str, Any] | None = None, **changes: Any) -> lm.Scenario:
     """Two inertias, and between two compliant stages a shaft of which nothing but dampers determines the speed."""
     gears = {
         "first": {"input": "a", "output": "node", "ratio": 1.0, "mesh_damping": FIRST["c"]}
@@ -36,7 +36,7 @@ def chain(inertia: float = 0.0, *, first: dict[str, Any] | None = None, **change
         "initial": {"speeds": {"a": 5.0}, "twists": {"first": 2e-3}},
         "simulation": {"duration": 0.5, "sample_interval": 1e-3},
     }
-    return lm.TrainScenario(**(tables | changes))
+    return lm.Scenario(**(tables | changes))
 
 
 def test_the_speed_of_the_node_is_that_of_the_balance_of_its_torques() -> None:
@@ -101,7 +101,7 @@ def test_with_backlash_before_the_node_it_follows_the_other_damper_through_the_g
 def test_a_direct_current_motor_without_inductance_holds_a_node() -> None:
     """A rotor without inertia on a spring: the back-e.m.f. is its damper."""
     k, k_N, T_R, w_R, J = 50.0, 3.0, 0.5, 300.0, 0.01
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={"rotor": {}, "load": {"inertia": J}},
         motors={
             "m": {
@@ -133,7 +133,7 @@ def test_two_of_them_in_a_row_and_one_tied_to_another() -> None:
     shafts: dict[str, Any] = {"a": {"inertia": 0.02}, "b": {"inertia": 0.3}}
     start = {"speeds": {"a": 5.0}}
     times = {"duration": 0.3, "sample_interval": 1e-3}
-    row = lm.TrainScenario(
+    row = lm.Scenario(
         shafts=shafts | {"n1": {}, "n2": {}, "n3": {}},
         gears={
             "s1": {"input": "a", "output": "n1", "ratio": 1.0} | spring,
@@ -144,7 +144,7 @@ def test_two_of_them_in_a_row_and_one_tied_to_another() -> None:
         initial=start,
         simulation=times,
     )
-    one = lm.TrainScenario(
+    one = lm.Scenario(
         shafts=shafts,
         gears={
             "s": {"input": "a", "output": "b", "ratio": 1.0, "mesh_damping": 2.0 / 3.0}
@@ -231,7 +231,7 @@ def test_random_trains_by_both_solvers(seed: int) -> None:
         ratio = float(draw.choice([-2.0, 1.0, 3.0]))
         gears[f"g{k}"] = gear | {"input": f"s{k}", "output": f"s{k + 1}", "ratio": ratio, "stiffness": stiffness}
     shafts["s0"]["torque"] = {"amplitude": 5.0, "frequency": float(draw.uniform(1.0, 5.0))}
-    scenario = lm.TrainScenario(shafts=shafts, gears=gears, simulation={"duration": 0.5, "sample_interval": 5e-3})
+    scenario = lm.Scenario(shafts=shafts, gears=gears, simulation={"duration": 0.5, "sample_interval": 5e-3})
     exact = lm.simulate(scenario)
     other = lm.simulate(scenario, solver="dormand-prince", relative_tolerance=1e-11)
     for name in ("s0_speed", "s1_speed", "s2_speed", "s3_speed", "s4_speed"):

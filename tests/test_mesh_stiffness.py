@@ -32,15 +32,13 @@ def monodromy(period: float, damping: float) -> np.ndarray:
     return half @ expm(fewer * ((2.0 - CONTACT_RATIO) * period)) @ half
 
 
-def even(
-    period: float, damping: float, twist: float, rate: float, periods: int, *, heavy: bool = False
-) -> lm.TrainScenario:
+def even(period: float, damping: float, twist: float, rate: float, periods: int, *, heavy: bool = False) -> lm.Scenario:
     """A shaft of even speed, given or of a large inertia, that turns a free one through the mesh."""
     speed = 2.0 * math.pi / (TEETH * period)
     given, free = {"inertia": 1e-4, "speed": {"mean": speed}}, {"inertia": 10.0}
     speeds = {"b": speed / RATIO - rate} | ({"a": speed} if heavy else {})
     gear = {"input": "a", "output": "b", "ratio": RATIO, "stiffness": {"kind": "linear", "stiffness": STIFFNESS}}
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={"a": free if heavy else given, "b": {"inertia": INERTIA}},
         gears={"mesh": gear | {"mesh_damping": damping, "mesh_stiffness": MESH}},
         initial={"speeds": speeds, "twists": {"mesh": twist}, "angles": {"a": 0.0}},
@@ -99,7 +97,7 @@ def test_a_step_gives_the_energy_of_the_spring_times_the_step_and_every_step_is_
     """Both shafts turn evenly, so the twist stays: one turn and a half of a mesh period, of two steps each."""
     speed = 10.0
     gear = {"input": "a", "output": "b", "ratio": RATIO, "stiffness": {"kind": "linear", "stiffness": STIFFNESS}}
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={
             "a": {"inertia": 1e-4, "speed": {"mean": speed}},
             "b": {"inertia": INERTIA, "speed": {"mean": speed / RATIO}},
@@ -197,15 +195,13 @@ def test_pairs_and_contact_ratio_say_the_same() -> None:
 def test_what_is_no_mesh_is_refused_in_one_line(mesh: dict[str, Any], said: str) -> None:
     gear = {"input": "a", "output": "b", "ratio": 2, "stiffness": {"kind": "linear", "stiffness": 1.0}}
     with pytest.raises(lm.InputError) as refused:
-        lm.TrainScenario(
-            shafts={"a": {"inertia": 1.0}, "b": {"inertia": 1.0}}, gears={"g": gear | {"mesh_stiffness": mesh}}
-        )
+        lm.Scenario(shafts={"a": {"inertia": 1.0}, "b": {"inertia": 1.0}}, gears={"g": gear | {"mesh_stiffness": mesh}})
     assert said in str(refused.value) and "gears.g" in str(refused.value) and "\n" not in str(refused.value)
 
 
 def test_a_rigid_gear_has_no_stiffness_to_scale() -> None:
     with pytest.raises(lm.InputError, match=r"gears\.g.*mesh_stiffness.*rigid"):
-        lm.TrainScenario(
+        lm.Scenario(
             shafts={"a": {"inertia": 1.0}, "b": {"inertia": 1.0}},
             gears={"g": {"input": "a", "output": "b", "ratio": 2, "mesh_stiffness": MESH}},
         )

@@ -159,7 +159,7 @@ class Hybrid:
         return end, state, broken, [s.sol(time) for time in wanted if time <= end]
 
 
-def speeds(scenario: lm.TrainScenario, *names: str) -> Vector:
+def speeds(scenario: lm.Scenario, *names: str) -> Vector:
     result = lm.simulate(scenario)
     return np.array([result[f"{name}_speed"].values for name in names]).T
 
@@ -174,7 +174,7 @@ def simulation(duration: float, interval: float = 0.01) -> dict[str, float]:
 
 
 def test_first() -> None:
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={
             "motor": {"inertia": 0.1, "torque": {"amplitude": 10.0, "frequency": 5.0, "phase": math.pi}},
             "gear": {"inertia": 2.0, "viscous_friction": 10.0},
@@ -218,7 +218,7 @@ def test_elastic_bearing(inertia: float) -> None:
     }
     if inertia:
         gears["spring"] = {"input": "output", "output": "load", "ratio": 1.0} | stiffness
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={
             "shaft": {"inertia": 1.0, "torque": {"ramps": [{"rise": -100.0, "duration": 5.0}]}},
             "housing": {"inertia": 5.0},
@@ -272,7 +272,7 @@ def test_simple_gear_shift() -> None:
     nodes = np.linspace(0.0, 40.0, 81)
     drag = 20.0 * (nodes / (math.pi / 0.3)) ** 2
     engaging = {"ramps": [{"rise": 1.0, "begin": 2.0, "duration": 0.1}]}
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={
             "engine": {"inertia": 1.0, "torque": {"steps": [{"height": -20.0, "time": 0.5}]}},
             "ring": {},
@@ -318,8 +318,8 @@ def test_simple_gear_shift() -> None:
     assert abs(energy["residual"]) < 1e-10 * energy["turned_over"]
 
 
-def coupled_clutches(peak: float) -> tuple[lm.TrainScenario, Hybrid]:
-    scenario = lm.TrainScenario(
+def coupled_clutches(peak: float) -> tuple[lm.Scenario, Hybrid]:
+    scenario = lm.Scenario(
         shafts={
             "j1": {"inertia": 1.0, "torque": {"amplitude": 10.0, "frequency": 5.0, "phase": math.pi}},
             **{name: {"inertia": 1.0} for name in ("j2", "j3", "j4")},
@@ -361,8 +361,8 @@ def test_coupled_clutches(peak: float) -> None:
     close(speeds(scenario, "j1", "j2", "j3", "j4"), expected)
 
 
-def friction(**tables: Any) -> lm.TrainScenario:
-    return lm.TrainScenario(
+def friction(**tables: Any) -> lm.Scenario:
+    return lm.Scenario(
         gears={
             "spring": {
                 "input": "inertia2",
@@ -424,7 +424,7 @@ def test_friction() -> None:
 
 def test_one_way_clutch() -> None:
     """A freewheel and a clutch between the same shafts: while both are stuck, one torque serves for two."""
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={
             "input": {"inertia": 1.0, "torque": {"amplitude": 10.0, "frequency": 3.0, "phase": math.pi}},
             "output": {"inertia": 1.0},
@@ -453,7 +453,7 @@ def test_one_way_clutch() -> None:
 
 def test_lossy_gear_with_bearing_friction() -> None:
     """LossyGearDemo2: both may be stuck at once, so that their torques are not unique; the motion is."""
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={
             "a": {
                 "inertia": 1.0,
@@ -524,7 +524,7 @@ def test_elastic_backlash(limited: bool) -> None:
     """Backlash with ElastoBacklash2: the flanks push as spring and damper, and part where these would pull. With ElastoBacklash
     (limited) the torque of the damper is at most that of the spring as well."""
     J, c, d, half = 5.0, 2e4, 50.0, math.pi / 8.0
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={"inertia": {"inertia": J, "torque": 0.0}, "wall": {"inertia": 1.0}},
         gears={
             "mesh": {

@@ -261,7 +261,7 @@ def loss_map(loads: int, speeds: int) -> dict[str, Any]:
     return {"kind": "map", "loads": rows, "speeds": columns, "values": values}
 
 
-def heat_losses(loads: int, speeds: int) -> lm.TrainScenario:
+def heat_losses(loads: int, speeds: int) -> lm.Scenario:
     shafts: dict[str, Any] = {f"inertia{k}": {"inertia": J} for k in range(1, 7)} | {"gear_output": {}}
     shafts["inertia1"] |= {
         "viscous_friction": 10.0,
@@ -272,7 +272,7 @@ def heat_losses(loads: int, speeds: int) -> lm.TrainScenario:
     spring = {"ratio": 1.0, "stiffness": {"kind": "linear", "stiffness": SPRING}}
     flanks = {"kind": "curve", "backlash": 2.0 * HALF, "slopes": [FLANK]}
     pressed = {"amplitude": 1.0, "frequency": 0.2}
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts=shafts,
         gears={
             "spring_damper": {"input": "inertia1", "output": "inertia2", **spring, "mesh_damping": DAMPING},
@@ -349,7 +349,7 @@ def brake_steps(step: float) -> tuple[Vector, float]:
         drag: dict[str, Any] = {"kind": "eddy_current", "peak_torque": peak, "error": 5e-4 * peak, "max_speed": 21.0}
         drag["critical_speed"] = CRITICAL * (1.0 + COPPER * (heat + half))
         result = lm.simulate(
-            lm.TrainScenario(
+            lm.Scenario(
                 shafts={"disc": {"inertia": 1.0, "torque": 0.0, "drag": drag if peak > 0.0 else None}},
                 initial={"speeds": {"disc": w}},
                 simulation={"duration": step, "sample_interval": step},
@@ -387,7 +387,7 @@ def test_eddy_current_brake_at_full_excitation() -> None:
             "error": error,
         }
         result = lm.simulate(
-            lm.TrainScenario(
+            lm.Scenario(
                 shafts={"disc": {"inertia": 1.0, "torque": 0.0, "drag": drag}},
                 initial={"speeds": {"disc": 20.0}},
                 simulation={"duration": 0.6, "sample_interval": 0.01},
@@ -407,7 +407,7 @@ def test_an_error_that_takes_too_many_straight_lines_is_refused_with_its_key() -
     with pytest.raises(
         lm.InputError, match=r"key shafts.disc.drag: has an error of 0.001 N\*m, which takes more than 100"
     ):
-        lm.TrainScenario(
+        lm.Scenario(
             shafts={"disc": {"inertia": 1.0, "torque": 0.0, "drag": drag}},
             simulation={"duration": 1.0, "sample_interval": 0.1},
         )

@@ -21,11 +21,11 @@ SERVO: dict[str, Any] = {
 }
 
 
-def scenario(**changes: Any) -> lm.TrainScenario:
+def scenario(**changes: Any) -> lm.Scenario:
     data = {key: dict(value) for key, value in SERVO.items()}
     for table, values in changes.items():
         data[table] = values
-    return lm.TrainScenario(**data)
+    return lm.Scenario(**data)
 
 
 def motor(**changes: Any) -> dict[str, Any]:
@@ -80,7 +80,7 @@ def test_currents_put_the_friction_into_the_line() -> None:
     assert own.friction_torque == pytest.approx(T, rel=1e-15)
     assert own.armature_voltage_constant is not None
     assert own.rated_torque * own.armature_voltage_constant - T == pytest.approx(2.0, rel=1e-15)
-    free = lm.TrainScenario(
+    free = lm.Scenario(
         shafts={"s": {}},
         motors={"m": own},
         command={"m": {"mean": 1.0}},
@@ -135,7 +135,7 @@ def test_a_line_that_contradicts_itself_is_refused(changes: dict[str, Any], word
 @pytest.mark.parametrize("current", ["ideal", "pi"])
 def test_a_controlled_motor_keeps_to_its_line(tmp_path: Path, current: str) -> None:
     """A reversal at the voltage limit is followed: torque is the request clipped to 40 (1 -+ w/30) N m."""
-    axis = lm.TrainScenario(
+    axis = lm.Scenario(
         shafts={"joint": {"inertia": 0.3}},
         motors={
             "m": {
@@ -174,7 +174,7 @@ def test_a_falling_drag_curve_holds_its_last_torque() -> None:
     speeds, torques = [0, 5, 10, 20, 40, 80], [0, 40, 50, 40, 23.5, 12.3]
     data = DISC | {"initial": {"speeds": {"disc": 120.0}}, "simulation": {"duration": 8.0, "sample_interval": 0.01}}
     drag = {"kind": "curve", "speeds": speeds, "torques": torques, "beyond": "hold"}
-    result = lm.simulate(lm.TrainScenario(shafts={"disc": {"inertia": 1.0, "drag": drag}}, **data))
+    result = lm.simulate(lm.Scenario(shafts={"disc": {"inertia": 1.0, "drag": drag}}, **data))
     w = result["disc_speed"]
     assert float(w.sel(time=3.0)) == pytest.approx(120.0 - 12.3 * 3.0, rel=1e-13)
     begin = 40.0 / 12.3
@@ -205,7 +205,7 @@ def test_an_eddy_current_brake_slows_down_as_its_law_says() -> None:
     """J w' = -2 M s/(1 + s^2): ln s + s^2/2 falls by 2 M t/(J w_k), down to half the critical speed."""
     M, w_k = 50.0, 10.0
     drag = {"kind": "eddy_current", "peak_torque": M, "critical_speed": w_k, "max_speed": 80.0, "error": 0.05}
-    result = lm.simulate(lm.TrainScenario(shafts={"disc": {"inertia": 1.0, "drag": drag}}, **DISC))
+    result = lm.simulate(lm.Scenario(shafts={"disc": {"inertia": 1.0, "drag": drag}}, **DISC))
     w = result["disc_speed"].to_numpy()
     w, t = w[w > 5.0], result["time"].to_numpy()[w > 5.0]
     measure = np.log(w) + 0.5 * (w / w_k) ** 2

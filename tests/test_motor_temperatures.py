@@ -221,7 +221,7 @@ def test_what_lacks_or_contradicts_is_named(call, message) -> None:
 
 def test_a_motor_of_a_train_is_chosen_by_name() -> None:
     single = run(0.5)
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={"a": {}, "b": {"inertia": 5.0, "viscous_friction": 10.0}},
         motors={name: {"shaft": "a", **single.motor.model_dump()} for name in ("one", "two")},
         gears={"g": {"input": "a", "output": "b", **single.gearbox.model_dump(exclude={"limits"})}},

@@ -13,7 +13,7 @@ from lostmotion.model.gearbox import GearboxLimits
 from lostmotion.model.losses import LossMap
 from lostmotion.model.motor import MotorLimits
 from lostmotion.model.torsion import Hysteresis, TorsionCurve
-from lostmotion.simulation.drive_scenario import LoadTable
+from lostmotion.simulation.drive_tables import LoadTable
 from lostmotion.simulation.keys import set_values
 
 # A catalogue motor and gearbox near their limits, so that every limit is judged.

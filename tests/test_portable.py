@@ -18,7 +18,7 @@ from portable import END_STATE, ENERGIES, SAMPLES, PortableCore, bits, compiled
 
 
 @cache
-def loaded(path: Path) -> lm.Scenario | lm.TrainScenario:
+def loaded(path: Path) -> lm.Scenario:
     """The scenario; two seconds of the axes that take long as one train."""
     return lm.load(path, {"simulation.duration": 2.0} if path.stem == "direction-finder" else {})
 

@@ -45,7 +45,7 @@ def random_drive(r: random.Random, kind: str) -> dict[str, Any]:
     return drive
 
 
-def random_axis(seed: int) -> lm.TrainScenario:
+def random_axis(seed: int) -> lm.Scenario:
     """A motor, a gear that may reverse, and a slide, which a mass matrix may couple to another one."""
     r = random.Random(f"axis {seed}")
     slides: dict[str, Any] = {"slide": random_slide(r)}
@@ -68,7 +68,7 @@ def random_axis(seed: int) -> lm.TrainScenario:
         "mesh_damping": r.uniform(0.0, 0.5),
     }
     command = {"mean": r.uniform(-0.2, 0.2), "amplitude": r.uniform(0.2, 1.0), "frequency": r.uniform(1.0, 5.0)}
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={
             "rotor": {},
             "shaft": {"inertia": 10.0 ** r.uniform(-4.0, -3.0), "friction_torque": r.uniform(0.0, 0.1)},

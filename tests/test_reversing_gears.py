@@ -15,7 +15,7 @@ from lostmotion.errors import InputError
 def test_a_bevel_differential_of_two_motors() -> None:
     """w_a - w_c = -(w_b - w_c). With M_a + M_b on the carrier, (J_c + 4 J/2) w_c' = M_a + M_b, and J (w_a - w_b)' = M_a - M_b."""
     J, carrier, a, b = 1e-4, 0.02, 0.3, 0.1
-    train = lm.TrainScenario(
+    train = lm.Scenario(
         shafts={"a": {}, "b": {}, "carrier": {"inertia": carrier, "torque": {"mean": 0.0}}},
         motors={n: {"kind": "torque_source", "shaft": n[1], "rotor_inertia": J} for n in ("ma", "mb")},
         gears={"bevel": {"input": "a", "output": "b", "housing": "carrier", "ratio": -1.0}},
@@ -46,7 +46,7 @@ STIFFNESS: dict[str, dict[str, Any]] = {
 }
 
 
-def axis(ratio: float, losses: str, stiffness: str, seed: int) -> lm.TrainScenario:
+def axis(ratio: float, losses: str, stiffness: str, seed: int) -> lm.Scenario:
     """Motor, gear, load; what is on the load is turned around with the ratio."""
     draw = np.random.default_rng(seed)
     way = 1.0 if ratio > 0.0 else -1.0
@@ -54,7 +54,7 @@ def axis(ratio: float, losses: str, stiffness: str, seed: int) -> lm.TrainScenar
     gear |= {"losses": LOSSES[losses], "rated_input_speed": 20.0, "rated_output_torque": 8.0}
     if stiffness == "spring":
         gear["hysteresis"] = {"efficiency": 0.9}
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={
             "motor": {"friction_torque": draw.uniform(0.0, 0.1), "viscous_friction": 1e-3},
             "load": {
@@ -101,7 +101,7 @@ def test_the_command_that_turns_a_reversing_gear_is_that_of_another(losses: str,
         tables["shafts"]["load"]["torque"] = {"mean": way * load}
         tables["motors"]["far"] = {"kind": "torque_source", "shaft": "load", "rotor_inertia": 0.1}
         tables["command"] = {"m": {"mean": 0.2}, "far": {"mean": 0.3 * way}}
-        found.append({m.name: m for m in lm.explain(lm.TrainScenario(**tables), 0.0).motors})
+        found.append({m.name: m for m in lm.explain(lm.Scenario(**tables), 0.0).motors})
     one, other = found
     assert (one["m"].command_forward, one["m"].command_backward) == pytest.approx(
         (other["m"].command_forward, other["m"].command_backward), rel=1e-14, nan_ok=False
@@ -113,7 +113,7 @@ def test_the_command_that_turns_a_reversing_gear_is_that_of_another(losses: str,
 
 def test_the_command_that_turns_a_reversing_gear_by_hand() -> None:
     """10 N m of friction on the load behind 5:1 at 0.9, and 0.1 N m on the motor."""
-    train = lm.TrainScenario(
+    train = lm.Scenario(
         shafts={"motor": {"friction_torque": 0.1}, "load": {"inertia": 1.0, "friction_torque": 10.0}},
         motors={"m": {"kind": "torque_source", "shaft": "motor", "rotor_inertia": 1e-3, "rated_torque": 10.0}},
         gears={"g": {"input": "motor", "output": "load", "ratio": -5.0, "stiffness": {"kind": "linear", "stiffness": 1e4},
@@ -181,7 +181,7 @@ def test_what_a_load_does_to_a_reversing_gear_is_what_it_does_to_another(gear: s
         losses = {"kind": "mesh_efficiency", "drive_efficiency": 0.9, "backdrive_efficiency": 0.8}
         tables["gears"]["belt"] = {"input": "rotor", "output": "motor", "ratio": belt, "losses": losses}
         tables["gears"]["belt"]["stiffness"] = {"kind": "linear", "stiffness": 50.0}
-        found.append(lm.sizing.self_locking(lm.TrainScenario(**tables).train(), "g", 5.0))
+        found.append(lm.sizing.self_locking(lm.Scenario(**tables).train(), "g", 5.0))
     one, other = found
     # Eigenvalues have roundings of the largest of them, some 100 1/s.
     assert (one.rate, one.undamped_rate) == pytest.approx((other.rate, other.undamped_rate), abs=1e-11)

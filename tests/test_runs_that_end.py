@@ -41,9 +41,9 @@ def interrupted_after(seconds: float, timer: int = signal.ITIMER_REAL) -> Iterat
         signal.signal(number, before)
 
 
-def latched_clutch(duration: float) -> lm.TrainScenario:
+def latched_clutch(duration: float) -> lm.Scenario:
     """A shaft that slips but is kept at rest by a clutch, whose torque follows a damper and a motor."""
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={
             "s0": {},
             "s1": {"inertia": 0.03, "friction_torque": 0.02, "torque": {}},
@@ -93,7 +93,7 @@ def test_energies_of_a_motion_through_a_wall_of_losses_are_integrated_in_long_pa
     assert energy["source"] == pytest.approx(float(np.trapezoid(power, fine["time"].values)), rel=2e-3)
 
 
-def random_train(rng: random.Random) -> lm.TrainScenario:
+def random_train(rng: random.Random) -> lm.Scenario:
     """Shafts in a row with friction, joined by safety clutches and dampers, behind a motor with a tiny time constant."""
 
     def log(low: float, high: float) -> float:
@@ -123,7 +123,7 @@ def random_train(rng: random.Random) -> lm.TrainScenario:
     command = {"amplitude": log(-3.0, 0.0), "frequency": log(-1.0, 1.5), "phase": rng.uniform(0.0, 6.3)}
     duration = rng.choice([0.02, 0.1]) * rng.uniform(0.5, 1.5)
     interval = duration / rng.choice([1, 2, 4, 7, 33.3])
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts=shafts,
         motors={"m0": motor},
         command={"m0": command},
@@ -198,7 +198,7 @@ def test_an_interruption_ends_any_run_within_a_second(name: str) -> None:
 @pytest.mark.parametrize("brake", [0.0, 1.0])
 def test_a_shaft_of_almost_no_inertia_costs_no_steps(inertia: float, brake: float) -> None:
     """Sun and carrier at a ratio of 2.5, three more shafts behind them, one of them light: 20 N·m on the inertia of them all."""
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={
             "sun": {"inertia": 1.0},
             "ring": {"inertia": 1.0},

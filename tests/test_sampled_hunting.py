@@ -19,10 +19,10 @@ K_V, K_P, K_I = 5.0, 20.0, 40.0
 STUCK = 8  # ticks after which the controller has settled
 
 
-def rotor(breakaway: float, step: float, **changes: Any) -> lm.TrainScenario:
+def rotor(breakaway: float, step: float, **changes: Any) -> lm.Scenario:
     """A rotor on its own with dry friction under a cascade; changes by the dotted key with / in place of dots."""
     encoder = {"resolution": step} if step else {"ideal": True}
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={"rotor": {"friction_torque": SLIDING, "breakaway_torque": breakaway}},
         motors={"m": {"kind": "torque_source", "shaft": "rotor", "rotor_inertia": INERTIA, "rated_torque": 10.0}},
         controllers={

@@ -23,7 +23,7 @@ def log(rng: random.Random, low: float, high: float) -> float:
     return float(low * (high / low) ** rng.random())
 
 
-def random_axis(rng: random.Random) -> lm.TrainScenario:
+def random_axis(rng: random.Random) -> lm.Scenario:
     """Motor and load with a rigid gear, friction at the load, a cascade by the poles of the rigid axis, and an encoder with steps."""
     inertia, w, ratio = log(rng, 0.01, 10.0), log(rng, 3.0, 60.0), rng.choice([1.0, 20.0, 100.0])
     tick, share = log(rng, 0.01, 0.1) / w, rng.uniform(0.2, 0.8)
@@ -66,7 +66,7 @@ def random_axis(rng: random.Random) -> lm.TrainScenario:
     return geared(share * inertia, load, gear, controller, w)
 
 
-def stable_axis(rng: random.Random) -> lm.TrainScenario:
+def stable_axis(rng: random.Random) -> lm.Scenario:
     """One whose complete sampled loop is stable while the load slips."""
     while True:
         scenario = random_axis(rng)
@@ -75,7 +75,7 @@ def stable_axis(rng: random.Random) -> lm.TrainScenario:
             return scenario
 
 
-def settled_errors(scenario: lm.TrainScenario, duration: float) -> np.ndarray:
+def settled_errors(scenario: lm.Scenario, duration: float) -> np.ndarray:
     """Errors of the load in the stuck intervals of an exact run after its step that last until all but the integrator has settled."""
     of = sampled_slip(axis_of(scenario))
     count = min(math.ceil(duration / of.tick), SAMPLES)
@@ -96,7 +96,7 @@ def settled_errors(scenario: lm.TrainScenario, duration: float) -> np.ndarray:
     return np.array(found)
 
 
-def check_band(scenario: lm.TrainScenario, found: Any, told: str) -> int:
+def check_band(scenario: lm.Scenario, found: Any, told: str) -> int:
     """Once a settled stuck interval has an error within the band, all that follow have; the reference is as far from a reading as it was."""
     low, high = found.band
     of = sampled_slip(axis_of(scenario))

@@ -28,10 +28,10 @@ PI = K_P + K_I * T / (Z - 1.0)
 DIFFERENCE = (1.0 - 1.0 / Z) / T
 
 
-def rigid(reference: str, **controller: Any) -> lm.TrainScenario:
+def rigid(reference: str, **controller: Any) -> lm.Scenario:
     """A motor with an inertia that gives the torque that is asked for."""
     axis = {"sample_time": T, "reference": {"kind": reference, "mean": 3.0}, "encoder": {"ideal": True}} | controller
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={"motor": {"inertia": J}},
         motors={"m": {"shaft": "motor", "kind": "torque_source", "rotor_inertia": 0.0, "rated_torque": 2.0}},
         controllers={"m": axis},
@@ -39,7 +39,7 @@ def rigid(reference: str, **controller: Any) -> lm.TrainScenario:
     )
 
 
-def sampled(scenario: lm.TrainScenario, loop: str, cut: bool) -> SampledLoop:
+def sampled(scenario: lm.Scenario, loop: str, cut: bool) -> SampledLoop:
     axis = axis_of(scenario)
     (regime,) = regimes(axis)
     return SampledLoop(axis, regime, loop, cut)

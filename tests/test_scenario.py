@@ -9,7 +9,7 @@ import pytest
 
 import lostmotion as lm
 from conftest import ALL_SCENARIOS, ROOT, SCENARIOS
-from lostmotion.simulation.drive_scenario import json_schema
+from lostmotion.simulation.drive_tables import DriveTables, drive_schema
 
 
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda p: p.stem)
@@ -184,8 +184,8 @@ def test_a_chirp_departs_from_its_sine_by_no_more_than_stated() -> None:
 
 
 def test_schema_describes_every_key_and_is_printed() -> None:
-    schema = json_schema()
-    assert set(lm.simulation.DriveScenario.model_fields) < set(schema["properties"])
+    schema = drive_schema()
+    assert set(DriveTables.model_fields) < set(schema["properties"])
     assert json.loads(json.dumps(schema)) == schema
 
 

@@ -13,7 +13,7 @@ import pytest
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.control.tuning import TwoInertias, suited
-from lostmotion.simulation.drive_scenario import LoadTable
+from lostmotion.simulation.drive_tables import LoadTable
 from lostmotion.simulation.run import run
 from lostmotion.sizing.duty_cycle import DutyCycle
 from lostmotion.sizing.required_motion import check_motor, input_demand, required_motion

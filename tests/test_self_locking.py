@@ -43,8 +43,8 @@ def worm_tables(
     }
 
 
-def scenario(tables: dict[str, Any], **more: Any) -> lm.TrainScenario:
-    return lm.TrainScenario(**({"simulation": {"duration": 1.0, "sample_interval": 1e-3}} | tables | more))
+def scenario(tables: dict[str, Any], **more: Any) -> lm.Scenario:
+    return lm.Scenario(**({"simulation": {"duration": 1.0, "sample_interval": 1e-3}} | tables | more))
 
 
 def verdict(load: float = LOAD, speed: float | None = None, **values: Any) -> SelfLocking:
@@ -248,7 +248,7 @@ def test_what_holds_and_stops_a_load_does_so(eta_b: float):
     assert (float(run["worm_speed"][-1]) == 0.0) is found.stops
 
 
-def hoist(share: float) -> tuple[lm.TrainScenario, float]:
+def hoist(share: float) -> tuple[lm.Scenario, float]:
     """Motor, belt with losses, coupled worm and drum, all with friction; the motor gives a share of the least torque."""
     tables = worm_tables(viscous=1e-3, damping=20.0, mass=0.2)
     tables["shafts"]["worm"] |= {"friction_torque": 0.01, "breakaway_torque": 0.02}
@@ -383,9 +383,7 @@ def test_the_torque_that_a_stuck_shaft_holds_is_shared_by_bearing_and_gear_as_th
 
 def test_a_drive_as_a_train_has_the_same_input_torque_at_rest():
     drive = lm.load("paper-2dof-nl-small")
-    from lostmotion.simulation.train_scenario import in_long_form
-
-    short, long = lm.simulate(drive), lm.simulate(in_long_form(drive))
+    short, long = lm.simulate(drive), lm.simulate(drive.long())
     stuck = short["input_contact"].values == 0.0
     assert stuck.sum() > 100
     assert long["gearbox_input_torque"].values[stuck] == pytest.approx(short["input_torque"].values[stuck], rel=1e-12)

@@ -12,9 +12,9 @@ from refusals import refused
 EXACT = 1e-10
 
 
-def shaft(command: object, **values: float) -> lm.TrainScenario:
+def shaft(command: object, **values: float) -> lm.Scenario:
     """One shaft of 0.02 kg m2, turned by a torque source of 2 N m for command 1, for one second."""
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={"table": {"inertia": 0.02, **values}},
         motors={"motor": {"shaft": "table", "kind": "torque_source", "rated_torque": 2.0, "rotor_inertia": 0.0}},
         command={"motor": command},
@@ -26,7 +26,7 @@ def derivative(result: object, variable: str, parameter: str) -> np.ndarray:
     return result[f"{variable}_sensitivity"].sel(parameter=parameter).to_numpy()
 
 
-def differences(scenario: lm.TrainScenario | lm.Scenario, key: str, value: float) -> dict[str, np.ndarray]:
+def differences(scenario: lm.Scenario, key: str, value: float) -> dict[str, np.ndarray]:
     """Central differences of sixth order."""
     h = 2.0**-11 * value
     weights = {1: 45 / 60, 2: -9 / 60, 3: 1 / 60}
@@ -38,7 +38,7 @@ def differences(scenario: lm.TrainScenario | lm.Scenario, key: str, value: float
     return sums
 
 
-def check_against_differences(scenario: lm.TrainScenario | lm.Scenario, values: dict[str, float], near: float) -> None:
+def check_against_differences(scenario: lm.Scenario, values: dict[str, float], near: float) -> None:
     """Where the variables are smooth: at a tenth of the instants a switching may lie between the runs beside."""
     result = lm.simulate(scenario, sensitivities=list(values))
     assert "sensitivities_end_by" not in result.attrs

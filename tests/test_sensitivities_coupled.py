@@ -49,7 +49,7 @@ KEYS = (
 VARIABLES = ("shoulder_speed", "elbow_speed", "wheel_speed", "elbow_angle", "mesh_twist")
 
 
-def differences(scenario: lm.TrainScenario, key: str, value: float) -> dict[str, Any]:
+def differences(scenario: lm.Scenario, key: str, value: float) -> dict[str, Any]:
     """Central differences of fourth order of whole runs."""
     h = 1e-6 * value
     runs = {k: lm.simulate(scenario.replace(**{key: value + k * h})) for k in (-2, -1, 1, 2)}
@@ -57,7 +57,7 @@ def differences(scenario: lm.TrainScenario, key: str, value: float) -> dict[str,
     return {name: sum(weights[k] * run[name].values for k, run in runs.items()) / (12.0 * h) for name in VARIABLES}
 
 
-def value_of(scenario: lm.TrainScenario, key: str) -> float:
+def value_of(scenario: lm.Scenario, key: str) -> float:
     node: Any = scenario.model_dump()
     for part in key.split("."):
         node = node[int(part)] if isinstance(node, list | tuple) else node[part]
@@ -67,7 +67,7 @@ def value_of(scenario: lm.TrainScenario, key: str) -> float:
 @pytest.mark.parametrize("key", KEYS)
 def test_derivatives_of_coupled_links_are_those_of_differences_of_runs(key: str) -> None:
     """Both entries off the diagonal change together; friction sticks, the elbow strikes its stop, the wheel its flanks."""
-    scenario = lm.TrainScenario(**LINKS)
+    scenario = lm.Scenario(**LINKS)
     result = lm.simulate(scenario, sensitivities=[key])
     assert lm.switchings_of(result).sizes["switching"] > 20
     expected = differences(scenario, key, value_of(scenario, key))
@@ -79,7 +79,7 @@ def test_derivatives_of_coupled_links_are_those_of_differences_of_runs(key: str)
 
 
 def test_an_entry_off_the_diagonal_is_set_on_both_sides() -> None:
-    scenario = lm.TrainScenario(**LINKS)
+    scenario = lm.Scenario(**LINKS)
     changed = scenario.replace(**{"mass_matrices.arm.matrix.0.1": 0.5})
     assert changed.mass_matrices["arm"].matrix == ((2.6, 0.5), (0.5, 0.4))
     with pytest.raises(lm.InputError, match=r"between shaft 'shoulder' and shaft 'elbow' it has 0.5 and 0.6"):

@@ -91,8 +91,8 @@ def test_margins_of_a_position_loop_that_is_slower_are_those_of_python_control()
     assert found.crossover == pytest.approx(at_phase / (2.0 * math.pi), rel=1e-5)
 
 
-def current_axis() -> lm.TrainScenario:
-    return lm.TrainScenario(
+def current_axis() -> lm.Scenario:
+    return lm.Scenario(
         shafts={"motor": {"inertia": 1e6}},  # stands
         motors={"m": {"shaft": "motor", "rotor_inertia": 0.0, "rated_torque": 0.5, "rated_speed": 300.0,
                       "electrical_time_constant": 1.3e-3, "armature_voltage_constant": 4.0}},
@@ -123,7 +123,7 @@ def test_the_proportional_speed_loop_of_a_rigid_drive_is_stable_up_to_its_closed
     estimate: str, limit: float, share: float
 ) -> None:
     J, K_p = 3e-3, 0.5 * limit * 3e-3 / T
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={"motor": {"inertia": J}},
         motors={"m": {"shaft": "motor", "kind": "torque_source", "rotor_inertia": 0.0, "rated_torque": 2.0}},
         controllers={"m": {"sample_time": T, "reference": {"kind": "speed", "mean": 3.0}, "encoder": {"ideal": True},
@@ -355,7 +355,7 @@ def test_the_sheet_of_the_shipped_axis(position_axis: Any) -> None:
     assert not report.limit_cycle.whole.cycles
 
 
-def hunting(backlash: float, **changes: Any) -> lm.TrainScenario:
+def hunting(backlash: float, **changes: Any) -> lm.Scenario:
     """A position loop on the load's encoder with an integrator, through a gap."""
     base = two_mass(
         {"gain": 1.1, "integral_gain": 45.0, "estimate": {"kind": "exact"}},
@@ -607,9 +607,9 @@ def test_margins_are_marked_where_the_curves_are() -> None:
 # --- the search ---
 
 
-def inertia_alone(speed: dict[str, Any]) -> lm.TrainScenario:
+def inertia_alone(speed: dict[str, Any]) -> lm.Scenario:
     """An inertia under a speed loop: L(z) = (K_p + K_i T/(z - 1)) T (z + 1)/(2 J z^2 (z - 1)), with one period of delay."""
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={"motor": {"torque": 0.0}},
         motors={"m": {"shaft": "motor", "kind": "torque_source", "rotor_inertia": J_M, "rated_torque": 1.0}},
         controllers={

@@ -16,13 +16,13 @@ DAMPING, STIFFNESS = 1e-3, 2000.0
 ROUND, WEAKENED = {"inductance_q": 4e-3}, {"dc_voltage": 300.0}
 
 
-def axis(speed: float, **more: Any) -> lm.TrainScenario:
+def axis(speed: float, **more: Any) -> lm.Scenario:
     """Motor and load on a coupling, at a constant speed, begun near its steady motion."""
     winding = {"pole_pairs": 4, "resistance_phase": 0.8, "inductance_d": 4e-3, "inductance_q": 9e-3, "flux_linkage": 0.09,
                "max_current_peak": 20.0} | {k: v for k, v in more.items() if k == "inductance_q"}  # fmt: skip
     every = more.get("every", 1) * T
     estimate = more.get("estimate", {"kind": "exact"})
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={"motor": {}, "load": {"inertia": 2e-3, "viscous_friction": DAMPING, "torque": 0.0}},
         motors={"m": {"shaft": "motor", "kind": "synchronous", "rotor_inertia": 1e-3, "rated_torque": 5.0,
                       "dc_voltage": more.get("dc_voltage", 560.0), "winding": winding}},
@@ -39,7 +39,7 @@ def axis(speed: float, **more: Any) -> lm.TrainScenario:
     )  # fmt: skip
 
 
-def at_speed(scenario: lm.TrainScenario, monkeypatch: pytest.MonkeyPatch) -> tuple[Any, Any]:
+def at_speed(scenario: lm.Scenario, monkeypatch: pytest.MonkeyPatch) -> tuple[Any, Any]:
     """The axis and its regime at the speed of its reference, the coupling twisted by the torque that it carries there."""
     speed = scenario.controllers["m"].reference.mean
     twist = DAMPING * speed / STIFFNESS

@@ -27,7 +27,7 @@ def gear(start: str, end: str, ratio: float, error: Any) -> dict[str, Any]:
     return {"input": start, "output": end, "ratio": ratio, "stiffness": stiff, "transmission_error": error}
 
 
-def turning(gears: dict[str, Any], duration: float, **more: Any) -> lm.TrainScenario:
+def turning(gears: dict[str, Any], duration: float, **more: Any) -> lm.Scenario:
     """A free train at constant speed: motor at 1 rad/s, nothing that brakes it.
 
     A shaft of inertia J on a spring k answers a displacement of frequency w with 1/(1 - w^2 J/k): with J = 1e-3 kg m2,
@@ -38,7 +38,7 @@ def turning(gears: dict[str, Any], duration: float, **more: Any) -> lm.TrainScen
         speed /= g["ratio"]
         shafts[g["output"]], speeds[g["output"]] = {"inertia": 1e-3}, speed
     motor = {"shaft": "motor", "kind": "torque_source", "rotor_inertia": 1e-3, "rated_torque": 1.0}
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts=shafts,
         motors={"m": motor},
         gears=gears,
@@ -108,7 +108,7 @@ def test_the_error_of_an_encoder_is_found_in_the_following_error() -> None:
         "speed": {"gain": 0.4, "integral_gain": 10.0, "estimate": {"kind": "difference"}},
     }
     base = turning({"pair": gear("motor", "load", 2.0, None)}, 60.0)
-    scenario = lm.TrainScenario(**{**dict(base), "initial": {}, "controllers": {"m": axis}})
+    scenario = lm.Scenario(**{**dict(base), "initial": {}, "controllers": {"m": axis}})
     found = lm.spectrum(scenario, start=8.0)
     assert found.against == "reference"
     assert found.lines[0].order == pytest.approx(4.0)

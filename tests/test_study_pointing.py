@@ -16,12 +16,12 @@ from lostmotion.studies.chunk import scenario_of_run
 CAMERA = {"sample_time": 5e-3, "latency": 10e-3, "noise": 1e-4, "seed": 4}
 
 
-def two_axes() -> lm.TrainScenario:
+def two_axes() -> lm.Scenario:
     s = lm.load("direction-finder", {"simulation.duration": 0.3})
     data = s.model_dump(exclude_none=True) | {"initial": {"on_reference": True}}
     for c in data["controllers"].values():
         c |= {"camera": CAMERA, "tracker": {"alpha": 0.5, "beta": 0.2}}
-    return lm.TrainScenario(**data)
+    return lm.Scenario(**data)
 
 
 def one_axis() -> lm.Scenario:
@@ -59,8 +59,8 @@ def test_rows_are_those_of_single_runs_for_any_number_of_workers(
     for run in range(4):
         s = scenario_of_run(study, run)
         r = lm.simulate(s, energy=False)
-        axis = s.controller if not isinstance(s, lm.TrainScenario) else s.controllers["traverse_drive"]
-        shaft = "load" if not isinstance(s, lm.TrainScenario) else "traverse"
+        axis = s.controller if s.is_drive else s.controllers["traverse_drive"]
+        shaft = "load" if s.is_drive else "traverse"
         missed = axis.reference.at(r.time.values)[0] - r[f"{shaft}_angle"].values
         assert found[0]["rms"][run].as_py() == pytest.approx(np.sqrt(np.mean(missed**2)), rel=1e-14)
         assert found[0]["peak"][run].as_py() == np.abs(missed[r.time.values > 0.1]).max()
@@ -83,6 +83,6 @@ def test_an_axis_begins_on_its_reference() -> None:
     assert steps["traverse_angle"] == float(r["traverse_angle"][0])
     for s, key in ((drive, "initial.load_angle"), (train, "initial.angles")):
         with pytest.raises(lm.InputError, match="follows from it"):
-            s.replace(**{key: 0.1 if not isinstance(s, lm.TrainScenario) else {"traverse": 0.1}})
+            s.replace(**{key: 0.1 if s.is_drive else {"traverse": 0.1}})
     with pytest.raises(lm.InputError, match="no controller"):
         lm.load("paper-2dof-nl-small", {"initial.on_reference": True})

@@ -316,7 +316,7 @@ NAMES = ("first", "second")
 PERIODS = 160  # of the vibration, that a slow rise of the torque takes
 
 
-def ring(friction: float = 0.0, losses: tuple[float, float] = (1.0, 1.0), **changes) -> lm.TrainScenario:
+def ring(friction: float = 0.0, losses: tuple[float, float] = (1.0, 1.0), **changes) -> lm.Scenario:
     """The ring without wind and viscous friction."""
     mesh = {"kind": "mesh_efficiency", "drive_efficiency": losses[0], "backdrive_efficiency": losses[1]}
     bare = {"shafts.ring.viscous_friction": 0.0, "shafts.ring.torque": 0.0}

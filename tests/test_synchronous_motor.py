@@ -229,7 +229,7 @@ def test_the_core_gets_the_numbers_of_the_dc_motor_that_it_equals() -> None:
 def test_a_train_a_linear_model_and_an_explanation_take_it() -> None:
     scenario = axis(motor(), 0.4)
     of_dc = axis(motor().as_dc(), 0.4)
-    train = lm.TrainScenario(
+    train = lm.Scenario(
         shafts={"a": {}, "b": {"inertia": 0.5}},
         motors={"m": {"shaft": "a", **MOTOR}},
         gears={"g": {"input": "a", "output": "b", **scenario.gearbox.model_dump(exclude={"limits"})}},

@@ -13,7 +13,6 @@ import scipy.linalg
 
 import lostmotion as lm
 from conftest import CONTROLLED, SCENARIOS, TRAINS
-from lostmotion.simulation.train_scenario import in_long_form
 
 WORM = lm.load("worm-lowering")
 RING = lm.load("two-motors-one-ring")
@@ -88,7 +87,7 @@ def test_a_train_stepped_follows_its_run(path: Path) -> None:
 
 def test_an_angle_that_no_gear_hands_on_is_no_variable_of_stepping_either() -> None:
     """Behind a clutch the angle is not recorded; runs and steps have the same variables."""
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={"engine": {"inertia": 0.01}, "wheel": {"inertia": 0.1, "torque": 0.0}},
         motors={"motor": {"shaft": "engine", "kind": "torque_source", "rated_torque": 2.0, "rotor_inertia": 0.01}},
         clutches={"clutch": {"input": "engine", "output": "wheel", "torque": 1.0}},
@@ -112,7 +111,7 @@ def _value(signal: Any, t: float) -> float:
 @pytest.mark.parametrize("path", [p for p in SCENARIOS if p not in CONTROLLED], ids=lambda p: p.stem)
 def test_the_short_and_the_long_form_step_with_the_same_bits(path: Path) -> None:
     scenario = lm.load(path)
-    drive, train = lm.Simulation(scenario, step=1e-3), lm.Simulation(in_long_form(scenario), step=1e-3)
+    drive, train = lm.Simulation(scenario, step=1e-3), lm.Simulation(scenario.long(), step=1e-3)
     pairs = {"motor_torque": "motor_torque", "motor_speed": "motor_speed", "load_speed": "load_speed"}
     pairs |= {"load_angle": "load_angle", "twist": "gearbox_twist", "output_torque": "gearbox_output_torque"}
     rated = scenario.gearbox.rated_output_torque
@@ -295,7 +294,7 @@ def test_the_linear_model_of_a_train_is_that_of_the_drive() -> None:
         hysteresis_capacities={"gearbox": 1.0},
     )
     drive = lm.linearize(scenario, start, command=0.4, load_torque=3.0)
-    train = lm.linearize(in_long_form(scenario), same, inputs={"motor_command": 0.4, "load_load_torque": "3 N*m"})
+    train = lm.linearize(scenario.long(), same, inputs={"motor_command": 0.4, "load_load_torque": "3 N*m"})
     assert train.states == ("motor_torque", "motor_speed", "load_speed", "gearbox_twist", "load_angle")
     assert np.array_equal(train.A, drive.A)
     assert np.array_equal(train.B, drive.B)
@@ -309,7 +308,7 @@ def test_the_linear_model_of_a_train_is_that_of_the_drive() -> None:
 
 
 @pytest.mark.parametrize("scenario", [WORM, RING, BELT], ids=lambda s: s.title[:12])
-def test_within_a_regime_a_run_follows_the_exponential_of_its_matrix(scenario: lm.TrainScenario) -> None:
+def test_within_a_regime_a_run_follows_the_exponential_of_its_matrix(scenario: lm.Scenario) -> None:
     simulation = lm.Simulation(scenario)
     commands = {name: 0.3 for name in simulation.inputs if name.endswith("_command")}
     loads = {name: 5.0 for name in simulation.inputs if name.endswith("_load_torque")}
@@ -410,7 +409,7 @@ def test_two_motors_hold_each_other_by_hand() -> None:
     ids=["worm", "ring", "belt"],
 )
 def test_the_smallest_command_turns_a_motor_for_good_and_less_does_not(
-    scenario: lm.TrainScenario, motor: str, held: dict[str, float]
+    scenario: lm.Scenario, motor: str, held: dict[str, float]
 ) -> None:
     command, angle = f"{motor}_command", f"{scenario.motors[motor].shaft}_angle"
     for way in (+1, -1):
@@ -446,7 +445,7 @@ def test_a_drive_is_explained_as_its_train(path: Path) -> None:
     scenario = lm.load(path)
     for share in (0.0, 0.31, 0.77):
         time = share * scenario.simulation.duration
-        drive, train = lm.explain(scenario, time), lm.explain(in_long_form(scenario), time)
+        drive, train = lm.explain(scenario, time), lm.explain(scenario.long(), time)
         assert len(drive.contacts) == len(train.contacts)
         for a, b in zip(drive.contacts, train.contacts, strict=True):
             values = (a.speed, a.torque, a.capacity_forward, a.capacity_backward)

@@ -12,7 +12,7 @@ import lostmotion as lm
 from test_drive_train import train
 
 
-def two_shafts(**tables: Any) -> lm.TrainScenario:
+def two_shafts(**tables: Any) -> lm.Scenario:
     """Two shafts, a torque source on the first, and these tables."""
     base: dict[str, Any] = {
         "shafts": {"a": {"inertia": 1e-3}, "b": {"inertia": 2e-3, "torque": 0.0}},
@@ -20,7 +20,7 @@ def two_shafts(**tables: Any) -> lm.TrainScenario:
         "command": {"m": {"mean": 0.3, "amplitude": 1.0, "frequency": 2.0}},
         "simulation": {"duration": 0.6, "sample_interval": 1e-3},
     }
-    return lm.TrainScenario(**base | {name: {**base.get(name, {}), **table} for name, table in tables.items()})
+    return lm.Scenario(**base | {name: {**base.get(name, {}), **table} for name, table in tables.items()})
 
 
 SOFT = {"input": "a", "output": "b", "ratio": 2.0, "stiffness": {"kind": "linear", "stiffness": 50.0}}
@@ -100,7 +100,7 @@ ELEMENTS = {
 }
 
 
-def chords(scenario: lm.TrainScenario) -> float:
+def chords(scenario: lm.Scenario) -> float:
     """By how much chords in place of sines move a speed [rad/s] at most: their error over the smallest inertia."""
     smooth: dict[str, Any] = {**scenario.gravity, **scenario.angle_torques}
     if not smooth:
@@ -110,7 +110,7 @@ def chords(scenario: lm.TrainScenario) -> float:
 
 
 @pytest.mark.parametrize("scenario", ELEMENTS.values(), ids=ELEMENTS)
-def test_both_solvers_agree_on_every_element(scenario: lm.TrainScenario) -> None:
+def test_both_solvers_agree_on_every_element(scenario: lm.Scenario) -> None:
     """The adaptive solver takes sines as they are, the exact one by chords."""
     exact = lm.simulate(scenario)
     coarse, fine = (
@@ -128,7 +128,7 @@ def test_both_solvers_agree_on_every_element(scenario: lm.TrainScenario) -> None
 
 def test_a_pendulum_swings_with_its_period() -> None:
     small = 0.02  # rad; the period of a pendulum is longer by small^2/16
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={"arm": {"inertia": 2.0 * 0.3**2}},
         gravity={"mass": {"shaft": "arm", "mass": 2.0, "radius": 0.3, "error": 1e-7}},
         initial={"angles": {"arm": small}},
@@ -172,7 +172,7 @@ def test_a_spring_balances_an_arm() -> None:
     # An arm that gravity would turn at m g r = 6 N m, held level by a spring of 10 N m/rad that is wound up by 0.6 rad:
     # there it stands, and swings about it with sqrt(k/J).
     mgr, k, J, small = 6.0, 10.0, 0.2, 1e-3
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={"arm": {"inertia": J}},
         gravity={"weight": {"shaft": "arm", "mass": mgr / 9.80665, "radius": 1.0, "angle": math.pi / 2, "error": 1e-7}},
         springs={
@@ -190,7 +190,7 @@ def test_a_spring_balances_an_arm() -> None:
 
 def test_friction_that_jams_ends_in_one_line() -> None:
     worm = {"losses": {"kind": "mesh_efficiency", "drive_efficiency": 0.5, "backdrive_efficiency": -0.2}}
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={"worm": {"inertia": 1e-4}, "drum": {"inertia": 2.0, "torque": 20.0}},
         gears={"g": {"input": "worm", "output": "drum", "ratio": 50.0, **worm}},
         initial={"speeds": {"worm": -100.0, "drum": -2.0}},
@@ -231,9 +231,9 @@ def test_a_bias_above_half_the_torque_of_the_ring_keeps_the_backlash_closed() ->
         assert float(loose[f"{name}_gear_twist"].max()) > gap
 
 
-def braked(command: Any, **delays: float) -> lm.TrainScenario:
+def braked(command: Any, **delays: float) -> lm.Scenario:
     """A flywheel of 2 kg·m² at 10 rad/s and a brake of 4 N·m."""
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={"wheel": {"inertia": 2.0, "torque": 0.0}},
         brakes={"b": {"shaft": "wheel", "torque": 4.0, **delays}},
         command={"b": command},
@@ -333,7 +333,7 @@ def test_a_stiffness_without_measure_ends_in_one_line(stiffness: float) -> None:
 @pytest.mark.parametrize("inertia", [1e-4, 1e-10, 1e-13, 0.0])
 def test_the_inertia_of_a_held_ring_does_not_matter(inertia: float, solver: str) -> None:
     """Sun 1 kg m^2 and carrier 10 kg m^2 at ratio 2.5: 20 N m accelerate the sun by 20/(1 + 10/2.5^2) rad/s^2."""
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={"sun": {"inertia": 1.0}, "ring": {"inertia": inertia}, "carrier": {"inertia": 10.0}},
         motors={"m": {"shaft": "sun", "kind": "torque_source", "rotor_inertia": 0.0}},
         gears={"p": {"input": "sun", "output": "carrier", "housing": "ring", "ratio": 2.5}},
@@ -354,7 +354,7 @@ def test_the_inertia_of_a_held_ring_does_not_matter(inertia: float, solver: str)
 @pytest.mark.parametrize("solver", ["exact", "dormand-prince"])
 def test_a_clutch_does_not_break_away_when_another_contact_stops(solver: str) -> None:
     """Friction of a reverses at the stop: 6.75 rad/s^2 before, then 2.25, where the clutch takes 0.995 of 1.2 N m."""
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={"a": {"inertia": 0.02, "friction_torque": 0.45}, "b": {"inertia": 0.18, "torque": -1.4}},
         motors={"m": {"shaft": "a", "kind": "torque_source", "rotor_inertia": 0.0}},
         clutches={"c": {"kind": "safety", "input": "a", "output": "b", "torque": 0.9, "breakaway_torque": 1.2}},

@@ -33,22 +33,22 @@ MASSES: dict[str, Any] = {
 }  # fmt: skip
 
 
-def both_ways(scenario: lm.TrainScenario, monkeypatch: pytest.MonkeyPatch, **how: Any) -> tuple[Any, Any]:
+def both_ways(scenario: lm.Scenario, monkeypatch: pytest.MonkeyPatch, **how: Any) -> tuple[Any, Any]:
     """The run by its parts, and of all at once."""
     by_parts = lm.simulate(scenario, **how)
     monkeypatch.setattr(core_runs, "parts_of", lambda whole: [whole])
     return by_parts, lm.simulate(scenario, **how)
 
 
-def finder() -> lm.TrainScenario:
+def finder() -> lm.Scenario:
     """Without steps of encoders, of which rounding may decide which one is read."""
     data = lm.load("direction-finder", {"simulation.duration": 1.0}).model_dump(exclude_none=True)
     for c in data["controllers"].values():
         c |= {"encoder": {"ideal": True}, "position_encoder": {"ideal": True, "shaft": c["shaft"]}}
-    return lm.TrainScenario(**data)
+    return lm.Scenario(**data)
 
 
-@pytest.mark.parametrize("make", [finder, lambda: lm.TrainScenario(**MASSES)], ids=["finder", "masses"])
+@pytest.mark.parametrize("make", [finder, lambda: lm.Scenario(**MASSES)], ids=["finder", "masses"])
 def test_parts_give_the_dataset_of_the_whole(make: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     parts, whole = both_ways(make(), monkeypatch, energy=True)
     assert list(parts) == list(whole)
@@ -72,14 +72,14 @@ def test_parts_give_the_dataset_of_the_whole(make: Any, monkeypatch: pytest.Monk
 
 def test_by_the_adaptive_solver_too(monkeypatch: pytest.MonkeyPatch) -> None:
     how: dict[str, Any] = {"solver": "dormand-prince", "relative_tolerance": 1e-11}
-    parts, whole = both_ways(lm.TrainScenario(**MASSES), monkeypatch, **how)
+    parts, whole = both_ways(lm.Scenario(**MASSES), monkeypatch, **how)
     for name in ("a_speed", "b_angle", "y_speed", "alone_angle"):
         assert np.abs(parts[name].values - whole[name].values).max() < 1e-7 * np.abs(whole[name].values).max()
 
 
 def test_what_joins_shafts_makes_them_one_part() -> None:
     def groups(**change: Any) -> list[list[str]]:
-        return [list(part.shafts) for part in parts_of(lm.TrainScenario(**(MASSES | change)))]
+        return [list(part.shafts) for part in parts_of(lm.Scenario(**(MASSES | change)))]
 
     assert groups() == [["a", "b"], ["x", "y"], ["alone"]]
     assert groups(freewheels={"f": {"input": "alone", "output": "y"}}, initial={}) == [["a", "b"], ["x", "y", "alone"]]

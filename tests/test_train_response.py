@@ -13,7 +13,6 @@ from typer.testing import CliRunner
 
 import lostmotion as lm
 from lostmotion.cli import app
-from lostmotion.simulation.train_scenario import in_long_form
 
 RUN = {"duration": 1.0, "sample_interval": 1e-3}
 ROTOR = 1e-9  # [kg m2]
@@ -47,9 +46,9 @@ TWO_STAGES: dict[str, Any] = {
 }
 
 
-def arm(**motor: Any) -> lm.TrainScenario:
+def arm(**motor: Any) -> lm.Scenario:
     """An arm that gravity pulls at, turned by a torque."""
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={"arm": {"inertia": 1.0, "viscous_friction": 0.5}},
         motors={"m": {"shaft": "arm", "kind": "torque_source", "rotor_inertia": ROTOR, "rated_torque": 1.0}},
         gravity={"weight": {"shaft": "arm", "mass": 1.0, "radius": 1.0 / 9.80665, "error": 1e-3}},
@@ -62,7 +61,7 @@ def arm(**motor: Any) -> lm.TrainScenario:
 def test_a_drive_in_the_long_form_has_the_same_motion_and_response_to_the_last_bit(name: str) -> None:
     drive = lm.load(name)
     assert isinstance(drive, lm.Scenario)
-    train = in_long_form(drive)
+    train = drive.long()
     names = {"motor_speed": "motor_speed", "load_speed": "load_speed", "output_torque": "gearbox_output_torque"}
     one, two = lm.periodic_motion(drive), lm.periodic_motion(train)
     for short, long in names.items():
@@ -92,7 +91,7 @@ def test_a_chain_of_four_masses_follows_its_transfer_function_over_four_decades(
         for k, (c, i) in enumerate(zip(stiffness, ratios, strict=True))
     }
     motors = {"m": {"shaft": "s0", "kind": "torque_source", "rotor_inertia": 1e-5, "rated_torque": 0.5}}
-    chain = lm.TrainScenario(shafts=shafts, motors=motors, gears=gears, simulation=RUN)
+    chain = lm.Scenario(shafts=shafts, motors=motors, gears=gears, simulation=RUN)
     frequencies = np.geomspace(0.05, 500.0, 25)
 
     def expected(force: np.ndarray) -> np.ndarray:
@@ -122,7 +121,7 @@ def test_a_chain_of_four_masses_follows_its_transfer_function_over_four_decades(
 
 
 def test_shooting_on_two_stages_with_backlash_agrees_with_a_long_transient() -> None:
-    scenario = lm.TrainScenario(**TWO_STAGES)
+    scenario = lm.Scenario(**TWO_STAGES)
     motion = lm.periodic_motion(scenario)
     assert motion.attrs["stable"] and motion.attrs["residual"] < 1e-10
     assert (motion["table_contact"].values == 0.0).any()  # it stops on its way
@@ -167,7 +166,7 @@ def test_an_arm_that_turns_over_each_period_moves_periodically() -> None:
 
 def test_newton_keeps_the_assembly_of_shafts_whose_angles_both_matter() -> None:
     # Cogging on the motor, gravity on the arm, a soft gear between them: twist = motor angle/ratio - arm angle, always.
-    scenario = lm.TrainScenario(
+    scenario = lm.Scenario(
         shafts={"motor": {"viscous_friction": 2e-3}, "arm": {"inertia": 0.2, "viscous_friction": 0.3}},
         motors={"m": {"shaft": "motor", "kind": "torque_source", "rotor_inertia": 1e-3, "rated_torque": 1.0}},
         gears={
@@ -195,7 +194,7 @@ def test_newton_keeps_the_assembly_of_shafts_whose_angles_both_matter() -> None:
 
 
 def test_several_threads_give_the_same_bits() -> None:
-    scenario = lm.TrainScenario(**TWO_STAGES)
+    scenario = lm.Scenario(**TWO_STAGES)
     one, three = (lm.frequency_response(scenario, [1.0, 9.0], [0.3, 0.6], threads=n) for n in (1, 3))
     assert one.identical(three)
 
@@ -224,18 +223,18 @@ def test_what_a_response_of_a_train_refuses(call: Any, message: str) -> None:
     tables = {k: v for k, v in TWO_STAGES.items() if k != "command"}
     motors = dict.fromkeys(("left", "right"), TWO_STAGES["motors"]["m"])
     with pytest.raises(lm.InputError, match=re.escape(message)):
-        call(lm.TrainScenario(**{**tables, "motors": motors}))
+        call(lm.Scenario(**{**tables, "motors": motors}))
 
 
 def test_a_start_of_the_other_kind_is_refused() -> None:
-    scenario = lm.TrainScenario(**TWO_STAGES)
+    scenario = lm.Scenario(**TWO_STAGES)
     with pytest.raises(lm.InputError, match="must be of the kind TrainInitial"):
         lm.periodic_motion(scenario, start=lm.Initial())
 
 
 def test_different_starts_lead_to_one_motion_of_a_train_once() -> None:
     starts = [lm.TrainInitial(), lm.TrainInitial(speeds={"motor": 3.0})]
-    assert len(lm.response.periodic_motions(lm.TrainScenario(**TWO_STAGES), starts=starts)) == 1
+    assert len(lm.response.periodic_motions(lm.Scenario(**TWO_STAGES), starts=starts)) == 1
 
 
 def test_the_command_draws_the_response_of_a_train(tmp_path: Path) -> None:

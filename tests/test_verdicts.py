@@ -29,7 +29,7 @@ def one_inertia(
     encoder: dict[str, Any],
     duration: float,
     sample_time: float = 1e-3,
-) -> lm.TrainScenario:
+) -> lm.Scenario:
     """A rotor of 1e-4 kg·m² with dry friction under a position loop."""
     rotor = {"friction_torque": friction, "breakaway_torque": breakaway, "viscous_friction": 1e-3}
     motor = {"kind": "torque_source", "shaft": "rotor", "rotor_inertia": 1e-4, "rated_torque": 0.5}
@@ -40,7 +40,7 @@ def one_inertia(
         "position": position,
         "speed": {"torque_limit": 0.5} | speed,
     }
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={"rotor": rotor},
         motors={"m": motor},
         controllers={"m": controller},
@@ -48,7 +48,7 @@ def one_inertia(
     )
 
 
-def geared(of: lm.TrainScenario, backlash: float, friction: float) -> lm.TrainScenario:
+def geared(of: lm.Scenario, backlash: float, friction: float) -> lm.Scenario:
     """The same rotor behind a gear of ratio 20 with a gap, the position read at the load."""
     gear = {
         "input": "rotor",
@@ -64,10 +64,10 @@ def geared(of: lm.TrainScenario, backlash: float, friction: float) -> lm.TrainSc
     data["shafts"] = {**data["shafts"], "load": load}
     data["gears"] = {"gear": gear}
     data["controllers"]["m"]["position_encoder"] = {"shaft": "load", "bits": 18}
-    return lm.TrainScenario(**data)
+    return lm.Scenario(**data)
 
 
-def random_axis(rng: random.Random) -> lm.TrainScenario:
+def random_axis(rng: random.Random) -> lm.Scenario:
     def log(low: float, high: float) -> float:
         return float(low * (high / low) ** rng.random())
 
@@ -96,7 +96,7 @@ def random_axis(rng: random.Random) -> lm.TrainScenario:
     return geared(axis, log(2e-4, 5e-3), rng.choice([0.0, 0.3])) if rng.random() < 0.3 else axis
 
 
-def angles_over(scenario: lm.TrainScenario, duration: float) -> tuple[np.ndarray, np.ndarray]:
+def angles_over(scenario: lm.Scenario, duration: float) -> tuple[np.ndarray, np.ndarray]:
     """Instants and the rotor's angle of one run."""
     times = {"simulation.duration": duration, "simulation.sample_interval": 0.02}
     whole = run(scenario.replace(**times), energy=False)
@@ -131,7 +131,7 @@ def test_verdicts_of_random_axes_are_those_of_long_runs(seed: int) -> None:
     assert min(counts["hunts"], counts["at rest"]) >= 0.1 * AXES, counts
 
 
-def slow_hunting(**changes: Any) -> lm.TrainScenario:
+def slow_hunting(**changes: Any) -> lm.Scenario:
     """A weak integrator, and a rotor that breaks away at twice its sliding friction."""
     axis = one_inertia(
         friction=0.02,
@@ -222,7 +222,7 @@ def test_a_load_that_drifts_through_its_gap_is_not_at_rest(speed: float) -> None
     data = geared(axis, 0.5, 0.0).model_dump(exclude_none=True)
     del data["controllers"]["m"]["position_encoder"]
     data["shafts"]["load"]["viscous_friction"] = 0.0
-    scenario = lm.TrainScenario(**data | {"initial": {"speeds": {"load": speed}}})
+    scenario = lm.Scenario(**data | {"initial": {"speeds": {"load": speed}}})
     assert float(lm.simulate(scenario)["load_angle"][-1]) == pytest.approx(10.0 * speed, rel=1e-9)
     found = at_rest(axis_of(scenario), 100.0)
     assert found.verdict != "at rest"
@@ -237,7 +237,7 @@ def test_an_unstable_loop_is_named_with_its_frequency() -> None:
 
     def found(gain: float) -> Any:
         controller = {"sample_time": T, "encoder": {"ideal": True}, "speed": {"gain": gain}}
-        scenario = lm.TrainScenario(
+        scenario = lm.Scenario(
             shafts={"rotor": {}},
             motors={"m": motor},
             controllers={"m": controller | {"reference": {"kind": "speed", "mean": 1.0}}},

@@ -27,7 +27,7 @@ LIMITS = {
 OIL = lm.data_sheets.Lubricant(viscosity_40="220 mm^2/s", viscosity_100="19 mm^2/s")
 
 
-def scenario(**changes: Any) -> lm.TrainScenario:
+def scenario(**changes: Any) -> lm.Scenario:
     """A torque source that turns a fan through a gear with viscous friction and a loss map."""
     losses = {
         "kind": "map",
@@ -47,7 +47,7 @@ def scenario(**changes: Any) -> lm.TrainScenario:
         "stiffness": {"kind": "linear", "stiffness": 500.0},
         "mesh_damping": 0.5,
     }
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={"rotor": {"inertia": 1e-5}, "fan": {"inertia": 1e-3, "viscous_friction": 5e-3}},
         motors={
             "motor": {"shaft": "rotor", "kind": "torque_source", "rotor_inertia": 1e-5, "limits": LIMITS},
@@ -162,7 +162,7 @@ def test_a_dc_motor_has_the_line_of_its_warm_winding_and_magnets() -> None:
         "armature_voltage_constant": 4.0,
         "limits": LIMITS,
     }
-    drive = lm.TrainScenario(
+    drive = lm.Scenario(
         shafts={"rotor": {"inertia": 1e-5}},
         motors={"motor": motor},
         command={"motor": 1.0},

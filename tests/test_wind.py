@@ -62,7 +62,7 @@ def test_the_periodogram_of_a_run_is_the_spectrum(name: str) -> None:
     time, torque = w.samples()
     step = time[1]
     r = lm.simulate(
-        lm.TrainScenario(
+        lm.Scenario(
             shafts={"dish": {"inertia": 40.0, "viscous_friction": 30.0, "torque": {"wind": WINDS[name]}}},
             simulation={"duration": 100.0, "sample_interval": step},
         ),
@@ -85,7 +85,7 @@ def test_the_periodogram_of_a_run_is_the_spectrum(name: str) -> None:
 def test_a_load_is_shaken_as_its_frequency_response_says() -> None:
     # J w' + b w = -M: each line of the wind by 1/(b + i 2 pi f J), after the transient exp(-t b/J), b/J = 2 1/s.
     J, b, w = 15.0, 30.0, wind("von_karman")
-    s = lm.TrainScenario(
+    s = lm.Scenario(
         shafts={"dish": {"inertia": J, "viscous_friction": b, "torque": {"wind": WINDS["von_karman"]}}},
         simulation={"duration": 100.0, "sample_interval": 0.02},
     )

@@ -16,10 +16,10 @@ B = np.array([[1.0 / J_M], [0], [0], [0]])
 """of the torque of the motor"""
 
 
-def two_mass(speed: dict[str, Any], **more: Any) -> lm.TrainScenario:
+def two_mass(speed: dict[str, Any], **more: Any) -> lm.Scenario:
     """Under torque control of the motor, with this speed loop and other keys of the controller."""
     axis = {"sample_time": T, "reference": {"kind": "speed", "mean": 3.0}, "encoder": {"ideal": True}, "speed": speed}
-    return lm.TrainScenario(
+    return lm.Scenario(
         shafts={"motor": {"inertia": J_M, "viscous_friction": C_M}, "load": {"inertia": J_L, "viscous_friction": C_L, "torque": 0.0}},
         motors={"m": {"shaft": "motor", "kind": "torque_source", "rotor_inertia": 0.0, "rated_torque": 2.0}},
         gears={"coupling": {"input": "motor", "output": "load", "ratio": 1.0, "stiffness": {"kind": "linear", "stiffness": k}}},

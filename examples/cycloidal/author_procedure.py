@@ -66,7 +66,7 @@ def _loading(curve: np.ndarray) -> tuple[slice, slice]:
     return slice(0, top), slice(zero, bottom)
 
 
-def coulomb_friction(scenario: lm.TrainScenario) -> float:
+def coulomb_friction(scenario: lm.Scenario) -> float:
     """Mean torque [N·m] at the output while it turns freely with 0.05 to 0.45 turns per second, of both directions."""
     free = scenario.replace(
         **{

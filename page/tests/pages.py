@@ -48,14 +48,14 @@ COMMANDS: dict[str, list[list[str]]] = {
 INSTANTS = {"drive": (0.0, 0.05, 0.6667, 0.9), "worm": (0.05, 0.31, 1.4), "axis": (0.0101, 0.8003, 2.5003)}
 
 
-def samples(scenario: lm.Scenario | lm.TrainScenario) -> dict[str, list[float | None]]:
+def samples(scenario: lm.Scenario) -> dict[str, list[float | None]]:
     """All variables; what is undefined as null."""
     result = lm.simulate(scenario)
     columns = {str(name): result[name].values.tolist() for name in result.data_vars}
     return {name: [None if math.isnan(v) else v for v in column] for name, column in columns.items()}
 
 
-def explanations(scenario: lm.Scenario | lm.TrainScenario, name: str) -> list[dict[str, Any]]:
+def explanations(scenario: lm.Scenario, name: str) -> list[dict[str, Any]]:
     """What `lm.explain` says at INSTANTS; of a closed loop by a simulation that has come there."""
     found = []
     for time in INSTANTS[name]:

@@ -51,7 +51,7 @@ from .servo.certificate import hunting_certificate as hunting_certificate
 from .servo.commission import commission as commission
 from .servo.tuning import tune as tune
 from .simulation.batches import SimulationBatch as SimulationBatch
-from .simulation.drive_scenario import Initial as Initial
+from .simulation.drive_tables import Initial as Initial
 from .simulation.explanation import explain as explain
 from .simulation.result_files import open_result as open_result
 from .simulation.result_files import save as save
@@ -62,7 +62,6 @@ from .simulation.shipped import shipped_scenarios as shipped_scenarios
 from .simulation.sources import load as load
 from .simulation.stepping import Simulation as Simulation
 from .simulation.switchings import switchings_of as switchings_of
-from .simulation.train_scenario import TrainScenario as TrainScenario
 from .simulation.train_tables import TrainInitial as TrainInitial
 from .sizing.drive_check import check_drive as check_drive
 from .studies.engine import study as study

@@ -41,6 +41,9 @@ _WITH_PAGES = (
     "test_rig.measurement",
 )
 
+# Names that were taken together in another one.
+_RENAMED = {"DriveScenario": "Scenario", "TrainScenario": "Scenario"}
+
 
 def homes_of(package: str) -> dict[str, str]:
     """Public names of a package, each with the absolute name of the module that defines it."""
@@ -60,6 +63,8 @@ def namespace(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str
     def get(name: str) -> Any:
         if name == "__all__":
             return [*known()]
+        if name in _RENAMED:
+            return _old(f"{package}.{name}", importlib.import_module(_TOP), _RENAMED[name])
         if name not in known():
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         value = _public(known()[name], name)
@@ -84,19 +89,25 @@ def _public(home: str, name: str) -> Any:
     return getattr(module, name)
 
 
+def _old(name: str, module: Any, new: str) -> Any:
+    warnings.warn(
+        f"{name} is now {module.__name__}.{new}; the old name will go in the next release",
+        DeprecationWarning,
+        stacklevel=4,
+    )
+    return getattr(module, new)
+
+
 def moved(name: str) -> Any:
     """The value of a name that used to be flat in `lostmotion`, from its namespace, with a warning.
 
     Raises AttributeError where no namespace has the name.
     """
+    if name in _RENAMED:
+        return _old(f"{_TOP}.{name}", importlib.import_module(_TOP), _RENAMED[name])
     spaces = [space for space, home in homes_of(_TOP).items() if home == _TOP]
     for space in spaces:
         module = importlib.import_module(f"{_TOP}.{space}")
         if name in homes_of(module.__name__):
-            warnings.warn(
-                f"{_TOP}.{name} is now {_TOP}.{space}.{name}; the old name will go in the next release",
-                DeprecationWarning,
-                stacklevel=3,
-            )
-            return getattr(module, name)
+            return _old(f"{_TOP}.{name}", module, name)
     raise AttributeError(f"module {_TOP!r} has no attribute {name!r}")

@@ -19,8 +19,8 @@ from ..model.gear import Gear
 from ..model.gearbox import Gearbox
 from ..model.losses import LossMap
 from ..model.torsion import TorsionCurve
+from ..simulation.scenario import Scenario
 from ..simulation.scenario_files import scenario_text
-from ..simulation.train_scenario import TrainScenario
 from .logs import Channel, Log
 from .rig import Rig
 from .task import Identification
@@ -91,7 +91,7 @@ def _rotor(gearbox: Gearbox) -> float:
     return gearbox.inertia
 
 
-def rig_scenario(gearbox: Gearbox, title: str = "", ripple: TorqueHarmonic | None = None) -> TrainScenario:
+def rig_scenario(gearbox: Gearbox, title: str = "", ripple: TorqueHarmonic | None = None) -> Scenario:
     """The rig: a motor as a source of torque, the gearbox, and a load machine that may be locked or brake."""
     gear = Gear.of(gearbox, input="motor", output="output").model_dump()
     inertia = LOAD_INERTIA * gearbox.inertia * gearbox.ratio**2
@@ -110,7 +110,7 @@ def rig_scenario(gearbox: Gearbox, title: str = "", ripple: TorqueHarmonic | Non
     }
     if ripple is not None:
         tables["angle_torques"] = {"ripple": ripple}
-    return TrainScenario(title=title, **tables)
+    return Scenario(title=title, **tables)
 
 
 def mesh_damping(gearbox: Gearbox) -> float:

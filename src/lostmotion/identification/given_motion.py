@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
-from ..simulation.train_scenario import TrainScenario
+from ..simulation.scenario import Scenario
 from .prepare import Prepared
 from .task import Identification
 
@@ -81,7 +81,7 @@ def rates_of(points: np.ndarray) -> np.ndarray:
     return np.column_stack([t, rate, change])
 
 
-def refuse_given_motion(scenario: TrainScenario) -> None:
+def refuse_given_motion(scenario: Scenario) -> None:
     """Refuse a rig with a shaft whose motion is given, which begins at no measured state.
 
     Raises

@@ -13,8 +13,8 @@ import numpy as np
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count
+from ..simulation.scenario import Scenario
 from ..simulation.scenario_files import scenario_text
-from ..simulation.train_scenario import TrainScenario
 from .engine import Engine, Point
 from .errors_of_logs import LogError, total
 from .fit import Fit, Problem, linearised, search
@@ -66,7 +66,7 @@ class IdentificationResult:
     """errors of the logs of each condition of ``fit.leave_out``, with and without them in the fit"""
     odd: list[OddLog] = field(default_factory=list, kw_only=True)
     """logs that disagree with the others, and the fault that explains each"""
-    scenario: TrainScenario
+    scenario: Scenario
     """the rig with the values that were found, of the first log"""
     profiles: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
     """by parameter, (value, rise of the loss)"""

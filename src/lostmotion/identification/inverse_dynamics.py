@@ -21,7 +21,7 @@ from ..errors import InputError
 from ..model.angle_torques import STANDARD_GRAVITY, AngleTorque, Gravity, TorqueHarmonic
 from ..model.losses import ConstantEfficiency, MeshEfficiency
 from ..model.motor import ShaftMotor
-from ..simulation.train_scenario import TrainScenario
+from ..simulation.scenario import Scenario
 from .acting import DELAY, course_of_input, numbers_of_input
 from .motion import Shown, measured_course
 from .prepare import Prepared
@@ -133,7 +133,7 @@ def _over_angle(t: Gravity | AngleTorque, angle: np.ndarray) -> np.ndarray:
     return np.array([curve(phi) for phi in angle.tolist()])
 
 
-def _check(scenario: TrainScenario) -> None:
+def _check(scenario: Scenario) -> None:
     """Whether its torques are those of the formula above."""
     for table in ("clutches", "freewheels", "brakes"):
         if names := list(getattr(scenario, table)):
@@ -155,7 +155,7 @@ def _check(scenario: TrainScenario) -> None:
 
 
 def _motor_torque(
-    rig: Rig, s: Stretch, known: Mapping[str, Any], scenario: TrainScenario, name: str, motor: ShaftMotor
+    rig: Rig, s: Stretch, known: Mapping[str, Any], scenario: Scenario, name: str, motor: ShaftMotor
 ) -> np.ndarray:
     """Measured, or of the command of a torque source."""
     for channel, m in rig.task.measured.items():
@@ -172,7 +172,7 @@ def _motor_torque(
     return np.asarray(np.clip(torque, -limit, limit))
 
 
-def _acting(rig: Rig, s: Stretch, known: Mapping[str, Any], scenario: TrainScenario, name: str) -> np.ndarray:
+def _acting(rig: Rig, s: Stretch, known: Mapping[str, Any], scenario: Scenario, name: str) -> np.ndarray:
     """An input of the log, or a constant of the scenario."""
     channel = rig.task.inputs.get(name)
     if channel is None:

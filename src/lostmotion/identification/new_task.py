@@ -16,8 +16,8 @@ import numpy as np
 from ..errors import InputError, visible
 from ..inputs.arguments import checked
 from ..inputs.validation import listed
+from ..simulation.scenario import Scenario
 from ..simulation.scenario_files import find_scenario, load
-from ..simulation.train_scenario import TrainScenario, in_long_form
 from .logs import Log
 from .prepare import SAME, channel_unit
 from .readers import ENDINGS, read_log
@@ -138,7 +138,7 @@ def first_task(
     if not logs:
         raise InputError(f"{directory}: none of its {len(paths)} logs can be read; the first: {refused[0]}")
     seen = _channels([log for _, log in logs])
-    scenario = in_long_form(load(find_scenario(str(rig), Path.cwd()))) if str(rig) else None
+    scenario = load(find_scenario(str(rig), Path.cwd())).long() if str(rig) else None
     measured, inputs = _roles(seen)
     doubts = [f"{text}; it is left out" for text in refused]
     doubts += _doubts(logs, seen, measured, inputs)
@@ -337,7 +337,7 @@ def _about_unit(c: _Seen) -> list[str]:
     ]
 
 
-def _input_lines(inputs: Sequence[_Seen], scenario: TrainScenario | None) -> list[str]:
+def _input_lines(inputs: Sequence[_Seen], scenario: Scenario | None) -> list[str]:
     if not inputs:
         return [
             '# Doubt: no channel is known to act on the rig; if one does, add [inputs.NAME] with channel = "..."',
@@ -370,13 +370,13 @@ def _input_lines(inputs: Sequence[_Seen], scenario: TrainScenario | None) -> lis
     return lines
 
 
-def _signals(scenario: TrainScenario | None) -> list[str]:
+def _signals(scenario: Scenario | None) -> list[str]:
     if scenario is None:
         return []
     return [*scenario.signals(), *(f"{name}_reference" for name in scenario.axes())]
 
 
-def _measured_lines(measured: Sequence[_Seen], scenario: TrainScenario | None) -> list[str]:
+def _measured_lines(measured: Sequence[_Seen], scenario: Scenario | None) -> list[str]:
     shafts = list(scenario.shafts) if scenario is not None else []
     lines: list[str] = []
     for c, key in zip(measured, _keyed(c.name for c in measured), strict=True):
@@ -407,7 +407,7 @@ def _factor(unit: str) -> float:
         return 1.0
 
 
-def _parameter_lines(scenario: TrainScenario | None) -> list[str]:
+def _parameter_lines(scenario: Scenario | None) -> list[str]:
     found: dict[str, float] = {}
     for table, parts in (("shafts", scenario.shafts), ("motors", scenario.motors)) if scenario is not None else ():
         for name, part in parts.items():

@@ -14,9 +14,9 @@ from ..inputs.validation import did_you_mean
 from ..simulation.keys import set_values
 from ..simulation.linear_units import of_slides
 from ..simulation.needs import need_no_impacts
+from ..simulation.scenario import Scenario
 from ..simulation.scenario_files import find_scenario, load
 from ..simulation.sensitivities import channels_of
-from ..simulation.train_scenario import TrainScenario, in_long_form
 from ..simulation.train_tables import TrainInitial
 from .formulas import Formula, names_in
 from .prepare import Prepared
@@ -31,7 +31,7 @@ KEPT = 800  # scenarios that are kept ready, a tenth of a megabyte each; few ser
 class Built:
     """A scenario as the solver takes it."""
 
-    scenario: TrainScenario
+    scenario: Scenario
     core: _core.Train
     composed: _core.ComposedTrain
 
@@ -91,7 +91,7 @@ class Rig:
     def __init__(self, task: Identification, directory: Path) -> None:
         self.task = task
         loaded = load(find_scenario(task.scenario, directory))
-        self.scenario = in_long_form(loaded)
+        self.scenario = loaded.long()
         need_no_impacts(self.scenario, "identify")
         self._variants = Variants(self.scenario)
         self._built: dict[Any, Built] = {}
@@ -267,7 +267,7 @@ class Rig:
             for key in keys
         )
 
-    def scenario_at(self, log: Prepared, values: Mapping[str, Any], rung: int) -> TrainScenario:
+    def scenario_at(self, log: Prepared, values: Mapping[str, Any], rung: int) -> Scenario:
         """The scenario of the first phase of a log, without its signals, checked as any other."""
         found = self.built(self.changes({**log.facts, **values}, rung, log.segments[0].phase)).scenario
         return found.replace()

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from ..model.torsion import Rigid
-from ..simulation.train_scenario import TrainScenario
+from ..simulation.scenario import Scenario
 
 
-def angle_terms(scenario: TrainScenario, shaft: str, recorded: Collection[str]) -> dict[str, float]:
+def angle_terms(scenario: Scenario, shaft: str, recorded: Collection[str]) -> dict[str, float]:
     """The angle of a shaft as a sum of recorded variables: factors by name, empty where gears do not give it.
 
     A gear without housing and transmission error has ``input angle = ratio * (output angle + twist)``.

@@ -14,7 +14,8 @@ from ..inputs.named import Named
 from ..model.shaft import Shaft
 from ..model.train import DriveTrain
 from ..simulation.keys import set_values
-from ..simulation.train_scenario import TrainScenario
+from ..simulation.scenario import Scenario
+from ..simulation.train_tables import TrainTables
 
 
 class Variants:
@@ -24,13 +25,13 @@ class Variants:
     that differ are checked.
     """
 
-    def __init__(self, scenario: TrainScenario) -> None:
+    def __init__(self, scenario: Scenario) -> None:
         self._like = scenario
         self._data = scenario.model_dump()
         self._shafts = scenario.own_shafts() | {name: slide.shaft() for name, slide in scenario.slides.items()}
         self._checked: set[Any] = set()
 
-    def __call__(self, changes: Mapping[str, Any]) -> TrainScenario:
+    def __call__(self, changes: Mapping[str, Any]) -> Scenario:
         """The scenario with values by dotted key.
 
         Raises
@@ -42,15 +43,15 @@ class Variants:
         shape = tuple((key, _shape(value)) for key, value in changes.items())
         if shape in self._checked and (found := self._quickly(data)) is not None:
             return found
-        scenario = TrainScenario(**data)
+        scenario = Scenario(**data)
         self._checked.add(shape)
         return scenario
 
-    def _quickly(self, data: Mapping[str, Any]) -> TrainScenario | None:
+    def _quickly(self, data: Mapping[str, Any]) -> Scenario | None:
         """Nothing where the constructor has to say what is wrong, or where slides make shafts of several tables."""
         if self._like.slides:
             return None
-        fields = {name: getattr(self._like, name) for name in TrainScenario.model_fields}
+        fields = {name: getattr(self._like, name) for name in TrainTables.model_fields}
         for table, elements in data.items():
             before = self._data[table]
             if elements is before:
@@ -66,7 +67,7 @@ class Variants:
                 )
             except (ValidationError, InputError):
                 return None
-        found = TrainScenario.model_construct(set(data), **fields)
+        found = TrainTables.model_construct(set(data), **fields)
         shafts = {
             name: self._shafts[name]
             if shaft is self._like.shafts[name]
@@ -77,14 +78,14 @@ class Variants:
         for name, slide in found.slides.items():
             shafts[name] = self._shafts[name] if slide is self._like.slides[name] else slide.shaft()
         tables = {table: Named(elements) for table, elements in {"shafts": shafts, **found.elements()}.items()}
-        keep(found, TrainScenario.train, DriveTrain.model_construct(None, **tables))
-        return found
+        keep(found, TrainTables.train, DriveTrain.model_construct(None, **tables))
+        return Scenario.of(found, checked=False)
 
 
 @cache
 def _element(table: str) -> TypeAdapter[Any] | None:
     """Reader of one element of a table of elements by name."""
-    kind = TrainScenario.model_fields[table].annotation
+    kind = TrainTables.model_fields[table].annotation
     return TypeAdapter(get_args(kind)[1]) if get_origin(kind) is dict else None
 
 

@@ -46,11 +46,9 @@ WANTED = {
     "ScrewData": 'a Screw, such as Screw(input="motor", output="table", lead="10 mm")',
     "ScrewSheet": "a ScrewSheet, such as catalogue() lists",
     "Initial": "a state, such as Initial(motor_speed=100)",
-    "DriveScenario": "a Scenario, such as load(path) returns",
     "Scenario": "a Scenario, such as load(path) returns",
     "Simulation": "a Simulation",
     "TrainInitial": 'a state of a train, such as TrainInitial(speeds={"motor": 100})',
-    "TrainScenario": "a TrainScenario, such as load(path) returns",
     "Study": "a Study, such as load_study(path) returns",
 }
 SILENT = ("None", "RunArrays")  # accepted, and not asked for

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import wraps
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 from weakref import ref
 
-from .part import Part
 
-P = TypeVar("P", bound=Part)
+class Keeper(Protocol):
+    """An immutable object that keeps values, such as a part."""
+
+    def kept_values(self) -> dict[Any, Any]: ...
+
+
+P = TypeVar("P", bound=Keeper)
 R = TypeVar("R")
 
 
 def kept(function: Callable[[P], R]) -> Callable[[P], R]:
-    """The function of a part alone, or method of a part, whose value is made once for each part and kept with it.
+    """The function of a part or scenario alone, or method of one, whose value is made once for each part and kept with it.
 
     The value belongs to the object: copies, pickles, comparisons and files are without it. It must not be changed.
     """
@@ -46,6 +51,6 @@ def kept_while_used(method: Callable[[P], R]) -> Callable[[P], R]:
     return call
 
 
-def keep(part: Part, function: Any, value: Any) -> None:
+def keep(part: Keeper, function: Any, value: Any) -> None:
     """Keeps with a part what a `kept` function of it would make."""
     part.kept_values()[function.__wrapped__] = value

@@ -72,6 +72,7 @@ class Drive(Part):
             )
         return self
 
+    @kept
     def train(self) -> DriveTrain:
         """The same drive as a train: shafts `motor` and `load`, joined by the gear `gearbox`, and on the first the motor `motor`."""
         return DriveTrain(
@@ -80,6 +81,7 @@ class Drive(Part):
             gears={"gearbox": _gear(self.gearbox)},
         )
 
+    @kept
     def named_train(self) -> NamedDrive:
         """The same train, with the names that variables of a drive have."""
         train = self.train()

@@ -220,7 +220,7 @@ class Actuated:
         Raises
         ------
         InputError
-            Another number of values, an unknown joint, `data` was changed without `follow`, or holds a value that is no number.
+            Another number of values, an unknown joint, `data` was changed without `follow`, or holds a value that is not a number.
         SolverError
             The motion of a drive has no continuation.
         """

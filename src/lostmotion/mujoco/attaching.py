@@ -20,9 +20,9 @@ from ..model.drive import Drive
 from ..model.load import Load
 from ..model.motor import Motor
 from ..model.train import DriveTrain
-from ..simulation.drive_scenario import DriveScenario
 from ..simulation.exact_batches import controlled
 from ..simulation.joint_trains import Driven
+from ..simulation.scenario import Scenario
 from ..simulation.shipped import shipped_scenarios
 from ..simulation.sources import load_drive
 from .actuated import MAX_SUBSTEPS, Actuated
@@ -41,9 +41,9 @@ def drive_of_joint(joint: str, given: Any, controller: Controller | None) -> Dri
     """
     if isinstance(given, str | Path):
         given = _named(joint, str(given))
-    if isinstance(given, DriveScenario) and given.controller is None:
+    if isinstance(given, Scenario) and given.is_drive and given.controller is None:
         given = given.drive()
-    if not isinstance(given, Drive | DriveScenario | DriveTrain):
+    if not isinstance(given, Drive | DriveTrain) and not (isinstance(given, Scenario) and given.is_drive):
         raise InputError(
             f"joint {joint!r}: {shown(given)} is no drive; give a Drive, a DriveTrain, a scenario, or the name of a gearbox or an actuator of the catalogue"
         )
@@ -56,7 +56,7 @@ def drive_of_joint(joint: str, given: Any, controller: Controller | None) -> Dri
     return controlled(given, controller)
 
 
-def _named(joint: str, name: str) -> Drive | DriveScenario:
+def _named(joint: str, name: str) -> Drive | Scenario:
     """Shipped scenario or scenario file by its name; an actuator of the catalogue; a gearbox, with an ideal torque source."""
     if name.endswith(".toml") or name in shipped_scenarios():
         return load_drive(name)

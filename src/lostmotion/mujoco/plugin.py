@@ -12,9 +12,9 @@ from ..inputs.validation import shown
 from ..model.drive import Drive
 from ..portable.checkout import made_here
 from ..portable.descriptions import description
-from ..simulation.drive_scenario import DriveScenario
 from ..simulation.exact_batches import controlled
 from ..simulation.joint_trains import joint_drive
+from ..simulation.scenario import Scenario
 from .attaching import drive_of_joint
 
 LIBRARY = Path(__file__).parent / "plugin_library"
@@ -86,9 +86,9 @@ def write_drive(drive: Any, path: str | Path, *, controller: Controller | None =
     <plugin joint="JOINT" plugin="lostmotion.drive"><config key="scenario" value=".../elbow.drive"/></plugin>
     """
     given = drive_of_joint(str(path), drive, controller)
-    if not isinstance(given, Drive | DriveScenario):
+    if not isinstance(given, Drive | Scenario):
         raise InputError(f"drive: {shown(drive)} is a train; use lostmotion.mujoco.attach")
-    scenario = given if isinstance(given, DriveScenario) else controlled(given, None)
+    scenario = given if isinstance(given, Scenario) else controlled(given, None)
     armature = joint_drive(str(path), given, scenario.load.inertia, 1e-3).reflected_inertia
     numbers = description(scenario, parameters=False)
     try:

@@ -18,8 +18,8 @@ from ..model.load import Load
 from ..model.losses import ConstantEfficiency
 from ..model.motor import Motor
 from ..model.torsion import Rigid
-from ..simulation.drive_scenario import DriveScenario, drive_of
 from ..simulation.joint_trains import joint_drive
+from ..simulation.scenario import Scenario, drive_of
 from ..simulation.stepping import Simulation
 from .joints import joint_id
 
@@ -71,7 +71,7 @@ class Reduction:
 
 @checked
 def reduce(
-    drive: Drive | DriveScenario,
+    drive: Drive | Scenario,
     amplitude: Angle,
     frequency: Frequency,
     load_torque: Torque = 0.0,

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from ..errors import InputError
 from ..response.rigid import RigidConstants, rigid_constants
-from ..simulation.drive_scenario import DriveScenario
+from ..simulation.scenario import Scenario
 from ..simulation.sources import load_drive
 
 MODELS = ("1-DOF-L", "2-DOF-L", "2-DOF-NL")
@@ -25,7 +25,7 @@ PRINTED_TIME_CONSTANT = 0.2334  # T_RC [s]
 DOES_NOT = "the printed value does not follow from the printed"
 
 
-def paper_scenario(model: str, amplitude: str) -> DriveScenario:
+def paper_scenario(model: str, amplitude: str) -> Scenario:
     """One of the paper's runs.
 
     Parameters
@@ -58,8 +58,8 @@ def constants() -> list[Constant]:
     new = rigid_constants(rigid)
     old = rigid_constants(rigid, motor_time_constant=PRINTED_MOTOR_TIME_CONSTANT, time_constant=PRINTED_TIME_CONSTANT)
     g = paper_scenario("2-DOF-L", "large").drive().gearbox
-    stiffness = g.stiffness.stiffness  # type: ignore[union-attr]
-    efficiency = g.losses.efficiency  # type: ignore[union-attr]
+    stiffness = g.stiffness.stiffness
+    efficiency = g.losses.efficiency
     J_M, J_Z = rigid.motor.rotor_inertia, rigid.load.inertia
     J_MR = J_M + g.inertia
     f_T0 = math.sqrt(stiffness / (g.ratio**2 * efficiency * J_MR) + stiffness / J_Z) / (2.0 * math.pi)

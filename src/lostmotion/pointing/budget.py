@@ -17,7 +17,6 @@ from ..inputs.validation import did_you_mean, shown
 from ..simulation.pointing_error import pointing_errors, pointing_names
 from ..simulation.run import run
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario, in_long_form
 from ..worker_threads import thread_pool
 from .causes import CAUSES, VARIANTS, present, without
 from .robustness import ROBUSTNESS, SPEEDS
@@ -153,7 +152,7 @@ def pointing_budget(
     >>> {axis: f"{1e3 * error.rms:.2g} mrad" for axis, error in budget.whole.items()}
     {'motor': '0.0019 mrad'}
     """
-    loaded = in_long_form(scenario)
+    loaded = scenario.long()
     given = None if after is None else argument("after", after, "s")
     _check(loaded, given or 0.0)
     as_it_is = _run(loaded)
@@ -164,7 +163,7 @@ def pointing_budget(
     )
     angles = _view(loaded, view or {})
     cases = _cases(loaded, robustness=robustness)
-    changed: dict[Case, TrainScenario] = {}
+    changed: dict[Case, Scenario] = {}
     known = {loaded: _numbers(as_it_is, start)}
     with thread_pool(os.cpu_count()) as pool:
         others = (one for one in _different(loaded, cases, changed) if one != loaded)
@@ -205,7 +204,7 @@ def pointing_budget(
     )
 
 
-def _end_of_transient(scenario: TrainScenario, as_it_is: Found) -> tuple[float, str]:
+def _end_of_transient(scenario: Scenario, as_it_is: Found) -> tuple[float, str]:
     """From when on errors do not depend on how the axes start [s], and the line that says so."""
     time, first, _ = as_it_is
     second = _run(without(scenario, [_other_start(scenario)]) or scenario)[1]
@@ -232,7 +231,7 @@ def first_gap(times: np.ndarray, quiet: float) -> float:
     return end
 
 
-def _other_start(scenario: TrainScenario) -> Callable[[dict[str, Any]], None]:
+def _other_start(scenario: Scenario) -> Callable[[dict[str, Any]], None]:
     """On the reference; where the axes begin on it, at rest there."""
     angles = dict(scenario.begin().angles)
 
@@ -248,7 +247,7 @@ Case = tuple[str, Any]
 """what a run is for, and its name there"""
 
 
-def _cases(scenario: TrainScenario, *, robustness: bool = True) -> dict[Case, Sequence[Callable[..., None]]]:
+def _cases(scenario: Scenario, *, robustness: bool = True) -> dict[Case, Sequence[Callable[..., None]]]:
     """The runs of a budget, with what each changes."""
     causes = present(scenario, CAUSES)
     names = list(causes)
@@ -268,10 +267,10 @@ def _cases(scenario: TrainScenario, *, robustness: bool = True) -> dict[Case, Se
 
 def runs_of(scenario: Scenario) -> int:
     """Number of runs of a budget, without those that find the end of the start-up transient."""
-    return len(_cases(in_long_form(scenario)))
+    return len(_cases(scenario.long()))
 
 
-def _check(scenario: TrainScenario, after: float) -> None:
+def _check(scenario: Scenario, after: float) -> None:
     if not scenario.axes():
         raise InputError("the scenario has no controller; add [controller], or [controllers.MOTOR] for each axis")
     for motor, controller in scenario.axes().items():
@@ -286,7 +285,7 @@ def _check(scenario: TrainScenario, after: float) -> None:
         )
 
 
-def _view(scenario: TrainScenario, view: Mapping[str, float | str]) -> dict[str, float]:
+def _view(scenario: Scenario, view: Mapping[str, float | str]) -> dict[str, float]:
     for motor in view:
         if motor not in scenario.axes():
             names = ", ".join(scenario.axes())
@@ -302,7 +301,7 @@ def _view(scenario: TrainScenario, view: Mapping[str, float | str]) -> dict[str,
     return angles
 
 
-def _units(scenario: TrainScenario) -> dict[str, str]:
+def _units(scenario: Scenario) -> dict[str, str]:
     """Unit of the position that each axis controls, by its motor."""
     return {motor: scenario.train().angle_unit(scenario.controlled(motor)) for motor in scenario.axes()}
 
@@ -312,10 +311,10 @@ Found = tuple[np.ndarray, dict[str, np.ndarray], dict[str, np.ndarray]]
 
 
 def _different(
-    scenario: TrainScenario,
+    scenario: Scenario,
     cases: Mapping[Case, Sequence[Callable[..., None]]],
-    changed: dict[Case, TrainScenario],
-) -> Iterator[TrainScenario]:
+    changed: dict[Case, Scenario],
+) -> Iterator[Scenario]:
     """The scenarios of the cases, each once: different changes may leave the same. Enters in `changed` which case has which."""
     seen = set()
     for case, changes in cases.items():
@@ -325,7 +324,7 @@ def _different(
             yield one
 
 
-def _run(scenario: TrainScenario) -> Found:
+def _run(scenario: Scenario) -> Found:
     result = run(scenario, energy=False)
     found, measured = {}, {}
     true = pointing_errors(scenario, result)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any, TypeVar
 
 from ..model.linear_train import LINEAR_DRIVES
-from ..simulation.train_scenario import TrainScenario
+from ..simulation.scenario import Scenario
 
 Tables = dict[str, Any]
 K = TypeVar("K")
@@ -136,18 +136,18 @@ VARIANTS: dict[str, Callable[[Tables], None]] = {
 """other controllers of the same axes"""
 
 
-def present(scenario: TrainScenario, table: Mapping[K, Callable[[Tables], None]]) -> dict[K, Callable[[Tables], None]]:
+def present(scenario: Scenario, table: Mapping[K, Callable[[Tables], None]]) -> dict[K, Callable[[Tables], None]]:
     """Changes of a table that change the scenario at all."""
     return {name: change for name, change in table.items() if _changed(scenario, [change]) is not None}
 
 
-def without(scenario: TrainScenario, changes: list[Callable[[Tables], None]]) -> TrainScenario | None:
+def without(scenario: Scenario, changes: list[Callable[[Tables], None]]) -> Scenario | None:
     """The scenario after the changes; None if they change nothing."""
     data = _changed(scenario, changes)
-    return None if data is None else TrainScenario(**data)
+    return None if data is None else Scenario(**data)
 
 
-def _changed(scenario: TrainScenario, changes: list[Callable[[Tables], None]]) -> Tables | None:
+def _changed(scenario: Scenario, changes: list[Callable[[Tables], None]]) -> Tables | None:
     data, before = (scenario.model_dump(exclude_none=True) for _ in range(2))
     for change in changes:
         change(data)

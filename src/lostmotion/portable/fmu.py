@@ -25,7 +25,6 @@ from ..simulation.needs import need_no_impacts
 from ..simulation.results import variables_of
 from ..simulation.run import run
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario, in_long_form
 from ..simulation.train_variables import axis_variables
 from . import fmi2, fmi3
 from .checkout import made_here
@@ -131,7 +130,7 @@ def export_fmu(
     if not controllers:
         scenario = scenario.without_controllers()
     if motion_inputs:
-        scenario = _with_given(in_long_form(scenario), motion_inputs)
+        scenario = _with_given(scenario.long(), motion_inputs)
     if references:
         _check_references(scenario)
     if libraries is None:
@@ -186,7 +185,7 @@ def _libraries(directory: Any, places: Mapping[str, tuple[str, str]], kernel: st
     return found
 
 
-def _with_given(scenario: TrainScenario, names: Sequence[str]) -> TrainScenario:
+def _with_given(scenario: Scenario, names: Sequence[str]) -> Scenario:
     """The scenario with the motions of these shafts and slides given: where they are not, by their speed at t = 0."""
     start, known = scenario.start(), {**scenario.shafts, **scenario.slides}
     changes: dict[str, Any] = {}

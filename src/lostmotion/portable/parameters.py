@@ -87,7 +87,7 @@ def parameters_of(scenario: Scenario, numbers: Numbers) -> Parameters:
         if isinstance(law, str):
             refused[key] = law
         elif law:
-            found.append(Parameter(key, unit or "1", value, law, limit_in(type(scenario), key)))
+            found.append(Parameter(key, unit or "1", value, law, limit_in(type(scenario.written), key)))
     return _together(scenario, found, refused, base, numbers)
 
 

@@ -17,7 +17,7 @@ from ..identification.prepare import Prepared
 from ..model.gear import Gear
 from ..model.losses import LossMap, MeshEfficiency, WormMesh, efficiency_map
 from ..model.train import DriveTrain
-from ..simulation.train_scenario import TrainScenario
+from ..simulation.scenario import Scenario
 from ..units.conversion import si_factor
 from ..units.practical import printed
 from .looks import FAINT, MEASURED, PALETTE, look
@@ -392,7 +392,7 @@ def friction_curves(result: IdentificationResult, shaft: str) -> tuple[Curve, ..
     return tuple(replace(c, style=look(k)) for k, c in enumerate(found.values()))
 
 
-def _phases(result: IdentificationResult) -> list[tuple[str, TrainScenario]]:
+def _phases(result: IdentificationResult) -> list[tuple[str, Scenario]]:
     """The rig in each phase of the task, with the values found, by what the phase is."""
     rig, first = result.rig, result.logs[0]
     assert rig is not None
@@ -401,7 +401,7 @@ def _phases(result: IdentificationResult) -> list[tuple[str, TrainScenario]]:
     return [(str(p.when), rig.built(c).scenario) for p, c in zip(result.task.phases, changes, strict=True)]
 
 
-def friction_curve(scenario: TrainScenario, name: str, label: str) -> Curve | None:
+def friction_curve(scenario: Scenario, name: str, label: str) -> Curve | None:
     """Friction of a shaft and of the bearings of its motors over speed; none without any."""
     train = scenario.train()
     shaft = train.shafts[name]

@@ -11,7 +11,6 @@ from ..simulation.results import RunArrays, energy_of, is_train_result, whole
 from ..simulation.scenario import Scenario
 from ..simulation.switchings import ATTRIBUTE as SWITCHINGS
 from ..simulation.switchings import MESH_STEP, names_in, unpacked
-from ..simulation.train_scenario import TrainScenario
 from ..simulation.windings import errors_of
 from ..units.practical import charted, practical, printed
 
@@ -111,7 +110,7 @@ def error_lines(result: xarray.Dataset | RunArrays) -> list[str]:
 
 def train_summary(result: xarray.Dataset | RunArrays) -> str:
     """A run of a drive train in a few lines: each element at the end and at its peak, and the energy."""
-    scenario = TrainScenario.from_json(result.attrs["scenario"])
+    scenario = Scenario.from_json(result.attrs["scenario"])
     train = scenario.train()
 
     def end_and_peak(name: str, unit: str, *, small: bool = False) -> str:

@@ -13,10 +13,8 @@ from ..inputs.validation import shown
 from ..live_page.drawn import axis_figures
 from ..model.losses import LossMap
 from ..model.train import DriveTrain
-from ..simulation.drive_scenario import short_form
 from ..simulation.results import energy_of, is_train_result, scenario_of
 from ..simulation.train_parts import parts_of
-from ..simulation.train_scenario import in_long_form
 from ..units.practical import charted
 from .looks import FAINT, look
 from .panels import Chart, Contacts, Curve, Flows, Ground, Panel
@@ -144,7 +142,7 @@ def _drive(result: xarray.Dataset) -> Iterator[Chart]:
 def _ratio(result: xarray.Dataset) -> float:
     if "gear_ratio" in result.attrs:
         return float(result.attrs["gear_ratio"])
-    return short_form(scenario_of(result), "figure").gearbox.ratio
+    return float(scenario_of(result).short_form("figure").gearbox.ratio)
 
 
 def _contacts(result: xarray.Dataset, names: Mapping[str, str]) -> Contacts:
@@ -153,7 +151,7 @@ def _contacts(result: xarray.Dataset, names: Mapping[str, str]) -> Contacts:
 
 def _train(result: xarray.Dataset) -> Iterator[Chart]:
     """Charts of a drive train: commands, speeds, torques, twists and contacts of all elements."""
-    scenario = in_long_form(scenario_of(result))
+    scenario = scenario_of(result).long()
     train = scenario.train()
     loads = [(train.load_torque_of(name), f"load on {name}", name) for name in scenario.loaded()]
     outputs = [(train.output_torque_of(name), name, gear.output) for name, gear in train.gears.items()]

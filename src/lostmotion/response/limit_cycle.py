@@ -12,7 +12,7 @@ from .. import _core
 from ..errors import InputError
 from ..simulation.core_runs import core_case, core_run
 from ..simulation.needs import need_free_motion
-from ..simulation.train_scenario import TrainScenario
+from ..simulation.scenario import Scenario
 from .shooting import PERIODICITY, SAMPLES_PER_PERIOD, reason_of
 from .standstill import FOREVER, NOTHING_MOVES, Outlook, Verdict, Watch, frequency_of
 
@@ -65,10 +65,10 @@ class Loop:
     watched: str
     """the channel whose swing is looked at"""
     channels: tuple[str, ...]
-    scenario: TrainScenario
+    scenario: Scenario
 
     @classmethod
-    def of(cls, scenario: TrainScenario) -> Loop:
+    def of(cls, scenario: Scenario) -> Loop:
         """Loop of a scenario whose inputs come to rest.
 
         Raises

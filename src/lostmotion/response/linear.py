@@ -18,9 +18,9 @@ from ..model.losses import ConstantEfficiency
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
 from ..simulation.core_runs import core_case
-from ..simulation.drive_scenario import DriveScenario, Initial, capacities_of, drive_of, state_of
+from ..simulation.drive_tables import Initial
 from ..simulation.needs import need_free_motion, need_open_loop
-from ..simulation.scenario import Scenario
+from ..simulation.scenario import Scenario, drive_of
 from ..simulation.stepping import Simulation
 from ..simulation.train_parts import NO_CONTACT
 from ..simulation.train_ports import loaded_train
@@ -219,7 +219,7 @@ def linearize(
     if time is not None:
         _refuse(given, "at a time of a run, state and inputs are its own")
         return _model_of_run(drive, time)
-    if not isinstance(drive, Drive | DriveScenario):
+    if not isinstance(drive, Drive) and not (isinstance(drive, Scenario) and drive.is_drive):
         names = ("command", "load_torque", *rates)
         _refuse({name: given[name] for name in names}, "a train takes its inputs by name, in inputs and input_rates")
         return _model_of_train(drive, state, inputs or {}, input_rates or {})
@@ -234,7 +234,10 @@ def linearize(
         state = Initial()
     ramps = [_ramp(command, rates["command_rate"]), _ramp(load_torque, rates["load_torque_rate"])]
     core = drive.core()
-    return _model(drive.train(), core, *_core.linearize_at(core, ramps, state_of(state), capacities_of(state), 0.0))
+    start, of_train = start_values(drive.named_train(), state.of_train()), state.of_train()
+    return _model(
+        drive.train(), core, *_core.linearize_at(core, ramps, start, dict(of_train.hysteresis_capacities), 0.0)
+    )
 
 
 def _refuse(given: dict[str, bool], why: str) -> None:

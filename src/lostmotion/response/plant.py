@@ -14,7 +14,6 @@ from ..errors import InputError
 from ..inputs.validation import listed, shown
 from ..model.drive import Drive
 from ..model.signals import Signal
-from ..simulation.drive_scenario import of_drive
 from ..simulation.needs import need_free_motion, need_open_loop
 from ..simulation.scenario import Scenario
 from ..simulation.train_variables import axis_variables
@@ -158,7 +157,7 @@ def plant_or_loop(drive: Drive | Scenario) -> Plant:
 
 def _scenario_of(what: Drive | Scenario) -> Scenario:
     """A scenario, or that of a drive without inputs, whose times are not used."""
-    return what if isinstance(what, Scenario) else of_drive(what, duration=1.0, sample_interval=1.0)
+    return what if isinstance(what, Scenario) else Scenario.of_drive(what, duration=1.0, sample_interval=1.0)
 
 
 def _plant_of(scenario: Scenario) -> Plant:

@@ -13,7 +13,7 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Time
 from ..model.drive import Drive
 from ..model.losses import ConstantEfficiency
-from ..simulation.drive_scenario import DriveScenario, drive_of
+from ..simulation.scenario import Scenario, drive_of
 
 if TYPE_CHECKING:
     pass
@@ -41,13 +41,13 @@ class RigidConstants:
 
 @checked
 def rigid_constants(
-    drive: Drive | DriveScenario, *, motor_time_constant: Time | None = None, time_constant: Time | None = None
+    drive: Drive | Scenario, *, motor_time_constant: Time | None = None, time_constant: Time | None = None
 ) -> RigidConstants:
     """Return the constants of (8) to (11) of a rigid drive.
 
     Parameters
     ----------
-    drive : Drive or DriveScenario
+    drive : Drive or Scenario
         A drive with a DC motor and a constant efficiency.
     motor_time_constant, time_constant : float, optional
         Time constants [s] that replace computed ones.

@@ -14,7 +14,7 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Count, Number, Torque
 from ..model.drive import Drive
 from ..model.signals import CommandSignal, Signal, TorqueSignal
-from ..simulation.drive_scenario import Initial
+from ..simulation.drive_tables import Initial
 from ..simulation.scenario import Scenario
 from ..simulation.train_tables import TrainInitial
 from .plant import Plant, plant_of

@@ -20,7 +20,6 @@ from ..model.angle_torques import AngleCurve, Harmonic
 from ..model.train import DriveTrain
 from ..simulation.run import run
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario, in_long_form
 
 if TYPE_CHECKING:
     import xarray
@@ -140,7 +139,7 @@ def spectrum(
     --------
     >>> import math
     >>> import lostmotion as lm
-    >>> drive = lm.TrainScenario(
+    >>> drive = lm.Scenario(
     ...     shafts={"motor": {}, "load": {"inertia": 1e-3, "torque": 0.0}},
     ...     motors={"m": {"shaft": "motor", "kind": "torque_source", "rotor_inertia": 1e-3, "rated_torque": 1.0}},
     ...     gears={
@@ -166,7 +165,7 @@ def spectrum(
     """
     if against is not None and against not in AGAINST:
         raise InputError(f"against: {shown(against)} is not known; take reference or motor")
-    long = in_long_form(scenario)
+    long = scenario.long()
     train = long.train()
     name = _motor(train, motor)
     over = train.motors[name].shaft
@@ -257,7 +256,7 @@ def _of(data: xarray.Dataset, train: DriveTrain, shaft: str) -> tuple[np.ndarray
     return data["time"].values, data[train.angle_of(shaft)].values, data[f"{shaft}_speed"].values
 
 
-def _window(long: TrainScenario, train: DriveTrain, over: str, start: float | None) -> tuple[float, float]:
+def _window(long: Scenario, train: DriveTrain, over: str, start: float | None) -> tuple[float, float]:
     """Begin of the evaluated part [s], and the speed of the motor in it [rad/s]; refused where that is not constant."""
     duration = long.simulation.duration
     begin = 0.5 * duration if start is None else start
@@ -276,7 +275,7 @@ def _window(long: TrainScenario, train: DriveTrain, over: str, start: float | No
     return begin, float(halves.mean())
 
 
-def _sampled(long: TrainScenario, over: str, window: tuple[float, float], highest: float) -> tuple[xarray.Dataset, int]:
+def _sampled(long: Scenario, over: str, window: tuple[float, float], highest: float) -> tuple[xarray.Dataset, int]:
     """The run, with samples dense enough for the highest order; and the index of the first that is evaluated."""
     begin, speed = window
     duration = long.simulation.duration
@@ -380,7 +379,7 @@ def _cause(order: float, width: float, sources: list[tuple[str, float, bool]]) -
     return f"not decided: {' or '.join(named)}" if named else NOT_STATED
 
 
-def _sources(long: TrainScenario, train: DriveTrain, over: str) -> Iterator[tuple[str, float, bool]]:
+def _sources(long: Scenario, train: DriveTrain, over: str) -> Iterator[tuple[str, float, bool]]:
     """Name, order per turn of the motor, and presence of multiples, for each part that states a period."""
 
     def of(shaft: str, order: float) -> float:

@@ -18,9 +18,9 @@ from typing import Literal
 import numpy as np
 
 from ..simulation.explanation import explain
+from ..simulation.scenario import Scenario
 from ..simulation.simulation_state import SimulationState
 from ..simulation.stepping import Simulation
-from ..simulation.train_scenario import TrainScenario
 from .closed_loop import running_slots
 from .closed_response import frame_of
 
@@ -90,7 +90,7 @@ class _Look:
 class Watch:
     """A scenario from the instant on at which its inputs have come to rest."""
 
-    def __init__(self, scenario: TrainScenario, names: Sequence[str]) -> None:
+    def __init__(self, scenario: Scenario, names: Sequence[str]) -> None:
         self.simulation = Simulation(scenario)
         self.core = self.simulation._core
         self.names = tuple(names)
@@ -107,7 +107,7 @@ class Watch:
 
     # --- time ---
 
-    def _begin(self, scenario: TrainScenario) -> None:
+    def _begin(self, scenario: Scenario) -> None:
         """Advances to the middle of a tick after all inputs have come to rest."""
         signals = {name: s for name, s in scenario.signals().items() if name in self.simulation.inputs}
         points = {name: s.breakpoint_list() for name, s in signals.items()}
@@ -407,7 +407,7 @@ def _why(watch: Watch, outlook: Outlook) -> str:
     return f"{watch.names[k]} still moves by {last[k]:.3g} {unit}, {last[k] / max(before[k], last[k] * 1e-9):.3g} of the time before"
 
 
-def moving_input(scenario: TrainScenario) -> str:
+def moving_input(scenario: Scenario) -> str:
     """The name of an input that never comes to rest; empty if all do."""
     signals = {name: (s.sine_list(), s.breakpoint_list()[-1][2:]) for name, s in scenario.signals().items()}
     signals |= {

@@ -19,7 +19,7 @@ from .. import _core
 from ..control.turning import turns
 from ..errors import InputError
 from ..model.torsion import Rigid
-from ..simulation.train_scenario import TrainScenario
+from ..simulation.scenario import Scenario
 from ..simulation.train_tables import TrainInitial
 from .limit_cycle import Loop
 from .linear import LinearModel, train_model
@@ -86,7 +86,7 @@ class StickSlip:
         return self.breakaway - self.sliding
 
 
-def stick_slip(scenario: TrainScenario) -> StickSlip:
+def stick_slip(scenario: Scenario) -> StickSlip:
     """The regimes of a scenario with one continuous position controller.
 
     Raises
@@ -112,7 +112,7 @@ def stick_slip(scenario: TrainScenario) -> StickSlip:
     return _Builder(loop, motor, shaft, still, forward, reverse).build(breakaway)
 
 
-def _motor(scenario: TrainScenario) -> str:
+def _motor(scenario: Scenario) -> str:
     found = scenario.continuous()
     if len(found) != 1 or scenario.axes():
         raise InputError(

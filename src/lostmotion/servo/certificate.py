@@ -19,7 +19,6 @@ from ..response.return_map import Image, Transients, image
 from ..response.standstill import moving_input
 from ..response.stick_slip import AtRestError, StickSlip, UndecidableError, stick_slip
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario, in_long_form
 from .motion import at_rest
 from .regimes import Axis, axis_of
 from .sampled_proof import map_without_steps, prove_sampled, reached_by_run
@@ -141,7 +140,7 @@ def hunting_certificate(scenario: Scenario, *, largest_error: float | str | None
     >>> certificate.verdict, round(1e3 * certificate.fixed_points[0].amplitude, 3)
     ('hunts', 5.762)
     """
-    train = in_long_form(scenario)
+    train = scenario.long()
     if largest_error is not None:
         largest_error = argument("largest_error", largest_error, _unit(train))
         if not largest_error > 0.0:
@@ -243,7 +242,7 @@ def _sampled_travel(axis: Axis) -> float:
     return float(np.abs(np.append(axis.controller.reference.at(times)[0], 0.0)).max()) or 1.0
 
 
-def _sampled_map(of: SampledSlip, proof: Proof, train: TrainScenario) -> xarray.Dataset | None:
+def _sampled_map(of: SampledSlip, proof: Proof, train: Scenario) -> xarray.Dataset | None:
     """Error left by a slip without the steps of the encoder, about a band; None without one."""
     import xarray as xr
 
@@ -260,13 +259,13 @@ def _sampled_map(of: SampledSlip, proof: Proof, train: TrainScenario) -> xarray.
     )
 
 
-def _unit(train: TrainScenario) -> str:
+def _unit(train: Scenario) -> str:
     """Unit of the error of the only controller."""
     shafts = [c.shaft for c in train.continuous().values()] + [c.shaft for c in train.axes().values()]
     return train.train().angle_unit((shafts or [None])[0] or list(train.train().shafts)[-1])
 
 
-def _travel(train: TrainScenario) -> float:
+def _travel(train: Scenario) -> float:
     """Largest distance of the reference from where it begins; 1 where it never moves."""
     ((motor, controller),) = train.continuous().items()
     points = controller.signals(motor)[f"{motor}_reference"].breakpoint_list()
@@ -355,7 +354,7 @@ def _fixed_point(of: StickSlip, a: float, b: float, at_a: float, at_b: float) ->
     return FixedPoint(error, sum(found.slip) + sum(found.stuck), (slope - 1.0) ** 2)
 
 
-def _dataset(of: StickSlip, points: list[tuple[float, Image]], verdict: str, train: TrainScenario) -> xarray.Dataset:
+def _dataset(of: StickSlip, points: list[tuple[float, Image]], verdict: str, train: Scenario) -> xarray.Dataset:
     import xarray as xr
 
     unit = _unit(train)

@@ -19,7 +19,6 @@ from ..response.plant import known_output, plant_of
 from ..response.shooting import floquet_multipliers, is_stable, motion_of
 from ..response.standstill import Verdict
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario, in_long_form
 from ..simulation.units_of_keys import unit_for
 from ..worker_threads import thread_pool
 from .motion import PART, at_rest, without_backlash, without_friction
@@ -110,7 +109,7 @@ def limit_cycle(scenario: Scenario, *, motor: str | None = None, causes: bool = 
     >>> hunting.verdict, round(hunting.period, 3)
     ('hunts', 2.841)
     """
-    train = in_long_form(scenario)
+    train = scenario.long()
     if train.axes():
         if train.continuous():
             raise InputError(
@@ -127,7 +126,7 @@ def limit_cycle(scenario: Scenario, *, motor: str | None = None, causes: bool = 
     return Hunting("hunts", "", True, 1.0 / found.period, amplitudes, motion, _multipliers(found), found_causes)
 
 
-def _found(train: TrainScenario) -> Found:
+def _found(train: Scenario) -> Found:
     return find_limit_cycle(Loop.of(train), train.simulation.duration)
 
 
@@ -141,7 +140,7 @@ def _swing(found: Found, name: str) -> float:
     return 0.0 if found.reason else float(np.ptp(found.values(name)))
 
 
-def _causes(train: TrainScenario, found: Found) -> tuple[str, ...]:
+def _causes(train: Scenario, found: Found) -> tuple[str, ...]:
     watched = Loop.of(train).watched
     low = PART * _swing(found, watched)
     left_out = {
@@ -153,7 +152,7 @@ def _causes(train: TrainScenario, found: Found) -> tuple[str, ...]:
     return tuple(name for name, other in left_out.items() if other is not None and _swing(_found(other), watched) < low)
 
 
-def without_static_friction(train: TrainScenario) -> TrainScenario | None:
+def without_static_friction(train: Scenario) -> Scenario | None:
     """With the friction in motion at rest, too; None where that changes nothing."""
     new = {}
     for table in ("shafts", "brakes", "clutches"):
@@ -168,7 +167,7 @@ def without_static_friction(train: TrainScenario) -> TrainScenario | None:
     return train.model_copy(update=new) if new else None
 
 
-def without_saturation(train: TrainScenario) -> TrainScenario | None:
+def without_saturation(train: Scenario) -> Scenario | None:
     """Without the limits of continuous controllers and of their motors; None where that changes nothing."""
     controllers = {
         name: c.model_copy(update={"limit": None, "anti_windup_time": None}) for name, c in train.continuous().items()
@@ -182,7 +181,7 @@ def without_saturation(train: TrainScenario) -> TrainScenario | None:
     return train.model_copy(update={"controllers": {**train.controllers, **controllers}, "motors": motors})
 
 
-def _sampled(train: TrainScenario, motor: str | None, *, causes: bool) -> Hunting:
+def _sampled(train: Scenario, motor: str | None, *, causes: bool) -> Hunting:
     """By a long run, as the servo report has it."""
     from .motion import limit_cycle as watched
 
@@ -247,7 +246,7 @@ def hunting_map(
     """
     import xarray as xr
 
-    train = in_long_form(scenario)
+    train = scenario.long()
     keys = {key: np.atleast_1d(np.asarray(values)) for key, values in grid.items()}
     if not 1 <= len(keys) <= 2 or not all(v.ndim == 1 and len(v) for v in keys.values()):
         raise InputError(f"grid: {shown(dict(grid))} must give values for one or two keys")
@@ -261,7 +260,7 @@ def hunting_map(
     def point(index: tuple[int, ...]) -> tuple[float, float, bool, str, str]:
         nonlocal done
         changes = {key: values[k].item() for (key, values), k in zip(keys.items(), index, strict=True)}
-        result = _point(in_long_form(scenario.replace(**changes)), of)
+        result = _point(scenario.replace(**changes).long(), of)
         done += 1
         if progress is not None:
             progress(done)
@@ -285,13 +284,13 @@ def hunting_map(
     return xr.Dataset(data, coords=coords, attrs={"variable": of})
 
 
-def _named(train: TrainScenario, key: str) -> dict[str, str]:
+def _named(train: Scenario, key: str) -> dict[str, str]:
     """Attributes of the values of a key."""
     unit = unit_for(train, key)
     return {"long_name": key} | ({} if unit is None else {"units": unit or "1"})
 
 
-def _point(train: TrainScenario, variable: str) -> tuple[float, float, bool, str, str]:
+def _point(train: Scenario, variable: str) -> tuple[float, float, bool, str, str]:
     """Amplitude, frequency, stable, verdict, reason."""
     if train.axes():
         hunting = limit_cycle(train, causes=False)

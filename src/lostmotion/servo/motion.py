@@ -18,7 +18,7 @@ from ..model.torsion import TorsionCurve
 from ..response.closed_loop import slowest
 from ..response.standstill import Verdict, Watch, decide, moving_input
 from ..simulation.run import run
-from ..simulation.train_scenario import TrainScenario
+from ..simulation.scenario import Scenario
 from .data import inertias
 from .regimes import Axis, speed_of
 
@@ -84,7 +84,7 @@ def ran(axis: Axis, **simulation: float) -> RunArrays:
     return run(scenario, energy=False)
 
 
-def changed(scenario: TrainScenario, **fields: Any) -> TrainScenario:
+def changed(scenario: Scenario, **fields: Any) -> Scenario:
     """The scenario with other fields."""
     return scenario.model_copy(update=fields)
 
@@ -340,7 +340,7 @@ def _left_out(axis: Axis, count: int) -> Iterator[tuple[str, Axis]]:
             yield " with ".join(names), other
 
 
-def _with(axis: Axis, scenario: TrainScenario | None) -> Axis | None:
+def _with(axis: Axis, scenario: Scenario | None) -> Axis | None:
     return None if scenario is None else Axis(scenario, axis.motor)
 
 
@@ -367,14 +367,14 @@ def at_rest(axis: Axis, most: float = math.inf) -> AtRest:
     return AtRest(found.verdict, found.reason, found.watched, motor, load, found.frequency)
 
 
-def _changed_all(scenario: TrainScenario, table: str, change: Any) -> TrainScenario | None:
+def _changed_all(scenario: Scenario, table: str, change: Any) -> Scenario | None:
     """With all elements of a table changed; None where that changes nothing."""
     elements = getattr(scenario, table)
     new: dict[str, Part] = {name: change(element) for name, element in elements.items()}
     return None if new == dict(elements) else changed(scenario, **{table: new})
 
 
-def without_backlash(scenario: TrainScenario) -> TrainScenario | None:
+def without_backlash(scenario: Scenario) -> Scenario | None:
     """With all gaps closed; None where there are none."""
 
     def change(gear: Any) -> Any:
@@ -386,7 +386,7 @@ def without_backlash(scenario: TrainScenario) -> TrainScenario | None:
     return _changed_all(scenario, "gears", change)
 
 
-def without_friction(scenario: TrainScenario) -> TrainScenario | None:
+def without_friction(scenario: Scenario) -> Scenario | None:
     """Without dry friction and hysteresis; None where there are none."""
     none = {
         "friction_torque": 0.0,

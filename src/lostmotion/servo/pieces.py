@@ -118,6 +118,13 @@ class Pieces:
         return self.between(low, high)
 
 
+def _zero_between(values: np.ndarray, strip: np.ndarray) -> np.ndarray:
+    """Where a line that has these values at both ends of a strip is zero, or the end that is nearer."""
+    change = values[:, 1] - values[:, 0]
+    share = np.where(change == 0.0, 0.0, -values[:, 0] / np.where(change == 0.0, 1.0, change))
+    return np.asarray(strip[:, 0] + np.clip(share, 0.0, 1.0) * (strip[:, 1] - strip[:, 0]))
+
+
 def kept_beside(pieces: Pieces, bound: np.ndarray, side: float) -> tuple[Pieces, np.ndarray]:
     """The parts with x below (1) or above (-1) a line, given at both values of w, and which piece each comes from.
 
@@ -129,13 +136,7 @@ def kept_beside(pieces: Pieces, bound: np.ndarray, side: float) -> tuple[Pieces,
         inner, outer = pieces.above, pieces.below
     reach, over = side * (bound - inner), side * (bound - outer)  # some of it is kept; all of it is kept
     w, width = pieces.strip, pieces.strip[:, 1] - pieces.strip[:, 0]
-
-    def crossing(values: np.ndarray) -> np.ndarray:
-        change = values[:, 1] - values[:, 0]
-        share = np.where(change == 0.0, 0.0, -values[:, 0] / np.where(change == 0.0, 1.0, change))
-        return np.asarray(w[:, 0] + np.clip(share, 0.0, 1.0) * width)
-
-    some, whole = crossing(reach), crossing(over)
+    some, whole = _zero_between(reach, w), _zero_between(over, w)
     none = math.inf
     # w for which something is kept
     low = np.where(reach[:, 0] >= 0.0, -none, np.where(reach[:, 1] >= 0.0, some, none))

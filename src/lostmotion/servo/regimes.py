@@ -21,7 +21,6 @@ from ..model.torsion import Elastic, Rigid
 from ..response.linear import LinearModel, train_model
 from ..simulation.needs import need_free_motion
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario, in_long_form
 from ..simulation.train_state import start_values
 from ..simulation.train_tables import TrainInitial
 from ..units.practical import charted, printed
@@ -40,7 +39,7 @@ BEYOND = 1.5  # times the last breakpoint: a twist in the last piece of a torsio
 class Axis:
     """One motor under a controller, in a scenario of the long form."""
 
-    scenario: TrainScenario
+    scenario: Scenario
     motor: str
 
     @cached_property
@@ -137,7 +136,7 @@ def axis_of(scenario: Scenario, motor: str | None = None) -> Axis:
         raise InputError(
             f"the controller of {name} has a firmware, whose duty cycle is not linear in the error; see its answers with response"
         )
-    axis = _loaded(Axis(in_long_form(scenario), name))
+    axis = _loaded(Axis(scenario.long(), name))
     if not axis.loops:
         raise InputError(
             f'the controller of {name} closes no loop; give it a speed loop, or current.kind = "pi" or "field_oriented"'

@@ -1,5 +1,5 @@
 from .batches import BatchState as BatchState
-from .drive_scenario import DriveScenario as DriveScenario
+from .drive_tables import DriveTables as DriveTables
 from .explanation import ContactState as ContactState
 from .explanation import Explanation as Explanation
 from .explanation import MotorState as MotorState
@@ -10,5 +10,6 @@ from .simulation_answers import SimulationSnapshot as SimulationSnapshot
 from .simulation_state import SimulationState as SimulationState
 from .train_tables import ShaftTable as ShaftTable
 from .train_tables import SlideTable as SlideTable
+from .train_tables import TrainTables as TrainTables
 from .variables import VARIABLES as VARIABLES
 from .variables import Variable as Variable

@@ -5,15 +5,13 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from copy import deepcopy
-from functools import partial
 from typing import Any
 
 from ..errors import InputError
 from ..inputs.validation import did_you_mean, shown
-from .drive_scenario import json_schema
-from .keys import renamed
-from .scenario import RECORD_NAME
-from .train_scenario import TrainScenario, train_from_tables, train_schema
+from .drive_tables import drive_schema
+from .tables import RECORD_NAME
+from .train_tables import train_schema
 
 DRIVES = {"screw": "screws", "rack": "racks", "belt": "belts"}
 MOTOR, SLIDE, GEARBOX = "motor", "slide", "gearbox"  # names in the long form; the drive is called after its kind
@@ -34,22 +32,6 @@ BESIDE = ("title", "task", "command", "controller", "initial", "simulation")
 def is_axis(tables: Mapping[str, Any]) -> bool:
     """Whether the tables of a scenario are in the short form of a linear axis."""
     return "axis" in tables
-
-
-def axis_from_tables(tables: Mapping[str, Any]) -> TrainScenario:
-    """The scenario of such tables: shafts `motor` and, behind a gearbox, that of the drive; slide `slide`.
-
-    Raises
-    ------
-    InputError
-        A value cannot be used.
-    """
-    return train_from_tables(long_form(tables), partial(renamed, names=KEYS)).as_axis()
-
-
-def key_in_file(scenario: TrainScenario, key: str) -> str:
-    """A dotted key of the long form as the file of the scenario has it."""
-    return renamed(key, KEYS) if scenario.is_axis else key
 
 
 def long_form(tables: Mapping[str, Any]) -> dict[str, Any]:
@@ -168,7 +150,7 @@ def file_schema() -> dict[str, Any]:
         renamed: dict[str, Any] = json.loads(json.dumps(schema).replace('"#/$defs/', '"#/$defs/train_'))
         return renamed
 
-    of_drive, long, axis = json_schema(), of_train(train_schema()), of_train(axis_schema())
+    of_drive, long, axis = drive_schema(), of_train(train_schema()), of_train(axis_schema())
     of_drive["properties"]["controller"]["anyOf"].append({"$ref": "#/$defs/train_ContinuousController"})
     axis.pop("$defs")
     definitions = of_drive.pop("$defs") | {f"train_{name}": node for name, node in long.pop("$defs").items()}

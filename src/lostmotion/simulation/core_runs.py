@@ -11,7 +11,6 @@ from ..inputs.kept import kept
 from ..worker_threads import thread_pool
 from .scenario import Scenario
 from .train_parts import SIDE_BY_SIDE, control_of_part, joined_results, parts_of
-from .train_scenario import TrainScenario, in_long_form
 
 Case = tuple[_core.Train, Sequence[_core.Signal], Mapping[str, float], Mapping[str, float]]
 """train, inputs, state and hysteresis capacities by name"""
@@ -49,9 +48,9 @@ def core_result(scenario: Scenario, options: tuple[Any, ...], control: Bound) ->
     if len(parts) == 1:
         case = core_case(scenario)
         return case[0], core_run(case, options, control)
-    whole = in_long_form(scenario)
+    whole = scenario.long()
 
-    def solved(part: TrainScenario) -> dict[str, Any]:
+    def solved(part: Scenario) -> dict[str, Any]:
         core, result = core_result(part, options, control_of_part(control, whole, part))
         names = {"channels": [name for name, *_ in core.channels()], "contacts": core.contact_names()}
         return result | names

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 from typing import Any
 
+from ..control.continuous import ContinuousController
 from ..errors import InputError
-from .drive_scenario import from_tables
-from .keys import renamed
-from .scenario import Scenario
-from .train_scenario import TrainScenario, in_long_form
+from .drive_tables import GEARBOX, LOAD, MOTOR, DriveTables
 
-MOTOR, LOAD, GEARBOX = "motor", "load", "gearbox"  # names in the long form
 GIVEN = ("speed", "motion")
 # Keys of the long form that such a scenario is checked by, and those of its file.
 KEYS = {
@@ -25,40 +21,51 @@ KEYS = {
 }
 
 
-def drive_from_tables(tables: Mapping[str, Any]) -> Scenario:
-    """The scenario of such tables: one in the long form where the short one does not suffice.
+def is_short(tables: Mapping[str, Any]) -> bool:
+    """Whether the short form suffices for such tables."""
+    return not (_continuous(tables) or _given(tables) or _strikes(tables))
+
+
+def long_form(tables: Mapping[str, Any]) -> dict[str, Any]:
+    """The same tables in the long form, for what only drive trains have.
 
     Raises
     ------
     InputError
-        A record is unknown or lacks what a run needs; a value cannot be used.
+        A value cannot be used.
     """
-    controller, load, gearbox = (_table(tables, key) for key in ("controller", LOAD, GEARBOX))
-    continuous = controller.get("kind") == "continuous"
-    given = {key: load[key] for key in GIVEN if load.get(key) is not None}
-    stiffness = _table(gearbox, "stiffness")
-    strikes = stiffness.get("kind") == "rigid" and bool(stiffness.get("backlash") or stiffness.get("restitution"))
-    if not (continuous or given or strikes):
-        return from_tables(tables)
+    continuous, given, strikes = _continuous(tables), _given(tables), _strikes(tables)
     if continuous:
         _check_continuous(tables)
     plain = {key: value for key, value in tables.items() if key != "controller" or not continuous}
     if given:
-        plain[LOAD] = {key: value for key, value in load.items() if key not in GIVEN}
+        plain[LOAD] = {key: value for key, value in _table(tables, LOAD).items() if key not in GIVEN}
     if strikes:
-        plain[GEARBOX] = {**gearbox, "stiffness": {"kind": "rigid"}}
-    drive = dict(in_long_form(from_tables(plain)))
+        plain[GEARBOX] = {**_table(tables, GEARBOX), "stiffness": {"kind": "rigid"}}
+    drive = dict(DriveTables(**plain).long())
     if continuous:
-        drive |= {"command": {}, "controllers": {MOTOR: controller}}
+        drive |= {"command": {}, "controllers": {MOTOR: tables["controller"]}}
     if given:
         drive["shafts"] = {**drive["shafts"], LOAD: {**dict(drive["shafts"][LOAD]), **given}}
         drive["initial"] = _without_load(drive["initial"], "motion" in given)
     if strikes:
-        drive["gears"] = {GEARBOX: {**dict(drive["gears"][GEARBOX]), "stiffness": stiffness}}
-    try:
-        return TrainScenario(**drive)
-    except InputError as error:
-        raise error.with_keys(partial(renamed, names=KEYS)) from None
+        drive["gears"] = {GEARBOX: {**dict(drive["gears"][GEARBOX]), "stiffness": _table(tables, GEARBOX)["stiffness"]}}
+    return drive
+
+
+def _continuous(tables: Mapping[str, Any]) -> bool:
+    controller = tables.get("controller")
+    return isinstance(controller, ContinuousController) or _table(tables, "controller").get("kind") == "continuous"
+
+
+def _given(tables: Mapping[str, Any]) -> dict[str, Any]:
+    load = _table(tables, LOAD)
+    return {key: load[key] for key in GIVEN if load.get(key) is not None}
+
+
+def _strikes(tables: Mapping[str, Any]) -> bool:
+    stiffness = _table(_table(tables, GEARBOX), "stiffness")
+    return stiffness.get("kind") == "rigid" and bool(stiffness.get("backlash") or stiffness.get("restitution"))
 
 
 def _table(tables: Mapping[str, Any], key: str) -> Mapping[str, Any]:

@@ -13,8 +13,9 @@ from ..control.controller import Controller
 from ..errors import InputError
 from ..inputs.validation import shown
 from ..model.drive import Drive
-from .drive_scenario import DriveScenario, LoadTable
-from .scenario import SimulationTable
+from .drive_tables import LoadTable
+from .scenario import Scenario
+from .tables import SimulationTable
 
 IN_THE_LONG_FORM = {
     "twist": "gearbox_twist",
@@ -26,9 +27,9 @@ IN_THE_LONG_FORM = {
 """names of variables of a drive whose load has a given motion"""
 
 
-def controlled(drive: Drive, controller: Controller | None) -> DriveScenario:
+def controlled(drive: Drive, controller: Controller | None) -> Scenario:
     """Return a drive as a scenario, with the controller if there is one; its duration is of no use."""
-    return DriveScenario(
+    return Scenario(
         motor=drive.motor,
         gearbox=drive.gearbox,
         load=LoadTable(**drive.load.model_dump()),

@@ -15,14 +15,15 @@ from ..model.drive import Drive
 from ..model.load import Load
 from ..model.torsion import Elastic
 from ..model.train import DriveTrain
-from .drive_scenario import DriveScenario, Initial
+from .drive_tables import Initial
+from .scenario import Scenario
 from .simulation_state import SimulationState
 from .stepping import Simulation
 from .train_tables import TrainInitial
 
 ROWS = {name: k for k, name in enumerate(_core.joint_rows())}
 
-Driven = Drive | DriveScenario | DriveTrain
+Driven = Drive | Scenario | DriveTrain
 
 
 @dataclass
@@ -91,7 +92,7 @@ def joint_drive(name: str, drive: Driven, inertia: float, step: float) -> JointD
     InputError
         It is not clear which shaft the joint is.
     """
-    if isinstance(drive, DriveScenario):
+    if isinstance(drive, Scenario):
         changed: Driven = drive.replace(**{"load.inertia": inertia})
     elif isinstance(drive, Drive):
         load = drive.load

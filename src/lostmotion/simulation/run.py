@@ -17,7 +17,7 @@ from ..model.drive import Drive
 from ..model.signals import CommandSignal, TorqueSignal
 from ..worker_threads import thread_pool
 from .core_runs import core_result
-from .drive_scenario import Initial, of_drive
+from .drive_tables import Initial
 from .ledger import warned
 from .results import RunArrays, raw_result, variables_of
 from .scenario import Scenario
@@ -92,7 +92,7 @@ def simulate(
     ----------
     scenario_or_drive : Scenario or Drive
         A scenario, whose values the other arguments replace, or a drive alone. The inputs of a drive train are those of its
-        scenario (`TrainScenario.replace` changes them); only duration and sample_interval can be given here.
+        scenario (`Scenario.replace` changes them); only duration and sample_interval can be given here.
     command : CommandSignal or float, optional
         E_C [-]. Default: the value in the scenario; 0 for a drive alone.
     load_torque : TorqueSignal or float, optional
@@ -142,7 +142,7 @@ def simulate(
     changes: dict[str, Any] = {"command": command, "load_torque": load_torque, "initial": initial}
     changes |= {"duration": duration, "sample_interval": sample_interval}
     one = scenario_or_drive
-    scenario: Scenario = of_drive(one, **changes) if isinstance(one, Drive) else one.with_inputs(**changes)
+    scenario = Scenario.of_drive(one, **changes) if isinstance(one, Drive) else one.with_inputs(**changes)
     if output not in ("dataset", "arrays"):
         raise InputError(f'output {output!r} is not known; it must be "dataset" or "arrays"')
     if sensitivities is not None and output == "arrays":

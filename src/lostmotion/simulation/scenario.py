@@ -3,276 +3,378 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
-from importlib import import_module
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from functools import partial
+from typing import Any, ClassVar, Self
 
-from pydantic import model_validator
+from pydantic_core import core_schema
 
 from .. import _core
-from ..control.axis import NO_LAWS, Bound, core_control
+from ..control.axis import NO_LAWS, Bound, core_control, motor_laws
 from ..control.continuous import ContinuousController
 from ..control.controller import Controller
 from ..control.law import Law
-from ..data_sheets.components import ACCESSORIES
-from ..inputs.kept import kept
-from ..inputs.part import Part
-from ..inputs.quantities import Positive, Time
-from ..model.gearbox import Transmission
+from ..control.turning import turns
+from ..data_sheets.components import use_records
+from ..data_sheets.train_components import use_train_records
+from ..errors import InputError
+from ..inputs.kept import kept, kept_while_used
+from ..inputs.named import Named
+from ..inputs.validation import did_you_mean, shown
+from ..model.drive import Drive
+from ..model.gearbox import Gearbox, Transmission
 from ..model.linear_train import LinearElements
+from ..model.motor import Motor
 from ..model.signals import Signal
 from ..model.train import DriveTrain
+from . import axis_form, drive_form
+from .drive_tables import DriveTables, Initial, LoadTable, check_drive, of_inputs
+from .keys import renamed, set_values
+from .tables import ScenarioTables, SimulationTable
+from .train_checks import check_train
+from .train_state import angles_at_start, given_speeds, start_values
+from .train_tables import LINEAR_INITIAL, TrainInitial, TrainTables, core_train
 from .variables import Variable
 
-MAX_SAMPLES = 100_000_000
 LONG_TABLES = ("shafts", "slides", *LinearElements.model_fields)  # of which one makes a scenario one in the long form
 
-# In the JSON Schema of files, beside what a scenario has.
-BASE = {"type": "string", "description": "scenario file that this one changes"}
-RECORD_NAME = {"type": "string", "description": "name of a record of the catalogue, or a file with one (.toml)"}
 
+class Scenario:
+    """Drive or drive train, what acts on it and what is wanted of it.
 
-def with_accessories(schema: dict[str, Any]) -> dict[str, Any]:
-    """A JSON Schema in which brake and amplifier of a task may name a record."""
-    from_record = {"type": "object", "properties": {"from": RECORD_NAME}, "required": ["from"]}
-    for task in ("Task", "TrainTask"):
-        properties = schema["$defs"].get(task, {}).get("properties", {})
-        for key in ACCESSORIES:
-            if key in properties:
-                properties[key]["anyOf"] += [RECORD_NAME, from_record]
-    return schema
+    It is written in one of three forms: the tables ``motor``, ``gearbox`` and ``load``; the table ``axis``; or shafts and what
+    joins them. Each becomes a drive train. What is written can be read as attributes, in every form also ``shafts``, ``motors``,
+    ``gears`` and the other tables of the train.
 
-
-def check_on_reference(initial: Any, controllers: Mapping[str, Controller], keys: Sequence[str]) -> None:
-    """Refuses `on_reference` where no reference says where an axis is, or where one of the keys says so, too.
+    Parameters
+    ----------
+    **tables
+        As in a file. Names of records, and text with units, are read.
 
     Raises
     ------
-    ValueError
-    """
-    if not initial.on_reference:
-        return
-    if not any(c.reference.kind == "position" for c in controllers.values()):
-        raise ValueError("has initial.on_reference but no controller with a reference of the position; leave it out")
-    if given := [key for key in keys if getattr(initial, key)]:
-        raise ValueError(
-            f"has initial.on_reference and initial.{given[0]}, which follows from it; leave one of them out"
-        )
-
-
-class SimulationTable(Part):
-    """Duration and instants of the result. Neither affects the motion."""
-
-    duration: Annotated[Time, Positive]
-    sample_interval: Annotated[Time, Positive]
-
-    @model_validator(mode="after")
-    def _not_too_many(self) -> Self:
-        if self.sample_interval > self.duration:
-            raise ValueError(f"has a sample_interval of {self.sample_interval} s, longer than its duration")
-        if self.duration / self.sample_interval > MAX_SAMPLES:
-            raise ValueError(f"asks for more than {MAX_SAMPLES:.0e} samples; lengthen sample_interval")
-        return self
-
-    @property
-    def samples(self) -> int:
-        """Number of instants 0, sample_interval, ... up to the duration."""
-        return int(self.duration / self.sample_interval * (1.0 + 1e-12)) + 1
-
-
-class Scenario(Part):
-    """Drive or drive train, what acts on it and what is wanted of it, in the short form or in the long form.
-
-    A scenario in the short form (`DriveScenario`) has the tables ``motor``, ``gearbox`` and ``load``; one in the long form
-    (`TrainScenario`) has shafts and what joins them. The constructor, `model_validate` and `from_json` read either form.
+    InputError
+        A record is unknown or lacks what a run needs; a value cannot be used.
 
     Examples
     --------
     >>> import lostmotion as lm
-    >>> lm.load("paper-2dof-nl-small").replace(**{"load.inertia": "3 kg*m^2"}).load.inertia
-    3.0
+    >>> scenario = lm.load("paper-2dof-nl-small").replace(**{"load.inertia": "3 kg*m^2"})
+    >>> scenario.load.inertia, scenario.shafts["load"].inertia
+    (3.0, 3.0)
+    >>> list(lm.load("two-motors-one-ring").motors)
+    ['first_motor', 'second_motor']
     """
 
-    if TYPE_CHECKING:
-        title: str
-        initial: Any
-        simulation: SimulationTable
+    __slots__ = ("__weakref__", "_made", "is_axis", "written")
 
-    # The classes of both forms: whether it is the long one.
-    forms: ClassVar[dict[bool, type[Any]]] = {}
+    written: DriveTables | TrainTables
+    """the tables in the form in which they are written, that of an axis in the long one"""
+    is_axis: bool
+    """whether it was written in the short form of a linear axis"""
 
-    def __new__(cls, /, *_: Any, **tables: Any) -> Self:
-        return super().__new__(cls._form(tables))
+    # What the tables have, found by `__getattr__`.
+    title: str
+    motor: Motor
+    gearbox: Gearbox
+    load: LoadTable
+    controller: Controller | None
+    simulation: SimulationTable
+
+    # Why it is refused where another object is wanted, and what to use.
+    refused_as: ClassVar[Mapping[str, str]] = {
+        "Gearbox": 'is a scenario, and the test rig measures one gear; give one, such as scenario.gears["NAME"]',
+    }
+
+    def __init__(self, /, *nameless: Any, **tables: Any) -> None:
+        if nameless:
+            raise InputError(f"the scenario takes its values by name, such as title=...; not {shown(nameless[0])}")
+        if axis_form.is_axis(tables):
+            written = partial(renamed, names=axis_form.KEYS)
+            with _in_keys(written):
+                self._set(_in_long_form(axis_form.long_form(tables), written), is_axis=True)
+        elif is_train(tables):
+            self._set(_in_long_form(tables))
+        else:
+            data = dict(tables)
+            use_records(data)
+            if drive_form.is_short(data):
+                self._set(DriveTables(**data))
+            else:
+                with _in_keys(partial(renamed, names=drive_form.KEYS)):
+                    self._set(TrainTables(**drive_form.long_form(data)))
+
+    def _set(self, written: DriveTables | TrainTables, *, is_axis: bool = False, checked: bool = True) -> None:
+        for name, value in (("written", written), ("is_axis", is_axis), ("_made", {})):
+            object.__setattr__(self, name, value)
+        if checked:
+            self.check()
+
+    def check(self) -> None:
+        """Refuse tables that contradict each other.
+
+        Raises
+        ------
+        InputError
+        """
+        try:
+            if isinstance(self.written, DriveTables):
+                check_drive(self, self.written)
+            else:
+                check_train(self)
+        except InputError:
+            raise
+        except ValueError as problem:
+            raise InputError(f"the scenario {problem}") from None
 
     @classmethod
-    def _form(cls, tables: Any) -> type[Self]:
-        if cls is not Scenario:
-            return cls
-        long = isinstance(tables, Mapping) and is_train(tables)
-        if long not in cls.forms:
-            import_module(".train_scenario" if long else ".drive_scenario", __package__)  # which import this module
-        return cls.forms[long]
+    def of(cls, written: ScenarioTables, *, is_axis: bool = False, checked: bool = True) -> Self:
+        """The scenario of its tables.
+
+        Parameters
+        ----------
+        checked
+            Whether to refuse tables that contradict each other, which has not been done yet.
+        """
+        made = cls.__new__(cls)
+        made._set(written, is_axis=is_axis, checked=checked)  # type: ignore[arg-type]
+        return made
 
     @classmethod
-    def model_validate(cls, obj: Any, **options: Any) -> Self:
+    def of_drive(cls, drive: Drive, **given: Any) -> Self:
+        """The scenario of a drive alone, with the inputs and times that `simulate` is given.
+
+        Raises
+        ------
+        InputError
+            There is no duration or no sample interval.
+        """
+        if given.get("duration") is None or given.get("sample_interval") is None:
+            raise InputError("a drive alone needs duration and sample_interval [s]")
+        tables = {"motor": drive.motor, "gearbox": drive.gearbox, "load": LoadTable(**dict(drive.load))}
+        changes = of_inputs(drive.load, None, {name: value for name, value in given.items() if value is not None})
+        return cls.of(DriveTables(**tables | changes))
+
+    @classmethod
+    def model_validate(cls, obj: Any) -> Self:
         """Make the scenario from its tables, as the constructor does."""
-        if cls is Scenario and not isinstance(obj, Scenario):
-            return cls._form(obj).model_validate(obj, **options)
-        return super().model_validate(obj, **options)
+        if isinstance(obj, cls):
+            return obj
+        if not isinstance(obj, Mapping) or not all(isinstance(key, str) for key in obj):
+            DriveTables.model_validate(obj)  # refuses it
+        return cls(**obj)
 
     @classmethod
     def from_json(cls, text: str) -> Self:
         """Make the scenario from JSON that `to_json` returned."""
-        tables = None
-        if cls is Scenario:
-            with suppress(TypeError, ValueError, RecursionError):  # which reading it as a form reports
-                tables = json.loads(text)
-        return cls._form(tables).model_validate_json(text)
+        with suppress(TypeError, ValueError, RecursionError):  # which reading it as a form reports
+            if isinstance(tables := json.loads(text), dict):
+                return cls(**tables)
+        return cls.of(DriveTables.model_validate_json(text))
 
-    def train(self) -> DriveTrain:
-        """The drive train without its surroundings."""
-        raise NotImplementedError
+    @classmethod
+    def model_json_schema(cls) -> dict[str, Any]:
+        """JSON Schema of scenario files in all their forms."""
+        return axis_form.file_schema()
 
-    def named_train(self) -> DriveTrain:
-        """The same, with the names that variables have in results of this scenario."""
-        raise NotImplementedError
+    @property
+    def tables(self) -> TrainTables:
+        """The tables in the long form."""
+        return self.written.long()
 
-    def long(self) -> Scenario:
-        """The scenario in the long form."""
-        raise NotImplementedError
+    def __getattr__(self, name: str) -> Any:
+        for tables in () if name.startswith("_") else (self.written, self.tables):
+            with suppress(AttributeError):
+                return getattr(tables, name)
+        raise AttributeError(f"the scenario has no {name}")
 
-    def variables(self) -> tuple[Variable, ...]:
-        """The variables that a result has, without those of controllers."""
-        raise NotImplementedError
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise InputError(f"the scenario is frozen; make a changed one instead of setting {name}")
 
-    def derive(self, data: dict[str, Any], time: Any) -> None:
-        """Add the variables that follow from those of the solver."""
-        raise NotImplementedError
+    def __iter__(self) -> Iterator[tuple[str, Any]]:
+        return iter(self.written)
 
-    def attributes(self) -> dict[str, float]:
-        """Attributes of what is computed of it, beside those of a run."""
-        return {}
+    def __eq__(self, other: object) -> bool:
+        return self.written == other.written if isinstance(other, Scenario) else NotImplemented
 
-    def ambient_temperature(self) -> float:
-        """Temperature [°C] of the task."""
-        raise NotImplementedError
+    def __hash__(self) -> int:
+        return hash(self.written)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _made_again, (self.written, self.is_axis)
+
+    def __repr__(self) -> str:
+        title = f"{self.title!r}, " if self.title else ""
+        time = f"{self.simulation.duration:.4g} s, {self.simulation.samples} samples"
+        return f"Scenario({title}{self.written.told()}, {time})"
+
+    def _repr_html_(self) -> str:
+        """All values with their units, for notebooks."""
+        return self.written._repr_html_()
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, *_: Any) -> core_schema.CoreSchema:
+        """Values of parts are scenarios or their tables."""
+
+        def written(scenario: Scenario, info: core_schema.SerializationInfo) -> dict[str, Any]:
+            return scenario.written.model_dump(mode=info.mode, exclude_none=info.exclude_none)
+
+        return core_schema.no_info_plain_validator_function(
+            cls.model_validate,
+            serialization=core_schema.plain_serializer_function_ser_schema(written, info_arg=True),
+            json_schema_input_schema=core_schema.dict_schema(),
+        )
+
+    def kept_values(self) -> dict[Any, Any]:
+        """Values that `inputs.kept.kept` keeps with this object."""
+        return self._made  # type: ignore[no-any-return]
+
+    @kept
+    def to_json(self) -> str:
+        """All values in SI, as JSON that `from_json` reads."""
+        return self.written.model_dump_json(exclude_none=True)
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None) -> Self:
+        """A copy with other tables, which are checked as in the constructor."""
+        return self.of(self.written.model_copy(update=update), is_axis=self.is_axis) if update else self
+
+    def unchecked(self, **tables: Any) -> Self:
+        """The same with other tables, which `check` has still to see."""
+        return self.of(self.written.unchecked(**tables), is_axis=self.is_axis, checked=False)
+
+    def replace(self, **changes: Any) -> Self:
+        """The same scenario with changes by dotted key, such as ``**{"load.inertia": 0.1}``, checked anew."""
+        data = self.written.model_dump()
+        set_values(data, changes.items())
+        return type(self)(**data)
 
     def with_inputs(self, **changes: Any) -> Self:
         """The same scenario with the inputs and times that `simulate` is given; None leaves a value as it is."""
         given = {name: value for name, value in changes.items() if value is not None}
-        return self._with_inputs(given) if given else self
+        return self.model_copy(update=self.written.of_inputs(given)) if given else self
 
-    def _with_inputs(self, given: Mapping[str, Any]) -> Self:
-        raise NotImplementedError
-
-    def with_gears(self, gears: Mapping[str, Any]) -> Self:
+    def with_gears(self, gears: Mapping[str, Transmission]) -> Self:
         """The same scenario with other gears, by their keys."""
-        raise NotImplementedError
+        return self.model_copy(update=self.written.of_gears(gears))
 
-    def record_keys(self) -> Iterator[str]:
-        """Keys that take names of records, and the conditions of their use."""
-        raise NotImplementedError
+    def with_axes(self, axes: Mapping[str, Controller]) -> Self:
+        """The same scenario with other sampled controllers, by the names of their motors; the others stay."""
+        return self.model_copy(update=self.written.of_axes(axes))
 
-    def input_keys(self) -> dict[str, str]:
-        """Keys of the signals of its inputs, by their names."""
-        raise NotImplementedError
+    def without_controllers(self) -> Self:
+        """The same scenario with the motors of its controllers turned by commands of 0."""
+        return self.replace(**self.written.open_loop())
 
-    def gear_key(self, name: str) -> str:
-        """Key of the table of a gear."""
-        raise NotImplementedError
+    def key_in_file(self, key: str) -> str:
+        """A dotted key of the long form as the file of the scenario has it."""
+        return renamed(key, axis_form.KEYS) if self.is_axis else key
 
-    def motor_key(self, name: str) -> str:
-        """Key of the table of a motor."""
-        raise NotImplementedError
+    @property
+    def is_drive(self) -> bool:
+        """Whether it is one motor, one gearbox and one load in the short form."""
+        return isinstance(self.written, DriveTables)
 
-    def core(self, *, sampled: bool = True) -> _core.Train:
-        """The solver's train, its motors as current loops make them.
+    def short_form(self, function: str) -> Self:
+        """The scenario itself, for what is defined for one motor, one gearbox and one load.
+
+        Raises
+        ------
+        InputError
+            It is another drive train.
+        """
+        if self.is_drive:
+            return self
+        raise InputError(
+            f"{function}: is a drive train ([shafts]), which can be run; this takes a drive of [motor], [gearbox] and [load]"
+        )
+
+    @kept
+    def long(self) -> Scenario:
+        """The scenario in the long form; of a drive with shafts `motor` and `load`, gear `gearbox`, motor `motor`."""
+        return self.of(self.tables, checked=False) if self.is_drive else self
+
+    def train(self) -> DriveTrain:
+        """The drive train without its surroundings."""
+        return self.written.train()
+
+    def named_train(self) -> DriveTrain:
+        """The same, with the names that variables have in results of this scenario."""
+        return self.written.named_train()
+
+    def commanded(self) -> list[str]:
+        """Names of what has a command: motors, brakes and friction clutches."""
+        return self.train().commanded()
+
+    def variables(self) -> tuple[Variable, ...]:
+        """The variables that a result has, without those of controllers."""
+        return self.written.variables(self.core())
+
+    def axes(self) -> dict[str, Controller]:
+        """The sampled controllers by the names of their motors."""
+        return {name: c for name, c in self.tables.controllers.items() if isinstance(c, Controller)}
+
+    def continuous(self) -> dict[str, ContinuousController]:
+        """The continuous controllers by the names of their motors."""
+        return {name: c for name, c in self.tables.controllers.items() if isinstance(c, ContinuousController)}
+
+    def by_prefix(self) -> dict[str, Controller]:
+        """The sampled controllers, by what the names of their variables begin with."""
+        return {self.written.prefix(name): c for name, c in self.axes().items()}
+
+    def sliding(self) -> dict[str, tuple[bool, bool]]:
+        """Whether the motor of a controller moves a slide, and whether its position is that of one, by the prefix of its variables."""
+        train, tables = self.train(), self.tables
+        return {
+            self.written.prefix(name): (
+                train.is_slide(train.motors[name].shaft),
+                train.is_slide(tables.controlled(name)),
+            )
+            for name in self.axes()
+        }
+
+    def core(
+        self,
+        *,
+        sampled: bool = True,
+        loaded: Collection[str] | None = None,
+        given: Collection[str] | None = None,
+    ) -> _core.Train:
+        """The solver's train with its continuous controllers, its motors as the current loops make them.
 
         Parameters
         ----------
         sampled
             Also those of sampled controllers.
+        loaded
+            Names of the shafts that a load torque acts on, if others than those of the scenario.
+        given
+            Names of the shafts whose motion is given, if others than those of the scenario.
         """
-        raise NotImplementedError
+        if sampled and loaded is None and given is None:
+            return self._own_core()
+        return self._core_with(sampled=sampled, loaded=loaded, given=given)
 
-    def axes(self) -> dict[str, Controller]:
-        """The sampled controllers by the names of their motors."""
-        raise NotImplementedError
+    @kept_while_used
+    def _own_core(self) -> _core.Train:
+        return self._core_with()
 
-    def continuous(self) -> dict[str, ContinuousController]:
-        """The continuous controllers by the names of their motors."""
-        raise NotImplementedError
-
-    def with_axes(self, axes: Mapping[str, Controller]) -> Self:
-        """The same scenario with other sampled controllers, by the names of their motors; the others stay."""
-        raise NotImplementedError
-
-    def without_controllers(self) -> Self:
-        """The same scenario with the motors of its controllers turned by commands of 0."""
-        raise NotImplementedError
-
-    def prefix(self, motor: str) -> str:
-        """Prefix of the names of the variables of a motor's controller."""
-        raise NotImplementedError
-
-    def controller_key(self, motor: str) -> str:
-        """Key of the table of a motor's controller."""
-        raise NotImplementedError
-
-    def input_key(self, name: str) -> str:
-        """Key of the signal or reference that an input of the core stands for."""
-        raise NotImplementedError
-
-    def sliding(self) -> dict[str, tuple[bool, bool]]:
-        """Whether the motor of a controller moves a slide, and whether its position is that of one, by the prefix of its variables."""
-        raise NotImplementedError
-
-    def given(self) -> list[str]:
-        """Names of the shafts and slides whose motion is given."""
-        raise NotImplementedError
-
-    def given_key(self, shaft: str) -> str:
-        """Dotted key that gives the motion of a shaft or a slide."""
-        raise NotImplementedError
-
-    def note(self) -> str:
-        """Notes of the sheets of gears and motors."""
-        raise NotImplementedError
-
-    def signals(self) -> dict[str, Signal[Any]]:
-        """All that acts on the train, by the name of its result variable."""
-        raise NotImplementedError
-
-    def begin(self) -> Any:
-        """State at t = 0, with what the references say of it."""
-        raise NotImplementedError
-
-    def start(self, initial: Any = None) -> dict[str, float]:
-        """State at t = 0 by the names of its variables.
-
-        Parameters
-        ----------
-        initial
-            State in place of the initial state of the scenario.
-        """
-        raise NotImplementedError
-
-    def capacities(self, initial: Any = None) -> dict[str, float]:
-        """Hysteresis capacities at t = 0 [N·m] by gear."""
-        raise NotImplementedError
-
-    def replace(self, **changes: Any) -> Self:
-        """The same scenario with changes by dotted key, such as ``**{"load.inertia": 0.1}``, checked anew."""
-        raise NotImplementedError
-
-    def gears_by_key(self) -> dict[str, Transmission]:
-        """The gears by the keys of their tables."""
-        return {self.gear_key(name): gear for name, gear in self.train().gears.items()}
-
-    def by_prefix(self) -> dict[str, Controller]:
-        """The sampled controllers, by what the names of their variables begin with."""
-        return {self.prefix(name): c for name, c in self.axes().items()}
+    def _core_with(
+        self,
+        *,
+        sampled: bool = True,
+        loaded: Collection[str] | None = None,
+        given: Collection[str] | None = None,
+    ) -> _core.Train:
+        continuous = self.continuous()
+        return core_train(
+            self.train(),
+            self.is_drive,
+            tuple(self.tables.loaded() if loaded is None else loaded),
+            tuple(self.tables.given() if given is None else given),
+            tuple(motor_laws(self.tables.controllers if sampled else continuous).items()),
+            tuple(continuous.items()),
+        )
 
     def control(self, laws: Mapping[str, Law] = NO_LAWS) -> Bound:
         """The solver's controllers, kept if there are no laws: change copies of them alone (`control.axis.own`)."""
@@ -283,14 +385,116 @@ class Scenario(Part):
         return self._bound(NO_LAWS)
 
     def _bound(self, laws: Mapping[str, Law]) -> Bound:
-        return core_control(self.train(), self.axes(), self.controller_key("{}") + ".", laws)
+        return core_control(self.train(), self.axes(), self.written.controller_key("{}") + ".", laws)
+
+    def signals(self) -> dict[str, Signal[Any]]:
+        """All that acts on the train, after delays of brakes and clutches, by the name of its result variable."""
+        train, controllers = self.named_train(), self.continuous()
+        commands = {
+            train.command_of(name): self.tables.acting(name) for name in self.commanded() if name not in controllers
+        }
+        torques = {train.load_torque_of(name): load for name, load in self.tables.loads().items()}
+        references = {name: s for motor, c in controllers.items() for name, s in c.signals(motor).items()}
+        motions: dict[str, Signal[Any]] = {}
+        for name, (speed, acceleration) in self.tables.motions().items():
+            motions |= {f"{name}_given_speed": speed, f"{name}_given_acceleration": acceleration}
+        return {**commands, **torques, **motions, **references}
 
     @kept
-    def to_json(self) -> str:
-        """All values in SI, as JSON that `from_json` reads."""
-        return self.model_dump_json(exclude_none=True)
+    def begin(self) -> TrainInitial:
+        """State at t = 0, with what the references say of it."""
+        written, train, tables = self.tables.initial, self.train(), self.tables
+        speeds = given_speeds(train, tables.motions())
+        angles = {name: float(s.motion.at(0.0)[0]) for name, s in tables.movers().items() if s.motion is not None}
+        if not written.on_reference:
+            given: dict[str, Any] = {}
+            for key, values in (("angles", angles), ("speeds", speeds)):
+                for name, value in values.items():
+                    own = LINEAR_INITIAL[key] if train.is_slide(name) else key
+                    given.setdefault(own, dict(getattr(written, own)))[name] = value
+            return written.model_copy(update={key: Named(values) for key, values in given.items()})
+        for name, controller in self.axes().items():
+            if controller.reference.kind == "position":
+                shaft = tables.controlled(name)
+                angles[shaft], speed = (float(value) for value in controller.reference.at(0.0)[:2])
+                ratios = {other: turns(train, other, shaft) for other in train.shafts}
+                speeds |= {other: i * speed for other, i in ratios.items() if i is not None}
+        found: dict[str, Any] = {}
+        for key, values in (("angles", angles), ("speeds", speeds)):
+            found[key] = Named({name: v for name, v in values.items() if not train.is_slide(name)})
+            found[LINEAR_INITIAL[key]] = Named({name: v for name, v in values.items() if train.is_slide(name)})
+        return written.model_copy(update=found)
+
+    def start(self, initial: Initial | TrainInitial | None = None) -> dict[str, float]:
+        """State at t = 0 by the names of its variables.
+
+        Parameters
+        ----------
+        initial
+            State in place of the initial state of the scenario.
+        """
+        train = self.named_train()
+        state = self.begin() if initial is None else initial.of_train()
+        values = start_values(train, state, self.core())
+        angles = angles_at_start(train, state.of_all("angles"), state.of_all("twists"))
+        known = []
+        for name, controller in self.continuous().items():
+            shaft = self.tables.controlled(name)
+            position = controller.reference.kind == "position"
+            measured = angles[shaft] if position else state.of_all("speeds").get(shaft, 0.0)
+            values |= controller.start(name, measured)
+            known += [f"{name}_{variable}" for variable in controller.system().states]
+        for name in state.controller_states:
+            if name not in known:
+                meant = did_you_mean(name, known, f"they are {', '.join(known) or 'none'}")
+                raise InputError(
+                    f"is no state of a controller of this train; {meant}", keys=(f"initial.controller_states.{name}",)
+                )
+        return values | state.controller_states
+
+    def capacities(self, initial: Initial | TrainInitial | None = None) -> dict[str, float]:
+        """Hysteresis capacities at t = 0 [N·m] by gear; what is not among them is 0."""
+        state = self.tables.initial if initial is None else initial.of_train()
+        return {name: h for name, h in state.of_all("hysteresis_capacities").items() if h}
+
+
+@contextmanager
+def _in_keys(written: Any) -> Iterator[None]:
+    """Errors that name keys as they are written."""
+    try:
+        yield
+    except InputError as error:
+        raise error.with_keys(written) from None
+
+
+def _in_long_form(tables: Mapping[str, Any], written: Any = str) -> TrainTables:
+    data = dict(tables)
+    use_train_records(data, written)
+    return TrainTables(**data)
+
+
+def _made_again(written: DriveTables | TrainTables, is_axis: bool) -> Scenario:
+    return Scenario.of(written, is_axis=is_axis, checked=False)
 
 
 def is_train(tables: Mapping[str, Any]) -> bool:
     """Whether the tables of a scenario are in the long form."""
     return any(table in tables for table in LONG_TABLES)
+
+
+def drive_of(what: Scenario | Drive) -> Drive:
+    """The drive of a scenario, or a drive as it is.
+
+    Raises
+    ------
+    InputError
+        The scenario is another drive train.
+    """
+    if isinstance(what, Drive):
+        return what
+    if not isinstance(what.written, DriveTables):
+        raise InputError(
+            f"drive: {shown(what)} is a drive train, and this is defined for one motor, one gearbox and one load; give such a "
+            "scenario, or take simulate, check_drive or self_locking of the train"
+        )
+    return what.written.drive()

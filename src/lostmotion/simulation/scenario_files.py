@@ -18,13 +18,11 @@ from ..inputs.toml_text import toml_text, without_empty
 from ..inputs.validation import names_like, shortened, shown
 from ..model.gearbox import Gearbox
 from ..model.linear import RatedScrew, ScrewData
-from .axis_form import axis_from_tables, file_schema, is_axis
-from .drive_form import drive_from_tables
+from .axis_form import file_schema
 from .keys import parse_override, set_values
-from .scenario import Scenario, is_train
+from .scenario import Scenario
 from .series_files import read_series
 from .shipped import shipped_scenarios
-from .train_scenario import train_from_tables
 
 MAX_BASES = 100  # files that are each the base of the one before
 
@@ -99,24 +97,9 @@ def changed(tables: dict[str, Any], path: Path) -> Scenario:
         With one line that names the file, the key, the value and the remedy.
     """
     try:
-        return scenario_from(tables)
+        return Scenario(**tables)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-
-
-def scenario_from(tables: Mapping[str, Any]) -> Scenario:
-    """The scenario of such tables. A drive in the short form with what only drive trains have is a drive train.
-
-    Raises
-    ------
-    InputError
-        A record is unknown or lacks what a run needs; a value cannot be used.
-    """
-    if is_axis(tables):
-        return axis_from_tables(tables)
-    if is_train(tables):
-        return train_from_tables(tables)
-    return drive_from_tables(tables)
 
 
 def read_tables(path: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> dict[str, Any]:

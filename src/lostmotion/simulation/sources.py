@@ -10,7 +10,6 @@ from typing import Any
 from ..errors import InputError
 from ..inputs.arguments import ScenarioName, checked
 from . import scenario_files
-from .drive_scenario import DriveScenario, short_form
 from .result_files import FORMATS, open_result
 from .scenario import Scenario
 from .scenario_files import changed, override
@@ -31,7 +30,7 @@ def load(source: ScenarioName | Path, overrides: Mapping[str, Any] | Iterable[st
     Returns
     -------
     Scenario
-        A `DriveScenario` for the short form (tables `[motor] [gearbox] [load]`), a `TrainScenario` for the long form
+        A `Scenario` for the short form (tables `[motor] [gearbox] [load]`), a `Scenario` for the long form
         (`[shafts.NAME]` and so on).
 
     Raises
@@ -60,7 +59,7 @@ def load(source: ScenarioName | Path, overrides: Mapping[str, Any] | Iterable[st
     return changed(tables, path)
 
 
-def load_drive(source: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> DriveScenario:
+def load_drive(source: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> Scenario:
     """Load a scenario as `load` does, if only the short form is allowed.
 
     Raises
@@ -68,4 +67,4 @@ def load_drive(source: str | Path, overrides: Mapping[str, Any] | Iterable[str] 
     InputError
         Also if the scenario is in the long form.
     """
-    return short_form(load(source, overrides), str(source))
+    return load(source, overrides).short_form(str(source))

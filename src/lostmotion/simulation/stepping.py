@@ -21,7 +21,7 @@ from ..model.couplings import FULL_COMMAND
 from ..model.drive import Drive
 from ..model.mass_matrix import MassMatrix
 from ..model.train import DriveTrain
-from .drive_scenario import Initial, capacities_of, state_of
+from .drive_tables import Initial
 from .given_motion import SLIDE_UNITS, UNITS, motion_given
 from .scenario import Scenario
 from .simulation_answers import SimulationAnswers
@@ -204,32 +204,30 @@ class Simulation(SimulationAnswers):
         """
         with self._turn:
             self._idle()
-            self._reset(self._initial if initial is None else initial)
+            if initial is not None and isinstance(initial, Initial) != self._short:
+                raise InputError(
+                    "initial: is the state of a train; that of a drive is an Initial"
+                    if self._short
+                    else "initial: is the state of a drive; that of a train is a TrainInitial"
+                )
+            self._reset(self._initial if initial is None else initial.of_train())
 
-    def _reset(self, start: Initial | TrainInitial) -> None:
+    def _reset(self, start: TrainInitial) -> None:
         self._change_masses(self._train.mass_matrices)
-        if isinstance(start, Initial) != self._short:
-            raise InputError(
-                "initial: is the state of a train; that of a drive is an Initial"
-                if self._short
-                else "initial: is the state of a drive; that of a train is a TrainInitial"
-            )
-        scenario: Any = self._scenario  # whose kind has just been checked
-        if isinstance(start, Initial):
-            self._core.reset(state_of(start), capacities_of(start))
-        elif scenario is not None:
-            self._core.reset(scenario.start(start), scenario.capacities(start))
+        if self._scenario is not None:
+            self._core.reset(self._scenario.start(start), self._scenario.capacities(start))
         else:
-            self._core.reset(start_values(self._train, start), dict(start.hysteresis_capacities))
+            train = self._drive.named_train() if isinstance(self._drive, Drive) else self._drive
+            self._core.reset(start_values(train, start, self._core_train), dict(start.hysteresis_capacities))
         self._begin_motions(start)
         self._initial = start
         if self._bound is not None:
             self._bound.coarse.reset(start)
             self._bound.forget()
 
-    def _begin_motions(self, start: Initial | TrainInitial) -> None:
+    def _begin_motions(self, start: TrainInitial) -> None:
         """Set the initial speeds of shafts with a given motion."""
-        if not self._motions or not isinstance(start, TrainInitial):
+        if not self._motions:
             return
         state: list[Any] = list(self._core.get_state())
         for name, (speed, _) in self._motions.items():

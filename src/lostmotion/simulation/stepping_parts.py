@@ -12,10 +12,8 @@ from ..inputs.validation import did_you_mean, shown
 from ..model.drive import Drive
 from ..model.mass_matrix import MassMatrix
 from ..model.train import DriveTrain
-from .drive_scenario import DriveScenario, Initial, drive_of
-from .scenario import Scenario
+from .scenario import Scenario, drive_of
 from .train_ports import given_train
-from .train_scenario import TrainScenario
 from .train_tables import TrainInitial
 
 GIVE: Any = object()  # in place of what has no default
@@ -28,20 +26,19 @@ MIN_INTERVAL, MAX_INTERVAL = 1e-12, 1e12
 
 def parts(
     what: Drive | Scenario | DriveTrain, loaded: Sequence[str] | None, given: Sequence[str] | None
-) -> tuple[Drive | DriveTrain, DriveTrain, _core.Train, tuple[str, ...], tuple[str, ...], Initial | TrainInitial]:
+) -> tuple[Drive | DriveTrain, DriveTrain, _core.Train, tuple[str, ...], tuple[str, ...], TrainInitial]:
     """Parts of a simulation: its subject, the same as a train, the solver's train, the loadable shafts, the shafts
     with given motion, and the start."""
-    if isinstance(what, DriveTrain | TrainScenario):
+    if isinstance(what, DriveTrain) or (isinstance(what, Scenario) and not what.is_drive):
         train, shafts, moved = given_train(what, loaded, given)
         if isinstance(what, DriveTrain):
             return train, train, train.core(shafts, given=moved), tuple(shafts), tuple(moved), TrainInitial()
         return train, train, what.core(loaded=shafts, given=moved), tuple(shafts), tuple(moved), what.begin()
-    assert isinstance(what, Drive | DriveScenario)
     if loaded is not None:
         raise InputError("loaded: is for trains; a drive has one load torque, on its load")
     if given is not None:
         raise InputError("given: is for trains; give drive.train() for a drive whose motor or load has a given motion")
-    start = what.begin() if isinstance(what, DriveScenario) else Initial()
+    start = what.begin() if isinstance(what, Scenario) else TrainInitial()
     return drive_of(what), what.train(), what.core(), (), (), start
 
 

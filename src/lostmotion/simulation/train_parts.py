@@ -14,7 +14,6 @@ from ..inputs.named import Named
 from ..model.linear_train import LinearElements
 from ..model.train import COUPLINGS
 from .scenario import Scenario
-from .train_scenario import TrainScenario, in_long_form
 from .train_tables import TrainInitial
 
 INSTANT, LEADING = 0, 2  # of a switching: the column of its instant, and how many come before those of contacts
@@ -30,7 +29,7 @@ def parts_of(scenario: Scenario) -> list[Any]:
     Shafts belong together that a gear, its housing, a clutch, a freewheel, a damper, a mass matrix, or a controller joins.
     """
     groups = _groups(scenario)
-    return [scenario] if len(groups) == 1 else [_part(in_long_form(scenario), shafts) for shafts in groups]
+    return [scenario] if len(groups) == 1 else [_part(scenario.long(), shafts) for shafts in groups]
 
 
 def _groups(scenario: Scenario) -> list[list[str]]:
@@ -62,7 +61,7 @@ def _joined(scenario: Scenario) -> Iterator[list[str]]:
         yield shafts + [encoder.shaft for encoder in encoders if encoder is not None and encoder.shaft is not None]
 
 
-def _part(scenario: TrainScenario, shafts: Collection[str]) -> TrainScenario:
+def _part(scenario: Scenario, shafts: Collection[str]) -> Scenario:
     """The scenario of some of its shafts, whose values have been checked with the whole."""
     train = scenario.train()
     kept: dict[str, Any] = {
@@ -115,7 +114,7 @@ def _stands_on(element: Any) -> str:
     return str(next(name for key in ("shaft", "input", "slide") if (name := getattr(element, key, None)) is not None))
 
 
-def control_of_part(control: Bound, whole: TrainScenario, part: TrainScenario) -> Bound:
+def control_of_part(control: Bound, whole: Scenario, part: Scenario) -> Bound:
     """Controllers that belong to a part."""
     tick, axes = control
     motors, shafts = list(whole.train().motors), list(whole.train().shafts)
@@ -129,7 +128,7 @@ def control_of_part(control: Bound, whole: TrainScenario, part: TrainScenario) -
 
 
 def joined_results(
-    whole: TrainScenario, parts: Sequence[TrainScenario], results: Sequence[dict[str, Any]], most: int
+    whole: Scenario, parts: Sequence[Scenario], results: Sequence[dict[str, Any]], most: int
 ) -> dict[str, Any]:
     """Result of the whole train from those of its parts.
 

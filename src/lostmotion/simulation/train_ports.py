@@ -7,17 +7,17 @@ from collections.abc import Sequence
 from ..errors import InputError
 from ..inputs.validation import did_you_mean, shown
 from ..model.train import DriveTrain
-from .train_scenario import TrainScenario
+from .scenario import Scenario
 from .train_variables import check_names
 
 
-def loaded_train(what: DriveTrain | TrainScenario) -> tuple[DriveTrain, list[str]]:
+def loaded_train(what: DriveTrain | Scenario) -> tuple[DriveTrain, list[str]]:
     """A train, and the names of the shafts that a load torque may act on: those of the scenario, of a train alone all."""
     return given_train(what, None, None)[:2]
 
 
 def given_train(
-    what: DriveTrain | TrainScenario, loaded: Sequence[str] | None, given: Sequence[str] | None
+    what: DriveTrain | Scenario, loaded: Sequence[str] | None, given: Sequence[str] | None
 ) -> tuple[DriveTrain, list[str], list[str]]:
     """A train, the names of the shafts that a load torque may act on, and of those whose motion is given.
 

@@ -4,19 +4,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from .. import _core
 from ..errors import InputError
 from ..inputs.validation import did_you_mean
 from ..model.gear import Gear
+from ..model.signals import Signal
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
+
+if TYPE_CHECKING:
+    from .train_tables import TrainInitial
 
 ROUNDING = 1e-12  # relative, between values that belong together
 
 
-def start_values(train: DriveTrain, initial: Any) -> dict[str, float]:
+def start_values(train: DriveTrain, initial: TrainInitial, core: _core.Train | None = None) -> dict[str, float]:
     """Values at t = 0 by the name of their result variable; what is not among them is 0.
+
+    Parameters
+    ----------
+    core
+        The solver's train, if there is one already.
 
     Raises
     ------
@@ -35,7 +45,7 @@ def start_values(train: DriveTrain, initial: Any) -> dict[str, float]:
     _check("motor_torques", initial.motor_torques, electric, 'motor of kind "dc" or "synchronous"')
     _check("hysteresis_capacities", initial.hysteresis_capacities, lossy, "gear with hysteresis")
     _check("hysteresis_forces", initial.hysteresis_forces, lossy, "screw, rack or belt with hysteresis")
-    if problem := train.core(()).check_start([speeds.get(name, 0.0) for name in train.shafts]):
+    if problem := (core or train.core(())).check_start([speeds.get(name, 0.0) for name in train.shafts]):
         raise InputError(str(problem), keys=("initial.speeds",))
     _check_flanks(train, speeds, twists)
     values = {f"{name}_speed": v for name, v in speeds.items()}
@@ -125,3 +135,18 @@ def _through(gear: Gear, twist: float, angle: float, *, forward: bool) -> float:
         if found == before:
             break
     return found
+
+
+def given_speeds(train: DriveTrain, motions: Mapping[str, tuple[Signal[Any], Signal[Any]]]) -> dict[str, float]:
+    """Speeds at t = 0 [rad/s, m/s] of shafts and slides with a given motion, and of others that rigid gears tie to them."""
+    rigid = [(g.input, g.output, g.ratio) for g in train.fixed_gears().values() if isinstance(g.stiffness, Rigid)]
+    speeds = {name: speed.at_start() for name, (speed, _) in motions.items()}
+    waiting = list(speeds)
+    while waiting:
+        shaft = waiting.pop()
+        for one, other, ratio in rigid:
+            found = {one: (other, 1.0 / ratio), other: (one, ratio)}.get(shaft)
+            if found is not None and found[0] not in speeds:
+                speeds[found[0]] = speeds[shaft] * found[1]
+                waiting.append(found[0])
+    return speeds

@@ -1,11 +1,36 @@
-"""Tables of a scenario in the long form that a train alone has not: its shafts and slides with loads, and its start."""
+"""The long form of a scenario: the tables of a drive train, with what acts on it."""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Iterator, Mapping
+from functools import cache, lru_cache
+from typing import Any
+
+from pydantic import ConfigDict, Field, model_validator
+
+from .. import _core
+from ..control.continuous import ContinuousController
+from ..control.controller import AnyController, Controller
 from ..control.references import MovesReference  # noqa: F401
+from ..data_sheets.train_components import CONDITIONS, RECORDS
+from ..errors import InputError
 from ..inputs import described
+from ..inputs.kept import kept
+from ..inputs.named import Elements, nothing
+from ..model.gearbox import Transmission
+from ..model.linear_train import LinearElements
+from ..model.motor import MotorLaw
 from ..model.shaft import Shaft
+from ..model.signals import CommandSignal, ForceSignal, Signal
 from ..model.slide import Slide
+from ..model.task import TrainTask
+from ..model.train import DriveTrain
+from .given_motion import MotionDerivative
+from .linear_units import in_si
+from .tables import BASE, RECORD_NAME, ScenarioTables, SimulationTable, with_accessories
+from .train_variables import add_angles, train_variables
+from .variables import Variable
 
 
 class ShaftTable(described.ShaftTableFields, Shaft):
@@ -26,6 +51,10 @@ class TrainInitial(described.TrainInitialFields):
     10.471975511965978
     """
 
+    def of_train(self) -> TrainInitial:
+        """The state of a drive train: this one."""
+        return self
+
     def at_rest(self) -> TrainInitial:
         """The same without motion, with its angles and twists."""
         return TrainInitial(angles=self.of_all("angles"), twists=self.of_all("twists"))
@@ -42,3 +71,234 @@ LINEAR_INITIAL = {
     "twists": "deflections",
     "hysteresis_capacities": "hysteresis_forces",
 }
+
+
+class TrainTables(ScenarioTables, LinearElements):
+    """Tables of a scenario in the long form: a drive train with its inputs, controllers, task and the duration of its run."""
+
+    model_config = ConfigDict(title="Drive train")
+
+    title: str = ""
+    shafts: Elements[ShaftTable] = Field(default_factory=nothing)
+    slides: Elements[SlideTable] = Field(default_factory=nothing)
+    """parts that move along a straight line; they follow the shafts in the order of results"""
+    command: Elements[CommandSignal] = Field(default_factory=nothing)
+    """command of each motor (1 is rated voltage, or with a torque source rated torque; left out, 0), brake and friction clutch (0: open, 1: the full torque)"""
+    controllers: Elements[AnyController] = Field(default_factory=nothing)
+    """controllers of motors, which then have no command"""
+    initial: TrainInitial = TrainInitial()
+    task: TrainTask = TrainTask()
+    simulation: SimulationTable
+
+    @model_validator(mode="before")
+    @classmethod
+    def _units_of_slides(cls, data: Any) -> Any:
+        return in_si(data, train_schema) if isinstance(data, Mapping) else data
+
+    @kept
+    def train(self) -> DriveTrain:
+        return DriveTrain(shafts=self.plain_shafts(), **self.elements())
+
+    def named_train(self) -> DriveTrain:
+        return self.train()
+
+    def long(self) -> TrainTables:
+        return self
+
+    def own_shafts(self) -> dict[str, Shaft]:
+        """The shafts as they are written, without the torques on them."""
+        return {name: Shaft(**{key: getattr(s, key) for key in Shaft.model_fields}) for name, s in self.shafts.items()}
+
+    def plain_shafts(self) -> dict[str, Shaft]:
+        """The shafts and slides without what acts on them."""
+        return self.with_drag(self.own_shafts()) | {name: slide.shaft() for name, slide in self.slides.items()}
+
+    def elements(self) -> dict[str, Any]:
+        """The tables of all else that makes the train."""
+        return self.plain_elements(self.slides)
+
+    def movers(self) -> dict[str, ShaftTable | SlideTable]:
+        """Shafts and slides."""
+        return {**self.shafts, **self.slides}
+
+    def controlled(self, motor: str) -> str:
+        """The shaft or slide that the reference of a motor's controller is for."""
+        return self.controllers[motor].shaft or list(self.train().shafts)[-1]
+
+    def initial_key(self, key: str, shaft: str) -> str:
+        """The dotted key of the state at t = 0 of a shaft or a slide, such as ``initial.positions.table`` for angles."""
+        return f"initial.{LINEAR_INITIAL[key] if shaft in self.slides else key}.{shaft}"
+
+    def loaded(self) -> list[str]:
+        """Names of the shafts and slides that a load acts on."""
+        return list(self.loads())
+
+    def loads(self) -> dict[str, Signal[Any]]:
+        """The load torques of shafts and load forces of slides, with the weight of inclined ones."""
+        found: dict[str, Signal[Any]] = {n: s.torque for n, s in self.shafts.items() if s.torque is not None}
+        for name, slide in self.slides.items():
+            weight = slide.weight(slide.mass + sum(m.mass for m in self.linear_motors.values() if m.slide == name))
+            if slide.force is not None or weight != 0.0:
+                force = ForceSignal() if slide.force is None else slide.force
+                found[name] = force.model_copy(update={"mean": force.mean + weight}) if weight != 0.0 else force
+        return found
+
+    def given(self) -> list[str]:
+        """Names of the shafts and slides whose motion is given."""
+        return [name for name, s in self.movers().items() if s.speed is not None or s.motion is not None]
+
+    def given_key(self, shaft: str) -> str:
+        """Dotted key that gives the motion of a shaft or a slide."""
+        key = "speed" if self.movers()[shaft].motion is None else "motion"
+        return f"{'slides' if shaft in self.slides else 'shafts'}.{shaft}.{key}"
+
+    def motions(self) -> dict[str, tuple[Signal[Any], Signal[Any]]]:
+        """Speed and acceleration of the shafts and slides whose motion is given."""
+        found: dict[str, tuple[Signal[Any], Signal[Any]]] = {}
+        for name, s in self.movers().items():
+            if s.motion is not None:
+                found[name] = (
+                    MotionDerivative(reference=s.motion, order=1),
+                    MotionDerivative(reference=s.motion, order=2),
+                )
+            elif s.speed is not None:
+                found[name] = s.speed, s.speed.acceleration()
+        return found
+
+    def acting(self, name: str) -> CommandSignal:
+        """The command of a motor, brake or clutch after its delays."""
+        command = self.command.get(name, CommandSignal())
+        element = self.brakes.get(name) or self.clutches.get(name)
+        return command if element is None else element.acting(command)
+
+    def prefix(self, motor: str) -> str:
+        return f"{motor}_"
+
+    def controller_key(self, motor: str) -> str:
+        return f"controllers.{motor}"
+
+    def gear_key(self, name: str) -> str:
+        return f"{self.kind_of(name)}s.{name}"
+
+    def motor_key(self, name: str) -> str:
+        return f"{'linear_motors' if name in self.linear_motors else 'motors'}.{name}"
+
+    def input_key(self, name: str) -> str:
+        if name.endswith("_load_force"):
+            slide = name.removesuffix("_load_force")
+            inclined = self.slides[slide].weight(1.0) != 0.0
+            return f"slides.{slide}.force" + (" and the weight" if inclined else "")
+        for suffix in ("_given_speed", "_given_acceleration", "_given_angle", "_given_position"):
+            if name.endswith(suffix):
+                return self.given_key(name.removesuffix(suffix))
+        for suffix, key in (
+            ("_load_torque", "shafts.{}.torque"),
+            ("_reference", "controllers.{}.reference"),
+        ):
+            if name.endswith(suffix):
+                return key.format(name.removesuffix(suffix))
+        return f"command.{name.removesuffix('_command')}"
+
+    def input_keys(self) -> dict[str, str]:
+        train = self.train()
+        keys = {train.command_of(name): f"command.{name}" for name in train.commanded()}
+        return keys | {
+            train.load_torque_of(name): f"slides.{name}.force" if train.is_slide(name) else f"shafts.{name}.torque"
+            for name in train.shafts
+        }
+
+    def record_keys(self) -> Iterator[str]:
+        for table, (key, _) in RECORDS.items():
+            beside = CONDITIONS[table].model_fields if table in CONDITIONS else ()
+            for name in getattr(self, table):
+                yield from (f"{table}.{name}.{key}" for key in (key, *beside))
+
+    def note(self) -> str:
+        notes = {name: part.note for name, part in self.train().gears.items()}
+        notes |= {name: part.note for name, part in self.motors.items()}
+        notes |= {name: part.note for name, part in self.linear_motors.items()}
+        return " ".join(f"{name}: {note}" for name, note in notes.items() if note)
+
+    def variables(self, core: _core.Train) -> tuple[Variable, ...]:
+        return train_variables(self.train(), core)
+
+    def derive(self, data: dict[str, Any], time: Any) -> None:
+        add_angles(self.train(), data, time)
+
+    def of_axes(self, axes: Mapping[str, Controller]) -> dict[str, Any]:
+        return {"controllers": {**self.controllers, **axes}}
+
+    def of_gears(self, gears: Mapping[str, Transmission]) -> dict[str, Any]:
+        return {"gears": {**self.gears, **{key.removeprefix("gears."): gear for key, gear in gears.items()}}}
+
+    def of_inputs(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        if others := [name for name in given if name not in SimulationTable.model_fields]:
+            raise InputError(
+                f"{others[0]}: a drive train has several; give them in its scenario, such as scenario.replace(**{{'command.NAME': 0.5}})"
+            )
+        return {"simulation": SimulationTable(**{**dict(self.simulation), **given})}
+
+    def open_loop(self) -> dict[str, Any]:
+        commands = {name: CommandSignal() for name in self.controllers}
+        return {"controllers": {}, "command": {**self.command, **commands}}
+
+    def told(self) -> str:
+        return repr(self.train())
+
+    @classmethod
+    def _described_by(cls) -> dict[str, Any]:
+        return train_schema()
+
+
+@lru_cache(maxsize=16)  # each keeps the regimes of its runs, a few megabytes
+def core_train(
+    train: DriveTrain,
+    short: bool,
+    loaded: tuple[str, ...],
+    given: tuple[str, ...],
+    laws: tuple[tuple[str, MotorLaw | None], ...],
+    continuous: tuple[tuple[str, ContinuousController], ...],
+) -> _core.Train:
+    """The solver's train, its motors as current loops make them, with continuous controllers."""
+    core = train.core(loaded, dict(laws), given)
+    core.short_form = short
+    for name, controller in continuous:
+        try:
+            controller.add_to(core, train, name)
+        except InputError as problem:
+            raise problem.inside(f"controllers.{name}") from None
+    return core
+
+
+@cache
+def _train_schema() -> str:
+    return json.dumps(_make_train_schema())
+
+
+def train_schema() -> dict[str, Any]:
+    """JSON Schema of scenario files in the long form, for editors."""
+    schema: dict[str, Any] = json.loads(_train_schema())
+    return schema
+
+
+def _make_train_schema() -> dict[str, Any]:
+    schema = with_accessories(TrainTables.model_json_schema())
+    schema["properties"] = {key: schema["properties"][key] for key in ("title", "shafts", "slides")} | schema[
+        "properties"
+    ]
+    schema["properties"]["base"] = BASE
+    schema["required"] = []  # with a base, none
+    for table, (key, own) in RECORDS.items():
+        elements = schema["properties"][table]
+        whole = elements["additionalProperties"]
+        conditions = CONDITIONS[table].model_json_schema()["properties"] if table in CONDITIONS else {}
+        part = schema["$defs"][whole["$ref"].rsplit("/", 1)[1]]
+        from_record = {
+            "type": "object",
+            "properties": {key: RECORD_NAME} | conditions | {name: part["properties"][name] for name in own},
+            "required": [key, *(name for name in own if name in part["required"])],
+            "description": f"As {part['title']}, with the values of a record of the catalogue, or of a sheet file; other keys take the "
+            "place of its values.",
+        }
+        elements["additionalProperties"] = {"anyOf": [whole, from_record]}
+    return schema

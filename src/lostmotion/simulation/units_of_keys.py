@@ -11,10 +11,11 @@ from ..inputs.schema import follow, unit_in_schema
 from ..inputs.validation import shown
 from ..units.conversion import to_si
 from ..units.scalars import is_number, objection
-from .drive_scenario import DriveScenario, json_schema
+from .drive_tables import DriveTables
 from .linear_units import unit_of_slides
 from .scenario import Scenario
-from .train_scenario import TrainScenario, train_schema
+from .tables import ScenarioTables
+from .train_tables import TrainTables
 
 
 def unit_of_key(key: str) -> str | None:
@@ -22,26 +23,26 @@ def unit_of_key(key: str) -> str | None:
 
     A key of both forms (`command.frequency`, where a motor has that name) is taken as that of the short one.
     """
-    of_drive = unit_in(DriveScenario, key)
-    return unit_in(TrainScenario, key) if of_drive is None else of_drive
+    of_drive = unit_in(DriveTables, key)
+    return unit_in(TrainTables, key) if of_drive is None else of_drive
 
 
-def unit_in(form: type[Scenario], key: str) -> str | None:
+def unit_in(form: type[ScenarioTables], key: str) -> str | None:
     """The same, of a key of the short or of the long form."""
-    return _unit(key, train_schema if form is TrainScenario else json_schema)
+    return _unit(key, form)
 
 
 def unit_for(scenario: Scenario, key: str) -> str | None:
     """SI unit of a dotted key of a scenario, where its controllers move slides in units of translation."""
-    unit = unit_in(type(scenario), key)
+    unit = unit_in(type(scenario.written), key)
     if not unit or not key.startswith("controllers."):
         return unit
     return unit_of_slides(scenario.model_dump(), key, unit)
 
 
-def limit_in(form: type[Scenario], key: str) -> Limit:
+def limit_in(form: type[ScenarioTables], key: str) -> Limit:
     """The range that a value of the short or of the long form may have, whatever the others are."""
-    nodes = _nodes(key, train_schema if form is TrainScenario else json_schema)
+    nodes = _nodes(key, form)
     numbers = [node for node in nodes if node.get("type") == "number"]
 
     def bound(name: str, widest: Callable[[list[float]], float]) -> float | None:
@@ -52,24 +53,24 @@ def limit_in(form: type[Scenario], key: str) -> Limit:
 
 
 @cache
-def _unit(key: str, schema: Callable[[], dict[str, Any]]) -> str | None:
-    return next((unit for node in _nodes(key, schema) if (unit := unit_in_schema(node)) is not None), None)
+def _unit(key: str, form: type[ScenarioTables]) -> str | None:
+    return next((unit for node in _nodes(key, form) if (unit := unit_in_schema(node)) is not None), None)
 
 
-def _nodes(key: str, schema: Callable[[], dict[str, Any]]) -> list[Mapping[str, Any]]:
+def _nodes(key: str, form: type[ScenarioTables]) -> list[Mapping[str, Any]]:
     """Nodes of a dotted key in the JSON Schema; none if it is unknown."""
     place = tuple(int(part) if part.isdecimal() else part for part in key.split("."))
-    found, nodes = follow(_made(schema), place)
+    found, nodes = follow(_made(form), place)
     if found != place:
         return []
     if any({"mean", "sines"} <= node.get("properties", {}).keys() for node in nodes):
-        return _nodes(f"{key}.mean", schema)  # a signal, which one value makes constant
+        return _nodes(f"{key}.mean", form)  # a signal, which one value makes constant
     return nodes
 
 
 @cache
-def _made(schema: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-    return schema()
+def _made(form: type[ScenarioTables]) -> dict[str, Any]:
+    return form._described_by()
 
 
 def in_si(value: Any, unit: str | None) -> Any:

@@ -8,11 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..inputs.arguments import checked
-from ..simulation.drive_scenario import DriveScenario
 from ..simulation.results import RunArrays
 from ..simulation.run import run
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import in_long_form
 from .axis_rules import brake_of_a_run
 from .duty_cycle import MIN_REST, STANDSTILL, DutyCycle, duty_cycle
 from .finding import Finding, Findings
@@ -67,8 +65,8 @@ def check_drive(scenario: Scenario) -> Findings:
 
 
 def _findings(scenario: Scenario) -> list[Finding]:
-    if not isinstance(scenario, DriveScenario):
-        return list(check_train(in_long_form(scenario)))
+    if not scenario.is_drive:
+        return list(check_train(scenario))
     result = _finely_sampled(scenario)
     cycle = duty_cycle(result, scenario.task.cycle)
     g, m, task = scenario.gearbox, scenario.motor, scenario.task
@@ -98,7 +96,7 @@ def _findings(scenario: Scenario) -> list[Finding]:
     return [_with_sinking(f, result, cycle) if f.rule in MEANS else f for f in findings]
 
 
-def _accessories(scenario: DriveScenario, result: RunArrays, torque: np.ndarray, speed: np.ndarray) -> list[Finding]:
+def _accessories(scenario: Scenario, result: RunArrays, torque: np.ndarray, speed: np.ndarray) -> list[Finding]:
     """The rules of the holding brake and of the amplifier, where the task has them."""
     task, found = scenario.task, list[Finding]()
     if task.brake is not None:
@@ -169,7 +167,7 @@ def _sinking(result: RunArrays) -> tuple[float, float]:
     return float(lasting.sum()), float(lasting[last:].sum())
 
 
-def _finely_sampled(scenario: DriveScenario) -> RunArrays:
+def _finely_sampled(scenario: Scenario) -> RunArrays:
     """The run with samples so close that no peak is missed; of a very long one only the beginning, since long ones end in rest."""
     table = scenario.simulation
     fastest = max((f for _, f, _ in resonances(scenario)), default=0.0)

@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass
 
 from ..model.signals import Ramp, TorqueSignal
-from ..simulation.drive_scenario import DriveScenario, Initial
+from ..simulation.drive_tables import Initial
 from ..simulation.run import run
+from ..simulation.scenario import Scenario
 
 MAX_DURATION = 1000.0  # [s]
 SAMPLES = 2000
@@ -39,7 +40,7 @@ class Holding:
         return self.from_rest == 0.0 and self.from_motion == 0.0
 
 
-def holding(scenario: DriveScenario, load_torque: float, speed: float) -> Holding:
+def holding(scenario: Scenario, load_torque: float, speed: float) -> Holding:
     """Determine the motion of a drive with command 0 under a constant load torque.
 
     Parameters
@@ -66,7 +67,7 @@ def holding(scenario: DriveScenario, load_torque: float, speed: float) -> Holdin
     return Holding(load_torque, from_rest, from_motion, begin)
 
 
-def _lasting_speed(scenario: DriveScenario, load_torque: TorqueSignal, start: Initial) -> float:
+def _lasting_speed(scenario: Scenario, load_torque: TorqueSignal, start: Initial) -> float:
     """Load speed [rad/s] that remains; 0 if the motor comes to rest, infinite if it does not settle."""
     duration = 4.0 * RAMP
     while True:

@@ -8,9 +8,9 @@ from .. import _core
 from ..model.gearbox import Gearbox
 from ..model.motor import Motor
 from ..model.torsion import Rigid
-from ..simulation.drive_scenario import DriveScenario
 from ..simulation.explanation import smallest_commands
 from ..simulation.results import RunArrays
+from ..simulation.scenario import Scenario
 from ..test_rig.rig import TestRig
 from .finding import Finding, Verdict
 from .holding import holding
@@ -25,7 +25,7 @@ def load_torques(result: RunArrays) -> list[float]:
     return sorted({float(torque.max()), float(torque.min())} - {0.0})
 
 
-def inertia(scenario: DriveScenario) -> Finding:
+def inertia(scenario: Scenario) -> Finding:
     """Inertia of the load relative to that of the motor side."""
     return inertia_ratio(scenario.motor, scenario.gearbox, scenario.load.inertia)
 
@@ -45,7 +45,7 @@ def inertia_ratio(motor: Motor, gearbox: Gearbox, load_inertia: float, largest: 
     )
 
 
-def resonances(scenario: DriveScenario) -> list[tuple[str, float, float]]:
+def resonances(scenario: Scenario) -> list[tuple[str, float, float]]:
     """(segment, resonance, anti-resonance) [Hz] of the softest and the stiffest segment of the torsion curve."""
     g = scenario.gearbox
     J_1 = g.ratio**2 * (scenario.motor.rotor_inertia + g.inertia)
@@ -62,7 +62,7 @@ def resonances(scenario: DriveScenario) -> list[tuple[str, float, float]]:
     ]
 
 
-def resonance(scenario: DriveScenario) -> list[Finding]:
+def resonance(scenario: Scenario) -> list[Finding]:
     """Whether a sine of the command excites one."""
     excited = {s.frequency for s in scenario.command.sines}
     if scenario.command.frequency is not None:
@@ -77,7 +77,7 @@ def resonance(scenario: DriveScenario) -> list[Finding]:
     return out
 
 
-def dead_zone(scenario: DriveScenario, result: RunArrays) -> Finding:
+def dead_zone(scenario: Scenario, result: RunArrays) -> Finding:
     """The commands that move the load from rest."""
     against = float(result["load_torque"][0])
     forward, backward = smallest_commands(scenario.drive(), against)
@@ -94,7 +94,7 @@ def dead_zone(scenario: DriveScenario, result: RunArrays) -> Finding:
     return Finding("dead_zone", "dead zone", value, "warning" if small else "ok", remark)
 
 
-def holdings(scenario: DriveScenario, result: RunArrays) -> list[Finding]:
+def holdings(scenario: Scenario, result: RunArrays) -> list[Finding]:
     """Whether the drive bears the load torques of the run with command 0."""
     loads = load_torques(result)
     if not loads:
@@ -104,7 +104,7 @@ def holdings(scenario: DriveScenario, result: RunArrays) -> list[Finding]:
     return [_held(scenario, load, float(abs(result["load_speed"]).max())) for load in loads]
 
 
-def _held(scenario: DriveScenario, load_torque: float, speed: float) -> Finding:
+def _held(scenario: Scenario, load_torque: float, speed: float) -> Finding:
     what = f"holding {load_torque:.4g} N·m with command 0"
     try:
         found = holding(scenario, load_torque, speed)

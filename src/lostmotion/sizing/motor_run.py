@@ -177,7 +177,7 @@ def temperatures(
     if m.winding is not None and (oriented := oriented_amplitudes(result, where)) is not None:
         heating = m.winding.phase_values().torque_constant * oriented[0]  # with all of the current across the magnets
     if ambient is None:
-        ambient = scenario_of(result).ambient_temperature()
+        ambient = scenario_of(result).task.ambient_temperature
     bodies = need_two_bodies(m, ambient, 0.0 if constant_resistance else COPPER, where)
     time = result["time"].values
     if len(time) < 2:

@@ -9,11 +9,10 @@ import numpy as np
 
 from ..model.linear import RatedScrew
 from ..model.losses import ConstantEfficiency, LossMap
-from ..simulation.axis_form import key_in_file
 from ..simulation.needs import need_no_impacts
 from ..simulation.results import RunArrays
 from ..simulation.run import run
-from ..simulation.train_scenario import TrainScenario
+from ..simulation.scenario import Scenario
 from .axis_rules import HOUR, AxialLoad, missing, screw_life, screw_rules
 from .duty_cycle import duty_cycle
 from .finding import Finding
@@ -27,7 +26,7 @@ SAMPLES = 20_000  # the fewest of a run
 NOT_JUDGED = ("inertia_ratio", "resonance", "dead_zone", "lost_motion", "holding")
 
 
-def check_train(scenario: TrainScenario) -> tuple[Finding, ...]:
+def check_train(scenario: Scenario) -> tuple[Finding, ...]:
     """Check a train as `check_drive` does.
 
     Raises
@@ -45,7 +44,7 @@ def check_train(scenario: TrainScenario) -> tuple[Finding, ...]:
         findings += _named(name, _screw(scenario, name, screw, result))
     powers = {}
     for name in train.motors:
-        judged, powers[key_in_file(scenario, scenario.key_of("motors", name))] = _motor(scenario, name, result)
+        judged, powers[scenario.key_in_file(scenario.key_of("motors", name))] = _motor(scenario, name, result)
         findings += judged
     findings += bus_findings(result, powers, scenario.task.supply, scenario.task.cycle)
     findings += _amplifier(scenario, result)
@@ -58,7 +57,7 @@ def check_train(scenario: TrainScenario) -> tuple[Finding, ...]:
     return tuple(findings)
 
 
-def _amplifier(scenario: TrainScenario, result: RunArrays) -> list[Finding]:
+def _amplifier(scenario: Scenario, result: RunArrays) -> list[Finding]:
     """The rules of the amplifier of the one motor; not judged of several motors."""
     train = scenario.train()
     if scenario.task.amplifier is None:
@@ -68,7 +67,7 @@ def _amplifier(scenario: TrainScenario, result: RunArrays) -> list[Finding]:
         return [Finding("amplifier_current", "amplifier", "not judged", "unknown", remark)]
     ((name, motor),) = train.motors.items()
     torque, speed = result[train.motor_torque_of(name)], result[f"{motor.shaft}_speed"]
-    where = key_in_file(scenario, scenario.key_of("motors", name))
+    where = scenario.key_in_file(scenario.key_of("motors", name))
     return amplifier_of_a_run(result, motor, torque, speed, scenario.task, where)
 
 
@@ -76,9 +75,9 @@ def _named(name: str, findings: list[Finding]) -> list[Finding]:
     return [replace(f, what=f"{name}: {f.what}") for f in findings]
 
 
-def _gear(scenario: TrainScenario, name: str, result: RunArrays) -> list[Finding]:
+def _gear(scenario: Scenario, name: str, result: RunArrays) -> list[Finding]:
     train = scenario.train()
-    gear, where = train.gears[name], key_in_file(scenario, f"{scenario.kind_of(name)}s.{name}")
+    gear, where = train.gears[name], scenario.key_in_file(f"{scenario.kind_of(name)}s.{name}")
     torque = train.output_torque_of(name)
     cycle = duty_cycle(
         result,
@@ -106,13 +105,13 @@ def _force(kind: str, peak: float) -> list[Finding]:
     return [] if kind == "screw" else [Finding("peak_output_torque", what, f"{peak:.4g} N", "unknown", remark)]
 
 
-def _screw(scenario: TrainScenario, name: str, screw: RatedScrew, result: RunArrays) -> list[Finding]:
+def _screw(scenario: Scenario, name: str, screw: RatedScrew, result: RunArrays) -> list[Finding]:
     """Life, static load, buckling, bending speed and ball speed of a screw, over the run, repeated without a pause."""
     train, time = scenario.train(), result.time
     force, speed = result[train.output_torque_of(name)], result[f"{train.gears[name].output}_speed"]
     load = AxialLoad(time, speed, force, scenario.task.cycle or float(time[-1] - time[0]))
     life = screw_life(load, screw)
-    where = key_in_file(scenario, f"screws.{name}")
+    where = scenario.key_in_file(f"screws.{name}")
     findings = screw_rules(load, screw, None, key=where)
     if life is None:
         return [missing("screw_life", "life of the screw, L10h", f"{where}.dynamic_capacity"), *findings]
@@ -121,7 +120,7 @@ def _screw(scenario: TrainScenario, name: str, screw: RatedScrew, result: RunArr
     return [Finding("screw_life", "life of the screw, L10h", value, "unknown", remark), *findings]
 
 
-def _load_torques(scenario: TrainScenario, name: str, result: RunArrays) -> list[float]:
+def _load_torques(scenario: Scenario, name: str, result: RunArrays) -> list[float]:
     """The largest and the least load torque at the output of a gear, from the shafts behind it through their ratios [N·m]; its
     rated torque where there are none."""
     train = scenario.train()
@@ -140,11 +139,11 @@ def _load_torques(scenario: TrainScenario, name: str, result: RunArrays) -> list
     return [gear.rated_output_torque]
 
 
-def _motor(scenario: TrainScenario, name: str, result: RunArrays) -> tuple[list[Finding], np.ndarray]:
+def _motor(scenario: Scenario, name: str, result: RunArrays) -> tuple[list[Finding], np.ndarray]:
     """Findings, and the power that it takes [W]."""
     train = scenario.train()
     motor, key = train.motors[name], scenario.key_of("motors", name)
-    where = key_in_file(scenario, key)
+    where = scenario.key_in_file(key)
     torque, speed = train.motor_torque_of(name), f"{motor.shaft}_speed"
     cycle = duty_cycle(result, scenario.task.cycle, speed=speed, motor_torque=torque, output_torque=torque)
     command, T, w = (result[key] for key in (f"{name}_command", torque, speed))

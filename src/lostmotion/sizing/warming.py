@@ -199,7 +199,7 @@ def warm_up(
     name, driven = _motor(scenario, motor)
     if magnet_coefficient and driven.kind != "dc":
         raise InputError('warm_up: magnet_coefficient acts on a motor of kind "dc"; leave it out')
-    ambient = scenario.ambient_temperature() if ambient is None else ambient
+    ambient = scenario.task.ambient_temperature if ambient is None else ambient
     bodies = need_two_bodies(driven, ambient, COPPER, scenario.motor_key(name))
     at = ambient if lubricant_temperature is None else lubricant_temperature
     law = _Law(scenario, name, bodies, lubricant, at, magnet_coefficient, _heating(scenario, name, heating))

@@ -32,7 +32,7 @@ from ..model.duty import Amplifier, Duty, HoldingBrake, Supply
 from ..model.motor import Motor, MotorLimits
 from ..model.signals import TimeFunction, TorqueSignal
 from ..model.task import Task
-from ..simulation.drive_scenario import DriveScenario
+from ..simulation.scenario import Scenario
 from ..sizing.finding import SOURCES
 from ..sizing.motion_check import INERTIA_RATIO
 from .select import Bound
@@ -202,7 +202,7 @@ class AxisTask(Task, Duty):
         asked = {column: getattr(self, key) for key, column in REQUIREMENTS.items()}
         return {column: Bound(max=value) for column, value in asked.items() if value is not None}
 
-    def check(self, scenario: DriveScenario) -> None:
+    def check(self, scenario: Scenario) -> None:
         """Sees that the motion of a scenario can be repeated, and that it has what the task asks for.
 
         Raises
@@ -243,7 +243,7 @@ def _up_to(motor: Motor, current: float) -> Motor:
     return motor.model_copy(update={"limits": limits.model_copy(update={"max_current": min(own, current)})})
 
 
-def reference_of(scenario: DriveScenario) -> PositionReference:
+def reference_of(scenario: Scenario) -> PositionReference:
     """The positions that the axis follows.
 
     Raises

@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 
 from ..model.motor import Motor
-from ..simulation.drive_scenario import DriveScenario
 from ..simulation.linear_units import of_slides
 from ..simulation.results import RunArrays
+from ..simulation.scenario import Scenario
 from ..sizing.duty_cycle import DutyCycle
 from ..sizing.motor_check import rms_rise
 from ..sizing.thermal import TwoBodies
@@ -110,7 +110,7 @@ def change(result: RunArrays, count: int) -> float:
 class Repeated:
     """Run of a candidate that repeats, or has as many cycles as the task permits."""
 
-    scenario: DriveScenario
+    scenario: Scenario
     cycles: Cycles
     result: RunArrays
     change: float

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..control.loops import FirstOrderCurrent, IdealCurrent
-from ..simulation.drive_scenario import DriveScenario
 from ..simulation.results import RunArrays
+from ..simulation.scenario import Scenario
 from ..sizing.motor_check import command_of_run
 from ..sizing.motor_run import current_voltage_power, oriented_amplitudes
 from ..sizing.thermal import mean_square
@@ -33,7 +33,7 @@ class Electrical:
     """[A]"""
 
     @classmethod
-    def of(cls, scenario: DriveScenario, result: RunArrays, here: slice) -> Electrical:
+    def of(cls, scenario: Scenario, result: RunArrays, here: slice) -> Electrical:
         """Quantities of the last cycle of a run that is sampled at each sample instant of its controller.
 
         Under field-oriented control the core has integrated energy and heat. Any other motor has the command E for a
@@ -68,12 +68,12 @@ class Electrical:
         return cls(current, voltage, step * power, square, square, rms)
 
 
-def _angle(scenario: DriveScenario, result: RunArrays, here: slice) -> np.ndarray:
+def _angle(scenario: Scenario, result: RunArrays, here: slice) -> np.ndarray:
     """Angle of the motor [rad]."""
     return np.asarray(scenario.gearbox.ratio * (result["load_angle"][here] + result["twist"][here]))
 
 
-def _over_ticks(scenario: DriveScenario, result: RunArrays, here: slice, step: float) -> tuple[np.ndarray, np.ndarray]:
+def _over_ticks(scenario: Scenario, result: RunArrays, here: slice, step: float) -> tuple[np.ndarray, np.ndarray]:
     """Means of the torque and of its square over each tick."""
     controller, m = scenario.controller, scenario.motor
     assert controller is not None

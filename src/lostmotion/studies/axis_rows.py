@@ -13,7 +13,7 @@ from ..data_sheets.linear_sheets import LinearMotorSheet
 from ..errors import InputError
 from ..model.gearbox import Gearbox
 from ..model.motor import Motor
-from ..simulation.drive_scenario import DriveScenario
+from ..simulation.scenario import Scenario
 from ..sizing.axis_rules import (
     derated,
     emergency_stop,
@@ -81,7 +81,7 @@ class Axes:
         return found
 
     @property
-    def _base(self) -> DriveScenario:
+    def _base(self) -> Scenario:
         return self.study.drive
 
     def _once(self, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:

@@ -8,9 +8,9 @@ import numpy as np
 
 from .. import _core
 from ..control.axis import driven
-from ..simulation.drive_scenario import DriveScenario
 from ..simulation.results import RunArrays
 from ..simulation.run import BYTES_PER_VALUE, check_memory, run
+from ..simulation.scenario import Scenario
 from ..simulation.windings import oriented
 from .axis import FEWEST, REPEATS
 from .axis_columns import Repeated, change
@@ -48,7 +48,7 @@ def until_it_repeats(study: Study, row: np.ndarray) -> Repeated:
         count = min(2 * count, task.max_cycles)
 
 
-def _run(scenario: DriveScenario, shorter: Cycles, longer: Cycles) -> RunArrays:
+def _run(scenario: Scenario, shorter: Cycles, longer: Cycles) -> RunArrays:
     """Run of the shorter cycles if the last two of them agree, else of the longer ones, which are those of the scenario."""
     samples = shorter.simulation.samples
     check_memory(len(longer.time), BYTES_PER_VALUE * len(VARIABLES))

@@ -17,13 +17,14 @@ from ..model.gearbox import Gearbox
 from ..model.motor import Motor
 from ..model.signals import Samples, TimeFunction, TorqueSignal
 from ..servo.data import lag_sum, secant
-from ..simulation.drive_scenario import DriveScenario, Initial, LoadTable
-from ..simulation.scenario import SimulationTable
+from ..simulation.drive_tables import Initial, LoadTable
+from ..simulation.scenario import Scenario
+from ..simulation.tables import SimulationTable
 from ..sizing.required_motion import duty_torque, required_motion
 from .axis import AxisTask, reference_of, repeated, repeated_torque
 
 
-def load_torque_of(base: DriveScenario, task: AxisTask) -> TorqueSignal:
+def load_torque_of(base: Scenario, task: AxisTask) -> TorqueSignal:
     """The load torque of one cycle: that of the base, with what the duty of the task adds along the reference."""
     if not task.anything:
         return base.load.torque
@@ -39,7 +40,7 @@ def _duty_torque(
     return TorqueSignal(samples=Samples(times=tuple(times.tolist()), values=tuple(torques.tolist())))
 
 
-def axis_scenario(base: DriveScenario, motor: Motor, gearbox: Gearbox, task: AxisTask, count: int) -> DriveScenario:
+def axis_scenario(base: Scenario, motor: Motor, gearbox: Gearbox, task: AxisTask, count: int) -> Scenario:
     """The base with a motor, a gearbox and gains by rule for them, over so many cycles, from rest where the reference begins.
 
     Raises
@@ -116,7 +117,7 @@ def begins_alike(shorter: Cycles, longer: Cycles) -> bool:
     return all(until(a) == until(b) for a, b in pairs)
 
 
-def cycles_of(base: DriveScenario, task: AxisTask, count: int) -> Cycles:
+def cycles_of(base: Scenario, task: AxisTask, count: int) -> Cycles:
     """Reference, load, times and start over so many cycles; made once."""
     made = base.kept_values().setdefault(cycles_of, {})
     if count not in made or made[count].task is not task:
@@ -134,7 +135,7 @@ def cycles_of(base: DriveScenario, task: AxisTask, count: int) -> Cycles:
     return made[count]  # type: ignore[no-any-return]
 
 
-def over(scenario: DriveScenario, cycles: Cycles) -> DriveScenario:
+def over(scenario: Scenario, cycles: Cycles) -> Scenario:
     """The scenario over so many cycles."""
     assert scenario.controller is not None
     controller = scenario.controller.unchecked(reference=cycles.reference)
@@ -142,7 +143,7 @@ def over(scenario: DriveScenario, cycles: Cycles) -> DriveScenario:
 
 
 @kept
-def with_scale_alone(base: DriveScenario) -> DriveScenario:
+def with_scale_alone(base: Scenario) -> Scenario:
     """The base with the scale of its slide as the only encoder, as with a linear motor."""
     controller = base.controller
     assert controller is not None
@@ -172,7 +173,7 @@ def _with_loop(controller: Controller, loop: AnyCurrent) -> tuple[Controller, fl
     return made[loop]  # type: ignore[no-any-return]
 
 
-def tuned(base: DriveScenario, motor: Motor, g: Gearbox, current: AnyCurrent | None = None) -> Controller:
+def tuned(base: Scenario, motor: Motor, g: Gearbox, current: AnyCurrent | None = None) -> Controller:
     """Controller of the base with gains by rule for a motor, a gearbox and its load. The torque of their inertia is
     fed forward. `current` is its current loop, if not that of the base."""
     assert base.controller is not None

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..response.crossovers import bandwidth
-from ..simulation.drive_scenario import DriveScenario
+from ..simulation.scenario import Scenario
 from ..simulation.variables import CHANNEL_NAMES, add_efficiency
 from ..worker_threads import thread_pool
 from .records import kind_of_record
@@ -98,7 +98,7 @@ def _names(study: Study, data: dict[str, np.ndarray], runs: Runs, threads: int) 
 def _ideal_speeds(study: Study, runs: Runs) -> np.ndarray:
     """Load speed [rad/s] at command 1 of a rigid drive without inertia, friction and load, for each run."""
 
-    def of(scenario: DriveScenario) -> float:
+    def of(scenario: Scenario) -> float:
         return scenario.motor.unloaded_speed / scenario.gearbox.ratio
 
     base = study.drive

@@ -10,7 +10,6 @@ from .. import _core
 from ..errors import InputError
 from ..model.torsion import Rigid
 from ..simulation.core_runs import core_case
-from ..simulation.drive_scenario import DriveScenario
 from ..simulation.results import ENERGY
 from .functions import REDUCTIONS
 from .runs import Runs, spread
@@ -29,7 +28,7 @@ def _fields() -> dict[str, int]:
 def core_can(study: Study) -> bool:
     """Whether all that varies is a plain number of the core, and the runs are all that is wanted."""
     s = study.scenario
-    if checks_drives(study) or not isinstance(s, DriveScenario) or s.controller is not None:
+    if checks_drives(study) or not s.is_drive or s.controller is not None:
         return False
     rigid = isinstance(s.gearbox.stiffness, Rigid)
     for v in study.vary:

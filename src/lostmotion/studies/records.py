@@ -16,7 +16,6 @@ from ..inputs.schema import unit_in_schema
 from ..inputs.toml_files import is_in_file
 from ..inputs.validation import did_you_mean, listed, shown
 from ..simulation.scenario import Scenario
-from ..simulation.scenario_files import scenario_from
 from ..simulation.units_of_keys import in_si
 
 # Of keys that take the name of a record: the part that the record describes, and what kind of record it is.
@@ -247,7 +246,7 @@ def with_records(written: Mapping[str, Any], changes: Mapping[str, Any]) -> Scen
             tables[table] = {**tables[table], name: _changed(tables, f"{table}.{name}", key, changes[key])}
         else:
             tables[table] = _changed(tables, table, key, changes[key])
-    return scenario_from(tables)
+    return Scenario(**tables)
 
 
 def _changed(tables: Mapping[str, Any], part: str, key: str, value: Any) -> dict[str, Any]:

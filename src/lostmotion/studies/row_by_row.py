@@ -13,7 +13,6 @@ from ..simulation.pointing_error import pointing_errors
 from ..simulation.run import run
 from ..simulation.scenario import Scenario
 from ..simulation.train_parts import parts_of
-from ..simulation.train_scenario import TrainScenario
 from ..simulation.windings import bound_values
 from ..worker_threads import thread_pool
 from .check import COLUMNS, check_columns
@@ -71,7 +70,7 @@ def run_each(study: Study, parameters: np.ndarray, threads: int) -> Runs:
 def together(study: Study) -> bool:
     """Whether its runs are of trains that the core can take at once."""
     scenario = study.scenario
-    return isinstance(scenario, TrainScenario) and not scenario.axes() and len(parts_of(scenario)) == 1
+    return not scenario.is_drive and not scenario.axes() and len(parts_of(scenario)) == 1
 
 
 def run_trains(study: Study, parameters: np.ndarray, threads: int) -> Runs:

@@ -16,9 +16,7 @@ from ..inputs.quantities import Whole
 from ..inputs.validation import did_you_mean, listed
 from ..model.duty import HoldingBrake
 from ..model.motor import Motor
-from ..simulation.drive_scenario import DriveScenario, short_form
 from ..simulation.scenario import Scenario
-from ..simulation.train_scenario import TrainScenario
 from ..simulation.units_of_keys import unit_in, unit_of_key
 from ..sizing.stages import stage_of, together
 from ..sizing.whole_drives import LINEAR, WHOLE, whole_drive
@@ -55,7 +53,7 @@ class Study(Part):
     """Many runs of one scenario, of a drive or of a drive train."""
 
     title: str = ""
-    scenario: DriveScenario | TrainScenario
+    scenario: Scenario
     """the base, with all values"""
     written: dict[str, Any] = Field(default={})
     """the base as its file has it, with the names of records; empty if made in Python"""
@@ -203,7 +201,7 @@ class Study(Part):
                         "out; name a record there, or vary that too"
                     )
             check_key(scenario, key, relative=relative)
-            if unit_in(type(scenario), key) != unit_of_key(key):
+            if unit_in(type(scenario.written), key) != unit_of_key(key):
                 raise ValueError(f"varies {key}, which is a key of the short form, too; rename that element")
 
     def _with_first_records(self) -> Scenario:
@@ -241,9 +239,9 @@ class Study(Part):
         return self.written or self.scenario.model_dump()
 
     @property
-    def drive(self) -> DriveScenario:
+    def drive(self) -> Scenario:
         """The base of a task, or of a study of a drive."""
-        return short_form(self.scenario, "study")
+        return self.scenario.short_form("study")
 
     @property
     def vocabulary(self) -> Vocabulary:
@@ -262,7 +260,7 @@ class Study(Part):
         """
         return self.scenario_with(dict(enumerate(row))) if self.axis is None else self.axis_at(row, FEWEST)
 
-    def axis_at(self, row: np.ndarray, cycles: int) -> DriveScenario:
+    def axis_at(self, row: np.ndarray, cycles: int) -> Scenario:
         """The scenario of one pair of a task over so many cycles.
 
         Raises
@@ -276,7 +274,7 @@ class Study(Part):
             gearbox = self._with_stage(gearbox, row)
         return axis_scenario(self.base_of(row), motor, gearbox, self.axis, cycles)
 
-    def base_of(self, row: np.ndarray) -> DriveScenario:
+    def base_of(self, row: np.ndarray) -> Scenario:
         """The base of a row of a task: of a linear motor with the scale alone."""
         return with_scale_alone(self.drive) if self.slides_itself(row) else self.drive
 
@@ -411,9 +409,9 @@ class Study(Part):
         }
         return base.replace(**changes) if changes else base
 
-    def drive_at(self, row: np.ndarray) -> DriveScenario:
+    def drive_at(self, row: np.ndarray) -> Scenario:
         """The same, of a study of a drive."""
-        return short_form(self.scenario_at(row), "study")
+        return self.scenario_at(row).short_form("study")
 
     def _with_records(self, records: dict[str, Any]) -> Scenario:
         """The base with other records; the last ones are kept, since other parameters may vary beside them."""

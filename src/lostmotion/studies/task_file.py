@@ -20,10 +20,10 @@ from ..model.signals import ForceSignal, TorqueSignal
 from ..model.slide import Slide
 from ..model.task import Task
 from ..reproducible import sin
-from ..simulation.drive_scenario import from_tables
 from ..simulation.linear_units import in_si, of_slides
+from ..simulation.scenario import Scenario
 from ..simulation.scenario_files import read_series_files, units_of_series
-from ..simulation.train_scenario import train_schema
+from ..simulation.train_tables import train_schema
 from ..sizing.stages import DIRECT, STAGES, stage_of
 from ..sizing.whole_drives import BESIDE, LINEAR, WHOLE
 from .axis import AxisTask, InnerLoop
@@ -158,7 +158,7 @@ def task_of(tables: dict[str, Any], directory: Path = Path()) -> Study:
         chosen = Selection(**{"objectives": usual} | select | {"limits": limits | select.get("limits", {})})
     return Study(
         title=written["title"],
-        scenario=from_tables(written),
+        scenario=Scenario(**written),
         written=written,
         vary=tuple(vary),
         axis=task,

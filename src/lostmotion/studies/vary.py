@@ -183,7 +183,7 @@ def base_value(scenario: Scenario, key: str) -> Any:
     ValueError
         There is nothing of that name.
     """
-    node: Any = scenario
+    node: Any = scenario.written
     for part in key.split("."):
         try:
             if isinstance(node, tuple | list):
@@ -254,7 +254,7 @@ def check_key(scenario: Scenario, key: str, *, relative: bool) -> None:
     if value is None:
         if relative:
             raise ValueError(f"varies {key} with relative, but the base scenario has no value there to multiply")
-        if unit_in(type(scenario), key) is None:
+        if unit_in(type(scenario.written), key) is None:
             raise ValueError(f"varies {key}, which the base scenario does not have; give it there first")
     elif isinstance(value, str | bool):
         raise ValueError(f"varies {key}, which is {shown(value)} and no number")

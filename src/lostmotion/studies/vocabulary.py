@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from ..simulation.drive_scenario import DriveScenario
 from ..simulation.pointing_error import pointing_names
 from ..simulation.results import ENERGY
 from ..simulation.scenario import Scenario
@@ -60,5 +59,5 @@ def vocabulary_of(scenario: Scenario) -> Vocabulary:
         (*((v.name, v.unit) for v in variables), *_controlled(scenario)),
         tuple(v.name for v in variables if not v.derived),
         tuple((entry.replace(": ", "_").replace(" ", "_"), entry) for entry in scenario.core().ledger_names()),
-        OF_THE_RUN if isinstance(scenario, DriveScenario) else OF_TRAINS,
+        OF_THE_RUN if scenario.is_drive else OF_TRAINS,
     )

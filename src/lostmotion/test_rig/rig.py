@@ -24,9 +24,10 @@ from ..model.load import Load
 from ..model.motor import Motor
 from ..model.signals import CommandSignal, Samples, TorqueSignal
 from ..model.torsion import Rigid
-from ..simulation.drive_scenario import Initial, of_drive
+from ..simulation.drive_tables import Initial
 from ..simulation.results import RunArrays
 from ..simulation.run import run
+from ..simulation.scenario import Scenario
 from ..simulation.switchings import names_in, unpacked
 from .loop import Loop
 
@@ -92,7 +93,7 @@ class TestRig:
 
     @staticmethod
     def _run(drive: Drive, **surroundings: Any) -> RunArrays:
-        return run(of_drive(drive, **surroundings), energy=False)
+        return run(Scenario.of_drive(drive, **surroundings), energy=False)
 
     def _flywheel(self) -> Drive:
         # So large that its speed does not sink notably under the torque of a large gear of low ratio either.

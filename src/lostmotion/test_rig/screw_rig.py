@@ -18,8 +18,8 @@ from ..model.linear import ScrewData
 from ..model.torsion import Rigid
 from ..simulation.results import RunArrays
 from ..simulation.run import run
+from ..simulation.scenario import Scenario
 from ..simulation.switchings import names_in, unpacked
-from ..simulation.train_scenario import TrainScenario
 from .loop import Loop
 from .rig import LOST_MOTION_LOAD, RAMP, RigError
 
@@ -113,7 +113,7 @@ class ScrewRig:
                 "motor": {"shaft": "input", "kind": "torque_source", "rotor_inertia": 0.0, "rated_torque": 1.0}
             }
             tables["command"] = {"motor": command}
-        return run(TrainScenario(**tables), energy=False)
+        return run(Scenario(**tables), energy=False)
 
     # --- the input locked: deflection under an axial force ---
 

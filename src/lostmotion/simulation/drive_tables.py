@@ -1,0 +1,230 @@
+"""The short form of a scenario: the tables of a motor, a gearbox and a load, with what acts on them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from pydantic import ConfigDict
+
+from .. import _core
+from ..control.axis import check_torques
+from ..control.controller import Controller
+from ..data_sheets.components import Conditions
+from ..errors import InputError
+from ..inputs import described
+from ..inputs.kept import kept
+from ..inputs.named import Named
+from ..model.drive import Drive
+from ..model.gearbox import Gearbox, Transmission
+from ..model.load import Load
+from ..model.motor import Motor
+from ..model.signals import CommandSignal, TorqueSignal
+from ..model.task import Task, TrainTask
+from ..model.torsion import Rigid
+from ..model.train import DriveTrain
+from .tables import BASE, RECORD_NAME, ScenarioTables, SimulationTable, Whole, check_on_reference, with_accessories
+from .train_tables import ShaftTable, TrainInitial, TrainTables
+from .variables import VARIABLES, Variable, add_efficiency
+
+MOTOR, LOAD, GEARBOX = "motor", "load", "gearbox"  # names in the long form
+
+
+class LoadTable(Load):
+    """The driven body and the disturbance torque on it."""
+
+    torque: TorqueSignal = TorqueSignal()
+    """M_Z"""
+
+
+class Initial(described.InitialFields):
+    """State of a drive at t = 0.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> lm.Initial(motor_speed="3000 rpm", load_speed="30 rpm").load_speed
+    3.141592653589793
+    """
+
+    @kept
+    def of_train(self) -> TrainInitial:
+        """The same state of the drive as a train; what follows from a reference, or is 0, is left out."""
+        motion: dict[str, Any] = {
+            "speeds": {MOTOR: self.motor_speed, LOAD: self.load_speed},
+            "angles": {LOAD: self.load_angle},
+        }
+        others = {
+            "twists": (GEARBOX, self.twist),
+            "motor_torques": (MOTOR, self.motor_torque),
+            "hysteresis_capacities": (GEARBOX, self.hysteresis_capacity),
+        }
+        found = {key: {name: value} for key, (name, value) in others.items() if value}
+        return TrainInitial(**({} if self.on_reference else motion), **found, on_reference=self.on_reference)
+
+    def at_rest(self) -> Initial:
+        """The same without motion and twist."""
+        return Initial()
+
+
+class DriveTables(ScenarioTables):
+    """Tables of a scenario in the short form: a drive with its inputs, controller, task and the duration of its run."""
+
+    model_config = ConfigDict(title="Scenario")
+
+    title: str = ""
+    command: CommandSignal = CommandSignal()
+    """E_C: 1 is rated voltage, or with a torque source rated torque"""
+    controller: Controller | None = None
+    """controller of the motor, which then has no command; its shafts are `motor` and `load`"""
+    motor: Motor
+    gearbox: Gearbox
+    load: LoadTable
+    initial: Initial = Initial()
+    task: Task = Task()
+    simulation: SimulationTable
+
+    @kept
+    def drive(self) -> Drive:
+        """The drive without its surroundings."""
+        load = Load(**{name: getattr(self.load, name) for name in Load.model_fields})
+        return Drive(motor=self.motor, gearbox=self.gearbox, load=load)
+
+    def train(self) -> DriveTrain:
+        return self.drive().train()
+
+    def named_train(self) -> DriveTrain:
+        return self.drive().named_train()
+
+    @kept
+    def long(self) -> TrainTables:
+        train = self.train()  # whose parts are checked
+        load = ShaftTable.model_construct(None, **dict(train.shafts[LOAD]), torque=self.load.torque)
+        return TrainTables.model_construct(
+            title=self.title,
+            shafts=Named({MOTOR: ShaftTable.model_construct(None, **dict(train.shafts[MOTOR])), LOAD: load}),
+            motors=train.motors,
+            gears=train.gears,
+            command=Named({MOTOR: self.command} if self.controller is None else {}),
+            controllers=Named({} if self.controller is None else {MOTOR: self.controller}),
+            initial=self.initial.of_train(),
+            task=TrainTask(**{key: getattr(self.task, key) for key in TrainTask.model_fields}),
+            simulation=self.simulation,
+        )
+
+    def prefix(self, motor: str) -> str:  # noqa: ARG002
+        return ""
+
+    def controller_key(self, motor: str) -> str:  # noqa: ARG002
+        return "controller"
+
+    def gear_key(self, name: str) -> str:
+        return name
+
+    def gears_by_key(self) -> Mapping[str, Transmission]:
+        return {GEARBOX: self.gearbox}
+
+    def motor_key(self, name: str) -> str:
+        return name
+
+    def input_key(self, name: str) -> str:
+        return {"load_torque": "load.torque", "reference": "controller.reference"}.get(name, name)
+
+    def input_keys(self) -> dict[str, str]:
+        return {"command": "command", "load_torque": "load.torque"}
+
+    def record_keys(self) -> Iterator[str]:
+        yield from ("gearbox", "motor", *(f"gearbox.{name}" for name in Conditions.model_fields))
+
+    def note(self) -> str:
+        return " ".join(filter(None, [self.gearbox.note, self.motor.note]))
+
+    def attributes(self) -> dict[str, float]:
+        return {"gear_ratio": self.gearbox.ratio}
+
+    def variables(self, core: _core.Train) -> tuple[Variable, ...]:  # noqa: ARG002
+        return VARIABLES
+
+    def derive(self, data: dict[str, Any], time: Any) -> None:  # noqa: ARG002
+        add_efficiency(data, self.gearbox.ratio)
+
+    def of_axes(self, axes: Mapping[str, Controller]) -> dict[str, Any]:
+        return {"controller": axes[MOTOR]}
+
+    def of_gears(self, gears: Mapping[str, Transmission]) -> dict[str, Any]:
+        return dict(gears)
+
+    def of_inputs(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        return of_inputs(self.load, self.simulation, given)
+
+    def open_loop(self) -> dict[str, Any]:
+        return {"controller": None}
+
+    def told(self) -> str:
+        return repr(self.drive())
+
+    @classmethod
+    def _described_by(cls) -> dict[str, Any]:
+        return drive_schema()
+
+
+def check_drive(scenario: Whole, written: DriveTables) -> None:
+    """Refuse what contradicts itself in the tables of a scenario in the short form.
+
+    Raises
+    ------
+    InputError, ValueError
+    """
+    written.drive()
+    check_on_reference(written.initial, scenario.axes(), ("load_angle", "load_speed", "motor_speed"))
+    speeds, motor = scenario.begin().speeds, written.motor
+    if isinstance(written.gearbox.stiffness, Rigid):
+        if written.initial.twist != 0.0:
+            raise ValueError(f"has initial.twist = {written.initial.twist} rad, but the gearbox is rigid; leave it out")
+        speed, load_speed = speeds[MOTOR], speeds[LOAD]
+        if abs(speed / written.gearbox.ratio - load_speed) > 1e-12 * abs(load_speed):
+            raise ValueError(
+                f"has initial.motor_speed = {speed} rad/s and initial.load_speed = {load_speed} rad/s, but the gearbox is "
+                "rigid; their quotient must be its ratio"
+            )
+    if motor.kind == "torque_source" and written.initial.motor_torque != 0.0:
+        raise ValueError("has initial.motor_torque, but a torque source has no such state; use command")
+    if written.controller is not None and written.command != CommandSignal():
+        raise InputError("both turn the motor; leave one of them out", keys=("command", "controller"))
+    check_torques(scenario.axes(), {MOTOR: written.initial.motor_torque}, "initial.motor_torque")
+    scenario.control()
+
+
+def of_inputs(load: Load, simulation: SimulationTable | None, given: Mapping[str, Any]) -> dict[str, Any]:
+    """The tables that change where `simulate` is given inputs and times."""
+    changes = {key: given[key] for key in ("initial",) if key in given}
+    if times := {key: given[key] for key in SimulationTable.model_fields if key in given}:
+        changes["simulation"] = SimulationTable(**dict(simulation or ()) | times)
+    if "command" in given:
+        changes["command"] = _signal(given["command"], CommandSignal)
+    if "load_torque" in given:
+        changes["load"] = LoadTable(**dict(load) | {"torque": _signal(given["load_torque"], TorqueSignal)})
+    return changes
+
+
+def _signal(value: Any, kind: Any) -> Any:
+    return kind(mean=value) if isinstance(value, int | float) else value
+
+
+def drive_schema() -> dict[str, Any]:
+    """JSON Schema of scenario files in the short form, for editors."""
+    schema = with_accessories(DriveTables.model_json_schema())
+    schema["properties"]["base"] = BASE
+    schema["required"] = []  # with a base, none
+    for table in ("gearbox", "motor"):
+        whole = schema["properties"][table]
+        conditions = Conditions.model_json_schema()["properties"] if table == "gearbox" else {}
+        from_record = {
+            "type": "object",
+            "properties": {"from": RECORD_NAME} | conditions,
+            "required": ["from"],
+            "description": f"A {table} of the catalogue, or of a sheet file; other keys take the place of its values. A table "
+            "that says its kind takes the place of the whole one, any other changes the keys that it gives.",
+        }
+        schema["properties"][table] = {"anyOf": [whole, RECORD_NAME, from_record]}
+    return schema

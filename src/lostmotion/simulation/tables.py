@@ -1,0 +1,181 @@
+"""Base of the tables of scenarios in their forms."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any, Protocol, Self
+
+from pydantic import model_validator
+
+from .. import _core
+from ..control.continuous import ContinuousController
+from ..control.controller import Controller
+from ..data_sheets.components import ACCESSORIES
+from ..inputs.part import Part
+from ..inputs.quantities import Positive, Time
+from ..model.gearbox import Transmission
+from ..model.train import DriveTrain
+from .variables import Variable
+
+MAX_SAMPLES = 100_000_000
+
+# In the JSON Schema of files, beside what a scenario has.
+BASE = {"type": "string", "description": "scenario file that this one changes"}
+RECORD_NAME = {"type": "string", "description": "name of a record of the catalogue, or a file with one (.toml)"}
+
+
+def with_accessories(schema: dict[str, Any]) -> dict[str, Any]:
+    """A JSON Schema in which brake and amplifier of a task may name a record."""
+    from_record = {"type": "object", "properties": {"from": RECORD_NAME}, "required": ["from"]}
+    for task in ("Task", "TrainTask"):
+        properties = schema["$defs"].get(task, {}).get("properties", {})
+        for key in ACCESSORIES:
+            if key in properties:
+                properties[key]["anyOf"] += [RECORD_NAME, from_record]
+    return schema
+
+
+def check_on_reference(initial: Any, controllers: Mapping[str, Controller], keys: Sequence[str]) -> None:
+    """Refuses `on_reference` where no reference says where an axis is, or where one of the keys says so, too.
+
+    Raises
+    ------
+    ValueError
+    """
+    if not initial.on_reference:
+        return
+    if not any(c.reference.kind == "position" for c in controllers.values()):
+        raise ValueError("has initial.on_reference but no controller with a reference of the position; leave it out")
+    if given := [key for key in keys if getattr(initial, key)]:
+        raise ValueError(
+            f"has initial.on_reference and initial.{given[0]}, which follows from it; leave one of them out"
+        )
+
+
+class SimulationTable(Part):
+    """Duration and instants of the result. Neither affects the motion."""
+
+    duration: Annotated[Time, Positive]
+    sample_interval: Annotated[Time, Positive]
+
+    @model_validator(mode="after")
+    def _not_too_many(self) -> Self:
+        if self.sample_interval > self.duration:
+            raise ValueError(f"has a sample_interval of {self.sample_interval} s, longer than its duration")
+        if self.duration / self.sample_interval > MAX_SAMPLES:
+            raise ValueError(f"asks for more than {MAX_SAMPLES:.0e} samples; lengthen sample_interval")
+        return self
+
+    @property
+    def samples(self) -> int:
+        """Number of instants 0, sample_interval, ... up to the duration."""
+        return int(self.duration / self.sample_interval * (1.0 + 1e-12)) + 1
+
+
+class Whole(Protocol):
+    """A scenario, as far as its tables are checked against each other."""
+
+    @property
+    def tables(self) -> Any: ...
+    def train(self) -> DriveTrain: ...
+    def commanded(self) -> list[str]: ...
+    def axes(self) -> dict[str, Controller]: ...
+    def continuous(self) -> dict[str, ContinuousController]: ...
+    def core(self) -> _core.Train: ...
+    def begin(self) -> Any: ...
+    def start(self) -> dict[str, float]: ...
+    def control(self) -> Any: ...
+
+
+class ScenarioTables(Part):
+    """Tables of a scenario in one of its forms: its parts as they are written, and what they and their variables are called."""
+
+    if TYPE_CHECKING:
+        title: str
+        initial: Any
+        task: Any
+        simulation: SimulationTable
+
+    @classmethod
+    def _subject(cls) -> str:
+        return "the scenario"
+
+    def train(self) -> DriveTrain:
+        """The drive train without its surroundings."""
+        raise NotImplementedError
+
+    def named_train(self) -> DriveTrain:
+        """The same, with the names that variables have in results of these tables."""
+        raise NotImplementedError
+
+    def long(self) -> Any:
+        """The same in the long form."""
+        raise NotImplementedError
+
+    def prefix(self, motor: str) -> str:
+        """Prefix of the names of the variables of a motor's controller."""
+        raise NotImplementedError
+
+    def controller_key(self, motor: str) -> str:
+        """Key of the table of a motor's controller."""
+        raise NotImplementedError
+
+    def gear_key(self, name: str) -> str:
+        """Key of the table of a gear."""
+        raise NotImplementedError
+
+    def gears_by_key(self) -> Mapping[str, Transmission]:
+        """The gears by the keys of their tables."""
+        return {self.gear_key(name): gear for name, gear in self.train().gears.items()}
+
+    def motor_key(self, name: str) -> str:
+        """Key of the table of a motor."""
+        raise NotImplementedError
+
+    def input_key(self, name: str) -> str:
+        """Key of the signal or reference that an input of the core stands for."""
+        raise NotImplementedError
+
+    def input_keys(self) -> dict[str, str]:
+        """Keys of the signals of its inputs, by their names."""
+        raise NotImplementedError
+
+    def record_keys(self) -> Iterator[str]:
+        """Keys that take names of records, and the conditions of their use."""
+        raise NotImplementedError
+
+    def note(self) -> str:
+        """Notes of the sheets of gears and motors."""
+        raise NotImplementedError
+
+    def attributes(self) -> dict[str, float]:
+        """Attributes of what is computed of it, beside those of a run."""
+        return {}
+
+    def variables(self, core: _core.Train) -> tuple[Variable, ...]:
+        """The variables that a result has, without those of controllers."""
+        raise NotImplementedError
+
+    def derive(self, data: dict[str, Any], time: Any) -> None:
+        """Add the variables that follow from those of the solver."""
+        raise NotImplementedError
+
+    def of_axes(self, axes: Mapping[str, Controller]) -> dict[str, Any]:
+        """The tables that change with other sampled controllers, by the names of their motors."""
+        raise NotImplementedError
+
+    def of_gears(self, gears: Mapping[str, Transmission]) -> dict[str, Any]:
+        """The tables that change with other gears, by their keys."""
+        raise NotImplementedError
+
+    def of_inputs(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        """The tables that change where `simulate` is given inputs and times."""
+        raise NotImplementedError
+
+    def open_loop(self) -> dict[str, Any]:
+        """The values by key that change where commands of 0 take the place of all controllers."""
+        raise NotImplementedError
+
+    def told(self) -> str:
+        """Its drive, in one line."""
+        raise NotImplementedError
