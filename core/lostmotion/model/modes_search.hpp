@@ -177,9 +177,8 @@ bool SwitchedTrain<Sizes>::breaks_away(Cache& cache, Now& now, const Event& even
     const auto memory = now.memory;
     Key slips;
     if (settle(cache, now, modes, slipping, slips).found == Found::yes) {
-        // With a self-locking gear more torque may turn it the other way; by rounding it only seems to. (Of two shafts
-        // the solver finds that at once, by the speed that falls, and the contact is stuck again.)
-        if (train().shafts.size() == 2 || !turns_the_other_way(look_up(cache, slips), now, event)) {
+        // With a self-locking gear more torque may turn it the other way; by rounding it only seems to.
+        if (!turns_the_other_way(look_up(cache, slips), now, event)) {
             key = slips;
             return true;
         }

@@ -367,8 +367,7 @@ class SwitchedTrain {
         return false;
     }
     // Has it turned back where the inputs jump? A breakpoint that is met but for rounding is no jump: else a contact
-    // would hold anew what it holds at rest, and another come to its limit. (Of two shafts without that, as the drive,
-    // nothing comes of it.)
+    // would hold anew what it holds at rest, and another come to its limit.
     template <class Driver, class Input>
     bool falls(const Driver& driver, const Input& before, const Input& after) const {
         double change = 0.0, size = 0.0;
@@ -377,8 +376,7 @@ class SwitchedTrain {
             change += share * (after[i] - before[i]);
             size += std::fabs(share) * std::fmax(std::fabs(before[i]), std::fabs(after[i]));
         }
-        const bool by_rounding = train().shafts.size() > 2 || holds_more(places().contacts[driver.contact]);
-        return change < (by_rounding ? -rounding * size : 0.0);
+        return change < -rounding * size;
     }
     template <class E, class Now>
     double violation(const E& e, const Now& now, const Event& event) const;
