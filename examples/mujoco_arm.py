@@ -125,7 +125,7 @@ def loop_of_the_load(added_backlash: float = 0.0) -> Any:
     box = lm.gearbox(LARGE, added_backlash=added_backlash)
     box = box.model_copy(update={"hysteresis": lm.model.Hysteresis(efficiency=0.95)})
     gain = 100.0 * (rotor + box.inertia + inertia / box.ratio**2)  # a speed loop of 100 rad/s
-    return lm.simulation.Scenario(
+    return lm.Scenario(
         motor={"kind": "torque_source", "rotor_inertia": rotor, "friction_torque": 0.01, "rated_torque": 1.0},
         gearbox=box,
         load={"inertia": inertia},

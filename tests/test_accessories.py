@@ -262,7 +262,7 @@ def test_records_that_cannot_be_judged_are_grouped_by_what_they_lack():
         ({"brake": "yaskawa-sgm7a-15a"}, "is a motor; a brake is wanted here"),
         ({"amplifier": "tgz"}, 'amplifier "tgz" is not in the catalogue'),
         ({"amplifier": {"continuous_current": 5.0, "peak_current": 3.0}}, "exchange them"),
-        ({"amplifier": {"continuous_current": 5.0}, "supply": {"continuous_current": 4.0}}, "say the same"),
+        ({"amplifier": {"continuous_current": 5.0}, "supply": {"continuous_current": 4.0}}, "says the same"),
     ],
 )
 def test_wrong_accessories_are_refused_in_one_line(changes: dict[str, Any], says: str):

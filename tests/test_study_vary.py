@@ -276,7 +276,7 @@ values = [1.0, 1.2]
         ('key = "gearbox"\ncatalogue = { colour = "red" }', "colour, which is no datum of a gearbox"),
         ('key = "gearbox"\ncatalogue = { ratio = 100 }', "list of minimum and maximum"),
         ('key = "gearbox"\ncatalogue = { ratio = ["1 N", "2 N"] }', "ratio"),
-        ('key = "gearbox"\ncatalogue = { kind = "belt" }', "no gearbox fits"),
+        ('key = "gearbox"\ncatalogue = { kind = "belt" }', "which no gearbox of the catalogue has"),
         ('key = "gearbox"\ncatalogue = { kind = 1 }', "must be a text"),
         ('key = "gearbox"\ncatalogue = "all"', "must be a table"),
         ('key = "gearbox"\ncatalogue = {}\nvalues = ["schaeffler-rt1-h-20-100"]', "give one of the two"),

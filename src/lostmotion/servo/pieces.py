@@ -119,7 +119,7 @@ class Pieces:
 
 
 def _zero_between(values: np.ndarray, strip: np.ndarray) -> np.ndarray:
-    """Where a line that has these values at both ends of a strip is zero, or the end that is nearer."""
+    """Zero of a line with these values at both ends of a strip, or the nearer end."""
     change = values[:, 1] - values[:, 0]
     share = np.where(change == 0.0, 0.0, -values[:, 0] / np.where(change == 0.0, 1.0, change))
     return np.asarray(strip[:, 0] + np.clip(share, 0.0, 1.0) * (strip[:, 1] - strip[:, 0]))

@@ -235,9 +235,9 @@ class Scenario:
         """All values in SI, as JSON that `from_json` reads."""
         return self.written.model_dump_json(exclude_none=True)
 
-    def model_copy(self, *, update: Mapping[str, Any] | None = None) -> Self:
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy with other tables, which are checked as in the constructor."""
-        return self.of(self.written.model_copy(update=update), is_axis=self.is_axis) if update else self
+        return self.of(self.written.model_copy(update=update, deep=deep), is_axis=self.is_axis, checked=bool(update))
 
     def unchecked(self, **tables: Any) -> Self:
         """The same with other tables, which `check` has still to see."""
