@@ -130,7 +130,9 @@ struct TrainIn {
 template <class Use>
 void in_kernel(const TimedTrain& t, Use&& use) {
     const model::Assembly a(t.train);
-    if (model::fits<model::Narrow>(t.train, a.layout()))
+    if (model::fits<model::Least>(t.train, a.layout()))
+        use(TrainIn<model::Least>(t));
+    else if (model::fits<model::Narrow>(t.train, a.layout()))
         use(TrainIn<model::Narrow>(t));
     else if (model::fits<model::Middle>(t.train, a.layout()))
         use(TrainIn<model::Middle>(t));
