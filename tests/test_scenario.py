@@ -20,6 +20,12 @@ def test_scenarios_load_and_survive_json(path: Path) -> None:
     assert type(lm.Scenario.model_validate(scenario.model_dump())) is type(scenario)
 
 
+def test_wrong_json_of_a_train_is_refused_by_its_own_key() -> None:
+    text = '{"shafts": {"rotor": {"inertia": -1}}, "simulation": {"duration": 1, "sample_interval": 0.1}}'
+    with pytest.raises(lm.InputError, match=r"key shafts\.rotor\.inertia: -1"):
+        lm.Scenario.from_json(text)
+
+
 @pytest.mark.parametrize("path", ALL_SCENARIOS, ids=lambda p: p.stem)
 def test_names_of_variables_are_those_of_the_core(path: Path) -> None:
     """In both forms: what the train calls its variables is what the solver samples."""

@@ -74,7 +74,7 @@ class Scenario:
     is_axis: bool
     """whether it was written in the short form of a linear axis"""
 
-    # What the tables have, found by `__getattr__`.
+    # Attributes of the tables, found by `__getattr__`.
     title: str
     motor: Motor
     gearbox: Gearbox
@@ -168,10 +168,10 @@ class Scenario:
     @classmethod
     def from_json(cls, text: str) -> Self:
         """Make the scenario from JSON that `to_json` returned."""
+        tables = None
         with suppress(TypeError, ValueError, RecursionError):  # which reading it as a form reports
-            if isinstance(tables := json.loads(text), dict):
-                return cls(**tables)
-        return cls.of(DriveTables.model_validate_json(text))
+            tables = json.loads(text)
+        return cls(**tables) if isinstance(tables, dict) else cls.of(DriveTables.model_validate_json(text))
 
     @classmethod
     def model_json_schema(cls) -> dict[str, Any]:
