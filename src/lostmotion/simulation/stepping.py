@@ -222,7 +222,7 @@ class Simulation(SimulationAnswers):
         self._begin_motions(start)
         self._initial = start
         if self._bound is not None:
-            self._bound.coarse.reset(start)
+            self._bound.coarse._reset(start)
             self._bound.forget()
 
     def _begin_motions(self, start: TrainInitial) -> None:
