@@ -88,15 +88,6 @@ struct [[gnu::visibility("hidden")]] BoundAxis : control::Axis {
     void raise_again() const {
         if (python_law) python_law->raise_again();
     }
-    void set_reference(const std::vector<std::array<double, 5>>& pieces,
-                       const std::vector<std::array<double, 3>>& sines) {
-        reference = {};
-        reference.pieces.clear();
-        for (const auto& [time, value, rate, acceleration, jerk] : pieces)
-            reference.pieces.push_back({time, {value, rate, acceleration, jerk}});
-        for (const auto& [amplitude, frequency, phase] : sines)
-            reference.sines.push_back({amplitude, frequency, phase});
-    }
 };
 
 // Base tick [s]; of each axis its controller, motor, the shafts with the encoders of position and speed, and that of
@@ -185,20 +176,12 @@ std::vector<std::tuple<std::string, std::string, std::string>> signal_names(cons
 inline void bind_control(nb::module_& m) {
     using namespace control;
     m.def(
-        "encoder_step",
-        [](const nb::dict& fields) {
-            Encoder e;
-            NamedFields f(fields);
-            e.describe(f);
-            return e.step();
-        },
-        "fields"_a, nb::sig("def encoder_step(fields: dict[str, typing.Any]) -> float"));
+        "encoder_step", [](const nb::dict& fields) { return described<Encoder>(fields).step(); }, "fields"_a,
+        nb::sig("def encoder_step(fields: dict[str, typing.Any]) -> float"));
     m.def(
         "tracker_gains",
         [](const nb::dict& fields) {
-            Tracker t;
-            NamedFields f(fields);
-            t.describe(f);
+            Tracker t = described<Tracker>(fields);
             Slots slots;
             t.place(slots);
             return std::tuple(t.alpha, t.beta, t.gamma);
@@ -239,7 +222,6 @@ inline void bind_control(nb::module_& m) {
                 return std::pair(i.d, i.q);
             },
             "torque"_a, "(i_d, i_q) [A] of the least current for a torque [N m], under field-oriented control.")
-        .def("set_reference", &BoundAxis::set_reference, "pieces"_a, "sines"_a)
         .def("raise_again", &BoundAxis::raise_again)
         .def("set_python_law", &BoundAxis::set_python_law, "function"_a, "states"_a,
              nb::sig("def set_python_law(self, function: collections.abc.Callable[..., float], states: int) -> None"))

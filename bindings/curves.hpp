@@ -6,6 +6,7 @@
 #include "lostmotion/kernel/inputs.hpp"
 #include "lostmotion/parts/gear.hpp"
 #include "lostmotion/parts/stiffness_curve.hpp"
+#include "lostmotion/scenario/part_fields.hpp"
 
 namespace lostmotion::binding {
 
@@ -16,11 +17,7 @@ inline void bind_curves(nb::module_& m) {
         .def(
             "__init__",
             [](TorsionCurve* self, const nb::dict& stiffness) {
-                StiffnessCurve s;
-                NamedFields f(stiffness);
-                s.describe(f);
-                f.refuse_unknown();
-                new (self) TorsionCurve(s.curve());
+                new (self) TorsionCurve(described<StiffnessCurve>(stiffness).curve());
             },
             "stiffness"_a, nb::sig("def __init__(self, stiffness: dict[str, typing.Any]) -> None"))
         .def_prop_ro("odd", &TorsionCurve::odd)
@@ -42,9 +39,13 @@ inline void bind_curves(nb::module_& m) {
     nb::class_<Signal>(m, "Signal")
         .def(
             "__init__",
-            [](Signal* self, const std::vector<std::array<double, 3>>& breakpoints,
-               const std::vector<std::array<double, 3>>& sines) { new (self) Signal(signal_of(breakpoints, sines)); },
-            "breakpoints"_a, "sines"_a);
+            [](Signal* self, const nb::dict& fields) {
+                new (self) Signal();
+                NamedFields f(fields);
+                lostmotion::describe(f, *self);
+                f.refuse_unknown();
+            },
+            "fields"_a, nb::sig("def __init__(self, fields: dict[str, typing.Any]) -> None"));
 }
 
 }  // namespace lostmotion::binding

@@ -1,8 +1,10 @@
 // Parameters by name, from a dict of Python.
 #pragma once
 
+#include <functional>
 #include <initializer_list>
 #include <limits>
+#include <map>
 #include <optional>
 #include <string>
 #include <type_traits>
@@ -24,8 +26,15 @@ class NamedFields {
     bool well() const { return true; }
     void wrong(const std::string& name, const std::string& how) { throw nb::value_error((name + ' ' + how).c_str()); }
 
-    void number(const char* name, double& v, Range = Range::any) { take(name, v); }
-    void number(const Field& field, double& v) { take(field.key, v); }
+    void number(const char* name, double& v, Range = Range::any) {
+        if (columns_.empty()) {
+            take(name, v);
+        } else if (const auto at = columns_.find(name); at != columns_.end()) {
+            v = at->second[row_];
+            ++used_;
+        }
+    }
+    void number(const Field& field, double& v) { number(field.key, v); }
     void pair(const Field& field, std::array<double, 2>& v) { take(field.key, v); }
     template <class Integer>
     void integer(const char* name, Integer& v, long long, long long) {
@@ -37,6 +46,8 @@ class NamedFields {
     }
     void flag(const char* name, bool& v) { take(name, v); }
     void text(const char* name, std::string& v) { take(name, v); }
+    void texts(const char* name, std::vector<std::string>& v) { take(name, v); }
+    void matrix(const char* name, std::vector<std::vector<double>>& v) { take(name, v); }
     void flag(const Field& field, bool& v) { take(field.key, v); }
     template <class Enum>
     void choice(const char* name, Enum& v, std::initializer_list<const char*> names) {
@@ -62,8 +73,24 @@ class NamedFields {
     void curve_if(const char* name, bool& there, Curve& v) {
         if (take(name, v)) there = true;
     }
+    // A list of dicts; or, where all that an entry has is numbers, a dict with a list of each of these.
     template <class T, class Use>
     void each(const char* name, std::vector<T>& v, Use&& use) {
+        if (nb::dict columns; values_.contains(name) && nb::try_cast(values_[name], columns)) {
+            ++used_;
+            within(columns, [&] {
+                columns_ = nb::cast<std::map<std::string, std::vector<double>, std::less<>>>(columns);
+                v.assign(columns_.empty() ? 0 : columns_.begin()->second.size(), T{});
+                for (const auto& [key, column] : columns_)
+                    if (column.size() != v.size()) wrong(key, "has another length");
+                for (row_ = 0; row_ < v.size(); ++row_) {
+                    used_ = 0;
+                    use(v[row_]);
+                }
+                columns_.clear();
+            });
+            return;
+        }
         std::vector<nb::dict> given;
         if (!take(name, given)) return;
         v.assign(given.size(), T{});
@@ -117,7 +144,17 @@ class NamedFields {
     }
 
     nb::dict values_;
-    std::size_t used_ = 0;
+    std::map<std::string, std::vector<double>, std::less<>> columns_;
+    std::size_t used_ = 0, row_ = 0;
 };
+
+// What a dict says, with its own describe().
+template <class T>
+T described(const nb::dict& fields, T value = {}) {
+    NamedFields f(fields);
+    value.describe(f);
+    f.refuse_unknown();
+    return value;
+}
 
 }  // namespace lostmotion::binding

@@ -144,27 +144,11 @@ class TrainDescription : public model::TrainDescription {
         if (!known) throw nb::value_error(("there is no table '" + table + "'").c_str());
     }
 
-    // signals: kind and shaft, which only an angle and a speed have.
-    using ControllerSignal = std::pair<std::string, std::string>;
-    using Matrix = std::vector<std::vector<double>>;
-    void add_controller(const std::string& motor, const std::vector<ControllerSignal>& signals,
-                        const ControllerSignal& compared, const std::vector<std::string>& states, const Matrix& A,
-                        const Matrix& B, const std::vector<double>& C, const std::vector<double>& D,
-                        const std::vector<double>& back_calculation, double limit, const TorsionCurve* curve,
-                        double droop) {
+    void add_controller(const std::string& motor, const nb::dict& fields) {
         model::LinearController c;
-        for (const ControllerSignal& s : signals) c.signals.push_back(controller_signal(s));
-        c.compared = controller_signal(compared);
-        c.states = states;
-        c.A = A;
-        c.B = B;
-        c.C = C;
-        c.D = D;
-        c.back_calculation = back_calculation;
-        c.limit = limit;
-        c.curved = curve != nullptr;
-        if (c.curved) c.curve = *curve;
-        c.droop = droop;
+        NamedFields named(fields);
+        model::describe(named, c);
+        named.refuse_unknown();
         model::TrainDescription::add_controller(std::move(c), motor);
     }
 
@@ -223,22 +207,11 @@ class TrainDescription : public model::TrainDescription {
  private:
     template <class Element>
     static Element made_for(const std::vector<Element>&, const std::string& name, const nb::dict& fields) {
-        Element element;
+        Element element = described<Element>(fields);
         element.name = name;
-        NamedFields named(fields);
-        element.describe(named);
-        named.refuse_unknown();
         return element;
     }
     mutable std::shared_ptr<const SharedRun> run_;
-
-    model::LinearController::Signal controller_signal(const ControllerSignal& s) const {
-        using Signal = model::LinearController::Signal;
-        const auto& [kind, shaft] = s;
-        if (kind == "reference") return {Signal::reference, 0};
-        if (kind == "reference_rate") return {Signal::reference_rate, 0};
-        return {kind == "angle" ? Signal::angle : Signal::speed, shaft_number(shaft)};
-    }
 };
 
 // By name, in their order.
@@ -431,8 +404,8 @@ inline void bind_train(nb::module_& m) {
              nb::sig("def add_coupling(self, table: str, name: str, input: str, output: str, fields: "
                      "collections.abc.Mapping[str, typing.Any]) -> None"),
              "What joins two shafts and is no gear, in the same way.")
-        .def("add_controller", &TrainDescription::add_controller, "motor"_a, "signals"_a, "compared"_a, "states"_a,
-             "A"_a, "B"_a, "C"_a, "D"_a, "back_calculation"_a, "limit"_a, "curve"_a.none(), "droop"_a)
+        .def("add_controller", &TrainDescription::add_controller, "motor"_a, "fields"_a,
+             nb::sig("def add_controller(self, motor: str, fields: collections.abc.Mapping[str, typing.Any]) -> None"))
         .def("check", &TrainDescription::check)
         .def_prop_rw(
             "short_form", [](const TrainDescription& t) { return t.train.short_form; },

@@ -84,7 +84,7 @@ class LossMap:
     def least_slope_over_load(self) -> float: ...
 
 class Signal:
-    def __init__(self, breakpoints: Sequence[Sequence[float]], sines: Sequence[Sequence[float]]) -> None: ...
+    def __init__(self, fields: dict[str, Any]) -> None: ...
 
 def described_tables(of_core: bool) -> dict[str, list[tuple[str, str, str, str, str, tuple[float | None, float | None, float | None], bool, Any, tuple[Any, ...]]]]:
     """
@@ -138,8 +138,6 @@ class Axis:
         """
         (i_d, i_q) [A] of the least current for a torque [N m], under field-oriented control.
         """
-
-    def set_reference(self, pieces: Sequence[Sequence[float]], sines: Sequence[Sequence[float]]) -> None: ...
 
     def raise_again(self) -> None: ...
 
@@ -224,7 +222,7 @@ class Train:
     def add_coupling(self, table: str, name: str, input: str, output: str, fields: Mapping[str, Any]) -> None:
         """What joins two shafts and is no gear, in the same way."""
 
-    def add_controller(self, motor: str, signals: Sequence[tuple[str, str]], compared: tuple[str, str], states: Sequence[str], A: Sequence[Sequence[float]], B: Sequence[Sequence[float]], C: Sequence[float], D: Sequence[float], back_calculation: Sequence[float], limit: float, curve: TorsionCurve | None, droop: float) -> None: ...
+    def add_controller(self, motor: str, fields: Mapping[str, Any]) -> None: ...
 
     def check(self) -> tuple[str, str, str] | None: ...
 

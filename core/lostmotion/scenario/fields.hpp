@@ -82,7 +82,13 @@ class FieldWriter {
         if (v) use();
     }
     void text(const char*, const std::string& v);
+    void texts(const char* name, std::vector<std::string>& v) {
+        each(name, v, [&](std::string& entry) { text(name, entry); });
+    }
     void list(const char*, const std::vector<double>& v, Range = Range::any);
+    void matrix(const char* name, std::vector<std::vector<double>>& v) {
+        each(name, v, [&](std::vector<double>& row) { list(name, row); });
+    }
     void list(const Field& field, const std::vector<double>& v) { list(field.key, v); }
     template <class T, class Use>
     void each(const char*, std::vector<T>& v, Use&& use) {
@@ -165,7 +171,13 @@ class FieldReader {
         use();
     }
     void text(const char* name, std::string& v);
+    void texts(const char* name, std::vector<std::string>& v) {
+        each(name, v, [&](std::string& entry) { text("", entry); });
+    }
     void list(const char* name, std::vector<double>& v, Range range = Range::any);
+    void matrix(const char* name, std::vector<std::vector<double>>& v) {
+        each(name, v, [&](std::vector<double>& row) { list("", row); });
+    }
     void list(const Field& field, std::vector<double>& v) { list(field.key, v, field.range); }
     template <class T, class Use>
     void each(const char* name, std::vector<T>& v, Use&& use) {

@@ -140,7 +140,7 @@ template <class F>
 void describe(F& f, MassMatrix& m) {
     f.text("name", m.name);
     f.each("shafts", m.shafts, [&](int& s) { f.integer("shaft", s, 0, max_number); });
-    f.each("matrix", m.matrix, [&](std::vector<double>& row) { f.list("row", row); });
+    f.matrix("matrix", m.matrix);
 }
 
 template <class F>
@@ -164,17 +164,16 @@ void describe(F& f, Gear& g) {
 template <class F>
 void describe(F& f, LinearController& c) {
     const auto signal = [&](LinearController::Signal& s) {
-        f.choice("kind", s.kind, 4);
+        f.choice("kind", s.kind, {"reference", "reference_rate", "angle", "speed"});
         f.integer("shaft", s.shaft, 0, max_number);
     };
-    const auto row = [&](std::vector<double>& r) { f.list("row", r); };
     f.text("name", c.name);
     f.integer("motor", c.motor, 0, max_number);
     f.each("signals", c.signals, signal);
     f.part("compared", [&] { signal(c.compared); });
-    f.each("states", c.states, [&](std::string& name) { f.text("name", name); });
-    f.each("A", c.A, row);
-    f.each("B", c.B, row);
+    f.texts("states", c.states);
+    f.matrix("A", c.A);
+    f.matrix("B", c.B);
     f.list("C", c.C);
     f.list("D", c.D);
     f.list("back_calculation", c.back_calculation);

@@ -15,6 +15,7 @@ from ..errors import InputError
 from ..inputs.described import Described, ReferenceBlocks
 from ..inputs.validation import did_you_mean, shown
 from ..model.motor import Motor, MotorLaw
+from ..model.signals import columns
 from ..model.train import DriveTrain
 from .continuous import ContinuousController
 from .controller import Controller
@@ -81,10 +82,13 @@ class _Place:
                         f"gives an angle, and {self.shaft} is a slide; leave it out, or name a shaft", keys=(key,)
                     )
         out = _core.Axis()
-        out.set_reference(c.reference.pieces(), c.reference.sine_list())
         out.set(
             {
                 "mode": c.reference.kind,
+                "reference": {
+                    "pieces": columns(("time", "value", "rate", "acceleration", "jerk"), c.reference.pieces()),
+                    "sines": columns(("amplitude", "frequency", "phase"), c.reference.sine_list()),
+                },
                 "ratio": self.ratio(self.motor_shaft, self.shaft, "shaft"),
                 "rated_torque": self.motor.rated_torque,
                 "delay": c.delay * samples,

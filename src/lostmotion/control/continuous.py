@@ -339,21 +339,23 @@ class ContinuousController(Part):
             turning = turns(train, motor.shaft, shaft)
             per_unit = -1.0 if turning is not None and turning < 0.0 else 1.0  # the curve takes the error
         measured = "angle" if self.reference.kind == "position" else "speed"
-        places = {"measured": (measured, shaft), "measured_rate": ("speed", shaft)}
-        core.add_controller(
-            name,
-            [places.get(signal, (signal, "")) for signal in system.signals],
-            (measured, shaft),
-            list(system.states),
-            system.A.tolist(),
-            system.B.tolist(),
-            (per_unit * system.C).tolist(),
-            (per_unit * system.D).tolist(),
-            (system.back / per_unit).tolist(),
-            limit,
-            curve,
-            droop,
-        )
+        number = list(train.shafts).index(shaft)
+        there = {"kind": measured, "shaft": number}
+        places = {"measured": there, "measured_rate": {"kind": "speed", "shaft": number}}
+        fields = {
+            "signals": [places.get(signal, {"kind": signal}) for signal in system.signals],
+            "compared": there,
+            "states": list(system.states),
+            "A": system.A.tolist(),
+            "B": system.B.tolist(),
+            "C": (per_unit * system.C).tolist(),
+            "D": (per_unit * system.D).tolist(),
+            "back_calculation": (system.back / per_unit).tolist(),
+            "limit": limit,
+            "curve": curve,
+            "droop": droop,
+        }
+        core.add_controller(name, fields)
 
     @staticmethod
     def _curve(firmware: Firmware, motor: Motor) -> tuple[_core.TorsionCurve, float]:

@@ -11,6 +11,7 @@ import numpy as np
 from .. import _core
 from ..control.axis import OPEN_LOOP, Bound, own
 from ..errors import InputError
+from ..model.signals import columns, core_signal
 from .formulas import number
 from .given_motion import GIVEN_ACCELERATION, GIVEN_SPEED, given_speed, rates_of, speed_of
 from .goal_shaping import shaped
@@ -89,8 +90,8 @@ class Acting:
         for (axis, *_), name in zip(control[1], axes, strict=True):
             signal = f"{name}_reference"
             if signal in self._task.inputs:
-                points = self._points(signal, known).tolist()
-                axis.set_reference([(t, v, slope, 0.0, 0.0) for t, v, slope in points], [])
+                points = columns(("time", "value", "rate"), self._points(signal, known).tolist())
+                axis.set({"reference": {"pieces": points}})
         return control
 
     def _numbers(self, name: str, known: Mapping[str, Any]) -> tuple[float, ...]:
@@ -107,9 +108,9 @@ class Acting:
 
     def _signal(self, name: str, known: Mapping[str, Any]) -> _core.Signal:
         if name.endswith(GIVEN_ACCELERATION):
-            return _core.Signal(list(map(tuple, rates_of(self._points(speed_of(name), known)).tolist())), [])
+            return core_signal(rates_of(self._points(speed_of(name), known)).tolist())
         key = ("signal", name, *self._numbers(name, known), *self._pieces[name], self._begin)
-        return self._kept(key, lambda: _core.Signal(list(map(tuple, self._points(name, known).tolist())), []))  # type: ignore[no-any-return]
+        return self._kept(key, lambda: core_signal(self._points(name, known).tolist()))  # type: ignore[no-any-return]
 
     def _points(self, name: str, known: Mapping[str, Any]) -> np.ndarray:
         """Array (points, 3) of time, value and slope of an input from `begin` on."""

@@ -6,7 +6,7 @@ import bisect
 import itertools
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from typing import Any, ClassVar, Generic, Self, TypeVar
 
@@ -227,7 +227,18 @@ class Signal(described.SignalFields[V], TimeFunction[V], Generic[V]):
 
 @lru_cache(maxsize=256)
 def _core_signal(signal: Signal[Any]) -> _core.Signal:
-    return _core.Signal([(t, value, slope) for t, value, slope in signal.breakpoint_list()], signal.sine_list())
+    return core_signal(signal.breakpoint_list(), signal.sine_list())
+
+
+def core_signal(breakpoints: Iterable[Sequence[float]], sines: Iterable[Sequence[float]] = ()) -> _core.Signal:
+    """The solver's signal of breakpoints and sines as `breakpoint_list` and `sine_list` have them."""
+    lines = columns(("time", "value", "slope"), breakpoints)
+    return _core.Signal({"breakpoints": lines, "sines": columns(("amplitude", "frequency", "phase"), sines)})
+
+
+def columns(keys: tuple[str, ...], rows: Iterable[Sequence[float]]) -> dict[str, tuple[float, ...]]:
+    """A list of each number of an entry, by its key in the core."""
+    return dict(zip(keys, zip(*rows, strict=True), strict=False))
 
 
 def _at(piece: list[Breakpoint], time: float, derivatives: int) -> list[float]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from .. import _core
 from ..errors import InputError
+from ..model.signals import core_signal
 from ..simulation.core_runs import core_case, core_run
 from ..simulation.needs import need_free_motion
 from ..simulation.scenario import Scenario
@@ -87,7 +88,7 @@ class Loop:
                     "periodic_motion"
                 )
             settled = max(settled, time)
-            constants.append(_core.Signal([(0.0, value, 0.0)], []))
+            constants.append(core_signal([(0.0, value, 0.0)]))
         controlled, last = scenario.continuous(), list(scenario.train().shafts)[-1]
         watched = f"{next(iter(controlled))}_error" if controlled else f"{last}_speed"
         channels = tuple(name for name, *_ in core.channels())

@@ -15,6 +15,7 @@ from ..inputs.quantities import Number, Time, Torque, argument, arguments
 from ..inputs.validation import did_you_mean, shown
 from ..model.drive import Drive
 from ..model.losses import ConstantEfficiency
+from ..model.signals import core_signal
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
 from ..simulation.core_runs import core_case
@@ -254,7 +255,7 @@ def _need_one_regime(regimes: str, such_as: str) -> None:
 
 
 def _ramp(value: float, rate: float) -> _core.Signal:
-    return _core.Signal([(0.0, value, rate)], [])
+    return core_signal([(0.0, value, rate)])
 
 
 def _model_now(simulation: Simulation) -> LinearModel:

@@ -18,6 +18,7 @@ import numpy as np
 from .. import _core
 from ..control.turning import turns
 from ..errors import InputError
+from ..model.signals import core_signal
 from ..model.torsion import Rigid
 from ..simulation.scenario import Scenario
 from ..simulation.train_tables import TrainInitial
@@ -137,7 +138,7 @@ def only_contact(
     UndecidableError
         There is none, or there are several.
     """
-    zeros = [_core.Signal([(0.0, 0.0, 0.0)], []) for _ in core.input_names()]
+    zeros = [core_signal([(0.0, 0.0, 0.0)]) for _ in core.input_names()]
     _, contacts, _ = _core.explain_at(core, zeros, start, capacities, 0.0)
     dry = [(name, ahead, back) for name, _, _, _, ahead, back, _ in contacts if math.isfinite(ahead)]
     if not dry:
@@ -187,7 +188,7 @@ def _model(loop: Loop, shaft: str, speed: float) -> LinearModel:
     ratios = {name: turns(train, name, shaft) for name in train.shafts}
     speeds = {name: speed * i for name, i in ratios.items() if i is not None and speed != 0.0}
     start = loop.scenario.start(TrainInitial(speeds=speeds))
-    zeros = [_core.Signal([(0.0, 0.0, 0.0)], []) for _ in loop.core.input_names()]
+    zeros = [core_signal([(0.0, 0.0, 0.0)]) for _ in loop.core.input_names()]
     return train_model(train, loop.core, *_core.linearize_at(loop.core, zeros, start, loop.capacities, 0.0))
 
 

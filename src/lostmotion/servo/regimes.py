@@ -16,7 +16,7 @@ from ..control.turning import turns
 from ..errors import InputError, need
 from ..inputs.validation import shown
 from ..model.gear import Gear
-from ..model.signals import ForceSignal, TorqueSignal
+from ..model.signals import ForceSignal, TorqueSignal, core_signal
 from ..model.torsion import Elastic, Rigid
 from ..response.linear import LinearModel, train_model
 from ..simulation.needs import need_free_motion
@@ -200,7 +200,7 @@ def model_at(axis: Axis, state: TrainInitial) -> LinearModel:
     scenario = axis.scenario
     core = scenario.core()
     values, capacities = start_values(axis.train, state), state.of_all("hysteresis_capacities")
-    ramps = [_core.Signal([(0.0, 0.0, 0.0)], []) for _ in core.input_names()]
+    ramps = [core_signal([(0.0, 0.0, 0.0)]) for _ in core.input_names()]
     rows = _core.linearize_at(core, ramps, values, capacities, 0.0)
     return train_model(axis.train, core, *rows)
 

@@ -13,6 +13,7 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Time
 from ..model.drive import Drive
 from ..model.self_locking import SelfLocking, self_locking
+from ..model.signals import core_signal
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
 from ..units.practical import charted
@@ -217,7 +218,7 @@ def explain(what: Scenario | Simulation, time: Time | None = None) -> Explanatio
 
 def smallest_commands(drive: Drive, load_torque: float = 0.0) -> tuple[float, float]:
     """Constant commands beyond which the load moves from rest, forward and backward, against a load torque [N·m]."""
-    inputs = [_core.Signal([(0.0, 0.0, 0.0)], []), _core.Signal([(0.0, load_torque, 0.0)], [])]
+    inputs = [core_signal([(0.0, value, 0.0)]) for value in (0.0, load_torque)]
     _, _, ((_, forward, backward),) = _core.explain_at(drive.core(), inputs, {}, {}, 0.0)
     return forward, backward
 

@@ -25,6 +25,7 @@ from ..inputs.validation import did_you_mean
 from ..model.gearbox import Transmission
 from ..model.losses import LossMap
 from ..model.motor import Motor
+from ..model.signals import core_signal
 from ..reproducible import interpolate, power
 from ..simulation.core_runs import core_case, core_run
 from ..simulation.results import raw_result
@@ -269,7 +270,7 @@ def _later(signal: Any, time: float) -> _core.Signal:
         (a, f, math.fmod(phase + 2.0 * math.pi * math.fmod(f * time, 1.0), 2.0 * math.pi))
         for a, f, phase in signal.sine_list()
     ]
-    return _core.Signal(lines, sines)
+    return core_signal(lines, sines)
 
 
 def _course(law: _Law, each: int, start: tuple[float, float]) -> _Course:
