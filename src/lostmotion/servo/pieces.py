@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .slip_boxes import Boxes
+from .state_sets import Sets
 
 ROUNDING = 1e-9  # of an encoder step, and of torque and speed, by which pieces overlap
 
 
 @dataclass
-class Pieces:
+class Pieces(Sets):
     """Pieces of the starts, after the same sample."""
 
-    centre: np.ndarray
-    """c, (piece, state)"""
     slope: np.ndarray
-    """g"""
+    """g, (piece, state); the centre is c"""
     radius: np.ndarray
     """bound of what is not affine"""
     strip: np.ndarray
@@ -29,29 +27,6 @@ class Pieces:
     """least x at both"""
     above: np.ndarray
     """largest x at both"""
-    mode: np.ndarray
-    """1, 0 or -1: slips forward, is stuck, slips in reverse"""
-    waited: np.ndarray
-    """samples for which it has been stuck"""
-    read: np.ndarray
-    """last reading less that at the break-away, in steps"""
-    came: np.ndarray
-    """direction of the slip that has just ended"""
-
-    def __len__(self) -> int:
-        return len(self.centre)
-
-    def take(self, which: np.ndarray) -> Pieces:
-        """Copies of some of them."""
-        return Pieces(*(getattr(self, f.name)[which].copy() for f in fields(self)))
-
-    @classmethod
-    def joined(cls, parts: Sequence[Pieces]) -> Pieces:
-        """All of them together."""
-        parts = [part for part in parts if len(part)] or parts[:1]
-        if len(parts) == 1:
-            return parts[0]
-        return cls(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)))
 
     def ends(self, row: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Values of an output that does not depend on x at both values of w, (piece, 2), and the radius."""
@@ -81,11 +56,16 @@ class Pieces:
         out.mode = self.mode.copy()
         return out
 
-    def move(self, matrix: np.ndarray) -> None:
-        """To the states that a matrix makes of them."""
-        self.centre, self.slope = self.centre @ matrix.T, self.slope @ matrix.T
-        if self.radius.any():
-            self.radius = self.radius @ np.abs(matrix).T
+    def moved(self, matrix: np.ndarray, add: np.ndarray | None = None) -> Pieces:
+        """Pieces of the states that a matrix makes of them; all but the states is shared."""
+        centre, slope = self.centre @ matrix.T, self.slope @ matrix.T
+        radius = self.radius @ np.abs(matrix).T if self.radius.any() else self.radius
+        return replace(self, centre=centre if add is None else centre + add, slope=slope, radius=radius)
+
+    def widen(self, state: int, low: np.ndarray, high: np.ndarray) -> None:
+        """Add an unknown between two values to a state."""
+        self.centre[:, state] += 0.5 * (low + high)
+        self.radius[:, state] += 0.5 * (high - low)
 
     def between(self, low: np.ndarray, high: np.ndarray) -> Pieces:
         """The parts with w between two values; empty ones are left out."""

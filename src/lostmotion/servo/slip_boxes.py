@@ -9,7 +9,6 @@ state is lost. What stops is collected by its reading, and goes on as one box ar
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -17,6 +16,7 @@ import numpy as np
 
 from ..response.stick_slip import UndecidableError
 from .sampled_slip import SampledSlip
+from .state_sets import Sets, along, bend_of, freed_within, need_within_limits, one_way, propagated
 
 UNKNOWNS = (
     3  # of a start: error, angle within the encoder step, torque within the ramp of a sample; others are added by stops
@@ -28,42 +28,16 @@ GENERATIONS = 200  # of stops without settling
 CELLS = 8  # of an encoder step, in which stops are collected
 
 
-def quiet(_row: np.ndarray) -> float:
-    """No effect of readings beside what is in the boxes."""
-    return 0.0
-
-
 @dataclass
-class Boxes:
+class Boxes(Sets):
     """Boxes of states after the same sample."""
 
-    centre: np.ndarray
     spread: np.ndarray
     """(box, state, unknown)"""
-    mode: np.ndarray
-    """1, 0 or -1: slips forward, is stuck, slips in reverse"""
-    waited: np.ndarray
-    """ticks for which it has been stuck"""
     origin: np.ndarray
     """number of the start"""
-    read: np.ndarray
-    """last reading, in steps"""
     before: np.ndarray
-    """the one before"""
-    came: np.ndarray
-    """direction of the slip that has just ended"""
-
-    def __len__(self) -> int:
-        return len(self.centre)
-
-    def take(self, which: np.ndarray) -> Boxes:
-        """Copies of some of them."""
-        return Boxes(*(getattr(self, f.name)[which].copy() for f in fields(self)))
-
-    @classmethod
-    def joined(cls, parts: Sequence[Boxes]) -> Boxes:
-        """All of them together."""
-        return cls(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)))
+    """the reading before the last"""
 
     @classmethod
     def around(cls, low: np.ndarray, high: np.ndarray, origin: np.ndarray, read: np.ndarray) -> Boxes:
@@ -71,7 +45,7 @@ class Boxes:
         n, none = low.shape[1], np.zeros(len(low), int)
         spread = np.zeros((len(low), n, UNKNOWNS + n))
         spread[:, np.arange(n), UNKNOWNS + np.arange(n)] = 0.5 * (high - low)
-        return cls(0.5 * (low + high), spread, none, none.copy(), origin, read, read.copy(), none.copy())
+        return cls(0.5 * (low + high), none, none.copy(), read, none.copy(), spread, origin, read.copy())
 
     def range_of(self, row: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Least and largest values of an output."""
@@ -150,7 +124,7 @@ def starts(of: SampledSlip, reading: tuple[float, float], cells: int, parts: int
             centre[1], spread[1], spread[0, 1] = 0.0, 0.0, half / cells
             slips = np.array([0 if of.lag else 1])
             none, read = np.zeros(1, int), np.zeros(1)
-            here.append(Boxes(centre[None], spread[None], slips, none, none, read, read, none))
+            here.append(Boxes(centre[None], slips, none, read, none, spread[None], none, read))
         found.append((tick, Boxes.joined(here)))
     return found
 
@@ -204,7 +178,7 @@ class Flow:
                 return
             if len(boxes) > BOXES:
                 break
-            boxes = self._propagated(boxes)
+            boxes = propagated(self.of, boxes, self._slipped)
             tick = (tick + 1) % self.of.frame
             boxes = self._sampled(boxes, tick)
             need_within_limits(self.of, boxes)
@@ -230,18 +204,6 @@ class Flow:
             self._stopped[key] = np.minimum(least, low[k]), np.maximum(most, high[k])
 
     # --- between samples ---
-
-    def _propagated(self, boxes: Boxes) -> Boxes:
-        of, parts = self.of, []
-        boxes.came[:] = 0
-        stuck, moving = boxes.take(boxes.mode == 0), boxes.take(boxes.mode != 0)
-        if len(stuck):
-            after = stuck.moved(of.stuck)
-            after.waited += 1
-            parts += [after] if of.lag == 0.0 else self._freed_within(stuck, after)
-        if len(moving):
-            parts += self._slipped(moving)
-        return Boxes.joined(parts)
 
     def _slipped(self, boxes: Boxes) -> list[Boxes]:
         """Boxes that go on slipping over a tick, and those that stop in it."""
@@ -270,23 +232,7 @@ class Flow:
         after = boxes.moved(self.of.stuck)
         after.came, after.mode = way.copy(), 0 * way
         after.waited[:] = 0
-        return self._freed_within(boxes, after)
-
-    def _freed_within(self, before: Boxes, after: Boxes) -> list[Boxes]:
-        """Boxes that stay stuck over a tick, or the rest of one, and those that break away; the torque is monotonic within a tick."""
-        of = self.of
-        one, two = before.range_of(of.held), after.range_of(of.held)
-        stays = (two[0] < of.breakaway) & (two[1] > -of.breakaway)
-        parts = [after.take(stays)]
-        for way in (1, -1):
-            top = np.maximum(along(way, *one)[1], along(way, *two)[1])
-            frees = top >= of.breakaway * (1.0 - ROUNDING)
-            some, speed = after.take(frees), of.tick * np.maximum(top[frees] - of.sliding, 0.0) / of.inertia
-            some.mode[:], some.waited[:] = way, 0
-            for state, most in ((1, speed), (0, speed * of.tick)):
-                some.widen(state, np.minimum(way * most, 0.0), np.maximum(way * most, 0.0))
-            parts.append(some)
-        return parts
+        return freed_within(self.of, boxes, after)
 
     # --- at a sample ---
 
@@ -328,7 +274,7 @@ class Flow:
         of = self.of
         for way in (1, -1):
             low, high = along(way, *boxes.range_of(of.held))
-            may = (boxes.mode == 0) & (high >= of.breakaway * (1.0 - ROUNDING))
+            may = (boxes.mode == 0) & (high >= of.breakaway)
             must = may & (low > of.breakaway)
             boxes.mode[must], boxes.waited[must] = way, 0
             both = np.flatnonzero(may & ~must)
@@ -339,47 +285,3 @@ class Flow:
                 boxes.clip(both, of.held, sides * of.breakaway, -sides)
                 boxes = Boxes.joined([boxes, freed])
         return boxes
-
-
-def one_way(sets: Any, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Least and largest readings, which go one way in a slip, and stay while a contact is stuck; not where it returns within a tick."""
-    way, free = np.where(sets.mode != 0, sets.mode, sets.came), sets.mode * sets.came < 0
-    low = np.where((way >= 0) & ~free, np.maximum(low, sets.read), low)
-    return low, np.maximum(np.where((way <= 0) & ~free, np.minimum(high, sets.read), high), low)
-
-
-def bend_of(of: SampledSlip, boxes: Boxes, noise: Callable[[np.ndarray], Any] = quiet) -> np.ndarray:
-    """By how much the speed may be below that at both ends of a tick: with a torque that is held it has its least value at one.
-
-    Parameters
-    ----------
-    noise
-        Largest effect of readings on an output, beside what is in the boxes.
-    """
-    if of.lag == 0.0:
-        return np.zeros(len(boxes))
-
-    def most(row: np.ndarray) -> np.ndarray:
-        return np.asarray(np.abs(boxes.range_of(row)).max(axis=0) + noise(row))
-
-    push = (np.maximum(most(of.held), most(of.command)) + of.sliding) / of.inertia
-    rate = push + abs(of.viscous) * (most(np.eye(len(of.held))[1]) + of.tick * push)
-    change = most(of.command - of.held) / (of.lag * of.inertia)
-    return np.asarray(0.125 * of.tick**2 * (change + abs(of.viscous) * rate))
-
-
-def need_within_limits(of: SampledSlip, boxes: Boxes, noise: Callable[[np.ndarray], Any] = quiet) -> None:
-    """Refuses boxes in which a limit of the controller may act.
-
-    Raises
-    ------
-    UndecidableError
-    """
-    for row, limit in of.limited:
-        if len(boxes) and (np.abs(boxes.range_of(row)).max(axis=0) + noise(row)).max() >= limit:
-            raise UndecidableError("the limit of the controller may act")
-
-
-def along(way: Any, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Least and largest values in a direction."""
-    return np.minimum(way * low, way * high), np.maximum(way * low, way * high)

@@ -12,7 +12,8 @@ import numpy as np
 
 from ..response.stick_slip import UndecidableError
 from .sampled_slip import SampledSlip
-from .slip_boxes import Boxes, bend_of, need_within_limits
+from .slip_boxes import Boxes
+from .state_sets import bend_of, need_within_limits
 
 LONGEST = 3000  # ticks of a slip
 SETTLING = 600  # ticks of a stuck interval that are looked at

@@ -11,7 +11,6 @@ within a sample.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -19,8 +18,8 @@ import numpy as np
 from ..response.stick_slip import UndecidableError
 from .pieces import ROUNDING, Pieces, kept_beside
 from .sampled_slip import SampledSlip
-from .slip_boxes import along, one_way
 from .slip_noise import finish, loudest
+from .state_sets import along, bend_of, freed_within, need_within_limits, one_way, propagated
 
 PIECES = 60_000  # at most at once
 WORK = 25_000_000  # pieces of all ticks together
@@ -95,7 +94,7 @@ class Slips:
         centre[:, :2] = slope[:, :2] = 0.0
         none = np.zeros(k, int)
         side = np.full((k, 2), half)
-        return Pieces(centre, slope, 0.0 * centre, strip, -side, side, none + mode, none, np.zeros(k), none.copy())
+        return Pieces(centre, none + mode, none, np.zeros(k), none.copy(), slope, 0.0 * centre, strip, -side, side)
 
     def _freed(self, start: np.ndarray, b: np.ndarray, rise: float) -> Pieces:
         """After the tick in which the torque with its lag rises to the break-away: ``start + b (w - 1) rise`` before it.
@@ -118,7 +117,7 @@ class Slips:
         pieces = self._pieces(
             np.tile(start - b, (STRIPS, 1)), np.tile(b, (STRIPS, 1)), np.stack([edges[:-1], edges[1:]], axis=1), 1
         )
-        pieces.move(of.stuck)
+        pieces = pieces.moved(of.stuck)
         width = np.diff(edges)
         for state, ends in ((1, speeds), (0, angles)):
             slope = np.diff(ends) / width
@@ -160,7 +159,7 @@ class Slips:
         of, found = self.of, set()
         for k in range(TICKS):
             if k or of.lag == 0.0:
-                pieces = self._propagated(pieces)
+                pieces = propagated(of, pieces, self._slipped)
                 tick = (tick + 1) % of.frame
             pieces = self._sampled(pieces, tick)
             done = self._settles(pieces, tick)
@@ -211,29 +210,11 @@ class Slips:
             found.append((np.array(rows), np.array(constants)))
         return found
 
-    def _propagated(self, pieces: Pieces) -> Pieces:
-        of, parts = self.of, []
-        pieces.came[:] = 0
-        still = pieces.mode == 0
-        if not still.any():
-            return Pieces.joined(self._slipped(pieces))
-        stuck, moving = pieces.take(still), pieces.take(~still)
-        if len(stuck):
-            after = replace(stuck, waited=stuck.waited.copy())
-            after.move(of.stuck)
-            after.waited += 1
-            parts += [after] if of.lag == 0.0 else self._freed_within(stuck, after)
-        if len(moving):
-            parts += self._slipped(moving)
-        return Pieces.joined(parts)
-
     def _slipped(self, before: Pieces) -> list[Pieces]:
         """Pieces that go on slipping over a tick, and those that stop in it."""
         of, way = self.of, before.mode
-        bend = self._bend(before)
-        after = replace(before)
-        after.move(of.slip)
-        after.centre = after.centre + way[:, None] * of.push
+        bend = bend_of(of, before)
+        after = before.moved(of.slip, way[:, None] * of.push)
         low = along(way, *after.range_of(self.speed))[0]
         sure = low > bend
         unsure = np.flatnonzero(~sure)
@@ -247,21 +228,6 @@ class Slips:
         row = self.of.slip[1]
         stops = stops.where(row, stops.mode * (bend[unsure] - of.push[1] + radius), -stops.mode)
         return [after.take(sure), going, *self._stopped_within(stops)]
-
-    def _bend(self, pieces: Pieces) -> np.ndarray:
-        """By how much the speed may be below that at both ends of a tick."""
-        of = self.of
-        if of.lag == 0.0:
-            return np.zeros(len(pieces))
-
-        def most(row: np.ndarray) -> np.ndarray:
-            return np.asarray(np.abs(pieces.range_of(row)).max(axis=0))
-
-        push = (np.maximum(most(of.held), most(of.command)) + of.sliding) / of.inertia
-        rate = push + abs(of.viscous) * (most(self.speed) + of.tick * push)
-        return np.asarray(
-            0.125 * of.tick**2 * (most(of.command - of.held) / (of.lag * of.inertia) + abs(of.viscous) * rate)
-        )
 
     def _stopped_within(self, pieces: Pieces) -> list[Pieces]:
         """Stuck from an instant of a tick on."""
@@ -287,29 +253,11 @@ class Slips:
         least = np.minimum(least, most)
         for values in (after.centre, after.slope, after.radius):
             values[:, 1] = 0.0
-        after.move(of.stuck)
-        after.centre[:, 0] += 0.5 * way * (least + most)
-        after.radius[:, 0] += 0.5 * (most - least)
+        after = after.moved(of.stuck)
+        after.widen(0, *along(way, least, most))
         after.came, after.mode = way, 0 * way
         after.waited[:] = 0
-        return self._freed_within(pieces, after)
-
-    def _freed_within(self, before: Pieces, after: Pieces) -> list[Pieces]:
-        """Pieces that stay stuck over a tick, or the rest of one, and those that break away; the torque is monotonic within a tick."""
-        of = self.of
-        one, two = before.range_of(of.held), after.range_of(of.held)
-        stays = (two[0] < of.breakaway) & (two[1] > -of.breakaway)
-        parts = [after.take(stays)]
-        for way in (1, -1):
-            top = np.maximum(along(way, *one)[1], along(way, *two)[1])
-            frees = top >= of.breakaway
-            some, speed = after.take(frees), of.tick * np.maximum(top[frees] - of.sliding, 0.0) / of.inertia
-            some.mode[:], some.waited[:] = way, 0
-            for state, most in ((1, speed), (0, speed * of.tick)):
-                some.centre[:, state] += 0.5 * way * most
-                some.radius[:, state] += 0.5 * most
-            parts.append(some)
-        return parts
+        return freed_within(of, pieces, after)
 
     # --- at a sample ---
 
@@ -317,11 +265,8 @@ class Slips:
         of = self.of
         matrix, column = of.samples[tick]
         pieces = self._divided(pieces)
-        pieces.move(matrix)
-        pieces.centre += np.outer(pieces.read * of.quantum, column)
-        for row, limit in of.limited:
-            if len(pieces) and np.abs(pieces.range_of(row)).max() >= limit:
-                raise UndecidableError("the limit of the controller may act")
+        pieces = pieces.moved(matrix, np.outer(pieces.read * of.quantum, column))
+        need_within_limits(of, pieces)
         return pieces if of.lag > 0.0 else self._freed_at(pieces)
 
     def _divided(self, pieces: Pieces) -> Pieces:
