@@ -7,7 +7,7 @@ import io
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,9 +15,6 @@ from ..atomic_writer import write_bytes
 from ..errors import need
 from .page import Report, write_page
 from .panels import Chart, Group, Panel
-
-if TYPE_CHECKING:
-    pass
 
 
 def write_text(path: Path, text: str) -> None:

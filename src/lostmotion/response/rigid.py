@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,9 +13,6 @@ from ..inputs.quantities import Time
 from ..model.drive import Drive
 from ..model.losses import ConstantEfficiency
 from ..simulation.scenario import Scenario, drive_of
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True)

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..data_sheets.gearbox_sheet import GearboxSheet
 from ..units.practical import ARCMIN, RPM
 from .rig import TestRig
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True)

@@ -1,14 +1,37 @@
-"""A torsion loop, and what is read off it."""
+"""Readings of slow loadings and of ramps until something breaks loose, of gearboxes and screws alike."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    pass
+from ..simulation.results import RunArrays
+from ..simulation.switchings import names_in, unpacked
+
+
+def segment(twist: Any, torque: Any, low: float, high: float) -> tuple[float, float]:
+    """(slope, torque at twist 0) of a loading between two torques, by the middle 80 % of it; NaN of fewer than three samples."""
+    margin = 0.1 * (high - low)
+    inside = (torque > low + margin) & (torque < high - margin)
+    if np.count_nonzero(inside) < 3:
+        return np.nan, np.nan
+    slope, offset = np.polyfit(twist[inside], torque[inside], 1)
+    return float(slope), float(offset)
+
+
+def gap(twist: Any, torque: Any, up_to: float) -> float:
+    """Total gap: twice where the first segment, loaded up to a torque, meets zero torque."""
+    slope, offset = segment(twist, torque, 0.0, up_to)
+    return -2.0 * offset / slope
+
+
+def break_away(result: RunArrays) -> dict[str, float] | None:
+    """The switching at which the input shaft first starts to turn, by the names of its columns; None: it never does."""
+    switchings = dict(zip(names_in(result.attrs), unpacked(result.attrs).T, strict=True))
+    events = np.flatnonzero((switchings["input_contact_before"] == 0) & (switchings["input_contact_after"] != 0))
+    return {name: float(column[events[0]]) for name, column in switchings.items()} if len(events) else None
 
 
 @dataclass(frozen=True)

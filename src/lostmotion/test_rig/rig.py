@@ -28,8 +28,7 @@ from ..simulation.drive_tables import Initial
 from ..simulation.results import RunArrays
 from ..simulation.run import run
 from ..simulation.scenario import Scenario
-from ..simulation.switchings import names_in, unpacked
-from .loop import Loop
+from .loop import Loop, break_away, gap, segment
 
 PAIR = 100.0  # bytes for a point of a map
 
@@ -205,20 +204,17 @@ class TestRig:
         twist, torque = self.initial_loading_curve(up_to)
         out = []
         for low, high in itertools.pairwise(edges):
-            inside = (torque > low + 0.1 * (high - low)) & (torque < high - 0.1 * (high - low))
-            if np.count_nonzero(inside) < 3:
+            slope, _ = segment(twist, torque, low, high)
+            if np.isnan(slope):
                 twist, torque = self.initial_loading_curve(high)  # a short piece needs a ramp of its own
-                inside = (torque > low + 0.1 * (high - low)) & (torque < high - 0.1 * (high - low))
-            out.append(float(np.polyfit(twist[inside], torque[inside], 1)[0]))
+                slope, _ = segment(twist, torque, low, high)
+            out.append(slope)
         return out
 
     @checked
     def backlash(self, torque: Torque) -> float:
         """Total gap [rad]: twice where the first loaded segment, taken up to `torque` [N·m], meets zero torque."""
-        twist, T = self.initial_loading_curve(_positive("torque", torque))
-        inside = (0.1 * torque < T) & (0.9 * torque > T)
-        slope, offset = np.polyfit(twist[inside], T[inside], 1)
-        return float(-2.0 * offset / slope)
+        return gap(*self.initial_loading_curve(_positive("torque", torque)), torque)
 
     @checked
     def loop(self, amplitude: Torque) -> Loop:
@@ -278,9 +274,7 @@ class TestRig:
         """(instant [s], output torque [N·m]) at which the input shaft first starts to turn: at once where nothing holds it."""
         if result["input_contact"][0] != 0:
             return 0.0, float(result["output_torque"][0])
-        switchings = dict(zip(names_in(result.attrs), unpacked(result.attrs).T, strict=True))
-        events = np.flatnonzero((switchings["input_contact_before"] == 0) & (switchings["input_contact_after"] != 0))
-        if len(events) == 0:
+        found = break_away(result)
+        if found is None:
             raise RigError("the input shaft never started to turn")
-        k = events[0]
-        return float(switchings["instant"][k]), float(switchings["output_torque_before"][k])
+        return found["instant"], found["output_torque_before"]

@@ -19,8 +19,7 @@ from ..model.torsion import Rigid
 from ..simulation.results import RunArrays
 from ..simulation.run import run
 from ..simulation.scenario import Scenario
-from ..simulation.switchings import names_in, unpacked
-from .loop import Loop
+from .loop import Loop, break_away, gap, segment
 from .rig import LOST_MOTION_LOAD, RAMP, RigError
 
 LOCKED = 1e12  # [N m] of friction on the input while it is locked
@@ -62,6 +61,7 @@ class ScrewRig:
         if not load > 0.0:
             raise InputError(f"load: {load:g} N must be greater than 0")
         self.screw, self.load = screw, load
+        self._travel = screw.travel() / (2.0 * np.pi)  # [m/rad]
         gear = screw.gear("input", "slide")
         self._inertia = gear.inertia
         self.rigid = isinstance(gear.stiffness, Rigid)
@@ -88,11 +88,10 @@ class ScrewRig:
         without_error: bool = False,
     ) -> RunArrays:
         """A run of the axis; friction is that of the rig on the input shaft, beside the screw's own drag."""
-        travel = self.screw.travel() / (2.0 * np.pi)
         screw = {n: getattr(self.screw, n) for n in self.screw.model_fields_set if n in ScrewData.model_fields}
         if without_error:
             screw.pop("pitch_error", None)
-        initial: dict[str, Any] = {"speeds": {"input": speed}, "slide_speeds": {"slide": travel * speed}}
+        initial: dict[str, Any] = {"speeds": {"input": speed}, "slide_speeds": {"slide": self._travel * speed}}
         if deflection and not self.rigid:
             initial["deflections"] = {"screw": deflection}
         tables: dict[str, Any] = {
@@ -146,12 +145,7 @@ class ScrewRig:
         ends = [0.0, *breaks]
         ends.append(max(self.load, 1.5 * ends[-1]))
         x, F = self.first_loading(ends[-1])
-        found = []
-        for low, high in itertools.pairwise(ends):
-            margin = 0.1 * (high - low)
-            inside = (low + margin <= F) & (high - margin >= F)
-            found.append(float(np.polyfit(x[inside], F[inside], 1)[0]))
-        return found
+        return [segment(x, F, low, high)[0] for low, high in itertools.pairwise(ends)]
 
     @checked
     def loop(self, amplitude: Force) -> Loop:
@@ -173,10 +167,7 @@ class ScrewRig:
     @checked
     def backlash(self, force: Force) -> float:
         """Axial play [m]: twice where the first loaded segment, taken up to a force [N], meets zero force."""
-        x, F = self.first_loading(force)
-        inside = (0.1 * force < F) & (0.9 * force > F)
-        slope, offset = np.polyfit(x[inside], F[inside], 1)
-        return float(-2.0 * offset / slope)
+        return gap(*self.first_loading(force), force)
 
     # --- in motion ---
 
@@ -184,8 +175,7 @@ class ScrewRig:
     def drag_torque(self, speed: Speed) -> float:
         """Torque [N·m] that keeps the unloaded screw turning at a speed [rad/s]: the mean deceleration of a coasting flywheel."""
         result = self._run(COASTING_TIME, 10, inertia=COASTING, mass=LIGHT, speed=speed, without_error=True)
-        travel = self.screw.travel() / (2.0 * np.pi)
-        inertia = COASTING + self._inertia + LIGHT * travel**2
+        inertia = COASTING + self._inertia + LIGHT * self._travel**2
         lost = speed - float(result["input_speed"][-1])
         return inertia * lost / COASTING_TIME
 
@@ -194,28 +184,27 @@ class ScrewRig:
         """Power out over power in of the thread at a share of the load, without the drag; < 0: the slide drives."""
         speed = 10.0
         force = share * self.load
-        travel = self.screw.travel() / (2.0 * np.pi)
         result = self._run(
             SETTLING,
             50,
             inertia=FLYWHEEL,
             damping=self._damping,
-            force=force - self._damping * travel * speed,
+            force=force - self._damping * self._travel * speed,
             speed=speed,
             deflection=self._at(force),
             without_error=True,
         )
         T = result["screw_input_torque"][-10:]
-        if float(np.ptp(T)) > 1e-6 * self.load * travel:
+        if float(np.ptp(T)) > 1e-6 * self.load * self._travel:
             raise RigError(f"no steady state at {share:g} of the load within {SETTLING:g} s")
-        driving = force * travel / float(T.mean())
+        driving = force * self._travel / float(T.mean())
         return driving if share > 0.0 else max(0.0, 1.0 / driving)
 
     def pitch_error(self) -> float:
         """Travel of the slide less that of the lead [m], from peak to peak over a slow turn without a force."""
         speed = 2.0 * np.pi / TURN
         result = self._run(TURN, 720, inertia=FLYWHEEL, mass=LIGHT, damping=self._slow(), speed=speed)
-        ideal = self.screw.travel() / (2.0 * np.pi) * result["input_angle"]
+        ideal = self._travel * result["input_angle"]
         return float(np.ptp((result["slide_position"] - ideal)[72:]))
 
     def _slow(self) -> float:
@@ -245,8 +234,7 @@ class ScrewRig:
 
     def starting_torque(self) -> float:
         """Torque [N·m] on the input that sets the screw in motion against the load, by a slow ramp."""
-        travel = self.screw.travel() / (2.0 * np.pi)
-        begin = self.load * travel
+        begin = self.load * self._travel
         rise = 4.0 * begin + 2.0 * self.screw.drag_torque
         result = self._run(
             RAMP,
@@ -265,14 +253,12 @@ class ScrewRig:
 
     def _brake(self) -> float:
         """A damper on the input [N·m·s/rad], without effect at rest, which keeps the screw slow once it is loose."""
-        return 1e3 * self.load * self.screw.travel() / (2.0 * np.pi)
+        return 1e3 * self.load * self._travel
 
     @staticmethod
     def _starts(result: RunArrays) -> float | None:
         """The instant [s] at which the input shaft first starts to turn, 0 where nothing holds it; None: never."""
         if "input_contact" not in result or result["input_contact"][0] != 0:
             return 0.0
-        switchings = dict(zip(names_in(result.attrs), unpacked(result.attrs).T, strict=True))
-        before, after = switchings["input_contact_before"], switchings["input_contact_after"]
-        events = np.flatnonzero((before == 0) & (after != 0))
-        return float(switchings["instant"][events[0]]) if len(events) else None
+        found = break_away(result)
+        return None if found is None else found["instant"]
