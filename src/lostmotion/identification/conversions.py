@@ -7,10 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..inputs.operators import ARITHMETIC
-
-MAX_LENGTH = 2000  # characters
-MAX_DEPTH = 100  # parts inside of parts
+from ..inputs.operators import ARITHMETIC, syntax_tree
 
 NAMES = ("X", "X1")  # of the raw value
 CONSTANTS = {"pi": np.pi}
@@ -54,13 +51,7 @@ def conversion_of(text: str) -> Callable[[np.ndarray], np.ndarray]:
     ValueError
         The formula has something else in it.
     """
-    if len(text) > MAX_LENGTH:
-        raise ValueError(f"{text[:40]!r}... is longer than {MAX_LENGTH} characters")
-    try:
-        tree = ast.parse(text.strip(), mode="eval").body
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise ValueError(f"{text[:40]!r} cannot be read as a formula") from None
-    course = _read(tree, text, MAX_DEPTH)
+    course = _read(syntax_tree(text, "a formula"), text)
 
     def convert(raw: np.ndarray) -> np.ndarray:
         values = np.asarray(raw, dtype=float)
@@ -70,9 +61,7 @@ def conversion_of(text: str) -> Callable[[np.ndarray], np.ndarray]:
     return convert
 
 
-def _read(node: ast.expr, text: str, depth: int) -> Course:
-    if depth == 0:
-        raise ValueError(f"{text[:40]!r}... is nested too deeply")
+def _read(node: ast.expr, text: str) -> Course:
     match node:
         case ast.Constant(bool() | str() | bytes() | complex() | None):
             pass
@@ -87,16 +76,16 @@ def _read(node: ast.expr, text: str, depth: int) -> Course:
         case ast.Name(name) if name in CONSTANTS:
             return lambda _: np.float64(CONSTANTS[name])
         case ast.UnaryOp(ast.USub() | ast.UAdd() as sign, operand):
-            inner = _read(operand, text, depth - 1)
+            inner = _read(operand, text)
             return (lambda x: -inner(x)) if isinstance(sign, ast.USub) else inner
         case ast.BinOp(left, operation, right) if type(operation) in ARITHMETIC:
             how = ARITHMETIC[type(operation)]
-            a, b = _read(left, text, depth - 1), _read(right, text, depth - 1)
+            a, b = _read(left, text), _read(right, text)
             return lambda x: how(a(x), b(x))
         case ast.BinOp(op=ast.BitXor()):
             raise ValueError(f"{text[:40]!r} has ^, which is a power or a bitwise operator; write pow(a, b)")
         case ast.Call(ast.Name(name), args, []) if name in FUNCTIONS and len(args) == FUNCTIONS[name][0]:
             function = FUNCTIONS[name][1]
-            given = [_read(arg, text, depth - 1) for arg in args]
+            given = [_read(arg, text) for arg in args]
             return lambda x: function(*(one(x) for one in given))
     raise ValueError(f"{text[:40]!r} has something else in it than X, numbers, + - * / ** and {', '.join(FUNCTIONS)}")

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import ast
 import math
-import warnings
 from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
 
 from ..errors import InputError
-from ..inputs.operators import ARITHMETIC, COMPARISONS, is_too_deep
+from ..inputs.operators import ARITHMETIC, COMPARISONS, syntax_tree
 from ..inputs.validation import MAX_LISTED, did_you_mean, shortened, shown
-
-MAX_LENGTH = 2000  # characters
 
 FUNCTIONS: dict[str, Callable[..., float]] = {
     "sqrt": math.sqrt,
@@ -49,16 +46,7 @@ class Formula:
     def __init__(self, text: str | float) -> None:
         self.text = str(text)
         self._shown = shortened(self.text, MAX_LISTED)
-        if len(self.text) > MAX_LENGTH:
-            raise ValueError(f"{self.text[:40]!r}... is longer than {MAX_LENGTH} characters")
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # of the parser, about text that is refused anyway
-                self._tree = ast.parse(" ".join(self.text.split()), mode="eval").body
-        except (SyntaxError, ValueError, RecursionError, MemoryError):
-            raise ValueError(f"{self._shown!r} cannot be read as a formula") from None
-        if is_too_deep(self._tree):
-            raise ValueError(f"{self._shown!r} is nested too deeply")
+        self._tree = syntax_tree(self.text, "a formula")
         self.names = frozenset(
             node.id
             for node in ast.walk(self._tree)

@@ -1,11 +1,14 @@
-"""Operators that expressions and formulas in files may use."""
+"""Expressions and formulas in files: their syntax trees, and the operators that they may use."""
 
 from __future__ import annotations
 
 import ast
 import operator
+import warnings
 from collections.abc import Callable
 from typing import Any
+
+from .validation import MAX_LISTED, shortened
 
 ARITHMETIC: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
@@ -14,7 +17,6 @@ ARITHMETIC: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Div: operator.truediv,
     ast.Pow: operator.pow,
 }
-MAX_DEPTH = 100  # parts inside of parts
 COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Lt: operator.lt,
     ast.LtE: operator.le,
@@ -23,13 +25,38 @@ COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Eq: operator.eq,
     ast.NotEq: operator.ne,
 }
+MAX_LENGTH = 2000  # characters
+MAX_DEPTH = 100  # parts inside of parts, which functions that call themselves can walk
 
 
-def is_too_deep(tree: ast.AST) -> bool:
-    """Whether an expression has more than `MAX_DEPTH` parts inside of parts, so that functions that call themselves cannot walk it."""
-    level = [tree]
+def syntax_tree(text: str, kind: str, remedy: str = "") -> ast.expr:
+    """The syntax tree of an expression, not too large to be walked. Nothing of it is run.
+
+    Parameters
+    ----------
+    kind
+        What it is in messages, such as ``"a formula"``.
+    remedy
+        Clause on what to do with one that is too long or nested too deeply.
+
+    Raises
+    ------
+    ValueError
+        It cannot be read, or is too long or nested too deeply.
+    """
+    remedy = f"; {remedy}" if remedy else ""
+    if len(text) > MAX_LENGTH:
+        raise ValueError(f"{text[:40]!r}... is longer than {MAX_LENGTH} characters{remedy}")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of the parser, about text that is refused anyway
+            tree = ast.parse(" ".join(text.split()), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        why = f" ({error.msg})" if isinstance(error, SyntaxError) else ""
+        raise ValueError(f"{shortened(text, MAX_LISTED)!r} cannot be read as {kind}{why}") from None
+    level: list[ast.expr] = [tree]
     for _ in range(MAX_DEPTH):
         level = [child for node in level for child in ast.iter_child_nodes(node) if isinstance(child, ast.expr)]
         if not level:
-            return False
-    return True
+            return tree
+    raise ValueError(f"{text[:40]!r}... is nested too deeply{remedy}")

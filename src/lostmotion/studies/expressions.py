@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import ast
 import operator
-import warnings
 from collections.abc import Callable, Mapping
 from functools import lru_cache, reduce
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..inputs.operators import ARITHMETIC, COMPARISONS, is_too_deep
+from ..inputs.operators import ARITHMETIC, COMPARISONS, syntax_tree
 from ..inputs.validation import MAX_LISTED, listed, nearest, shortened
 from ..simulation.variables import VARIABLES
 from .functions import BANDWIDTH, FUNCTIONS, METHODS, REDUCTIONS, Function, Parameter
@@ -25,7 +24,6 @@ from .vocabulary import OF_DRIVES, OF_THE_RUN, Vocabulary
 Names = Mapping[str, Any]
 """values by name: variables (run, time), `energy` (entry -> runs), `bandwidth` (a function of the amplitude)"""
 
-MAX_LENGTH = 2000  # characters
 KNOWN_UNITS = ("1", *dict.fromkeys(v.unit for v in VARIABLES), "J", "Hz", "N*m/rad")
 
 LOGIC: dict[type[ast.operator], Callable[[Any, Any], Any]] = {ast.BitAnd: operator.and_, ast.BitOr: operator.or_}
@@ -71,7 +69,7 @@ class Expression:
 
     def __init__(self, text: str, vocabulary: Vocabulary = OF_DRIVES) -> None:
         self.text, shown = text, shortened(text, MAX_LISTED)
-        tree = _parse(text)
+        tree = syntax_tree(text, "an expression", "split it into several columns")
         self.names = frozenset(node.id for node in ast.walk(tree) if isinstance(node, ast.Name))
         """all that it names"""
         known = {name for name, _ in vocabulary.variables}
@@ -116,23 +114,6 @@ def _unknown(name: str, text: str, vocabulary: Vocabulary) -> ValueError:
     near = nearest(name, [v for v, _ in vocabulary.variables])
     hint = f"; did you mean {near}?" if near else ""
     return ValueError(f"{name!r} in {text!r} is neither a result variable nor one of {choice}{hint}")
-
-
-def _parse(text: str) -> ast.expr:
-    """The syntax tree, not too large to be walked."""
-    if len(text) > MAX_LENGTH:
-        raise ValueError(f"{text[:40]!r}... is longer than {MAX_LENGTH} characters; split it into several columns")
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of the parser, about text that is refused anyway
-            tree = ast.parse(" ".join(text.split()), mode="eval").body
-    except SyntaxError as error:
-        raise ValueError(f"{shortened(text, MAX_LISTED)!r} cannot be read as an expression ({error.msg})") from None
-    except (ValueError, RecursionError, MemoryError):
-        raise ValueError(f"{text[:40]!r} cannot be read as an expression") from None
-    if is_too_deep(tree):
-        raise ValueError(f"{text[:40]!r}... is nested too deeply; split it into several columns")
-    return tree
 
 
 class _Reader:
