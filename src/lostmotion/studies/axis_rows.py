@@ -299,7 +299,7 @@ class Axes:
         select = self.study.select
         found = [rule for rule in str(columns["violated"]).split() if rule]
         for name, bound in {} if select is None else select.limits.items():
-            low, high = bound.in_unit({"1": "", "": None}.get(u := self.study.kept_units.get(name, ""), u))
+            low, high = bound.in_unit(self.study.kept_units.get(name, ""))
             if name in columns and not low <= float(columns[name]) <= high:
                 found.append(name)
         return tuple(found)

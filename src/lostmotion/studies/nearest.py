@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -140,20 +141,20 @@ def _slowed_signal(signal: Any, factor: float) -> Any:
 def _tried(study: Study, miss: Miss) -> Miss:
     """With the least factor by which the cycle has to be longer, if there is one, and what rules and run say of it."""
     if same := dict.fromkeys("its parts" if limit in CHOICE else limit for limit in miss.lacks if limit in AT_ANY_TIME):
-        return Miss(miss.candidate, miss.lacks, None, f"a slower cycle does not change {', '.join(same)}")
+        return replace(miss, then=f"a slower cycle does not change {', '.join(same)}")
     row = study.parameters(miss.candidate.run, miss.candidate.run + 1)[0]
     try:
         if miss.candidate.ran:
             return _run_slower(study, miss, row)
         factor = least_factor(study, row)
         if factor is None:
-            return Miss(miss.candidate, miss.lacks, None, f"no cycle up to {SLOWEST:g} times as long passes the rules")
+            return replace(miss, then=f"no cycle up to {SLOWEST:g} times as long passes the rules")
         said = _said(study, slowed(study, factor), row, factor)
-        by_rules = Miss(miss.candidate, miss.lacks, factor, said)
+        by_rules = replace(miss, slower=factor, then=said)
         slower = by_rules if said.startswith(FITS) else _run_slower(study, miss, row, factor)
         return by_rules if slower.slower is None else slower
     except (InputError, RuntimeError) as error:
-        return Miss(miss.candidate, miss.lacks, None, f"a slower cycle was not tried: {error}")
+        return replace(miss, then=f"a slower cycle was not tried: {error}")
 
 
 def _run_slower(study: Study, miss: Miss, row: np.ndarray, least: float = 1.0) -> Miss:
@@ -162,12 +163,9 @@ def _run_slower(study: Study, miss: Miss, row: np.ndarray, least: float = 1.0) -
     for factor in (math.ceil(DIGITS * least * share) / DIGITS for share in TRIES):
         slower = slowed(study, factor)
         if Axes(slower).refused(row) is None and (said := _said(study, slower, row, factor)).startswith(FITS):
-            return Miss(miss.candidate, miss.lacks, factor, said)
-    return Miss(
-        miss.candidate,
-        miss.lacks,
-        None,
-        f"its run violates a limit in all cycles tried, up to {least * TRIES[-1]:.3g} times as long",
+            return replace(miss, slower=factor, then=said)
+    return replace(
+        miss, then=f"its run violates a limit in all cycles tried, up to {least * TRIES[-1]:.3g} times as long"
     )
 
 
@@ -213,23 +211,18 @@ class Lacking:
 
 def not_judged(ranked: list[Candidate]) -> list[Lacking]:
     """The records that lack what a run needs, grouped by the datum, with the candidates that this concerns."""
-    groups: dict[str, list[str]] = {}
-    for c in ranked:
-        if NO_DATA in c.violated:
-            groups.setdefault(_without_names(c.why), []).append(c.name)
-    return _by_size(groups)
+    return _by_datum((_without_names(c.why), c.name) for c in ranked if NO_DATA in c.violated)
 
 
 def rules_not_judged(ranked: list[Candidate]) -> list[Lacking]:
     """The rules that are not judged, grouped by the datum that is missing, with the candidates that this concerns."""
+    return _by_datum((text, c.name) for c in ranked for text in c.missing)
+
+
+def _by_datum(lacking: Iterable[tuple[str, str]]) -> list[Lacking]:
     groups: dict[str, list[str]] = {}
-    for c in ranked:
-        for text in c.missing:
-            groups.setdefault(text, []).append(c.name)
-    return _by_size(groups)
-
-
-def _by_size(groups: dict[str, list[str]]) -> list[Lacking]:
+    for datum, name in lacking:
+        groups.setdefault(datum, []).append(name)
     return [Lacking(text, tuple(names)) for text, names in sorted(groups.items(), key=lambda pair: -len(pair[1]))]
 
 

@@ -38,15 +38,15 @@ class Bound(Part):
             raise ValueError("needs min or max")
         return self
 
-    def in_unit(self, unit: str | None) -> tuple[float, float]:
-        """(minimum, maximum) permissible value in a unit; None: it is not known, any is taken in SI.
+    def in_unit(self, unit: str) -> tuple[float, float]:
+        """(minimum, maximum) permissible value in the unit of a column, ``"1"`` of a plain number; empty: not known, any is taken in SI.
 
         Raises
         ------
         ValueError
             A value has the unit of something else.
         """
-        low, high = in_si(self.min, unit), in_si(self.max, unit)
+        low, high = (in_si(value, {"1": "", "": None}.get(unit, unit)) for value in (self.min, self.max))
         return (-float("inf") if low is None else float(low), float("inf") if high is None else float(high))
 
 
@@ -77,9 +77,8 @@ def check_bounds(selection: Selection, units: dict[str, str]) -> None:
     ValueError
     """
     for column, bound in selection.limits.items():
-        unit: Any = units.get(column)
         try:
-            low, high = bound.in_unit({"1": "", "": None}.get(unit, unit))
+            low, high = bound.in_unit(units.get(column, ""))
         except ValueError as error:
             raise ValueError(f"select.limits.{column}: {error}") from None
         if low > high:

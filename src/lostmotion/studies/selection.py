@@ -89,10 +89,7 @@ def candidates(table: pa.Table, study: Study) -> list[Candidate]:
     select = study.select
     if select is None:
         raise ValueError("this study does not select; give it a table [select]")
-    bounds = {
-        column: b.in_unit({"1": "", "": None}.get(u := unit_of(table, column), u))
-        for column, b in select.limits.items()
-    }
+    bounds = {column: b.in_unit(unit_of(table, column)) for column, b in select.limits.items()}
     found = [_candidate(row, study, select, bounds) for row in table.to_pylist()]
     return sorted(found, key=lambda c: (NOT_RUN in c.violated, len(c.violated), _rank(c, select), c.run))
 
@@ -113,34 +110,21 @@ def _candidate(
     violated, why = row.get("violated", "").split(), [row["why"]] if row.get("why") else []
     over = {rule: use - 1.0 for rule in violated if math.isfinite(use := row.get(f"{USE}{rule}", math.nan))}
     missing = tuple(filter(None, row.get(MISSING, "").split("; ")))
-    if study.axis is not None and math.isnan(row["cycles"]):  # refused before any run
-        return Candidate(
-            run=row["run"],
-            name=name,
-            violated=tuple(violated),
-            why=row["why"],
-            not_judged=row["not judged"],
-            values=values,
-            ran=False,
-            estimated=row[ESTIMATED],
-            choice=choice,
-            missing=missing,
-            over=over,
-        )
-    for column, bound in bounds.items():
-        if bound[0] <= row[column] <= bound[1]:
-            continue
-        found, excess = _beyond(column, row, bound, study)
-        violated.append(column)
-        why.append(found)
-        over |= excess
-    for column, value in values.items():
-        if math.isnan(value):
+    ran, tightest = study.axis is None or not math.isnan(row["cycles"]), ""  # a task refuses some before any run
+    if ran:
+        for column, bound in bounds.items():
+            if bound[0] <= row[column] <= bound[1]:
+                continue
+            found, excess = _beyond(column, row, bound, study)
+            violated.append(column)
+            why.append(found)
+            over |= excess
+        for column in (column for column, value in values.items() if math.isnan(value)):
             violated.append(column)
             why.append(f"{column} has no value")
-    uses = {rule: use for rule in TASK_SHARES if math.isfinite(use := row.get(f"{USE}{rule}", math.nan))}
-    critical = max(uses, key=lambda rule: uses[rule], default="")
-    tightest = f"{critical} {100.0 * uses[critical]:.0f} %" if critical else ""
+        uses = {rule: use for rule in TASK_SHARES if math.isfinite(use := row.get(f"{USE}{rule}", math.nan))}
+        critical = max(uses, key=lambda rule: uses[rule], default="")
+        tightest = f"{critical} {100.0 * uses[critical]:.0f} %" if critical else ""
     return Candidate(
         run=row["run"],
         name=name,
@@ -149,6 +133,7 @@ def _candidate(
         not_judged=row.get("not judged", ""),
         values=values,
         tightest=tightest,
+        ran=ran,
         estimated=row.get(ESTIMATED, ""),
         choice=choice,
         missing=missing,
