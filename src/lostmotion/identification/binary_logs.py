@@ -18,7 +18,7 @@ from ..inputs.hdf5_files import datasets
 from ..inputs.limits import check_memory, memory_limit
 from ..inputs.validation import did_you_mean, listed
 from .conversions import conversion_of
-from .logs import Channel, Log, as_number, quiet_ends, reason, warnings_of
+from .logs import Channel, Log, as_number, as_refusal, quiet_ends, reason, warnings_of
 from .mdf_blocks import check_mdf_blocks
 from .tables import TIME_NAMES
 
@@ -75,16 +75,10 @@ def _mat5_variables(path: Path) -> dict[str, Any]:
     import scipy.io
 
     check_memory(_mat5_bytes(path), str(path))
-    try:
+    with as_refusal(path, "is not a MATLAB file", "; save it with -v7 or -v7.3"):
         listed = [(name, shape) for name, shape, kind in scipy.io.whosmat(str(path)) if kind in MATLAB_NUMBERS]
         check_memory(8.0 * sum(math.prod(shape) for _, shape in listed), str(path))
         data = scipy.io.loadmat(str(path), squeeze_me=True, variable_names=[name for name, _ in listed])
-    except InputError:
-        raise
-    except Exception as error:  # the library raises what its parts raise
-        raise InputError(
-            f"is not a MATLAB file ({reason(error)}); save it with -v7 or -v7.3", where=str(path)
-        ) from None
     return {name: value for name, value in data.items() if not name.startswith("__")}
 
 
@@ -117,27 +111,20 @@ def _hdf5_variables(path: Path, *, matlab: bool) -> tuple[dict[str, Any], dict[s
 
     found: dict[str, Any] = {}
     units: dict[str, str] = {}
-    try:
-        with h5py.File(path, "r") as file:
-            for name, node in datasets(path, file, depth=0 if matlab else LEVELS).items():
-                if matlab and node.dtype.kind in "biuf":
-                    value = np.squeeze(node[()].T)
-                    text = node.attrs.get("MATLAB_class", b"") == b"char"
-                    found[name] = "".join(map(chr, np.atleast_1d(value))) if text else value
-                elif node.dtype.names is not None:
-                    found |= {
-                        f"{name}.{part}": node[part] for part in node.dtype.names if node.dtype[part].kind in "biuf"
-                    }
-                elif node.dtype.kind in "biuf" or node.shape == ():
-                    found[name] = _text(node[()])
-                if not matlab:
-                    own = _attributes(node)
-                    units[name] = str(own.get("units", own.get("unit", "")))
-            attributes = {} if matlab else _attributes(file)
-    except InputError:
-        raise
-    except Exception as error:  # the library raises what its parts raise
-        raise InputError(f"is not a {kind} file ({reason(error)})", where=str(path)) from None
+    with as_refusal(path, f"is not a {kind} file"), h5py.File(path, "r") as file:
+        for name, node in datasets(path, file, depth=0 if matlab else LEVELS).items():
+            if matlab and node.dtype.kind in "biuf":
+                value = np.squeeze(node[()].T)
+                text = node.attrs.get("MATLAB_class", b"") == b"char"
+                found[name] = "".join(map(chr, np.atleast_1d(value))) if text else value
+            elif node.dtype.names is not None:
+                found |= {f"{name}.{part}": node[part] for part in node.dtype.names if node.dtype[part].kind in "biuf"}
+            elif node.dtype.kind in "biuf" or node.shape == ():
+                found[name] = _text(node[()])
+            if not matlab:
+                own = _attributes(node)
+                units[name] = str(own.get("units", own.get("unit", "")))
+        attributes = {} if matlab else _attributes(file)
     return found, units, attributes
 
 
@@ -178,14 +165,11 @@ def read_parquet_log(path: Path, *, time: str = "") -> Log:
             types.is_integer(kind) or types.is_floating(kind) or types.is_boolean(kind) or types.is_timestamp(kind)
         )
 
-    try:
-        with pq.ParquetFile(path) as file:
-            schema = file.schema_arrow
-            names = [field.name for field in schema if is_read(field.type)]
-            check_memory(16.0 * len(names) * file.metadata.num_rows, str(path))
-            table = file.read(names)
-    except (OSError, pa.ArrowException) as error:
-        raise InputError(f"is not a Parquet file ({reason(error)})", where=str(path)) from None
+    with as_refusal(path, "is not a Parquet file"), pq.ParquetFile(path) as file:
+        schema = file.schema_arrow
+        names = [field.name for field in schema if is_read(field.type)]
+        check_memory(16.0 * len(names) * file.metadata.num_rows, str(path))
+        table = file.read(names)
     units = {f.name: (f.metadata or {}).get(b"unit", b"").decode() for f in schema}
     header = {k.decode(): v.decode() for k, v in (schema.metadata or {}).items() if not k.startswith(b"ARROW")}
     columns: dict[str, Any] = {}
@@ -315,20 +299,20 @@ def read_tdms_log(path: Path, *, time: str = "") -> Log:
 
     variables: dict[str, Any] = {}
     units = {}
-    try:
-        with warnings_of("nptdms") as said, path.open("rb") as stream, nptdms.TdmsFile.open(stream) as file:
-            channels = [c for group in file.groups() for c in group.channels() if c.dtype.kind in "biuf"]
-            check_memory(sum(float(len(c)) * (c.dtype.itemsize + 8.0) for c in channels), str(path))
-            for channel in channels:
-                variables[channel.name] = np.asarray(channel[:])
-                units[channel.name] = str(channel.properties.get("unit_string", ""))
-                if channel.properties.keys() >= WAVEFORM and not any(name in variables for name in TIME_NAMES):
-                    variables["time"] = channel.time_track()
-            properties = file.properties
-    except InputError:
-        raise
-    except Exception as error:  # the library raises what its parts raise
-        raise InputError(f"is not a TDMS file ({reason(error)})", where=str(path)) from None
+    with (
+        as_refusal(path, "is not a TDMS file"),
+        warnings_of("nptdms") as said,
+        path.open("rb") as stream,
+        nptdms.TdmsFile.open(stream) as file,
+    ):
+        channels = [c for group in file.groups() for c in group.channels() if c.dtype.kind in "biuf"]
+        check_memory(sum(float(len(c)) * (c.dtype.itemsize + 8.0) for c in channels), str(path))
+        for channel in channels:
+            variables[channel.name] = np.asarray(channel[:])
+            units[channel.name] = str(channel.properties.get("unit_string", ""))
+            if channel.properties.keys() >= WAVEFORM and not any(name in variables for name in TIME_NAMES):
+                variables["time"] = channel.time_track()
+        properties = file.properties
     variables |= {name: value for name, value in properties.items() if isinstance(value, int | float | str)}
     log = log_of_variables(path, variables, units, time)
     return log.noted(f"may be cut off or damaged; npTDMS reports: {said[0]}") if said else log

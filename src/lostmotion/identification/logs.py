@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,17 @@ def reason(error: Exception) -> str:
     if isinstance(error, MemoryError):
         return "it announces more than fits into memory"
     return shortened(" ".join(str(error).split()), MAX_LISTED) or "it is damaged"
+
+
+@contextmanager
+def as_refusal(path: Path, what: str, remedy: str = "") -> Iterator[None]:
+    """Whatever a library raises about a file, as one message: `what` the file is not, the reason, and a remedy."""
+    try:
+        yield
+    except (InputError, ImportError):
+        raise
+    except Exception as error:  # the library raises what its parts raise
+        raise InputError(f"{what} ({reason(error)}){remedy}", where=str(path)) from None
 
 
 @contextmanager

@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..inputs.limits import check_memory
 from ..inputs.zip_files import members
 from .binary_logs import log_of_variables
-from .logs import Log, reason
+from .logs import Log, as_refusal
 
 HEADER = 64_000  # [bytes] of a description of an array
 
@@ -31,7 +31,7 @@ def read_numpy_log(path: Path, *, time: str = "") -> Log:
     variables: dict[str, Any] = {}
     units: dict[str, str] = {}
     others: list[str] = []
-    try:
+    with as_refusal(path, "is not a file of NumPy", "; save it with numpy.save or numpy.savez"):
         if path.suffix.lower() == ".npy":
             with path.open("rb") as file:
                 arrays = {"": _array(path, "", file, path.stat().st_size)}
@@ -42,12 +42,6 @@ def read_numpy_log(path: Path, *, time: str = "") -> Log:
                     name = member.removesuffix(".npy")
                     with archive.open(member) as stream:
                         arrays[name] = _array(path, name, stream, about.file_size)
-    except InputError:
-        raise
-    except Exception as error:  # of a damaged archive, or a header that is no description of an array
-        raise InputError(
-            f"is not a file of NumPy ({reason(error)}); save it with numpy.save or numpy.savez", where=str(path)
-        ) from None
     for name, array in arrays.items():
         for own, values in _fields(name, array).items():
             if values.dtype.kind in "mM":

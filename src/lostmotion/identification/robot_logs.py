@@ -16,7 +16,7 @@ import numpy as np
 from ..errors import InputError, need
 from ..inputs.limits import check_memory, memory_limit
 from ..inputs.validation import listed
-from .logs import Channel, Log, as_number, reason
+from .logs import Channel, Log, as_number, as_refusal, reason
 
 Course = tuple[np.ndarray, np.ndarray]  # times of the messages [ns] and values
 STAMP = ".header.stamp"
@@ -141,32 +141,26 @@ def _read_mcap(path: Path) -> Recording:
     channels: dict[int, Any] = {}
     schemas: dict[int, Any] = {}
     first: dict[str, int] = {}  # log time of the first message of each topic
-    try:
-        with path.open("rb") as file:
-            for record in _mcap_records(path, file):
-                if isinstance(record, records.Schema):
-                    schemas[record.id] = record
-                elif isinstance(record, records.Channel):
-                    channels[record.id] = record
-                elif isinstance(record, records.Metadata):
-                    recording.header |= {k: as_number(v) for k, v in record.metadata.items()}
-                elif isinstance(record, records.Message):
-                    channel = channels[record.channel_id]
-                    topic = channel.topic.strip("/")
-                    if channel.id not in decoders:
-                        decoders[channel.id] = _decoder(
-                            path, topic, channel.message_encoding, schemas.get(channel.schema_id)
-                        )
-                    first[topic] = min(record.log_time, first.get(topic, record.log_time))
-                    recording.add(
-                        topic, record.publish_time, decoders[channel.id], record.data, channel.message_encoding
+    with (
+        as_refusal(path, "is not an MCAP file that mcap reads", "; if cut off, use `mcap recover`"),
+        path.open("rb") as file,
+    ):
+        for record in _mcap_records(path, file):
+            if isinstance(record, records.Schema):
+                schemas[record.id] = record
+            elif isinstance(record, records.Channel):
+                channels[record.id] = record
+            elif isinstance(record, records.Metadata):
+                recording.header |= {k: as_number(v) for k, v in record.metadata.items()}
+            elif isinstance(record, records.Message):
+                channel = channels[record.channel_id]
+                topic = channel.topic.strip("/")
+                if channel.id not in decoders:
+                    decoders[channel.id] = _decoder(
+                        path, topic, channel.message_encoding, schemas.get(channel.schema_id)
                     )
-    except (InputError, ImportError):
-        raise
-    except Exception as error:  # the library raises what its parts raise
-        raise InputError(
-            f"is not an MCAP file that mcap reads ({reason(error)}); if cut off, use `mcap recover`", where=str(path)
-        ) from None
+                first[topic] = min(record.log_time, first.get(topic, record.log_time))
+                recording.add(topic, record.publish_time, decoders[channel.id], record.data, channel.message_encoding)
     recording.topics = {topic: recording.topics[topic] for topic in sorted(recording.topics, key=lambda t: first[t])}
     return recording
 
@@ -217,16 +211,11 @@ def _decoder(path: Path, topic: str, encoding: str, schema: Any) -> Callable[[by
     from rosbags.typesys import Stores, get_typestore
     from rosbags.typesys.msg import normalize_msgtype
 
-    try:
+    with as_refusal(path, f"topic {topic}: the definition of {schema.name} cannot be read", "; record it again"):
         store = get_typestore(Stores.EMPTY)
         store.register(_types(schema.data.decode(errors="replace"), schema.name, idl=schema.encoding == "ros2idl"))
         kind = normalize_msgtype(schema.name)
         store.get_msgdef(kind)
-    except Exception as error:  # of a grammar
-        raise InputError(
-            f"topic {topic}: the definition of {schema.name} cannot be read ({reason(error)}); record it again",
-            where=str(path),
-        ) from None
     decode = store.deserialize_cdr if encoding == "cdr" else store.deserialize_ros1
     return partial(decode, typename=kind)
 
@@ -292,7 +281,8 @@ def _read_bag(path: Path) -> Recording:
     from rosbags.typesys import Stores, get_typestore
 
     recording = Recording(path)
-    try:
+    remedy = "; if cut off, use `rosbag reindex` or `ros2 bag reindex`"
+    with as_refusal(path, "is not a bag that rosbags reads", remedy):
         if path.suffix.lower() == ".db3":
             _check_tables(path)
         with rosbag2.Reader(path) if path.suffix.lower() == ".db3" else rosbag1.Reader(path) as opened:
@@ -305,14 +295,6 @@ def _read_bag(path: Path) -> Recording:
             for connection, at, data in reader.messages():
                 topic = connection.topic.strip("/")
                 recording.add(topic, at, partial(reader.deserialize, typ=connection.msgtype), data, "ros")
-    except InputError:
-        raise
-    except Exception as error:  # the library raises what its parts raise
-        raise InputError(
-            f"is not a bag that rosbags reads ({reason(error)}); if cut off, use `rosbag reindex` or "
-            "`ros2 bag reindex`",
-            where=str(path),
-        ) from None
     return recording
 
 
@@ -322,14 +304,9 @@ def _check_definition(path: Path, connection: Any) -> None:
     kind = connection.msgdef.format
     if kind == MessageDefinitionFormat.NONE:
         return
-    try:
+    topic = connection.topic.strip("/")
+    with as_refusal(path, f"topic {topic}: the definition of {connection.msgtype} cannot be read", "; record it again"):
         _types(connection.msgdef.data, connection.msgtype, idl=kind == MessageDefinitionFormat.IDL)
-    except Exception as error:  # of a grammar
-        raise InputError(
-            f"topic {connection.topic.strip('/')}: the definition of {connection.msgtype} cannot be read "
-            f"({reason(error)}); record it again",
-            where=str(path),
-        ) from None
 
 
 def _bounded(path: Path, chunk: Any) -> Any:

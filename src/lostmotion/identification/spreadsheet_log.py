@@ -15,7 +15,7 @@ from ..errors import InputError, need
 from ..inputs.limits import check_memory
 from ..inputs.validation import listed
 from ..inputs.zip_files import members
-from .logs import Log, reason
+from .logs import Log, as_refusal
 from .tables import Row, UnreadError, plain_number, table_log
 
 PER_ELEMENT = 1500  # bytes of memory for an element of a part that describes the workbook, measured of styles
@@ -39,7 +39,7 @@ def read_xlsx_log(path: Path, *, time: str = "") -> Log:
     need("openpyxl", "Reading XLSX files", "identify")
     import openpyxl
 
-    try:
+    with as_refusal(path, "is not an XLSX file", "; save it as .xlsx again, or as CSV"):
         with zipfile.ZipFile(path) as archive:
             _check(path, archive)
         with warnings.catch_warnings(), path.open("rb") as file:
@@ -47,12 +47,6 @@ def read_xlsx_log(path: Path, *, time: str = "") -> Log:
             book = openpyxl.load_workbook(file, read_only=True, data_only=True, keep_links=False)
             log = _of_book(path, book, time)
             book.close()
-    except InputError:
-        raise
-    except Exception as error:  # the library raises what its parts raise
-        raise InputError(
-            f"is not an XLSX file ({reason(error)}); save it as .xlsx again, or as CSV", where=str(path)
-        ) from None
     return log
 
 
