@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -56,12 +57,15 @@ def summary(result: xarray.Dataset | RunArrays) -> str:
         parts = [f"{name.replace('_', ' ')} {e[name]:.4g}" for name in names if e.get(name, 0.0) != 0.0]
         ends = f"from the motor {e['source']:.4g}", f"stored {e['kinetic_change'] + e['elastic_change']:.4g}"
         lines.append(f"  energy [J]: {', '.join([ends[0], *parts, ends[1]])}")
-        if e["turned_over"] > 0.0:
-            lines.append(f"  energy balance closes to {closes_to(result)}")
-    lines += [*contact_lines(result), *mesh_lines(result), *error_lines(result)]
-    lines += [f"  warning: {result.attrs['warning']}"] if "warning" in result.attrs else []
-    lines += [f"  note: {result.attrs['note']}"] if "note" in result.attrs else []
-    return "\n".join(lines)
+    return "\n".join([*lines, *_last_lines(result)])
+
+
+def _last_lines(result: xarray.Dataset | RunArrays) -> Iterator[str]:
+    """Lines of any run: how far its energy balance closes, its contacts and meshes, its bounds, warning and note."""
+    if "energy" in result.attrs and energy_of(result)["turned_over"] > 0.0:
+        yield f"  energy balance closes to {closes_to(result)}"
+    yield from (*contact_lines(result), *mesh_lines(result), *error_lines(result))
+    yield from (f"  {kind}: {result.attrs[kind]}" for kind in ("warning", "note") if kind in result.attrs)
 
 
 def contact_lines(result: xarray.Dataset | RunArrays) -> list[str]:
@@ -143,11 +147,7 @@ def train_summary(result: xarray.Dataset | RunArrays) -> str:
         apart = ("residual", "turned_over")
         parts = ", ".join(f"{name} {value:.4g}" for name, value in e.items() if value != 0.0 and name not in apart)
         lines.append(f"  energy [J]: {parts or 'none'}")
-        if e["turned_over"] > 0.0:
-            lines.append(f"  energy balance closes to {closes_to(result)}")
-    lines += [*contact_lines(result), *mesh_lines(result), *error_lines(result)]
-    lines += [f"  {kind}: {result.attrs[kind]}" for kind in ("warning", "note") if kind in result.attrs]
-    return "\n".join(lines)
+    return "\n".join([*lines, *_last_lines(result)])
 
 
 def _end(values: np.ndarray) -> float:
