@@ -312,21 +312,9 @@ def _model_of_train(
     return _model(train, core, *_core.linearize_at(core, ramps, start, dict(state.hysteresis_capacities), 0.0))
 
 
-def _model(
-    train: DriveTrain,
-    core: _core.Train,
-    states: dict[str, float],
-    capacities: dict[str, float],
-    inputs: dict[str, float],
-    rates: np.ndarray,
-    outputs: list[str],
-    rows: np.ndarray,
-    contacts: dict[str, int],
-) -> LinearModel:
+def _model(train: DriveTrain, core: _core.Train, *regime: Any) -> LinearModel:
     """The linear model, from what the solver says of one of its regimes."""
-    if core.short_form:
-        return _drive_model(states, capacities, inputs, rates, dict(zip(outputs, rows, strict=True)), contacts)
-    return train_model(train, core, states, capacities, inputs, rates, outputs, rows, contacts)
+    return _drive_model(*regime) if core.short_form else train_model(train, core, *regime)
 
 
 def _drive_model(
@@ -334,11 +322,12 @@ def _drive_model(
     capacities: dict[str, float],
     inputs: dict[str, float],
     rates: np.ndarray,
-    rows: dict[str, np.ndarray],
+    outputs: list[str],
+    values: np.ndarray,
     contacts: dict[str, int],
 ) -> LinearModel:
     """With all states and outputs of a drive: those that this one does not have are 0."""
-    n, own = len(STATES), [STATES.index(name) for name in states]
+    n, own, rows = len(STATES), [STATES.index(name) for name in states], dict(zip(outputs, values, strict=True))
 
     def whole(row: np.ndarray) -> np.ndarray:
         out = np.zeros(n + 3)

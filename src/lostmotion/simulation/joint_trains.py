@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..control.turning import turns
 from ..errors import InputError
 from ..model.drive import Drive
 from ..model.load import Load
@@ -74,14 +75,7 @@ class JointDrive:
 
     def ratios(self) -> dict[str, float]:
         """Speed of each shaft over that of the joint, all meshes stiff."""
-        found = {self.shaft: 1.0}
-        for _ in self.train.gears:
-            for gear in self.train.gears.values():
-                if gear.output in found and gear.input not in found:
-                    found[gear.input] = found[gear.output] * gear.ratio
-                if gear.input in found and gear.output not in found:
-                    found[gear.output] = found[gear.input] / gear.ratio
-        return {name: found.get(name, 0.0) for name in self.train.shafts}
+        return {name: turns(self.train, name, self.shaft) or 0.0 for name in self.train.shafts}
 
 
 def joint_drive(name: str, drive: Driven, inertia: float, step: float) -> JointDrive:

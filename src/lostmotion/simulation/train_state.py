@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 from .. import _core
 from ..errors import InputError
 from ..inputs.validation import did_you_mean
-from ..model.gear import Gear
 from ..model.signals import Signal
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
+from .train_variables import angle_through
 
 if TYPE_CHECKING:
     from .train_tables import TrainInitial
@@ -102,7 +102,7 @@ def angles_at_start(train: DriveTrain, given: Mapping[str, float], twists: Mappi
             if shaft not in (gear.input, gear.output):
                 continue
             other = gear.output if shaft == gear.input else gear.input
-            angle = _through(gear, twists.get(name, 0.0), angles[shaft], forward=shaft == gear.input)
+            angle = float(angle_through(gear, angles[shaft], twists.get(name, 0.0), forward=shaft == gear.input))
             if other not in angles:
                 angles[other], origin[other] = angle, origin[shaft]
                 waiting.append(other)
@@ -117,24 +117,6 @@ def angles_at_start(train: DriveTrain, given: Mapping[str, float], twists: Mappi
                     keys=(f"initial.{key}.{two}",),
                 )
     return angles
-
-
-def _through(gear: Gear, twist: float, angle: float, *, forward: bool) -> float:
-    """The angle at the other side of a gear: twist = input angle/ratio - output angle - transmission error."""
-    error = gear.transmission_error
-    if forward:
-        return angle / gear.ratio - twist - (error.core()(angle) if error is not None else 0.0)
-    if error is None:
-        return gear.ratio * (angle + twist)
-    e = error.core()
-    # Of angle_in - ratio e(angle_in) = ratio (angle + twist); e is small against the angle of a turn.
-    wanted = gear.ratio * (angle + twist)
-    found = wanted
-    for _ in range(200):
-        found, before = wanted + gear.ratio * e(found), found
-        if found == before:
-            break
-    return found
 
 
 def given_speeds(train: DriveTrain, motions: Mapping[str, tuple[Signal[Any], Signal[Any]]]) -> dict[str, float]:

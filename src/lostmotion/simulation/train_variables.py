@@ -141,12 +141,23 @@ def angles_through_gears(train: DriveTrain, known: Collection[str]) -> Iterator[
 
 
 def angle_through(gear: Gear, angle: Any, twist: Any, *, forward: bool) -> Any:
-    """The angle at the other side of a gear, forward at its output, of numbers or arrays."""
-    if not forward:  # without a transmission error, which needs that angle in the solver
-        return gear.ratio * (angle + twist)
+    """The angle at the other side of a gear, forward at its output: twist = input angle/ratio - output angle - transmission error.
+
+    Numbers or arrays; of an error backward numbers alone, as the solver has that angle in runs.
+    """
     error = gear.transmission_error
-    e = 0.0 if error is None else np.vectorize(error.core())(angle)
-    return angle / gear.ratio - twist - e
+    if forward:
+        return angle / gear.ratio - twist - (0.0 if error is None else np.vectorize(error.core())(angle))
+    found = wanted = gear.ratio * (angle + twist)
+    if (
+        error is not None
+    ):  # angle_in - ratio e(angle_in) = ratio (angle + twist); e is small against the angle of a turn
+        e = error.core()
+        for _ in range(200):
+            found, before = wanted + gear.ratio * e(found), found
+            if found == before:
+                break
+    return found
 
 
 def add_angles(train: DriveTrain, data: dict[str, Any], time: Any) -> None:
