@@ -1,8 +1,14 @@
 #include "described.hpp"
 
+#include <algorithm>
+#include <string_view>
+
 #include "arrays.hpp"
 #include "lostmotion/scenario/control_fields.hpp"
+#include "lostmotion/scenario/law_fields.hpp"
+#include "lostmotion/scenario/machine_fields.hpp"
 #include "lostmotion/scenario/shaft_fields.hpp"
+#include "lostmotion/scenario/task_fields.hpp"
 
 namespace lostmotion::binding {
 
@@ -18,10 +24,10 @@ class DescribedFields : public FieldVisitor {
     using FieldVisitor::choice;
     using FieldVisitor::flag;
     using FieldVisitor::number;
-    void number(const Field& field, double v) { add(field, "number", limits(field.range), nb::float_(v)); }
+    void number(const Field& field, double v = 0.0) { add(field, "number", limits(field.range), nb::float_(v)); }
     void number(const Field& field, double v, double least, double most) {
         const nb::object above = limits(field.range)[0];
-        add(field, "number", nb::make_tuple(above, above.is_none() ? nb::object(nb::float_(least)) : nb::none(), most),
+        add(field, "number", nb::make_tuple(above, above.is_none() ? bound(least) : nb::none(), bound(most)),
             nb::float_(v));
     }
     // Numbers by the names of elements.
@@ -31,7 +37,8 @@ class DescribedFields : public FieldVisitor {
     }
     template <class Integer>
     void integer(const Field& field, Integer v, long long low, long long high) {
-        add(field, "integer", nb::make_tuple(nb::none(), low, high), nb::int_(v));
+        const nb::object most = high == Entries::any ? nb::none() : nb::object(nb::int_(high));
+        add(field, "integer", nb::make_tuple(nb::none(), low, most), nb::int_(v));
     }
     void flag(const Field& field, bool v) {
         add(field, "flag", nb::make_tuple(nb::none(), nb::none(), nb::none()), nb::bool_(v));
@@ -43,6 +50,15 @@ class DescribedFields : public FieldVisitor {
         const nb::object most = entries.most == Entries::any ? nb::none() : nb::object(nb::int_(entries.most));
         add(field, "list", limits(field.range), nb::tuple(nb::cast(v)), nb::make_tuple(entries.fewest, most));
     }
+    // Of what `use` describes only these keys, which are needed here.
+    template <class Use>
+    void need(std::initializer_list<std::string_view> keys, Use&& use) {
+        needed_ = keys;
+        use();
+        needed_.clear();
+    }
+    // Rows of numbers.
+    void matrix(const Field& field) { add(field, "matrix", limits(field.range), nb::make_tuple()); }
     void table(const Field& field, const char* parts) {
         add(field, "table", limits(Range::any), nb::dict(), parts_of(parts));
     }
@@ -56,6 +72,8 @@ class DescribedFields : public FieldVisitor {
     }
 
  private:
+    std::vector<std::string_view> needed_;
+
     static nb::tuple limits(Range range) {
         const nb::object none = nb::none(), zero = nb::float_(0.0), one = nb::float_(1.0);
         switch (range) {
@@ -69,13 +87,15 @@ class DescribedFields : public FieldVisitor {
             default: return nb::make_tuple(none, none, none);
         }
     }
+    static nb::object bound(double v) { return std::isinf(v) ? nb::none() : nb::object(nb::float_(v)); }
     static nb::object parts_of(const char* parts) { return nb::str(parts).attr("split")("|"); }
     void add(const Field& field, const char* kind, const nb::tuple& range, const nb::object& value,
              const nb::object& more = nb::make_tuple()) {
-        if (field.given == Given::none) return;
+        const bool chosen = std::ranges::find(needed_, field.key) != needed_.end();
+        if (field.given == Given::none || chosen == needed_.empty()) return;
         rows.append(nb::make_tuple(field.key, kind, field.symbol, field.unit, field.meaning, range,
-                                   field.given == Given::needed, field.given == Given::has_default ? value : nb::none(),
-                                   more));
+                                   chosen || field.given == Given::needed,
+                                   !chosen && field.given == Given::has_default ? value : nb::none(), more));
     }
 };
 
@@ -97,6 +117,9 @@ void bind_described(nb::module_& m) {
             } else {
                 signals::each_table(add);
                 signals::each_shaft_table(add);
+                tables::each_machine(add);
+                tables::each_law(add);
+                tables::each_task(add);
             }
             return tables;
         },

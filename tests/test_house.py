@@ -247,7 +247,7 @@ def test_every_public_name_exists_and_is_documented() -> None:
 GENERATED = {"_core.pyi", "described.pyi"}
 
 
-# Of an element, a gear, controllers, a reference and a signal: parameters that no other part has by the same name, and the gains of three loops.
+# Of an element, a gear, controllers, a reference, a signal, a filter and a motor's limits: parameters that no other part has by the same name, and the gains of three loops.
 STATED = {
     "the gain of the position loop": r""" "gain",\s*"K_v" """,
     "the gain of the speed loop": r""" "gain",\s*"k_p" """,
@@ -266,6 +266,8 @@ STATED = {
         "speed_bandwidth",
         "reference_filter",
         "crossing_time",
+        "pole_frequency",
+        "max_winding_temperature",
         "end_frequency",
     )
 }
@@ -299,7 +301,7 @@ def test_every_described_parameter_says_what_it_is() -> None:
     for table, rows in described.TABLES.items():
         for key, kind, symbol, unit, meaning, _, needed, default, _ in rows:
             assert symbol or meaning, f"{table}.{key}"
-            assert unit or kind != "pair" or key == "limits", f"{table}.{key}"
+            assert unit or kind != "pair" or key in ("limits", "loss_range"), f"{table}.{key}"
             assert default is None or not needed, f"{table}.{key}"
 
 

@@ -43,10 +43,10 @@ void each_friction(Use&& use, const Motion& m) {
         f.list({m.forces, "", m.force, not_negative, needed, "dry friction at each speed"}, {}, {0, Entries::any});
     });
     use(m.load, [=](auto& f) {
-        f.number({m.slipping, "T_C", m.force, not_negative, has_default, m.sliding}, 0.0);
-        f.number({m.at_rest, "T_S", m.force, not_negative, may_be_left_out, m.stuck}, 0.0);
-        f.number({"stribeck_speed", "w_S", m.speed, positive, may_be_left_out, m.law}, 0.0);
-        f.number({"friction_error", "", m.force, positive, may_be_left_out, m.error}, 0.0);
+        f.number({m.slipping, "T_C", m.force, not_negative, has_default, m.sliding});
+        f.number({m.at_rest, "T_S", m.force, not_negative, may_be_left_out, m.stuck});
+        f.number({"stribeck_speed", "w_S", m.speed, positive, may_be_left_out, m.law});
+        f.number({"friction_error", "", m.force, positive, may_be_left_out, m.error});
         f.table({"friction_curve", "", "", any, may_be_left_out,
                  "dry friction over speed, in place of the dry friction while it slips and stribeck_speed"},
                 m.curve);
@@ -65,20 +65,18 @@ void each_drag(Use&& use) {
                  "extend|hold");
     });
     use("QuadraticDrag", [=](auto& f) {
-        f.number({"coefficient", "c", "N*m*s^2/rad^2", positive, needed, "c of the torque c w |w|"}, 0.0);
-        f.number(max_speed, 0.0);
+        f.number({"coefficient", "c", "N*m*s^2/rad^2", positive, needed, "c of the torque c w |w|"});
+        f.number(max_speed);
         f.number({"error", "", "N*m", positive, may_be_left_out,
                   "by which the straight lines depart from the parabola at most; left out, 0.1 % of the torque at "
-                  "max_speed"},
-                 0.0);
+                  "max_speed"});
     });
     use("EddyCurrentDrag", [=](auto& f) {
-        f.number({"peak_torque", "", "N*m", positive, needed, "at the critical speed"}, 0.0);
-        f.number({"critical_speed", "", "rad/s", positive, needed, "speed of the largest torque"}, 0.0);
-        f.number(max_speed, 0.0);
+        f.number({"peak_torque", "", "N*m", positive, needed, "at the critical speed"});
+        f.number({"critical_speed", "", "rad/s", positive, needed, "speed of the largest torque"});
+        f.number(max_speed);
         f.number({"error", "", "N*m", positive, may_be_left_out,
-                  "by which they depart from it at most; left out, 0.1 % of the peak torque"},
-                 0.0);
+                  "by which they depart from it at most; left out, 0.1 % of the peak torque"});
     });
     use("Drag", [](auto& f) {
         f.table({"drag", "", "", any, may_be_left_out, "torque against the motion over speed"},
@@ -89,14 +87,14 @@ void each_drag(Use&& use) {
 template <class Use>
 void each_slide(Use&& use) {
     use("EndStops", [](auto& f) {
-        f.number({"lower", "", "m", any, needed, "position of the lower stop"}, 0.0);
-        f.number({"upper", "", "m", any, needed, "position of the upper stop"}, 0.0);
-        f.number({"stiffness", "k", "N/m", positive, needed, "of each stop"}, 0.0);
+        f.number({"lower", "", "m", any, needed, "position of the lower stop"});
+        f.number({"upper", "", "m", any, needed, "position of the upper stop"});
+        f.number({"stiffness", "k", "N/m", positive, needed, "of each stop"});
     });
     use("Slide", [](auto& f) {
         constexpr double upright = 0.5 * std::numbers::pi;
-        f.number({"mass", "m", "kg", not_negative, has_default, "of what moves, without masses of linear motors"}, 0.0);
-        f.number({"viscous_friction", "b", "N*s/m", not_negative, has_default, "against the frame"}, 0.0);
+        f.number({"mass", "m", "kg", not_negative, has_default, "of what moves, without masses of linear motors"});
+        f.number({"viscous_friction", "b", "N*s/m", not_negative, has_default, "against the frame"});
         f.number({"inclination", "", "rad", any, has_default,
                   "inclination of the positive direction above the horizontal; 90 deg: vertical, positive upwards. The "
                   "weight's share along the slide acts against it"},
@@ -104,9 +102,9 @@ void each_slide(Use&& use) {
         f.table({"end_stops", "", "", any, may_be_left_out, "elastic stops at both ends of the travel"}, "EndStops");
     });
     use("Load", [](auto& f) {
-        f.number({"inertia", "J_Z", "kg*m^2", positive, needed, "J_Z"}, 0.0);
-        f.number({"viscous_friction", "b_ZR", "N*m*s/rad", not_negative, has_default, "b_ZR"}, 0.0);
-        f.number({"friction_torque", "", "N*m", not_negative, has_default, "dry friction of the bearing"}, 0.0);
+        f.number({"inertia", "J_Z", "kg*m^2", positive, needed, "J_Z"});
+        f.number({"viscous_friction", "b_ZR", "N*m*s/rad", not_negative, has_default, "b_ZR"});
+        f.number({"friction_torque", "", "N*m", not_negative, has_default, "dry friction of the bearing"});
     });
     use("ShaftTable", [](auto& f) {
         f.table({"torque", "M_Z", "", any, may_be_left_out, "M_Z, against its motion; left out, none can act on it"},
@@ -137,14 +135,13 @@ template <class Use>
 void each_initial(Use&& use) {
     constexpr const char* on_reference = "on_reference";
     use("Initial", [](auto& f) {
-        f.number({"motor_torque", "M_D", "N*m"}, 0.0);
-        f.number({"motor_speed", "w_M", "rad/s"}, 0.0);
-        f.number({"load_speed", "w", "rad/s"}, 0.0);
-        f.number({"twist", "d", "rad"}, 0.0);
-        f.number({"load_angle", "phi", "rad"}, 0.0);
+        f.number({"motor_torque", "M_D", "N*m"});
+        f.number({"motor_speed", "w_M", "rad/s"});
+        f.number({"load_speed", "w", "rad/s"});
+        f.number({"twist", "d", "rad"});
+        f.number({"load_angle", "phi", "rad"});
         f.number({"hysteresis_capacity", "h", "N*m", not_negative, has_default,
-                  "h, which the last turning point before t = 0 left behind"},
-                 0.0);
+                  "h, which the last turning point before t = 0 left behind"});
         f.flag({on_reference, "", "", any, has_default,
                 "angle and speeds are those of the controller's reference at t = 0"},
                false);

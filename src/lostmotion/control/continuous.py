@@ -11,21 +11,13 @@ from pydantic import Field, model_validator
 
 from .. import _core
 from ..errors import InputError, need
+from ..inputs import described
 from ..inputs.arguments import checked
-from ..inputs.part import Part
 from ..inputs.quantities import (
     Angle,
-    Inertia,
-    IntegralTorqueGain,
     Limit,
-    NotNegative,
     Number,
-    Positive,
     Speed,
-    Stiffness,
-    Time,
-    Torque,
-    ViscousFriction,
 )
 from ..inputs.validation import did_you_mean, shown
 from ..model.motor import Motor
@@ -68,14 +60,7 @@ class LinearSystem:
     back: np.ndarray
 
 
-class _PID(Part):
-    proportional_weight: Annotated[Number, Share] = 1.0
-    """share of the reference that the proportional part sees: below 1 steps of the reference overshoot less"""
-    derivative_weight: Annotated[Number, Share] = 0.0
-    """share of the reference that the derivative part sees: 0 takes the derivative of what is measured alone"""
-    filter_time: Annotated[Time, NotNegative] = 0.0
-    """time constant of the first-order filter of the derivative"""
-
+class _PID(described.PIDFields):
     @property
     def gains(self) -> tuple[float, float, float]:
         """k_p, k_i, k_d (SI)."""
@@ -113,30 +98,16 @@ class _PID(Part):
         return LinearSystem(tuple(direct), tuple(rows), A, B, C, np.array(list(direct.values())), back_calculation)
 
 
-class PositionPID(_PID):
+class PositionPID(described.PositionPIDFields, _PID):
     """PID controller of a position: ``k_p (b r - phi) + k_i integral of (r - phi) + k_d d/dt (c r - phi)/(1 +
     filter_time d/dt)``.
     """
 
-    gain: Annotated[Stiffness, NotNegative] = 0.0
-    """k_p"""
-    integral_gain: Annotated[IntegralTorqueGain, NotNegative] = 0.0
-    """k_i"""
-    derivative_gain: Annotated[ViscousFriction, NotNegative] = 0.0
-    """k_d"""
 
-
-class SpeedPID(_PID):
+class SpeedPID(described.SpeedPIDFields, _PID):
     """PID controller of a speed: ``k_p (b r - w) + k_i integral of (r - w) + k_d d/dt (c r - w)/(1 + filter_time
     d/dt)``.
     """
-
-    gain: Annotated[ViscousFriction, NotNegative] = 0.0
-    """k_p"""
-    integral_gain: Annotated[Stiffness, NotNegative] = 0.0
-    """k_i"""
-    derivative_gain: Annotated[Inertia, NotNegative] = 0.0
-    """k_d"""
 
     @model_validator(mode="after")
     def _filtered(self) -> Self:
@@ -147,17 +118,10 @@ class SpeedPID(_PID):
         return self
 
 
-class StateSpace(Part):
+class StateSpace(described.StateSpaceFields):
     """State space ``x' = A x + B e, v = C x + D e`` in SI, of the error, or of reference and measured value if B and
     D have two columns.
     """
-
-    A: tuple[Row, ...] = ()
-    B: tuple[Row, ...] = ()
-    C: Row = ()
-    D: Row = (0.0,)
-    back_calculation: Row | None = None
-    """per state, what the excess over the limit adds to its rate: x' = A x + B e + back_calculation (u - v)"""
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
@@ -197,7 +161,7 @@ class StateSpace(Part):
         return LinearSystem(("reference", "measured"), states, A, B, np.array(self.C, float), D, back)
 
 
-class ContinuousController(Part):
+class ContinuousController(described.ContinuousControllerFields):
     """A controller without sample time, whose states are states of the train: for theory, and for exact limit cycles.
 
     Examples
@@ -220,10 +184,6 @@ class ContinuousController(Part):
     """controller of either, which gives the torque of the motor [N·m], or the relative voltage if current.kind is "voltage\""""
     firmware: Firmware | None = None
     """position control of a hobby servo: error to duty cycle to the torque of its winding"""
-    limit: Annotated[Torque, Positive] | None = None
-    """limit of the magnitude of the torque; torque_limit and the largest current of the motor act, too"""
-    anti_windup_time: Annotated[Time, Positive] | None = None
-    """with which the integrator follows the limited output (back-calculation); left out, gain/integral_gain"""
     current: Annotated[IdealCurrent | FirstOrderCurrent | VoltageCommand, Field(discriminator="kind")] = IdealCurrent()
 
     @model_validator(mode="after")

@@ -5,8 +5,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
+from ..inputs import described
 from ..inputs.described import ReferenceBlocks
-from ..inputs.quantities import NotNegative, Positive, Switch, Time, Whole
 from .camera import Camera, Tracker
 from .continuous import ContinuousController
 from .encoder import Encoder
@@ -31,7 +31,7 @@ AnyCurrent = Annotated[
 ]
 
 
-class Controller(ReferenceBlocks):
+class Controller(described.ControllerFields, ReferenceBlocks):
     """Cascade of position, speed and current loop, each at its own sample time; what is left out is not there.
 
     At each sample instant the encoders are read, the loops that are due are computed, the outermost first, and what the innermost
@@ -48,18 +48,12 @@ class Controller(ReferenceBlocks):
     kind: Literal["sampled"] = "sampled"
     reference: AnyReference
     """reference of the position, the speed or the torque, which the outermost loop follows; with a camera, the path of the target"""
-    sample_time: Annotated[Time, Positive]
-    """sample time of the innermost loop, and of loops without their own"""
-    delay: Annotated[Whole, Field(ge=0, le=1)] = 1
-    """sample times from reading the encoders until the result acts"""
     shaft: str | None = None
     """shaft of the position and the speed of the reference; left out, the last one"""
     encoder: Encoder | None = None
     """encoder of the speed loop, and of the position loop unless that has its own"""
     position_encoder: Encoder | None = None
     """encoder of the position loop, such as one on the load"""
-    blend_time: Annotated[Time, Positive] | None = None
-    """time constant with which the position encoder is taken over beyond that of the speed loop; left out, it counts alone"""
     position: PositionLoop | None = None
     speed: SpeedLoop | None = None
     firmware: Firmware | None = None
@@ -72,10 +66,6 @@ class Controller(ReferenceBlocks):
     """on the shaft of the reference: the loops then know of the target what it shows"""
     tracker: Tracker | None = None
     """filter of the frames of the camera"""
-    law: Switch = False
-    """the loops are a function of your own, which `simulate(..., law=function)` gives"""
-    phase: Annotated[Time, NotNegative] = 0.0
-    """by which the samples of the position loop come after those of the others"""
 
     @model_validator(mode="after")
     def _loops_fit_the_reference(self) -> Self:

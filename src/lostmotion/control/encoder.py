@@ -1,18 +1,18 @@
 """Encoders: what a controller reads of an angle."""
 
-from typing import Annotated, Self
+from typing import Self
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from .. import _core
 from ..errors import InputError
+from ..inputs import described
 from ..inputs.described import EncoderFields
-from ..inputs.quantities import Whole
 
 RESOLUTION_KEYS = ("lines", "bits", "grating_period", "resolution")
 
 
-class Encoder(EncoderFields):
+class Encoder(described.EncoderDelayFields, EncoderFields):
     """A rotary encoder on a shaft: ``q floor(angle/q + 1/2) + error sin(periods angle + phase)``.
 
     Its resolution q is 2 pi/(4 lines) for an incremental encoder, which has `lines`. For an absolute encoder, which
@@ -28,8 +28,6 @@ class Encoder(EncoderFields):
 
     shaft: str | None = None
     """shaft with the encoder; default: the motor's shaft"""
-    delay: Annotated[Whole, Field(ge=0, le=1000)] = 0
-    """sample times from the reading until the controller has it"""
 
     @model_validator(mode="after")
     def _has_a_resolution(self) -> Self:

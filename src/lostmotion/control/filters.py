@@ -8,21 +8,17 @@ from pydantic import Field, model_validator
 
 from .. import _core
 from ..errors import InputError
+from ..inputs import described
 from ..inputs.arguments import checked
-from ..inputs.part import Part
-from ..inputs.quantities import Frequency, NotNegative, Number, Positive, Time
 from ..reproducible import tan
 
 MAX_ORDER = _core.MAX_FILTER_ORDER
 
 
-class LowPass(Part):
+class LowPass(described.LowPassFields):
     """1/(1 + s/w), or with a damping of second order, by Tustin's rule with the corner prewarped."""
 
     kind: Literal["low_pass"]
-    frequency: Annotated[Frequency, Positive]
-    damping: Annotated[Number, Positive] | None = None
-    """damping of a filter of second order; left out, the filter is of first order"""
 
     def continuous(self) -> tuple[list[float], list[float]]:
         """Numerator and denominator in s/w, the highest power first."""
@@ -33,18 +29,10 @@ class LowPass(Part):
         return prewarped(*self.continuous(), self.frequency, sample_time)
 
 
-class Notch(Part):
+class Notch(described.NotchFields):
     """((s/w_z)^2 + 2 D_z s/w_z + 1)/((s/w_n)^2 + 2 D_n s/w_n + 1), by Tustin's rule with w_z prewarped."""
 
     kind: Literal["notch"]
-    frequency: Annotated[Frequency, Positive]
-    """frequency of the zeros"""
-    depth: Annotated[Number, NotNegative] = 0.0
-    """D_z, damping of the zeros"""
-    width: Annotated[Number, Positive] = 0.5
-    """D_n, damping of the poles"""
-    pole_frequency: Annotated[Frequency, Positive] | None = None
-    """default: the value of the zeros"""
 
     def continuous(self) -> tuple[list[float], list[float]]:
         """Numerator and denominator in s/w_z, the highest power first."""
@@ -56,15 +44,10 @@ class Notch(Part):
         return prewarped(*self.continuous(), self.frequency, sample_time)
 
 
-class TransferFunction(Part):
+class TransferFunction(described.TransferFunctionFields):
     """A transfer function in z at the sample time of its loop."""
 
     kind: Literal["transfer_function"] = "transfer_function"
-    numerator: tuple[Number, ...] = Field(min_length=1)
-    """coefficients of z, the highest power first"""
-    denominator: tuple[Number, ...] = Field(min_length=1, max_length=MAX_ORDER + 1)
-    sample_time: Annotated[Time, Positive] | None = None
-    """sample time for which it was made; default: the sample time of its loop"""
 
     @model_validator(mode="after")
     def _can_be_computed(self) -> Self:

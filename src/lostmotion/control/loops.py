@@ -4,6 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from ..inputs import described
 from ..inputs.described import (
     CurrentLoopFields,
     DifferenceFields,
@@ -14,15 +15,11 @@ from ..inputs.described import (
     SpeedLoopFields,
 )
 from ..inputs.part import Part
-from ..inputs.quantities import Positive, Time
 from .filters import Filter
 
 
-class PositionLoop(PositionLoopFields):
+class PositionLoop(described.SampledLoopFields, PositionLoopFields):
     """``speed = sat(gain e + integral + feedforward * rate of the reference)``, in terms of the reference's shaft."""
-
-    sample_time: Annotated[Time, Positive] | None = None
-    """default: the value of the controller"""
 
     @model_validator(mode="after")
     def _dead_zone_has_a_use(self) -> Self:
@@ -56,7 +53,7 @@ class ExactSpeed(Part):
     kind: Literal["exact"]
 
 
-class SpeedLoop(SpeedLoopFields):
+class SpeedLoop(described.SampledLoopFields, SpeedLoopFields):
     """Proportional and integral, with anti-windup by back-calculation; in terms of the motor.
 
     ``v = I - (k_p - k_t) w + feedforward``, ``M = sat(k_t (w* - w) + v)``, ``I += T (k_i/k_t) (M - v)``
@@ -66,8 +63,6 @@ class SpeedLoop(SpeedLoopFields):
     """method that makes the speed from the angles read"""
     reference_filters: tuple[Filter, ...] = ()
     torque_filters: tuple[Filter, ...] = ()
-    sample_time: Annotated[Time, Positive] | None = None
-    """default: the value of the controller"""
 
     @model_validator(mode="after")
     def _one_integral(self) -> Self:
@@ -95,18 +90,14 @@ class VoltageCommand(Part):
     kind: Literal["voltage"]
 
 
-class FirstOrderCurrent(Part):
+class FirstOrderCurrent(described.FirstOrderCurrentFields):
     """The torque follows with a time constant, as a tuned current loop does, within the torque-speed line of the motor."""
 
     kind: Literal["first_order"]
-    time_constant: Annotated[Time, Positive]
 
 
-class SampledCurrent(Part):
+class SampledCurrent(described.SampledLoopFields):
     """A sampled PI controller of the voltage, its zero on the pole of the winding, so that the loop is g/(z (z - 1))."""
-
-    sample_time: Annotated[Time, Positive] | None = None
-    """default: the value of the controller"""
 
 
 class CurrentLoop(CurrentLoopFields, SampledCurrent):

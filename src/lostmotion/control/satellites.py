@@ -2,13 +2,13 @@
 
 import math
 from datetime import UTC, datetime
-from typing import Annotated, Literal, Self
+from typing import Literal, Self
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import field_validator, model_validator
 
 from ..errors import need
-from ..inputs.quantities import Angle, Length, Limit, Time
+from ..inputs import described
 from ..reproducible import cos, sin
 from .targets import ORDER, Jet, TargetPath
 
@@ -27,7 +27,7 @@ def sidereal_time(days: float, more: np.ndarray) -> np.ndarray:
     return np.asarray(2.0 * math.pi * ((days % 1.0 + more) + (67310.54841 + beyond) / DAY))
 
 
-class Satellite(TargetPath):
+class Satellite(described.SatelliteFields, TargetPath):
     """A satellite over a place on the earth, without refraction. Traverse is the azimuth less the bearing of y.
 
     Its position in the true equator, mean equinox frame of SGP4 is turned into the earth's by the mean sidereal time
@@ -40,14 +40,6 @@ class Satellite(TargetPath):
     """the two lines"""
     begin: datetime
     """UTC at t = 0, such as 2024-05-01T20:15:00Z"""
-    latitude: Annotated[Angle, Limit(ge=-math.pi / 2, le=math.pi / 2)]
-    """latitude of the station, geodetic"""
-    longitude: Angle
-    """east"""
-    altitude: Length = 0.0
-    """above the ellipsoid"""
-    ut1: Annotated[Time, Field(ge=-1.0, le=1.0)] = 0.0
-    """UT1 - UTC, as the IERS publishes it; a second is 15 arcsec"""
 
     @field_validator("begin")
     @classmethod

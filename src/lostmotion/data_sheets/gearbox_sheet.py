@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from ..errors import InputError
+from ..inputs import described
 from ..inputs.part import Part
 from ..inputs.quantities import (
     Angle,
@@ -73,7 +74,7 @@ class StiffnessData(Part):
         return tuple(out)
 
 
-class GearboxSheet(Record):
+class GearboxSheet(described.GearboxLoadsFields, Record):
     """Data sheet of a gearbox."""
 
     kind: Literal["strain_wave", "planetary", "worm", "cycloidal", "other"]
@@ -82,14 +83,6 @@ class GearboxSheet(Record):
     rated_output_torque: Annotated[Torque, Positive] | None = None
     rated_input_speed: Annotated[Speed, Positive] | None = None
     """at which the rated torque and the efficiency hold"""
-    average_output_torque: Annotated[Torque, Positive] | None = None
-    peak_output_torque: Annotated[Torque, Positive] | None = None
-    """repeated, as in acceleration"""
-    momentary_output_torque: Annotated[Torque, Positive] | None = None
-    """in an emergency stop"""
-    average_input_speed: Annotated[Speed, Positive] | None = None
-    """for the mean over a duty cycle"""
-    max_input_speed: Annotated[Speed, Positive] | None = None
     inertia: Annotated[Inertia, NotNegative] | None = None
     """on the input shaft"""
     viscous_friction: Annotated[ViscousFriction, NotNegative] = 0.0

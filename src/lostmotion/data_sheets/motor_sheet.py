@@ -5,6 +5,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from ..errors import InputError
+from ..inputs import described
 from ..inputs.quantities import (
     Current,
     Inductance,
@@ -15,8 +16,6 @@ from ..inputs.quantities import (
     Positive,
     Resistance,
     Speed,
-    Temperature,
-    ThermalResistance,
     Time,
     Torque,
     TorqueConstant,
@@ -33,7 +32,7 @@ SYNCHRONOUS, DC_EQUIVALENT, TORQUE_SOURCE = "synchronous motor", "DC-equivalent 
 BLOCK_KEYS = ("rated_voltage", "torque_constant", "resistance", "inductance", "pole_pairs")
 
 
-class MotorSheet(Record):
+class MotorSheet(described.MotorHeatFields, Record):
     """Data sheet of a DC motor, of a brushless one seen from its supply as a DC motor, or of a synchronous one."""
 
     kind: Literal["dc_brushed", "brushless", "synchronous"] = "dc_brushed"
@@ -65,14 +64,6 @@ class MotorSheet(Record):
     """k_N, where it is known itself"""
     electrical_time_constant: Annotated[Time, Positive] | None = None
     max_speed: Annotated[Speed, Positive] | None = None
-    thermal_resistance: Annotated[ThermalResistance, Positive] | None = None
-    """winding to ambient, in place of its two parts"""
-    thermal_resistance_winding_case: Annotated[ThermalResistance, Positive] | None = None
-    thermal_resistance_case_ambient: Annotated[ThermalResistance, Positive] | None = None
-    thermal_time_constant_winding: Annotated[Time, Positive] | None = None
-    thermal_time_constant_motor: Annotated[Time, Positive] | None = None
-    """thermal time constant motor of the case against the ambient"""
-    max_winding_temperature: Temperature | None = None
 
     @model_validator(mode="after")
     def _fits_kind(self) -> Self:

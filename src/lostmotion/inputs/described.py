@@ -25,7 +25,13 @@ M = TypeVar("M")  # a move of it
 
 OF_VALUE: dict[str, Any] = {"value": V, "value/s": S, "value/s^2": A, "value/s^3": J}
 """units in terms of the value"""
-TYPES = {"pair": "tuple[float, float]", "integer": "int", "flag": "bool", "named": "dict[str, float]"}
+TYPES = {
+    "pair": "tuple[float, float]",
+    "integer": "int",
+    "flag": "bool",
+    "named": "dict[str, float]",
+    "matrix": "tuple[tuple[float, ...], ...]",
+}
 
 Row = tuple[Any, ...]
 """key, kind, symbol, unit, meaning, range, whether it is needed, default, and more"""
@@ -84,6 +90,8 @@ def _type(kind: str, unit: str, limits: tuple[float | None, float | None, float 
     if kind == "list":
         fewest, largest = more
         return Annotated[tuple[number, ...], Field(min_length=fewest or None, max_length=largest)]
+    if kind == "matrix":
+        return tuple[tuple[number, ...], ...]
     return tuple[number, number] if kind == "pair" else number
 
 

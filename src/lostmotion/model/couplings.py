@@ -1,12 +1,12 @@
 """Elements that hold a shaft or join two at the same speed: brakes, clutches, freewheels."""
 
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Literal, Self
 
 from pydantic import model_validator
 
+from ..inputs import described
 from ..inputs.described import CommandedFields
 from ..inputs.part import Part
-from ..inputs.quantities import NotNegative, Time
 from .signals import CommandSignal
 
 FULL_COMMAND = 1.0 + 1e-9
@@ -22,13 +22,8 @@ class BetweenShafts(Part):
     """shaft"""
 
 
-class Commanded(CommandedFields):
+class Commanded(described.CommandDelaysFields, CommandedFields):
     """Dry friction with a capacity that its command applies, with the delays of a data sheet."""
-
-    engagement_delay: Annotated[Time, NotNegative] = 0.0
-    """from a step up of the command until it acts"""
-    release_delay: Annotated[Time, NotNegative] = 0.0
-    """from a step down of the command until it acts"""
 
     def acting(self, command: CommandSignal) -> CommandSignal:
         """The command as it acts, after the delays.

@@ -1,33 +1,17 @@
 """Gravity, payloads and process forces on the load of an axis over its cycle; its supply and its holding brake."""
 
-from typing import Annotated, Self
+from typing import Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
+from ..inputs import described
 from ..inputs.part import Part
-from ..inputs.quantities import (
-    Angle,
-    Capacitance,
-    Current,
-    Force,
-    Inertia,
-    Length,
-    Mass,
-    NotNegative,
-    Positive,
-    Power,
-    Resistance,
-    Switch,
-    Time,
-    Torque,
-    Voltage,
-)
 from ..reproducible import interpolate, sin
 from .angle_torques import STANDARD_GRAVITY
 
 
-class ArmGravity(Part):
+class ArmGravity(described.ArmGravityFields):
     """Weight of a body on an arm: against the motion acts m g r sin(position - hanging).
 
     Examples
@@ -35,12 +19,6 @@ class ArmGravity(Part):
     >>> round(float(ArmGravity(mass="4 kg", radius="0.3 m").torque(0.5 * 3.141592653589793)), 4)
     11.768
     """
-
-    mass: Annotated[Mass, Positive]
-    radius: Annotated[Length, Positive]
-    """distance of its centre of gravity from the axis"""
-    hanging: Angle = 0.0
-    """position at which it hangs straight down; a quarter of a turn on, the arm is level"""
 
     def torque(
         self, position: np.ndarray | float, mass: float | None = None, radius: float | None = None
@@ -50,16 +28,8 @@ class ArmGravity(Part):
         return np.asarray(m * STANDARD_GRAVITY * r * sin(np.asarray(position) - self.hanging))
 
 
-class Payload(Part):
+class Payload(described.PayloadFields):
     """A body that the load carries during a part of the cycle."""
-
-    begin: Annotated[Time, NotNegative]
-    end: Annotated[Time, Positive]
-    mass: Annotated[Mass, NotNegative] = 0.0
-    radius: Annotated[Length, Positive] | None = None
-    """distance of its centre of gravity from the axis of a rotary load"""
-    inertia: Annotated[Inertia, NotNegative] = 0.0
-    """about its own centre of gravity, of a rotary load"""
 
     @model_validator(mode="after")
     def _lasts(self) -> Self:
@@ -78,17 +48,9 @@ class Payload(Part):
         return self.mass if slides else self.inertia + self.mass * (self.radius or 0.0) * (self.radius or 0.0)
 
 
-class Process(Part):
+class Process(described.ProcessFields):
     """A torque or a force against the motion in the positive direction, over time or over the position. It follows
     straight lines through points, and is constant before the first and after the last."""
-
-    times: tuple[Annotated[Time, NotNegative], ...] | None = Field(None, min_length=2)
-    positions: tuple[Angle, ...] | None = Field(None, min_length=2)
-    """positions of the load, in place of times"""
-    torques: tuple[Torque, ...] | None = None
-    """on a rotary load"""
-    forces: tuple[Force, ...] | None = None
-    """on a slide"""
 
     @model_validator(mode="after")
     def _is_a_curve(self) -> Self:
@@ -163,17 +125,8 @@ class Duty(Part):
         return self.gravity is not None or bool(self.payload or self.process)
 
 
-class HoldingBrake(Part):
+class HoldingBrake(described.HoldingBrakeFields):
     """Brake on the shaft of the motor, or on a slide."""
-
-    torque: Annotated[Torque, Positive] | None = None
-    """static, that it holds"""
-    inertia: Annotated[Inertia, NotNegative] = 0.0
-    force: Annotated[Force, Positive] | None = None
-    """static, of a brake on the slide of a linear axis, in place of torque"""
-
-    of_the_motor: Switch = False
-    """the brake that is built into the record of the motor"""
 
     @model_validator(mode="after")
     def _holds_something(self) -> Self:
@@ -186,16 +139,8 @@ class HoldingBrake(Part):
         return self
 
 
-class Amplifier(Part):
+class Amplifier(described.AmplifierFields):
     """Amplifier that feeds the motor. Currents of a motor with a winding are effective values of a phase."""
-
-    continuous_current: Annotated[Current, Positive]
-    """rms over the cycle"""
-    peak_current: Annotated[Current, Positive] | None = None
-    peak_time: Annotated[Time, Positive] | None = None
-    """longest time above the continuous current"""
-    max_dc_voltage: Annotated[Voltage, Positive] | None = None
-    """largest voltage of the DC bus"""
 
     @model_validator(mode="after")
     def _peak_is_above(self) -> Self:
@@ -204,21 +149,8 @@ class Amplifier(Part):
         return self
 
 
-class Bus(Part):
+class Bus(described.BusFields):
     """DC bus that feeds motors, and takes what they return."""
-
-    max_voltage: Annotated[Voltage, Positive] | None = None
-    """largest voltage of the bus before energy returns to it"""
-    voltage_limit: Annotated[Voltage, Positive] | None = None
-    """largest voltage that the bus may reach; with a brake resistor the voltage at which it is switched on"""
-    capacitance: Annotated[Capacitance, Positive] | None = None
-    """capacitance of the bus"""
-    brake_resistance: Annotated[Resistance, Positive] | None = None
-    """resistance of the brake resistor, which is switched on at voltage_limit"""
-    brake_power: Annotated[Power, Positive] | None = None
-    """continuous power of the brake resistor"""
-    returns_to_mains: Switch = False
-    """the energy goes back to the mains, or a battery takes it: neither capacitors nor resistor are judged"""
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -234,13 +166,8 @@ class Bus(Part):
         return self.max_voltage
 
 
-class Supply(Bus):
+class Supply(described.SupplyFields, Bus):
     """DC bus and amplifier that feed the motor."""
-
-    min_voltage: Annotated[Voltage, Positive] | None = None
-    """least voltage of the bus, at which the motor must reach its torque and speed"""
-    continuous_current: Annotated[Current, Positive] | None = None
-    """continuous current of the amplifier, rms over the cycle"""
 
     @model_validator(mode="after")
     def _voltages_in_order(self) -> Self:

@@ -4,44 +4,19 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 
 from pydantic import Field, field_validator, model_validator
 
+from ..inputs import described
 from ..inputs.described import TransmissionFields
-from ..inputs.part import Part
-from ..inputs.quantities import (
-    Force,
-    Number,
-    Positive,
-    Speed,
-    Time,
-    Torque,
-)
 from ..units.practical import practical
 from .losses import ConstantEfficiency, LossMap
 from .mesh_stiffness import MeshStiffness
 from .torsion import Hysteresis, LinearStiffness, Rigid, TorsionCurve
 
 
-class GearboxLimits(Part):
+class GearboxLimits(described.GearboxLimitsFields, described.GearboxLoadsFields):
     """Limits of a gearbox. No run depends on them; the drive check compares with them."""
 
-    average_output_torque: Annotated[Torque, Positive] | None = None
-    peak_output_torque: Annotated[Torque, Positive] | None = None
-    """repeated, as in acceleration"""
-    momentary_output_torque: Annotated[Torque, Positive] | None = None
-    """in an emergency stop"""
-    average_input_speed: Annotated[Speed, Positive] | None = None
-    """for the mean over a duty cycle; left out, the rated speed stands in for it"""
-    max_input_speed: Annotated[Speed, Positive] | None = None
-    rated_life: Annotated[Time, Positive] | None = None
-    """L10h at rated torque and rated speed"""
-    life_exponent: Annotated[Number, Positive] = 3.0
-    """p of the life over the torque; 10/3 where roller bearings decide"""
-    max_radial_force: Annotated[Force, Positive] | None = None
-    """on the output bearing"""
-    max_axial_force: Annotated[Force, Positive] | None = None
-    """on the output bearing"""
 
-
-class Transmission(TransmissionFields):
+class Transmission(described.TransmissionDataFields, TransmissionFields):
     """Base of gearboxes and gears of a drive train: ratio, inertia, compliance."""
 
     if TYPE_CHECKING:
@@ -52,9 +27,6 @@ class Transmission(TransmissionFields):
     mesh_stiffness: MeshStiffness | None = None
     """factor on the stiffness over the angle of the input shaft; left out, 1"""
     limits: GearboxLimits | None = None
-    loss_range: tuple[Annotated[Number, Positive], Annotated[Number, Positive]] | None = None
-    """range of estimated losses: the multiples between which those of such gearboxes lie. No run depends on it; the drive check says
-    which of its verdicts hold at both ends"""
     note: str = ""
     """note for readers of the results, such as that a loss table is a stand-in"""
 
@@ -112,7 +84,7 @@ class Transmission(TransmissionFields):
         }
 
 
-class Gearbox(Transmission):
+class Gearbox(described.GearboxFields, Transmission):  # type: ignore[misc]  # it needs what a transmission may leave out
     """A compliance and a loss law, each chosen freely.
 
     Examples
@@ -122,10 +94,6 @@ class Gearbox(Transmission):
     81.0
     """
 
-    rated_input_speed: Annotated[Speed, Positive]
-    """n_1R"""
-    rated_output_torque: Annotated[Torque, Positive]
-    """T_2R"""
     losses: Annotated[ConstantEfficiency | LossMap, Field(discriminator="kind")]
 
     @model_validator(mode="after")

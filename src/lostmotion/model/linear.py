@@ -6,32 +6,14 @@ slide.
 """
 
 import math
-from typing import Annotated, Literal, Self
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
 from .. import _core
 from ..errors import InputError
+from ..inputs import described
 from ..inputs.part import Part
-from ..inputs.quantities import (
-    MAX_ENTRIES,
-    Angle,
-    AxialStiffness,
-    Density,
-    Force,
-    Inertia,
-    Length,
-    Limit,
-    LinearViscousFriction,
-    NotNegative,
-    Number,
-    Positive,
-    Pressure,
-    Speed,
-    Torque,
-    ViscousFriction,
-    Whole,
-)
 from ..reproducible import arctan
 from .angle_torques import AngleCurve, ErrorCurve, ErrorHarmonic, Harmonic
 from .gear import Gear
@@ -42,16 +24,8 @@ STEEL = 7850.0  # [kg/m^3]
 ELASTIC_MODULUS = 206e9  # of steel [Pa]
 
 
-Mounting = Literal["fixed-free", "supported-supported", "fixed-supported", "fixed-fixed"]
-
-
-class StiffnessCurve(Part):
+class StiffnessCurve(described.StiffnessCurveFields):
     """Force over deflection: odd, continuous, piecewise linear, as the nut, the screw and its bearings give way together."""
-
-    slopes: tuple[Annotated[AxialStiffness, NotNegative], ...] = Field(min_length=1, max_length=MAX_ENTRIES)
-    """slopes of the segments, from deflection 0 outwards"""
-    breaks: tuple[Annotated[Length, Positive], ...] = ()
-    """deflections at which the slope changes; one fewer than slopes"""
 
     @model_validator(mode="after")
     def _is_a_curve(self) -> Self:
@@ -59,24 +33,16 @@ class StiffnessCurve(Part):
         return self
 
 
-class PitchHarmonic(Harmonic):
+class PitchHarmonic(described.PitchHarmonicFields, Harmonic):
     """A pitch error ``amplitude * sin(order * phi + phase)`` over the angle of the input shaft, by straight lines."""
-
-    amplitude: Annotated[Length, Positive]
-    """at the slide"""
-    error: Annotated[Length, Positive] | None = None
-    """by which the straight lines depart from the sine at most; left out, 0.1 % of the amplitude"""
 
     def gear_error(self) -> ErrorHarmonic:
         """The same as the transmission error of a gear."""
         return ErrorHarmonic(order=self.order, phase=self.phase, amplitude=self.amplitude, error=self.error)
 
 
-class PitchCurve(AngleCurve):
+class PitchCurve(described.PitchCurveFields, AngleCurve):
     """A pitch error over the angle of the input shaft: straight lines through points over one period."""
-
-    errors: tuple[Length, ...]
-    """at the slide"""
 
     @model_validator(mode="after")
     def _is_a_curve(self) -> Self:
@@ -91,34 +57,14 @@ class PitchCurve(AngleCurve):
 PitchError = Annotated[PitchHarmonic | PitchCurve, Field(discriminator="kind")]
 
 
-class LinearDrive(Part):
+class LinearDrive(described.LinearDriveFields):
     """Base of screws, racks and belts: losses, compliance, backlash, pitch error, and the values of the input shaft."""
 
-    efficiency: Annotated[Number, Limit(gt=0.0, le=1.0)] | None = None
-    """while the input drives; left out, none is lost"""
-    backdriving_efficiency: Annotated[Number, Limit(le=1.0)] | None = None
-    """while the slide drives; 0 or less: self-locking; left out, 2 - 1/efficiency, which loses the same share of the force"""
-    stiffness: Annotated[AxialStiffness, Positive] | None = None
-    """axial, at the slide, of all that is in series; left out, rigid"""
     stiffness_curve: StiffnessCurve | None = None
     """force over deflection, in place of stiffness"""
-    backlash: Annotated[Length, NotNegative] = 0.0
-    """whole axial play at the slide"""
-    restitution: Annotated[Number, Limit(ge=0.0, le=1.0)] | None = None
-    """speed at which rigid flanks part over that at which they strike; needed with backlash and no stiffness"""
-    preload: Annotated[Force, NotNegative] = 0.0
-    """removes the segments of stiffness_curve below it"""
-    damping: Annotated[LinearViscousFriction, NotNegative] = 0.0
-    """at the slide, while the flanks touch"""
     hysteresis: Hysteresis | None = None
     pitch_error: PitchError | None = None
     """e over the angle of the input shaft, at the slide: deflection = input angle/ratio - position - e"""
-    inertia: Annotated[Inertia, NotNegative] = 0.0
-    """inertia of all that turns with the input shaft"""
-    viscous_friction: Annotated[ViscousFriction, NotNegative] = 0.0
-    """on the input shaft"""
-    drag_torque: Annotated[Torque, NotNegative] = 0.0
-    """dry friction on the input shaft, such as that of the preload"""
     note: str = ""
     """note for readers of the results"""
 
@@ -222,7 +168,7 @@ def one_way(part: Part, ways: dict[str, tuple[str, ...]], optional: tuple[str, .
     return used[0]
 
 
-class ScrewData(LinearDrive):
+class ScrewData(described.ScrewDataFields, LinearDrive):
     """A ball screw or a lead screw alone, as a data sheet has it.
 
     Examples
@@ -232,34 +178,6 @@ class ScrewData(LinearDrive):
     >>> [round(efficiency, 4) for efficiency in screw.efficiencies()]
     [0.9766, 0.9761]
     """
-
-    lead: Annotated[Length, Positive] | None = None
-    """travel to one turn"""
-    pitch: Annotated[Length, Positive] | None = None
-    """distance of neighbouring threads, which with the number of starts says the lead"""
-    starts: Annotated[Whole, Field(ge=1, le=20)] | None = None
-    mean_diameter: Annotated[Length, Positive] | None = None
-    """d, of the pitch circle; tan(lead angle) = lead/(pi d)"""
-    friction_coefficient: Annotated[Number, NotNegative] | None = None
-    """in the thread: with mean_diameter, in place of efficiency"""
-    friction_angle: Annotated[Angle, NotNegative] | None = None
-    """in place of friction_coefficient"""
-    nut_stiffness: Annotated[AxialStiffness, Positive] | None = None
-    """in series with the next ones, in place of stiffness"""
-    bearing_stiffness: Annotated[AxialStiffness, Positive] | None = None
-    supported_length: Annotated[Length, Positive] | None = None
-    """length of the screw between bearing and nut; with both ends fixed, between both bearings, the nut in the middle"""
-    core_diameter: Annotated[Length, Positive] | None = None
-    """core diameter of the screw's thread root"""
-    elastic_modulus: Annotated[Pressure, Positive] | None = None
-    """default: steel, 206 GPa"""
-    support: Literal["one end", "both ends"] | None = None
-    """at which the screw is fixed axially: stiffness E A/L (left out, this), or 4 E A/L"""
-    diameter: Annotated[Length, Positive] | None = None
-    """diameter of the screw: with length, in place of inertia"""
-    length: Annotated[Length, Positive] | None = None
-    density: Annotated[Density, Positive] | None = None
-    """default: steel, 7850 kg/m^3"""
 
     @model_validator(mode="after")
     def _is_a_screw(self) -> Self:
@@ -341,7 +259,7 @@ class ScrewData(LinearDrive):
         return math.pi / 32.0 * (self.density or STEEL) * self.length * d2 * d2
 
 
-class RatedScrew(ScrewData):
+class RatedScrew(described.RatedScrewFields, ScrewData):
     """A ball screw or a lead screw alone, with the ratings by which its life, buckling and speed are judged.
 
     Examples
@@ -350,18 +268,6 @@ class RatedScrew(ScrewData):
     >>> lm.model.RatedScrew(lead="10 mm", efficiency=0.9, dynamic_capacity="20 kN").dynamic_capacity
     20000.0
     """
-
-    dynamic_capacity: Annotated[Force, Positive] | None = None
-    """C: axial load for a million turns of nominal life"""
-    static_capacity: Annotated[Force, Positive] | None = None
-    """C_0"""
-    load_factor: Annotated[Number, Positive] = 1.0
-    """f_w of the life: 1.2 to 1.5 for normal motion, more with shocks"""
-    mounting: Mounting = "fixed-supported"
-    """mounting of the ends of the screw, for buckling and bending along supported_length"""
-    ball_circle_diameter: Annotated[Length, Positive] | None = None
-    max_input_speed: Annotated[Speed, Positive] | None = None
-    """left out, 70 m rpm/ball_circle_diameter"""
 
 
 class Placed(Part):

@@ -1,20 +1,11 @@
 """Linear motors: a force on a slide, from the data of the motor."""
 
 import math
-from typing import Annotated, Self
+from typing import Self
 
 from pydantic import model_validator
 
-from ..inputs.part import Part
-from ..inputs.quantities import (
-    Current,
-    Force,
-    ForceConstant,
-    Length,
-    Mass,
-    NotNegative,
-    Positive,
-)
+from ..inputs import described
 from ..reproducible import sin
 from .angle_torques import TorqueCurve
 from .motor import ShaftMotor
@@ -22,7 +13,7 @@ from .motor import ShaftMotor
 COGGING_POINTS = 72  # in a period: chords that depart from the sine by less than 0.1 % of its amplitude
 
 
-class LinearMotorData(Part):
+class LinearMotorData(described.LinearMotorDataFields):
     """A linear motor alone, as a data sheet has it: a source of force.
 
     Examples
@@ -31,24 +22,6 @@ class LinearMotorData(Part):
     (200.0, 600.0)
     """
 
-    mass: Annotated[Mass, NotNegative] = 0.0
-    """mass of the part that moves"""
-    rated_force: Annotated[Force, Positive] | None = None
-    """force at command 1"""
-    peak_force: Annotated[Force, Positive] | None = None
-    """at which the force ends; left out, without limit"""
-    force_constant: Annotated[ForceConstant, Positive] | None = None
-    """force to the current in the unit of the currents"""
-    rated_current: Annotated[Current, Positive] | None = None
-    """with force_constant, in place of rated_force"""
-    peak_current: Annotated[Current, Positive] | None = None
-    """with force_constant, in place of peak_force"""
-    friction_force: Annotated[Force, NotNegative] = 0.0
-    """dry friction"""
-    cogging_force: Annotated[Force, Positive] | None = None
-    """amplitude, over the position with the period pole_pitch"""
-    pole_pitch: Annotated[Length, Positive] | None = None
-    """tau, from a north pole to the next south pole: half a magnetic period"""
     note: str = ""
     """note for readers of the results"""
 

@@ -2,38 +2,28 @@
 
 import itertools
 import math
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import field_validator, model_validator
 
 from .. import _core
+from ..inputs import described
 from ..inputs.breakpoints import check_apart
 from ..inputs.part import Part
-from ..inputs.quantities import (
-    Angle,
-    Length,
-    Limit,
-    NotNegative,
-    Number,
-    Positive,
-    Switch,
-    Whole,
-)
 from ..reproducible import arctan
 
 
-class ConstantEfficiency(Part):
+class ConstantEfficiency(described.ConstantEfficiencyFields):
     """T_1 = T_2/(i eta) in both directions of power flow (5b), so it creates energy while the load drives."""
 
     kind: Literal["constant_efficiency"] = "constant_efficiency"
-    efficiency: Annotated[Number, Limit(gt=0.0, le=1.0)]
 
     def core_fields(self) -> dict[str, Any]:
         """Fields for the core of a gear with these losses."""
         return {"losses.efficiency": self.efficiency}
 
 
-class LossMap(Part):
+class LossMap(described.LossMapFields):
     """Loss coefficient m_2B over relative speed and signed relative load (12), linear on triangles.
 
     Examples
@@ -45,14 +35,6 @@ class LossMap(Part):
     """
 
     kind: Literal["map"] = "map"
-    speeds: tuple[Annotated[Number, NotNegative], ...] = Field(min_length=2)
-    """v = |w_M|/n_1R, rising from 0"""
-    loads: tuple[Number, ...] = Field(min_length=2)
-    """mu = T_2 sign(w_M)/T_2R, rising; positive where the motor drives"""
-    values: tuple[tuple[Annotated[Number, NotNegative], ...], ...]
-    """m_2B, one row for each load, one entry for each speed"""
-    mirrored: Switch = False
-    """loads begin at 0 and hold for both directions of power flow"""
 
     @field_validator("speeds", "loads")
     @classmethod
@@ -125,21 +107,17 @@ class TwoEfficiencies(Part):
         return {"efficiencies": dict(zip(("driving", "overrunning"), self.efficiencies(), strict=True))}
 
 
-class MeshEfficiency(TwoEfficiencies):
+class MeshEfficiency(TwoEfficiencies, described.MeshEfficiencyFields):
     """An efficiency for each direction of power flow, as printed for worm gears. Only in drive trains."""
 
     kind: Literal["mesh_efficiency"] = "mesh_efficiency"
-    drive_efficiency: Annotated[Number, Limit(gt=0.0, le=1.0)]
-    """eta_f, while the input drives"""
-    backdrive_efficiency: Annotated[Number, Limit(le=1.0)]
-    """eta_b, while the output drives; 0 or less: self-locking"""
 
     def efficiencies(self) -> tuple[float, float]:
         """(eta_f, eta_b)."""
         return self.drive_efficiency, self.backdrive_efficiency
 
 
-class WormMesh(TwoEfficiencies):
+class WormMesh(TwoEfficiencies, described.WormMeshFields):
     """A worm and its wheel with friction: eta_f = tan g/tan(g + r), eta_b = tan(g - r)/tan g. Only in drive trains.
 
     The lead angle g is given, or follows from module, number of starts and reference diameter of the worm. The
@@ -147,18 +125,6 @@ class WormMesh(TwoEfficiencies):
     """
 
     kind: Literal["worm"] = "worm"
-    lead_angle: Annotated[Angle, Positive] | None = None
-    """g, at the reference diameter"""
-    module: Annotated[Length, Positive] | None = None
-    """axial module m"""
-    starts: Annotated[Whole, Field(ge=1, le=20)] | None = None
-    """threads z of the worm"""
-    diameter: Annotated[Length, Positive] | None = None
-    """reference diameter d of the worm; tan g = m z/d"""
-    friction_angle: Annotated[Angle, NotNegative] | None = None
-    """r"""
-    friction_coefficient: Annotated[Number, NotNegative] | None = None
-    """in the mesh; r is its arc tangent"""
 
     @model_validator(mode="after")
     def _is_a_worm(self) -> Self:

@@ -7,15 +7,15 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from .. import _core
+from ..inputs import described
 from ..inputs.breakpoints import RESOLUTION, check_apart
-from ..inputs.part import Part
-from ..inputs.quantities import Angle, Limit, Number, Positive
+from ..inputs.quantities import Limit, Number, Positive
 from ..reproducible import total
 
 Share = Annotated[Number, Limit(ge=0.0)]
 
 
-class MeshStiffness(Part):
+class MeshStiffness(described.MeshStiffnessFields):
     """A factor on the stiffness of a gear over the angle of its input shaft, constant while the same pairs of teeth mesh.
 
     Examples
@@ -25,16 +25,8 @@ class MeshStiffness(Part):
     0.88
     """
 
-    teeth: Annotated[Number, Positive]
-    """teeth of the wheel on the input shaft; for other gears, mesh periods in one turn of the input shaft"""
-    contact_ratio: Annotated[Number, Limit(ge=1.0)] | None = None
-    """mean number of pairs of teeth in mesh; its fraction is the share of the period in which one pair more meshes, with the factor 1"""
-    fewer_pairs: Annotated[Number, Limit(gt=0.0, le=1.0)] | None = None
-    """factor on the stiffness while the fewer pairs mesh, below 1; with contact_ratio"""
     pairs: Annotated[tuple[tuple[Share, Annotated[Number, Positive]], ...], Field(max_length=1000)] = ()
     """in place of contact_ratio and fewer_pairs: from which share of a mesh period on, and the factor on the stiffness"""
-    phase: Angle = 0.0
-    """angle of the input shaft at which a period begins: with contact_ratio, at the middle of the more pairs"""
 
     @model_validator(mode="after")
     def _is_one_form(self) -> Self:

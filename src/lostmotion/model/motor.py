@@ -3,24 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Literal, Self
 
 from pydantic import model_validator
 
 from ..errors import InputError
+from ..inputs import described
 from ..inputs.arguments import checked
 from ..inputs.described import MotorFields, ShaftMotorFields
-from ..inputs.part import Part
 from ..inputs.quantities import (
-    Current,
-    Positive,
-    Resistance,
-    Speed,
-    Temperature,
-    ThermalResistance,
-    Time,
-    Torque,
-    TorqueConstant,
     Voltage,
 )
 from ..reproducible import total
@@ -31,29 +22,8 @@ MotorLaw = tuple[tuple[str, Any], ...]
 """fields of a motor that a current loop replaces"""
 
 
-class MotorLimits(Part):
+class MotorLimits(described.MotorHeatFields, described.MotorLimitsFields):
     """Limits of a motor. No run depends on them; the drive check compares with them."""
-
-    continuous_torque: Annotated[Torque, Positive] | None = None
-    peak_torque: Annotated[Torque, Positive] | None = None
-    """for seconds, as in acceleration"""
-    max_speed: Annotated[Speed, Positive] | None = None
-    resistance: Annotated[Resistance, Positive] | None = None
-    """resistance of the winding, at 25 °C"""
-    torque_constant: Annotated[TorqueConstant, Positive] | None = None
-    thermal_resistance: Annotated[ThermalResistance, Positive] | None = None
-    """winding to ambient, in place of its two parts"""
-    thermal_resistance_winding_case: Annotated[ThermalResistance, Positive] | None = None
-    thermal_resistance_case_ambient: Annotated[ThermalResistance, Positive] | None = None
-    thermal_time_constant_winding: Annotated[Time, Positive] | None = None
-    """thermal time constant winding of the winding against a case of constant temperature"""
-    thermal_time_constant_motor: Annotated[Time, Positive] | None = None
-    """thermal time constant motor of the case against the ambient"""
-    max_winding_temperature: Temperature | None = None
-    max_voltage: Annotated[Voltage, Positive] | None = None
-    """voltage limit of the amplifier of a torque source; a DC motor has `voltage_limit`"""
-    max_current: Annotated[Current, Positive] | None = None
-    """the smaller of those of motor and amplifier"""
 
     @model_validator(mode="after")
     def _one_resistance(self) -> Self:
@@ -93,7 +63,7 @@ POINT_KEYS = ("rated_speed", "armature_voltage_constant")
 SAID_BY_WINDING = ("resistance", "torque_constant", "max_current")
 
 
-class Motor(MotorFields):
+class Motor(described.MotorDataFields, MotorFields):
     """DC motor with servo amplifier (eq. 2), synchronous motor with ideal field orientation, or a torque source in
     its place.
 
@@ -108,24 +78,8 @@ class Motor(MotorFields):
     kind: Literal["dc", "torque_source", "synchronous"] = "dc"
     """`torque_source`: the command times `rated_torque` acts on the rotor without delay; `synchronous`: command 1 is the largest
     voltage that the amplifier can give, dc_voltage/sqrt(3), amplitude of a phase"""
-    rated_voltage: Annotated[Voltage, Positive] | None = None
-    """u_ZR, that of command 1. A change over a record or a base, by `--set` or in a study is the same motor at another voltage: rated_speed and
-    armature_voltage_constant follow so that stall torque and no-load speed go with the voltage, unless they are given too"""
-    stall_torque: Annotated[Torque, Positive] | None = None
-    """at rated voltage, with no_load_speed in place of rated_speed and armature_voltage_constant; what the shaft gives, if the currents
-    are stated"""
-    no_load_speed: Annotated[Speed, Positive] | None = None
-    """at rated voltage without load; without friction too, unless the currents are stated"""
-    stall_current: Annotated[Current, Positive] | None = None
-    """at rated voltage, with no_load_current"""
-    no_load_current: Annotated[Current, Positive] | None = None
-    """I_0: the friction of the motor is stall_torque I_0/(I_S - I_0), in place of friction_torque"""
-    voltage_limit: Annotated[Voltage, Positive] | None = None
-    """largest voltage of the amplifier"""
     winding: Winding | None = None
     """winding of a synchronous motor, or of one that is modelled as a torque source, for its current and its heat"""
-    dc_voltage: Annotated[Voltage, Positive] | None = None
-    """dc voltage of the amplifier that feeds a synchronous motor"""
     limits: MotorLimits | None = None
     note: str = ""
     """note for readers of the results, such as that the friction is not printed"""

@@ -1,22 +1,17 @@
 """The torsion of a gearbox: stiffness, backlash and hysteresis."""
 
 import itertools
-from typing import Annotated, Literal, Self
+from typing import Literal, Self
 
 from pydantic import model_validator
 
 from .. import _core
 from ..errors import InputError
+from ..inputs import described
 from ..inputs.breakpoints import check_apart
 from ..inputs.described import TorsionCurveFields
 from ..inputs.part import Part
 from ..inputs.quantities import (
-    Angle,
-    Limit,
-    NotNegative,
-    Number,
-    Positive,
-    Stiffness,
     argument,
 )
 
@@ -111,18 +106,17 @@ class TorsionCurve(TorsionCurveFields, Elastic):
         return self.model_copy(update=own)
 
 
-class LinearStiffness(Elastic):
+class LinearStiffness(described.LinearStiffnessFields, Elastic):
     """One stiffness for all twists (5a)."""
 
     kind: Literal["linear"] = "linear"
-    stiffness: Annotated[Stiffness, Positive]
 
     def core(self) -> _core.TorsionCurve:
         """The curve of the solver."""
         return _core.TorsionCurve([], [self.stiffness])
 
 
-class Rigid(Part):
+class Rigid(described.RigidFields):
     """No twist at all (7), or rigid flanks that strike at the ends of a backlash.
 
     Examples
@@ -133,10 +127,6 @@ class Rigid(Part):
     """
 
     kind: Literal["rigid"] = "rigid"
-    backlash: Annotated[Angle, NotNegative] = 0.0
-    """total gap at the output"""
-    restitution: Annotated[Number, Limit(ge=0.0, le=1.0)] | None = None
-    """speed at which the flanks part over that at which they strike; needed with backlash"""
 
     @property
     def strikes(self) -> bool:
@@ -152,8 +142,5 @@ class Rigid(Part):
         return self
 
 
-class Hysteresis(Part):
+class Hysteresis(described.HysteresisFields):
     """Turning-point hysteresis (16)."""
-
-    efficiency: Annotated[Number, Limit(gt=0.0, le=1.0)]
-    """eta_H, average efficiency of the hysteresis process; 1: none"""

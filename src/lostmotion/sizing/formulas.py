@@ -8,16 +8,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from ..model.linear import ELASTIC_MODULUS, STEEL, Mounting
+from ..model.linear import ELASTIC_MODULUS, STEEL
 
-BUCKLING: dict[Mounting, float] = {
+BUCKLING: dict[str, float] = {
     "fixed-free": 0.25,
     "supported-supported": 1.0,
     "fixed-supported": 2.0,
     "fixed-fixed": 4.0,
 }
 """Euler's factor of each mounting of a screw"""
-BENDING: dict[Mounting, float] = {
+BENDING: dict[str, float] = {
     "fixed-free": 1.875104,
     "supported-supported": math.pi,
     "fixed-supported": 3.926602,
@@ -95,7 +95,7 @@ def gear_life(
     return float(rated_life * rated_speed / speed * (rated_torque / torque) ** exponent)
 
 
-def buckling_force(core_diameter: float, length: float, mounting: Mounting, modulus: float = ELASTIC_MODULUS) -> float:
+def buckling_force(core_diameter: float, length: float, mounting: str, modulus: float = ELASTIC_MODULUS) -> float:
     """Permissible axial load [N] of a long screw: half of Euler's n pi^2 E I/l^2.
 
     Source: THK general catalogue, A-685 and A-731 (eta_2 contains the half); Rexroth R310RU3301, p. 121; HIWIN BS-08-2.
@@ -125,7 +125,7 @@ def compression_force(core_diameter: float) -> float:
 def critical_speed(
     core_diameter: float,
     length: float,
-    mounting: Mounting,
+    mounting: str,
     modulus: float = ELASTIC_MODULUS,
     density: float = STEEL,
 ) -> float:
