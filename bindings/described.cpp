@@ -59,6 +59,10 @@ class DescribedFields : public FieldVisitor {
     }
     // Rows of numbers.
     void matrix(const Field& field) { add(field, "matrix", limits(field.range), nb::make_tuple()); }
+    template <class Use>
+    void table(const Field& field, const char* parts, Use&&) {
+        table(field, parts);
+    }
     void table(const Field& field, const char* parts) {
         add(field, "table", limits(Range::any), nb::dict(), parts_of(parts));
     }

@@ -19,7 +19,7 @@
 #include "lostmotion/analysis/steady_regime.hpp"
 #include "lostmotion/analysis/train_batch.hpp"
 #include "lostmotion/model/train_description.hpp"
-#include "lostmotion/scenario/part_fields.hpp"
+#include "lostmotion/scenario/machine_fields.hpp"
 
 namespace lostmotion::binding {
 
@@ -362,7 +362,6 @@ inline void bind_train(nb::module_& m) {
 
     nb::class_<PeriodicCurve>(m, "PeriodicCurve")
         .def(nb::init<double, std::vector<double>, std::vector<double>>(), "period"_a, "angles"_a, "values"_a)
-        .def_static("sine", &PeriodicCurve::sine, "amplitude"_a, "order"_a, "phase"_a, "error"_a)
         .def("pieces", &PeriodicCurve::pieces)
         .def("__call__", &PeriodicCurve::operator(), "angle"_a);
     m.def(
@@ -372,14 +371,22 @@ inline void bind_train(nb::module_& m) {
             return std::make_pair(mesh.driving(), mesh.overrunning());
         },
         "lead_angle"_a, "friction_angle"_a);
-    m.def("quadratic_drag", &model::Shaft::quadratic_drag, "coefficient"_a, "max_speed"_a, "error"_a);
+    m.attr("USUAL_ERROR") = signals::usual_error;
     m.def(
-        "stribeck_curve",
-        [](double coulomb, double breakaway, double stribeck_speed, double error) {
-            const auto f = model::DryFriction::stribeck(coulomb, breakaway, stribeck_speed, error);
-            return std::make_pair(f.speeds, f.torques);
+        "harmonic", [](const nb::dict& fields) { return described<tables::HarmonicLaw>(fields).curve(); }, "fields"_a,
+        nb::sig("def harmonic(fields: dict[str, typing.Any]) -> PeriodicCurve"));
+    m.def(
+        "quadratic_drag", [](const nb::dict& fields) { return described<signals::QuadraticDrag>(fields).curve(); },
+        "fields"_a, nb::sig("def quadratic_drag(fields: dict[str, typing.Any]) -> TorsionCurve"));
+    m.def(
+        "dry_friction",
+        [](const nb::dict& fields) {
+            const auto f = described<signals::FrictionTable>(fields).law();
+            return std::tuple(f.torque, f.breakaway_torque, f.speeds, f.torques);
         },
-        "friction_torque"_a, "breakaway_torque"_a, "stribeck_speed"_a, "error"_a);
+        "fields"_a,
+        nb::sig("def dry_friction(fields: dict[str, typing.Any]) -> tuple[float, float, list[float], list[float]]"),
+        "(T_C, T_S, speeds, torques); the lists are empty where there is no curve.");
 
     nb::class_<TrainDescription>(m, "Train", nb::is_weak_referenceable())
         .def(nb::init<>())

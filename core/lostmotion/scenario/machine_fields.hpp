@@ -4,7 +4,7 @@
 #include <limits>
 #include <numbers>
 
-#include "signal_fields.hpp"
+#include "shaft_fields.hpp"
 
 namespace lostmotion::tables {
 
@@ -91,6 +91,34 @@ void each_motor(Use&& use) {
     });
 }
 
+// amplitude * sin(order * phi + phase) over the angle phi of a shaft.
+struct HarmonicLaw {
+    double amplitude = 0.0, phase = 0.0, error = 0.0;
+    int order = 1;
+
+    template <class F>
+    void describe_angle(F& f) {
+        f.integer({"order", "n", "", any, has_default, "periods in one turn of the shaft"}, order, 1, 10000);
+        f.number({"phase", "", "rad", any, has_default, "phase at angle 0"}, phase);
+    }
+    template <class F>
+    void describe_size(F& f, const char* unit, const char* meaning) {
+        f.number({"amplitude", "", unit, positive, needed, meaning}, amplitude);
+        f.number({"error", "", unit, positive, may_be_left_out,
+                  "by which the straight lines depart from the sine at most; left out, 0.1 % of the amplitude"},
+                 error);
+    }
+    template <class F>
+    void describe(F& f) {
+        describe_angle(f);
+        describe_size(f, "", "");
+    }
+    model::PeriodicCurve curve() const {
+        const double usual = signals::usual_error * std::fabs(amplitude);
+        return model::PeriodicCurve::sine(amplitude, order, phase, error > 0.0 ? error : usual);
+    }
+};
+
 template <class Use>
 void each_gear(Use&& use) {
     use("LinearStiffness",
@@ -169,10 +197,7 @@ void each_gear(Use&& use) {
     });
     use("Gearbox",
         [](auto& f) { f.need({"rated_input_speed", "rated_output_torque"}, [&] { Gearbox().describe(f); }); });
-    use("Harmonic", [](auto& f) {
-        f.integer({"order", "n", "", any, has_default, "periods in one turn of the shaft"}, 1, 1, 10000);
-        f.number({"phase", "", "rad", any, has_default, "phase at angle 0"});
-    });
+    use("Harmonic", [](auto& f) { HarmonicLaw().describe_angle(f); });
     use("AngleCurve", [](auto& f) {
         f.number({"period", "", "rad", positive, has_default, "left out, one turn of the shaft"},
                  2.0 * std::numbers::pi);
@@ -192,11 +217,7 @@ void each_gear(Use&& use) {
 template <class Use>
 void each_law_over_angle(Use&& use) {
     const auto harmonic = [&](const char* name, const char* unit, const char* meaning) {
-        use(name, [=](auto& f) {
-            f.number({"amplitude", "", unit, positive, needed, meaning});
-            f.number({"error", "", unit, positive, may_be_left_out,
-                      "by which the straight lines depart from the sine at most; left out, 0.1 % of the amplitude"});
-        });
+        use(name, [=](auto& f) { HarmonicLaw().describe_size(f, unit, meaning); });
     };
     const auto curve = [&](const char* name, const char* key, const char* unit, const char* meaning) {
         use(name, [=](auto& f) { f.list({key, "", unit, any, needed, meaning}, {}, {0, Entries::any}); });

@@ -7,6 +7,9 @@
 
 namespace lostmotion::signals {
 
+// Straight lines depart from a smooth law by this share of its largest value at most, where no error is given.
+inline constexpr double usual_error = 1e-3;
+
 // Names and units of one kind of motion.
 struct Motion {
     const char *load, *curve, *slipping, *at_rest, *forces, *force, *speed, *sliding, *stuck, *law, *error;
@@ -36,26 +39,64 @@ inline constexpr Motion translation{
     "v_S: the friction falls from breakaway_force to friction_force by ``exp(-(v/v_S)^2)``; left out, at once",
     "by which straight lines depart from that curve at most; left out, 0.1 % of the difference of both forces"};
 
-template <class Use>
-void each_friction(Use&& use, const Motion& m) {
-    use(m.curve, [=](auto& f) {
-        f.list({"speeds", "", m.speed, not_negative, needed, "rising from 0"}, {}, {2});
-        f.list({m.forces, "", m.force, not_negative, needed, "dry friction at each speed"}, {}, {0, Entries::any});
-    });
-    use(m.load, [=](auto& f) {
-        f.number({m.slipping, "T_C", m.force, not_negative, has_default, m.sliding});
-        f.number({m.at_rest, "T_S", m.force, not_negative, may_be_left_out, m.stuck});
-        f.number({"stribeck_speed", "w_S", m.speed, positive, may_be_left_out, m.law});
-        f.number({"friction_error", "", m.force, positive, may_be_left_out, m.error});
+// Dry friction as files have it.
+struct FrictionTable {
+    const Motion* of = &rotation;
+    double slipping = 0.0, at_rest = 0.0, stribeck_speed = 0.0, error = 0.0;
+    std::vector<double> speeds = {}, forces = {};
+
+    template <class F>
+    void describe_curve(F& f) {
+        f.list({"speeds", "", of->speed, not_negative, needed, "rising from 0"}, speeds, Entries{2});
+        f.list({of->forces, "", of->force, not_negative, needed, "dry friction at each speed"}, forces,
+               Entries{0, Entries::any});
+    }
+    template <class F>
+    void describe(F& f) {
+        f.number({of->slipping, "T_C", of->force, not_negative, has_default, of->sliding}, slipping);
+        f.number({of->at_rest, "T_S", of->force, not_negative, may_be_left_out, of->stuck}, at_rest);
+        f.number({"stribeck_speed", "w_S", of->speed, positive, may_be_left_out, of->law}, stribeck_speed);
+        f.number({"friction_error", "", of->force, positive, may_be_left_out, of->error}, error);
         f.table({"friction_curve", "", "", any, may_be_left_out,
                  "dry friction over speed, in place of the dry friction while it slips and stribeck_speed"},
-                m.curve);
-    });
+                of->curve, [&] { describe_curve(f); });
+    }
+
+    model::DryFriction law() const {
+        if (!speeds.empty()) return {0.0, at_rest, speeds, forces};
+        if (stribeck_speed == 0.0) return {slipping, at_rest, {}, {}};
+        return model::DryFriction::stribeck(slipping, at_rest, stribeck_speed,
+                                            error > 0.0 ? error : usual_error * (at_rest - slipping));
+    }
+};
+
+template <class Use>
+void each_friction(Use&& use, const Motion& m) {
+    use(m.curve, [&](auto& f) { FrictionTable{&m}.describe_curve(f); });
+    use(m.load, [&](auto& f) { FrictionTable{&m}.describe(f); });
 }
+
+struct QuadraticDrag {
+    double coefficient = 0.0, max_speed = 0.0, error = 0.0;
+
+    template <class F>
+    void describe(F& f) {
+        f.number({"coefficient", "c", "N*m*s^2/rad^2", positive, needed, "c of the torque c w |w|"}, coefficient);
+        f.number({"max_speed", "", "rad/s", positive, needed, "up to which the straight lines follow the law"},
+                 max_speed);
+        f.number({"error", "", "N*m", positive, may_be_left_out,
+                  "by which the straight lines depart from the parabola at most; left out, 0.1 % of the torque at "
+                  "max_speed"},
+                 error);
+    }
+    TorsionCurve curve() const {
+        const double usual = usual_error * (coefficient * max_speed * max_speed);
+        return model::Shaft::quadratic_drag(coefficient, max_speed, error > 0.0 ? error : usual);
+    }
+};
 
 template <class Use>
 void each_drag(Use&& use) {
-    const Field max_speed{"max_speed", "", "rad/s", positive, needed, "up to which the straight lines follow the law"};
     use("DragCurve", [](auto& f) {
         f.list({"speeds", "", "rad/s", not_negative, needed, "rising from 0"}, {}, {2});
         f.list({"torques", "", "N*m", not_negative, needed, "the first is 0: what holds at rest is friction"}, {},
@@ -64,17 +105,11 @@ void each_drag(Use&& use) {
                   "beyond the last point: the last line goes on, or the last torque stays"},
                  "extend|hold");
     });
-    use("QuadraticDrag", [=](auto& f) {
-        f.number({"coefficient", "c", "N*m*s^2/rad^2", positive, needed, "c of the torque c w |w|"});
-        f.number(max_speed);
-        f.number({"error", "", "N*m", positive, may_be_left_out,
-                  "by which the straight lines depart from the parabola at most; left out, 0.1 % of the torque at "
-                  "max_speed"});
-    });
-    use("EddyCurrentDrag", [=](auto& f) {
+    use("QuadraticDrag", [](auto& f) { QuadraticDrag().describe(f); });
+    use("EddyCurrentDrag", [](auto& f) {
         f.number({"peak_torque", "", "N*m", positive, needed, "at the critical speed"});
         f.number({"critical_speed", "", "rad/s", positive, needed, "speed of the largest torque"});
-        f.number(max_speed);
+        f.number({"max_speed", "", "rad/s", positive, needed, "up to which the straight lines follow the law"});
         f.number({"error", "", "N*m", positive, may_be_left_out,
                   "by which they depart from it at most; left out, 0.1 % of the peak torque"});
     });

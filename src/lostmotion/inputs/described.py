@@ -50,6 +50,11 @@ class Described(Part):
         keys = (key for base in reversed(type(self).__mro__) for key in vars(base).get("core_keys", ()))
         return {key: getattr(self, key) for key in keys}
 
+    def fields_of(self, part: "type[Described]") -> dict[str, Any]:
+        """What the core describes of a part, tables as mappings."""
+        values = ((key, getattr(self, key)) for key in part.described)
+        return {key: v.fields_of(type(v)) if isinstance(v, Described) else v for key, v in values}
+
 
 def _is_table(row: Row) -> bool:
     return row[1] in ("table", "tables")
@@ -178,6 +183,7 @@ def stub() -> str:
     ]
     lines += ["", "class Described(Part):", "    described: ClassVar[tuple[str, ...]]"]
     lines += ["    core_keys: ClassVar[tuple[str, ...]]", "    def core_fields(self) -> dict[str, Any]: ..."]
+    lines += ["    def fields_of(self, part: type[Described]) -> dict[str, Any]: ..."]
     for name, rows in TABLES.items():
         generic = f", Generic[{', '.join(names)}]" if (names := _variables(rows).values()) else ""
         lines += ["", f"class {name}Fields(Described{generic}):"]

@@ -28,36 +28,20 @@ Frequency = Annotated[float, Unit("Hz")]
 Voltage = Annotated[float, Unit("V")]
 Stiffness = Annotated[float, Unit("N*m/rad")]
 ViscousFriction = Annotated[float, Unit("N*m*s/rad")]
-PositionGain = Annotated[float, Unit("1/s")]
-IntegralPositionGain = Annotated[float, Unit("1/s^2")]
-LossAdaptation = Annotated[float, Unit("1/(N*m)")]
-IntegralTorqueGain = Annotated[float, Unit("N*m/rad/s")]
-QuadraticFriction = Annotated[float, Unit("N*m*s^2/rad^2")]
 Mass = Annotated[float, Unit("kg")]
 Length = Annotated[float, Unit("m")]
-Area = Annotated[float, Unit("m^2")]
-Density = Annotated[float, Unit("kg/m^3")]
-TorqueSpectrum = Annotated[float, Unit("N^2*m^2/Hz")]
 LinearSpeed = Annotated[float, Unit("m/s")]
 LinearAcceleration = Annotated[float, Unit("m/s^2")]
 LinearJerk = Annotated[float, Unit("m/s^3")]
 Force = Annotated[float, Unit("N")]
-AxialStiffness = Annotated[float, Unit("N/m")]
-LinearViscousFriction = Annotated[float, Unit("N*s/m")]
-ForceConstant = Annotated[float, Unit("N/A")]
-Pressure = Annotated[float, Unit("Pa")]
 MassPerLength = Annotated[float, Unit("kg/m")]
 LinearVoltageConstant = Annotated[float, Unit("V*s/m")]
 Power = Annotated[float, Unit("W")]
 Current = Annotated[float, Unit("A")]
 Resistance = Annotated[float, Unit("ohm")]
 Inductance = Annotated[float, Unit("H")]
-Capacitance = Annotated[float, Unit("A*s/V")]
 TorqueConstant = Annotated[float, Unit("N*m/A")]
-VoltageConstant = Annotated[float, Unit("V*s/rad")]
-FluxLinkage = Annotated[float, Unit("V*s")]
 KinematicViscosity = Annotated[float, Unit("m^2/s")]
-ThermalResistance = Annotated[float, Unit("K/W")]
 
 
 @dataclass(frozen=True)
@@ -75,9 +59,6 @@ class Limit:
         schema.get("schema", {}).update({name: value for name, value in vars(self).items() if value is not None})
         return schema  # type: ignore[no-any-return]
 
-
-MAX_ENTRIES = 100
-"""of a list of numbers that the core describes"""
 
 Positive = Limit(gt=0.0)
 NotNegative = Limit(ge=0.0)

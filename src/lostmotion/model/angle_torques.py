@@ -1,14 +1,13 @@
 """Elements that depend on the angle of a shaft: gravity, cogging, ripple, and the transmission error of a gear."""
 
 import itertools
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
 from .. import _core
 from ..inputs import described
 from ..inputs.breakpoints import check_apart
-from .shaft import SHARE
 
 STANDARD_GRAVITY = 9.80665  # [m/s^2]
 
@@ -18,10 +17,12 @@ class Harmonic(described.HarmonicFields):
 
     kind: Literal["sine"] = "sine"
 
-    def _core_curve(self, amplitude: float, error: float | None) -> _core.PeriodicCurve:
-        return _core.PeriodicCurve.sine(
-            amplitude, self.order, self.phase, SHARE * abs(amplitude) if error is None else error
-        )
+    if TYPE_CHECKING:
+        amplitude: Any  # in which unit, each of them says
+        error: Any
+
+    def core(self) -> _core.PeriodicCurve:
+        return _core.harmonic({key: getattr(self, key) for key in ("amplitude", "order", "phase", "error")})
 
 
 class AngleCurve(described.AngleCurveFields):
@@ -29,7 +30,18 @@ class AngleCurve(described.AngleCurveFields):
 
     kind: Literal["curve"] = "curve"
 
-    def _check_points(self, values: tuple[float, ...]) -> None:
+    def values(self) -> tuple[float, ...]:
+        """Value at each angle."""
+        (key,) = self.described
+        found: tuple[float, ...] = getattr(self, key)
+        return found
+
+    def core(self) -> _core.PeriodicCurve:
+        return _core.PeriodicCurve(self.period, self.angles, self.values())
+
+    @model_validator(mode="after")
+    def _is_a_curve(self) -> Self:
+        values = self.values()
         if len(self.angles) != len(values):
             raise ValueError(f"has {len(self.angles)} angles and {len(values)} values; give as many of each")
         if self.angles[0] != 0.0:
@@ -42,6 +54,7 @@ class AngleCurve(described.AngleCurveFields):
             raise ValueError(
                 f"has angles that end at {self.angles[-1]}; the last must be below the period {self.period}, where the first value comes again"
             )
+        return self
 
 
 class PeriodicTorque:
@@ -49,8 +62,9 @@ class PeriodicTorque:
 
     table_of_core: ClassVar[str] = "angle_torques"
 
-    def core(self) -> _core.PeriodicCurve:
-        raise NotImplementedError
+    if TYPE_CHECKING:
+
+        def core(self) -> _core.PeriodicCurve: ...
 
     def core_fields(self) -> dict[str, Any]:
         """Fields for the core, in SI units."""
@@ -63,9 +77,6 @@ class TorqueHarmonic(PeriodicTorque, described.TorqueHarmonicFields, Harmonic):
     shaft: str
     """on which it acts, in the direction of its angle"""
 
-    def core(self) -> _core.PeriodicCurve:
-        return self._core_curve(self.amplitude, self.error)
-
 
 class TorqueCurve(PeriodicTorque, described.TorqueCurveFields, AngleCurve):
     """A torque on the shaft over its angle: straight lines through points over one period."""
@@ -73,32 +84,13 @@ class TorqueCurve(PeriodicTorque, described.TorqueCurveFields, AngleCurve):
     shaft: str
     """on which it acts, in the direction of its angle"""
 
-    @model_validator(mode="after")
-    def _is_a_curve(self) -> Self:
-        self._check_points(self.torques)
-        return self
-
-    def core(self) -> _core.PeriodicCurve:
-        return _core.PeriodicCurve(self.period, list(self.angles), list(self.torques))
-
 
 class ErrorHarmonic(described.ErrorHarmonicFields, Harmonic):
     """A transmission error ``amplitude * sin(order * phi + phase)`` over the angle of the input shaft, by straight lines."""
 
-    def core(self) -> _core.PeriodicCurve:
-        return self._core_curve(self.amplitude, self.error)
-
 
 class ErrorCurve(described.ErrorCurveFields, AngleCurve):
     """A transmission error over the angle of the input shaft: straight lines through points over one period."""
-
-    @model_validator(mode="after")
-    def _is_a_curve(self) -> Self:
-        self._check_points(self.errors)
-        return self
-
-    def core(self) -> _core.PeriodicCurve:
-        return _core.PeriodicCurve(self.period, list(self.angles), list(self.errors))
 
 
 class Gravity(PeriodicTorque, described.GravityFields):
@@ -109,9 +101,7 @@ class Gravity(PeriodicTorque, described.GravityFields):
 
     def core(self) -> _core.PeriodicCurve:
         amplitude = self.mass * STANDARD_GRAVITY * self.radius
-        return _core.PeriodicCurve.sine(
-            -amplitude, 1, self.angle, SHARE * amplitude if self.error is None else self.error
-        )
+        return _core.harmonic({"amplitude": -amplitude, "phase": self.angle, "error": self.error})
 
 
 AngleTorque = Annotated[TorqueHarmonic | TorqueCurve, Field(discriminator="kind")]

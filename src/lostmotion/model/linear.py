@@ -44,11 +44,6 @@ class PitchHarmonic(described.PitchHarmonicFields, Harmonic):
 class PitchCurve(described.PitchCurveFields, AngleCurve):
     """A pitch error over the angle of the input shaft: straight lines through points over one period."""
 
-    @model_validator(mode="after")
-    def _is_a_curve(self) -> Self:
-        self._check_points(self.errors)
-        return self
-
     def gear_error(self) -> ErrorCurve:
         """The same as the transmission error of a gear."""
         return ErrorCurve(period=self.period, angles=self.angles, errors=self.errors)

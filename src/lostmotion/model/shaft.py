@@ -10,7 +10,7 @@ from .. import _core
 from ..inputs import described
 from ..inputs.breakpoints import check_apart
 
-SHARE = 1e-3  # of the largest value, by which straight lines depart from a smooth law if no error is given
+SHARE = _core.USUAL_ERROR
 
 
 def check_points(speeds: tuple[float, ...], torques: tuple[float, ...], what: str = "torques") -> None:
@@ -91,8 +91,7 @@ class QuadraticDrag(described.QuadraticDragFields):
     kind: Literal["quadratic"] = "quadratic"
 
     def core(self) -> _core.TorsionCurve:
-        top = self.coefficient * self.max_speed * self.max_speed
-        return _core.quadratic_drag(self.coefficient, self.max_speed, SHARE * top if self.error is None else self.error)
+        return _core.quadratic_drag(self.fields_of(type(self)))
 
 
 class EddyCurrentDrag(described.EddyCurrentDragFields):
@@ -185,11 +184,4 @@ class Shaft(described.DragFields, described.DryFrictionFields, described.ShaftFi
 
     def friction(self) -> tuple[float, float, list[float], list[float]]:
         """(T_C, T_S, speeds [rad/s], torques [N·m]) of its dry friction; the lists are empty where there is no curve."""
-        breakaway = self.breakaway_torque or 0.0
-        if self.friction_curve is not None:
-            return 0.0, breakaway, list(self.friction_curve.speeds), list(self.friction_curve.torques)
-        if self.stribeck_speed is None:
-            return self.friction_torque, breakaway, [], []
-        error = SHARE * (breakaway - self.friction_torque) if self.friction_error is None else self.friction_error
-        speeds, torques = _core.stribeck_curve(self.friction_torque, breakaway, self.stribeck_speed, error)
-        return self.friction_torque, breakaway, speeds, torques
+        return _core.dry_friction(self.fields_of(described.DryFrictionFields))
