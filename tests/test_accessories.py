@@ -118,7 +118,7 @@ def test_the_brake_of_the_motor():
     assert 7.84 * rules(study)["holding_brake"].use == pytest.approx(held, rel=1e-9)
     lacking = Axes(study).judged(study.parameters(1, 2)[0])
     assert isinstance(lacking, lm.InputError)
-    assert "no brake of yaskawa-sgmsh-10aa" in str(lacking)
+    assert '"yaskawa-sgmsh-10aa": the catalogue has no brake of this motor' in str(lacking)
 
 
 @pytest.mark.parametrize("brake", ["yaskawa-sgmah-02-brake", {"from": "yaskawa-sgmah-02-brake", "torque": "0.1 N m"}])
@@ -249,8 +249,11 @@ def test_own_sheets_from_templates(tmp_path: Path):
 
 
 def test_records_that_cannot_be_judged_are_grouped_by_what_they_lack():
-    why = "actuator from 'a-{}': the record lacks rotor_inertia, see the manufacturer"
-    ranked = [Candidate(k, f"a-{k}", ("data",), why.format(k), "", {}) for k in range(3)]
+    lacks = "the record lacks rotor_inertia, see the manufacturer"
+    errors = [lm.InputError(lacks, table="actuator", record=f"'a-{k}'") for k in range(3)]
+    assert str(errors[1]) == "actuator from 'a-1': the record lacks rotor_inertia, see the manufacturer"
+    missing = [(error.problems[0].of_any_record(),) for error in errors]
+    ranked = [Candidate(k, f"a-{k}", ("data",), str(errors[k]), "", {}, missing=missing[k]) for k in range(3)]
     (group,) = not_judged(ranked)
     assert group.datum == "actuator: the record lacks rotor_inertia, see the manufacturer"
     assert len(group.candidates) == 3

@@ -31,12 +31,22 @@ class Problem(NamedTuple):
     """dotted keys of these; none where it concerns all that was given"""
     reason: str
     """the value, what is wrong with it, and the remedy"""
+    table: str = ""
+    """the table that a record fills, where the fault is that of a record"""
+    record: str = ""
+    """this record, as messages name it"""
 
     def sentence(self) -> str:
-        """Keys and reason as messages have them."""
+        """Keys, record and reason as messages have them."""
+        if self.table:
+            return f"{self.table}{' from ' if self.record else ''}{self.record}: {self.reason}"
         if not self.keys:
             return self.reason
         return f"{'key' if len(self.keys) == 1 else 'keys'} {', '.join(self.keys)}: {self.reason}"
+
+    def of_any_record(self) -> str:
+        """The sentence without the name of the record."""
+        return self._replace(record="").sentence()
 
 
 class InputError(ValueError):
@@ -48,6 +58,8 @@ class InputError(ValueError):
         What is wrong, or the reason alone where keys are given.
     keys : tuple of str
         Dotted keys of the values.
+    table, record : str
+        Table that a record fills, and the name of that record, where the fault is that of the record.
     where : str
         File, log or function that the text begins with.
     problems : sequence of Problem, optional
@@ -70,12 +82,14 @@ class InputError(ValueError):
         text: str = "",
         *,
         keys: tuple[str, ...] = (),
+        table: str = "",
+        record: str = "",
         where: str = "",
         problems: Sequence[Problem] | None = None,
         more: int = 0,
     ) -> None:
         self.where, self.more = where, more
-        self.problems = (Problem(keys, str(text)),) if problems is None else tuple(problems)
+        self.problems = (Problem(keys, str(text), table, record),) if problems is None else tuple(problems)
         said = "; ".join(problem.sentence() for problem in self.problems) + (f"; and {more} more" if more else "")
         super().__init__(visible(f"{where}: {said}" if where else said))
 
@@ -90,7 +104,7 @@ class InputError(ValueError):
 
     def with_keys(self, change: Callable[[str], str]) -> InputError:
         """The same error of values that have other keys."""
-        problems = [Problem(tuple(map(change, p.keys)), p.reason) for p in self.problems]
+        problems = [p._replace(keys=tuple(map(change, p.keys))) for p in self.problems]
         return InputError(where=self.where, problems=problems, more=self.more)
 
 

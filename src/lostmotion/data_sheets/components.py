@@ -60,7 +60,7 @@ def gearbox_table(
             raise InputError(unknown_key(key, known, inner), keys=(f"{where}.{shortened(key)}",))
     record = find(reference, "gearbox")
     assert isinstance(record, GearboxSheet)
-    return _table_of_sheet(record, f"{where} from {shown(reference)}", changes, where)
+    return _table_of_sheet(record, shown(reference), changes, where)
 
 
 def gearbox_of(sheet: GearboxSheet) -> Gearbox:
@@ -71,11 +71,11 @@ def gearbox_of(sheet: GearboxSheet) -> Gearbox:
     InputError
         It lacks what a run needs.
     """
-    return Gearbox(**_table_of_sheet(sheet, sheet.name, {}, "gearbox")[0])
+    return Gearbox(**_table_of_sheet(sheet, shown(sheet.name), {}, "gearbox")[0])
 
 
 def _table_of_sheet(
-    record: GearboxSheet, what: str, changes: Mapping[str, Any], where: str
+    record: GearboxSheet, name: str, changes: Mapping[str, Any], where: str
 ) -> tuple[dict[str, Any], BuiltMap | None]:
     from .gearbox_sheet import SCALARS, GearboxSheet
     from .loss_map_builder import build_loss_map
@@ -85,10 +85,11 @@ def _table_of_sheet(
         sheet = GearboxSheet(**_given(record) | scalars) if scalars else record
         conditions = Conditions(**{key: changes[key] for key in Conditions.model_fields if key in changes})
     except InputError as error:
-        raise InputError(f"{what}: {error}") from None
+        raise InputError(str(error), table=where, record=name) from None
     for key, hint in sheet.missing().items():
         if key not in changes:
-            raise InputError(f"{what}: the record lacks {key}, {hint}; give {where}.{key} beside {_naming(where)}")
+            lacks = f"the record lacks {key}, {hint}; give {where}.{key} beside {_naming(where)}"
+            raise InputError(lacks, table=where, record=name)
     built = None
     if not _whole(changes.get("losses")):
         try:
@@ -296,7 +297,7 @@ def actuator(
     if beside:
         sheet = ActuatorSheet(**_given(sheet) | beside)
     for key, hint in sheet.missing().items():
-        raise InputError(f"actuator from {shown(name)}: the record lacks {key}, {hint}")
+        raise InputError(f"the record lacks {key}, {hint}", table="actuator", record=shown(name))
     return sheet.motor(), gearbox_of(sheet.gearbox_sheet())
 
 
@@ -337,7 +338,8 @@ def motor_table(reference: str, changes: Mapping[str, Any], where: str = "motor"
         needed = {*record.missing(), *(["dc_voltage"] if changes.get("kind") == "synchronous" else [])}
         keys = [f"{where}.{key}" for key in lacked if key in needed and key not in changes]
         remedy = f"; give {' and '.join(keys)} beside `from`" if keys else ""
-        raise InputError(f"{where} from {shown(reference)}: {error}{remedy}") from None
+        reason = error.reason if isinstance(error, InputError) else str(error)
+        raise InputError(reason + remedy, table=where, record=shown(reference)) from None
     if changes.get("kind") == "torque_source":
         table = as_torque_source(table)
     elif "rated_voltage" in changes:
@@ -408,9 +410,8 @@ def built_in_brake(motor: str) -> dict[str, Any]:
 
     found = next((r for r in catalogue() if isinstance(r, BrakeSheet) and motor.lower() in r.motors), None)
     if found is None:
-        raise InputError(
-            f"task.brake: the catalogue has no brake of {motor}; give its torque and inertia from the data sheet"
-        )
+        lacks = "the catalogue has no brake of this motor; give its torque and inertia from the data sheet"
+        raise InputError(lacks, table="task.brake", record=shown(motor))
     return _accessory("brake", {"from": found.name})
 
 
@@ -420,7 +421,7 @@ def _accessory(kind: str, table: Mapping[str, Any]) -> dict[str, Any]:
 
     record = find(table["from"], kind)
     for key, hint in record.missing().items():
-        raise InputError(f"task.{kind} from {shown(table['from'])}: the record lacks {key}, {hint}")
+        raise InputError(f"the record lacks {key}, {hint}", table=f"task.{kind}", record=shown(table["from"]))
     values = {key: getattr(record, own) for key, own in ACCESSORIES[kind].items()}
     beside = {key: value for key, value in table.items() if key != "from"}
     return {key: value for key, value in values.items() if value is not None} | beside

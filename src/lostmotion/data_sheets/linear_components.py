@@ -76,13 +76,12 @@ def _without_replaced(record: LinearSheet, values: dict[str, Any], changes: Mapp
 def _need_all(record: LinearSheet, reference: str, values: Mapping[str, Any], where: str) -> None:
     for need, keys in record.NEEDS.items():
         if not any(key in values for key in keys):
-            raise InputError(
-                f"{where} from {shown(reference)}: the record lacks {need}, see {record.where(need)}; give {where}.{need} beside `from`"
-            )
+            lacks = f"the record lacks {need}, see {record.where(need)}; give {where}.{need} beside `from`"
+            raise InputError(lacks, table=where, record=shown(reference))
     open_choices = record.open_choices(values)
     if open_choices:
         what = " and ".join(f"{where}.{key} ({text})" for key, text in open_choices.items())
-        raise InputError(f"{where} from {shown(reference)}: give {what} beside `from`; no record says it")
+        raise InputError(f"give {what} beside `from`; no record says it", table=where, record=shown(reference))
 
 
 def _at_preload(record: ScrewSheet, preload: Any, values: Mapping[str, Any], where: str) -> dict[str, float]:

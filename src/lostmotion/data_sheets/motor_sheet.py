@@ -174,11 +174,13 @@ class MotorSheet(described.MotorHeatFields, Record):
         if self.kind == "synchronous":
             for key in ("winding", "dc_voltage"):
                 if getattr(self, key) is None:
-                    raise InputError(f"{self.name}: lacks {key}; see {self.where(key)}")
+                    raise InputError(f"lacks {key}; see {self.where(key)}", where=self.name)
             return self.motor()
         for key in ("pole_pairs", "torque_constant", "resistance", "inductance"):
             if getattr(self, key) is None:
-                raise InputError(f"{self.name}: lacks {key}, which a synchronous motor needs; see {self.where(key)}")
+                raise InputError(
+                    f"lacks {key}, which a synchronous motor needs; see {self.where(key)}", where=self.name
+                )
         winding = Winding(
             pole_pairs=self.pole_pairs,
             resistance_line_to_line=self.resistance,
@@ -190,7 +192,7 @@ class MotorSheet(described.MotorHeatFields, Record):
     def _need_all(self) -> None:
         if missing := self.missing():
             key, where = next(iter(missing.items()))
-            raise InputError(f"{self.name}: lacks {key}; {where}")
+            raise InputError(f"lacks {key}; {where}", where=self.name)
 
     def _friction(self) -> float:
         """T_10 [N·m]."""

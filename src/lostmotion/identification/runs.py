@@ -95,8 +95,8 @@ def run_logs(
             except InputError as problem:
                 if not by:
                     raise
-                keys, reason = problem.problems[0]
-                raise NoDerivativeError(next(iter(keys or by)), reason) from None
+                first = problem.problems[0]
+                raise NoDerivativeError(next(iter(first.keys or by)), first.reason) from None
             for course, row in zip(alike, rows, strict=True):
                 course.take(row)
     return [c.seen() for c in courses]

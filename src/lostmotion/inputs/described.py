@@ -51,7 +51,7 @@ class Described(Part):
         return {key: getattr(self, key) for key in keys}
 
     def fields_of(self, part: "type[Described]") -> dict[str, Any]:
-        """What the core describes of a part, tables as mappings."""
+        """Values of the keys that a base has from the core, tables as mappings."""
         values = ((key, getattr(self, key)) for key in part.described)
         return {key: v.fields_of(type(v)) if isinstance(v, Described) else v for key, v in values}
 

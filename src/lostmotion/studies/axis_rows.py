@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..data_sheets.linear_sheets import LinearMotorSheet
-from ..errors import InputError
+from ..errors import InputError, Problem
 from ..model.gearbox import Gearbox
 from ..model.motor import Motor
 from ..simulation.scenario import Scenario
@@ -43,7 +43,7 @@ from ..worker_threads import thread_pool
 from .axis import AxisTask, reference_of
 from .axis_columns import COLUMNS, Repeated, row_of
 from .axis_run import until_it_repeats
-from .check import ESTIMATED, columns_of
+from .check import BETWEEN, ESTIMATED, MISSING, columns_of
 from .check import TASK_COLUMNS as CHECKS
 from .choice import CHOICE, lacks, value_of
 from .choice import judged as judged_choice
@@ -152,9 +152,9 @@ class Axes:
     def judged(self, row: np.ndarray) -> list[Finding] | InputError:
         """Findings for a pair before any run, or the error of a record that lacks data for a run."""
         gearbox, motor = self.gearbox(row), self.motor(row)
-        lacking = list(dict.fromkeys(str(error) for error in (gearbox, motor) if isinstance(error, InputError)))
-        if lacking:
-            return InputError("; ".join(lacking))
+        errors = [error for error in (gearbox, motor) if isinstance(error, InputError)]
+        if errors:
+            return InputError(problems=list(dict.fromkeys(p for error in errors for p in error.problems)))
         assert not isinstance(gearbox, InputError)
         assert not isinstance(motor, InputError)
         demand, findings = gearbox
@@ -164,7 +164,7 @@ class Axes:
                 f"the sheet of the motor lacks its winding, which select for {of} needs; take mechanical_energy"
             )
         if lacking:
-            return InputError("; ".join(lacking))
+            return InputError(problems=[Problem((), text) for text in lacking])
         task, load, slides = self.task, float(self.motion().inertia.max()), self.study.slides_itself(row)
         largest = None if slides else task.max_inertia_ratio
         found = check_motor(demand, motor, load, task.ambient_temperature, largest, slides=slides)
@@ -246,7 +246,8 @@ class Axes:
         """The columns of a pair that the rules refuse; None if it is to be run."""
         found = self.judged(row)
         if isinstance(found, InputError):
-            return CHECKS | {"violated": NO_DATA, "why": str(found)}
+            lacking = BETWEEN.join(p.of_any_record() for p in found.problems)
+            return CHECKS | {"violated": NO_DATA, "why": str(found), MISSING: lacking}
         if not any(f.verdict == "warning" for f in found):
             return None
         return columns_of(found, CHECKS) | {column: value for column, (value, _) in self.choice(row).items()}

@@ -17,7 +17,9 @@ COLUMNS: dict[str, float | str] = {f"{USE}{rule}": math.nan for rule in SHARES} 
 ESTIMATED = "estimated losses"
 """column of tasks: verdict over the range of estimated losses"""
 MISSING = "missing data"
-"""column of tasks: what the rules that are not judged lack"""
+"""column of tasks: what the rules that are not judged lack, or what its records lack for a run"""
+BETWEEN = " | "
+"""stands between two of these"""
 TASK_COLUMNS: dict[str, float | str] = {f"{USE}{rule}": math.nan for rule in TASK_SHARES} | dict.fromkeys(
     (*TEXTS, MISSING, ESTIMATED), ""
 )
@@ -49,5 +51,5 @@ def columns_of(findings: Iterable[Finding], columns: Mapping[str, float | str] =
     unknown = [f for f in findings if f.verdict == "unknown"]
     row["not judged"] = " ".join(dict.fromkeys(f.rule for f in unknown))
     if MISSING in columns:
-        row[MISSING] = "; ".join(dict.fromkeys(f"{f.rule}: {f.remark}" for f in unknown))
+        row[MISSING] = BETWEEN.join(dict.fromkeys(f"{f.rule}: {f.remark}" for f in unknown))
     return row

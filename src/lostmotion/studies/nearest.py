@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -210,22 +209,18 @@ class Lacking:
 
 
 def not_judged(ranked: list[Candidate]) -> list[Lacking]:
-    """The records that lack what a run needs, grouped by the datum, with the candidates that this concerns."""
-    return _by_datum((_without_names(c.why), c.name) for c in ranked if NO_DATA in c.violated)
+    """Data that records lack for a run, with the candidates that this concerns."""
+    return _by_datum(c for c in ranked if NO_DATA in c.violated)
 
 
 def rules_not_judged(ranked: list[Candidate]) -> list[Lacking]:
     """The rules that are not judged, grouped by the datum that is missing, with the candidates that this concerns."""
-    return _by_datum((text, c.name) for c in ranked for text in c.missing)
+    return _by_datum(c for c in ranked if NO_DATA not in c.violated)
 
 
-def _by_datum(lacking: Iterable[tuple[str, str]]) -> list[Lacking]:
+def _by_datum(found: Iterable[Candidate]) -> list[Lacking]:
     groups: dict[str, list[str]] = {}
-    for datum, name in lacking:
-        groups.setdefault(datum, []).append(name)
+    for c in found:
+        for text in c.missing:
+            groups.setdefault(text, []).append(c.name)
     return [Lacking(text, tuple(names)) for text, names in sorted(groups.items(), key=lambda pair: -len(pair[1]))]
-
-
-def _without_names(text: str) -> str:
-    """Reason of records that lack data, without their names."""
-    return re.sub(r"brake of [a-z0-9.-]+", "brake of the motor", re.sub(r" from (\"[^\"]*\"|'[^']*')", "", text))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..units.practical import practical
-from .check import ESTIMATED, MISSING
+from .check import BETWEEN, ESTIMATED, MISSING
 from .choice import CHOICE
 from .records import shown_name
 from .select import TASK_SHARES, USE, Selection
@@ -48,7 +48,7 @@ class Candidate:
     choice: dict[str, float] = field(default_factory=dict)
     """mass, length, price and lead time of the pair of a task, as far as they are known"""
     missing: tuple[str, ...] = ()
-    """rules of a task that are not judged, each with the datum that is missing"""
+    """rules of a task that are not judged, each with the datum that is missing, or what its records lack for a run"""
     over: dict[str, float] = field(default_factory=dict)
     """by limit: by how much it is exceeded, as a share of it, where that is a number"""
 
@@ -109,7 +109,7 @@ def _candidate(
         return Candidate(row["run"], name, (NOT_RUN,), row["error"], "", values)
     violated, why = row.get("violated", "").split(), [row["why"]] if row.get("why") else []
     over = {rule: use - 1.0 for rule in violated if math.isfinite(use := row.get(f"{USE}{rule}", math.nan))}
-    missing = tuple(filter(None, row.get(MISSING, "").split("; ")))
+    missing = tuple(filter(None, row.get(MISSING, "").split(BETWEEN)))
     ran, tightest = study.axis is None or not math.isnan(row["cycles"]), ""  # a task refuses some before any run
     if ran:
         for column, bound in bounds.items():
