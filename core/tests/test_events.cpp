@@ -45,13 +45,11 @@ struct BouncingBall {
     static const Form& torque_at_load(const Regime& r) { return r.output_torque[0]; }
 
     double restitution = 0.5;
-    Regime build(const Key& key) const {
-        Regime r;
+    void build(const Key& key, Regime& r) const {
         r.key = key;
         r.rate[height] = Form::unit(speed);
         r.rate[speed] = Form::unit(Dims::one, -9.81);
         r.guards[r.n_guards++] = Guard{Form::unit(height), Guard::speed, ground};
-        return r;
     }
     template <class Cache>
     Found start(Cache&, InstantOf<Dims>&, Key&) const {

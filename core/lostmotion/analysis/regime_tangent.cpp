@@ -19,10 +19,10 @@ std::optional<model::Row> channel_form(const model::Assembly& a, const model::Re
     }
 }
 
-auto RegimeTangents::operator()(const model::Key& key, const model::Regime& regime) -> RegimeTangent& {
+auto RegimeTangents::operator()(const model::Key& key) -> RegimeTangent& {
     if (last_ != nullptr && last_->regime.key == key) return *last_;
     std::unique_ptr<RegimeTangent>& t = all_[key];
-    if (!t) t = compose(regime);
+    if (!t) t = compose(key);
     return *(last_ = t.get());
 }
 
@@ -42,11 +42,12 @@ void RegimeTangents::prepare(RegimeTangent& t, double base) const {
                          std::move(M), std::move(dM), base);
 }
 
-auto RegimeTangents::compose(const model::Regime& r) const -> std::unique_ptr<RegimeTangent> {
+auto RegimeTangents::compose(const model::Key& key) const -> std::unique_ptr<RegimeTangent> {
     auto t = std::make_unique<RegimeTangent>();
+    trains_.base().build(key, t->regime);
+    const model::Regime& r = t->regime;
     const int terms = layout().terms, parameters = inputs_.parameters();
     const auto room = [&](std::size_t rows) { return Varied(static_cast<int>(rows), terms, parameters); };
-    t->regime = r;
     t->rate = room(r.rate.size());
     t->guard = room(r.guards.size());
     t->output_torque = room(r.output_torque.size());

@@ -49,14 +49,14 @@ class RegimeTangents {
     }
 
     // base: a length [s] over which the series of this regime converge.
-    RegimeTangent& operator()(const model::Key& key, const model::Regime& regime);
+    RegimeTangent& operator()(const model::Key& key);
     void prepare(RegimeTangent& t, double base) const;
     const std::vector<TrainChannel>& channels() const { return channels_; }
 
  private:
     const model::Layout& layout() const { return trains_.base().layout(); }
 
-    std::unique_ptr<RegimeTangent> compose(const model::Regime& r) const;
+    std::unique_ptr<RegimeTangent> compose(const model::Key& key) const;
     void add(RegimeTangent& t, const VariedTrain::Beside& b) const;
 
     const std::shared_ptr<const VariedTrain> varied_;

@@ -171,7 +171,7 @@ class TrainSensitivity final : public TrainWatcher<D> {
     }
     void enter(const typename System::Regime& r) {
         regime_ = &r;
-        tangent_ = &regimes_(r.key, r.rows);
+        tangent_ = &regimes_(r.key);
         if (!tangent_->alike && !ended()) {
             output_.ends_at = time_;
             output_.ends_by = "a regime that has other conditions beside the value of a parameter";
@@ -231,7 +231,7 @@ class TrainSensitivity final : public TrainWatcher<D> {
     void set_held(const typename LockedTorques<D>::Hold& hold, const double* torques, const double* derivatives,
                   double* to) {
         const RegimeTangent& rest = *tangent_;
-        const RegimeTangent& in = hold.at_limit ? regimes_(hold.at_limit->key, hold.at_limit->rows) : rest;
+        const RegimeTangent& in = hold.at_limit ? regimes_(hold.at_limit->key) : rest;
         const auto set_row = [&](int memory) { return to + (n_.first_memory + memory) * parameters_; };
         for (const auto& l : in.regime.locked)
             std::copy_n(derivatives + l.contact * parameters_, parameters_, set_row(l.memory));

@@ -5,6 +5,8 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
+#include <type_traits>
 #include <vector>
 
 #include "row.hpp"
@@ -18,9 +20,10 @@ struct Key {
     std::array<std::int8_t, max_contacts> modes{};
     std::array<std::int16_t, max_branches> branch{};
 
-    friend bool operator==(const Key&, const Key&) = default;
+    friend bool operator==(const Key& a, const Key& b) { return std::memcmp(&a, &b, sizeof(Key)) == 0; }
     std::size_t hash() const;
 };
+static_assert(std::has_unique_object_representations_v<Key>);
 struct KeyHash {
     std::size_t operator()(const Key& k) const { return k.hash(); }
 };

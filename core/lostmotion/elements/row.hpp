@@ -1,9 +1,12 @@
-// Linear forms of a train while it is composed: run-time layout, fixed storage, so that nothing is allocated.
+// Linear forms of a train while it is composed, by its layout. Those of a small train allocate nothing.
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstring>
+#include <memory>
+#include <utility>
 
 namespace lostmotion::model {
 
@@ -23,10 +26,19 @@ struct Layout {
 class Coefficients {
  public:
     Coefficients() {}
-    Coefficients(const Coefficients& o) : size_(o.size_) { std::copy_n(o.c_.begin(), size_, c_.begin()); }
+    Coefficients(const Coefficients& o) { *this = o; }
+    Coefficients(Coefficients&& o) noexcept { *this = std::move(o); }
     Coefficients& operator=(const Coefficients& o) {
         size_ = o.size_;
-        std::copy_n(o.c_.begin(), size_, c_.begin());
+        if (size_ > few && many_ == nullptr) many_ = room_for_all();
+        copy(o.begin(), size_, data());
+        return *this;
+    }
+    Coefficients& operator=(Coefficients&& o) noexcept {
+        if (o.many_ == nullptr) return *this = std::as_const(o);
+        size_ = o.size_;
+        std::swap(many_, o.many_);
+        if (o.many_ == nullptr) o.size_ = 0;
         return *this;
     }
 
@@ -35,28 +47,39 @@ class Coefficients {
     void reach(std::size_t size) {
         if (size <= size_) return;
         const std::size_t whole = (size + 3) / 4 * 4;
-        std::fill(c_.begin() + static_cast<std::ptrdiff_t>(size_), c_.begin() + static_cast<std::ptrdiff_t>(whole),
-                  0.0);
+        if (whole > few && many_ == nullptr) {
+            many_ = room_for_all();
+            copy(few_.data(), size_, many_.get());
+        }
+        for (double *to = data() + size_, *end = data() + whole; to != end; to += 4) std::fill_n(to, 4, 0.0);
         size_ = whole;
     }
     template <class Index>
     double operator[](Index k) const {
-        return static_cast<std::size_t>(k) < size_ ? c_[static_cast<std::size_t>(k)] : 0.0;
+        return static_cast<std::size_t>(k) < size_ ? begin()[k] : 0.0;
     }
     template <class Index>
     double& operator[](Index k) {
         reach(static_cast<std::size_t>(k) + 1);
-        return c_[static_cast<std::size_t>(k)];
+        return data()[k];
     }
-    const double* begin() const { return c_.data(); }
-    const double* end() const { return c_.data() + size_; }
-    double* data() { return c_.data(); }
+    const double* begin() const { return many_ == nullptr ? few_.data() : many_.get(); }
+    const double* end() const { return begin() + size_; }
+    double* data() { return many_ == nullptr ? few_.data() : many_.get(); }
 
  private:
+    static constexpr std::size_t few = 20;
+    static_assert(few % 4 == 0 && max_columns % 4 == 0);
+    static void copy(const double* from, std::size_t size, double* to) {  // in fours
+        for (std::size_t k = 0; k < size; k += 4) std::memcpy(to + k, from + k, 4 * sizeof(double));
+    }
+    static std::unique_ptr<double[]> room_for_all() { return std::make_unique_for_overwrite<double[]>(max_columns); }
+
+    // As far as size_; the many, once there have been more than a few.
     std::size_t size_ = 0;
-    std::array<double, max_columns> c_;  // as far as size_
+    std::unique_ptr<double[]> many_;
+    std::array<double, few> few_;
 };
-static_assert(max_columns % 4 == 0);
 
 // sum_k c[k] * term[k]
 struct Row {
@@ -66,11 +89,25 @@ struct Row {
     Row& operator+=(const Row& o);
     Row& operator-=(const Row& o);
     Row& operator*=(double a);
-    friend Row operator+(Row a, const Row& b) { return a += b; }
-    friend Row operator-(Row a, const Row& b) { return a -= b; }
-    friend Row operator*(double a, Row f) { return f *= a; }
-    friend Row operator/(Row f, double a) { return f *= 1.0 / a; }
-    friend Row operator-(Row f) { return f *= -1.0; }
+    friend Row operator+(const Row& a, const Row& b) {
+        return copy(a, [&](Row& out) { out += b; });
+    }
+    friend Row operator-(const Row& a, const Row& b) {
+        return copy(a, [&](Row& out) { out -= b; });
+    }
+    friend Row operator*(double a, const Row& f) {
+        return copy(f, [&](Row& out) { out *= a; });
+    }
+    friend Row operator/(const Row& f, double a) { return 1.0 / a * f; }
+    friend Row operator-(const Row& f) { return -1.0 * f; }
+
+ private:
+    template <class Change>
+    static Row copy(const Row& f, Change&& change) {
+        Row out = f;
+        change(out);
+        return out;
+    }
 };
 
 // Makes the forms that an element states.

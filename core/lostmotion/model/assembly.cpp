@@ -2,8 +2,7 @@
 
 namespace lostmotion::model {
 
-Regime Assembly::build(const Key& key) const {
-    Regime r;
+void Assembly::build(const Key& key, Regime& r) const {
     r.key = key;
     r.ties = places().ties(key.modes.data());
     for (int c = 0; c < layout().contacts; ++c)
@@ -26,7 +25,6 @@ Regime Assembly::build(const Key& key) const {
     for (Guard& g : r.guards) r.put_massless_speeds(g.form);
     for (LockedTorque<Row>& l : r.locked)
         for (Row* f : {&l.low, &l.high, &l.needs, &l.friction}) r.put_massless_speeds(*f);
-    return r;
 }
 
 }  // namespace lostmotion::model

@@ -10,7 +10,13 @@ class Assembly : public ElementForms {
     explicit Assembly(Train train, bool with_remainders = false)
         : ElementForms(std::move(train), with_remainders), equations_(*this) {}
 
-    Regime build(const Key& key) const;
+    // r: as it has been made, but for the room for its guards.
+    void build(const Key& key, Regime& r) const;
+    Regime build(const Key& key) const {
+        Regime r;
+        build(key, r);
+        return r;
+    }
 
  private:
     Equations equations_;

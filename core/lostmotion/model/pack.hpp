@@ -49,9 +49,14 @@ using PackedForm = LinearFormOf<D>;
 template <class D, class F = PackedForm<D>>
 F pack(const Row& f, const Layout& n) {
     F out{};
-    const auto copy = [&](int from, int count, int to) {
-        for (int k = 0; k < count; ++k) out.c[static_cast<std::size_t>(to + k)] = f.c[from + k];
+    const auto copy = [&, known = static_cast<int>(f.c.size())](int from, int count, int to) {
+        std::copy_n(f.c.begin() + from, std::clamp(known - from, 0, count), out.c.begin() + to);
     };
+    // With the same places in the kernel.
+    if (n.coupled == D::coupled && n.angles == D::angles && n.memory == D::memory) {
+        copy(0, n.terms, 0);
+        return out;
+    }
     copy(0, n.coupled, 0);
     copy(n.coupled, n.angles, D::coupled);
     copy(n.one, 1, D::one);
@@ -132,10 +137,10 @@ inline std::vector<GivenState> given_states(const Regime& r, const Places& place
     return out;
 }
 
+// out: as it has been made.
 template <class D>
-PackedRegime<D> pack(const Regime& r, const Assembly& a) {
+void pack(const Regime& r, const Assembly& a, PackedRegime<D>& out) {
     const Layout& n = a.layout();
-    PackedRegime<D> out;
     out.key = r.key;
     for (int k = 0; k < n.states; ++k) out.rate[k < n.coupled ? k : D::coupled + k - n.coupled] = pack<D>(r.rate[k], n);
     for (std::size_t g = 0; g < r.output_torque.size(); ++g) {
@@ -166,6 +171,11 @@ PackedRegime<D> pack(const Regime& r, const Assembly& a) {
                               pack<D>(l.high, n), pack<D>(l.needs, n), pack<D>(l.friction, n), l.needs_torque});
     out.in_data = r.in_data;
     out.given = given_states(r, a.places());
+}
+template <class D>
+PackedRegime<D> pack(const Regime& r, const Assembly& a) {
+    PackedRegime<D> out;
+    pack(r, a, out);
     return out;
 }
 

@@ -24,7 +24,7 @@ using Widest = std::conditional_t<
 
 template <class D>
 struct TrainRegime : PackedRegime<D> {
-    model::Regime rows;  // as composed: torques and power flows of the elements
+    model::Regime rows;  // as composed, without its guards: torques and power flows of the elements
     // The flows of power by their number, once they have been asked for.
     struct Flow {
         int number;
@@ -43,8 +43,10 @@ class TrainSystem {
     using State = StateOf<D>;
 
     explicit TrainSystem(const Assembly& assembly) : assembly_(assembly), search_(assembly, D{}) {
-        for (const GearPlace& g : assembly.places().gears)
+        for (const GearPlace& g : assembly.places().gears) {
             if (g.twist != nowhere) twists_[n_twists_++] = g.twist;
+            has_parametric_work_ = has_parametric_work_ || g.parametric_work != nowhere;
+        }
     }
 
     const Assembly& assembly() const { return assembly_; }
@@ -52,11 +54,18 @@ class TrainSystem {
     bool overflowed() const { return overflowed_; }
     SearchCounts& searches() const { return search_.searches; }
 
-    Regime build(const Key& key) const {
-        model::Regime rows = assembly_.build(key);
-        Regime r{pack<D>(rows, assembly_), {}};
-        r.rows = std::move(rows);
+    // r: as it has been made.
+    void build(const Key& key, Regime& r) const {
+        r.rows.guards.swap(room_);
+        assembly_.build(key, r.rows);
+        pack<D>(r.rows, assembly_, r);
+        r.rows.guards.swap(room_);
+        room_.clear();
         if (!r.complete) overflowed_ = true;
+    }
+    Regime build(const Key& key) const {
+        Regime r;
+        build(key, r);
         return r;
     }
     // In these modes, at the instant and the torques of another regime.
@@ -67,14 +76,15 @@ class TrainSystem {
     Found start(Cache& cache, InstantOf<D>& now, Key& key) const {
         const Found found = search_.start(cache, now, key);
         add_parametric_work(assembly_.meshes_at(now.x), key, now);
-        return overflowed_ ? Found::outside : found;
+        return certain(found);
     }
     template <class Cache>
     Found next(Cache& cache, InstantOf<D>& now, const Guard* fired, Key& key, const InputsOf<D>& input) const {
+        if (!has_parametric_work_) return certain(search_.next(cache, now, fired, key, input));
         const Key before = key;
         const Found found = search_.next(cache, now, fired, key, input);
         add_parametric_work(before, key, now);
-        return overflowed_ ? Found::outside : found;
+        return certain(found);
     }
     void near_event(const FormTable<D, D::guards>& guards, typename FormTable<D, D::guards>::Values& out) const {
         search_.near_event(guards, out);
@@ -130,6 +140,7 @@ class TrainSystem {
     }
 
  private:
+    Found certain(Found found) const { return overflowed_ ? Found::outside : found; }
     // A step of the stiffness changes the energy of a spring at the twist that it has.
     void add_parametric_work(const Key& before, const Key& after, InstantOf<D>& now) const {
         for (std::size_t g = 0; g < assembly_.train().gears.size(); ++g) {
@@ -146,7 +157,9 @@ class TrainSystem {
     SwitchedTrain<D> search_;
     std::array<int, D::coupled> twists_{};
     int n_twists_ = 0;
+    bool has_parametric_work_ = false;
     mutable bool overflowed_ = false;
+    mutable std::vector<model::Guard> room_;
 };
 
 }  // namespace lostmotion::model

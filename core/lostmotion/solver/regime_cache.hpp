@@ -64,10 +64,7 @@ class RegimeCache {
         std::array<Entry*, D::guards> neighbour{};  // what lies beyond each guard, as far as it is known
 
         void set(const System& system, const Key& key) {
-            if constexpr (std::is_trivially_destructible_v<Regime>)
-                new (&regime) Regime(system.build(key));  // in place, since they are large
-            else
-                regime = system.build(key);
+            system.build(key, regime);
             const Regime& r = regime;
             new (&rates) LinearRatesOf<D>(r.rate);
             if constexpr (requires { r.given; }) rates.given = r.given.empty() ? nullptr : &r.given;
@@ -161,11 +158,9 @@ class RegimeCache {
     RegimeCache(const RegimeCache&) = delete;
     RegimeCache& operator=(const RegimeCache&) = delete;
 
-    const Regime& regime(Key key) { return entry(key).regime; }
+    const Regime& regime(const Key& key) { return entry(key).regime; }
 
-    Entry& entry(Key key) {  // by value: two words in registers
-        return last_ != nullptr && key == last_->regime.key ? *last_ : find(key);
-    }
+    Entry& entry(const Key& key) { return last_ != nullptr && key == last_->regime.key ? *last_ : find(key); }
     // What lies beyond a guard of another regime; its key is asked for the first time only.
     template <class Key>
     Entry& beyond(Entry& from, int guard, Key&& key) {
@@ -195,25 +190,28 @@ class RegimeCache {
  private:
     static constexpr std::size_t max_kept = 4000;  // from run to run; each takes about 12 kilobytes
 
-    [[gnu::noinline]] Entry& find(Key key) {
+    [[gnu::noinline]] Entry& find(const Key& key) {
         std::size_t k = slot(key);
         if (slots_[k] == nullptr) {
             if (2 * (used_ + 1) > slots_.size()) k = grow(key);
-            if (used_ == entries_.size()) entries_.push_back(std::make_unique<Entry>());
+            if (used_ == entries_.size())
+                entries_.push_back(std::make_unique_for_overwrite<Entry>());
+            else
+                entries_[used_]->regime = {};
             slots_[k] = entries_[used_++].get();
             slots_[k]->set(system_, key);
         }
         return *(last_ = slots_[k]);
     }
     // Where the regime is, or where it has to go.
-    std::size_t slot(Key key) const {
+    std::size_t slot(const Key& key) const {
         const std::size_t mask = slots_.size() - 1;
         std::size_t k = key.hash() & mask;
         while (slots_[k] != nullptr && !(slots_[k]->regime.key == key)) k = (k + 1) & mask;
         return k;
     }
     // Makes room for more; returns the slot of a key anew.
-    std::size_t grow(Key key) {
+    std::size_t grow(const Key& key) {
         slots_.assign(2 * slots_.size(), nullptr);
         for (std::size_t n = 0; n < used_; ++n) slots_[slot(entries_[n]->regime.key)] = entries_[n].get();
         return slot(key);
