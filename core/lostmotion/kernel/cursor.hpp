@@ -46,6 +46,7 @@ class Cursor {
         rate_known_ = carries_rate_ = true;
     }
     InputState<D>& inputs() { return input_; }
+    const std::vector<GivenState>* given() const { return propagator_->rates().given; }
     // From now on the constant, which is the same, is in another place.
     void keep(const Column& constant) { constant_ = &constant; }
 
@@ -57,7 +58,9 @@ class Cursor {
         rate_known_ = true;
         return rate_;
     }
-    Coupled fourth_derivative() const { return propagator_->taylor().fourth_derivative(coupled(rate()), input_); }
+    [[gnu::always_inline]] Coupled fourth_derivative() const {
+        return propagator_->taylor().fourth_derivative(coupled(rate()), input_);
+    }
 
     void anchor(double time) {
         input_.follow(time);

@@ -36,7 +36,9 @@ class Flow {
         return rounding * magnitude + time_rounding * std::fabs(now_.time * rate);
     }
     // Value of the k-th derivative of a form, k > 0, and the sum of the magnitudes of its terms.
-    double rate(const LinearForm& f, int k) { return evaluate_rate<D>(f, derivative(k), now_.input[k]); }
+    [[gnu::always_inline]] double rate(const LinearForm& f, int k) {
+        return evaluate_rate<D>(f, derivative(k), now_.input[k]);
+    }
     double rate_magnitude(const LinearForm& f, int k) {
         const State& terms = magnitude(k);
         const auto& u = now_.input[k];
@@ -47,7 +49,7 @@ class Flow {
     }
 
  private:
-    const State& derivative(int k) {
+    [[gnu::always_inline]] const State& derivative(int k) {
         if (order_ == 0) {
             x_[1] = rates_(now_.x, rates_.constant(now_.memory), now_.input[0]);
             order_ = 1;

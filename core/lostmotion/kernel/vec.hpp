@@ -178,7 +178,10 @@ struct Pack {
     [[gnu::always_inline]] void store(double* to) const {
         for (int p = 0; p < parts; ++p) lostmotion::store(part[p], to + p * width);
     }
-    [[gnu::always_inline]] double operator[](int k) const { return part[k / width][k % width]; }
+    [[gnu::always_inline]] double operator[](int k) const {
+        const auto at = static_cast<unsigned>(k);  // which is divided by a shift
+        return part[at / width][at % width];
+    }
     void set(int k, double number) { part[k / width][k % width] = number; }
     // In pairs, four at a time: in the same order in every build.
     [[gnu::always_inline]] double sum() const {

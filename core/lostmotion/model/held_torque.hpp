@@ -15,14 +15,14 @@ struct HeldTorque {
 
 // As it was before, or at the nearest value that its own contact and the friction of the shaft behind it can hold.
 // torques: of gears and couplings before, by contact. value(form): of a form now.
-template <class Form, class Value>
-HeldTorque held_torque(const LockedTorque<Form>& l, const std::array<double, max_contacts>& torques, Value&& value) {
+template <class Form, class Torques, class Value>
+HeldTorque held_torque(const LockedTorque<Form>& l, const Torques& torques, Value&& value) {
     constexpr double unbounded = std::numeric_limits<double>::infinity();
     HeldTorque low{l.has_low ? value(l.low) : -unbounded, Bound::low},
         high{l.has_high ? value(l.high) : unbounded, Bound::high};
     if (l.on_held_shaft) {
         double needs = value(l.needs);
-        for (int c = 0; c < max_contacts; ++c)
+        for (std::size_t c = 0; c < torques.size(); ++c)
             if (l.needs_torque[c] != 0.0) needs += l.needs_torque[c] * torques[c];
         const double friction = value(l.friction);
         HeldTorque lower = low, upper = high;

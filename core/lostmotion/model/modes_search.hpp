@@ -19,15 +19,37 @@ void SwitchedTrain<Sizes>::set_near_event() {
 template <class Sizes>
 template <class X, class AtRest>
 void SwitchedTrain<Sizes>::stop(X& x, AtRest& at_rest) const {
-    std::array<std::int8_t, max_contacts> modes{};
-    for (int c = 0; c < contacts(); ++c) modes[c] = at_rest[c] ? 0 : 1;
-    Ties ties = places().ties(modes.data(), nullptr, true);
-    for (int c = 0; c < contacts(); ++c)
-        at_rest[c] = places().contacts[c].may_rest(x) && kept_at_rest(places().contacts[c], ties);
-    if (!places().driven.empty()) {  // whose speeds stay what they are, to the last bit
+    const auto bits = [&] {
+        std::uint32_t all = 0;
+        for (int c = 0; c < contacts(); ++c) all |= std::uint32_t{at_rest[c]} << c;
+        return all;
+    };
+    const Stopped& all = stopped(bits());
+    for (int c = 0; c < contacts(); ++c) at_rest[c] = (all.kept >> c & 1) != 0 && places().contacts[c].may_rest(x);
+    if (places().driven.empty()) {
+        set_tied_speeds(x, all.ties);
+    } else {  // whose speeds stay what they are, to the last bit
+        std::array<std::int8_t, max_contacts> modes{};
         for (int c = 0; c < contacts(); ++c) modes[c] = at_rest[c] ? 0 : 1;
-        ties = places().ties(modes.data());
+        set_tied_speeds(x, places().ties(modes.data()));
     }
+}
+
+template <class Sizes>
+auto SwitchedTrain<Sizes>::stopped(std::uint32_t at_rest) const -> const Stopped& {
+    std::unique_ptr<Stopped>& known = stopped_[at_rest % stopped_.size()];
+    if (known != nullptr && known->at_rest == at_rest) return *known;
+    std::array<std::int8_t, max_contacts> modes{};
+    for (int c = 0; c < contacts(); ++c) modes[c] = (at_rest >> c & 1) != 0 ? 0 : 1;
+    known = std::make_unique<Stopped>(Stopped{at_rest, 0, places().ties(modes.data(), nullptr, true)});
+    for (int c = 0; c < contacts(); ++c)
+        known->kept |= std::uint32_t{kept_at_rest(places().contacts[c], known->ties)} << c;
+    return *known;
+}
+
+template <class Sizes>
+template <class X>
+void SwitchedTrain<Sizes>::set_tied_speeds(X& x, const Ties& ties) const {
     for (std::size_t s = 0; s < train().shafts.size(); ++s) {
         double& w = x[places().shafts[s].speed];
         if (!ties.at_rest[s] && !ties.follows(static_cast<int>(s))) continue;
@@ -117,11 +139,12 @@ Found SwitchedTrain<Sizes>::next(Cache& cache, Now& now, const G* fired, Key& ke
     if (fired != nullptr && fired->kind == Guard::impact) return strikes(cache, now, *fired, key);
     Rest given_rest{};
     const bool comes_to_rest = fired == nullptr && follow_given(now, key, given_rest);
-    if (fired != nullptr ? goes_on(cache, now, *fired, key) : !comes_to_rest && stays(cache, now, key, input))
+    auto& ended = look_up(cache, key);
+    if (fired != nullptr ? goes_on(cache, ended, now, *fired, key) : !comes_to_rest && stays(ended, now, input))
         return Found::yes;
     Now past = now;
     past.input[0] = input;
-    const auto& old = cache.regime(key);
+    const auto& old = regime_of(ended);
     Event event;
     event.before = key;
     for (std::size_t g = 0; g < train().gears.size(); ++g) event.gear[g] = evaluate(n_, old.output_torque[g], past);
@@ -143,7 +166,7 @@ Found SwitchedTrain<Sizes>::next(Cache& cache, Now& now, const G* fired, Key& ke
     stop(now.x, event.at_rest);
     past.x = now.x;
     for (int c = 0; c < contacts(); ++c) event.stopped[c] = event.at_rest[c] && !before[c];
-    if (fired != nullptr) {
+    if (fired != nullptr && fired->kind == Guard::capacity) {
         margin_size = magnitude(n_, fired->form, now);
         near = near_event(fired->form);
     }
@@ -221,12 +244,21 @@ Found SwitchedTrain<Sizes>::find(Cache& cache, Now& now, const Now& before, Even
     return search() == Found::yes ? Found::yes : found;
 }
 
+template <class Sizes>
+bool SwitchedTrain<Sizes>::at_its_limit(const Key& key) const {
+    if (!some_redundant_) return false;
+    std::uint64_t modes = 0;
+    for (int c = 0; c < contacts(); ++c) modes |= std::uint64_t{static_cast<unsigned>(key.modes[c]) & 3u} << 2 * c;
+    Limit& known = limits_[modes * 0x9e3779b97f4a7c15u >> 58];
+    if (known.modes != modes) known = {modes, pushes_against_rest(key)};
+    return known.reached;
+}
+
 // A contact that "slips" while those that are stuck keep its speed at zero, or that would have to slip against another
 // that is tied to it, does not move: it gives all that it can, and what everything at rest leaves open follows from
 // that.
 template <class Sizes>
-bool SwitchedTrain<Sizes>::at_its_limit(const Key& key) const {
-    if (!some_redundant_) return false;
+bool SwitchedTrain<Sizes>::pushes_against_rest(const Key& key) const {
     const std::vector<ContactPlace>& all = places().contacts;
     const Ties ties = places().ties(key.modes.data());
     std::array<int, max_shafts> direction{};  // of each free shaft
@@ -250,17 +282,10 @@ bool SwitchedTrain<Sizes>::at_its_limit(const Key& key) const {
 template <class Sizes>
 template <class Cache, class Now>
 Found SwitchedTrain<Sizes>::enumerate(Cache& cache, Now& now, const Event& event, const Key& from, Key& key) const {
-    struct Combination {
-        Key modes;
-        std::ptrdiff_t slips;
-    };
-    std::vector<Combination> all;
-    all.reserve(27);
-    for (std::uint64_t number = 0; static_cast<double>(number) < combinations(event); ++number) {
-        const Key modes = combination(number, event, from);
-        all.push_back(
-            {modes, contacts() - std::ranges::count(modes.modes.begin(), modes.modes.begin() + contacts(), 0)});
-    }
+    Key modes;
+    std::vector<int> slips_of(static_cast<std::size_t>(combinations(event)));
+    for (std::size_t number = 0; number < slips_of.size(); ++number)
+        slips_of[number] = combination(number, event, from, modes);
     const auto before = now.memory;  // all that a trial may change
     Found worst = Found::inconsistent;
     const double limit = event.closest ? max_violation : std::numeric_limits<double>::infinity();
@@ -269,11 +294,13 @@ Found SwitchedTrain<Sizes>::enumerate(Cache& cache, Now& now, const Event& event
     auto of_closest = before;
     for (const bool at_limit : {false, true})
         for (int slips = 0; slips <= contacts(); ++slips)
-            for (const Combination& next : all) {
-                if (next.slips != slips || at_its_limit(next.modes) != at_limit) continue;
+            for (std::size_t number = 0; number < slips_of.size(); ++number) {
+                if (slips_of[number] != slips) continue;
+                combination(number, event, from, modes);
+                if (at_its_limit(modes) != at_limit) continue;
                 now.memory = before;
-                const Found found = at_limit ? settle_at_limit(cache, now, next.modes, event, key)
-                                             : settle(cache, now, next.modes, event, key).found;
+                const Found found = at_limit ? settle_at_limit(cache, now, modes, event, key)
+                                             : settle(cache, now, modes, event, key).found;
                 if (found == Found::yes && !event.closest && !at_limit) return found;
                 if (found == Found::outside) worst = found;
                 if (found != Found::yes) continue;
@@ -334,14 +361,15 @@ Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, Ke
         path.clear();
         begun = tried.size();
         for (const auto all = static_cast<std::uint64_t>(combinations(event)); drawn <= all;) {
-            modes = combination(drawn++ * stride % all, event, from);
+            combination(drawn++ * stride % all, event, from, modes);
             if (is_new()) return true;
         }
         return false;
     };
     while (tried.size() < longest_pivoting) {
         now.memory = before;
-        Trial trial = settle(cache, now, modes, event, key);
+        std::vector<Violation> violations;
+        const Trial trial = settle(cache, now, modes, event, key, {&violations});
         if (trial.found == Found::inconsistent && trial.turns_back &&
             settle_at_limit(cache, now, modes, event, key) == Found::yes)
             return Found::yes;
@@ -355,14 +383,14 @@ Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, Ke
                 of_closest = now.memory;
             }
         }
-        std::erase_if(trial.violations, [&](const Violation& v) {
+        std::erase_if(violations, [&](const Violation& v) {
             return !event.at_rest[v.contact] || modes.modes[v.contact] == v.mode;
         });
-        std::sort(trial.violations.begin(), trial.violations.end(), [](const Violation& a, const Violation& b) {
+        std::sort(violations.begin(), violations.end(), [](const Violation& a, const Violation& b) {
             return a.order != b.order ? a.order < b.order : a.relative > b.relative;
         });
         path.push_back(tried.size());
-        tried.push_back({modes, std::move(trial.violations)});
+        tried.push_back({modes, std::move(violations)});
         while (!path.empty() && !lead_on(tried[path.back()])) path.pop_back();
         if (!path.empty() && tried.size() - begun < from_one_start) continue;
         ++searches.fallbacks;
@@ -415,15 +443,15 @@ double SwitchedTrain<Sizes>::violation(const E& e, const Now& now, const Event& 
 // Across an edge of a law or a limit the motion is smooth enough for every contact to go on as it was; if that is
 // consistent there is nothing to search.
 template <class Sizes>
-template <class Cache, class Now, class G>
-bool SwitchedTrain<Sizes>::goes_on(Cache& cache, Now& now, const G& fired, Key& key) const {
+template <class Cache, class E, class Now, class G>
+bool SwitchedTrain<Sizes>::goes_on(Cache& cache, E& from, Now& now, const G& fired, Key& key) const {
     if (!fired.is_edge()) return false;
-    const auto& e = beyond(cache, key, fired);
+    const auto& e = beyond(cache, from, fired);
     if (!regime_of(e).solvable) return false;
     const auto before = now.memory;
     shift(fired, now);
-    std::vector<Violation> of_contacts;
-    if (violated(e, now, Guards{}, nullptr, of_contacts) == nullptr && of_contacts.empty()) {
+    Violated of_contacts;
+    if (first_left(e, now, Guards{}, nullptr, of_contacts) == nullptr && !of_contacts.any) {
         key = regime_of(e).key;
         return true;
     }
@@ -434,16 +462,15 @@ bool SwitchedTrain<Sizes>::goes_on(Cache& cache, Now& now, const G& fired, Key& 
 // An input has changed: does the regime go on? The contacts that move keep their direction. A guard that is zero to
 // rounding has not ended it; the solver finds it if it goes on to fall.
 template <class Sizes>
-template <class Cache, class Now, class Input>
-bool SwitchedTrain<Sizes>::stays(Cache& cache, const Now& now, const Key& key, const Input& input) const {
-    const auto& e = look_up(cache, key);
+template <class E, class Now, class Input>
+bool SwitchedTrain<Sizes>::stays(const E& e, const Now& now, const Input& input) const {
     const auto& r = regime_of(e);
     for (const auto& driver : r.drivers)
         if (falls(driver, input, now.input[0])) return false;
     Event lasting;
     lasting.by_value = true;
-    std::vector<Violation> of_contacts;
-    return violated(e, now, moving(e, r.at_rest), &lasting, of_contacts) == nullptr && of_contacts.empty();
+    Violated of_contacts;
+    return first_left(e, now, moving(e, r.at_rest), &lasting, of_contacts) == nullptr && !of_contacts.any;
 }
 
 }  // namespace lostmotion::model

@@ -74,8 +74,7 @@ void SwitchedTrain<Sizes>::locate(const Now& now, Key& trial) const {
 // The cells of the loss laws, at the output torques T_2.
 template <class Sizes>
 template <class Now>
-void SwitchedTrain<Sizes>::locate_losses(const Now& now, const std::array<double, max_contacts>& T_2,
-                                         Key& trial) const {
+void SwitchedTrain<Sizes>::locate_losses(const Now& now, const Torques& T_2, Key& trial) const {
     for (std::size_t g = 0; g < train().gears.size(); ++g) {
         const Gear& gear = train().gears[g];
         if (!gear.has_dry_losses()) continue;
@@ -95,7 +94,7 @@ template <class Sizes>
 template <class R, class Now>
 void SwitchedTrain<Sizes>::hold(const R& r, Now& now, const Event& event) const {
     if (r.locked.empty()) return;
-    std::array<double, max_contacts> torques{};
+    Torques torques{};
     for (int c = 0; c < contacts(); ++c) {
         const ContactPlace& p = places().contacts[c];
         if (p.kind != ContactPlace::shaft)
@@ -109,13 +108,13 @@ void SwitchedTrain<Sizes>::hold(const R& r, Now& now, const Event& event) const 
 // Is this combination of modes consistent? Pieces and cells are found by a walk that begins at what the torques were.
 template <class Sizes>
 template <class Cache, class Now>
-auto SwitchedTrain<Sizes>::settle(Cache& cache, Now& now, const Key& modes, const Event& event, Key& key) const
-    -> Trial {
+auto SwitchedTrain<Sizes>::settle(Cache& cache, Now& now, const Key& modes, const Event& event, Key& key,
+                                  Violated violated) const -> Trial {
     ++searches.trials;
     Key trial;
     trial.modes = modes.modes;
     locate(now, trial);
-    std::array<double, max_contacts> T_2 = event.gear;
+    Torques T_2 = event.gear;
     for (std::size_t g = 0; g < train().gears.size(); ++g) {
         const GearPlace& p = places().gears[g];
         if (train().gears[g].rigid() || train().gears[g].strikes()) continue;
@@ -127,7 +126,7 @@ auto SwitchedTrain<Sizes>::settle(Cache& cache, Now& now, const Key& modes, cons
     }
     locate_losses(now, T_2, trial);
     if (some_redundant_) hold(cache.regime(trial), now, event);
-    Trial result = walk(cache, now, event, trial, key);
+    Trial result = walk(cache, now, event, trial, key, violated);
     if (result.found == Found::inconsistent && settle_on_corner(cache, now, event, trial, key))
         result.found = Found::yes;
     if (result.found != Found::inconsistent || !event.from_each_load) return result;
@@ -216,7 +215,8 @@ Found SwitchedTrain<Sizes>::settle_at_limit(Cache& cache, Now& now, const Key& m
 // From a piece and a cell across each of their edges that is violated, until none is: do the contacts hold there?
 template <class Sizes>
 template <class Cache, class Now>
-auto SwitchedTrain<Sizes>::walk(Cache& cache, Now& now, const Event& event, Key trial, Key& key) const -> Trial {
+auto SwitchedTrain<Sizes>::walk(Cache& cache, Now& now, const Event& event, Key trial, Key& key,
+                                Violated violated) const -> Trial {
     constexpr int longest_walk = 400;
     Key previous = trial;
     Guards along;  // edges that lead back to where the walk came from: the motion goes along them
@@ -224,21 +224,21 @@ auto SwitchedTrain<Sizes>::walk(Cache& cache, Now& now, const Event& event, Key 
     for (int step = 0; step < longest_walk; ++step) {
         const auto& e = look_up(cache, trial);
         const auto& r = regime_of(e);
-        result.violations.clear();
+        violated.clear();
         if (!r.solvable) return result;
-        const auto* left = violated(e, now, moving(e, event.at_rest) | along, &event, result.violations);
+        const auto* left = first_left(e, now, moving(e, event.at_rest) | along, &event, violated);
         if (left != nullptr && left->kind == Guard::outside) {
             result.found = Found::outside;
             return result;
         }
         if (left == nullptr) {
-            result.turns_back = std::all_of(result.violations.begin(), result.violations.end(),
-                                            [](const Violation& v) { return v.turning; });
-            if (!result.violations.empty() && !event.closest) return result;
-            result.turns_back = false;
+            if (violated.any && !event.closest) {
+                result.turns_back = violated.only_turning;
+                return result;
+            }
             if (event.has_ended(trial) && !event.closest) {
                 if (event.kind != Guard::edge && event.kind != Guard::input_limit) {
-                    result.violations.push_back({event.contact, event.neighbour, n_derivatives, 0.0});
+                    violated.add({event.contact, event.neighbour, n_derivatives, 0.0});
                     return result;
                 }
                 trial.branch[event.branch] = static_cast<std::int16_t>(event.neighbour);

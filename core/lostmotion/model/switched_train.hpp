@@ -12,10 +12,12 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <bitset>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -36,6 +38,16 @@ std::size_t guard_count(const R& r) {
     else
         return r.guards.size();
 }
+
+// For how many contacts, and gears, and for how many guards there is room.
+template <class Sizes>
+struct Room {
+    static constexpr int contacts = max_contacts, guards = max_guards;
+};
+template <int coupled, int angles, int inputs, int memory, int contacts_, int guards_>
+struct Room<Dims<coupled, angles, inputs, memory, contacts_, guards_>> {
+    static constexpr int contacts = contacts_, guards = guards_;
+};
 
 using lostmotion::Found;
 using lostmotion::SearchCounts;
@@ -84,13 +96,15 @@ class SwitchedTrain {
     // Sets the speeds of contacts at rest to what they are, to the last bit, and marks those that this implies.
     template <class X, class AtRest>
     void stop(X& x, AtRest& at_rest) const;
+    template <class X>
+    void set_tied_speeds(X& x, const Ties& ties) const;
 
     // The key in these modes, at the instant and the torques of another regime.
     template <class R, class Now>
     Key branches_at(const R& other, const Key& modes, const Now& now) const {
         Key key;
         key.modes = modes.modes;
-        std::array<double, max_contacts> T_2{};
+        Torques T_2{};
         for (std::size_t g = 0; g < train().gears.size(); ++g) T_2[g] = evaluate(n_, other.output_torque[g], now);
         locate(now, key);
         locate_losses(now, T_2, key);
@@ -101,13 +115,14 @@ class SwitchedTrain {
     mutable SearchCounts searches;
 
  private:
+    using Torques = std::array<double, static_cast<std::size_t>(Room<Sizes>::contacts)>;
     struct Event {
         Rest at_rest{};
-        Rest stopped{};                               // those that have come to rest at this event
-        std::array<double, max_contacts> gear{};      // T_2 of each gear before [N m]
-        std::array<double, max_contacts> coupling{};  // torque of each coupling before [N m], by contact
-        bool with_guard = false;                      // a guard has ended the regime before
-        Guard::Kind kind = Guard::outside;            // and what it was
+        Rest stopped{};                     // those that have come to rest at this event
+        Torques gear{};                     // T_2 of each gear before [N m]
+        Torques coupling{};                 // torque of each coupling before [N m], by contact
+        bool with_guard = false;            // a guard has ended the regime before
+        Guard::Kind kind = Guard::outside;  // and what it was
         int contact = nowhere, branch = nowhere, neighbour = 0, memory = nowhere;
         double shift = 0.0;
         Key before{};
@@ -124,7 +139,7 @@ class SwitchedTrain {
         // The solver has seen this regime to its end.
         bool has_ended(const Key& key) const { return with_guard && kind != Guard::speed && key == before; }
     };
-    using Guards = std::bitset<max_guards>;
+    using Guards = std::bitset<static_cast<std::size_t>(Room<Sizes>::guards)>;
     // For each contact at rest and each mode, -1, 0 and +1: negative where the contact has to change to that mode.
     // Margins of what is stuck, accelerations of what slips; infinite where there is no condition.
     using Conditions = std::array<std::array<double, 3>, max_contacts>;
@@ -138,7 +153,22 @@ class SwitchedTrain {
     struct Trial {
         Found found = Found::inconsistent;
         bool turns_back = false;  // all that is violated is that what drives a contact to its limit turns back
-        std::vector<Violation> violations;  // of the contacts, once piece and cell are found
+    };
+    // What of the contacts is violated; each by itself only where there is a list for them.
+    struct Violated {
+        std::vector<Violation>* each = nullptr;
+        bool any = false, only_turning = true;
+
+        void clear() {
+            if (each != nullptr) each->clear();
+            any = false;
+            only_turning = true;
+        }
+        void add(const Violation& v) {
+            if (each != nullptr) each->push_back(v);
+            any = true;
+            only_turning = only_turning && v.turning;
+        }
     };
 
     int contacts() const { return assembly_.layout().contacts; }
@@ -170,7 +200,14 @@ class SwitchedTrain {
         if (guard.branch != nowhere && guard.memory != nowhere) now.memory[guard.memory] += guard.shift;
     }
 
+    // What contacts at rest, as bits, make of the speeds: found once for each set.
+    struct Stopped {
+        std::uint32_t at_rest, kept;
+        Ties ties;
+    };
+    const Stopped& stopped(std::uint32_t at_rest) const;
     bool at_its_limit(const Key& key) const;
+    bool pushes_against_rest(const Key& key) const;
     bool holds_more(const ContactPlace& c) const;
     template <class Cache, class Now>
     Found find(Cache& cache, Now& now, const Now& before, Event event, Key& key) const;
@@ -191,19 +228,22 @@ class SwitchedTrain {
             if (event.at_rest[c] && !places().contacts[c].bilateral) n *= places().contacts[c].one_way ? 2.0 : 3.0;
         return n;
     }
-    // One of them, by its number: the last contact changes first, from stuck to forward to backward.
-    Key combination(std::uint64_t number, const Event& event, const Key& from) const {
-        Key out;
+    // One of them, by its number: the last contact changes first, from stuck to forward to backward. Returns how many
+    // contacts slip.
+    int combination(std::uint64_t number, const Event& event, const Key& from, Key& out) const {
+        int slips = 0;
         for (int c = contacts(); c-- > 0;) {
             const ContactPlace& p = places().contacts[c];
             if (p.bilateral) continue;
             out.modes[c] = from.modes[c];
-            if (!event.at_rest[c]) continue;
-            const std::uint64_t n = p.one_way ? 2 : 3, mode = number % n;
-            out.modes[c] = mode == 0 ? 0 : mode == 1 && !p.one_way ? +1 : -1;
-            number /= n;
+            if (event.at_rest[c]) {
+                const std::uint64_t n = p.one_way ? 2 : 3, mode = number % n;
+                out.modes[c] = mode == 0 ? 0 : mode == 1 && !p.one_way ? +1 : -1;
+                number /= n;
+            }
+            slips += out.modes[c] != 0;
         }
-        return out;
+        return slips;
     }
     // Impacts of rigid flanks: modes_impact.hpp.
     using MovedShafts = std::array<bool, max_shafts>;
@@ -228,13 +268,13 @@ class SwitchedTrain {
     template <class Cache, class Now>
     Found pivot(Cache& cache, Now& now, const Event& event, Key modes, const Key& from, Key& key) const;
     template <class Cache, class Now>
-    Trial settle(Cache& cache, Now& now, const Key& modes, const Event& event, Key& key) const;
+    Trial settle(Cache& cache, Now& now, const Key& modes, const Event& event, Key& key, Violated violated = {}) const;
     template <class Cache, class Now>
     bool settle_on_corner(Cache& cache, Now& now, const Event& event, const Key& trial, Key& key) const;
     template <class Cache, class Now>
     Found settle_at_limit(Cache& cache, Now& now, const Key& modes, const Event& event, Key& key) const;
     template <class Cache, class Now>
-    Trial walk(Cache& cache, Now& now, const Event& event, Key trial, Key& key) const;
+    Trial walk(Cache& cache, Now& now, const Event& event, Key trial, Key& key, Violated violated = {}) const;
     template <class Cache, class Now>
     bool breaks_away(Cache& cache, Now& now, const Event& event, double margin_size, double near, Key& key) const;
     template <class E, class Now>
@@ -246,7 +286,7 @@ class SwitchedTrain {
     template <class Now>
     bool follow_given(Now& now, const Key& key, Rest& rests) const;
     template <class Now>
-    void locate_losses(const Now& now, const std::array<double, max_contacts>& T_2, Key& trial) const;
+    void locate_losses(const Now& now, const Torques& T_2, Key& trial) const;
     template <class R, class Now>
     void hold(const R& r, Now& now, const Event& event) const;
     template <class Now>
@@ -254,7 +294,7 @@ class SwitchedTrain {
 
     // What a cache knows of a regime: an entry of the kernel's, or the regime itself.
     template <class Cache>
-    static const auto& look_up(Cache& cache, const Key& key) {
+    static auto& look_up(Cache& cache, const Key& key) {
         if constexpr (requires { cache.entry(key); })
             return cache.entry(key);
         else
@@ -267,20 +307,18 @@ class SwitchedTrain {
         else
             return e;
     }
-    // The regime that lies beyond an edge of the one with this key.
-    template <class Cache, class G>
-    static const auto& beyond(Cache& cache, const Key& key, const G& edge) {
+    // The regime that lies beyond an edge of another.
+    template <class Cache, class E, class G>
+    static const auto& beyond(Cache& cache, E& from, const G& edge) {
         const auto neighbour = [&] {
-            Key k = key;
+            Key k = regime_of(from).key;
             cross(edge, k);
             return k;
         };
-        if constexpr (requires { cache.entry(key); }) {
-            auto& from = cache.entry(key);
+        if constexpr (requires { from.regime; })
             return cache.beyond(from, static_cast<int>(&edge - from.regime.guards.data()), neighbour);
-        } else {
+        else
             return cache.regime(neighbour());
-        }
     }
     template <class E, class Now>
     auto flow(const E& e, const Now& now) const {
@@ -335,13 +373,13 @@ class SwitchedTrain {
     }
     // A guard of a law or an input that does not hold just after now; those of contacts are collected.
     template <class E, class Now>
-    auto violated(const E& e, const Now& now, const Guards& ignored, const Event* event,
-                  std::vector<Violation>& of_contacts) const {
+    auto first_left(const E& e, const Now& now, const Guards& ignored, const Event* event,
+                    Violated& of_contacts) const {
         const auto& r = regime_of(e);
         auto along = flow(e, now);
         decltype(&r.guards[0]) left = nullptr;
         for (const auto& driver : r.drivers)
-            if (turns_back(along, driver.torque)) of_contacts.push_back({driver.contact, 0, n_derivatives, 0.0, true});
+            if (turns_back(along, driver.torque)) of_contacts.add({driver.contact, 0, n_derivatives, 0.0, true});
         each_near_zero(e, now, ignored, [&](const auto& guard, double value, double size) {
             const Sign s = sign_after(along, guard.form, value, size, event != nullptr && event->by_value_alone(guard));
             if (s.sign >= 0) return true;
@@ -349,9 +387,9 @@ class SwitchedTrain {
                 left = &guard;
                 return false;
             }
-            of_contacts.push_back({guard.contact, guard.kind == Guard::speed ? 0 : guard.neighbour,
-                                   s.order - Guard::acceleration_order(guard.kind), -s.relative,
-                                   guard.kind == Guard::turning});
+            of_contacts.add({guard.contact, guard.kind == Guard::speed ? 0 : guard.neighbour,
+                             s.order - Guard::acceleration_order(guard.kind), -s.relative,
+                             guard.kind == Guard::turning});
             return true;
         });
         return left;
@@ -389,10 +427,10 @@ class SwitchedTrain {
             [&](int c) { sum += std::fabs(evaluate(n_, r.contact_torque[c], now) - event.coupling[c]); });
         return sum;
     }
-    template <class Cache, class Now, class G>
-    bool goes_on(Cache& cache, Now& now, const G& fired, Key& key) const;
-    template <class Cache, class Now, class Input>
-    bool stays(Cache& cache, const Now& now, const Key& key, const Input& input) const;
+    template <class Cache, class E, class Now, class G>
+    bool goes_on(Cache& cache, E& from, Now& now, const G& fired, Key& key) const;
+    template <class E, class Now, class Input>
+    bool stays(const E& e, const Now& now, const Input& input) const;
 
     static constexpr double max_violation = 1e-6;                                      // that rounding may make
     static constexpr double on_corner = 8.0 * std::numeric_limits<double>::epsilon();  // of an angle and its period
@@ -405,6 +443,13 @@ class SwitchedTrain {
     std::array<double, max_inputs> near_input_{};
     Rest holds_more_{};            // contacts that hold more than they take while they slip
     bool some_redundant_ = false;  // while all contacts are at rest; else no one keeps another at rest
+    // What has been found of sets of contacts and of modes, by their last bits.
+    mutable std::array<std::unique_ptr<Stopped>, 16> stopped_;
+    struct Limit {
+        std::uint64_t modes = ~std::uint64_t{0};
+        bool reached = false;
+    };
+    mutable std::array<Limit, 64> limits_;
 };
 
 }  // namespace lostmotion::model

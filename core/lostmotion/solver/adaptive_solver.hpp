@@ -207,7 +207,7 @@ class AdaptiveSolver {
         if (fired != nullptr) stopped_at_ = fired->subject();
         if (status != Status::done) return status;
         ++switchings_;
-        return accumulation_.add(time_, 1.0, linear_rates());
+        return accumulation_.add(time_, 1.0, [this] { return linear_rates(); });
     }
 
     State rates(const LinearRatesOf<D>& linear, const ColumnOf<D>& constant, double t, const State& x) {

@@ -74,13 +74,14 @@ inline auto ExactSolver<System>::begin_in_doubt(Entry& e, const Cursor& at, cons
     State magnitude = e.rates.magnitude(magnitudes(at.x()), magnitudes(memory), at.input().magnitudes());
     for (int t = 0; t < e.n_twists; ++t)
         if (const int k = e.twists[t].state; at.rate()[k] == 0.0) magnitude[k] = 0.0;  // it starts from rest
-    const Coupled ahead = bound_ahead(e, coupled(at.rate())), rounding_ahead = bound_ahead(e, coupled(magnitude));
+    const Coupled rounding_ahead = bound_ahead(e, coupled(magnitude));
+    if (!at.carries_rate()) {
+        for (int t = 0; t < e.n_twists; ++t) course_.twist[t].grazing_magnitude = rounding_ahead[e.twists[t].state];
+        return;
+    }
+    const Coupled ahead = bound_ahead(e, coupled(at.rate()));
     for (int t = 0; t < e.n_twists; ++t) {
         auto& twist = course_.twist[t];
-        if (!at.carries_rate()) {
-            twist.grazing_magnitude = rounding_ahead[e.twists[t].state];
-            continue;
-        }
         const double bound = ahead[e.twists[t].state];
         twist.most_doubt = rounding * rounding_ahead[e.twists[t].state];
         twist.doubt = bound > twist.most_doubt ? twist.most_doubt / bound : 1.0;

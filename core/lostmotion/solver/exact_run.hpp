@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <optional>
 
 #include "../kernel/cursor.hpp"
 #include "../kernel/interruption.hpp"
@@ -335,22 +336,23 @@ template <class System>
 Status ExactSolver<System>::change_regime(const Guard* fired, Observer& observer) {
     if (fired != nullptr) {
         std::swap(begin_, there_);
-        const auto* given = cache_.entry(key_).rates.given;
+        const auto* given = begin_->given();
         if (++crossings_ % 8 == 0 || given != nullptr) begin_->inputs().anchor(time_);
         if (given != nullptr) [[unlikely]]
             for (const GivenState& g : *given)
                 now_.x[static_cast<std::size_t>(g.state)] = begin_->input().given_at(g, time_);
     }
-    const Key before = key_;
+    std::optional<Key> before;
+    if (fired == nullptr) before = key_;
     const Status status = switch_regime(system_, cache_, begin_->inputs(), time_, fired, now_, key_, observer);
     if (fired != nullptr) stopped_at_ = fired->subject();
     if (status != Status::done) return status;
     if (fired == nullptr)
-        follow_inputs(before);
+        follow_inputs(*before);
     else
         course_.forget();
     ++switchings_;
-    return accumulation_.add(time_, unit_, linear_rates());
+    return accumulation_.add(time_, unit_, [this]() -> auto& { return linear_rates(); });
 }
 
 }  // namespace lostmotion

@@ -72,9 +72,9 @@ Status switch_regime(const System& system, Cache& cache, InputState<D>& input, d
                      Observer<System>& observer) {
     using Guard = typename System::Guard;
     if (fired != nullptr && fired->kind == Guard::outside) return Status::outside;
-    const bool wanted = observer.wants_switching();
-    SwitchingOf<System> s;
-    if (wanted) {
+    std::optional<SwitchingOf<System>> shown;
+    if (observer.wants_switching()) {
+        SwitchingOf<System>& s = shown.emplace();
         const auto& old = cache.regime(key);
         if (fired == nullptr) input.anchor_left(time);
         s.time = time;
@@ -107,7 +107,7 @@ Status switch_regime(const System& system, Cache& cache, InputState<D>& input, d
         }
     const Found found = system.next(cache, now, fired, key, before ? *before : now.input[0]);
     if (found != Found::yes) return status_of(found);
-    if (wanted) show_switching(system, cache, now, key, s, observer);
+    if (shown) show_switching(system, cache, now, key, *shown, observer);
     return Status::done;
 }
 
@@ -135,15 +135,16 @@ Status follow_change(const System& system, Cache& cache, const InputsOf<D>& left
 // rates of the regime are faster than that time, the numbers do not resolve the instants of its motion.
 class Accumulation {
  public:
-    template <class D>
-    Status add(double time, double unit, const LinearRatesOf<D>& rates) {
+    // rates(): of the regime.
+    template <class Rates>
+    Status add(double time, double unit, Rates&& rates) {
         const double resolved = span * std::fmax(std::fabs(time), unit);
         if (count_ == 0 || time - since_ > resolved) {
             count_ = 0;
             since_ = time;
         }
         if (++count_ <= max_count) return Status::done;
-        return resolved * rates.fastest() > 1.0 ? Status::outside : Status::zeno;
+        return resolved * rates().fastest() > 1.0 ? Status::outside : Status::zeno;
     }
 
  private:
