@@ -13,7 +13,7 @@ from ..model.torsion import TorsionCurve
 from ..portable.descriptions import described
 from ..simulation.needs import need_free_motion
 from ..simulation.scenario import Scenario
-from ..simulation.units_of_keys import unit_for
+from ..simulation.units_of_keys import limit_in, unit_for
 from ..units.practical import ARCMIN
 from ..version import __version__
 from . import sliders
@@ -123,8 +123,9 @@ def _sliders(scenario: Scenario, values: list[tuple[str, float]], closed: str | 
     for key, _ in values:
         if key.endswith("friction_torque") or (key.startswith("slides.") and key.endswith("friction_force")):
             usual[key] = _usual_friction(scenario, key)
-    units = {key: unit_for(scenario, key) for key, _ in values if key.startswith("controllers.")}
-    parameters = sliders.of_parameters(values, usual, views, units)
+    units = {key: unit_for(scenario, key) or "1" for key, _ in values}
+    limits = {key: limit_in(type(scenario.written), key) for key, _ in values}
+    parameters = sliders.of_parameters(values, usual, views, units, limits)
     found = [*_signal_sliders(scenario), *_reference_sliders(scenario), *parameters]
     return [
         *sliders.told_apart(sliders.ordered(found)),

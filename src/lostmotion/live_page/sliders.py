@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from ..inputs.quantities import Limit
 from ..model.signals import TimeFunction
 from ..units.practical import ARCMIN
 
@@ -88,45 +89,48 @@ def from_zero(value: float, usual: float = 0.0) -> Range:
     return Range(0.0, 4.0 * value if value > 0.0 else usual)
 
 
-SHARE = Range(0.3, 1.0)
+LEAST_SHARE = 0.3
+"""of what ends at a largest value that a file may have, such as an efficiency"""
 
-# End of a key -> label, SI unit, and its range: ways around the value, from 0 on, or a share.
-LABELS: dict[str, tuple[str, str, float | str]] = {
-    "rotor_inertia": ("rotor inertia", "kg*m^2", 10.0),
-    "electrical_time_constant": ("electrical time constant", "s", 10.0),
-    "ratio": ("ratio", "1", 3.0),
-    "stiffness.backlash": ("backlash (total)", "rad", "from 0"),
-    "stiffness.stiffness": ("torsional stiffness", "N*m/rad", 10.0),
-    "hysteresis.efficiency": ("hysteresis efficiency", "1", "share"),
-    "losses.efficiency": ("efficiency", "1", "share"),
-    "mesh_damping": ("mesh damping", "N*m*s/rad", "from 0"),
-    "inertia": ("inertia", "kg*m^2", 10.0),
-    "viscous_friction": ("viscous friction", "N*m*s/rad", "from 0"),
-    "feedforward.friction_torque": ("friction feedforward", "N*m", "from 0"),
-    "friction_torque": ("friction torque", "N*m", "from 0"),
-    "breakaway_torque": ("break-away torque", "N*m", 4.0),
-    "position.gain": ("position gain", "1/s", 10.0),
-    "position.integral_gain": ("position integral gain", "1/s^2", "from 0"),
-    "position.feedforward": ("speed feedforward", "1", "from 0"),
-    "speed.gain": ("speed gain", "N*m*s/rad", 10.0),
-    "speed.integral_gain": ("speed integral gain", "N*m/rad", "from 0"),
-    "speed.torque_limit": ("torque limit", "N*m", 10.0),
-    "slides.mass": ("mass", "kg", 10.0),
-    "slides.friction_force": ("friction force", "N", "from 0"),
-    "slides.breakaway_force": ("break-away force", "N", 4.0),
-    "slides.viscous_friction": ("viscous friction", "N*s/m", "from 0"),
-    "screws.lead": ("lead", "m", 3.0),
-    "current.time_constant": ("current loop time constant", "s", 10.0),
+# End of a key -> label, and how many ways around the value its slider goes; None: from 0 on. Unit and largest value are those of the key.
+LABELS: dict[str, tuple[str, float | None]] = {
+    "rotor_inertia": ("rotor inertia", 10.0),
+    "electrical_time_constant": ("electrical time constant", 10.0),
+    "ratio": ("ratio", 3.0),
+    "stiffness.backlash": ("backlash (total)", None),
+    "stiffness.stiffness": ("torsional stiffness", 10.0),
+    "hysteresis.efficiency": ("hysteresis efficiency", None),
+    "losses.efficiency": ("efficiency", None),
+    "mesh_damping": ("mesh damping", None),
+    "inertia": ("inertia", 10.0),
+    "viscous_friction": ("viscous friction", None),
+    "feedforward.friction_torque": ("friction feedforward", None),
+    "friction_torque": ("friction torque", None),
+    "breakaway_torque": ("break-away torque", 4.0),
+    "position.gain": ("position gain", 10.0),
+    "position.integral_gain": ("position integral gain", None),
+    "position.feedforward": ("speed feedforward", None),
+    "speed.gain": ("speed gain", 10.0),
+    "speed.integral_gain": ("speed integral gain", None),
+    "speed.torque_limit": ("torque limit", 10.0),
+    "slides.mass": ("mass", 10.0),
+    "slides.friction_force": ("friction force", None),
+    "slides.breakaway_force": ("break-away force", 4.0),
+    "slides.viscous_friction": ("viscous friction", None),
+    "screws.lead": ("lead", 3.0),
+    "current.time_constant": ("current loop time constant", 10.0),
 }
 # Of screws, racks and belts.
-LINEAR_LABELS: dict[str, tuple[str, str, float | str]] = {
-    "stiffness": ("axial stiffness", "N/m", 10.0),
-    "backlash": ("axial play (total)", "m", "from 0"),
-    "damping": ("damping", "N*s/m", "from 0"),
-    "efficiency": ("efficiency", "1", "share"),
-    "inertia": ("inertia", "kg*m^2", 10.0),
-    "drag_torque": ("drag torque", "N*m", "from 0"),
+LINEAR_LABELS: dict[str, tuple[str, float | None]] = {
+    "stiffness": ("axial stiffness", 10.0),
+    "backlash": ("axial play (total)", None),
+    "damping": ("damping", None),
+    "efficiency": ("efficiency", None),
+    "inertia": ("inertia", 10.0),
+    "drag_torque": ("drag torque", None),
 }
+ON_SLIDES = {"N": ("torque", "force"), "kg": ("inertia", "mass")}
+"""words of a label that change where a motor moves a slide, by the unit"""
 LINEAR_TABLES = ("slides", "screws", "racks", "belts")
 TABLES = (
     *LINEAR_TABLES,
@@ -149,7 +153,8 @@ def of_parameters(
     values: Iterable[tuple[str, float]],
     usual: Mapping[str, float],
     views: Mapping[str, Place],
-    units: Mapping[str, str | None],
+    units: Mapping[str, str],
+    limits: Mapping[str, Limit],
 ) -> Iterator[Slider]:
     """Sliders of the values that the core can change.
 
@@ -161,8 +166,8 @@ def of_parameters(
         Of keys that are 0: to where the slider goes.
     views
         Of keys that are drawn: where they stand.
-    units
-        Of keys of controllers: SI units, which are those of forces where a motor moves a slide.
+    units, limits
+        SI units of the keys, which are those of forces where a motor moves a slide, and what a file may have.
     """
     for key, value in values:
         table, *names = key.split(".")
@@ -170,12 +175,13 @@ def of_parameters(
         none = key.endswith((".ratio", "losses.efficiency")) and value == 1.0  # a coupling, a gear without losses
         if table not in TABLES or label is None or none:
             continue
-        text, unit, way = label
-        if (own := units.get(key)) and own != unit:
-            text, unit = text.replace("torque", "force").replace("inertia", "mass"), own
-        if way == "share":
-            reach = Range(min(SHARE.min, value), SHARE.max)
-        elif isinstance(way, float) and value > 0.0:
+        text, way = label
+        unit, most = units[key], limits[key].le
+        if unit in ON_SLIDES:
+            text = text.replace(*ON_SLIDES[unit])
+        if most is not None:
+            reach = Range(min(LEAST_SHARE * most, value), most)
+        elif way is not None and value > 0.0:
             reach = around(value, way)
         else:
             reach = from_zero(value, usual.get(key, 0.0))
@@ -183,7 +189,7 @@ def of_parameters(
             yield Slider(key, _group(table, names), text, unit, value, reach, "parameter", views.get(key))
 
 
-def _label(key: str) -> tuple[str, str, float | str] | None:
+def _label(key: str) -> tuple[str, float | None] | None:
     table, *_, last = parts = key.split(".")
     if table in LINEAR_TABLES:
         found = LINEAR_LABELS.get(last) if table != "slides" and len(parts) == 3 else None

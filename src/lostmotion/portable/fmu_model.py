@@ -181,7 +181,8 @@ def add_default_experiment(root: ET.Element, model: Model) -> None:
 
 def parameter_meaning(p: Parameter) -> str:
     """Meaning of a parameter."""
-    return f"value of the key {p.key}" + (", at t = 0" if is_of_start(p) else "")
+    start = ", at t = 0" if is_of_start(p) else ""
+    return f"value of the key {p.key}{start}{': ' if p.meaning else ''}{p.meaning}"
 
 
 def parameter_range(p: Parameter) -> dict[str, str]:
@@ -204,13 +205,13 @@ def document(root: ET.Element) -> bytes:
 def page(model: Model) -> str:
     """documentation/index.html of an FMU."""
 
-    def table(rows: list[tuple[str, str, str]], heads: tuple[str, str, str]) -> str:
+    def table(rows: list[tuple[str, ...]], heads: tuple[str, ...]) -> str:
         lines = "".join("<tr>" + "".join(f"<td>{html.escape(c)}</td>" for c in row) + "</tr>" for row in rows)
         return f"<table><tr>{''.join(f'<th>{h}</th>' for h in heads)}</tr>{lines}</table>"
 
-    inputs = [(v.name, v.unit, v.meaning) for v in model.inputs]
-    outputs = [(v.name, v.unit, v.meaning) for v in model.outputs]
-    parameters = [(p.key, p.unit, repr(p.value)) for p in model.parameters]
+    inputs: list[tuple[str, ...]] = [(v.name, v.unit, v.meaning) for v in model.inputs]
+    outputs: list[tuple[str, ...]] = [(v.name, v.unit, v.meaning) for v in model.outputs]
+    parameters: list[tuple[str, ...]] = [(p.key, p.unit, repr(p.value), p.meaning) for p in model.parameters]
     note = f"<p>{html.escape(model.note)}</p>" if model.note else ""
     exchange = (
         "<p>In Model Exchange the importer's integrator has these equations between two events; stuck and slipping "
@@ -230,5 +231,5 @@ def page(model: Model) -> str:
         f"{table(inputs, ('name', 'unit', 'meaning'))}"
         f"<h2>Outputs</h2>{table(outputs, ('name', 'unit', 'meaning'))}"
         "<h2>Parameters</h2><p>By their keys in the scenario file. They can be changed between communication points, those of the "
-        f"start before the first.</p>{table(parameters, ('key', 'unit', 'value'))}</html>\n"
+        f"start before the first.</p>{table(parameters, ('key', 'unit', 'value', 'meaning'))}</html>\n"
     )

@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import InputError
 from ..inputs.quantities import Limit
 from ..simulation.scenario import Scenario
-from ..simulation.units_of_keys import limit_in, unit_for
+from ..simulation.units_of_keys import limit_in, meaning_in, unit_for
 
 Numbers = Callable[[Scenario], np.ndarray]
 
@@ -49,6 +49,7 @@ class Parameter:
     effects: tuple[Effect, ...]
     limit: Limit
     """the range of its value in scenario files"""
+    meaning: str = ""
 
     def core(self) -> tuple[str, str, float, tuple[float, float, float], list[tuple[int, bool, float, float]]]:
         """Parameters as `write_description` of the core takes them."""
@@ -87,7 +88,8 @@ def parameters_of(scenario: Scenario, numbers: Numbers) -> Parameters:
         if isinstance(law, str):
             refused[key] = law
         elif law:
-            found.append(Parameter(key, unit or "1", value, law, limit_in(type(scenario.written), key)))
+            form = type(scenario.written)
+            found.append(Parameter(key, unit or "1", value, law, limit_in(form, key), meaning_in(form, key)))
     return _together(scenario, found, refused, base, numbers)
 
 

@@ -52,6 +52,11 @@ def limit_in(form: type[ScenarioTables], key: str) -> Limit:
     return Limit(gt=bound("exclusiveMinimum", min), ge=bound("minimum", min), le=bound("maximum", max))
 
 
+def meaning_in(form: type[ScenarioTables], key: str) -> str:
+    """Meaning of a key of the short or of the long form; empty where nothing says it."""
+    return next((str(node["description"]) for node in _nodes(key, form) if "description" in node), "")
+
+
 @cache
 def _unit(key: str, form: type[ScenarioTables]) -> str | None:
     return next((unit for node in _nodes(key, form) if (unit := unit_in_schema(node)) is not None), None)
