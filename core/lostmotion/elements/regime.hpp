@@ -140,6 +140,20 @@ struct Regime {
     bool solvable = true;  // false: the reactions have no unique solution (jamming)
     bool in_data = true;   // false: a loss map is used outside its data
 
+    // Keeps but its memory.
+    void clear() {
+        for (auto* rows :
+             {&rate, &motor_torque, &output_torque, &input_torque, &gear_hysteresis, &contact_torque, &drive_torque})
+            rows->clear();
+        guards.clear();
+        massless.clear();
+        drivers.clear();
+        locked.clear();
+        at_rest = {};
+        driving_input = -1;
+        driving_way = 0.0;
+        solvable = in_data = true;
+    }
     // Puts the speeds of shafts without inertia into a form.
     void put_massless_speeds(Row& f) const {
         for (const MasslessSpeed& m : massless)

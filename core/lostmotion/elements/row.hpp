@@ -49,7 +49,7 @@ class Coefficients {
         const std::size_t whole = (size + 3) / 4 * 4;
         if (whole > few && many_ == nullptr) {
             many_ = room_for_all();
-            copy(few_.data(), size_, many_.get());
+            copy(few_.data(), size_, many_->data());
         }
         for (double *to = data() + size_, *end = data() + whole; to != end; to += 4) std::fill_n(to, 4, 0.0);
         size_ = whole;
@@ -63,9 +63,9 @@ class Coefficients {
         reach(static_cast<std::size_t>(k) + 1);
         return data()[k];
     }
-    const double* begin() const { return many_ == nullptr ? few_.data() : many_.get(); }
+    const double* begin() const { return many_ == nullptr ? few_.data() : many_->data(); }
     const double* end() const { return begin() + size_; }
-    double* data() { return many_ == nullptr ? few_.data() : many_.get(); }
+    double* data() { return many_ == nullptr ? few_.data() : many_->data(); }
 
  private:
     static constexpr std::size_t few = 20;
@@ -73,11 +73,12 @@ class Coefficients {
     static void copy(const double* from, std::size_t size, double* to) {  // in fours
         for (std::size_t k = 0; k < size; k += 4) std::memcpy(to + k, from + k, 4 * sizeof(double));
     }
-    static std::unique_ptr<double[]> room_for_all() { return std::make_unique_for_overwrite<double[]>(max_columns); }
+    using Many = std::array<double, max_columns>;
+    static std::unique_ptr<Many> room_for_all() { return std::make_unique_for_overwrite<Many>(); }
 
     // As far as size_; the many, once there have been more than a few.
     std::size_t size_ = 0;
-    std::unique_ptr<double[]> many_;
+    std::unique_ptr<Many> many_;
     std::array<double, few> few_;
 };
 

@@ -3,6 +3,7 @@
 namespace lostmotion::model {
 
 void Assembly::build(const Key& key, Regime& r) const {
+    r.clear();
     r.key = key;
     r.ties = places().ties(key.modes.data());
     for (int c = 0; c < layout().contacts; ++c)

@@ -10,7 +10,7 @@ class Assembly : public ElementForms {
     explicit Assembly(Train train, bool with_remainders = false)
         : ElementForms(std::move(train), with_remainders), equations_(*this) {}
 
-    // r: as it has been made, but for the room for its guards.
+    // r: may be that of another key, whose memory is used again.
     void build(const Key& key, Regime& r) const;
     Regime build(const Key& key) const {
         Regime r;

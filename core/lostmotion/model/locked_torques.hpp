@@ -73,7 +73,7 @@ class LockedTorques {
     void each_given(const Hold& hold, const Regime& rest, Use&& use) const {
         if (!hold.at_limit) return;
         for (const Locked& l : rest.locked)
-            if (!hold.at_limit->rows.ties.redundant[l.contact]) use(l);
+            if (!hold.at_limit->redundant[l.contact]) use(l);
     }
     // What a contact of a gear or of a coupling takes.
     const Form& torque(const Regime& r, int contact) const {
@@ -107,7 +107,7 @@ class LockedTorques {
             m[l.memory] = memory[l.memory];
         }
         for (const Locked& l : rest.locked) {
-            if (r.rows.ties.redundant[l.contact]) continue;
+            if (r.redundant[l.contact]) continue;
             Form gap = torque(r, l.contact);
             gap.c[D::first_memory + l.memory] -= 1.0;
             if (!is_zero(gap, x, memory, u)) return false;

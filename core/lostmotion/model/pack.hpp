@@ -103,9 +103,11 @@ struct PackedRegime {
     std::array<PackedForm<D>, D::contacts>
         mesh_loss{};  // of each gear, what it takes at its output, |i| T_1 - T_2 as turned by the input [N m]
     std::array<PackedForm<D>, D::contacts> contact_torque{};  // of each contact [N m]
+    std::vector<PackedForm<D>> motor_torque, drive_torque;    // of each motor and of each given motion [N m]
+    std::vector<PackedForm<D>> massless_speed;                // of each shaft without inertia
     std::array<PackedGuard<D>, D::guards> guards{};
     int n_guards = 0;
-    std::array<bool, D::contacts> at_rest{};
+    std::array<bool, D::contacts> at_rest{}, redundant{};
     std::array<bool, D::coupled> resting{}, following{};  // speeds kept at zero, and those that follow others
     bool solvable = true, in_data = true;
     std::vector<Driver<PackedForm<D>>> drivers;
@@ -156,7 +158,11 @@ void pack(const Regime& r, const Assembly& a, PackedRegime<D>& out) {
         out.guards[out.n_guards++] = {pack<D>(g.form, n), g.kind,   g.contact, g.branch, g.neighbour,
                                       g.by_grazing,       g.memory, g.shift,   g.behind};
     }
+    for (const Row& f : r.motor_torque) out.motor_torque.push_back(pack<D>(f, n));
+    for (const Row& f : r.drive_torque) out.drive_torque.push_back(pack<D>(f, n));
+    for (const MasslessSpeed& m : r.massless) out.massless_speed.push_back(pack<D>(m.form, n));
     std::copy_n(r.at_rest.begin(), n.contacts, out.at_rest.begin());
+    std::copy_n(r.ties.redundant.begin(), n.contacts, out.redundant.begin());
     const auto& shafts = a.places().shafts;
     for (int s = 0; s < static_cast<int>(shafts.size()); ++s) {
         out.resting[shafts[s].speed] = r.ties.at_rest[s];

@@ -24,7 +24,6 @@ using Widest = std::conditional_t<
 
 template <class D>
 struct TrainRegime : PackedRegime<D> {
-    model::Regime rows;  // as composed, without its guards: torques and power flows of the elements
     // The flows of power by their number, once they have been asked for.
     struct Flow {
         int number;
@@ -56,11 +55,8 @@ class TrainSystem {
 
     // r: as it has been made.
     void build(const Key& key, Regime& r) const {
-        r.rows.guards.swap(room_);
-        assembly_.build(key, r.rows);
-        pack<D>(r.rows, assembly_, r);
-        r.rows.guards.swap(room_);
-        room_.clear();
+        assembly_.build(key, composed_);
+        pack<D>(composed_, assembly_, r);
         if (!r.complete) overflowed_ = true;
     }
     Regime build(const Key& key) const {
@@ -159,7 +155,7 @@ class TrainSystem {
     int n_twists_ = 0;
     bool has_parametric_work_ = false;
     mutable bool overflowed_ = false;
-    mutable std::vector<model::Guard> room_;
+    mutable model::Regime composed_;  // its memory is used again
 };
 
 }  // namespace lostmotion::model

@@ -76,7 +76,7 @@ class TrainReader {
                 column(at.x[c.index < layout ? index : D::coupled + index - static_cast<std::size_t>(layout)]);
                 return;
             }
-            case TrainChannel::motor_torque: form(row(regime_.rows.motor_torque[index])); return;
+            case TrainChannel::motor_torque: form(regime_.motor_torque[index]); return;
             case TrainChannel::output_torque: form(regime_.output_torque[index]); return;
             case TrainChannel::input_torque:
                 form(regime_.input_torque[index]);
@@ -91,8 +91,8 @@ class TrainReader {
                 return;
             case TrainChannel::output: form(row(model_.assembly.controller_command(c.index, regime_.key))); return;
             case TrainChannel::error: form(row(model_.assembly.controller_error(c.index))); return;
-            case TrainChannel::drive_torque: form(row(regime_.rows.drive_torque[index])); return;
-            case TrainChannel::massless_speed: form(row(regime_.rows.massless[index].form)); return;
+            case TrainChannel::drive_torque: form(regime_.drive_torque[index]); return;
+            case TrainChannel::massless_speed: form(regime_.massless_speed[index]); return;
             case TrainChannel::contact_torque: form(regime_.contact_torque[index]); return;
             case TrainChannel::shaft_sign: each([&](int k) { return signs(speed(c.index, at, k)); }); return;
             case TrainChannel::twist_sign: each([&](int k) { return signs(twist_rate(index, at, k)); }); return;
@@ -123,7 +123,7 @@ class TrainReader {
     template <class Instants>
     Vec speed(int shaft, const Instants& at, int k) const {
         if (const int massless = place(shaft).massless; massless != model::nowhere)
-            return evaluate(row(regime_.rows.massless[static_cast<std::size_t>(massless)].form), at, k);
+            return evaluate(regime_.massless_speed[static_cast<std::size_t>(massless)], at, k);
         return load(&at.x[static_cast<std::size_t>(place(shaft).speed)][k]);
     }
     template <class Instants>

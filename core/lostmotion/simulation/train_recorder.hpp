@@ -62,7 +62,7 @@ class TrainMeter {
     [[gnu::cold]] void find_flows(model::TrainRegime<D>& r) const {
         const model::Layout& n = assembly_.layout();
         auto& flows = r.flows.emplace();
-        for (const model::NumberedPower& f : model::power_flows(assembly_, r.rows))
+        for (const model::NumberedPower& f : model::power_flows(assembly_, assembly_.build(r.key)))
             flows.push_back({f.flow, model::pack<D>(f.power.torque, n), model::pack<D>(f.power.speed, n)});
     }
     // The row of a flow, which it keeps from regime to regime.
