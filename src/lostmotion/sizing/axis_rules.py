@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from ..model.gearbox import Gearbox
 from ..model.linear import RatedScrew
 from ..units.practical import RPM
 from .duty_cycle import integral
-from .finding import Finding, within
+from .finding import Finding, Verdict, within
 from .formulas import (
     belt_force,
     buckling_force,
@@ -33,6 +33,7 @@ from .stages import BeltStage, RackStage, Stage
 
 HOUR = 3600.0
 PLACES = 4
+BRAKE = "torque that the holding brake carries"
 
 
 def least(rule: str, what: str, value: float, wanted: float, unit: str, name: str) -> Finding:
@@ -48,6 +49,11 @@ def least(rule: str, what: str, value: float, wanted: float, unit: str, name: st
 def missing(rule: str, what: str, key: str) -> Finding:
     """A rule that cannot be judged."""
     return Finding(rule, what, "not judged", "unknown", f"{key} is missing")
+
+
+def against(rule: str, what: str, value: float, limit: float | None, unit: str, name: str, key: str) -> Finding:
+    """Compares a value with a limit; not judged without the limit, which `key` would give."""
+    return missing(rule, what, key) if limit is None else within(rule, what, value, limit, unit, name)
 
 
 def gearbox_life(demand: InputDemand, wanted: float) -> Finding:
@@ -78,10 +84,7 @@ def output_bearing(g: Gearbox, radial: float | None, axial: float | None) -> lis
             continue
         limit = None if limits is None else getattr(limits, f"max_{name}_force")
         what, key = f"{name} force on the output bearing", f"gearbox.limits.max_{name}_force"
-        if limit is None:
-            found.append(missing("output_bearing", what, key))
-        else:
-            found.append(within("output_bearing", what, force, limit, "N", f"{name} force of the gearbox", key=key))
+        found.append(against("output_bearing", what, force, limit, "N", f"{name} force of the gearbox", key))
     return found
 
 
@@ -95,9 +98,8 @@ def emergency_stop(motion: RequiredMotion, g: Gearbox, deceleration: float) -> F
     peak = float(np.abs(stop[moving]).max(initial=0.0))
     what = "output torque in an emergency stop"
     limit = g.limits and (g.limits.momentary_output_torque or g.limits.peak_output_torque)
-    if not limit:
-        return missing("emergency_stop", what, "gearbox.limits.momentary_output_torque")
-    return within("emergency_stop", what, peak, limit, "N·m", "momentary torque of the gearbox")
+    name, key = "momentary torque of the gearbox", "gearbox.limits.momentary_output_torque"
+    return against("emergency_stop", what, peak, limit or None, "N·m", name, key)
 
 
 def holding_brake(demand: InputDemand, brake: HoldingBrake | None, slide: RequiredMotion | None = None) -> Finding:
@@ -108,26 +110,23 @@ def holding_brake(demand: InputDemand, brake: HoldingBrake | None, slide: Requir
     """
     if slide is not None and (demand.motion is slide or (brake is not None and brake.force is not None)):
         force, what = float(np.abs(slide.holding).max()), "force that the brake of the slide carries"
-        if brake is None or brake.force is None:
-            return missing("holding_brake", f"{what}: {force:.4g} N", "task.brake.force")
-        return within("holding_brake", what, force, brake.force, "N", "force of the brake")
+        return _held_by(None if brake is None else brake.force, what, force, "N", "force")
     need = float(np.abs(demand.motion.holding).max()) / abs(demand.gearbox.ratio)
-    what = "torque that the holding brake carries"
-    if brake is None or brake.torque is None:
-        return missing("holding_brake", f"{what}: {need:.4g} N·m", "task.brake.torque")
-    return within("holding_brake", what, need, brake.torque, "N·m", "torque of the brake")
+    return _held_by(None if brake is None else brake.torque, BRAKE, need, "N·m", "torque")
+
+
+def _held_by(limit: float | None, what: str, need: float, unit: str, word: str) -> Finding:
+    told = what if limit is not None else f"{what}: {need:.4g} {unit}"
+    return against("holding_brake", told, need, limit, unit, f"{word} of the brake", f"task.brake.{word}")
 
 
 def brake_of_a_run(brake: HoldingBrake, need: float) -> Finding:
     """Static torque of a brake against the largest load torque of a run at the motor [N·m], without friction."""
-    what = "torque that the holding brake carries"
-    if brake.torque is None:
-        return missing("holding_brake", f"{what}: {need:.4g} N·m", "task.brake.torque")
-    found = within("holding_brake", what, need, brake.torque, "N·m", "torque of the brake")
-    if brake.inertia == 0.0:
+    found = _held_by(brake.torque, BRAKE, need, "N·m", "torque")
+    if brake.torque is None or brake.inertia == 0.0:
         return found
     told = f"its inertia of {brake.inertia:.4g} kg·m² is not in the run; add it to motor.rotor_inertia"
-    return replace(found, remark="; ".join(filter(None, [found.remark, told])))
+    return found.noted(told)
 
 
 def stage_rules(motion: RequiredMotion, stage: Stage, wanted_life: float | None) -> list[Finding]:
@@ -201,11 +200,8 @@ def screw_rules(load: AxialLoad, screw: RatedScrew, wanted_life: float | None, *
             found.append(missing("screw_life", what, f"{key}.dynamic_capacity"))
         else:
             found.append(least("screw_life", what, life / HOUR, wanted_life / HOUR, "h", "wanted life"))
-    if screw.static_capacity is None:
-        found.append(missing("screw_static", "axial load of the screw, largest", f"{key}.static_capacity"))
-    else:
-        what, name = "axial load of the screw, largest", "static capacity of the screw"
-        found.append(within("screw_static", what, peak, screw.static_capacity, "N", name))
+    what, name = "axial load of the screw, largest", "static capacity of the screw"
+    found.append(against("screw_static", what, peak, screw.static_capacity, "N", name, f"{key}.static_capacity"))
     what = "axial load of the screw against buckling"
     if screw.core_diameter is None or screw.supported_length is None:
         lacks = f"{key}.{'core_diameter' if screw.core_diameter is None else 'supported_length'}"
@@ -223,42 +219,27 @@ def screw_rules(load: AxialLoad, screw: RatedScrew, wanted_life: float | None, *
     speed = screw.max_input_speed
     if speed is None and screw.ball_circle_diameter is not None:
         speed = dn_speed(screw.ball_circle_diameter)
-    what = "speed of the screw against that of its balls"
-    if speed is None:
-        found.append(missing("screw_speed", what, f"{key}.max_input_speed or {key}.ball_circle_diameter"))
-    else:
-        found.append(within("screw_speed", what, RPM * fastest, RPM * speed, "rpm", "largest speed of the screw"))
-    return found
+    what, name = "speed of the screw against that of its balls", "largest speed of the screw"
+    lacks, most = f"{key}.max_input_speed or {key}.ball_circle_diameter", None if speed is None else RPM * speed
+    return [*found, against("screw_speed", what, RPM * fastest, most, "rpm", name, lacks)]
 
 
 def belt_rules(motion: RequiredMotion, belt: BeltStage) -> list[Finding]:
     """Tension of a belt and the load of its teeth. Sources: `formulas.belt_force` and `formulas.tooth_forces`."""
-    peak = float(np.abs(motion.torque).max())
-    found = []
-    what = "force of the belt, with pretension"
-    if belt.rated_force is None:
-        found.append(missing("belt_force", what, "belt.rated_force"))
-    else:
-        force = belt_force(peak, belt.pretension)
-        found.append(within("belt_force", what, force, belt.rated_force, "N", "force of the belt in operation"))
-    what = "circumferential force on the teeth of the belt"
-    if belt.tooth_force is None or belt.teeth is None:
-        key = "belt.tooth_force" if belt.tooth_force is None else "belt.teeth"
-        found.append(missing("belt_teeth", what, key))
-    else:
-        limit = tooth_forces(belt.tooth_force, belt.teeth)
-        found.append(within("belt_teeth", what, peak, limit, "N", "force of the teeth in mesh"))
-    return found
+    peak, force_key = float(np.abs(motion.torque).max()), "belt.rated_force"
+    what, name = "force of the belt, with pretension", "force of the belt in operation"
+    force = against("belt_force", what, belt_force(peak, belt.pretension), belt.rated_force, "N", name, force_key)
+    limit = tooth_forces(belt.tooth_force, belt.teeth) if belt.tooth_force and belt.teeth else None
+    what, name = "circumferential force on the teeth of the belt", "force of the teeth in mesh"
+    key = "belt.teeth" if belt.tooth_force else "belt.tooth_force"
+    return [force, against("belt_teeth", what, peak, limit, "N", name, key)]
 
 
 def rack_rules(motion: RequiredMotion, rack: RackStage) -> list[Finding]:
     """Largest force along a rack against its peak force, or else its rated one. Source: the data sheet."""
     peak, limit = float(np.abs(motion.torque).max()), rack.peak_force or rack.rated_force
-    what = "force along the rack, largest"
-    if limit is None:
-        return [missing("rack_force", what, "rack.rated_force")]
-    name = "peak force of the rack" if rack.peak_force else "rated force of the rack"
-    return [within("rack_force", what, peak, limit, "N", name)]
+    what, name = "force along the rack, largest", f"{'peak' if rack.peak_force else 'rated'} force of the rack"
+    return [against("rack_force", what, peak, limit, "N", name, "rack.rated_force")]
 
 
 def derated(findings: list[Finding], share: float) -> list[Finding]:
@@ -286,5 +267,5 @@ def with_safety(findings: list[Finding], factors: Mapping[str, float]) -> list[F
 def _tightened(finding: Finding, factor: float, why: str) -> Finding:
     assert finding.use is not None
     use = finding.use * factor
-    remark = "; ".join(filter(None, [finding.remark, f"{why}: {100.0 * use:.0f} % of the limit"]))
-    return replace(finding, use=use, verdict="warning" if use > 1.0 else finding.verdict, remark=remark)
+    verdict: Verdict = "warning" if use > 1.0 else finding.verdict
+    return finding.noted(f"{why}: {100.0 * use:.0f} % of the limit", use=use, verdict=verdict)

@@ -152,7 +152,7 @@ def _with_sinking(finding: Finding, result: RunArrays, cycle: DutyCycle) -> Find
         told += ", also at its end, so that this mean depends on the duration; let the run end with the move, or give task.cycle"
         if finding.verdict == "ok":
             finding = replace(finding, verdict="unknown")
-    return replace(finding, remark="; ".join(filter(None, [finding.remark, told])))
+    return finding.noted(told)
 
 
 def _sinking(result: RunArrays) -> tuple[float, float]:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
-from typing import Literal, Self
+from dataclasses import dataclass, replace
+from typing import Any, Literal, Self
 
 from ..errors import InputError
 from ..inputs.validation import shown
@@ -86,6 +86,10 @@ class Finding:
         mark = {"ok": "ok     ", "warning": "WARNING", "unknown": "?      "}[self.verdict]
         remark = f" ({self.remark})" if self.remark else ""
         return f"{mark}  {self.what}: {self.value}{remark}"
+
+    def noted(self, remark: str, **changes: Any) -> Finding:
+        """The same with one more remark, and other changes."""
+        return replace(self, remark="; ".join(filter(None, [self.remark, remark])), **changes)
 
     def __str__(self) -> str:
         return f"{self.in_short} [{self.source}]"

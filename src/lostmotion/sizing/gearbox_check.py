@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..model.gearbox import Gearbox, Transmission
@@ -56,9 +55,8 @@ def _with_momentary(finding: Finding, torque: float, momentary: float | None) ->
         return finding
     if torque > momentary:
         remark = f"even the momentary torque of the gearbox, {momentary:.4g} N·m, is exceeded"
-        return replace(finding, verdict="warning", remark="; ".join(filter(None, [finding.remark, remark])))
-    remark = f"in an emergency stop the gearbox stands {momentary:.4g} N·m"
-    return replace(finding, remark="; ".join(filter(None, [finding.remark, remark])))
+        return finding.noted(remark, verdict="warning")
+    return finding.noted(f"in an emergency stop the gearbox stands {momentary:.4g} N·m")
 
 
 def input_speeds(g: Transmission, cycle: DutyCycle, where: str = "gearbox") -> list[Finding]:

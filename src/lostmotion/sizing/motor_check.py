@@ -134,6 +134,31 @@ def command_of_run(
     return needed_command(m, torque, speed)
 
 
+def current_voltage_power(
+    m: Motor, command: np.ndarray, torque: np.ndarray, speed: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Current [A], voltage [V] and electrical power [W] of a motor at command, torque [N·m] and speed [rad/s]; NaN where its data
+    do not tell. Current and voltage of a motor with a winding are amplitudes of a phase."""
+    unknown = np.full_like(torque, np.nan)
+    if m.winding is not None:
+        phase = m.winding.phase_values()
+        i = torque / phase.torque_constant
+        if m.kind == "synchronous":
+            u_q = m.phase_voltage * command
+        else:  # a torque source gives what it takes, but for the voltage of L_q di_q/dt
+            u_q = phase.resistance * i + phase.voltage_constant * speed
+        return i, np.asarray(phase.voltage(u_q, torque, speed)), 1.5 * u_q * i
+    limits = m.limits
+    k = None if limits is None else limits.torque_constant
+    R = None if limits is None else limits.resistance
+    current = unknown if k is None else torque / k
+    if m.kind == "dc" and m.rated_voltage is not None:
+        voltage = m.rated_voltage * command
+    else:
+        voltage = unknown if k is None or R is None else R * current + k * speed
+    return current, voltage, voltage * current
+
+
 def voltage(
     m: Motor,
     command: np.ndarray,
@@ -146,29 +171,17 @@ def voltage(
     """The largest that the command asks for, or that torque [N·m] and speed [rad/s] need; under field-oriented control the one
     that a phase had [V]."""
     limits = m.limits
+    peak = float(abs(current_voltage_power(m, command, torque, speed)[1] if oriented is None else oriented).max())
     if m.winding is not None:
-        phase = m.winding.phase_values()
-        if m.kind == "synchronous":
-            u_q = m.phase_voltage * command
-        else:
-            u_q = phase.resistance * torque / phase.torque_constant + phase.voltage_constant * speed
-        peak = float((phase.voltage(u_q, torque, speed) if oriented is None else oriented).max())
         limit = None if m.dc_voltage is None else m.phase_voltage
         what = "voltage of a phase, largest amplitude"
         return within("voltage", what, peak, limit, "V", "dc voltage / √3", key=f"{where}.dc_voltage")
-    if m.kind == "dc":
-        if m.rated_voltage is None:
-            return Finding("voltage", "voltage, largest", "not known", "unknown", f"{where}.rated_voltage is missing")
-        peak = m.rated_voltage * float(abs(command).max())
-        limit = m.voltage_limit or (limits.max_voltage if limits else None)
-    elif limits is not None and limits.resistance is not None and limits.torque_constant is not None:
-        current = torque / limits.torque_constant
-        emf = limits.torque_constant * speed
-        peak = float(abs(limits.resistance * current + emf).max())
-        limit = limits.max_voltage
-    else:
+    if m.kind == "dc" and m.rated_voltage is None:
+        return Finding("voltage", "voltage, largest", "not known", "unknown", f"{where}.rated_voltage is missing")
+    if math.isnan(peak):
         missing = f"{where}.limits.resistance and {where}.limits.torque_constant are missing"
         return Finding("voltage", "voltage, largest", "not known", "unknown", missing)
+    limit = (m.voltage_limit if m.kind == "dc" else None) or (limits.max_voltage if limits else None)
     key = f"{where}.voltage_limit" if m.kind == "dc" else f"{where}.limits.max_voltage"
     return within("voltage", "voltage, largest", peak, limit, "V", "limit of the amplifier", key=key)
 

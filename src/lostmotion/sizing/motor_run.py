@@ -15,7 +15,7 @@ from ..inputs.quantities import Temperature
 from ..inputs.validation import did_you_mean
 from ..model.motor import Motor
 from ..simulation.results import RunArrays, scenario_of
-from .motor_check import command_of_run
+from .motor_check import command_of_run, current_voltage_power
 from .thermal import COPPER, mean_square, need_two_bodies, rms
 
 if TYPE_CHECKING:
@@ -95,31 +95,6 @@ def _controller_of(result: xarray.Dataset, where: str) -> Controller | Continuou
     scenario = scenario_of(result)
     controllers: dict[str, Controller | ContinuousController] = {**scenario.axes(), **scenario.continuous()}
     return controllers.get(where.removeprefix("motors."))
-
-
-def current_voltage_power(
-    m: Motor, command: np.ndarray, torque: np.ndarray, speed: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Current [A], voltage [V] and electrical power [W] of a motor at command, torque [N·m] and speed [rad/s]; NaN where its data
-    do not tell. Current and voltage of a motor with a winding are amplitudes of a phase."""
-    unknown = np.full_like(torque, np.nan)
-    if m.winding is not None:
-        phase = m.winding.phase_values()
-        i = torque / phase.torque_constant
-        if m.kind == "synchronous":
-            u_q = m.phase_voltage * command
-        else:  # a torque source gives what it takes, but for the voltage of L_q di_q/dt
-            u_q = phase.resistance * i + phase.voltage_constant * speed
-        return i, np.asarray(phase.voltage(u_q, torque, speed)), 1.5 * u_q * i
-    limits = m.limits
-    k = None if limits is None else limits.torque_constant
-    R = None if limits is None else limits.resistance
-    current = unknown if k is None else torque / k
-    if m.kind == "dc" and m.rated_voltage is not None:
-        voltage = m.rated_voltage * command
-    else:
-        voltage = unknown if k is None or R is None else R * current + k * speed
-    return current, voltage, voltage * current
 
 
 @checked

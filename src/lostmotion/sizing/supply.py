@@ -17,7 +17,8 @@ from .axis_rules import missing
 from .duty_cycle import integral
 from .finding import Finding, within
 from .formulas import bus_voltage, capacitor_energy
-from .motor_run import current_voltage_power, phase_amplitudes
+from .motor_check import current_voltage_power
+from .motor_run import phase_amplitudes
 from .required_motion import InputDemand
 
 
@@ -163,11 +164,9 @@ def amplifier_rules(
             found.append(within("amplifier_peak", what, longest, amplifier.peak_time, "s", name))
     if amplifier.max_dc_voltage is not None:
         key, name = "task.supply.max_voltage", "largest bus voltage of the amplifier"
-        what = "DC bus of the amplifier"
-        if bus is None:
-            found.append(missing("amplifier_voltage", what, key))
-        else:
-            found.append(within("amplifier_voltage", what, bus, amplifier.max_dc_voltage, "V", name))
+        what, limit = "DC bus of the amplifier", amplifier.max_dc_voltage
+        unknown = missing("amplifier_voltage", what, key)
+        found.append(unknown if bus is None else within("amplifier_voltage", what, bus, limit, "V", name))
     return found
 
 

@@ -10,8 +10,8 @@ import numpy as np
 from ..control.loops import FirstOrderCurrent, IdealCurrent
 from ..simulation.results import RunArrays
 from ..simulation.scenario import Scenario
-from ..sizing.motor_check import command_of_run
-from ..sizing.motor_run import current_voltage_power, oriented_amplitudes
+from ..sizing.motor_check import command_of_run, current_voltage_power
+from ..sizing.motor_run import oriented_amplitudes
 from ..sizing.thermal import mean_square
 
 
