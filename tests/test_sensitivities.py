@@ -141,5 +141,5 @@ def test_the_parameter_without_derivatives_is_data_of_the_error() -> None:
     keys = ["load.inertia", "controller.sample_time"]
     with pytest.raises(lm.InputError, match=r"^sensitivities: key controller\.sample_time: ") as caught:
         lm.simulate(scenario, sensitivities=keys)
-    ((named, reason),) = caught.value.problems
-    assert named == ("controller.sample_time",) and reason.startswith("changes the instants")
+    (problem,) = caught.value.problems
+    assert problem.keys == ("controller.sample_time",) and problem.reason.startswith("changes the instants")
