@@ -38,13 +38,7 @@ inline void bind_curves(nb::module_& m) {
         .def("least_slope_over_load", &LossMap::least_slope_over_load);
     nb::class_<Signal>(m, "Signal")
         .def(
-            "__init__",
-            [](Signal* self, const nb::dict& fields) {
-                new (self) Signal();
-                NamedFields f(fields);
-                lostmotion::describe(f, *self);
-                f.refuse_unknown();
-            },
+            "__init__", [](Signal* self, const nb::dict& fields) { new (self) Signal(described<Signal>(fields)); },
             "fields"_a, nb::sig("def __init__(self, fields: dict[str, typing.Any]) -> None"));
 }
 

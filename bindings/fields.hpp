@@ -156,11 +156,14 @@ class NamedFields {
     std::size_t used_ = 0, row_ = 0;
 };
 
-// What a dict says, with its own describe().
+// A part from a dict of its parameters. The describe() of the part, or that of its namespace, names them.
 template <class T>
 T described(const nb::dict& fields, T value = {}) {
     NamedFields f(fields);
-    value.describe(f);
+    if constexpr (requires { value.describe(f); })
+        value.describe(f);
+    else
+        describe(f, value);
     f.refuse_unknown();
     return value;
 }

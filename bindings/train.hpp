@@ -145,11 +145,7 @@ class TrainDescription : public model::TrainDescription {
     }
 
     void add_controller(const std::string& motor, const nb::dict& fields) {
-        model::LinearController c;
-        NamedFields named(fields);
-        model::describe(named, c);
-        named.refuse_unknown();
-        model::TrainDescription::add_controller(std::move(c), motor);
+        model::TrainDescription::add_controller(described<model::LinearController>(fields), motor);
     }
 
     // Composed once, when it is first wanted; nothing may be added afterwards.
