@@ -76,10 +76,9 @@ class TrainSystem {
     }
     template <class Cache>
     Found next(Cache& cache, InstantOf<D>& now, const Guard* fired, Key& key, const InputsOf<D>& input) const {
-        if (!has_parametric_work_) return certain(search_.next(cache, now, fired, key, input));
         const Key before = key;
         const Found found = search_.next(cache, now, fired, key, input);
-        add_parametric_work(before, key, now);
+        if (has_parametric_work_) add_parametric_work(before, key, now);
         return certain(found);
     }
     void near_event(const FormTable<D, D::guards>& guards, typename FormTable<D, D::guards>::Values& out) const {

@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <memory>
-#include <optional>
 
 #include "../kernel/cursor.hpp"
 #include "../kernel/interruption.hpp"
@@ -342,13 +341,12 @@ Status ExactSolver<System>::change_regime(const Guard* fired, Observer& observer
             for (const GivenState& g : *given)
                 now_.x[static_cast<std::size_t>(g.state)] = begin_->input().given_at(g, time_);
     }
-    std::optional<Key> before;
-    if (fired == nullptr) before = key_;
+    const Key before = key_;
     const Status status = switch_regime(system_, cache_, begin_->inputs(), time_, fired, now_, key_, observer);
     if (fired != nullptr) stopped_at_ = fired->subject();
     if (status != Status::done) return status;
     if (fired == nullptr)
-        follow_inputs(*before);
+        follow_inputs(before);
     else
         course_.forget();
     ++switchings_;
