@@ -247,7 +247,8 @@ def test_every_public_name_exists_and_is_documented() -> None:
 GENERATED = {"_core.pyi", "described.pyi"}
 
 
-# Of an element, a gear, controllers, a reference, a signal, a filter and a motor's limits: parameters that no other part has by the same name, and the gains of three loops.
+# Parameters of an element, a gear, controllers, a reference, a signal, a filter and the limits of a motor. No other part has a parameter of the same
+# name, but for the gains of three loops.
 STATED = {
     "the gain of the position loop": r""" "gain",\s*"K_v" """,
     "the gain of the speed loop": r""" "gain",\s*"k_p" """,

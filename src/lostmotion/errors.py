@@ -59,7 +59,7 @@ class InputError(ValueError):
     keys : tuple of str
         Dotted keys of the values.
     table, record : str
-        Table that a record fills, and the name of that record, where the fault is that of the record.
+        Where a record is at fault: the table that it fills, and its name.
     where : str
         File, log or function that the text begins with.
     problems : sequence of Problem, optional

@@ -8,9 +8,6 @@
 
 namespace lostmotion::tables {
 
-using enum Range;
-using enum Given;
-
 template <class Use>
 void each_law(Use&& use) {
     use("LowPass", [](auto& f) {
@@ -41,7 +38,7 @@ void each_law(Use&& use) {
         [](auto& f) { f.number(above_zero("sample_time", "s", "default: the value of the controller")); });
     use("CameraTiming", [](auto& f) {
         f.number({"sample_time", "", "s", positive, needed,
-                  "from frame to frame; a whole multiple of that of the controller"});
+                  "time from frame to frame; a whole multiple of the controller's sample time"});
         f.number({"latency", "", "s", not_negative, has_default,
                   "from the exposure of a frame until the controller has what it shows; a whole multiple, too"});
     });
@@ -93,8 +90,8 @@ void each_law(Use&& use) {
         f.integer({"delay", "", "", any, has_default, "sample times from reading the encoders until the result acts"},
                   1, 0, 1);
         f.number(above_zero("blend_time", "s",
-                            "time constant with which the position encoder is taken over beyond that of the speed "
-                            "loop; left out, it counts alone"));
+                            "time constant of the low pass through which the position encoder corrects the encoder of "
+                            "the speed loop; left out, the position encoder counts alone"));
         f.flag({"law", "", "", any, has_default,
                 "the loops are a function of your own, which `simulate(..., law=function)` gives"},
                false);

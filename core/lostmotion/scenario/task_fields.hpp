@@ -5,9 +5,6 @@
 
 namespace lostmotion::tables {
 
-using enum Range;
-using enum Given;
-
 template <class Use>
 void each_duty(Use&& use) {
     use("ArmGravity", [](auto& f) {
@@ -123,7 +120,7 @@ void each_linear_part(Use&& use) {
             {"inertia", "", "kg*m^2", not_negative, has_default, "inertia of all that turns with the input shaft"});
         f.number({"viscous_friction", "", "N*m*s/rad", not_negative, has_default, "on the input shaft"});
         f.number({"drag_torque", "", "N*m", not_negative, has_default,
-                  "dry friction on the input shaft, such as that of the preload"});
+                  "dry friction on the input shaft, for example by the preload"});
     });
     use("ScrewData", [](auto& f) {
         f.number(above_zero("lead", "m", "travel to one turn"));
