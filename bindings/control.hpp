@@ -187,7 +187,20 @@ inline void bind_control(nb::module_& m) {
             return std::tuple(t.alpha, t.beta, t.gamma);
         },
         "fields"_a, nb::sig("def tracker_gains(fields: dict[str, typing.Any]) -> tuple[float, float, float]"));
-    m.attr("MAX_FILTER_ORDER") = DiscreteSystem::max_order;
+    m.def(
+        "discrete_filter",
+        [](const nb::dict& fields, double sample_time) {
+            Filter f = described<Filter>(fields);
+            f.discretise(sample_time);
+            const DiscreteSystem s = f.system();
+            nb::dict out;
+            out["A"] = s.A, out["B"] = s.B, out["C"] = s.C, out["D"] = s.D;
+            return nb::make_tuple(f.numerator, f.denominator, out);
+        },
+        "fields"_a, "sample_time"_a,
+        nb::sig("def discrete_filter(fields: dict[str, typing.Any], sample_time: float) -> tuple[list[float], "
+                "list[float], dict[str, typing.Any]]"),
+        "Numerator and denominator in z, the highest power first, and the system of a controller.");
     nb::class_<GearLosses>(m, "GearLosses")
         .def(
             "__init__",

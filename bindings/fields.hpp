@@ -65,10 +65,7 @@ class NamedFields {
     }
     void list(const char* name, std::vector<double>& v, Range = Range::any) { take(name, v); }
     void list(const Field& field, std::vector<double>& v) { take(field.key, v); }
-    template <class Entries>
-    void list(const Field& field, std::vector<double>& v, Entries) {
-        take(field.key, v);
-    }
+    void list(const Field& field, std::vector<double>& v, Entries) { take(field.key, v); }
     template <class Use>
     void table(const Field& field, const char*, Use&& use) {
         part(field.key, use);

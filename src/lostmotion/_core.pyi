@@ -100,7 +100,10 @@ def encoder_step(fields: dict[str, Any]) -> float: ...
 
 def tracker_gains(fields: dict[str, Any]) -> tuple[float, float, float]: ...
 
-MAX_FILTER_ORDER: int = 16
+def discrete_filter(fields: dict[str, Any], sample_time: float) -> tuple[list[float], list[float], dict[str, Any]]:
+    """
+    Numerator and denominator in z, the highest power first, and the system of a controller.
+    """
 
 class GearLosses:
     def __init__(self, fields: dict[str, Any]) -> None: ...

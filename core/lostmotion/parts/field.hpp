@@ -33,6 +33,12 @@ struct Field {
     const char* meaning = "";
 };
 
+// How many numbers a list may have.
+struct Entries {
+    static constexpr int any = 1 << 30;
+    int fewest = 0, most = 100;
+};
+
 // A visitor of fields that takes none. Others derive from it and take some.
 class FieldVisitor {
  public:

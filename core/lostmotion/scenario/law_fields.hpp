@@ -10,24 +10,9 @@ namespace lostmotion::tables {
 
 template <class Use>
 void each_law(Use&& use) {
-    use("LowPass", [](auto& f) {
-        f.number({"frequency", "f", "Hz", positive, needed, "corner frequency"});
-        f.number(
-            above_zero("damping", "", "damping of a filter of second order; left out, the filter is of first order"));
-    });
-    use("Notch", [](auto& f) {
-        f.number({"frequency", "", "Hz", positive, needed, "frequency of the zeros"});
-        f.number({"depth", "D_z", "", not_negative, has_default, "D_z, damping of the zeros"});
-        f.number({"width", "D_n", "", positive, has_default, "D_n, damping of the poles"}, 0.5);
-        f.number(above_zero("pole_frequency", "Hz", "default: the value of the zeros"));
-    });
-    use("TransferFunction", [](auto& f) {
-        f.list({"numerator", "", "", any, needed, "coefficients of z, the highest power first"}, {}, {1, Entries::any});
-        f.list({"denominator", "", "", any, needed, "coefficients of z, the highest power first"}, {},
-               {1, control::DiscreteSystem::max_order + 1});
-        f.number(
-            above_zero("sample_time", "s", "sample time for which it was made; default: the sample time of its loop"));
-    });
+    use("LowPass", [](auto& f) { control::Filter().describe_low_pass(f); });
+    use("Notch", [](auto& f) { control::Filter().describe_notch(f); });
+    use("TransferFunction", [](auto& f) { control::Filter().describe_transfer_function(f); });
     use("DutyCurve", [](auto& f) {
         f.list({"errors", "", "rad", not_negative, needed, "position errors, rising from 0"}, {}, {0, Entries::any});
         f.list({"values", "", "", share, needed, "duty cycle at each of them, from 0 on"}, {}, {0, Entries::any});

@@ -6,12 +6,6 @@
 
 namespace lostmotion {
 
-// How many numbers a list may have.
-struct Entries {
-    static constexpr int any = 1 << 30;
-    int fewest = 0, most = 100;
-};
-
 namespace signals {
 
 using enum Range;

@@ -20,7 +20,7 @@ from ..model.train import DriveTrain
 from .continuous import ContinuousController
 from .controller import Controller
 from .encoder import Encoder
-from .filters import core_filter
+from .filters import discrete
 from .law import Law
 from .loops import CurrentLoop, FieldOriented, FirstOrderCurrent, SpeedLoop, VoltageCommand
 from .sample_times import whole_multiple
@@ -142,7 +142,7 @@ class _Place:
             out[key] = []
             for k, f in enumerate(getattr(loop, key)):
                 try:
-                    out[key].append(core_filter(f, c.loop_time("speed")))
+                    out[key].append(discrete(f, c.loop_time("speed"))[2])
                 except InputError as problem:
                     raise InputError(str(problem), keys=(f"speed.{key}[{k}]",)) from None
         if c.inverse_model is not None:

@@ -10,9 +10,6 @@ from .. import _core
 from ..errors import InputError
 from ..inputs import described
 from ..inputs.arguments import checked
-from ..reproducible import tan
-
-MAX_ORDER = _core.MAX_FILTER_ORDER
 
 
 class LowPass(described.LowPassFields):
@@ -20,28 +17,11 @@ class LowPass(described.LowPassFields):
 
     kind: Literal["low_pass"]
 
-    def continuous(self) -> tuple[list[float], list[float]]:
-        """Numerator and denominator in s/w, the highest power first."""
-        return ([1.0], [1.0, 1.0]) if self.damping is None else ([1.0], [1.0, 2.0 * self.damping, 1.0])
-
-    def discrete(self, sample_time: float) -> tuple[np.ndarray, np.ndarray]:
-        """Numerator and denominator in z, the highest power first."""
-        return prewarped(*self.continuous(), self.frequency, sample_time)
-
 
 class Notch(described.NotchFields):
     """((s/w_z)^2 + 2 D_z s/w_z + 1)/((s/w_n)^2 + 2 D_n s/w_n + 1), by Tustin's rule with w_z prewarped."""
 
     kind: Literal["notch"]
-
-    def continuous(self) -> tuple[list[float], list[float]]:
-        """Numerator and denominator in s/w_z, the highest power first."""
-        r = 1.0 if self.pole_frequency is None else self.frequency / self.pole_frequency
-        return [1.0, 2.0 * self.depth, 1.0], [r * r, 2.0 * self.width * r, 1.0]
-
-    def discrete(self, sample_time: float) -> tuple[np.ndarray, np.ndarray]:
-        """Numerator and denominator in z, the highest power first."""
-        return prewarped(*self.continuous(), self.frequency, sample_time)
 
 
 class TransferFunction(described.TransferFunctionFields):
@@ -59,47 +39,30 @@ class TransferFunction(described.TransferFunctionFields):
             )
         return self
 
-    def discrete(self, sample_time: float) -> tuple[np.ndarray, np.ndarray]:
-        """Numerator and denominator in z, the highest power first."""
-        if self.sample_time is not None and not math.isclose(self.sample_time, sample_time, rel_tol=1e-9):
-            raise InputError(
-                f"has sample_time = {self.sample_time:g} s, but its loop runs every {sample_time:g} s; make it for that sample time"
-            )
-        return np.array(self.numerator), np.array(self.denominator)
-
 
 Filter = Annotated[LowPass | Notch | TransferFunction, Field(discriminator="kind")]
 
 
-def prewarped(
-    numerator: list[float], denominator: list[float], frequency: float, sample_time: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Tustin's rule, s/w = (z - 1)/(z + 1)/tan(w T/2), under which both have the same value at w.
+def discrete(
+    filter: LowPass | Notch | TransferFunction, sample_time: float
+) -> tuple[list[float], list[float], dict[str, Any]]:
+    """Numerator and denominator in z, the highest power first, and the solver's system.
 
     Raises
     ------
     InputError
-        The frequency is not below half the sampling frequency.
+        The filter was made for another sample time, or its frequency is not below half the sampling frequency.
     """
-    if not frequency < 0.5 / sample_time:
+    if not isinstance(filter, TransferFunction):
+        if not filter.frequency < 0.5 / sample_time:
+            raise InputError(
+                f"has frequency = {filter.frequency:g} Hz, but its loop samples at {1.0 / sample_time:g} Hz; it must be below half of that"
+            )
+    elif filter.sample_time is not None and not math.isclose(filter.sample_time, sample_time, rel_tol=1e-9):
         raise InputError(
-            f"has frequency = {frequency:g} Hz, but its loop samples at {1.0 / sample_time:g} Hz; it must be below half of that"
+            f"has sample_time = {filter.sample_time:g} s, but its loop runs every {sample_time:g} s; make it for that sample time"
         )
-    c = 1.0 / tan(math.pi * frequency * sample_time)
-    order = len(denominator) - 1
-
-    def in_z(coefficients: list[float]) -> np.ndarray:
-        total = np.zeros(order + 1)
-        factor = 1.0
-        for power, a in enumerate(reversed(coefficients)):
-            term = np.array([a * factor])
-            for sign in [-1.0] * power + [1.0] * (order - power):  # times z + sign
-                term = np.append(term, 0.0) + sign * np.append(0.0, term)
-            total += term
-            factor *= c
-        return total
-
-    return in_z(numerator), in_z(denominator)
+    return _core.discrete_filter(filter.model_dump(), sample_time)
 
 
 @checked
@@ -149,20 +112,3 @@ def as_filter(system: "Any") -> TransferFunction:
     return TransferFunction(
         numerator=tuple(map(float, numerator)), denominator=tuple(map(float, denominator)), sample_time=float(dt)
     )
-
-
-def companion(numerator: np.ndarray, denominator: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """A, B, C, D of a transfer function in z, in controllable form."""
-    n = len(denominator) - 1
-    a = denominator / denominator[0]
-    b = np.concatenate([np.zeros(n + 1 - len(numerator)), numerator]) / denominator[0]
-    A = np.eye(n, k=-1)
-    A[:1] = -a[1:]
-    B = np.eye(n, 1).ravel()
-    return A, B, b[1:] - b[0] * a[1:], float(b[0])
-
-
-def core_filter(filter: LowPass | Notch | TransferFunction, sample_time: float) -> dict[str, Any]:
-    """The solver's system."""
-    A, B, C, D = companion(*filter.discrete(sample_time))
-    return {"A": A.ravel().tolist(), "B": B.tolist(), "C": C.tolist(), "D": D}

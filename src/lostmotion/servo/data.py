@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from ..control.controller import Controller
+from ..control.filters import discrete
 from ..control.loops import Difference, FirstOrderCurrent, Observer, SampledCurrent
 from ..control.tuning import TwoInertias
 from ..control.turning import turns
@@ -108,7 +109,7 @@ def lag_sum(controller: Controller) -> float:
     elif isinstance(e, Observer) and e.inertia is None:
         lag += e.damping / (math.pi * e.bandwidth)
     for f in speed.torque_filters:
-        numerator, denominator = (np.asarray(x, float) for x in f.discrete(T))
+        numerator, denominator = map(np.array, discrete(f, T)[:2])
         slopes = [float(np.polyval(np.polyder(p), 1.0) / p.sum()) for p in (denominator, numerator)]
         lag += T * (slopes[0] - slopes[1])  # of the phase at z = 1
     return lag
