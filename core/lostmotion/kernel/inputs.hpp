@@ -330,21 +330,22 @@ class InputState {
     template <int N = n_derivatives>
     std::array<Inputs, N> jet() const {
         std::array<Inputs, N> u;
-        jet(N, u.data());
+        jet<N>(u.data());
         return u;
     }
-    void jet(int n, Inputs* u) const {
+    template <int N>
+    void jet(Inputs* u) const {
         u[0] = linear_;
-        if (n > 1) u[1] = slope_;
-        for (int k = 2; k < n; ++k) u[k] = {};
+        if constexpr (N > 1) u[1] = slope_;
+        for (int k = 2; k < N; ++k) u[k] = {};
         for (int q = 0; q < sines_end_[n_inputs - 1]; q += 2) {
             const int i = basis_[q].input;
             const double omega = basis_[q].omega, turned_twice = -omega * omega;
             double even = weights_[q], odd = omega * weights_[q + 1];
-            for (int k = 0; k < n; k += 2) {
+            for (int k = 0; k < N; k += 2) {
                 u[k][i] += even;
                 even *= turned_twice;
-                if (k + 1 < n) u[k + 1][i] += odd;
+                if (k + 1 < N) u[k + 1][i] += odd;
                 odd *= turned_twice;
             }
         }

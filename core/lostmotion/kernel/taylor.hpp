@@ -168,7 +168,7 @@ class Taylor {
 
     // At an instant with this rate and these inputs.
     [[gnu::always_inline]] void expand(const Lanes& rate, const InputState<D>& input, Expansion<D>& out) const {
-        input.jet(terms + 1, out.input.data());
+        input.template jet<terms + 1>(out.input.data());
         Varies varies;
         for (int i = 0; i < D::inputs; ++i) varies[i] = input.varies(i);
         expand(rate, varies, out);

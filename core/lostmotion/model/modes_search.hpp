@@ -283,7 +283,8 @@ template <class Sizes>
 template <class Cache, class Now>
 Found SwitchedTrain<Sizes>::enumerate(Cache& cache, Now& now, const Event& event, const Key& from, Key& key) const {
     Key modes;
-    std::vector<int> slips_of(static_cast<std::size_t>(combinations(event)));
+    std::vector<int>& slips_of = slips_of_;  // one that allocates nothing
+    slips_of.resize(static_cast<std::size_t>(combinations(event)));
     for (std::size_t number = 0; number < slips_of.size(); ++number)
         slips_of[number] = combination(number, event, from, modes);
     const auto before = now.memory;  // all that a trial may change

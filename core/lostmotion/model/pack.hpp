@@ -49,12 +49,15 @@ using PackedForm = LinearFormOf<D>;
 template <class D, class F = PackedForm<D>>
 F pack(const Row& f, const Layout& n) {
     F out{};
-    const auto copy = [&, known = static_cast<int>(f.c.size())](int from, int count, int to) {
+    const int known = static_cast<int>(f.c.size());
+    const auto copy = [&](int from, int count, int to) {
         std::copy_n(f.c.begin() + from, std::clamp(known - from, 0, count), out.c.begin() + to);
     };
-    // With the same places in the kernel.
-    if (n.coupled == D::coupled && n.angles == D::angles && n.memory == D::memory) {
-        copy(0, n.terms, 0);
+    // With the same places in the kernel, in fours, as a form has them.
+    if (n.coupled == D::coupled && n.angles == D::angles && n.memory == D::memory && n.inputs == D::inputs) {
+        constexpr int whole = D::terms / 4 * 4;
+        for (int k = 0; k < std::min(known, whole); k += 4) std::copy_n(f.c.begin() + k, 4, out.c.begin() + k);
+        if (known > whole) std::copy_n(f.c.begin() + whole, D::terms - whole, out.c.begin() + whole);
         return out;
     }
     copy(0, n.coupled, 0);

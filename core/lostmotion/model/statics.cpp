@@ -77,13 +77,12 @@ std::array<int, max_shafts> parts(const Places& places, const Key& key) {
 
 Statics::Statics(const Places& places, const Key& key, const Ties& ties, std::vector<Row>& motion)
     : places_(places), contacts_(places.contacts), layout_(places.layout), key_(key), ties_(ties), motion_(motion) {
-    for (const ShaftPlace& s : places.shafts) inertia_.push_back(s.inertia);
-    pivot_ = inertia_;
+    for (std::size_t s = 0; s < shafts(); ++s) pivot_[s] = inertia_[s] = places.shafts[s].inertia;
     if (!places.coupled_inertias.empty()) factorise();
 }
 
 void Statics::factorise() {
-    const std::size_t n = inertia_.size();
+    const std::size_t n = shafts();
     factor_.assign(n, std::vector<double>(n));
     Matrix left(n, std::vector<double>(n));  // of J, its lower triangle
     for (const CoupledInertia& c : places_.coupled_inertias)
@@ -99,7 +98,7 @@ void Statics::factorise() {
 }
 
 void Statics::divide_by_inertias() {
-    const std::size_t n = motion_.size();
+    const std::size_t n = shafts();
     for (std::size_t s = 0; s < n; ++s)
         if (is_given(s)) motion_[s] = acceleration_of(s);
     for (const CoupledInertia& c : places_.coupled_inertias) {
@@ -129,7 +128,7 @@ std::vector<int> Statics::stuck() const {
 // Do the inertias of shafts that hang together, as one of them feels them, differ that much?
 bool Statics::has_light_shafts() const {
     std::array<double, max_shafts> speed{};  // magnitudes, of each shaft for that of the first of its part
-    for (std::size_t first = 0; first < inertia_.size(); ++first) {
+    for (std::size_t first = 0; first < shafts(); ++first) {
         if (speed[first] != 0.0) continue;
         speed[first] = 1.0;
         double least = std::numeric_limits<double>::infinity(), most = 0.0;
@@ -167,13 +166,14 @@ bool Statics::solve(const std::vector<Row*>& forms) {
 
 bool Statics::solve_reactions(const std::vector<int>& of, const std::vector<Row*>& forms) {
     const std::size_t n = of.size();
+    if (n == 0) return true;
     std::vector<Row> rows(n);
     std::vector<int> unknowns;
     for (std::size_t k = 0; k < n; ++k) {
         contacts_[of[k]].each_shaft([&](int s, double per) { rows[k] += per * motion_[s]; });
         unknowns.push_back(unknown(of[k]));
     }
-    const bool free = moves_freely(of, rows), two_shafts = motion_.size() == 2;
+    const bool free = moves_freely(of, rows), two_shafts = shafts() == 2;
     const auto take = [&](Row& f, double factor, const Row& row) { subtract(f, factor, row, two_shafts); };
     if (!eliminate(rows, unknowns, n, take)) return false;
     for (Row* f : forms) substitute(*f, rows, unknowns, n, take);
@@ -183,7 +183,7 @@ bool Statics::solve_reactions(const std::vector<int>& of, const std::vector<Row*
 
 bool Statics::moves_freely(const std::vector<int>& of, const std::vector<Row>& rows) const {
     const std::array<int, max_shafts> part = parts(places_, key_);
-    for (std::size_t p = 0; p < inertia_.size(); ++p) {
+    for (std::size_t p = 0; p < shafts(); ++p) {
         std::vector<std::size_t> in;
         for (std::size_t k = 0; k < of.size(); ++k)
             if (part[contacts_[of[k]].a] == static_cast<int>(p)) in.push_back(k);
@@ -205,7 +205,7 @@ void Statics::follow(Row& f, const Ties& heavy) const {
 }
 
 bool Statics::solve_balances(const std::vector<int>& of, const std::vector<Row*>& forms) {
-    const int shafts = static_cast<int>(motion_.size());
+    const int all = static_cast<int>(shafts());
     const Ties heavy = places_.ties(key_.modes.data(), inertia_.data());
     const auto is_free = [&](int s) { return (heavy.free[s] >> s & 1) != 0; };
     std::vector<int> unknowns;
@@ -213,12 +213,12 @@ bool Statics::solve_balances(const std::vector<int>& of, const std::vector<Row*>
     for (const int s : places_.massless)
         if (is_free(s) && places_.moves_no_inertia(s, heavy)) unknowns.push_back(places_.shafts[s].speed);
     const std::size_t in_forms = unknowns.size();
-    for (int s = 0; s < shafts; ++s)
+    for (int s = 0; s < all; ++s)
         if (is_free(s) && !places_.moves_no_inertia(s, heavy)) unknowns.push_back(max_columns + s);
-    if (unknowns.size() != motion_.size()) return false;
+    if (unknowns.size() != shafts()) return false;
     for (Row& f : motion_) follow(f, heavy);
-    std::vector<Balance> rows(motion_.size());
-    for (int s = 0; s < shafts; ++s) {
+    std::vector<Balance> rows(shafts());
+    for (int s = 0; s < all; ++s) {
         if (is_given(static_cast<std::size_t>(s))) motion_[s] = acceleration_of(static_cast<std::size_t>(s));
         std::transform(motion_[s].c.begin(), motion_[s].c.end(), rows[s].c.begin(), std::negate<>());
         each_inertia(static_cast<std::size_t>(s), [&](int t, double J) {
@@ -237,7 +237,7 @@ bool Statics::solve_balances(const std::vector<int>& of, const std::vector<Row*>
         massless_.push_back({places_.shafts[s].speed, Row::unit(places_.shafts[s].speed)});
         put(massless_.back().form);
     }
-    for (int s = 0; s < shafts; ++s) {
+    for (int s = 0; s < all; ++s) {
         motion_[s] = Row{};
         heavy.each_share(s, [&](int k, double share) {
             const auto at = std::find(unknowns.begin(), unknowns.end(), max_columns + k) - unknowns.begin();
@@ -250,9 +250,9 @@ bool Statics::solve_balances(const std::vector<int>& of, const std::vector<Row*>
 
 bool Statics::balances_move_freely(const std::vector<int>& of, const Ties& heavy) const {
     const std::array<int, max_shafts> part = parts(places_, key_);
-    for (std::size_t p = 0; p < inertia_.size(); ++p) {
+    for (std::size_t p = 0; p < shafts(); ++p) {
         std::vector<int> in;
-        for (std::size_t s = 0; s < inertia_.size(); ++s)
+        for (std::size_t s = 0; s < shafts(); ++s)
             if (part[s] == static_cast<int>(p)) in.push_back(static_cast<int>(s));
         Matrix with(in.size()), without(in.size());
         for (std::size_t row = 0; row < in.size(); ++row) {

@@ -51,6 +51,7 @@ class Statics {
     // of det [J S, -B] over det [J S, C^T].
     bool moves_freely(const std::vector<int>& of, const std::vector<Row>& rows) const;
     bool balances_move_freely(const std::vector<int>& of, const Ties& heavy) const;
+    std::size_t shafts() const { return places_.shafts.size(); }
     bool is_given(std::size_t shaft) const { return places_.shafts[shaft].given_acceleration != nowhere; }
     Row acceleration_of(std::size_t shaft) const {
         return Row::unit(layout_.first_input + places_.shafts[shaft].given_acceleration);
@@ -65,7 +66,7 @@ class Statics {
     const Key& key_;
     const Ties& ties_;
     std::vector<Row>& motion_;
-    std::vector<double> inertia_, pivot_;      // of each shaft: the diagonals of J and of D
+    std::array<double, max_shafts> inertia_, pivot_;  // of each shaft: the diagonals of J and of D
     std::vector<std::vector<double>> factor_;  // L, where J is not diagonal
     std::vector<MasslessSpeed> massless_;
 };

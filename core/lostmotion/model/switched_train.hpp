@@ -450,6 +450,7 @@ class SwitchedTrain {
         bool reached = false;
     };
     mutable std::array<Limit, 64> limits_;
+    mutable std::vector<int> slips_of_;  // each combination: how many contacts slip
 };
 
 }  // namespace lostmotion::model

@@ -153,8 +153,8 @@ class ExactSolver {
     [[gnu::noinline]] bool has_settled(const Regime& regime, const State& rate) const;
     bool rest_unforced(const Entry& e, const State& rate);
     [[gnu::cold]] void follow_inputs(const Key& before);
-    [[gnu::cold]] Coupled bound_ahead(Entry& e, const Coupled& x) const;
-    [[gnu::cold]] void begin_in_doubt(Entry& e, const Cursor& at, const Memory& memory);
+    Coupled bound_ahead(Entry& e, const Coupled& x) const;
+    void begin_in_doubt(Entry& e, const Cursor& at, const Memory& memory);
     [[gnu::cold]] void rest(const Segment<System>& segment, const Cursor& at, double limit);
     [[gnu::cold]] void keep_course(const Entry& e, const Cursor& at);
     double twist_speed_rounding(Entry& e, int t, const Cursor& at) const;

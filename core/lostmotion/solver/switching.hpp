@@ -33,7 +33,7 @@ struct SwitchingOf {
 template <class D>
 void see_inputs(const InputState<D>& input, double time, InstantOf<D>& now) {
     now.time = time;
-    input.jet(n_derivatives, now.input.data());
+    input.template jet<n_derivatives>(now.input.data());
     now.input_magnitudes = input.magnitudes();
 }
 
