@@ -59,6 +59,11 @@ class TrainSystem {
         pack<D>(composed_, assembly_, r);
         if (!r.complete) overflowed_ = true;
     }
+    // One that has been built, in full; most often the last.
+    const model::Regime& composed(const Regime& r) const {
+        if (composed_.rate.empty() || !(composed_.key == r.key)) assembly_.build(r.key, composed_);
+        return composed_;
+    }
     Regime build(const Key& key) const {
         Regime r;
         build(key, r);

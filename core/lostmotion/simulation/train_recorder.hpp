@@ -31,7 +31,7 @@ class TrainMeter {
     bool segment(const Segment<model::TrainSystem<D>>& s) {
         model::TrainRegime<D>& r = s.entry.regime;
         if (!(s.end > s.begin)) return true;
-        if (!r.flows) find_flows(r);
+        if (!r.flows) find_flows(r, s.system.composed(r));
         for (const auto& f : *r.flows) place(f.number);
         if (std::ranges::all_of(assembly_.places().shafts, [&](const model::ShaftPlace& p) {
                 return r.resting[static_cast<std::size_t>(p.speed)];
@@ -59,10 +59,10 @@ class TrainMeter {
     // Motor, viscous and dry friction of its shaft, mesh, hysteresis, the same friction of the load, load torque.
     static constexpr int in_words_of_paper[] = {0, 1, 2, 6, 7, 3, 5, 4};
 
-    [[gnu::cold]] void find_flows(model::TrainRegime<D>& r) const {
+    [[gnu::cold]] void find_flows(model::TrainRegime<D>& r, const model::Regime& composed) const {
         const model::Layout& n = assembly_.layout();
         auto& flows = r.flows.emplace();
-        for (const model::NumberedPower& f : model::power_flows(assembly_, assembly_.build(r.key)))
+        for (const model::NumberedPower& f : model::power_flows(assembly_, composed))
             flows.push_back({f.flow, model::pack<D>(f.power.torque, n), model::pack<D>(f.power.speed, n)});
     }
     // The row of a flow, which it keeps from regime to regime.

@@ -18,6 +18,7 @@ namespace lostmotion {
 template <class System>
 struct Segment {
     using Entry = typename RegimeCache<System>::Entry;
+    const System& system;
     Entry& entry;
     const Cursor<typename System::Dims>& at;  // where it begins
     double begin, end;                        // [s]
@@ -297,8 +298,8 @@ Status ExactSolver<System>::advance(double t_end, Observer& observer) {
         if (interruption(steps_of_a_search)) return Status::interrupted;
         Entry& entry = cache_.entry(key_);
         if (!entry.propagator.ready()) entry.prepare(rotations_, scale_);
-        Segment<System> segment{entry, *begin_, time_, t_end, true, now_.memory, entry.rates.constant(now_.memory),
-                                now_.x};
+        Segment<System> segment{
+            system_, entry, *begin_, time_, t_end, true, now_.memory, entry.rates.constant(now_.memory), now_.x};
         begin_->place(entry.propagator, segment.constant, now_.x, course_.rate_known ? &course_.rate : nullptr);
         if (begin_->constant_inputs()) {
             if (has_settled(entry.regime, begin_->rate())) begin_->settle();
