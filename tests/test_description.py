@@ -191,6 +191,13 @@ def test_signals_references_and_times_are_replaced(library: c.CDLL, axis: Scenar
     assert (
         lib.lm_scenario_set_reference(axis.handle, c.c_size_t(7), pieces, c.c_size_t(2), None, c.c_size_t(0)) == INVALID
     )
+    for times, wrong in (((0.1, 0.2), "begin at 0 s"), ((0.0, 0.0), "rise in time"), ((0.0, math.nan), "[1].time")):
+        pieces = doubles([(t, 0.1, 0.0, 0.0, 0.0) for t in times])
+        lib.lm_scenario_set_reference(axis.handle, c.c_size_t(0), pieces, c.c_size_t(2), None, c.c_size_t(0))
+        assert wrong in axis.error()
+        load = Signal(doubles([(t, 0.1, 0.0) for t in times]), 2, None, 0)
+        assert lib.lm_scenario_set_signal(axis.handle, c.c_size_t(place), c.byref(load)) == INVALID
+        assert wrong in axis.error()
 
 
 def test_a_result_tells_how_far_it_came(library: c.CDLL) -> None:  # noqa: F811

@@ -66,7 +66,8 @@ LM_API int lm_scenario_set(lm_scenario* scenario, size_t k, double value);
  * ones. Nothing changes if one is wrong. */
 LM_API int lm_scenario_set_all(lm_scenario* scenario, const double* values);
 
-/* Straight lines, each from a time on: value and slope; and sines: amplitude, frequency [Hz], phase [rad]. */
+/* Straight lines, each from a time on, the first from 0 s: value and slope; and sines: amplitude, frequency [Hz],
+ * phase [rad]. */
 typedef struct {
     const double* breakpoints; /* n_breakpoints x (time, value, slope) */
     size_t n_breakpoints;

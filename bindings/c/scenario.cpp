@@ -1,6 +1,5 @@
 // The C interface: descriptions of scenarios.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstring>
 #include <string>
@@ -11,17 +10,8 @@
 namespace lm = lostmotion;
 
 std::string read_signal(const lm_signal& from, lm::Signal& to) {
-    if (!(from.n_breakpoints > 0 && finite(from.breakpoints, 3 * from.n_breakpoints)) ||
-        (from.n_sines > 0 && !finite(from.sines, 3 * from.n_sines)))
-        return "has no breakpoint, or a number is not finite";
-    std::vector<std::array<double, 3>> breakpoints(from.n_breakpoints), sines(from.n_sines);
-    for (std::size_t k = 0; k < from.n_breakpoints; ++k) {
-        std::copy_n(from.breakpoints + 3 * k, 3, breakpoints[k].begin());
-        if (k > 0 && breakpoints[k][0] <= breakpoints[k - 1][0]) return "has breakpoints that do not rise in time";
-    }
-    for (std::size_t k = 0; k < from.n_sines; ++k) std::copy_n(from.sines + 3 * k, 3, sines[k].begin());
-    to = lm::signal_of(breakpoints, sines);
-    return {};
+    NumberLists numbers;
+    return numbers.list(from.breakpoints, from.n_breakpoints, 3).list(from.sines, from.n_sines, 3).read(to);
 }
 
 extern "C" {
@@ -59,18 +49,10 @@ int lm_scenario_set_signal(lm_scenario* scenario, size_t input, const lm_signal*
 
 int lm_scenario_set_reference(lm_scenario* scenario, size_t controller, const double* pieces, size_t n,
                               const double* sines, size_t n_sines) {
-    if (!(n > 0 && finite(pieces, 5 * n)) || (n_sines > 0 && !finite(sines, 3 * n_sines)))
-        return scenario->changed("the reference has no piece, or a number is not finite");
     lm::control::Reference reference;
-    reference.pieces.resize(n);
-    for (std::size_t k = 0; k < n; ++k) {
-        const double* p = pieces + 5 * k;
-        reference.pieces[k] = {p[0], {p[1], p[2], p[3], p[4]}};
-        if (k == 0 ? p[0] != 0.0 : !(p[0] > p[-5]))
-            return scenario->changed("the reference must begin at 0 s, and its pieces rise in time");
-    }
-    for (std::size_t k = 0; k < n_sines; ++k)
-        reference.sines.push_back({sines[3 * k], sines[3 * k + 1], sines[3 * k + 2]});
+    NumberLists numbers;
+    const std::string wrong = numbers.list(pieces, n, 5).list(sines, n_sines, 3).read(reference);
+    if (!wrong.empty()) return scenario->changed(wrong);
     return scenario->changed(scenario->description.set_reference(controller, std::move(reference)));
 }
 

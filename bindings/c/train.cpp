@@ -1,11 +1,8 @@
 // The C interface: trains, element by element.
 #include "train.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <limits>
 #include <new>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,6 +12,10 @@
 namespace lm = lostmotion;
 
 namespace {
+
+std::string about(const std::string& what, const std::string& wrong) {
+    return wrong.empty() ? wrong : what + ": " + wrong;
+}
 
 std::string name_error(const lm_train& train, const char* name) {
     if (name == nullptr || *name == '\0') return "an element has no name";
@@ -32,50 +33,30 @@ std::string name_error(const lm_train& train, const char* name) {
     return {};
 }
 
-// "" if all numbers are finite and rise.
-std::string rising_error(const std::string& what, const std::vector<double>& v, double above) {
-    for (const double x : v) {
-        if (!(std::isfinite(x) && x > above)) return what + " must rise, from above " + std::to_string(above);
-        above = x;
-    }
-    return {};
-}
-std::string finite_error(const std::string& what, const std::vector<double>& v) {
-    for (const double x : v)
-        if (!std::isfinite(x)) return what + " must be finite";
-    return {};
-}
-
-// The curve, or what is wrong with it.
 std::string read(const lm_curve& c, const std::string& what, lm::TorsionCurve& to) {
-    if (c.slopes == nullptr || (c.n_breaks > 0 && c.breaks == nullptr)) return what + ": breaks or slopes are missing";
-    std::vector<double> breaks = list(c.breaks, c.n_breaks), slopes = list(c.slopes, c.n_breaks + 1);
-    if (auto e = rising_error(what + ": breaks", breaks, 0.0); !e.empty()) return e;
-    if (auto e = finite_error(what + ": slopes", slopes); !e.empty()) return e;
-    to = lm::TorsionCurve(std::move(breaks), std::move(slopes));
-    return {};
+    NumberLists sides;
+    for (int side = 0; side < 2; ++side) sides.list(c.breaks, c.n_breaks).list(c.slopes, c.n_breaks + 1);
+    return about(what, sides.read(to));
 }
 std::string read(const lm_periodic_curve& c, const std::string& what, lm::model::PeriodicCurve& to) {
-    if (c.n == 0 || c.angles == nullptr || c.values == nullptr) return what + ": angles or values are missing";
-    std::vector<double> angles = list(c.angles, c.n), values = list(c.values, c.n);
-    if (!(std::isfinite(c.period) && c.period > 0.0)) return what + ": the period must be > 0";
-    if (auto e = finite_error(what + ": values", values); !e.empty()) return e;
-    for (std::size_t k = 0; k < c.n; ++k)
-        if (!(angles[k] >= 0.0 && angles[k] < c.period && (k == 0 || angles[k] > angles[k - 1])))
-            return what + ": angles must rise, from 0 on and below the period";
-    to = lm::model::PeriodicCurve(c.period, std::move(angles), std::move(values));
-    return {};
+    NumberLists numbers;
+    numbers.number(c.period).list(c.angles, c.n).list(c.values, c.n);
+    return about(what, numbers.number(0.0).number(1.0).number(0.0).read(to));  // of no sine
 }
 std::string read(const lm_loss_map& m, const std::string& what, lm::LossMap& to) {
-    if (m.speeds == nullptr || m.loads == nullptr || m.values == nullptr || m.n_speeds < 2 || m.n_loads < 2)
-        return what + ": a loss map needs two speeds and two loads at least";
-    std::vector<double> speeds = list(m.speeds, m.n_speeds), loads = list(m.loads, m.n_loads),
-                        values = list(m.values, m.n_speeds * m.n_loads);
-    if (auto e = rising_error(what + ": speeds", speeds, -1e-300); !e.empty()) return e;
-    if (auto e = rising_error(what + ": loads", loads, -std::numeric_limits<double>::infinity()); !e.empty()) return e;
-    if (auto e = finite_error(what + ": values", values); !e.empty()) return e;
-    to = lm::LossMap(std::move(speeds), std::move(loads), std::move(values));
-    return {};
+    NumberLists axes;
+    axes.list(m.speeds, m.n_speeds).list(m.loads, m.n_loads).list(m.values, m.n_speeds * m.n_loads);
+    return about(what, axes.read(to));
+}
+
+// use(element): of this name, which returns what is wrong.
+template <class Element, class Use>
+int with_named(lm_train& train, std::vector<Element>& elements, const char* kind, const char* name, Use&& use) {
+    return train.attempt([&]() -> std::string {
+        for (Element& e : elements)
+            if (e.name == text(name)) return use(e);
+        return "there is no " + std::string(kind) + " '" + text(name) + "'";
+    });
 }
 
 // A train with these parameters, of which a motor or gear is taken.
@@ -179,44 +160,29 @@ int lm_add_gear(lm_train* train, const char* name, const char* input, const char
 }
 
 int lm_limit_mesh_damping(lm_train* train, const char* gear) {
-    return train->attempt([&] {
-        for (lm::model::Gear& g : train->description.train.gears)
-            if (g.name == text(gear)) {
-                g.damping_limited = true;
-                return std::string{};
-            }
-        return "there is no gear '" + text(gear) + "'";
+    return with_named(*train, train->description.train.gears, "gear", gear, [](lm::model::Gear& g) {
+        g.damping_limited = true;
+        return std::string{};
     });
 }
 
 int lm_set_mesh_stiffness(lm_train* train, const char* gear, const lm_periodic_curve* factors) {
-    return train->attempt([&] {
-        for (lm::model::Gear& g : train->description.train.gears)
-            if (g.name == text(gear))
-                return read(*factors, "gear '" + text(gear) + "': mesh stiffness", g.mesh_stiffness);
-        return "there is no gear '" + text(gear) + "'";
+    return with_named(*train, train->description.train.gears, "gear", gear, [&](lm::model::Gear& g) {
+        return read(*factors, "gear '" + g.name + "': mesh stiffness", g.mesh_stiffness);
     });
 }
 
 int lm_set_slide(lm_train* train, const char* shaft) {
-    return train->attempt([&] {
-        for (lm::model::Shaft& s : train->description.train.shafts)
-            if (s.name == text(shaft)) {
-                s.domain = lm::model::Domain::translation;
-                return std::string{};
-            }
-        return "there is no shaft '" + text(shaft) + "'";
+    return with_named(*train, train->description.train.shafts, "shaft", shaft, [](lm::model::Shaft& s) {
+        s.domain = lm::model::Domain::translation;
+        return std::string{};
     });
 }
 
 int lm_give_motion(lm_train* train, const char* shaft) {
-    return train->attempt([&] {
-        for (lm::model::Shaft& s : train->description.train.shafts)
-            if (s.name == text(shaft)) {
-                s.given_motion = true;
-                return std::string{};
-            }
-        return "there is no shaft '" + text(shaft) + "'";
+    return with_named(*train, train->description.train.shafts, "shaft", shaft, [](lm::model::Shaft& s) {
+        s.given_motion = true;
+        return std::string{};
     });
 }
 
@@ -238,16 +204,14 @@ int lm_add_mass_matrix(lm_train* train, const char* name, const char* const* sha
 }
 
 int lm_set_housing(lm_train* train, const char* gear, const char* shaft) {
-    return train->attempt([&] {
-        const auto named = [](const char* name) {
-            return [name](const auto& element) { return element.name == text(name); };
-        };
-        const lm::model::Train& t = train->description.train;
-        if (std::ranges::none_of(t.gears, named(gear))) return "there is no gear '" + text(gear) + "'";
-        if (std::ranges::none_of(t.shafts, named(shaft))) return "there is no shaft '" + text(shaft) + "'";
-        train->description.set_housing(text(gear), text(shaft));
+    lm::model::TrainDescription& of = train->description;
+    const auto set = [&](const auto&) {
+        of.set_housing(text(gear), text(shaft));
         return std::string{};
-    });
+    };
+    const auto nothing = [](const auto&) { return std::string{}; };
+    const int known = with_named(*train, of.train.gears, "gear", gear, nothing);
+    return known != LM_OK ? known : with_named(*train, of.train.shafts, "shaft", shaft, set);
 }
 
 int lm_add_brake(lm_train* train, const char* name, const char* shaft, double torque, double breakaway_torque) {

@@ -10,6 +10,7 @@
 
 #include "lostmotion.h"
 #include "lostmotion/model/train_description.hpp"
+#include "lostmotion/scenario/part_fields.hpp"
 
 // What change() returns as text, or what it throws, where there are exceptions.
 template <class Change>
@@ -43,3 +44,31 @@ inline std::string text(const char* s) { return s == nullptr ? std::string() : s
 inline std::vector<double> list(const double* from, std::size_t n) {
     return from == nullptr ? std::vector<double>() : std::vector<double>(from, from + n);
 }
+
+// Lists of numbers in the order of a description, each with its length.
+class NumberLists {
+ public:
+    NumberLists& number(double v) {
+        numbers_.push_back(v);
+        return *this;
+    }
+    // width: of an entry.
+    NumberLists& list(const double* from, std::size_t n, std::size_t width = 1) {
+        missing_ = missing_ || (from == nullptr && n > 0);
+        number(static_cast<double>(n));
+        if (from != nullptr) numbers_.insert(numbers_.end(), from, from + n * width);
+        return *this;
+    }
+    // The part that is described so, or what is wrong with it.
+    template <class Part>
+    std::string read(Part& to) const {
+        if (missing_) return "has no numbers";
+        lostmotion::FieldReader f(numbers_);
+        describe(f, to);
+        return f.error();
+    }
+
+ private:
+    std::vector<double> numbers_;
+    bool missing_ = false;
+};
