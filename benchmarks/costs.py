@@ -129,7 +129,8 @@ def batches(report: Report, scenario: lm.Scenario) -> None:
         chosen = np.ascontiguousarray(values[:, :used])
 
         def work() -> None:
-            _core.run_batch([core_case(s)], fields[:used], chosen, 1.0, 1e-3, 1001, (), channels, [], threads)
+            what = {"fields": fields[:used], "values": chosen, "energies": (), "channels": channels, "kept": []}
+            _core.run_batch([core_case(s)], **what, **s.simulation.grid(), threads=threads)
 
         return runs / (1e-3 * best(7 if runs < 5000 else 3, work))
 

@@ -86,33 +86,33 @@ def cases() -> tuple[list[Any], list[list[tuple[Any, ...]]], Bound]:
     beside = {key: neighbours(s, key) for key in KEYS}
     control = s.control()
     exact = [sensitive_case(s, [core_variation(s, key, beside[key]) for key in KEYS], control)]
-    runs = [[(*core_case(as_is := n.scenario), as_is.control()) for n in beside[key]] for key in KEYS]  # type: ignore[arg-type]
+    runs = [[(core_case(n.scenario), n.scenario.control()) for n in beside[key]] for key in KEYS]
     return exact, runs, control
 
 
 def section(report: Report) -> None:
     exact, runs, control = cases()
     s = arm()
-    options = (s.simulation.duration, s.simulation.sample_interval, s.simulation.samples, False, 0.0, 0)
+    grid = s.simulation.grid()
 
     def differences() -> None:
         for of_key in runs:
-            for *case, bound in of_key:
-                _core.run(*case, *options, bound)
+            for case, bound in of_key:
+                _core.run(case, **grid, control=bound)
 
     core = core_case(s)
-    names = [name for name, _, _ in core[0].channels()]
-    one = best(5, lambda: _core.run(*core, *options, control), time.process_time)
+    names = [name for name, *_ in s.core().channels()]
+    one = best(5, lambda: _core.run(core, **grid, control=control), time.process_time)
     gradient = best(5, lambda: run_cases(exact, CHANNELS), time.process_time)
     by_differences = best(3, differences, time.process_time)
     (found,) = run_cases(exact, CHANNELS)
     rows = [names.index(name) for name in CHANNELS]
     gaps = []
     for p, (of_key, beside) in enumerate(zip(runs, [neighbours(s, key) for key in KEYS], strict=True)):
-        base = _core.run(*core, *options, control)["values"][rows]
+        base = _core.run(core, **grid, control=control)["values"][rows]
         got = sum(
-            n.weight * (_core.run(*case, *options, bound)["values"][rows] - base)
-            for n, (*case, bound) in zip(beside, of_key, strict=True)
+            n.weight * (_core.run(case, **grid, control=bound)["values"][rows] - base)
+            for n, (case, bound) in zip(beside, of_key, strict=True)
         )
         size = np.max(np.abs(found.derivatives[p]), axis=1, keepdims=True)  # 0 if the motion does not depend on it
         size = np.where(size > 0.0, size, np.inf)

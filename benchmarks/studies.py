@@ -42,13 +42,13 @@ def core_alone(study: lm.studies.Study, threads: int) -> float:
     """Processor time of the calls into the core alone [s]."""
     fields = [_core.batch_fields().index(v.key) for v in study.vary]
     channels = ("load_speed", "twist")
-    table, case = study.scenario.simulation, core_case(study.scenario)
+    case, grid = core_case(study.scenario), study.scenario.simulation.grid()
+    what = {"fields": fields, "energies": (), "channels": channels, "kept": KEPT, "threads": threads}
     chunks = [study.parameters(k, k + CHUNK) for k in range(0, study.total, CHUNK)]
 
     def work() -> None:
         for values in chunks:
-            grid = (table.duration, table.sample_interval, table.samples)
-            _core.run_batch([case], fields, np.ascontiguousarray(values), *grid, (), channels, KEPT, threads)
+            _core.run_batch([case], values=np.ascontiguousarray(values), **what, **grid)
 
     return 1e-3 * best(3, work, time.process_time)
 

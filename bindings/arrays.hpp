@@ -21,6 +21,7 @@ namespace nb = nanobind;
 using namespace nb::literals;
 
 using Array = nb::ndarray<nb::numpy, double>;
+using Record = nb::typed<nb::dict, nb::str, nb::any>;  // values by their keys
 using Room = nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using Values = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 

@@ -81,7 +81,7 @@ inline void bind_exact_batch(nb::module_& m) {
                     kinds.push_back(batch_scenario(*trains[k], controls[k]));
                 new (self) B(kinds, kind_of, step);
             },
-            "trains"_a, "controls"_a, "kind_of"_a, "step"_a)
+            "trains"_a, nb::kw_only(), "controls"_a, "kind_of"_a, "step"_a)
         .def(
             "step",
             [](B& b, const std::vector<BatchInput>& inputs, const std::optional<BatchInput>& speed,
@@ -95,7 +95,8 @@ inline void bind_exact_batch(nb::module_& m) {
                 if (speed && acceleration) motion->acceleration = batch_input(*acceleration, b);
                 step_batch([&] { return b.step(given, motion, threads); });
             },
-            "inputs"_a, "speed"_a.none(), "angle"_a.none(), "acceleration"_a.none(), "threads"_a)
+            "inputs"_a, nb::kw_only(), "speed"_a = nb::none(), "angle"_a = nb::none(), "acceleration"_a = nb::none(),
+            "threads"_a)
         .def(
             "reset",
             [](B& b, const std::optional<BatchMask>& which, const Values& start) {
@@ -142,7 +143,7 @@ inline void bind_batches(nb::module_& m) {
                     throw nb::type_error("values of other models");
                 new (self) B(std::move(models), std::move(model_of), step);
             },
-            "bases"_a, "base"_a, "keys"_a, "curve_breaks"_a, "values"_a, "model_of"_a, "step"_a)
+            "bases"_a, nb::kw_only(), "base"_a, "keys"_a, "curve_breaks"_a, "values"_a, "model_of"_a, "step"_a)
         .def_static(
             "error", [](const TrainDescription& t) { return B::error(t.train); }, "train"_a,
             "What keeps a train from being stepped in a batch, or nothing.")

@@ -63,46 +63,43 @@ class [[gnu::visibility("hidden")]] PythonLaw {
     std::exception_ptr raised_;
 };
 
-struct [[gnu::visibility("hidden")]] BoundAxis : control::Axis {
+struct [[gnu::visibility("hidden")]] BoundAxis : ControlledAxis {
     std::shared_ptr<PythonLaw> python_law;
 
     void set_python_law(nb::callable function, int states) {
-        python_law = std::make_shared<PythonLaw>(std::move(function), states, field_orientation.has_value());
-        own_law = {};
-        own_law.function = PythonLaw::call;
-        own_law.data = python_law.get();
-        own_law.states = states;
+        python_law = std::make_shared<PythonLaw>(std::move(function), states, law.field_orientation.has_value());
+        set_own_law(PythonLaw::call, python_law.get(), states);
     }
     // The address of a function of the type control::OwnLawFunction, and of what it is given.
     void set_compiled_law(std::size_t function, std::size_t data, int states) {
-        own_law = {};
-        own_law.function = reinterpret_cast<control::OwnLawFunction>(function);
-        own_law.data = reinterpret_cast<void*>(data);
-        own_law.states = states;
+        set_own_law(reinterpret_cast<control::OwnLawFunction>(function), reinterpret_cast<void*>(data), states);
     }
-    void set(const nb::dict& fields) {
+    void set(const Record& fields) {
         NamedFields f(fields);
-        control::describe(f, static_cast<control::Axis&>(*this));
+        describe(f, static_cast<ControlledAxis&>(*this));
         f.refuse_unknown();
     }
     void raise_again() const {
         if (python_law) python_law->raise_again();
     }
+
+ private:
+    void set_own_law(control::OwnLawFunction function, void* data, int states) {
+        law.own_law = {};
+        law.own_law.function = function;
+        law.own_law.data = data;
+        law.own_law.states = states;
+    }
 };
 
-// Base tick [s]; of each axis its controller, motor, the shafts with the encoders of position and speed, and that of
-// the reference.
-using BoundControl = std::pair<double, std::vector<std::tuple<BoundAxis, int, int, int, int>>>;
+// Base tick [s], and the axes.
+using BoundControl = std::pair<double, std::vector<BoundAxis>>;
 
 inline Control control_of(const BoundControl& bound) {
-    Control c;
-    c.tick = bound.first;
-    for (const auto& [axis, motor, position_shaft, speed_shaft, reference_shaft] : bound.second)
-        c.axes.push_back({axis, motor, position_shaft, speed_shaft, reference_shaft});
-    return c;
+    return {bound.first, {bound.second.begin(), bound.second.end()}};
 }
 inline void raise_again(const BoundControl& bound) {
-    for (const auto& each : bound.second) std::get<0>(each).raise_again();
+    for (const BoundAxis& each : bound.second) each.raise_again();
 }
 
 // Of what the axes show in a run: the shape, and room for it.
@@ -137,11 +134,9 @@ inline void bind_linear_steps(nb::module_& m) {
     m.def(
         "linear_step",
         [](const BoundAxis& axis, Loop outermost, bool cut, std::int64_t sample, double sample_time) {
-            return as_array(linear_step(axis, outermost, cut, sample, sample_time));
+            return as_array(linear_step(axis.law, outermost, cut, sample, sample_time));
         },
-        "axis"_a, "outermost"_a, "cut"_a, "sample"_a, "sample_time"_a,
-        nb::sig("def linear_step(axis: Axis, outermost: Loop, cut: bool, sample: int, sample_time: float) -> "
-                "numpy.typing.NDArray[numpy.float64]"),
+        "axis"_a, nb::kw_only(), "outermost"_a, "cut"_a, "sample"_a, "sample_time"_a,
         "Slots after a sample step, over the slots before it and (angle of the position's encoder, angle and speed of "
         "the speed's, torque of the motor, value, rate and acceleration of the reference, measured value of a loop "
         "that is cut).");
@@ -152,14 +147,11 @@ inline void bind_linear_steps(nb::module_& m) {
            int every, int since, double sample_time) {
             const SteadyOrientation motion{
                 speed, lag, torque, weakening, {current.first, current.second}, {voltage.first, voltage.second}};
-            return as_array(
-                linear_orientation(axis.field_orientation.value(), motion, outermost, cut, every, since, sample_time));
+            return as_array(linear_orientation(axis.law.field_orientation.value(), motion, outermost, cut, every, since,
+                                               sample_time));
         },
-        "axis"_a, "speed"_a, "lag"_a, "torque"_a, "weakening"_a, "current"_a, "voltage"_a, "outermost"_a, "cut"_a,
-        "every"_a, "since"_a, "sample_time"_a,
-        nb::sig("def linear_orientation(axis: Axis, speed: float, lag: float, torque: float, weakening: "
-                "float, current: tuple[float, float], voltage: tuple[float, float], outermost: CurrentAxis, cut: bool, "
-                "every: int, since: int, sample_time: float) -> numpy.typing.NDArray[numpy.float64]"),
+        "axis"_a, nb::kw_only(), "speed"_a, "lag"_a, "torque"_a, "weakening"_a, "current"_a, "voltage"_a, "outermost"_a,
+        "cut"_a, "every"_a, "since"_a, "sample_time"_a,
         "Slots of the field orientation after a sample step, the voltage (u_d, u_q) that acts and the measured "
         "currents, over "
         "the slots before it and (torque that is asked for; speed, angle as it is read and angle of the rotor; i_d, "
@@ -175,63 +167,59 @@ std::vector<std::tuple<std::string, std::string, std::string>> signal_names(cons
 
 inline void bind_control(nb::module_& m) {
     using namespace control;
-    m.def(
-        "encoder_step", [](const nb::dict& fields) { return described<Encoder>(fields).step(); }, "fields"_a,
-        nb::sig("def encoder_step(fields: dict[str, typing.Any]) -> float"));
+    m.def("encoder_step", [](const Record& fields) { return described<Encoder>(fields).step(); }, "fields"_a);
     m.def(
         "tracker_gains",
-        [](const nb::dict& fields) {
+        [](const Record& fields) {
             Tracker t = described<Tracker>(fields);
             Slots slots;
             t.place(slots);
             return std::tuple(t.alpha, t.beta, t.gamma);
         },
-        "fields"_a, nb::sig("def tracker_gains(fields: dict[str, typing.Any]) -> tuple[float, float, float]"));
+        "fields"_a);
     m.def(
         "discrete_filter",
-        [](const nb::dict& fields, double sample_time) {
+        [](const Record& fields, double sample_time) {
             Filter f = described<Filter>(fields);
             f.discretise(sample_time);
             const DiscreteSystem s = f.system();
-            nb::dict out;
+            Record out;
             out["A"] = s.A, out["B"] = s.B, out["C"] = s.C, out["D"] = s.D;
-            return nb::make_tuple(f.numerator, f.denominator, out);
+            return std::tuple(f.numerator, f.denominator, out);
         },
         "fields"_a, "sample_time"_a,
-        nb::sig("def discrete_filter(fields: dict[str, typing.Any], sample_time: float) -> tuple[list[float], "
-                "list[float], dict[str, typing.Any]]"),
         "Numerator and denominator in z, the highest power first, and the system of a controller.");
     nb::class_<GearLosses>(m, "GearLosses")
         .def(
             "__init__",
-            [](GearLosses* self, const nb::dict& fields) {
-                new (self) GearLosses();
-                NamedFields f(fields);
-                control::describe(f, *self);
-            },
-            "fields"_a, nb::sig("def __init__(self, fields: dict[str, typing.Any]) -> None"))
+            [](GearLosses* self, const Record& fields) { new (self) GearLosses(described<GearLosses>(fields)); },
+            "fields"_a)
         .def("__call__", &GearLosses::operator(), "output_torque"_a, "direction"_a, "speed"_a)
         .def("output_torque", &GearLosses::output_torque, "input_torque"_a, "direction"_a, "speed"_a, "factor"_a);
     nb::class_<BoundAxis> axis(m, "Axis");
     axis.def(nb::init<>())
         .def(nb::init<const BoundAxis&>(), "other"_a, "A copy, which may be changed.")
-        .def("set", &BoundAxis::set, "fields"_a, nb::sig("def set(self, fields: dict[str, typing.Any]) -> None"),
+        .def("set", &BoundAxis::set, "fields"_a,
              "Parameters by the keys of scenario files, tables as dicts; what is left out stays as it is.")
         .def(
             "slots",
             [](const BoundAxis& a) {
-                control::Axis placed = a;
+                control::Axis placed = a.law;
                 placed.place(1.0);
                 return std::pair(placed.slots(), placed.running_slots());
             },
             "How many numbers it remembers, and which of them go on with time.")
-        .def_prop_ro("position_phase", [](const BoundAxis& a) { return a.position_schedule.phase; })
-        .def_prop_ro("commutates_by_encoder", [](const BoundAxis& a) { return a.commutates_by_encoder; })
-        .def_prop_ro("is_oriented", [](const BoundAxis& a) { return a.field_orientation.has_value(); })
+        .def_prop_ro("position_phase", [](const BoundAxis& a) { return a.law.position_schedule.phase; })
+        .def_prop_ro("commutates_by_encoder", [](const BoundAxis& a) { return a.law.commutates_by_encoder; })
+        .def_prop_ro("is_oriented", [](const BoundAxis& a) { return a.law.field_orientation.has_value(); })
+        .def_ro("motor", &BoundAxis::motor)
+        .def_ro("position_shaft", &BoundAxis::position_shaft)
+        .def_ro("speed_shaft", &BoundAxis::speed_shaft)
+        .def_ro("reference_shaft", &BoundAxis::reference_shaft)
         .def(
             "least_current",
             [](const BoundAxis& a, double torque) {
-                const DirectQuadrature i = a.field_orientation.value().least_current(torque);
+                const DirectQuadrature i = a.law.field_orientation.value().least_current(torque);
                 return std::pair(i.d, i.q);
             },
             "torque"_a, "(i_d, i_q) [A] of the least current for a torque [N m], under field-oriented control.")
@@ -251,12 +239,9 @@ inline void bind_control(nb::module_& m) {
             return signal_names(names);
         },
         "motor_slides"_a = false, "position_slides"_a = false,
-        nb::sig("def axis_signals(motor_slides: bool = False, position_slides: bool = False) -> list[tuple[str, str, "
-                "str]]"),
         "Name, unit, meaning of what each axis shows, where the motor moves a slide, or the position is that of one.");
     m.def(
         "winding_signals", [] { return signal_names(winding_signal_names); },
-        nb::sig("def winding_signals() -> list[tuple[str, str, str]]"),
         "The same of what one with a winding shows beside it.");
 }
 

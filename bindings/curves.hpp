@@ -16,10 +16,10 @@ inline void bind_curves(nb::module_& m) {
         .def(nb::init<Vector, Vector>(), "breaks"_a, "slopes"_a)
         .def(
             "__init__",
-            [](TorsionCurve* self, const nb::dict& stiffness) {
+            [](TorsionCurve* self, const Record& stiffness) {
                 new (self) TorsionCurve(described<StiffnessCurve>(stiffness).curve());
             },
-            "stiffness"_a, nb::sig("def __init__(self, stiffness: dict[str, typing.Any]) -> None"))
+            "stiffness"_a)
         .def_prop_ro("odd", &TorsionCurve::odd)
         .def_prop_ro("pieces", &TorsionCurve::pieces)
         .def(
@@ -38,8 +38,8 @@ inline void bind_curves(nb::module_& m) {
         .def("least_slope_over_load", &LossMap::least_slope_over_load);
     nb::class_<Signal>(m, "Signal")
         .def(
-            "__init__", [](Signal* self, const nb::dict& fields) { new (self) Signal(described<Signal>(fields)); },
-            "fields"_a, nb::sig("def __init__(self, fields: dict[str, typing.Any]) -> None"));
+            "__init__", [](Signal* self, const Record& fields) { new (self) Signal(described<Signal>(fields)); },
+            "fields"_a);
 }
 
 }  // namespace lostmotion::binding

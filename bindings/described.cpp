@@ -57,6 +57,14 @@ class DescribedFields : public FieldVisitor {
         use();
         needed_.clear();
     }
+    // Entries of two numbers, the first in the range of the field.
+    void pairs(const Field& field, Range second, int most) {
+        add(field, "pairs", limits(field.range), nb::make_tuple(), nb::make_tuple(limits(second), most));
+    }
+    void texts(const Field& field, int count) {
+        add(field, "texts", limits(Range::any), nb::none(), nb::make_tuple(count));
+    }
+    void instant(const Field& field) { add(field, "instant", limits(Range::any), nb::none()); }
     // Rows of numbers.
     void matrix(const Field& field) { add(field, "matrix", limits(field.range), nb::make_tuple()); }
     template <class Use>

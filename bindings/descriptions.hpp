@@ -2,7 +2,6 @@
 #pragma once
 
 #include <string>
-#include <tuple>
 #include <vector>
 
 #include "lostmotion/scenario/description.hpp"
@@ -16,47 +15,31 @@ inline std::vector<double> scenario_numbers(Scenario s) {
     return std::move(f.numbers);
 }
 
-// start: states by name; capacities: of the hysteresis of gears by name. What is left out is 0.
-inline std::vector<double> describe(const std::string& title, const TrainDescription& description,
-                                    const std::vector<Signal>& inputs, const Named& start, const Named& capacities,
-                                    double duration, double interval, const BoundControl& bound) {
+inline std::vector<double> describe(const Case& one, const std::string& title, double duration, double sample_interval,
+                                    const BoundControl& bound) {
     Scenario s;
     s.title = title;
-    s.inputs = inputs;
+    s.inputs = one.inputs;
     s.duration = duration;
-    s.sample_interval = interval;
+    s.sample_interval = sample_interval;
     s.control = control_of(bound);
-    s.train = description.train;
-    for (const std::string& name : model::state_names(model::Assembly(s.train)))
-        s.start.push_back(value_of(start, name));
-    for (const model::Gear& g : s.train.gears) s.hysteresis_capacities.push_back(value_of(capacities, g.name));
+    s.train = one.assembly().train();
+    for (const std::string& name : model::state_names(one.assembly()))
+        s.start.push_back(value_of(one.start.states, name));
+    for (const model::Gear& g : s.train.gears)
+        s.hysteresis_capacities.push_back(value_of(one.start.hysteresis_capacities, g.name));
     return scenario_numbers(std::move(s));
 }
 
-// Of each parameter its key, unit and value, above which, from which on and up to which it may be, and of each number
-// that follows from it the place, whether it follows from the reciprocal value, offset and slope.
-using ParameterOfDescription = std::tuple<std::string, std::string, double, std::tuple<double, double, double>,
-                                          std::vector<std::tuple<int, bool, double, double>>>;
 inline std::vector<double> write_description(const std::vector<double>& scenario,
-                                             const std::vector<ParameterOfDescription>& parameters) {
+                                             const std::vector<Record>& parameters) {
     std::vector<ScenarioParameter> all;
-    for (const auto& [key, unit, value, range, effects] : parameters) {
-        const auto& [above, at_least, at_most] = range;
-        all.push_back({key, unit, value, {}, {above, at_least, at_most}});
-        for (const auto& [place, reciprocal, offset, slope] : effects)
-            all.back().effects.push_back(
-                {place, reciprocal ? Effect::reciprocal : Effect::proportional, offset, slope});
-    }
+    for (const Record& fields : parameters) all.push_back(described<ScenarioParameter>(fields));
     return ScenarioDescription::write(scenario, std::move(all));
 }
 
 inline void bind_descriptions(nb::module_& m) {
-    m.def("describe", &describe, "title"_a, "train"_a, "inputs"_a, "start"_a, "hysteresis_capacities"_a, "duration"_a,
-          "interval"_a, "control"_a,
-          nb::sig("def describe(title: str, train: Train, inputs: collections.abc.Sequence[Signal], start: "
-                  "collections.abc.Mapping[str, float], hysteresis_capacities: collections.abc.Mapping[str, float], "
-                  "duration: float, interval: float, control: tuple[float, "
-                  "collections.abc.Sequence[tuple[Axis, int, int, int, int]]]) -> list[float]"));
+    m.def("describe", &describe, "case"_a, nb::kw_only(), "title"_a, "duration"_a, "sample_interval"_a, "control"_a);
     m.def("write_description", &write_description, "scenario"_a, "parameters"_a);
 }
 

@@ -120,12 +120,7 @@ class NamedFields {
             use(*v);
         });
     }
-    // After all has been read.
-    void refuse_unknown() const {
-        if (used_ != values_.size()) wrong_keys();
-    }
-
- private:
+    // Whether it is given.
     template <class T>
     bool take(const char* name, T& v) {
         if (!values_.contains(name)) return false;
@@ -135,6 +130,12 @@ class NamedFields {
         v = nb::cast<T>(given);
         return true;
     }
+    // After all has been read.
+    void refuse_unknown() const {
+        if (used_ != values_.size()) wrong_keys();
+    }
+
+ private:
     template <class Use>
     void within(nb::dict inner, Use&& use) {
         std::swap(values_, inner);

@@ -8,9 +8,9 @@
 
 namespace lostmotion::binding {
 
-// Channels; of each contact: name, mode, speed, torque, capacity forward and backward, and by element the shares of
-// these; of each motor: name, command from which on it turns forward, and backward.
-inline nb::tuple explain_point(const model::Assembly& a, const TrainPoint& p) {
+// Values of the channels; of each contact: name, mode, speed, torque, capacity forward and backward, and by element the
+// shares of these; of each motor: name, command from which on it turns forward, and backward.
+inline Record explain_point(const model::Assembly& a, const TrainPoint& p) {
     nb::list contacts, motors;
     for (const ContactReport& c : explain_contacts(a, p)) {
         nb::list shares;
@@ -20,13 +20,15 @@ inline nb::tuple explain_point(const model::Assembly& a, const TrainPoint& p) {
     }
     for (const MotorReport& m : explain_motors(a, p))
         motors.append(nb::make_tuple(m.name, m.command_forward, m.command_backward));
-    return nb::make_tuple(p.values, contacts, motors);
+    Record out;
+    out["values"] = p.values, out["contacts"] = contacts, out["motors"] = motors;
+    return out;
 }
 
 // States, hysteresis capacities and inputs at the point, by name; rows of the rates; names and rows of the outputs; the
 // modes of the contacts by name.
-inline nb::tuple linearize_point(const model::Assembly& a, const std::vector<TrainChannel>& channels,
-                                 const TrainPoint& p) {
+inline Record linearize_point(const model::Assembly& a, const std::vector<TrainChannel>& channels,
+                              const TrainPoint& p) {
     const LinearRegime m = linearize(a, channels, p);
     const std::size_t width = m.states.size() + static_cast<std::size_t>(a.layout().inputs) + 1;
     const auto matrix = [&](const std::vector<std::vector<double>>& rows) {
@@ -40,15 +42,16 @@ inline nb::tuple linearize_point(const model::Assembly& a, const std::vector<Tra
     const model::Regime r = a.build(p.key);
     for (int c = 0; c < a.layout().contacts; ++c)
         modes[model::contact_name(a, c).c_str()] = r.at_rest[c] ? 0 : int(p.key.modes[c]);
-    return nb::make_tuple(states, in_order(capacities_at(a, p.now.memory.data())), inputs, matrix(m.rate), m.outputs,
-                          matrix(m.output), modes);
+    Record out;
+    out["states"] = states, out["capacities"] = in_order(capacities_at(a, p.now.memory.data())), out["inputs"] = inputs;
+    out["rates"] = matrix(m.rate), out["outputs"] = m.outputs, out["values"] = matrix(m.output);
+    out["contacts"] = modes;
+    return out;
 }
 
 // Runs to an instant: use(run, point) there.
 template <class Use>
-nb::tuple at_instant(const TrainDescription& description, const std::vector<Signal>& inputs, const Named& start,
-                     const Named& capacities, double time, Use&& use) {
-    const TrainRun& run = *description.run();
+auto at_instant(const Case& one, double time, Use&& use) {
     TrainOptions options;
     options.duration = time;
     options.interrupted = poll_signals;
@@ -56,38 +59,28 @@ nb::tuple at_instant(const TrainDescription& description, const std::vector<Sign
     TrainReport report;
     {
         nb::gil_scoped_release release;
-        report = run.reach(inputs, {start, capacities}, options, point);
+        report = one.train->reach(one.inputs, one.start, options, point);
     }
-    check_train_run(report, run.assembly());
-    return use(run, point);
+    check_train_run(report, one.assembly());
+    return use(*one.train, point);
 }
 
-// Tuples are spelled out for the stub.
 inline void bind_instants(nb::module_& m) {
     m.def(
         "explain_at",
-        [](const TrainDescription& t, const std::vector<Signal>& inputs, const Named& start, const Named& capacities,
-           double time) {
-            return at_instant(t, inputs, start, capacities, time, [](const TrainRun& run, const TrainPoint& p) {
-                return explain_point(run.assembly(), p);
-            });
+        [](const Case& one, double time) {
+            return at_instant(
+                one, time, [](const TrainRun& run, const TrainPoint& p) { return explain_point(run.assembly(), p); });
         },
-        "train"_a, "inputs"_a, "start"_a, "hysteresis_capacities"_a, "time"_a,
-        nb::sig("def explain_at(train: Train, inputs: collections.abc.Sequence[Signal], start: "
-                "collections.abc.Mapping[str, float], hysteresis_capacities: collections.abc.Mapping[str, float], "
-                "time: float) -> tuple[list[float], list[tuple[typing.Any, ...]], list[tuple[str, float, float]]]"));
+        "case"_a, "time"_a);
     m.def(
         "linearize_at",
-        [](const TrainDescription& t, const std::vector<Signal>& inputs, const Named& start, const Named& capacities,
-           double time) {
-            return at_instant(t, inputs, start, capacities, time, [](const TrainRun& run, const TrainPoint& p) {
+        [](const Case& one, double time) {
+            return at_instant(one, time, [](const TrainRun& run, const TrainPoint& p) {
                 return linearize_point(run.assembly(), run.channels(), p);
             });
         },
-        "train"_a, "inputs"_a, "start"_a, "hysteresis_capacities"_a, "time"_a,
-        nb::sig("def linearize_at(train: Train, inputs: collections.abc.Sequence[Signal], start: "
-                "collections.abc.Mapping[str, float], hysteresis_capacities: collections.abc.Mapping[str, float], "
-                "time: float) -> tuple[typing.Any, ...]"));
+        "case"_a, "time"_a);
 }
 
 }  // namespace lostmotion::binding

@@ -52,7 +52,7 @@ inline void bind_joint_trains(nb::module_& m) {
                 }
                 new (self) T(std::move(joints));
             },
-            "trains"_a, "shafts"_a, "commands"_a, "scales"_a, nb::keep_alive<1, 2>(),
+            "trains"_a, nb::kw_only(), "shafts"_a, "commands"_a, "scales"_a, nb::keep_alive<1, 2>(),
             "commands: the place of each among the inputs; -1: a controller has a reference in its place.")
         .def(
             "set_commands",
@@ -129,7 +129,7 @@ inline void bind_joint_trains(nb::module_& m) {
                               vector(matrix), vector(row_length), vector(row_begin), vector(column), std::move(damping),
                               std::move(trained), std::move(others), std::move(place), std::move(place_of_speed)});
             },
-            "trains"_a, "position"_a.noconvert(), "speed"_a.noconvert(), "acceleration"_a.noconvert(),
+            "trains"_a, nb::kw_only(), "position"_a.noconvert(), "speed"_a.noconvert(), "acceleration"_a.noconvert(),
             "warmstart"_a.noconvert(), "force"_a.noconvert(), "matrix"_a.noconvert(), "row_length"_a.noconvert(),
             "row_begin"_a.noconvert(), "column"_a.noconvert(), "damping"_a, "trained"_a, "others"_a, "place"_a,
             "place_of_speed"_a, nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>(),
@@ -155,14 +155,14 @@ inline void bind_joint_trains(nb::module_& m) {
                 check(r.advance(interval, substeps), t);
                 write_joints(t, out);
             },
-            "trains"_a, "interval"_a, "substeps"_a, "out"_a)
+            "trains"_a, nb::kw_only(), "interval"_a, "substeps"_a, "out"_a)
         .def(
             "advance_under",
             [=](R& r, T& t, double interval, int substeps, JointVector force, JointValues out) {
                 check(r.advance(interval, substeps, vector(force), false), t);
                 write_joints(t, out);
             },
-            "trains"_a, "interval"_a, "substeps"_a, "force"_a, "out"_a)
+            "trains"_a, nb::kw_only(), "interval"_a, "substeps"_a, "force"_a, "out"_a)
         .def("restore", &R::restore)
         .def(
             "integrate",
@@ -174,11 +174,20 @@ inline void bind_joint_trains(nb::module_& m) {
             "course",
             [](const R& r) {
                 const R::Course& c = r.course();
-                return std::make_tuple(c.acceleration, c.before, c.inertia, c.force, c.smooth);
+                Record out;
+                out["acceleration"] = c.acceleration, out["before"] = c.before, out["inertia"] = c.inertia;
+                out["force"] = c.force, out["smooth"] = c.smooth;
+                return out;
             },
-            [](R& r,
-               std::tuple<std::vector<double>, std::vector<double>, std::vector<double>, std::vector<double>, bool> c) {
-                R::Course to{std::get<0>(c), std::get<1>(c), std::get<2>(c), std::get<3>(c), std::get<4>(c)};
+            [](R& r, const Record& given) {
+                R::Course to;
+                NamedFields f(given);
+                f.list("acceleration", to.acceleration);
+                f.list("before", to.before);
+                f.list("inertia", to.inertia);
+                f.list("force", to.force);
+                f.flag("smooth", to.smooth);
+                f.refuse_unknown();
                 if (to.acceleration.size() != r.acceleration().size() || to.before.size() != r.acceleration().size() ||
                     to.inertia.size() != r.course().inertia.size() || to.force.size() != r.course().force.size())
                     throw nb::type_error("the course of another robot");

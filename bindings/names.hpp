@@ -7,14 +7,10 @@ namespace lostmotion::binding {
 
 inline void bind_names(nb::module_& m) {
     const auto drive = [] { return model::Assembly(model::drive_train()); };
-    m.def(
-        "channels", [drive] { return channel_rows(train_channels(drive())); },
-        nb::sig("def channels() -> list[tuple[str, str, str, str]]"), "Name, symbol, unit, meaning.");
-    m.def("states", [drive] { return model::state_names(drive()); }, nb::sig("def states() -> list[str]"));
-    m.def("energy_entries", [drive] { return ledger_names(drive()); }, nb::sig("def energy_entries() -> list[str]"));
-    m.def(
-        "switching_columns", [drive] { return switching_columns(drive()); },
-        nb::sig("def switching_columns() -> list[str]"));
+    m.def("channels", [drive] { return channel_rows(train_channels(drive())); }, "Name, symbol, unit, meaning.");
+    m.def("states", [drive] { return model::state_names(drive()); });
+    m.def("energy_entries", [drive] { return ledger_names(drive()); });
+    m.def("switching_columns", [drive] { return switching_columns(drive()); });
     m.def(
         "causes",
         [](bool short_form) {
@@ -22,8 +18,7 @@ inline void bind_names(nb::module_& m) {
             for (const SwitchingCause& c : switching_causes(short_form)) all.emplace_back(c.number, c.name);
             return all;
         },
-        "short_form"_a, nb::sig("def causes(short_form: bool) -> list[tuple[int, str]]"),
-        "Of switchings: number and name.");
+        "short_form"_a, "Of switchings: number and name.");
     m.def(
         "parameters",
         [] {
@@ -31,23 +26,17 @@ inline void bind_names(nb::module_& m) {
             for (const model::Parameter& p : model::parameters()) all.emplace_back(p.key, p.unit);
             return all;
         },
-        nb::sig("def parameters() -> list[tuple[str, str]]"), "Of a drive: key and unit.");
-    m.def(
-        "batch_fields",
-        [] {
-            std::vector<std::string> keys;
-            for (const BatchField& f : batch_fields()) keys.push_back(f.key);
-            return keys;
-        },
-        nb::sig("def batch_fields() -> list[str]"));
-    m.def(
-        "reductions",
-        [] {
-            std::vector<std::string> names;
-            for (const auto& row : reduction_names) names.emplace_back(row.name);
-            return names;
-        },
-        nb::sig("def reductions() -> list[str]"));
+        "Of a drive: key and unit.");
+    m.def("batch_fields", [] {
+        std::vector<std::string> keys;
+        for (const BatchField& f : batch_fields()) keys.push_back(f.key);
+        return keys;
+    });
+    m.def("reductions", [] {
+        std::vector<std::string> names;
+        for (const auto& row : reduction_names) names.emplace_back(row.name);
+        return names;
+    });
 }
 
 }  // namespace lostmotion::binding

@@ -9,9 +9,9 @@ namespace lostmotion::binding {
 // A signal for each input, the period, components at the start by name; those left out are 0.
 using Point = std::tuple<std::vector<Signal>, double, Named>;
 
-inline nb::dict respond(const TrainDescription& train, const std::vector<Point>& asked, std::size_t samples,
-                        int harmonics, int max_periods, double tolerance, bool keep_table, bool limit_cycle,
-                        unsigned threads, const nb::object& progress) {
+inline Record respond(const TrainDescription& train, const std::vector<Point>& asked, std::size_t samples,
+                      int harmonics, int max_periods, double tolerance, bool keep_table, bool limit_cycle,
+                      unsigned threads, const nb::object& progress) {
     const ResponseSpec spec{samples, harmonics, max_periods, tolerance, keep_table, limit_cycle};
     std::vector<ResponseRequest> points;
     for (const auto& [inputs, period, start] : asked) points.push_back({inputs, period, start});
@@ -28,7 +28,7 @@ inline nb::dict respond(const TrainDescription& train, const std::vector<Point>&
         std::copy(values.begin(), values.end(), data.get());
         return as_array(std::move(data), shape);
     };
-    nb::dict out;
+    Record out;
     out["components"] = t.components;
     out["neutral"] = t.neutral;
     out["error"] = t.error;
@@ -47,12 +47,8 @@ inline nb::dict respond(const TrainDescription& train, const std::vector<Point>&
 }
 
 inline void bind_responses(nb::module_& m) {
-    m.def("respond", &respond, "train"_a, "points"_a, "samples"_a, "harmonics"_a, "max_periods"_a, "tolerance"_a,
-          "keep_table"_a, "limit_cycle"_a, "threads"_a, "progress"_a = nb::none(),
-          nb::sig("def respond(train: Train, points: collections.abc.Sequence[tuple[collections.abc.Sequence[Signal], "
-                  "float, collections.abc.Mapping[str, float]]], samples: int, harmonics: int, max_periods: int, "
-                  "tolerance: float, keep_table: bool, limit_cycle: bool, threads: int, progress: "
-                  "collections.abc.Callable[[int], None] | None = None) -> dict[str, typing.Any]"));
+    m.def("respond", &respond, "train"_a, "points"_a, nb::kw_only(), "samples"_a, "harmonics"_a, "max_periods"_a,
+          "tolerance"_a, "keep_table"_a, "limit_cycle"_a, "threads"_a, "progress"_a = nb::none());
 }
 
 }  // namespace lostmotion::binding

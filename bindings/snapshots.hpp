@@ -66,30 +66,38 @@ inline ControlCourse to_control(const Numbers& v) {
     return {static_cast<std::int64_t>(v[0]), {v.begin() + 1, v.end()}};
 }
 
+// State of a simulation by keys.
 template <class System>
-nb::tuple get_state(const SimulationOf<System>& s) {
+Record get_state(const SimulationOf<System>& s) {
     const auto& n = s.snapshot();
-    return nb::make_tuple(n.time, Numbers(n.x.begin(), n.x.end()), from_memory(n.memory), from_key(n.key),
-                          Numbers(n.input.begin(), n.input.end()), n.started, from_course(n.course, n.steady),
-                          from_control(n.control));
+    Record out;
+    out["time"] = n.time;
+    out["state"] = Numbers(n.x.begin(), n.x.end());
+    out["memory"] = from_memory(n.memory);
+    out["regime"] = from_key(n.key);
+    out["inputs"] = Numbers(n.input.begin(), n.input.end());
+    out["started"] = n.started;
+    out["course"] = from_course(n.course, n.steady);
+    out["control"] = from_control(n.control);
+    return out;
 }
 
 template <class System>
-void set_state(SimulationOf<System>& s, double time, const Numbers& x, const Numbers& memory,
-               const std::vector<int>& key, const Numbers& input, bool started, const Numbers& course,
-               const Numbers& control) {
+void set_state(SimulationOf<System>& s, const Record& from) {
     typename SimulationOf<System>::Snapshot to;
-    to.time = time;
+    const auto numbers = [&](const char* key) { return nb::cast<Numbers>(from[key]); };
+    to.time = nb::cast<double>(from["time"]);
+    const Numbers x = numbers("state"), input = numbers("inputs");
     check_size(x, to.x.size());
     std::copy(x.begin(), x.end(), to.x.begin());
-    to_memory(memory, to.memory);
-    to_key(key, to.key);
+    to_memory(numbers("memory"), to.memory);
+    to_key(nb::cast<std::vector<int>>(from["regime"]), to.key);
     check_size(input, to.input.size());
     std::copy(input.begin(), input.end(), to.input.begin());
-    to.started = started;
-    to_course(course, to.course, to.steady);
-    to.control = to_control(control);
-    if (started) check_size(to.control.slots, static_cast<std::size_t>(s.control_slots()));
+    to.started = nb::cast<bool>(from["started"]);
+    to_course(numbers("course"), to.course, to.steady);
+    to.control = to_control(numbers("control"));
+    if (to.started) check_size(to.control.slots, static_cast<std::size_t>(s.control_slots()));
     s.restore(to);
 }
 

@@ -11,12 +11,11 @@
 
 namespace lostmotion::binding {
 
-// Input, amplitude, frequency [Hz], phase [rad].
-using Sines = std::vector<std::tuple<int, double, double, double>>;
+// Amplitude and frequency [Hz] by the number of an input.
+using Sines = std::map<int, std::pair<double, double>>;
 inline InputSines input_sines(const Sines& sines) {
     InputSines out;
-    for (const auto& [input, amplitude, frequency, phase] : sines)
-        out.push_back({input, {amplitude, frequency, phase}});
+    for (const auto& [input, sine] : sines) out.push_back({input, {sine.first, sine.second, 0.0}});
     return out;
 }
 
@@ -73,7 +72,7 @@ inline void bind_stepping(nb::module_& m) {
                     throw nb::value_error(error.c_str());
                 new (self) S(t.train, step, control, input_sines(sines));
             },
-            "train"_a, "step"_a, "control"_a, "sines"_a, nb::keep_alive<1, 4>())
+            "train"_a, nb::kw_only(), "step"_a, "control"_a, "sines"_a, nb::keep_alive<1, 4>())
         .def(
             "advance",
             [](S& s, double interval, const Numbers& begin, const Numbers& end) {
@@ -89,7 +88,7 @@ inline void bind_stepping(nb::module_& m) {
                 advance(s, begin, end, [&] { return s.answer(interval, begin, end, *load, out); });
                 return std::make_tuple(load->inertia, out.acceleration, out.compliance);
             },
-            "interval"_a, "begin"_a, "end"_a, "shaft"_a,
+            "interval"_a, "begin"_a, "end"_a, nb::kw_only(), "shaft"_a,
             "Advances; returns inertia and mean acceleration of a shaft, and -da/dM of its load torque M.")
         .def(
             "answers", [](const S& s, int shaft) { return s.load_shaft(shaft).has_value(); }, "shaft"_a,
@@ -107,13 +106,8 @@ inline void bind_stepping(nb::module_& m) {
             },
             "snapshot"_a)
         .def("read", &read)
-        .def(
-            "explain", [](S& s) { return explain_point(s.assembly(), point_now(s)); },
-            nb::sig("def explain(self) -> "
-                    "tuple[list[float], list[tuple[typing.Any, ...]], list[tuple[str, float, float]]]"))
-        .def(
-            "linearize", [](S& s) { return linearize_point(s.assembly(), s.channels(), point_now(s)); },
-            nb::sig("def linearize(self) -> tuple[typing.Any, ...]"))
+        .def("explain", [](S& s) { return explain_point(s.assembly(), point_now(s)); })
+        .def("linearize", [](S& s) { return linearize_point(s.assembly(), s.channels(), point_now(s)); })
         .def(
             "reset",
             [](S& s, const Named& start, const Named& capacities) {
@@ -121,17 +115,9 @@ inline void bind_stepping(nb::module_& m) {
                 if (!error.empty()) throw nb::value_error(error.c_str());
             },
             "start"_a, "hysteresis_capacities"_a)
+        .def("get_state", [](const S& s) { return s.with([](const auto& in) { return get_state(in); }); })
         .def(
-            "get_state", [](const S& s) { return s.with([](const auto& in) { return get_state(in); }); },
-            nb::sig("def get_state(self) -> tuple[float, list[float], list[float], list[int], list[float], bool, "
-                    "list[float], list[float]]"))
-        .def(
-            "set_state",
-            [](S& s, double time, const Numbers& x, const Numbers& memory, const std::vector<int>& regime,
-               const Numbers& input, bool started, const Numbers& course, const Numbers& control) {
-                s.with([&](auto& in) { set_state(in, time, x, memory, regime, input, started, course, control); });
-            },
-            "time"_a, "state"_a, "memory"_a, "regime"_a, "input"_a, "started"_a, "course"_a, "control"_a)
+            "set_state", [](S& s, const Record& state) { s.with([&](auto& in) { set_state(in, state); }); }, "state"_a)
         .def(
             "control_signals",
             [](S& s) {
@@ -151,8 +137,8 @@ inline void bind_stepping(nb::module_& m) {
                double interval) {
                 new (self) MotionCourse({to_speed, to_angle, to_acceleration}, angle, speed, acceleration, interval);
             },
-            "to_angle"_a.none(), "to_speed"_a, "to_acceleration"_a.none(), "angle"_a, "speed"_a, "acceleration"_a,
-            "interval"_a)
+            nb::kw_only(), "to_angle"_a.none(), "to_speed"_a, "to_acceleration"_a.none(), "angle"_a, "speed"_a,
+            "acceleration"_a, "interval"_a)
         .def("times", [](const MotionCourse& c) { return Numbers(c.times().begin(), c.times().end()); })
         .def("speed", &MotionCourse::speed, "time"_a)
         .def("acceleration", &MotionCourse::acceleration, "time"_a);

@@ -85,7 +85,7 @@ class SharedRun : public TrainRun {
 // As Python describes a train.
 class TrainDescription : public model::TrainDescription {
  public:
-    void add_shaft(const nb::dict& fields) {
+    void add_shaft(const Record& fields) {
         model::Shaft s;
         NamedFields named(fields);
         model::describe(named, s);
@@ -104,7 +104,7 @@ class TrainDescription : public model::TrainDescription {
             if (m.name == name) m.matrix = matrix;
         return other;
     }
-    void add_motor(const std::string& name, const std::string& shaft, const nb::dict& fields) {
+    void add_motor(const std::string& name, const std::string& shaft, const Record& fields) {
         model::ShaftMotor m;
         m.name = name;
         NamedFields named(fields);
@@ -113,8 +113,7 @@ class TrainDescription : public model::TrainDescription {
         named.refuse_unknown();
         model::TrainDescription::add(std::move(m), shaft);
     }
-    void add_gear(const std::string& name, const std::string& input, const std::string& output,
-                  const nb::dict& fields) {
+    void add_gear(const std::string& name, const std::string& input, const std::string& output, const Record& fields) {
         model::Gear g;
         g.name = name;
         NamedFields named(fields);
@@ -124,7 +123,7 @@ class TrainDescription : public model::TrainDescription {
         model::TrainDescription::add(std::move(g), input, output);
     }
 
-    void add(const std::string& table, const std::string& name, const std::string& shaft, const nb::dict& fields) {
+    void add(const std::string& table, const std::string& name, const std::string& shaft, const Record& fields) {
         bool known = false;
         model::Train::each_kind(train, [&](const char* own, const char*, const auto& elements) {
             if (table != own) return;
@@ -134,7 +133,7 @@ class TrainDescription : public model::TrainDescription {
         if (!known) throw nb::value_error(("there is no table '" + table + "'").c_str());
     }
     void add_coupling(const std::string& table, const std::string& name, const std::string& input,
-                      const std::string& output, const nb::dict& fields) {
+                      const std::string& output, const Record& fields) {
         bool known = false;
         model::Train::each_coupling_kind(train, [&](const char* own, const char*, const auto& elements) {
             if (table != own) return;
@@ -144,7 +143,7 @@ class TrainDescription : public model::TrainDescription {
         if (!known) throw nb::value_error(("there is no table '" + table + "'").c_str());
     }
 
-    void add_controller(const std::string& motor, const nb::dict& fields) {
+    void add_controller(const std::string& motor, const Record& fields) {
         model::TrainDescription::add_controller(described<model::LinearController>(fields), motor);
     }
 
@@ -192,17 +191,18 @@ class TrainDescription : public model::TrainDescription {
         const model::MeshLoss loss = train.gears.at(gear).loss(driven, speed);
         return {loss.torque, loss.per_torque};
     }
-    nb::tuple steady_regime(const std::vector<double>& speeds, const std::vector<double>& torques) const {
+    std::tuple<std::vector<std::string>, Array, bool> steady_regime(const std::vector<double>& speeds,
+                                                                    const std::vector<double>& torques) const {
         const SteadyRegime r = lostmotion::steady_regime(train, {speeds, torques});
         const std::size_t n = r.states.size();
         auto rate = std::make_unique_for_overwrite<double[]>(n * n);
         std::copy(r.rate.begin(), r.rate.end(), rate.get());
-        return nb::make_tuple(r.states, as_array(std::move(rate), {n, n}), r.determined);
+        return {r.states, as_array(std::move(rate), {n, n}), r.determined};
     }
 
  private:
     template <class Element>
-    static Element made_for(const std::vector<Element>&, const std::string& name, const nb::dict& fields) {
+    static Element made_for(const std::vector<Element>&, const std::string& name, const Record& fields) {
         Element element = described<Element>(fields);
         element.name = name;
         return element;
@@ -228,41 +228,50 @@ inline void check_train_run(const TrainReport& report, const model::Assembly& a)
     if (const std::string error = error_text(report, a); !error.empty()) throw SolverError(error);
 }
 
-inline TrainOptions train_options(double duration, double interval, std::size_t samples, bool energy,
-                                  std::size_t max_switchings) {
+// What a run begins with. start: states by name; capacities: of the hysteresis of gears by name; what is left out is 0.
+struct Case {
+    std::shared_ptr<const SharedRun> train;
+    std::vector<Signal> inputs;
+    TrainStart start;
+
+    const model::Assembly& assembly() const { return train->assembly(); }
+    TrainCase of_batch() const { return {assembly().train(), inputs, start}; }
+
+    TrainReport run(TrainOptions& options, double* out) const {
+        options.interrupted = poll_signals;
+        nb::gil_scoped_release release;
+        std::unique_ptr<AnyWorkspace> workspace = train->take();
+        TrainReport report = train->run(inputs, start, options, out, workspace);
+        train->give_back(std::move(workspace));
+        return report;
+    }
+};
+
+inline TrainOptions train_options(double duration, double sample_interval, std::size_t samples) {
     TrainOptions options;
     options.duration = duration;
-    options.sample_interval = interval;
+    options.sample_interval = sample_interval;
     options.samples = samples;
-    options.energy = energy;
-    options.max_switchings = max_switchings;
     return options;
 }
 
-// start: states by name; capacities: of the hysteresis of gears by name. What is left out is 0.
-inline nb::dict run(const TrainDescription& description, const std::vector<Signal>& inputs, const Named& start,
-                    const Named& capacities, double duration, double interval, std::size_t samples, bool energy,
-                    double tolerance, std::size_t max_switchings, const BoundControl& bound) {
-    const SharedRun& run = *description.run();
-    const model::Assembly& a = run.assembly();
-    TrainOptions options = train_options(duration, interval, samples, energy, max_switchings);
+inline Record run(const Case& one, double duration, double sample_interval, std::size_t samples, bool energy,
+                  double tolerance, std::size_t max_switchings, const BoundControl& bound) {
+    const model::Assembly& a = one.assembly();
+    const std::size_t channels = one.train->channels().size();
+    TrainOptions options = train_options(duration, sample_interval, samples);
+    options.energy = energy;
+    options.max_switchings = max_switchings;
     options.tolerance = tolerance;
-    options.interrupted = poll_signals;
     options.control = control_of(bound);
-    auto data = std::make_unique_for_overwrite<double[]>(run.channels().size() * samples);
+    auto data = std::make_unique_for_overwrite<double[]>(channels * samples);
     auto signals = control_room(options);
-    TrainReport report;
-    {
-        nb::gil_scoped_release release;
-        std::unique_ptr<AnyWorkspace> workspace = run.take();
-        report = run.run(inputs, {start, capacities}, options, data.get(), workspace);
-        run.give_back(std::move(workspace));
-    }
+    const TrainReport report = one.run(options, data.get());
     raise_again(bound);
     check_train_run(report, a);
-    nb::dict out;
+    Record out;
     out["control"] = as_array(std::move(signals), control_shape(options));
-    out["values"] = as_array(std::move(data), {run.channels().size(), samples});
+    out["values"] = as_array(std::move(data), {channels, samples});
     out["switchings"] = switching_table(report, a);
     out["switching_count"] = report.switching_count;
     out["energy"] = in_order(named_ledger(report, a));
@@ -276,14 +285,11 @@ inline nb::dict run(const TrainDescription& description, const std::vector<Signa
 
 // The same under controllers, some channels of it alone, into out: channels x samples. enough: called at the sample
 // `pause`, up to which all is written; true ends the run there.
-inline std::size_t run_into(const Room& out, const TrainDescription& description, const std::vector<Signal>& inputs,
-                            const Named& start, const Named& capacities, double duration, double interval,
+inline std::size_t run_into(const Case& one, const Room& out, double duration, double sample_interval,
                             const BoundControl& bound, const std::vector<int>& channels, std::size_t pause,
-                            const nb::callable& enough) {
-    const SharedRun& run = *description.run();
-    TrainOptions options = train_options(duration, interval, out.shape(1), false, 0);
+                            const nb::typed<nb::callable, bool()>& enough) {
+    TrainOptions options = train_options(duration, sample_interval, out.shape(1));
     if (channels.size() != out.shape(0) || pause >= options.samples) throw nb::value_error("too little room");
-    options.interrupted = poll_signals;
     options.control = control_of(bound);
     options.channels = channels;
     options.pause = pause;
@@ -297,36 +303,23 @@ inline std::size_t run_into(const Room& out, const TrainDescription& description
             return true;
         }
     };
-    TrainReport report;
-    {
-        nb::gil_scoped_release release;
-        std::unique_ptr<AnyWorkspace> workspace = run.take();
-        report = run.run(inputs, {start, capacities}, options, out.data(), workspace);
-        run.give_back(std::move(workspace));
-    }
+    const TrainReport report = one.run(options, out.data());
     if (raised) std::rethrow_exception(raised);
-    check_train_run(report, run.assembly());
+    check_train_run(report, one.assembly());
     return report.switching_count;
 }
 
-// Each case: train, inputs, start, hysteresis capacities. fields, values: of one case, what differs from run to run,
-// runs x fields. Of each run the text of its error, empty if it has none; switchings; the energies; and the samples, or
-// what is kept of them.
-using CaseOfTrain = std::tuple<const TrainDescription*, std::vector<Signal>, Named, Named>;
-inline nb::tuple run_batch(const std::vector<CaseOfTrain>& cases, const std::vector<int>& fields, const Values& values,
-                           double duration, double interval, std::size_t samples,
-                           const std::vector<std::string>& energies, const std::vector<std::string>& channels,
-                           const std::vector<std::pair<std::size_t, int>>& kept, unsigned threads,
-                           const nb::object& progress) {
-    TrainBatch batch{{},
-                     train_options(duration, interval, samples, !energies.empty(), 0),
-                     channels,
-                     {},
-                     energies,
-                     fields,
-                     {values.data(), values.size()}};
-    for (const auto& [train, inputs, start, capacities] : cases)
-        batch.cases.push_back({train->train, inputs, {start, capacities}});
+// fields, values: of one case, what differs from run to run, runs x fields. Of each run the text of its error, empty if
+// it has none; switchings; the energies; and the samples, or what is kept of them.
+inline Record run_batch(const std::vector<const Case*>& cases, const std::vector<int>& fields, const Values& values,
+                        double duration, double sample_interval, std::size_t samples,
+                        const std::vector<std::string>& energies, const std::vector<std::string>& channels,
+                        const std::vector<std::pair<std::size_t, int>>& kept, unsigned threads,
+                        const nb::object& progress) {
+    TrainBatch batch{{}, {}, channels, {}, energies, fields, {values.data(), values.size()}};
+    batch.options = train_options(duration, sample_interval, samples);
+    batch.options.energy = !energies.empty();
+    for (const Case* one : cases) batch.cases.push_back(one->of_batch());
     for (const auto& [channel, how] : kept) batch.kept.push_back({channel, static_cast<Reduction>(how)});
     std::vector<std::size_t> shape{batch.runs(), kept.size()};
     if (kept.empty()) shape = {batch.runs(), channels.size(), samples};
@@ -340,9 +333,13 @@ inline nb::tuple run_batch(const std::vector<CaseOfTrain>& cases, const std::vec
     watch.check();
     std::vector<std::string> errors;
     for (const TrainRow& r : rows) errors.push_back(r.error);
-    return nb::make_tuple(
-        as_array(std::move(data), shape), errors, numbers(rows, [](const TrainRow& r) { return r.switchings; }),
-        column(rows, {energies.size()}, [](const TrainRow& r, double* to) { std::ranges::copy(r.energies, to); }));
+    Record out;
+    out["values"] = as_array(std::move(data), shape);
+    out["errors"] = errors;
+    out["switchings"] = numbers(rows, [](const TrainRow& r) { return r.switchings; });
+    out["energies"] =
+        column(rows, {energies.size()}, [](const TrainRow& r, double* to) { std::ranges::copy(r.energies, to); });
+    return out;
 }
 
 // A reduction of each row.
@@ -368,47 +365,33 @@ inline void bind_train(nb::module_& m) {
         },
         "lead_angle"_a, "friction_angle"_a);
     m.attr("USUAL_ERROR") = signals::usual_error;
+    m.def("harmonic", [](const Record& fields) { return described<tables::HarmonicLaw>(fields).curve(); }, "fields"_a);
     m.def(
-        "harmonic", [](const nb::dict& fields) { return described<tables::HarmonicLaw>(fields).curve(); }, "fields"_a,
-        nb::sig("def harmonic(fields: dict[str, typing.Any]) -> PeriodicCurve"));
-    m.def(
-        "quadratic_drag", [](const nb::dict& fields) { return described<signals::QuadraticDrag>(fields).curve(); },
-        "fields"_a, nb::sig("def quadratic_drag(fields: dict[str, typing.Any]) -> TorsionCurve"));
+        "quadratic_drag", [](const Record& fields) { return described<signals::QuadraticDrag>(fields).curve(); },
+        "fields"_a);
     m.def(
         "dry_friction",
-        [](const nb::dict& fields) {
+        [](const Record& fields) {
             const auto f = described<signals::FrictionTable>(fields).law();
             return std::tuple(f.torque, f.breakaway_torque, f.speeds, f.torques);
         },
-        "fields"_a,
-        nb::sig("def dry_friction(fields: dict[str, typing.Any]) -> tuple[float, float, list[float], list[float]]"),
-        "(T_C, T_S, speeds, torques); the lists are empty where there is no curve.");
+        "fields"_a, "(T_C, T_S, speeds, torques); the lists are empty where there is no curve.");
 
     nb::class_<TrainDescription>(m, "Train", nb::is_weak_referenceable())
         .def(nb::init<>())
-        .def("add_shaft", &TrainDescription::add_shaft, "fields"_a,
-             nb::sig("def add_shaft(self, fields: collections.abc.Mapping[str, typing.Any]) -> None"))
-        .def("add_motor", &TrainDescription::add_motor, "name"_a, "shaft"_a, "fields"_a,
-             nb::sig("def add_motor(self, name: str, shaft: str, fields: collections.abc.Mapping[str, typing.Any]) -> "
-                     "None"))
-        .def("add_gear", &TrainDescription::add_gear, "name"_a, "input"_a, "output"_a, "fields"_a,
-             nb::sig("def add_gear(self, name: str, input: str, output: str, fields: collections.abc.Mapping[str, "
-                     "typing.Any]) -> None"))
+        .def("add_shaft", &TrainDescription::add_shaft, "fields"_a)
+        .def("add_motor", &TrainDescription::add_motor, "name"_a, nb::kw_only(), "shaft"_a, "fields"_a)
+        .def("add_gear", &TrainDescription::add_gear, "name"_a, nb::kw_only(), "input"_a, "output"_a, "fields"_a)
         .def("add_mass_matrix", &TrainDescription::add_mass_matrix, "name"_a, "shafts"_a, "matrix"_a,
              "Inertias [kg m2] of several shafts, in place of their own.")
         .def("with_mass_matrix", &TrainDescription::with_mass_matrix, "name"_a, "matrix"_a,
              "The same train with other numbers in one of its mass matrices.")
         .def("set_housing", &TrainDescription::set_housing, "gear"_a, "shaft"_a)
-        .def("add", &TrainDescription::add, "table"_a, "name"_a, "shaft"_a, "fields"_a,
-             nb::sig("def add(self, table: str, name: str, shaft: str, fields: collections.abc.Mapping[str, "
-                     "typing.Any]) -> None"),
+        .def("add", &TrainDescription::add, "table"_a, "name"_a, nb::kw_only(), "shaft"_a, "fields"_a,
              "What acts on one shaft: the table of its kind, and its fields in SI units.")
-        .def("add_coupling", &TrainDescription::add_coupling, "table"_a, "name"_a, "input"_a, "output"_a, "fields"_a,
-             nb::sig("def add_coupling(self, table: str, name: str, input: str, output: str, fields: "
-                     "collections.abc.Mapping[str, typing.Any]) -> None"),
-             "What joins two shafts and is no gear, in the same way.")
-        .def("add_controller", &TrainDescription::add_controller, "motor"_a, "fields"_a,
-             nb::sig("def add_controller(self, motor: str, fields: collections.abc.Mapping[str, typing.Any]) -> None"))
+        .def("add_coupling", &TrainDescription::add_coupling, "table"_a, "name"_a, nb::kw_only(), "input"_a, "output"_a,
+             "fields"_a, "What joins two shafts and is no gear, in the same way.")
+        .def("add_controller", &TrainDescription::add_controller, "motor"_a, "fields"_a)
         .def("check", &TrainDescription::check)
         .def_prop_rw(
             "short_form", [](const TrainDescription& t) { return t.train.short_form; },
@@ -417,45 +400,32 @@ inline void bind_train(nb::module_& m) {
         .def("kernel", [](const TrainDescription& t) { return t.run()->kernel(); })
         .def("massless_shafts", &TrainDescription::massless_shafts)
         .def("check_start", &TrainDescription::check_start, "speeds"_a)
-        .def("channels", &TrainDescription::channels, nb::sig("def channels(self) -> list[tuple[str, str, str, str]]"),
-             "Name, symbol, unit, meaning.")
+        .def("channels", &TrainDescription::channels, "Name, symbol, unit, meaning.")
         .def("ledger_names", &TrainDescription::ledger_names)
         .def("input_names", &TrainDescription::input_names)
         .def("switching_columns", &TrainDescription::switching_columns)
         .def("shafts", &TrainDescription::shafts,
              "Inertia [kg m2] and friction that holds at rest [N m] of each shaft.")
         .def("mesh_loss", &TrainDescription::mesh_loss, "gear"_a, "driven"_a, "speed"_a)
-        .def("steady_regime", &TrainDescription::steady_regime, "speeds"_a, "torques"_a,
-             nb::sig("def steady_regime(self, speeds: collections.abc.Sequence[float], torques: "
-                     "collections.abc.Sequence[float]) -> tuple[list[str], numpy.typing.NDArray[numpy.float64], bool]"))
+        .def("steady_regime", &TrainDescription::steady_regime, "speeds"_a, "torques"_a)
         .def("contact_names", &TrainDescription::contact_names);
-    m.def("run", &run, "train"_a, "inputs"_a, "start"_a, "hysteresis_capacities"_a, "duration"_a, "interval"_a,
-          "samples"_a, "energy"_a, "tolerance"_a, "max_switchings"_a, "control"_a,
-          nb::sig("def run(train: Train, inputs: collections.abc.Sequence[Signal], start: "
-                  "collections.abc.Mapping[str, float], hysteresis_capacities: collections.abc.Mapping[str, float], "
-                  "duration: float, interval: float, samples: int, energy: bool, tolerance: float, max_switchings: "
-                  "int, control: tuple[float, "
-                  "collections.abc.Sequence[tuple[Axis, int, int, int, int]]]) -> dict[str, typing.Any]"));
-    m.def("run_into", &run_into, "out"_a, "train"_a, "inputs"_a, "start"_a, "hysteresis_capacities"_a, "duration"_a,
-          "interval"_a, "control"_a, "channels"_a, "pause"_a, "enough"_a,
-          nb::sig("def run_into(out: numpy.typing.NDArray[numpy.float64], train: Train, inputs: "
-                  "collections.abc.Sequence[Signal], start: collections.abc.Mapping[str, float], "
-                  "hysteresis_capacities: collections.abc.Mapping[str, float], duration: float, interval: float, "
-                  "control: tuple[float, collections.abc.Sequence[tuple[Axis, int, int, int, int]]], channels: "
-                  "collections.abc.Sequence[int], pause: int, enough: collections.abc.Callable[[], bool]) -> int"));
-    m.def("run_batch", &run_batch, "cases"_a, "fields"_a, "values"_a, "duration"_a, "interval"_a, "samples"_a,
-          "energies"_a, "channels"_a, "kept"_a, "threads"_a, "progress"_a = nb::none(),
-          nb::sig("def run_batch(cases: collections.abc.Sequence[tuple[Train, collections.abc.Sequence[Signal], "
-                  "collections.abc.Mapping[str, float], collections.abc.Mapping[str, float]]], fields: "
-                  "collections.abc.Sequence[int], values: numpy.typing.NDArray[numpy.float64], duration: float, "
-                  "interval: float, samples: int, energies: collections.abc.Sequence[str], channels: "
-                  "collections.abc.Sequence[str], kept: collections.abc.Sequence[tuple[int, int]], threads: int, "
-                  "progress: collections.abc.Callable[[int], None] | None = None) -> "
-                  "tuple[numpy.typing.NDArray[numpy.float64], list[str], numpy.typing.NDArray[numpy.float64], "
-                  "numpy.typing.NDArray[numpy.float64]]"));
-    m.def("reduce_rows", &reduce_rows, "how"_a, "values"_a,
-          nb::sig("def reduce_rows(how: int, values: numpy.typing.NDArray[numpy.float64]) -> "
-                  "numpy.typing.NDArray[numpy.float64]"));
+    nb::class_<Case>(m, "Case")
+        .def(
+            "__init__",
+            [](Case* self, const TrainDescription& train, std::vector<Signal> inputs, Named start, Named capacities) {
+                new (self) Case{train.run(), std::move(inputs), {std::move(start), std::move(capacities)}};
+            },
+            "train"_a, nb::kw_only(), "inputs"_a, "start"_a = Named(), "hysteresis_capacities"_a = Named(),
+            "What a run begins with: a train, its inputs, and by name its states and the hysteresis of its gears; what "
+            "is left out is 0.")
+        .def_ro("inputs", &Case::inputs);
+    m.def("run", &run, "case"_a, nb::kw_only(), "duration"_a, "sample_interval"_a, "samples"_a, "energy"_a = false,
+          "tolerance"_a = 0.0, "max_switchings"_a = 0, "control"_a = BoundControl{1.0, {}});
+    m.def("run_into", &run_into, "case"_a, "out"_a, nb::kw_only(), "duration"_a, "sample_interval"_a, "control"_a,
+          "channels"_a, "pause"_a, "enough"_a);
+    m.def("run_batch", &run_batch, "cases"_a, nb::kw_only(), "fields"_a, "values"_a, "duration"_a, "sample_interval"_a,
+          "samples"_a, "energies"_a, "channels"_a, "kept"_a, "threads"_a, "progress"_a = nb::none());
+    m.def("reduce_rows", &reduce_rows, "how"_a, "values"_a);
 }
 
 }  // namespace lostmotion::binding

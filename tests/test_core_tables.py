@@ -63,7 +63,7 @@ def test_every_number_of_a_drive_is_a_parameter_of_the_core_with_the_same_unit()
 
 def test_a_drive_of_the_core_refuses_a_parameter_that_it_does_not_know() -> None:
     with pytest.raises(ValueError, match=r"unknown keys among .*mass"):
-        _core.Train().add_motor("m", "motor", {"mass": 1.0})
+        _core.Train().add_motor("m", shaft="motor", fields={"mass": 1.0})
 
 
 def test_the_states_are_variables_and_what_a_run_can_start_from() -> None:

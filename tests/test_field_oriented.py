@@ -161,9 +161,8 @@ def test_the_bound_holds_against_the_full_equations(part: int) -> None:
 def in_parts(one: lm.Scenario, parts: int) -> Any:
     """The run with so many exchanges of torque and speed in a tick."""
     tick, axes = one.control()
-    axes[0][0].set({"field_orientation": {"parts": parts}})
-    table = one.simulation
-    return whole_run(one, (table.duration, table.sample_interval, table.samples, False, 0.0, 0), "", (tick, axes))
+    axes[0].set({"field_orientation": {"parts": parts}})
+    return whole_run(one, "", (tick, axes), {**one.simulation.grid(), "energy": False, "max_switchings": 0})
 
 
 def test_the_error_falls_with_the_fourth_power_of_the_stretch() -> None:

@@ -188,7 +188,7 @@ def test_a_snapshot_keeps_the_mass_matrix() -> None:
     light = lm.Simulation(scenario)
     for _ in range(20):
         light.advance(1e-3, **inputs)
-    assert light.state.values[0] == ends[0][0]
+    assert light.state.values["state"] == ends[0]["state"]
 
 
 def test_a_snapshot_of_another_simulation_is_refused() -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
+from lostmotion.simulation.core_runs import core_case
 from lostmotion.simulation.run import run
 from lostmotion.studies.axis_columns import change
 from lostmotion.studies.axis_run import VARIABLES, until_it_repeats
@@ -73,15 +74,15 @@ def test_an_error_at_the_pause_ends_the_run():
     study = task_of(TABLES)
     row = study.parameters(0, 1)[0]
     scenario = study.axis_at(row, 4)
-    train = scenario.core()
 
     def fails() -> bool:
         raise KeyError("at the pause")
 
     out = np.empty((1, scenario.simulation.samples))
-    inputs = [scenario.signals()[name].core() for name in train.input_names()]
-    rest = (scenario.start(), scenario.capacities(), scenario.simulation.duration, scenario.simulation.sample_interval)
+    table = scenario.simulation
+    times = {"duration": table.duration, "sample_interval": table.sample_interval}
+    rest = {**times, "control": scenario.control(), "pause": 100, "enough": fails}
     with pytest.raises(KeyError, match="at the pause"):
-        lm._core.run_into(out, train, inputs, *rest, scenario.control(), [0], 100, fails)
+        lm._core.run_into(core_case(scenario), out, channels=[0], **rest)
     with pytest.raises(ValueError, match="room"):
-        lm._core.run_into(out, train, inputs, *rest, scenario.control(), [0, 1], 100, fails)
+        lm._core.run_into(core_case(scenario), out, channels=[0, 1], **rest)

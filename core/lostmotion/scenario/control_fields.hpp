@@ -170,15 +170,18 @@ void each_table(Use&& use) {
 }  // namespace control
 
 template <class F>
+void describe(F& f, ControlledAxis& a) {
+    f.integer("motor", a.motor, 0, model::max_number);
+    f.integer("position_shaft", a.position_shaft, 0, model::max_number);
+    f.integer("speed_shaft", a.speed_shaft, 0, model::max_number);
+    f.integer("reference_shaft", a.reference_shaft, 0, model::max_number);
+    control::describe(f, a.law);
+}
+
+template <class F>
 void describe(F& f, Control& c) {
     f.number("tick", c.tick, Range::positive);
-    f.each("axes", c.axes, [&](ControlledAxis& a) {
-        f.integer("motor", a.motor, 0, model::max_number);
-        f.integer("position_shaft", a.position_shaft, 0, model::max_number);
-        f.integer("speed_shaft", a.speed_shaft, 0, model::max_number);
-        f.integer("reference_shaft", a.reference_shaft, 0, model::max_number);
-        control::describe(f, a.law);
-    });
+    f.each("axes", c.axes, [&](ControlledAxis& a) { describe(f, a); });
 }
 
 }  // namespace lostmotion

@@ -47,6 +47,22 @@ struct ScenarioParameter {
     double value = 0.0;  // SI
     std::vector<Effect> effects;
     ParameterRange range = {};
+
+    template <class F>
+    void describe(F& f, long last_place = 1L << 30) {
+        f.text("key", key);
+        f.text("unit", unit);
+        f.number("value", value);
+        f.number("above", range.above, Range::bound);
+        f.number("at_least", range.at_least, Range::bound);
+        f.number("at_most", range.at_most, Range::bound);
+        f.each("effects", effects, [&](Effect& e) {
+            f.integer("place", e.place, 0, last_place);
+            f.choice("law", e.law, {"proportional", "reciprocal"});
+            f.number("offset", e.offset);
+            f.number("slope", e.slope);
+        });
+    }
 };
 
 class ScenarioDescription {
@@ -87,20 +103,7 @@ class ScenarioDescription {
 
     template <class F>
     static void describe(F& f, std::vector<ScenarioParameter>& parameters, std::size_t places) {
-        f.each("parameters", parameters, [&](ScenarioParameter& p) {
-            f.text("key", p.key);
-            f.text("unit", p.unit);
-            f.number("value", p.value);
-            f.number("above", p.range.above, Range::bound);
-            f.number("at_least", p.range.at_least, Range::bound);
-            f.number("at_most", p.range.at_most, Range::bound);
-            f.each("effects", p.effects, [&](Effect& e) {
-                f.integer("place", e.place, 0, static_cast<long>(places) - 1);
-                f.choice("law", e.law, 2);
-                f.number("offset", e.offset);
-                f.number("slope", e.slope);
-            });
-        });
+        f.each("parameters", parameters, [&](ScenarioParameter& p) { p.describe(f, static_cast<long>(places) - 1); });
     }
     template <class F>
     static void describe(F& f, Scenario& s) {

@@ -66,10 +66,6 @@ class FieldWriter {
         numbers.push_back(static_cast<double>(v));
     }
     template <class Enum>
-    void choice(const char*, Enum v, int) {
-        numbers.push_back(static_cast<double>(static_cast<int>(v)));
-    }
-    template <class Enum>
     void choice(const char*, Enum v, std::initializer_list<const char*>) {
         numbers.push_back(static_cast<double>(static_cast<int>(v)));
     }
@@ -153,12 +149,8 @@ class FieldReader {
     }
     template <class Enum>
     void choice(const char* name, Enum& v, std::initializer_list<const char*> names) {
-        choice(name, v, static_cast<int>(names.size()));
-    }
-    template <class Enum>
-    void choice(const char* name, Enum& v, int count) {
         int given = 0;
-        integer(name, given, 0, count - 1);
+        integer(name, given, 0, static_cast<int>(names.size()) - 1);
         if (well()) v = static_cast<Enum>(given);
     }
     void flag(const char* name, bool& v);

@@ -84,6 +84,8 @@ void each_law(Use&& use) {
                   "by which the samples of the position loop come after those of the others"});
     });
     use("Satellite", [](auto& f) {
+        f.texts({"elements", "", "", any, needed, "the two lines"}, 2);
+        f.instant({"begin", "", "", any, needed, "UTC at t = 0, such as 2024-05-01T20:15:00Z"});
         f.number({"latitude", "", "rad", any, needed, "latitude of the station, geodetic"}, 0.0,
                  -0.5 * std::numbers::pi, 0.5 * std::numbers::pi);
         f.number({"longitude", "", "rad", any, needed, "east"});

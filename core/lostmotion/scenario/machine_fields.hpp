@@ -171,6 +171,10 @@ void each_gear(Use&& use) {
         f.number(
             {"phase", "", "rad", any, has_default,
              "angle of the input shaft at which a period begins: with contact_ratio, at the middle of the more pairs"});
+        f.pairs({"pairs", "", "", not_negative, has_default,
+                 "in place of contact_ratio and fewer_pairs: from which share of a mesh period on, and the factor on "
+                 "the stiffness"},
+                positive, 1000);
     });
     use("GearboxLoads", [](auto& f) {
         f.number(above_zero("average_output_torque", "N*m", "for the mean over a duty cycle"));

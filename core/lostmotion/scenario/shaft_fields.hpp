@@ -141,6 +141,7 @@ void each_slide(Use&& use) {
         f.number({"viscous_friction", "b_ZR", "N*m*s/rad", not_negative, has_default, "b_ZR"});
         f.number({"friction_torque", "", "N*m", not_negative, has_default, "dry friction of the bearing"});
     });
+    use("LoadTable", [](auto& f) { f.table({"torque", "M_Z", "", any, has_default, "M_Z"}, "TorqueSignal"); });
     use("ShaftTable", [](auto& f) {
         f.table({"torque", "M_Z", "", any, may_be_left_out, "M_Z, against its motion; left out, none can act on it"},
                 "TorqueSignal");

@@ -26,8 +26,8 @@ from .loops import CurrentLoop, FieldOriented, FirstOrderCurrent, SpeedLoop, Vol
 from .sample_times import whole_multiple
 from .turning import turns
 
-Bound = tuple[float, list[tuple[_core.Axis, int, int, int, int]]]
-"""shortest sample time [s]; of each axis the controller, its motor, the shafts of the position's and of the speed's encoder, and that of its reference"""
+Bound = tuple[float, list[_core.Axis]]
+"""shortest sample time [s], and the controllers with the numbers of their motors and shafts"""
 OPEN_LOOP: Bound = (1.0, [])
 NO_LAWS: Mapping[str, Law] = MappingProxyType({})
 
@@ -81,9 +81,14 @@ class _Place:
                     raise InputError(
                         f"gives an angle, and {self.shaft} is a slide; leave it out, or name a shaft", keys=(key,)
                     )
+        shafts = list(self.train.shafts)
         out = _core.Axis()
         out.set(
             {
+                "motor": list(self.train.motors).index(self.name),
+                "position_shaft": shafts.index(self.encoder_shaft("position_encoder")),
+                "speed_shaft": shafts.index(self.encoder_shaft("encoder")),
+                "reference_shaft": shafts.index(self.shaft),
                 "mode": c.reference.kind,
                 "reference": {
                     "pieces": columns(("time", "value", "rate", "acceleration", "jerk"), c.reference.pieces()),
@@ -241,13 +246,10 @@ def core_control(
         place = _Place(train, name, controller)
         try:
             samples = whole_multiple(controller.sample_time, base, "sample_time")
-            position, speed = (place.encoder_shaft(key) for key in ("position_encoder", "encoder"))
-            shafts = list(train.shafts)
             axis = place.axis(samples)
             if name in laws:
                 laws[name].set(axis)
-            encoders = shafts.index(position), shafts.index(speed)
-            axes.append((axis, list(train.motors).index(name), *encoders, shafts.index(place.shaft)))
+            axes.append(axis)
         except InputError as problem:
             raise problem.inside(key.format(name).removesuffix(".")) from None
     return base, axes
@@ -256,7 +258,7 @@ def core_control(
 def own(control: Bound) -> Bound:
     """Copies of the controllers, which may be changed."""
     base, axes = control
-    return base, [(_core.Axis(axis), motor, position, speed, aim) for axis, motor, position, speed, aim in axes]
+    return base, [_core.Axis(axis) for axis in axes]
 
 
 TORQUE_SOURCE = ("kind", "torque_source")

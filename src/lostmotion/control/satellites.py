@@ -36,10 +36,6 @@ class Satellite(described.SatelliteFields, TargetPath):
     """
 
     path: Literal["satellite"]
-    elements: tuple[str, str]
-    """the two lines"""
-    begin: datetime
-    """UTC at t = 0, such as 2024-05-01T20:15:00Z"""
 
     @field_validator("begin")
     @classmethod

@@ -87,7 +87,7 @@ class Acting:
         if not axes:
             return OPEN_LOOP
         control = own(built.scenario.control())
-        for (axis, *_), name in zip(control[1], axes, strict=True):
+        for axis, name in zip(control[1], axes, strict=True):
             signal = f"{name}_reference"
             if signal in self._task.inputs:
                 points = columns(("time", "value", "rate"), self._points(signal, known).tolist())

@@ -33,7 +33,6 @@ class Built:
 
     scenario: Scenario
     core: _core.Train
-    composed: _core.ComposedTrain
 
     @cached_property
     def names(self) -> list[str]:
@@ -219,7 +218,7 @@ class Rig:
         if found is None:
             scenario = self._variants(kept)
             core = scenario.core()
-            found = Built(scenario, core, _core.ComposedTrain(core))
+            found = Built(scenario, core)
             if len(self._built) >= KEPT:
                 self._built.clear()
             self._built[name] = found

@@ -138,7 +138,7 @@ class _Course:
         self._smooth = True
         self._error: Exception | None = None
         self.channels: tuple[str, ...] = ()
-        self.case: tuple[Any, ...] = ()
+        self.case: Any = None
         self.train: Any = None
         try:
             rates = (
@@ -197,18 +197,15 @@ class _Course:
             variations = [
                 (name, self._beside(name, p, changes, built, acting, segment)) for name, p in self._by.items()
             ]
-        self.train = built.composed
-        self.case = (
-            built.composed,
-            acting.inputs(built, self._known),
-            start,
-            capacities,
-            acting.control(built, self._known),
-            variations,
-            end - begin,
-            float(f"{self._log.log.interval:.1g}"),
-            0,
-            self._at.tolist(),
+        self.train = built.core
+        inputs = acting.inputs(built, self._known)
+        self.case = _core.SensitiveRun(
+            _core.Case(built.core, inputs=inputs, start=start, hysteresis_capacities=capacities),
+            variations=variations,
+            control=acting.control(built, self._known),
+            duration=end - begin,
+            sample_interval=float(f"{self._log.log.interval:.1g}"),
+            instants=self._at.tolist(),
         )
 
     def _beside(
@@ -245,9 +242,13 @@ class _Course:
             elif other_start:
                 own, capacities = rig.start(self._log, at, there)
                 start = rig.driven(own, at, acting.given_speeds(known)), capacities
-            inputs = acting.inputs(at, known) if other_inputs else None
-            control = acting.control(at, known) if of_control else None
-            out.append((offset, weight, at.composed if of_rig else None, inputs, start, control))
+            differs = {
+                "train": at.core if of_rig else None,
+                "inputs": acting.inputs(at, known) if other_inputs else None,
+                "start": start,
+                "control": acting.control(at, known) if of_control else None,
+            }
+            out.append({"offset": offset, "weight": weight, **differs})
         return out
 
     def _note_terms(self, parameter: int, at: Built, weight: float) -> None:

@@ -5,6 +5,7 @@ is the base of the part `Name`. It is made when its name is first used: write ``
 tables are parts of the same module. The names for type checkers are in `described.pyi`, which ``make stub`` writes.
 """
 
+from datetime import datetime
 from functools import reduce
 from operator import or_
 from typing import Annotated, Any, ClassVar, Generic, Literal, TypeVar
@@ -31,6 +32,9 @@ TYPES = {
     "flag": "bool",
     "named": "dict[str, float]",
     "matrix": "tuple[tuple[float, ...], ...]",
+    "pairs": "tuple[tuple[float, float], ...]",
+    "texts": "tuple[str, str]",
+    "instant": "datetime",
 }
 
 Row = tuple[Any, ...]
@@ -85,6 +89,10 @@ def _type(kind: str, unit: str, limits: tuple[float | None, float | None, float 
         return Literal[*more]
     if kind == "flag":
         return Switch
+    if kind == "texts":
+        return tuple[(str,) * more[0]]  # type: ignore[misc]
+    if kind == "instant":
+        return datetime
     if kind == "integer":
         return Annotated[Whole, Field(ge=least, le=most)]
     number: Any = OF_VALUE.get(unit) or Annotated[float, Unit(unit)]
@@ -95,6 +103,9 @@ def _type(kind: str, unit: str, limits: tuple[float | None, float | None, float 
     if kind == "list":
         fewest, largest = more
         return Annotated[tuple[number, ...], Field(min_length=fewest or None, max_length=largest)]
+    if kind == "pairs":
+        second, most = more
+        return Annotated[tuple[tuple[number, _type("number", unit, second, ())], ...], Field(max_length=most)]
     if kind == "matrix":
         return tuple[tuple[number, ...], ...]
     return tuple[number, number] if kind == "pair" else number
@@ -174,7 +185,7 @@ def stub() -> str:
     homes: dict[str, list[str]] = {}
     for name in sorted(inner):
         homes.setdefault(_part_named(name).__module__.removeprefix("lostmotion"), []).append(name)
-    lines = ["from typing import Any, ClassVar, Generic, Literal, TypeVar", ""]
+    lines = ["from datetime import datetime", "from typing import Any, ClassVar, Generic, Literal, TypeVar", ""]
     lines += [f"from .{home} import {', '.join(names)}" for home, names in sorted(homes.items())]
     lines += [
         "from .part import Part",

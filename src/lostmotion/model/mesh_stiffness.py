@@ -2,17 +2,14 @@
 
 import itertools
 import math
-from typing import Annotated, Self
+from typing import Self
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from .. import _core
 from ..inputs import described
 from ..inputs.breakpoints import RESOLUTION, check_apart
-from ..inputs.quantities import Limit, Number, Positive
 from ..reproducible import total
-
-Share = Annotated[Number, Limit(ge=0.0)]
 
 
 class MeshStiffness(described.MeshStiffnessFields):
@@ -24,9 +21,6 @@ class MeshStiffness(described.MeshStiffnessFields):
     >>> lm.model.MeshStiffness(teeth=30, contact_ratio=1.6, fewer_pairs=0.7).mean()
     0.88
     """
-
-    pairs: Annotated[tuple[tuple[Share, Annotated[Number, Positive]], ...], Field(max_length=1000)] = ()
-    """in place of contact_ratio and fewer_pairs: from which share of a mesh period on, and the factor on the stiffness"""
 
     @model_validator(mode="after")
     def _is_one_form(self) -> Self:

@@ -164,7 +164,7 @@ def overrunning(
     """
     part = gear if isinstance(gear, Gear) else Gear.of(gear, input="input", output="output")
     core = _core.Train()
-    core.add_gear("gear", part.input, part.output, part.core_fields())
+    core.add_gear("gear", input=part.input, output=part.output, fields=part.core_fields())
     return _overrunning(core, 0, part, load_torque, input_speed)
 
 

@@ -230,15 +230,16 @@ class DriveTrain(TrainElements):
             train.add_mass_matrix(name, mass.shafts, mass.matrix)
         for name, m in self.motors.items():
             law = driven.get(name)
-            train.add_motor(name, m.shaft, m.as_dc().core_fields() | dict(() if law is None else law))
+            train.add_motor(name, shaft=m.shaft, fields=m.as_dc().core_fields() | dict(() if law is None else law))
         for name, g in self.gears.items():
-            train.add_gear(name, g.input, g.output, g.core_fields())
+            train.add_gear(name, input=g.input, output=g.output, fields=g.core_fields())
             if g.housing is not None:
                 train.set_housing(name, g.housing)
         for table in COUPLINGS:
             for name, coupling in getattr(self, table).items():
-                train.add_coupling(table, name, coupling.input, coupling.output, coupling.core_fields())
+                ends = {"input": coupling.input, "output": coupling.output}
+                train.add_coupling(table, name, **ends, fields=coupling.core_fields())
         for table, kind in ON_SHAFTS.items():
             for name, element in getattr(self, table).items():
-                train.add(kind, name, element.shaft, element.core_fields())
+                train.add(kind, name, shaft=element.shaft, fields=element.core_fields())
         return train

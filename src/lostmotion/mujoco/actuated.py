@@ -112,13 +112,20 @@ class Actuated:
     def _core_robot(self) -> Any:
         m, d = self.model, self.data
         return self._trains.robot(
-            *(d.qpos, d.qvel, d.qacc, d.qacc_warmstart, d.qfrc_smooth, d.M),
-            *(m.M_rownnz, m.M_rowadr, m.M_colind),
-            m.dof_damping.reshape(m.nv, -1)[:, 0].tolist(),
-            self._dofs.tolist(),
-            [k for k in range(m.nv) if k not in set(self._dofs)],
-            self._addresses.tolist(),
-            [] if self._turning else list(range(m.nv)),
+            position=d.qpos,
+            speed=d.qvel,
+            acceleration=d.qacc,
+            warmstart=d.qacc_warmstart,
+            force=d.qfrc_smooth,
+            matrix=d.M,
+            row_length=m.M_rownnz,
+            row_begin=m.M_rowadr,
+            column=m.M_colind,
+            damping=m.dof_damping.reshape(m.nv, -1)[:, 0].tolist(),
+            trained=self._dofs.tolist(),
+            others=[k for k in range(m.nv) if k not in set(self._dofs)],
+            place=self._addresses.tolist(),
+            place_of_speed=[] if self._turning else list(range(m.nv)),
         )
 
     def __repr__(self) -> str:
@@ -197,7 +204,8 @@ class Actuated:
         self._trains.place(d.qpos[self._addresses].tolist(), d.qvel[self._dofs].tolist(), carried)
         self._trains.guesses = [(-float(f), 0.0) for f in force]
         n, zero = len(self.joints), [0.0] * m.nv
-        self._robot.course = zero, zero, [0.0] * (n * n), [0.0] * n, False
+        still = {"acceleration": zero, "before": zero, "inertia": [0.0] * (n * n), "force": [0.0] * n, "smooth": False}
+        self._robot.course = still
         self._contact = d.qfrc_constraint.copy()
 
     def _away(self, k: int) -> InputError:

@@ -80,6 +80,6 @@ def numbers_of(scenario: Scenario) -> np.ndarray:
             "the motor by its command"
         )
     table = scenario.simulation
-    times = table.duration, table.sample_interval
+    times = {"duration": table.duration, "sample_interval": table.sample_interval}
     control = scenario.control() if scenario.axes() else OPEN_LOOP
-    return np.array(_core.describe(scenario.title, *core_case(scenario), *times, control))
+    return np.array(_core.describe(core_case(scenario), title=scenario.title, **times, control=control))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -51,13 +50,15 @@ class Parameter:
     """the range of its value in scenario files"""
     meaning: str = ""
 
-    def core(self) -> tuple[str, str, float, tuple[float, float, float], list[tuple[int, bool, float, float]]]:
+    def core(self) -> dict[str, Any]:
         """Parameters as `write_description` of the core takes them."""
         limit = self.limit
-        bounds = [(limit.gt, -math.inf), (limit.ge, -math.inf), (limit.le, math.inf)]
-        above, at_least, at_most = (none if bound is None else bound for bound, none in bounds)
-        effects = [(e.place, e.reciprocal, e.offset, e.slope) for e in self.effects]
-        return self.key, self.unit, self.value, (above, at_least, at_most), effects
+        law = {True: "reciprocal", False: "proportional"}
+        effects = [
+            {"place": e.place, "law": law[e.reciprocal], "offset": e.offset, "slope": e.slope} for e in self.effects
+        ]
+        bounds = {"above": limit.gt, "at_least": limit.ge, "at_most": limit.le}
+        return {"key": self.key, "unit": self.unit, "value": self.value, **bounds, "effects": effects}
 
 
 @dataclass(frozen=True)

@@ -106,7 +106,7 @@ class ClosedLoop:
             for channel, torque in windings:  # in place of the straight line that drives the mechanics
                 row[channel] = torque(row)
             rows.append(row)
-            slots.append([*self.core.get_state()[-1][1:], *self.core.control_signals()])
+            slots.append([*self.core.get_state()["control"][1:], *self.core.control_signals()])
             self._to(sample)
         self._next()
         return np.array(rows).T, np.array(slots).T
@@ -115,19 +115,20 @@ class ClosedLoop:
 
     def state(self) -> tuple[np.ndarray, tuple[int, ...]]:
         """The numbers that vary continuously, and the modes of the contacts with the pieces of the laws."""
-        _, x, memory, key, _, _, _, control = self.core.get_state()
-        repeating = np.delete(control[1:], self._running)
-        return np.array([*x, *memory, *repeating]), tuple(key)
+        now = self.core.get_state()
+        repeating = np.delete(now["control"][1:], self._running)
+        return np.array([*now["state"], *now["memory"], *repeating]), tuple(now["regime"])
 
     def set_state(self, numbers: np.ndarray) -> None:
         """In the present modes."""
-        time, x, memory, key, inputs, started, course, control = self.core.get_state()
-        v, n, m = numbers.tolist(), len(x), len(x) + len(memory)
-        known = len(x) + len(inputs)  # of the course: rates, and the inputs that they belong to
-        forgotten = course[:known] + [0.0] * (len(course) - known)
-        slots = np.array(control[1:])
+        now = self.core.get_state()
+        v, n, m = numbers.tolist(), len(now["state"]), len(now["state"]) + len(now["memory"])
+        known = n + len(now["inputs"])  # of the course: rates, and the inputs that they belong to
+        now["course"][known:] = [0.0] * (len(now["course"]) - known)
+        next_sample, *slots = now["control"]
+        slots = np.array(slots)
         slots[np.delete(np.arange(len(slots)), self._running)] = v[m:]
-        self.core.set_state(time, v[:n], v[n:m], key, inputs, started, forgotten, [control[0], *slots.tolist()])
+        self.core.set_state(now | {"state": v[:n], "memory": v[n:m], "control": [next_sample, *slots.tolist()]})
 
 
 class _UnderSine(Simulation):
@@ -141,7 +142,7 @@ class _UnderSine(Simulation):
 def running_slots(control: Bound) -> Iterator[int]:
     """Slots in the memory of all controllers with instants and energies of windings, which no periodic motion restores."""
     first = 0
-    for axis, *_ in control[1]:
+    for axis in control[1]:
         count, running = axis.slots()
         yield from (first + slot for slot in running)
         first += count

@@ -49,7 +49,7 @@ def axis_signals(scenario: Scenario) -> Iterator[AxisSignal]:
 
     base, axes = scenario.control({name: Law(_nothing) for name, c in scenario.axes().items() if c.law})
     first, own, winding = 0, len(_core.axis_signals()), _core.winding_signals()
-    count = sum(axis.slots()[0] for axis, *_ in axes)
+    count = sum(axis.slots()[0] for axis in axes)
     for k, (motor, c) in enumerate(scenario.axes().items()):
         mode = c.reference.kind
         every = {loop: n * round(c.sample_time / base) for loop, _, n in c.schedules()}
@@ -67,7 +67,7 @@ def axis_signals(scenario: Scenario) -> Iterator[AxisSignal]:
         for n, (name, unit, _) in enumerate(winding):
             if name in signals_of(c) and unit != "J":
                 yield AxisSignal(titled(name, motor), count + k * (own + len(winding)) + own + n, 0, 0)
-        first += axes[k][0].slots()[0]
+        first += axes[k].slots()[0]
 
 
 def _nothing(*_: Any) -> float:

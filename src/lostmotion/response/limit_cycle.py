@@ -11,7 +11,7 @@ import numpy as np
 from .. import _core
 from ..errors import InputError
 from ..model.signals import core_signal
-from ..simulation.core_runs import core_case, core_run
+from ..simulation.core_runs import core_case
 from ..simulation.needs import need_free_motion
 from ..simulation.scenario import Scenario
 from .shooting import PERIODICITY, SAMPLES_PER_PERIOD, reason_of
@@ -56,11 +56,9 @@ class Loop:
     """A train with constant inputs, ready to run."""
 
     core: _core.Train
-    inputs: Sequence[_core.Signal]
+    case: _core.Case
     constants: Sequence[_core.Signal]
     """constant values that the inputs have reached"""
-    start: Mapping[str, float]
-    capacities: Mapping[str, float]
     settled: float
     """from when on the inputs are constant [s]"""
     watched: str
@@ -78,7 +76,7 @@ class Loop:
             One of them does not.
         """
         need_free_motion(scenario, "limit cycle")
-        core, inputs, start, capacities = core_case(scenario)
+        core = scenario.core()
         signals, constants, settled = scenario.signals(), [], 0.0
         for name in core.input_names():
             time, value, slope = signals[name].breakpoint_list()[-1]
@@ -92,12 +90,12 @@ class Loop:
         controlled, last = scenario.continuous(), list(scenario.train().shafts)[-1]
         watched = f"{next(iter(controlled))}_error" if controlled else f"{last}_speed"
         channels = tuple(name for name, *_ in core.channels())
-        return cls(core, inputs, constants, start, capacities, settled, watched, channels, scenario)
+        return cls(core, core_case(scenario), constants, settled, watched, channels, scenario)
 
     def run(self, duration: float, samples: int) -> dict[str, Any]:
         """From the start."""
-        case = (self.core, self.inputs, self.start, self.capacities)
-        return core_run(case, (duration, duration / samples, samples, False, 0.0, MAX_SWITCHINGS))
+        grid: dict[str, Any] = {"duration": duration, "sample_interval": duration / samples, "samples": samples}
+        return _core.run(self.case, **grid, max_switchings=MAX_SWITCHINGS)
 
     def outlook(self, duration: float) -> Outlook:
         """Conclusion from the state at a time after the inputs have come to rest."""
@@ -110,13 +108,13 @@ class Loop:
         return _core.respond(
             self.core,
             [(self.constants, period, start)],
-            SAMPLES_PER_PERIOD,
-            1,
-            MAX_PERIODS,
-            PERIODICITY,
-            True,
-            True,
-            threads,
+            samples=SAMPLES_PER_PERIOD,
+            harmonics=1,
+            max_periods=MAX_PERIODS,
+            tolerance=PERIODICITY,
+            keep_table=True,
+            limit_cycle=True,
+            threads=threads,
         )
 
 

@@ -236,9 +236,9 @@ def linearize(
     ramps = [_ramp(command, rates["command_rate"]), _ramp(load_torque, rates["load_torque_rate"])]
     core = drive.core()
     start, of_train = start_values(drive.named_train(), state.of_train()), state.of_train()
-    return _model(
-        drive.train(), core, *_core.linearize_at(core, ramps, start, dict(of_train.hysteresis_capacities), 0.0)
-    )
+    capacities = dict(of_train.hysteresis_capacities)
+    case = _core.Case(core, inputs=ramps, start=start, hysteresis_capacities=capacities)
+    return _model(drive.train(), core, _core.linearize_at(case, 0.0))
 
 
 def _refuse(given: dict[str, bool], why: str) -> None:
@@ -262,8 +262,8 @@ def _model_now(simulation: Simulation) -> LinearModel:
     if simulation._scenario is not None:
         need_free_motion(simulation._scenario, "linearize")
     with simulation._turn:
-        rows = simulation._idle().linearize()
-    return _model(simulation._train, simulation._core_train, *rows)
+        regime = simulation._idle().linearize()
+    return _model(simulation._train, simulation._core_train, regime)
 
 
 def _model_of_run(what: Any, time: float) -> LinearModel:
@@ -273,8 +273,7 @@ def _model_of_run(what: Any, time: float) -> LinearModel:
         raise InputError(f"time {time} s must lie between 0 and the duration, {what.simulation.duration} s")
     need_open_loop(what, "linearize at a time")
     need_free_motion(what, "linearize")
-    case = core_case(what)
-    return _model(what.train(), case[0], *_core.linearize_at(*case, time))
+    return _model(what.train(), what.core(), _core.linearize_at(core_case(what), time))
 
 
 def _model_of_train(
@@ -309,12 +308,14 @@ def _model_of_train(
         for name in names
     ]
     start = start_values(train, state) if what is train else what.start(state)
-    return _model(train, core, *_core.linearize_at(core, ramps, start, dict(state.hysteresis_capacities), 0.0))
+    capacities = dict(state.hysteresis_capacities)
+    case = _core.Case(core, inputs=ramps, start=start, hysteresis_capacities=capacities)
+    return _model(train, core, _core.linearize_at(case, 0.0))
 
 
-def _model(train: DriveTrain, core: _core.Train, *regime: Any) -> LinearModel:
+def _model(train: DriveTrain, core: _core.Train, regime: Mapping[str, Any]) -> LinearModel:
     """The linear model, from what the solver says of one of its regimes."""
-    return _drive_model(*regime) if core.short_form else train_model(train, core, *regime)
+    return _drive_model(**regime) if core.short_form else train_model(train, core, **regime)
 
 
 def _drive_model(
@@ -353,12 +354,12 @@ def train_model(
     inputs: dict[str, float],
     rates: np.ndarray,
     outputs: list[str],
-    rows: np.ndarray,
+    values: np.ndarray,
     contacts: dict[str, int],
 ) -> LinearModel:
     """The linear model of a train, from what the solver says of one of its regimes."""
     n, m = len(states), len(inputs)
-    of = dict(zip(outputs, rows, strict=True))
+    of = dict(zip(outputs, values, strict=True))
     nothing = np.zeros(n + m + 1)
     if all(gear.transmission_error is None for gear in train.gears.values()):  # else the angles are not linear
         known = [name for name in train.shafts if train.angle_of(name) in of]

@@ -63,14 +63,14 @@ def respond(
     result = _core.respond(
         plant.core,
         points,
-        SAMPLES_PER_PERIOD,
-        harmonics,
-        max_periods,
-        PERIODICITY,
-        keep_table,
-        limit_cycle,
-        threads or os.cpu_count() or 1,
-        progress,
+        samples=SAMPLES_PER_PERIOD,
+        harmonics=harmonics,
+        max_periods=max_periods,
+        tolerance=PERIODICITY,
+        keep_table=keep_table,
+        limit_cycle=limit_cycle,
+        threads=threads or os.cpu_count() or 1,
+        progress=progress,
     )
     result["angle_advance"] = result["advance"][:, result["components"].index(plant.angle)]
     return result

@@ -166,8 +166,9 @@ class Watch:
     # --- what follows from the state ---
 
     def _numbers(self) -> tuple[np.ndarray, tuple[int, ...]]:
-        _, x, memory, key, _, _, _, control = self.core.get_state()
-        return np.array([*x, *memory, *np.delete(control[1:], self._running)]), tuple(key)
+        now = self.core.get_state()
+        repeating = np.delete(now["control"][1:], self._running)
+        return np.array([*now["state"], *now["memory"], *repeating]), tuple(now["regime"])
 
     def _look(self) -> _Look | None:
         """The state now; None where a contact slips, or a shaft without friction moves, which may reach a flank of its gap."""
@@ -252,10 +253,10 @@ class Watch:
 
     def _set(self, numbers: np.ndarray) -> None:
         """In the present modes."""
-        time, x, memory, key, inputs, started, course, control = self.core.get_state()
-        v, n, m = numbers.tolist(), len(x), len(x) + len(memory)
-        forgotten = [0.0] * len(course)
-        self.core.set_state(time, v[:n], v[n:m], key, inputs, started, forgotten, [control[0], *v[m:]])
+        now = self.core.get_state()
+        v, n, m = numbers.tolist(), len(now["state"]), len(now["state"]) + len(now["memory"])
+        new = {"state": v[:n], "memory": v[n:m], "course": [0.0] * len(now["course"])}
+        self.core.set_state(now | new | {"control": [now["control"][0], *v[m:]]})
 
     # --- what follows from the motion ---
 

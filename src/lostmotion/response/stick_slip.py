@@ -104,7 +104,7 @@ def stick_slip(scenario: Scenario) -> StickSlip:
         raise UndecidableError(f"the firmware of {motor} is no linear law")
     if reasons := list(others(scenario.train())):
         raise UndecidableError(f"the slip is not one linear regime: it has {', '.join(reasons)}")
-    shaft, breakaway = only_contact(scenario.train(), loop.core, loop.start, loop.capacities)
+    shaft, breakaway = only_contact(scenario.train(), loop.core, scenario.start(), scenario.capacities())
     still, forward, reverse = (_model(loop, shaft, way * SLIP_SPEED) for way in (0.0, 1.0, -1.0))
     if not np.allclose(forward.A, reverse.A, rtol=NONE, atol=0.0):
         raise UndecidableError("it slips forward otherwise than in reverse")
@@ -139,7 +139,8 @@ def only_contact(
         There is none, or there are several.
     """
     zeros = [core_signal([(0.0, 0.0, 0.0)]) for _ in core.input_names()]
-    _, contacts, _ = _core.explain_at(core, zeros, start, capacities, 0.0)
+    case = _core.Case(core, inputs=zeros, start=start, hysteresis_capacities=capacities)
+    contacts = _core.explain_at(case, 0.0)["contacts"]
     dry = [(name, ahead, back) for name, _, _, _, ahead, back, _ in contacts if math.isfinite(ahead)]
     if not dry:
         raise UndecidableError("it has no dry contact that could stick")
@@ -189,7 +190,9 @@ def _model(loop: Loop, shaft: str, speed: float) -> LinearModel:
     speeds = {name: speed * i for name, i in ratios.items() if i is not None and speed != 0.0}
     start = loop.scenario.start(TrainInitial(speeds=speeds))
     zeros = [core_signal([(0.0, 0.0, 0.0)]) for _ in loop.core.input_names()]
-    return train_model(train, loop.core, *_core.linearize_at(loop.core, zeros, start, loop.capacities, 0.0))
+    capacities = loop.scenario.capacities()
+    case = _core.Case(loop.core, inputs=zeros, start=start, hysteresis_capacities=capacities)
+    return train_model(train, loop.core, **_core.linearize_at(case, 0.0))
 
 
 class _Builder:

@@ -77,9 +77,9 @@ class Axis:
     @cached_property
     def law(self) -> tuple[_core.Axis, str, str]:
         """The controller as the solver has it, and the shafts whose angles its position and its speed are read from."""
-        ((law, _, position, speed, _),) = core_control(self.train, {self.motor: self.controller})[1]
+        (law,) = core_control(self.train, {self.motor: self.controller})[1]
         shafts = list(self.train.shafts)
-        return law, shafts[position], shafts[speed]
+        return law, shafts[law.position_shaft], shafts[law.speed_shaft]
 
     @property
     def loops(self) -> tuple[str, ...]:
@@ -201,8 +201,8 @@ def model_at(axis: Axis, state: TrainInitial) -> LinearModel:
     core = scenario.core()
     values, capacities = start_values(axis.train, state), state.of_all("hysteresis_capacities")
     ramps = [core_signal([(0.0, 0.0, 0.0)]) for _ in core.input_names()]
-    rows = _core.linearize_at(core, ramps, values, capacities, 0.0)
-    return train_model(axis.train, core, *rows)
+    case = _core.Case(core, inputs=ramps, start=values, hysteresis_capacities=capacities)
+    return train_model(axis.train, core, **_core.linearize_at(case, 0.0))
 
 
 def _points(axis: Axis) -> Iterator[tuple[str, str, TrainInitial, dict[str, int]]]:

@@ -101,7 +101,7 @@ class SampledLoop:
         winding, motor, loop = self.regime.winding, self.axis.motor, self.loop
         oriented = CURRENTS.get(loop) if winding is not None else None
         outermost = getattr(_core.Loop, "current" if oriented else loop)
-        step = _core.linear_step(law, outermost, self.cut, tick, self.tick)
+        step = _core.linear_step(law, outermost=outermost, cut=self.cut, sample=tick, sample_time=self.tick)
         currents = np.zeros((4, 0)) if winding is None else winding.step(oriented, self.cut, tick)
         counts = (self._plant_states, len(step), len(currents) - 4, len(INPUTS))
         plant, slots, own, inputs = np.split(np.eye(sum(counts)), np.cumsum(counts)[:-1])

@@ -254,7 +254,8 @@ def _torque(
 def _assembled(axis: Axis, plant: _Plant) -> SampledSlip:
     law, _, encoder = axis.law
     tick, frame = axis.controller.sample_time, math.lcm(*(n for _, _, n in axis.controller.schedules()))
-    steps = [_core.linear_step(law, _core.Loop.position, False, law.position_phase + j, tick) for j in range(frame)]
+    options: dict[str, Any] = {"outermost": _core.Loop.position, "cut": False, "sample_time": tick}
+    steps = [_core.linear_step(law, sample=law.position_phase + j, **options) for j in range(frame)]
     names = [name for name, *_ in _core.axis_signals()]
     torque, speed = names.index("torque_reference"), names.index("speed_reference")
     kept = _remembered(steps, {_core.COMMAND_SLOT, torque, speed})

@@ -270,10 +270,20 @@ class OrientedWinding:
             The current that is looked at; None for both under a torque.
         """
         m = self.steady
-        (i_d, i_q), (u_d, u_q) = m.wanted.tolist(), m.asked.tolist()
-        motion = (self.speed, self.lag, m.torque_reference, m.weakening, (i_d, i_q), (u_d, u_q))
-        looked_at = outermost or _core.CurrentAxis.none
-        return _core.linear_orientation(self.law, *motion, looked_at, cut, self.every, tick % self.every, self.tick)
+        return _core.linear_orientation(
+            self.law,
+            speed=self.speed,
+            lag=self.lag,
+            torque=m.torque_reference,
+            weakening=m.weakening,
+            current=m.wanted.tolist(),
+            voltage=m.asked.tolist(),
+            outermost=outermost or _core.CurrentAxis.none,
+            cut=cut,
+            every=self.every,
+            since=tick % self.every,
+            sample_time=self.tick,
+        )
 
     @cached_property
     def over_ticks(self) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -164,9 +164,14 @@ class SimulationBatch:
         for core in cores:
             if problem := _core.DriveBatch.error(core):
                 raise InputError(f"drives: one {problem}; use lm.Simulation for it")
-        places = models.reshape(-1).tolist()
         self._core = _core.DriveBatch(
-            cores, base, own.keys, own.breaks, np.ascontiguousarray(values), places, self._step
+            cores,
+            base=base,
+            keys=own.keys,
+            curve_breaks=own.breaks,
+            values=np.ascontiguousarray(values),
+            model_of=models.reshape(-1).tolist(),
+            step=self._step,
         )
         return bases
 

@@ -30,11 +30,8 @@ from .variables import VARIABLES, Variable, add_efficiency
 MOTOR, LOAD, GEARBOX = "motor", "load", "gearbox"  # names in the long form
 
 
-class LoadTable(Load):
+class LoadTable(described.LoadTableFields, Load):
     """The driven body and the disturbance torque on it."""
-
-    torque: TorqueSignal = TorqueSignal()
-    """M_Z"""
 
 
 class Initial(described.InitialFields):

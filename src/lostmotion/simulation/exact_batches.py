@@ -73,7 +73,7 @@ class ExactBatch:
                     bound[key[1:]] = controlled(*pair).control()
                 controls.append(OPEN_LOOP if pair is None else bound[key[1:]])
             kind_of.append(kinds[key])
-        self._core = _core.ExactBatch(trains, controls, kind_of, step)
+        self._core = _core.ExactBatch(trains, controls=controls, kind_of=kind_of, step=step)
         self._given, self._count, self._steps = given, len(kind_of), 0
         self._names = IN_THE_LONG_FORM if given else {}
         rows = self._core.values
@@ -96,13 +96,7 @@ class ExactBatch:
         zero = np.zeros(1)
         given = {"command": command, "motor_command": command, "reference": command, "motor_reference": command}
         given |= {"load_torque": load_torque}
-        self._core.step(
-            [given.get(name, zero) for name in self._core.inputs],
-            motion.get("speed"),
-            motion.get("angle"),
-            motion.get("acceleration"),
-            threads,
-        )
+        self._core.step([given.get(name, zero) for name in self._core.inputs], **motion, threads=threads)
         self._steps += self._count
 
     def reset(self, which: np.ndarray | None, initial: Mapping[str, np.ndarray]) -> None:

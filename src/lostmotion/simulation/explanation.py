@@ -206,20 +206,19 @@ def explain(what: Scenario | Simulation, time: Time | None = None) -> Explanatio
             raise InputError("a simulation is explained at its present time; leave time out")
         with what._turn:
             now, found = what.time, what._idle().explain()
-        return _explanation(what._train, what._core_train, now, *found)
+        return _explanation(what._train, what._core_train, now, **found)
     if time is None:
         raise InputError(f"time is missing; give one between 0 and the duration, {what.simulation.duration} s")
     if not 0.0 <= time <= what.simulation.duration:
         raise InputError(f"time {time} s must lie between 0 and the duration, {what.simulation.duration} s")
     need_open_loop(what, "explain")
-    case = core_case(what)
-    return _explanation(what.train(), case[0], time, *_core.explain_at(*case, time))
+    return _explanation(what.train(), what.core(), time, **_core.explain_at(core_case(what), time))
 
 
 def smallest_commands(drive: Drive, load_torque: float = 0.0) -> tuple[float, float]:
     """Constant commands beyond which the load moves from rest, forward and backward, against a load torque [N·m]."""
     inputs = [core_signal([(0.0, value, 0.0)]) for value in (0.0, load_torque)]
-    _, _, ((_, forward, backward),) = _core.explain_at(drive.core(), inputs, {}, {}, 0.0)
+    ((_, forward, backward),) = _core.explain_at(_core.Case(drive.core(), inputs=inputs), 0.0)["motors"]
     return forward, backward
 
 

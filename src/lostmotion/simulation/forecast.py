@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from .core_runs import core_result
 from .run import MAX_SWITCHINGS
@@ -46,8 +46,9 @@ def forecast(scenario: Scenario, tolerance: float = 0.0) -> Forecast:
     def taken(end: float) -> tuple[float, int]:
         """Processor time of the run up to a time [s], and its switchings."""
         begin = time.process_time()
-        options: tuple[Any, ...] = (end, end, 2, tolerance == 0.0, tolerance, MAX_SWITCHINGS)
-        switchings = int(core_result(scenario, options, control)[1]["switching_count"])
+        times = {"duration": end, "sample_interval": end, "samples": 2}
+        how = {"energy": tolerance == 0.0, "tolerance": tolerance, "max_switchings": MAX_SWITCHINGS}
+        switchings = int(core_result(scenario, control, times | how)["switching_count"])
         return time.process_time() - begin, switchings
 
     seconds, part, switchings, rate = 0.0, 0.0, 0, 0.0

@@ -148,9 +148,9 @@ class JointTrains:
         self.drives = tuple(drives)
         self._core = _core.JointTrains(
             [d.simulation._core for d in self.drives],
-            [list(d.train.shafts).index(d.shaft) for d in self.drives],
-            [-1 if d.command is None else d.command for d in self.drives],
-            [d.command_scale for d in self.drives],
+            shafts=[list(d.train.shafts).index(d.shaft) for d in self.drives],
+            commands=[-1 if d.command is None else d.command for d in self.drives],
+            scales=[d.command_scale for d in self.drives],
         )
         self._values = np.zeros((len(ROWS), len(self.drives)))
         self.read()
@@ -168,16 +168,16 @@ class JointTrains:
         """Commands of the motors; of a joint with a controller its reference."""
         self._core.set_commands(ctrl)
 
-    def robot(self, *arrays: Any) -> _core.RobotStep:
-        """Steps of a robot with the arrays of its engine, in the order of `_core.RobotStep`."""
-        return _core.RobotStep(self._core, *arrays)
+    def robot(self, **arrays: Any) -> _core.RobotStep:
+        """Steps of a robot with the arrays of its engine."""
+        return _core.RobotStep(self._core, **arrays)
 
     def advance(self, robot: _core.RobotStep, interval: float, substeps: int, force: np.ndarray | None = None) -> None:
         """Advance under these forces [N·m] at the middle of the interval [s]; without, by what the robot takes from its engine."""
         if force is None:
-            robot.advance(self._core, interval, substeps, self._values)
+            robot.advance(self._core, interval=interval, substeps=substeps, out=self._values)
         else:
-            robot.advance_under(self._core, interval, substeps, force, self._values)
+            robot.advance_under(self._core, interval=interval, substeps=substeps, force=force, out=self._values)
 
     def go_back(self) -> None:
         """To where the last step began."""

@@ -17,9 +17,8 @@ ROUNDING = 2.0**-46  # share of a stored energy: 64 units in the last place
 
 def ledger_of(scenario: Scenario) -> dict[str, float]:
     """The ledger of a run of the exact solver [J]."""
-    table = scenario.simulation
-    options = (table.duration, table.sample_interval, table.samples, True, 0.0, 0)
-    ledger: dict[str, float] = core_result(scenario, options, scenario.control())[1]["energy"]
+    options = scenario.simulation.grid() | {"energy": True, "max_switchings": 0}
+    ledger: dict[str, float] = core_result(scenario, scenario.control(), options)["energy"]
     return ledger
 
 

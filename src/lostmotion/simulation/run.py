@@ -16,7 +16,7 @@ from ..inputs.quantities import Number
 from ..model.drive import Drive
 from ..model.signals import CommandSignal, TorqueSignal
 from ..worker_threads import thread_pool
-from .core_runs import core_result
+from .core_runs import Options, core_result
 from .drive_tables import Initial
 from .ledger import warned
 from .results import RunArrays, raw_result, variables_of
@@ -185,28 +185,26 @@ def run(
     table = scenario.simulation
     check_memory(table.samples, BYTES_PER_VALUE * len(variables_of(scenario)))
     how = "exact" if exact else f"dormand-prince, relative tolerance {tolerance:g}"
-    options: tuple[Any, ...] = (
-        table.duration,
-        table.sample_interval,
-        table.samples,
-        energy and exact,
-        0.0 if exact else tolerance,
-        MAX_SWITCHINGS,
-    )
+    options = {
+        **table.grid(),
+        "energy": energy and exact,
+        "tolerance": 0.0 if exact else tolerance,
+        "max_switchings": MAX_SWITCHINGS,
+    }
     laws = as_laws(law, scenario.axes())
     control = scenario.control(laws)
     if not any(oriented(scenario)):
-        return whole_run(scenario, options, how, control)
+        return whole_run(scenario, how, control, options)
     if not all(one.repeatable for one in laws.values()):
-        return _warned(scenario, whole_run(scenario, options, how, control))
-    again = (scenario, (*options[:3], False, *options[4:]), how, coarser(scenario.control(laws)))
+        return _warned(scenario, whole_run(scenario, how, control, options))
+    again = (scenario, how, coarser(scenario.control(laws)), options | {"energy": False})
     if laws or table.duration > SIDE_BY_SIDE * control[0]:
-        result = whole_run(scenario, options, how, control)
+        result = whole_run(scenario, how, control, options)
         coarse = whole_run(*again)
     else:
         with thread_pool(1) as beside:
             waiting = beside.submit(whole_run, *again)
-            result = whole_run(scenario, options, how, control)
+            result = whole_run(scenario, how, control, options)
             coarse = waiting.result()
     bound = json.dumps(error_bound(scenario, result.values, coarse.values))
     return _warned(scenario, replace(result, attrs={**result.attrs, ERROR_BOUND: bound}))
@@ -218,18 +216,10 @@ def _warned(scenario: Scenario, result: RunArrays) -> RunArrays:
     return replace(result, attrs=warned(result.attrs, text)) if text else result
 
 
-def whole_run(scenario: Scenario, options: tuple[Any, ...], how: str, control: Bound) -> RunArrays:
-    """One run of the core. Parts of a train that nothing joins are solved apart; under controllers side by side, unless one of
-    these is a function in Python.
-
-    Parameters
-    ----------
-    options
-        Duration [s], sample interval [s], samples, whether to keep the energy ledger, relative tolerance (0: exact), and how
-        many switchings are kept.
-    """
-    core, result = core_result(scenario, options, control)
-    return raw_result(scenario, core, result, how, ledger=options[3])
+def whole_run(scenario: Scenario, how: str, control: Bound, options: Options) -> RunArrays:
+    """One run of the core as arrays."""
+    result = core_result(scenario, control, options)
+    return raw_result(scenario, scenario.core(), result, how, ledger=options["energy"])
 
 
 def check_memory(samples: int, width: float) -> None:

@@ -121,29 +121,19 @@ def core_variation(scenario: Scenario, key: str, beside: Sequence[Neighbour]) ->
     out = []
     for n in beside:
         other = n.scenario
-        core, inputs, start, capacities = core_case(other)
-        control = other.control() if scenario.axes() and not (of_start or of_inputs) else None
-        train = None if of_start or of_inputs else _core.ComposedTrain(core)
-        out.append((n.offset, n.weight, train, None if of_start else inputs, (start, capacities), control))
+        differs: dict[str, Any] = {"start": (other.start(), other.capacities())}
+        if not of_start:
+            differs["inputs"] = core_case(other).inputs
+        if not (of_start or of_inputs):
+            differs |= {"train": other.core(), "control": other.control() if scenario.axes() else None}
+        out.append({"offset": n.offset, "weight": n.weight, **differs})
     return key, out
 
 
-def sensitive_case(scenario: Scenario, variations: Sequence[Any], control: Bound) -> tuple[Any, ...]:
+def sensitive_case(scenario: Scenario, variations: Sequence[Any], control: Bound) -> _core.SensitiveRun:
     """A run as the core takes it."""
-    core, inputs, start, capacities = core_case(scenario)
-    table = scenario.simulation
-    return (
-        _core.ComposedTrain(core),
-        inputs,
-        start,
-        capacities,
-        control,
-        list(variations),
-        table.duration,
-        table.sample_interval,
-        table.samples,
-        [],
-    )
+    grid = scenario.simulation.grid()
+    return _core.SensitiveRun(core_case(scenario), variations=variations, control=control, **grid)
 
 
 def channels_of(core: _core.Train) -> list[str]:
@@ -204,7 +194,7 @@ class CoreDerivatives:
 
 
 def run_cases(
-    cases: Sequence[tuple[Any, ...]], channels: Sequence[str], threads: int = 1, *, signals: bool = True
+    cases: Sequence[_core.SensitiveRun], channels: Sequence[str], threads: int = 1, *, signals: bool = True
 ) -> list[CoreDerivatives]:
     """Runs with their derivatives, each as `sensitive_case` gives it, on several threads.
 
@@ -219,11 +209,11 @@ def run_cases(
         What one of them asks for has no derivative.
     """
     out = []
-    for row in _core.run_sensitive_trains(list(cases), list(channels), signals, threads):
-        parameter, reason = row[0]
+    for row in _core.run_sensitive_trains(cases, channels, signals=signals, threads=threads):
+        parameter, reason = row.pop("problem")
         if reason:
             raise InputError(reason, keys=(parameter,) if parameter else (), where="sensitivities")
-        out.append(CoreDerivatives(*row[1:]))
+        out.append(CoreDerivatives(**row))
     return out
 
 

@@ -18,7 +18,7 @@ class SimulationState:
 
     time: float
     """[s]"""
-    values: tuple[Any, ...] = field(repr=False)
+    values: dict[str, Any] = field(repr=False)
     drive: Drive | DriveTrain = field(repr=False)
     """drive of this state"""
     controllers: dict[str, Controller | ContinuousController] = field(default_factory=dict, repr=False)

@@ -35,8 +35,6 @@ from .train_variables import train_variables
 from .variables import VARIABLES, Variable
 from .windings import bounded, coarser
 
-INPUTS_OF_STATE = 4  # where the core's state of a simulation has the last values of its inputs
-
 
 class Simulation(SimulationAnswers):
     """A drive or a train that is advanced interval by interval.
@@ -143,7 +141,8 @@ class Simulation(SimulationAnswers):
         self.reset(initial)
 
     def _simulation_of(self, core: _core.Train) -> _core.Simulation:
-        return _core.Simulation(core, self._made["step"], self._control, self._acting_always(core.input_names()))
+        sines = {k: self._sines[name] for k, name in enumerate(core.input_names()) if name in self._sines}
+        return _core.Simulation(core, step=self._made["step"], control=self._control, sines=sines)
 
     def _change_masses(self, masses: Mapping[str, MassMatrix]) -> None:
         """Other mass matrices from now on; the contacts are found anew."""
@@ -155,9 +154,8 @@ class Simulation(SimulationAnswers):
             core = core.with_mass_matrix(name, mass.matrix)
             if fault := core.check():
                 raise InputError(fault[-1], where=f"mass_matrix.{name}")
-        time, x, memory, regime, values, _, *rest = self._idle().get_state()
         simulation = self._simulation_of(core)
-        simulation.set_state(time, x, memory, regime, values, False, *rest)
+        simulation.set_state(self._idle().get_state() | {"started": False})
         self._core, self._core_train, self._masses = simulation, core, self._masses | changed
         if self._bound is not None:
             self._bound.coarse._change_masses(masses)
@@ -229,10 +227,10 @@ class Simulation(SimulationAnswers):
         """Set the initial speeds of shafts with a given motion."""
         if not self._motions:
             return
-        state: list[Any] = list(self._core.get_state())
+        state = self._core.get_state()
         for name, (speed, _) in self._motions.items():
-            state[INPUTS_OF_STATE][speed] = start.speeds.get(name, 0.0)
-        self._core.set_state(*state)
+            state["inputs"][speed] = start.speeds.get(name, 0.0)
+        self._core.set_state(state)
 
     @property
     def error_bound(self) -> dict[str, float]:
@@ -378,7 +376,13 @@ class Simulation(SimulationAnswers):
                 angle = 0.0 if to_angle is None else self._value(self._train.angle_of(name), values)
                 speed, acceleration = (self._value(f"{name}_{what}", values) for what in ("speed", "acceleration"))
                 courses[name] = _core.MotionCourse(
-                    to_angle, given["speed"], given.get("acceleration"), angle, speed, acceleration, h
+                    to_angle=to_angle,
+                    to_speed=given["speed"],
+                    to_acceleration=given.get("acceleration"),
+                    angle=angle,
+                    speed=speed,
+                    acceleration=acceleration,
+                    interval=h,
                 )
             times = sorted({t for course in courses.values() for t in course.times()})
             try:
@@ -410,10 +414,6 @@ class Simulation(SimulationAnswers):
         """The controllers, as often as they exchange torque and speed with the mechanics."""
         return control
 
-    def _acting_always(self, names: Sequence[str]) -> list[tuple[int, float, float, float]]:
-        """The sines by the numbers of their inputs, with a phase of 0."""
-        return [(k, *self._sines[name], 0.0) for k, name in enumerate(names) if name in self._sines]
-
     def _step(self, interval: Any, begin: list[float], end: list[float], shaft: int | None = None) -> Any:
         """Advance the core. With the number of a shaft, return its inertia, mean acceleration and compliance."""
         interval = interval if type(interval) is float else argument("interval", interval, "s")
@@ -429,11 +429,11 @@ class Simulation(SimulationAnswers):
                 if shaft is None:
                     self._core.advance(interval, begin, end)
                 else:
-                    answer = self._core.answer(interval, begin, end, shaft)
+                    answer = self._core.answer(interval, begin, end, shaft=shaft)
             except _core.SolverError:
                 if self._bound is not None and before is not None:
                     self._bound.coarse.state = before
-                for axis, *_ in self._control[1]:
+                for axis in self._control[1]:
                     axis.raise_again()  # what a law of your own has raised
                 raise
             finally:
@@ -452,9 +452,11 @@ class Simulation(SimulationAnswers):
     def state(self) -> SimulationState:
         """The whole state; set it to return to it, or to continue it in another simulation of the same drive."""
         with self._turn:
-            time, *rest = self._idle().get_state()
+            values = self._idle().get_state()
             bound = None if self._bound is None else self._bound.state
-        return SimulationState(time, tuple(rest), self._drive, self._all_controllers(), dict(self._masses), bound)
+        return SimulationState(
+            values.pop("time"), values, self._drive, self._all_controllers(), dict(self._masses), bound
+        )
 
     @state.setter
     def state(self, state: SimulationState) -> None:
@@ -466,10 +468,10 @@ class Simulation(SimulationAnswers):
             if same:
                 with self._turn:
                     self._change_masses(state.mass_matrices)
-                    self._idle().set_state(state.time, *state.values)
+                    self._idle().set_state({"time": state.time, **state.values})
                     if self._bound is not None:
                         self._bound.state = state.bound
-        except (AttributeError, TypeError):
+        except (AttributeError, KeyError, TypeError):
             raise InputError(f"{shown(state)} is no state of a simulation; give what `state` returned") from None
         if not same:
             raise InputError(f"{shown(state)} is the state of another drive, with other parameters or controllers")

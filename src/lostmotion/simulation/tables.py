@@ -71,6 +71,10 @@ class SimulationTable(Part):
         """Number of instants 0, sample_interval, ... up to the duration."""
         return int(self.duration / self.sample_interval * (1.0 + 1e-12)) + 1
 
+    def grid(self) -> dict[str, Any]:
+        """Duration, sample interval and number of samples, as runs of the core take them."""
+        return {"duration": self.duration, "sample_interval": self.sample_interval, "samples": self.samples}
+
 
 class Whole(Protocol):
     """A scenario, as far as its tables are checked against each other."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..control.axis import Bound
+from ..control.axis import Bound, own
 from ..control.controller import Controller
 from ..inputs.kept import kept
 from ..inputs.named import Named
@@ -120,11 +120,11 @@ def control_of_part(control: Bound, whole: Scenario, part: Scenario) -> Bound:
     motors, shafts = list(whole.train().motors), list(whole.train().shafts)
     motor_of = {motors.index(name): k for k, name in enumerate(part.train().motors)}
     shaft_of = {shafts.index(name): k for k, name in enumerate(part.train().shafts)}
-    return tick, [
-        (axis, motor_of[motor], shaft_of[position], shaft_of[speed], shaft_of[reference])
-        for axis, motor, position, speed, reference in axes
-        if motor in motor_of
-    ]
+    mine = own((tick, [axis for axis in axes if axis.motor in motor_of]))
+    for axis in mine[1]:
+        places = {key: shaft_of[getattr(axis, key)] for key in ("position_shaft", "speed_shaft", "reference_shaft")}
+        axis.set({"motor": motor_of[axis.motor], **places})
+    return mine
 
 
 def joined_results(

@@ -41,7 +41,7 @@ def set_torques(scenario: Scenario, data: dict[str, np.ndarray]) -> None:
 def coarser(control: Bound) -> Bound:
     """Copies of the controllers, with one exchange of torque and speed in each tick in place of two."""
     tick, axes = own(control)
-    for axis, *_ in axes:
+    for axis in axes:
         if axis.is_oriented:
             axis.set({"field_orientation": {"parts": 1}})
     return tick, axes

@@ -27,7 +27,7 @@ from ..model.losses import LossMap
 from ..model.motor import Motor
 from ..model.signals import core_signal
 from ..reproducible import interpolate, power
-from ..simulation.core_runs import core_case, core_run
+from ..simulation.core_runs import core_case
 from ..simulation.results import raw_result
 from ..simulation.run import MAX_SWITCHINGS, check_memory
 from ..simulation.scenario import Scenario
@@ -245,7 +245,8 @@ def _motor(scenario: Scenario, name: str | None) -> tuple[str, Motor]:
 
 def _heating(scenario: Scenario, motor: str, given: Sequence[str] | None) -> tuple[str, ...]:
     h = scenario.simulation.sample_interval
-    entries = list(core_run(core_case(scenario), (h, h, 2, True, 0.0, 0))["energy"])
+    run = _core.run(core_case(scenario), duration=h, sample_interval=h, samples=2, energy=True)
+    entries = list(run["energy"])
     if given is not None:
         for entry in given:
             if entry not in entries:
@@ -276,7 +277,7 @@ def _later(signal: Any, time: float) -> _core.Signal:
 def _course(law: _Law, each: int, start: tuple[float, float]) -> _Course:
     scenario, table = law.scenario, law.scenario.simulation
     names, signals = scenario.core().input_names(), scenario.signals()
-    _, _, state, capacities = core_case(scenario)
+    state, capacities = scenario.start(), scenario.capacities()
     last = table.samples - 1
     torque = [name for name, *_ in scenario.core().channels()].index(scenario.train().motor_torque_of(law.name))
     now, results, temperatures = start, [], [np.array([start])]
@@ -285,8 +286,10 @@ def _course(law: _Law, each: int, start: tuple[float, float]) -> _Course:
         samples = min(each, last - first)
         begin, length = first * table.sample_interval, samples * table.sample_interval
         core = law.at(*now).core()
-        case = (core, [_later(signals[name], begin) for name in names], state, capacities)
-        result = core_run(case, (length, table.sample_interval, samples + 1, True, 0.0, MAX_SWITCHINGS))
+        inputs = [_later(signals[name], begin) for name in names]
+        grid: dict[str, Any] = {"duration": length, "sample_interval": table.sample_interval, "samples": samples + 1}
+        case = _core.Case(core, inputs=inputs, start=state, hysteresis_capacities=capacities)
+        result = _core.run(case, **grid, energy=True, max_switchings=MAX_SWITCHINGS)
         state, capacities = _end(result["end_state"], capacities, short=scenario.core().short_form)
         square = float(np.mean(mean_square(np.asarray(result["values"][torque])))) / law.magnet_factor(now[1]) ** 2
         losses = math.fsum(result["energy"][entry] for entry in law.heating) / length

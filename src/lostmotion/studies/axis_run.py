@@ -68,17 +68,16 @@ def _run(scenario: Scenario, shorter: Cycles, longer: Cycles) -> RunArrays:
     train = scenario.train().core(("load",), {"motor": driven(scenario.axes()["motor"])})
     train.short_form = True
     signals, numbers = scenario.signals(), {name: k for k, (name, *_) in enumerate(train.channels())}
+    inputs = [signals[name].core() for name in train.input_names()]
+    state = {"start": scenario.start(), "hysteresis_capacities": scenario.capacities()}
     switchings = _core.run_into(
+        _core.Case(train, inputs=inputs, **state),
         values,
-        train,
-        [signals[name].core() for name in train.input_names()],
-        scenario.start(),
-        scenario.capacities(),
-        longer.simulation.duration,
-        longer.simulation.sample_interval,
-        scenario.control(),
-        [numbers[name] for name in VARIABLES],
-        samples - 1,
-        enough,
+        duration=longer.simulation.duration,
+        sample_interval=longer.simulation.sample_interval,
+        control=scenario.control(),
+        channels=[numbers[name] for name in VARIABLES],
+        pause=samples - 1,
+        enough=enough,
     )
     return until(samples if stopped else len(longer.time), switching_count=switchings)

@@ -66,20 +66,18 @@ def run_in_core(study: Study, parameters: np.ndarray, threads: int) -> Runs:
             values[:, j] *= float(base_value(s, key))
     errors = _out_of_range(study, parameters)
     where = np.flatnonzero([e == "" for e in errors])
-    made, texts, switchings, energies = _core.run_batch(
+    found = _core.run_batch(
         [core_case(s)],
-        [_fields()[key] for key, _, _ in keys],
-        np.ascontiguousarray(values[where]),
-        s.simulation.duration,
-        s.simulation.sample_interval,
-        s.simulation.samples,
-        ENERGY if asks_for(study, "energy") else (),
-        sampled,
-        [(sampled.index(variable), REDUCTIONS.index(how)) for how, variable in reduced.values()],
-        threads,
+        fields=[_fields()[key] for key, _, _ in keys],
+        values=np.ascontiguousarray(values[where]),
+        **s.simulation.grid(),
+        energies=ENERGY if asks_for(study, "energy") else (),
+        channels=sampled,
+        kept=[(sampled.index(variable), REDUCTIONS.index(how)) for how, variable in reduced.values()],
+        threads=threads,
     )
-    n = len(parameters)
-    for row, text in zip(where.tolist(), texts, strict=True):
+    n, made, energies = len(parameters), found["values"], found["energies"]
+    for row, text in zip(where.tolist(), found["errors"], strict=True):
         errors[row] = text
     ratio = next((values[:, j] for j, (key, _, _) in enumerate(keys) if key == "gearbox.ratio"), None)
     return Runs(
@@ -88,7 +86,7 @@ def run_in_core(study: Study, parameters: np.ndarray, threads: int) -> Runs:
         kept={name: spread(made[:, k], where, n) for k, name in enumerate(reduced)},
         energy={e: spread(energies[:, k], where, n) for k, e in enumerate(ENERGY)} if energies.shape[1] else {},
         checks={},
-        switchings=np.nan_to_num(spread(switchings, where, n)),
+        switchings=np.nan_to_num(spread(found["switchings"], where, n)),
         errors=errors,
         ratio=np.full(n, s.gearbox.ratio) if ratio is None else ratio,
     )

@@ -75,7 +75,7 @@ def together(study: Study) -> bool:
 
 def run_trains(study: Study, parameters: np.ndarray, threads: int) -> Runs:
     """Drive trains without controllers, of one part: made here, run in the core on several threads, the GIL released."""
-    n, table = len(parameters), study.scenario.simulation
+    n = len(parameters)
     sampled, reduced = channels(study), reductions(study)
     entries = study.vocabulary.energies if asks_for(study, "energy") else ()
     trains: dict[int, Scenario] = {}
@@ -86,19 +86,18 @@ def run_trains(study: Study, parameters: np.ndarray, threads: int) -> Runs:
         except InputError as error:
             errors[k] = str(error)
     where = np.array(list(trains), dtype=int)
-    made, texts, switchings, energies = _core.run_batch(
+    found = _core.run_batch(
         [core_case(scenario) for scenario in trains.values()],
-        [],
-        np.empty((0, 0)),
-        table.duration,
-        table.sample_interval,
-        table.samples,
-        [entry for _, entry in entries],
-        sampled,
-        [(sampled.index(variable), REDUCTIONS.index(how)) for how, variable in reduced.values()],
-        threads,
+        fields=[],
+        values=np.empty((0, 0)),
+        **study.scenario.simulation.grid(),
+        energies=[entry for _, entry in entries],
+        channels=sampled,
+        kept=[(sampled.index(variable), REDUCTIONS.index(how)) for how, variable in reduced.values()],
+        threads=threads,
     )
-    for row, text in zip(where.tolist(), texts, strict=True):
+    made, energies = found["values"], found["energies"]
+    for row, text in zip(where.tolist(), found["errors"], strict=True):
         errors[row] = text
     checks = _checks_of(trains, errors) if checks_drives(study) else {}
     return Runs(
@@ -109,7 +108,7 @@ def run_trains(study: Study, parameters: np.ndarray, threads: int) -> Runs:
         kept={name: spread(made[:, k], where, n) for k, name in enumerate(reduced)},
         energy={name: spread(energies[:, k], where, n) for k, (name, _) in enumerate(entries)},
         checks=checks,
-        switchings=np.nan_to_num(spread(switchings, where, n)),
+        switchings=np.nan_to_num(spread(found["switchings"], where, n)),
         errors=errors,
     )
 
