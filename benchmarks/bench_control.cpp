@@ -6,7 +6,7 @@
 #include <cstdlib>
 
 #include "cascade.hpp"
-#include "lostmotion/simulation/train_solving.hpp"
+#include "lostmotion/simulation/train_run.hpp"
 
 using namespace lostmotion;
 
@@ -19,30 +19,26 @@ int main(int argc, char** argv) {
     options.energy = false;
     options.max_switchings = 0;
     const TrainRun train(paper.train);
-    return train.in_kernel([&]<class D>(const typename TrainReader<D>::Model& model) {
-        TrainWorkspace<D> workspace(model.assembly);
-        const std::vector<Signal> none(2);
-        const auto run = [&] {
-            return run_train_exactly_in<D>(model, none, {}, {}, options, nullptr, nullptr, &workspace);
-        };
-        if (argc > 1) {
-            options.control = cascade(paper.drive, 2.0 * std::numbers::pi / 8192.0, 0.2);
-            for (int k = std::atoi(argv[1]); k > 0; --k) run();
-            return 0;
-        }
-        struct Case {
-            const char* name;
-            double resolution, amplitude;
-        };
-        const double lines = 2.0 * std::numbers::pi / 8192.0;
-        for (const Case& c : {Case{"standing still", 0.0, 0.0}, Case{"sine of 0.2 rad", 0.0, 0.2},
-                              Case{"sine of 0.2 rad, encoder of 2048 lines", lines, 0.2}}) {
-            options.control = cascade(paper.drive, c.resolution, c.amplitude);
-            const TrainReport report = run();
-            if (report.status != Status::done) return 1;
-            const double ms = best_ms(50, run);
-            std::printf("%s|8000|%zu|%ld|%.6f\n", c.name, report.switching_count, report.steps, ms);
-        }
+    const std::vector<Signal> none(2);
+    std::unique_ptr<AnyWorkspace> workspace;
+    const auto run = [&] { return train.run_exactly(none, {}, {}, options, nullptr, workspace); };
+    if (argc > 1) {
+        options.control = cascade(paper.drive, 2.0 * std::numbers::pi / 8192.0, 0.2);
+        for (int k = std::atoi(argv[1]); k > 0; --k) run();
         return 0;
-    });
+    }
+    struct Case {
+        const char* name;
+        double resolution, amplitude;
+    };
+    const double lines = 2.0 * std::numbers::pi / 8192.0;
+    for (const Case& c : {Case{"standing still", 0.0, 0.0}, Case{"sine of 0.2 rad", 0.0, 0.2},
+                          Case{"sine of 0.2 rad, encoder of 2048 lines", lines, 0.2}}) {
+        options.control = cascade(paper.drive, c.resolution, c.amplitude);
+        const TrainReport report = run();
+        if (report.status != Status::done) return 1;
+        const double ms = best_ms(50, run);
+        std::printf("%s|8000|%zu|%ld|%.6f\n", c.name, report.switching_count, report.steps, ms);
+    }
+    return 0;
 }

@@ -26,12 +26,9 @@ Cost cost_of(const model::Train& train, const std::vector<Signal>& signals, doub
     Cost cost;
     cost.first = best_ms(repeats, [&] { TrainRun(train).run(signals, {}, {}, options, nullptr); });
     const TrainRun run(train);
-    run.in_kernel([&]<class D>(const typename TrainReader<D>::Model& model) {
-        TrainWorkspace<D> workspace(model.assembly);
-        cost.again = best_ms(repeats, [&] {
-            cost.switchings =
-                run_train_exactly_in<D>(model, signals, {}, {}, options, nullptr, nullptr, &workspace).switching_count;
-        });
+    std::unique_ptr<AnyWorkspace> workspace;
+    cost.again = best_ms(repeats, [&] {
+        cost.switchings = run.run_exactly(signals, {}, {}, options, nullptr, workspace).switching_count;
     });
     return cost;
 }

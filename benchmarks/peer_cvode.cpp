@@ -200,7 +200,8 @@ class Cvode {
         user_.linear = &task_.cache.entry(key_).rates;
         user_.constant = user_.linear->constant(now_.memory);
         limit_ = next_breakpoint(signals_, now_.time);
-        if (r.driving_input >= 0) limit_ = input_.turning(r.driving_input, r.driving_way, limit_);
+        Interruption never;
+        if (r.driving_input >= 0) limit_ = input_.turning(r.driving_input, r.driving_way, limit_, never);
         user_.put(now_.x, y_);
         CVodeReInit(memory_, now_.time, y_);
     }

@@ -1,0 +1,30 @@
+"""The programs of the benchmark compile, and its modules can be imported: `make bench` runs too long for a test."""
+
+from __future__ import annotations
+
+import importlib
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+BENCHMARKS = ROOT / "benchmarks"
+FOREIGN = {"timed_compiler"}  # a command, which runs when it is imported
+
+
+@pytest.mark.parametrize("program", sorted(BENCHMARKS.glob("*.cpp")), ids=lambda p: p.stem)
+def test_a_program_compiles(program: Path) -> None:
+    if program.stem == "peer_cvode" and not Path("/usr/include/cvode/cvode.h").exists():
+        pytest.skip("without SUNDIALS")
+    flags = ["-std=gnu++20", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
+    done = subprocess.run(
+        ["c++", "-fsyntax-only", *flags, "-I", ROOT / "core", program], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("module", sorted({p.stem for p in BENCHMARKS.glob("*.py")} - FOREIGN))
+def test_a_module_can_be_imported(module: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(BENCHMARKS)
+    importlib.import_module(module)
