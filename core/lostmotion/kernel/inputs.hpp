@@ -63,16 +63,6 @@ struct Signal {
     }
 };
 
-// breakpoints: time, value, slope; sines: amplitude, frequency, phase.
-inline Signal signal_of(const std::vector<std::array<double, 3>>& breakpoints,
-                        const std::vector<std::array<double, 3>>& sines) {
-    Signal s;
-    s.breakpoints.clear();
-    for (const auto& [time, value, slope] : breakpoints) s.breakpoints.push_back({time, value, slope});
-    for (const auto& [amplitude, frequency, phase] : sines) s.sines.push_back({amplitude, frequency, phase});
-    return s;
-}
-
 template <class D>
 using SignalsOf = std::array<Signal, D::inputs>;
 
