@@ -1,6 +1,7 @@
 // What a run costs: over simulated time, number of switchings and size of the loss map; a frequency response; and the
 // floating-point peak of this machine. Prints one line a case: table, then its cells.
 #include <cstdio>
+#include <stdexcept>
 #include <thread>
 
 #include "lostmotion/analysis/respond.hpp"
@@ -23,6 +24,7 @@ Cost cost_of(const model::Train& train, const std::vector<Signal>& signals, doub
     options.duration = duration;
     options.energy = false;
     options.max_switchings = 0;
+    if (const TrainRun run(train); !run.error().empty()) throw std::runtime_error(run.error());
     Cost cost;
     cost.first = best_ms(repeats, [&] { TrainRun(train).run(signals, {}, {}, options, nullptr); });
     const TrainRun run(train);
@@ -45,7 +47,7 @@ void costs() {
             std::printf("events|%g|%g|%zu|%.4f|%.3f\n", amplitude, frequency, c.switchings, c.again,
                         c.switchings > 0 ? 1e3 * c.again / static_cast<double>(c.switchings) : 0.0);
         }
-    for (const int fine : {1, 2, 4, 8, 16}) {
+    for (const int fine : {1, 2, 4, 8, 12}) {
         const PaperRun finer(stand_in_map(fine));
         const Cost c = cost_of(finer.train, finer.signals, 2.0, 50);
         std::printf("map|%d x %d|%zu|%.4f|%.4f\n", 6 * fine + 1, 10 * fine + 1, c.switchings, c.again, c.first);
