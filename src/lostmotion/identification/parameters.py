@@ -1,9 +1,9 @@
 """Parameters of an identification: start values, bounds, scales and priors."""
 
 import math
-from typing import Annotated, Any, Self
+from typing import Any, Self
 
-from pydantic import BeforeValidator, model_validator
+from pydantic import model_validator
 
 from ..inputs.part import Part
 from ..inputs.quantities import Number
@@ -25,9 +25,6 @@ def in_unit(value: Any, unit: str, key: str) -> float | None:
         return si_value(value, unit) * si_factor(unit)
     except ValueError as problem:
         raise ValueError(f"has {key} = {value!r}, which {problem}") from None
-
-
-Written = Annotated[float | None, BeforeValidator(lambda value: value)]
 
 
 class FreeParameter(Part):

@@ -23,7 +23,6 @@ from .parameters import FreeParameter, in_unit
 FormulaText = str | float
 # Keys of inputs and measured channels that are formulas.
 CHANNEL_FORMULAS = ("scale", "offset", "delay", "rate_limit", "acceleration_limit", "filter_time", "resolution")
-Setting = FormulaText | tuple["Setting", ...] | dict[str, Any]
 
 
 class LogFiles(Part):
