@@ -6,8 +6,11 @@ import subprocess
 import sys
 from graphlib import TopologicalSorter
 from pathlib import Path
+from types import FrameType
+from typing import Any
 
 import pytest
+from pydantic import BaseModel
 
 import lostmotion
 from conftest import ROOT, run_in_build
@@ -304,6 +307,77 @@ def test_every_described_parameter_says_what_it_is() -> None:
             assert symbol or meaning, f"{table}.{key}"
             assert unit or kind != "pair" or key in ("limits", "loss_range"), f"{table}.{key}"
             assert default is None or not needed, f"{table}.{key}"
+
+
+# Values of this file, which changes another one: a value of a load and a gain of a controller.
+WRITTEN = """
+base = "position-axis"
+load.inertia = 1.2345
+controller.position.gain = 12.345
+"""
+MOST_FILES = 8  # from the text of a scenario file to the fields that the core takes
+
+
+def holds(given: Any, value: float) -> bool:
+    """Whether something is a value, or the table or part that has it."""
+    if isinstance(given, BaseModel):
+        given = vars(given)
+    entries = given.values() if isinstance(given, dict) else given if isinstance(given, list | tuple) else (given,)
+    return any(type(entry) is float and entry == value for entry in entries)
+
+
+def way_of(value: float, path: Path) -> list[str]:
+    """Files of the package with functions that are called with a value of a scenario file, until the core can take it."""
+    way, ended = ["inputs/toml_files.py"], False  # which reads it
+
+    def follow(frame: FrameType, event: str, result: Any) -> None:
+        nonlocal ended
+        code = frame.f_code
+        if ended or not code.co_filename.startswith(str(PACKAGE)):
+            return
+        sys.setprofile(None)
+        if event == "call":
+            count = code.co_argcount + code.co_kwonlyargcount + bool(code.co_flags & 4) + bool(code.co_flags & 8)
+            file = str(Path(code.co_filename).relative_to(PACKAGE))
+            if any(holds(frame.f_locals.get(name), value) for name in code.co_varnames[:count]) and way[-1] != file:
+                way.append(file)
+        elif event == "return" and code.co_name == "core_fields":
+            ended = holds(result, value)
+        sys.setprofile(follow)
+
+    sys.setprofile(follow)
+    try:
+        lostmotion.load(path).core()
+    finally:
+        sys.setprofile(None)
+    assert ended
+    return way
+
+
+@pytest.mark.parametrize("value", [1.2345, 12.345], ids=["load inertia", "gain of a controller"])
+def test_a_value_goes_from_its_file_to_the_core_without_return(value: float, tmp_path: Path) -> None:
+    lostmotion.load("position-axis")  # makes the parts
+    (tmp_path / "scenario.toml").write_text(WRITTEN)
+    way = way_of(value, tmp_path / "scenario.toml")
+    assert way[1] == "simulation/scenario_files.py"
+    assert way[-1] == "inputs/described.py"
+    assert len(way) <= MOST_FILES, way
+    assert len(set(way)) == len(way), way
+
+
+def test_a_loss_map_is_validated_once() -> None:
+    checked = []
+
+    def count(frame: FrameType, event: str, _: Any) -> None:
+        if event == "call" and frame.f_code.co_name == "_is_a_map":
+            checked.append(frame.f_code)
+
+    sys.setprofile(count)
+    try:
+        lostmotion.simulate(lostmotion.load("position-axis"), duration=0.01)
+    finally:
+        sys.setprofile(None)
+    assert len(checked) == 1
 
 
 def test_the_extension_s_stub_is_current(tmp_path: Path) -> None:

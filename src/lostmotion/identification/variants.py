@@ -69,16 +69,13 @@ class Variants:
                 return None
         found = TrainTables.model_construct(set(data), **fields)
         shafts = {
-            name: self._shafts[name]
-            if shaft is self._like.shafts[name]
-            else Shaft.model_construct(None, **{key: getattr(shaft, key) for key in Shaft.model_fields})
+            name: self._shafts[name] if shaft is self._like.shafts[name] else Shaft.like(shaft)
             for name, shaft in found.shafts.items()
         }
         shafts = found.with_drag(shafts)
         for name, slide in found.slides.items():
             shafts[name] = self._shafts[name] if slide is self._like.slides[name] else slide.shaft()
-        tables = {table: Named(elements) for table, elements in {"shafts": shafts, **found.elements()}.items()}
-        keep(found, TrainTables.train, DriveTrain.model_construct(None, **tables))
+        keep(found, TrainTables.train, DriveTrain.model_construct(None, shafts=Named(shafts), **found.elements()))
         return Scenario.of(found, checked=False)
 
 

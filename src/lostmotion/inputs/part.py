@@ -66,6 +66,31 @@ class Part(BaseModel):
         with cls._one_error(obj):
             return super().model_validate(plain(obj), **options)
 
+    @classmethod
+    def like(cls, part: "Part", **others: Any) -> Self:
+        """Make the part with the values that another one has under the same names. They are not checked again."""
+        same = {name: getattr(part, name) for name in cls.model_fields if name in type(part).model_fields}
+        return cls.model_construct(None, **same | others)
+
+    @classmethod
+    def of_parts(cls, **parts: Any) -> Self:
+        """Make the part of parts that are not checked again. It is only checked whether they fit together.
+
+        Raises
+        ------
+        InputError
+        """
+        made = cls.model_construct(None, **parts)
+        try:
+            for rule in cls.__pydantic_decorators__.model_validators.values():
+                if rule.info.mode == "after":
+                    rule.func(made)
+        except InputError:
+            raise
+        except ValueError as problem:
+            raise InputError(f"{cls._subject()} {problem}") from None
+        return made
+
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy with changes, which are checked as in the constructor."""
         if not update:

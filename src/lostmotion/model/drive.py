@@ -7,6 +7,7 @@ from pydantic import model_validator
 
 from .. import _core
 from ..inputs.kept import kept
+from ..inputs.named import Named
 from ..inputs.part import Part
 from .gear import Gear
 from .gearbox import Gearbox
@@ -75,17 +76,16 @@ class Drive(Part):
     @kept
     def train(self) -> DriveTrain:
         """The same drive as a train: shafts `motor` and `load`, joined by the gear `gearbox`, and on the first the motor `motor`."""
-        return DriveTrain(
-            shafts={"motor": Shaft(), "load": _load_shaft(self.load)},
-            motors={"motor": _motor_on_shaft(self.motor)},
-            gears={"gearbox": _gear(self.gearbox)},
+        return DriveTrain.of_parts(
+            shafts=Named({"motor": Shaft(), "load": Shaft.like(self.load)}),
+            motors=Named({"motor": _motor_on_shaft(self.motor)}),
+            gears=Named({"gearbox": _gear(self.gearbox)}),
         )
 
     @kept
     def named_train(self) -> NamedDrive:
         """The same train, with the names that variables of a drive have."""
-        train = self.train()
-        return NamedDrive.model_construct(**{name: getattr(train, name) for name in DriveTrain.model_fields})
+        return NamedDrive.like(self.train())
 
     def core(self, law: MotorLaw | None = None) -> _core.Train:
         """The solver's train, its motor as a current loop may make it; the last ones are kept for equal parts."""
@@ -102,13 +102,8 @@ class Drive(Part):
 
 
 @kept
-def _load_shaft(load: Load) -> Shaft:
-    return Shaft(**{name: getattr(load, name) for name in Load.model_fields})
-
-
-@kept
 def _motor_on_shaft(motor: Motor) -> ShaftMotor:
-    return ShaftMotor(shaft="motor", **{name: getattr(motor, name) for name in Motor.model_fields})
+    return ShaftMotor.like(motor, shaft="motor")
 
 
 @kept

@@ -76,4 +76,4 @@ class Gear(Transmission, BetweenShafts):
     @classmethod
     def of(cls, gearbox: Gearbox, *, input: str, output: str) -> Self:
         """The gearbox between two shafts."""
-        return cls(input=input, output=output, **{name: getattr(gearbox, name) for name in Gearbox.model_fields})
+        return cls.like(gearbox, input=input, output=output)

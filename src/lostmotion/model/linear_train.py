@@ -6,7 +6,7 @@ from typing import Any
 from pydantic import Field
 
 from ..errors import InputError
-from ..inputs.named import Elements, nothing
+from ..inputs.named import Elements, Named, nothing
 from ..inputs.validation import did_you_mean, shown
 from .gear import Gear
 from .linear import LinearDrive, Screw
@@ -102,7 +102,7 @@ class LinearElements(TrainElements):
         for name, slide in slides.items():
             if slide.end_stops is not None:
                 tables["springs"][name + END_STOPS] = slide.end_stops.spring(name)
-        return tables
+        return {table: Named(elements) for table, elements in tables.items()}
 
     def with_drag(self, shafts: Mapping[str, Shaft]) -> dict[str, Shaft]:
         """Shafts with the drag torque of the screws, racks and belts that they drive."""

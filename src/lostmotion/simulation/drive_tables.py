@@ -84,8 +84,7 @@ class DriveTables(ScenarioTables):
     @kept
     def drive(self) -> Drive:
         """The drive without its surroundings."""
-        load = Load(**{name: getattr(self.load, name) for name in Load.model_fields})
-        return Drive(motor=self.motor, gearbox=self.gearbox, load=load)
+        return Drive.of_parts(motor=self.motor, gearbox=self.gearbox, load=Load.like(self.load))
 
     def train(self) -> DriveTrain:
         return self.drive().train()
@@ -96,16 +95,15 @@ class DriveTables(ScenarioTables):
     @kept
     def long(self) -> TrainTables:
         train = self.train()  # whose parts are checked
-        load = ShaftTable.model_construct(None, **dict(train.shafts[LOAD]), torque=self.load.torque)
-        return TrainTables.model_construct(
+        load = ShaftTable.like(train.shafts[LOAD], torque=self.load.torque)
+        return TrainTables.like(
+            train,
             title=self.title,
-            shafts=Named({MOTOR: ShaftTable.model_construct(None, **dict(train.shafts[MOTOR])), LOAD: load}),
-            motors=train.motors,
-            gears=train.gears,
+            shafts=Named({MOTOR: ShaftTable.like(train.shafts[MOTOR]), LOAD: load}),
             command=Named({MOTOR: self.command} if self.controller is None else {}),
             controllers=Named({} if self.controller is None else {MOTOR: self.controller}),
             initial=self.initial.of_train(),
-            task=TrainTask(**{key: getattr(self.task, key) for key in TrainTask.model_fields}),
+            task=TrainTask.like(self.task),
             simulation=self.simulation,
         )
 

@@ -17,7 +17,7 @@ from ..data_sheets.train_components import CONDITIONS, RECORDS
 from ..errors import InputError
 from ..inputs import described
 from ..inputs.kept import kept
-from ..inputs.named import Elements, nothing
+from ..inputs.named import Elements, Named, nothing
 from ..model.gearbox import Transmission
 from ..model.linear_train import LinearElements
 from ..model.motor import MotorLaw
@@ -97,7 +97,7 @@ class TrainTables(ScenarioTables, LinearElements):
 
     @kept
     def train(self) -> DriveTrain:
-        return DriveTrain(shafts=self.plain_shafts(), **self.elements())
+        return DriveTrain.of_parts(shafts=Named(self.plain_shafts()), **self.elements())
 
     def named_train(self) -> DriveTrain:
         return self.train()
@@ -107,7 +107,7 @@ class TrainTables(ScenarioTables, LinearElements):
 
     def own_shafts(self) -> dict[str, Shaft]:
         """The shafts as they are written, without the torques on them."""
-        return {name: Shaft(**{key: getattr(s, key) for key in Shaft.model_fields}) for name, s in self.shafts.items()}
+        return {name: Shaft.like(shaft) for name, shaft in self.shafts.items()}
 
     def plain_shafts(self) -> dict[str, Shaft]:
         """The shafts and slides without what acts on them."""
