@@ -1,6 +1,6 @@
 """Data sheets of what belongs to a servo motor: its holding brake and its amplifier."""
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -46,9 +46,7 @@ class BrakeSheet(Record):
     motors: tuple[str, ...] = ()
     """names of the records of motors that it is built into"""
 
-    def missing(self) -> dict[str, str]:
-        """Data that the rule on the holding brake requires and the record lacks."""
-        return {} if self.holding_torque is not None else {"holding_torque": f"see {self.where('holding_torque')}"}
+    NEEDS: ClassVar[dict[str, tuple[str, ...]]] = {"holding_torque": ("holding_torque",)}
 
     def assumptions(self) -> tuple[str, ...]:
         """Assumptions beyond the data, one sentence each."""
@@ -82,7 +80,4 @@ class AmplifierSheet(Record):
     losses: Annotated[Power, Positive] | None = None
     switching_frequency: Annotated[Frequency, Positive] | None = None
 
-    def missing(self) -> dict[str, str]:
-        """Data that the rules on amplifiers require and the record lacks."""
-        key = "continuous_current"
-        return {} if self.continuous_current is not None else {key: f"see {self.where(key)}"}
+    NEEDS: ClassVar[dict[str, tuple[str, ...]]] = {"continuous_current": ("continuous_current",)}

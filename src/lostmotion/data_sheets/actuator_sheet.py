@@ -1,6 +1,6 @@
 """The data sheet of an actuator: a motor and its gearbox in one, rated at the output."""
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -36,14 +36,11 @@ class ActuatorSheet(Record):
     pole_pairs: Annotated[Whole, Field(gt=0)] | None = None
     rated_voltage: Annotated[Voltage, Positive] | None = None
 
-    def missing(self) -> dict[str, str]:
-        """Data that a run requires and the record lacks."""
-        need = {
-            "rotor_inertia": self.rotor_inertia,
-            "rated_output_torque": self.rated_output_torque,
-            "rated_output_speed": self.rated_output_speed or self.no_load_output_speed,
-        }
-        return {key: f"see {self.where(key)}" for key, value in need.items() if value is None}
+    NEEDS: ClassVar[dict[str, tuple[str, ...]]] = {
+        "rotor_inertia": ("rotor_inertia",),
+        "rated_output_torque": ("rated_output_torque",),
+        "rated_output_speed": ("rated_output_speed", "no_load_output_speed"),
+    }
 
     def level(self) -> str | None:
         """Level of a run with these data: ``"torque source"``, or None."""

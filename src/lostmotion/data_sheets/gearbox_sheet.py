@@ -137,15 +137,13 @@ class GearboxSheet(described.GearboxLoadsFields, Record):
 
     def missing(self) -> dict[str, str]:
         """Data that a run requires and the record lacks: the key of `[gearbox]`, and a hint to its place."""
-        out = {}
-        if self.rated_output_torque is None:
-            out["rated_output_torque"] = f"see {self.where('rated_output_torque')}"
-        if self.rated_input_speed is None:
-            out["rated_input_speed"] = f"see {self.where('rated_input_speed')}"
-        if self.inertia is None:
-            out["inertia"] = f"moment of inertia on the input shaft; see {self.where('inertia')}"
-        if self.stiffness is None and not self.rigid:
-            out["stiffness"] = f"torsional stiffness; see {self.where('stiffness')}"
+        hints = {
+            "rated_output_torque": "",
+            "rated_input_speed": "",
+            "inertia": "moment of inertia on the input shaft; ",
+            **({} if self.rigid else {"stiffness": "torsional stiffness; "}),
+        }
+        out = {key: f"{hint}see {self.where(key)}" for key, hint in hints.items() if getattr(self, key) is None}
         if self.losses.empty and self.loss_estimate() is None:
             out["losses"] = f"an efficiency or a loss table; see {self.where('losses.efficiency')}"
         return out

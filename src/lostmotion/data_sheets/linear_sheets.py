@@ -47,17 +47,11 @@ class LinearSheet(Record):
     """for some keys those of which one must be given too; without them they are data for nothing but the list"""
     CHOICES: ClassVar[dict[str, str]] = {}
     """values that no record can state, since they depend on the axis"""
-    NEEDS: ClassVar[dict[str, tuple[str, ...]]] = {}
-    """values that a run requires, with the alternative keys of each"""
 
     def values(self) -> dict[str, Any]:
         """Data that the table of a scenario has too."""
         names = (name for name in type(self).PART.model_fields if name in self.model_fields_set)
         return {name: value for name in names if (value := getattr(self, name)) is not None}
-
-    def missing(self) -> dict[str, str]:
-        """Data that a run requires and the record lacks: the key, and a hint to its place."""
-        return {key: f"see {self.where(key)}" for key in self._lacking()}
 
     def open_choices(self, values: Mapping[str, Any]) -> dict[str, str]:
         """Choices that are incomplete: none of the alternative keys has a value."""
@@ -71,10 +65,6 @@ class LinearSheet(Record):
         """The keys that take the place of one."""
         ways = [ways for ways in type(self).ALTERNATIVES if any(key in way for way in ways)]
         return {other for each in ways for way in each if key not in way for other in way}
-
-    def _lacking(self) -> list[str]:
-        given = self.values()
-        return [need for need, keys in type(self).NEEDS.items() if not any(key in given for key in keys)]
 
 
 class ScrewSheet(LinearSheet, RatedScrew):

@@ -1,7 +1,7 @@
 """Common fields of the records of data sheets: sources of the data, and gaps."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -81,6 +81,9 @@ class Record(Part):
     sources: tuple[Source, ...] = ()
     gaps: tuple[Gap, ...] = ()
 
+    NEEDS: ClassVar[dict[str, tuple[str, ...]]] = {}
+    """data that a run, or the rule on this kind, requires; for each the alternative keys, of which one is enough"""
+
     def given(self) -> list[str]:
         """Dotted keys of all data that are given."""
         out = []
@@ -93,8 +96,9 @@ class Record(Part):
         return sorted(out)
 
     def missing(self) -> dict[str, str]:
-        """Data that a run requires and the record lacks, with a hint to their place."""
-        raise NotImplementedError
+        """Data that a run requires and the record lacks: the key, and a hint to its place."""
+        given = {key for key in self.model_fields_set if getattr(self, key) is not None}
+        return {need: f"see {self.where(need)}" for need, keys in self.NEEDS.items() if given.isdisjoint(keys)}
 
     def level(self) -> str | None:
         """Level of a run with these data; None if it cannot run."""
