@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -14,10 +14,11 @@ from .targets import need_directory, try_directory, writing
 from .terminal import busy, progress
 
 if TYPE_CHECKING:
-    from ..data_sheets.gearbox_sheet import GearboxSheet
-    from ..data_sheets.linear_sheets import ScrewSheet
+    from ..data_sheets.sheet import Record
     from ..model.angle_torques import TorqueHarmonic
     from ..test_rig.comparison import Comparison
+    from ..test_rig.measurement import RigReport
+    from ..test_rig.screw_measurement import ScrewReport
 
 
 def rig(
@@ -62,7 +63,6 @@ def rig(
     lostmotion rig rexroth-25x10rx3-i4 --set "supported_length=600 mm"
     lostmotion rig my-gearbox.toml --logs campaign --ripple "2 0.02 N*m"
     """
-    from ..data_sheets.gearbox_sheet import GearboxSheet
     from ..data_sheets.linear_sheets import ScrewSheet
     from ..data_sheets.records import find_one_of
     from ..reports.pictures import endings
@@ -74,89 +74,63 @@ def rig(
     if (directory := output if logs is None else logs) is not None:
         try_directory(directory)
     sheet = find_one_of(name, ("gearbox", "screw"))
-    if isinstance(sheet, ScrewSheet):
-        if logs is not None:
-            raise InputError(f"--logs: {sheet.name} is a screw, and logs are written of gearboxes; leave --logs out")
-        _rig_of_screw(name, sheet, overrides or (), output, pictures)
-        return
-    assert isinstance(sheet, GearboxSheet)
-    _rig_of_gearbox(name, sheet, overrides or (), output, pictures, logs, ripple)
-
-
-def _rig_of_screw(
-    name: str, sheet: ScrewSheet, overrides: Sequence[str], output: Path | None, pictures: Sequence[str]
-) -> None:
-    from ..simulation.scenario_files import screw_from_record
-    from ..test_rig.screw_measurement import WORK, measure_screw
-
-    screw = screw_from_record(name, overrides)
-    with progress(WORK, "Measuring") as step:
-        report = measure_screw(screw, sheet, progress=step)
-    from ..reports.screw_rig import summary_rows, write_screw_sheet
-
-    page = None
-    if output is not None:
-        with writing(output), busy("Writing"):
-            page = write_screw_sheet(output, sheet.name, report, sheet, (), pictures)
-    _print_all(sheet.title or sheet.name, report.comparisons, summary_rows(report), (), next_line(name, page))
-
-
-def _rig_of_gearbox(
-    name: str,
-    sheet: GearboxSheet,
-    overrides: Sequence[str],
-    output: Path | None,
-    pictures: Sequence[str],
-    logs: Path | None,
-    ripple: str | None,
-) -> None:
-    from ..simulation.scenario_files import gearbox_from_record
-
-    part, notes = gearbox_from_record(name, overrides)
+    if isinstance(sheet, ScrewSheet) and logs is not None:
+        raise InputError(f"--logs: {sheet.name} is a screw, and logs are written of gearboxes; leave --logs out")
     if logs is not None:
-        from ..identification.campaign import write_campaign
-
-        title = f"{sheet.title or sheet.name}: logs of the virtual rig"
-        torque = None if ripple is None else _ripple(ripple)
-        with busy("Running the rig"):
-            file = write_campaign(logs, part, title=title, ripple=torque)
-        print(f"Logs written to {logs / 'logs'}")
-        print(f"Next: lostmotion identify {file} -o identified")
+        _write_logs(name, sheet, overrides or (), logs, ripple)
         return
-    from ..test_rig.measurement import WORK, measure
+    report, notes = _measured(name, sheet, overrides or ())
+    from ..reports import rig as of_gearbox
+    from ..reports import screw_rig as of_screw
 
-    with progress(WORK, "Measuring") as step:
-        report = measure(part, sheet, notes, step)
-    from ..reports.rig import summary_rows, write_sheet
-
+    pages: Any = of_screw if isinstance(sheet, ScrewSheet) else of_gearbox
     page = None
     if output is not None:
         with writing(output), busy("Writing"):
-            page = write_sheet(output, sheet.name, report, sheet, notes, pictures)
-    _print_all(sheet.title or sheet.name, report.comparisons, summary_rows(report), notes, next_line(name, page))
-
-
-def next_line(name: str, page: Path | None) -> str:
-    """Path of the report and the next command, or the command that writes the report."""
-    if page is None:
-        return f"All charts on a page: lostmotion rig {name} -o rig"
-    return f"Report written to {page}\nIts data, sources and gaps: lostmotion catalogue {name}"
-
-
-def _print_all(
-    title: str,
-    comparisons: Sequence[Comparison],
-    rows: Sequence[tuple[str, str]],
-    notes: Sequence[str],
-    end: str,
-) -> None:
-    print(title)
-    _print_comparisons(comparisons)
-    for what, value in rows:
+            page = pages.write_sheet(output, sheet.name, report, sheet, notes, pictures)
+    print(sheet.title or sheet.name)
+    _print_comparisons(report.comparisons)
+    for what, value in pages.summary_rows(report):
         print(f"  {what}: {value}")
     for note in notes:
         print(f"  note: {note}")
-    print(end)
+    if page is None:
+        print(f"All charts on a page: lostmotion rig {name} -o rig")
+    else:
+        print(f"Report written to {page}\nIts data, sources and gaps: lostmotion catalogue {name}")
+
+
+def _measured(name: str, sheet: Record, overrides: Sequence[str]) -> tuple[RigReport | ScrewReport, tuple[str, ...]]:
+    """What the rig measures, and the notes of a gearbox's loss map."""
+    from ..data_sheets.gearbox_sheet import GearboxSheet
+    from ..data_sheets.linear_sheets import ScrewSheet
+    from ..simulation.scenario_files import gearbox_from_record, screw_from_record
+
+    if isinstance(sheet, ScrewSheet):
+        from ..test_rig.screw_measurement import WORK, measure_screw
+
+        screw = screw_from_record(name, overrides)
+        with progress(WORK, "Measuring") as step:
+            return measure_screw(screw, sheet, progress=step), ()
+    from ..test_rig.measurement import WORK, measure
+
+    assert isinstance(sheet, GearboxSheet)
+    part, notes = gearbox_from_record(name, overrides)
+    with progress(WORK, "Measuring") as step:
+        return measure(part, sheet, notes, step), notes
+
+
+def _write_logs(name: str, sheet: Record, overrides: Sequence[str], directory: Path, ripple: str | None) -> None:
+    from ..identification.campaign import write_campaign
+    from ..simulation.scenario_files import gearbox_from_record
+
+    part, _ = gearbox_from_record(name, overrides)
+    title = f"{sheet.title or sheet.name}: logs of the virtual rig"
+    torque = None if ripple is None else _ripple(ripple)
+    with busy("Running the rig"):
+        file = write_campaign(directory, part, title=title, ripple=torque)
+    print(f"Logs written to {directory / 'logs'}")
+    print(f"Next: lostmotion identify {file} -o identified")
 
 
 def _ripple(text: str) -> TorqueHarmonic:

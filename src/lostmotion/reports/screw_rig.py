@@ -113,7 +113,7 @@ def screw_report(name: str, report: ScrewReport, sheet: ScrewSheet | None = None
     )
 
 
-def write_screw_sheet(
+def write_sheet(
     directory: Path,
     name: str,
     report: ScrewReport,
