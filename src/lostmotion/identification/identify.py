@@ -111,13 +111,13 @@ class IdentificationResult:
 
     def errors_text(self, *, held_out: bool) -> str:
         """MAE and RMSE of each channel that has errors, with its unit."""
-        found = []
-        for channel in self.task.measured:
-            mae, rmse = self.error(channel, held_out=held_out)
-            if not math.isnan(mae):
-                unit = f" {self.unit(channel)}".rstrip()
-                found.append(f"{channel} MAE {mae:.4g}{unit}, RMSE {rmse:.4g}{unit}")
-        return "; ".join(found)
+        found = {channel: self._error_text(channel, held_out=held_out) for channel in self.task.measured}
+        return "; ".join(f"{channel} {text}" for channel, text in found.items() if text)
+
+    def _error_text(self, channel: str, *, held_out: bool) -> str:
+        mae, rmse = self.error(channel, held_out=held_out)
+        unit = f" {self.unit(channel)}".rstrip()
+        return "" if math.isnan(mae) else f"MAE {mae:.4g}{unit}, RMSE {rmse:.4g}{unit}"
 
     def values_for(self, log: str) -> dict[str, float]:
         """Values of all parameters, and of the nuisances of one log by its name."""
@@ -142,12 +142,9 @@ class IdentificationResult:
             lines.append(f"  {name} = {p.shown(self.values[name])} ({p.shown(i.low)} to {p.shown(i.high)}){unit}{flag}")
         for channel in self.task.measured:
             for held_out, what in ((False, "fitted"), (True, "held out")):
-                mae, rmse = self.error(channel, held_out=held_out)
-                if not math.isnan(mae):
+                if text := self._error_text(channel, held_out=held_out):
                     own = [e for e in self.errors if e.held_out == held_out and e.channel == channel]
-                    n = sum(not math.isnan(e.mae) for e in own)
-                    unit = f" {self.unit(channel)}".rstrip()
-                    lines.append(f"  {channel}, {_logs(n)} {what}: MAE {mae:.4g}{unit}, RMSE {rmse:.4g}{unit}")
+                    lines.append(f"  {channel}, {_logs(sum(not math.isnan(e.mae) for e in own))} {what}: {text}")
         lines += [f"  {condition.text(self.error_unit)}" for condition in self.conditions]
         lines += [f"  {u.text}" for u in self.undetermined] + [f"  {text}" for text in self.at_bounds]
         return lines + [f"  {text}" for text in [*self.differences(), *self.inputs, *self.starts()]]
