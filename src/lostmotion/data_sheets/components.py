@@ -448,18 +448,19 @@ def use_accessories(task: Any, motor: Any = None) -> Any:
     return found
 
 
-def find_accessories(data: dict[str, Any], directory: Path) -> dict[str, Any]:
-    """Tables whose files with brake and amplifier of the task are relative to a directory, by their whole names."""
-    task = data.get("task")
+def record_in(directory: Path, given: Any, key: str = "from") -> Any:
+    """A table that names a record, or its name alone. If the record is in a file relative to the directory, with the whole name."""
+    name = given.get(key) if isinstance(given, dict) else given
+    if not isinstance(name, str) or not is_in_file(name):
+        return given
+    return {**(given if isinstance(given, dict) else {}), key: str(directory / name)}
+
+
+def accessories_in(directory: Path, task: Any) -> Any:
+    """A table `[task]` with the whole names of the files of its brake and amplifier."""
     if not isinstance(task, dict):
-        return data
-    found = dict(task)
-    for kind in ACCESSORIES:
-        given = found.get(kind)
-        name = given.get("from") if isinstance(given, dict) else given
-        if isinstance(name, str) and is_in_file(name):
-            found[kind] = {**(given if isinstance(given, dict) else {}), "from": str(directory / name)}
-    return {**data, "task": found}
+        return task
+    return task | {kind: record_in(directory, task[kind]) for kind in ACCESSORIES if kind in task}
 
 
 def use_records(data: dict[str, Any]) -> None:

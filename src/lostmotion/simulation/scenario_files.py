@@ -8,12 +8,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ..data_sheets.components import find_accessories, gearbox_table
+from ..data_sheets.components import accessories_in, gearbox_table, record_in
 from ..data_sheets.linear_components import linear_table
 from ..data_sheets.train_components import RECORDS, without_record
 from ..errors import InputError
 from ..inputs.schema import follow, unit_in_schema
-from ..inputs.toml_files import RESULTS, is_in_file, no_such_file, read_toml
+from ..inputs.toml_files import RESULTS, no_such_file, read_toml
 from ..inputs.toml_text import toml_text, without_empty
 from ..inputs.validation import names_like, shortened, shown
 from ..model.gearbox import Gearbox
@@ -183,23 +183,19 @@ def _change_voltages(based: dict[str, Any], data: Mapping[str, Any]) -> None:
 
 def _find_records(data: dict[str, Any], directory: Path) -> None:
     """Files with a record are relative to the scenario."""
-    data |= find_accessories(data, directory)
-    for table in ("gearbox", "motor"):
-        if isinstance(data.get(table), str):
-            data[table] = {"from": data[table]}
-    naming = [(data.get(table), "from") for table in ("gearbox", "motor")]
-    if isinstance(data.get("axis"), dict):
-        for part, value in data["axis"].items():
-            if isinstance(value, str):
-                data["axis"][part] = {"from": value}
-        naming += [(element, "from") for element in data["axis"].values()]
+    if "task" in data:
+        data["task"] = accessories_in(directory, data["task"])
+    axis = data.get("axis")
+    for tables in (data, axis) if isinstance(axis, dict) else (data,):
+        for name in tables if tables is axis else ("gearbox", "motor"):
+            if isinstance(tables.get(name), str):
+                tables[name] = {"from": tables[name]}
+            if name in tables:
+                tables[name] = record_in(directory, tables[name])
     for table, (key, _) in RECORDS.items():
         if isinstance(data.get(table), dict):
-            naming += [(element, key) for element in data[table].values()]
-    for element, key in naming:
-        record = element.get(key) if isinstance(element, dict) else None
-        if isinstance(element, dict) and isinstance(record, str) and is_in_file(record):
-            element[key] = str(directory / record)
+            elements = data[table]
+            data[table] = {n: record_in(directory, e, key) if isinstance(e, dict) else e for n, e in elements.items()}
 
 
 def read_series_files(

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from ..control.controller import AnyCurrent
-from ..data_sheets.components import find_accessories, use_accessories
+from ..data_sheets.components import accessories_in, record_in, use_accessories
 from ..data_sheets.records import find
 from ..errors import InputError, inside
 from ..inputs.arguments import checked
 from ..inputs.quantities import argument
 from ..inputs.schema import follow, unit_in_schema
-from ..inputs.toml_files import is_in_file, read_toml
+from ..inputs.toml_files import read_toml
 from ..inputs.validation import shown, unknown_key
 from ..model.angle_torques import STANDARD_GRAVITY
 from ..model.signals import ForceSignal, TorqueSignal
@@ -205,14 +205,9 @@ def _with_candidates(tables: dict[str, Any]) -> dict[str, Any]:
 
 def _relative(tables: dict[str, Any], directory: Path) -> dict[str, Any]:
     """The tables with files of records, which are relative to the task file, by their whole names."""
-    out = dict(tables)
-    for kind in CANDIDATES:
-        table = out.get(kind)
-        name = table.get("from") if isinstance(table, dict) else table
-        if isinstance(name, str) and is_in_file(name):
-            beside = table if isinstance(table, dict) else {}
-            out[kind] = {**beside, "from": str(directory.resolve() / name)}
-    return find_accessories(out, directory.resolve())
+    home = directory.resolve()
+    out = tables | {kind: record_in(home, tables[kind]) for kind in CANDIDATES if kind in tables}
+    return out | ({"task": accessories_in(home, out["task"])} if "task" in out else {})
 
 
 def _torque_sources(written: dict[str, Any], vary: list[Any]) -> bool:
