@@ -43,6 +43,25 @@ def small() -> Path:
     return ROOT / "scenarios" / "paper-2dof-nl-small.toml"
 
 
+def jamming() -> lm.Scenario:
+    """A rigid self-locking worm under a heavy load, which jams: its effective inertia is below zero."""
+    return lm.Scenario(
+        shafts={"worm": {}, "drum": {"inertia": 2.0, "torque": 20.0}},
+        motors={"motor": {"shaft": "worm", "kind": "torque_source", "rotor_inertia": 1e-4}},
+        gears={
+            "gear": {
+                "input": "worm",
+                "output": "drum",
+                "ratio": 50,
+                "stiffness": {"kind": "rigid"},
+                "losses": {"kind": "mesh_efficiency", "drive_efficiency": 0.44, "backdrive_efficiency": -0.2},
+            }
+        },
+        initial={"speeds": {"worm": -100.0, "drum": -2.0}},
+        simulation={"duration": 0.1, "sample_interval": 1e-3},
+    )
+
+
 def for_all(cases: Iterable[Any]) -> Callable[[Callable[..., None]], Callable[[], None]]:
     """A test of many small cases that reports all failures at once; a tuple gives several arguments."""
 

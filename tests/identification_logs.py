@@ -112,10 +112,10 @@ POSITION_NOISE = 2e-5  # m
 MASS, FRICTION, STIFFNESS = 95.0, 20.0, 900.0
 
 
-def released(time: np.ndarray, begin: float) -> np.ndarray:
+def released(time: np.ndarray, begin: float, mass: float = MASS) -> np.ndarray:
     """Position of m x'' + b x' + k x = 0, released at rest."""
-    decay = FRICTION / (2.0 * MASS)
-    w = np.sqrt(STIFFNESS / MASS - decay**2)
+    decay = FRICTION / (2.0 * mass)
+    w = np.sqrt(STIFFNESS / mass - decay**2)
     return np.asarray(begin * np.exp(-decay * time) * (np.cos(w * time) + decay / w * np.sin(w * time)))
 
 

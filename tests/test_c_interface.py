@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
-from conftest import ROOT, TRAINS
+from conftest import ROOT, TRAINS, jamming
 from lostmotion import _core
 from lostmotion.model.angle_torques import TorqueCurve
 from lostmotion.model.shaft import DragCurve
@@ -430,21 +430,7 @@ def test_what_is_wrong_is_said_in_one_line(library: c.CDLL, worm: Simulation) ->
 
 def test_a_jam_is_said_as_in_python(library: c.CDLL) -> None:
     """A rigid self-locking worm under a heavy load (drivetrain: effective inertia below zero)."""
-    scenario = lm.Scenario(
-        shafts={"worm": {}, "drum": {"inertia": 2.0, "torque": 20.0}},
-        motors={"motor": {"shaft": "worm", "kind": "torque_source", "rotor_inertia": 1e-4}},
-        gears={
-            "gear": {
-                "input": "worm",
-                "output": "drum",
-                "ratio": 50,
-                "stiffness": {"kind": "rigid"},
-                "losses": {"kind": "mesh_efficiency", "drive_efficiency": 0.44, "backdrive_efficiency": -0.2},
-            }
-        },
-        initial={"speeds": {"worm": -100.0, "drum": -2.0}},
-        simulation={"duration": 0.1, "sample_interval": 1e-3},
-    )
+    scenario = jamming()
     with pytest.raises(lm.SolverError) as jammed:
         lm.simulate(scenario)
     simulation = Train(library, scenario).simulation(1e-3)

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import lostmotion as lm
-from conftest import ALL_SCENARIOS, ROOT
+from conftest import ALL_SCENARIOS, ROOT, jamming
 from lostmotion.portable import fmu as exporting
 from lostmotion.portable.parameters import Parameters
 
@@ -315,21 +315,7 @@ def test_a_jam_ends_in_an_error_with_the_sentence_of_python(tmp_path: Path, monk
     from fmpy.fmi1 import FMICallException
 
     without_parameters(monkeypatch)
-    scenario = lm.Scenario(
-        shafts={"worm": {}, "drum": {"inertia": 2.0, "torque": 20.0}},
-        motors={"motor": {"shaft": "worm", "kind": "torque_source", "rotor_inertia": 1e-4}},
-        gears={
-            "gear": {
-                "input": "worm",
-                "output": "drum",
-                "ratio": 50,
-                "stiffness": {"kind": "rigid"},
-                "losses": {"kind": "mesh_efficiency", "drive_efficiency": 0.44, "backdrive_efficiency": -0.2},
-            }
-        },
-        initial={"speeds": {"worm": -100.0, "drum": -2.0}},
-        simulation={"duration": 0.1, "sample_interval": 1e-3},
-    )
+    scenario = jamming()
     with pytest.raises(lm.SolverError) as jammed:
         lm.simulate(scenario)
     path = tmp_path / "jam.fmu"

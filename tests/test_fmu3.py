@@ -8,17 +8,13 @@ from xml.etree import ElementTree as ET
 import pytest
 
 import lostmotion as lm
-from lostmotion.portable import fmu as exporting
-from lostmotion.portable.parameters import Parameters
-from test_fmu import Slave, pytestmark
+from test_fmu import Slave, pytestmark, without_parameters
 
 fmpy: Any = pytest.importorskip("fmpy", reason="FMPy is missing: .venv/bin/pip install --group portable")
 __all__ = ["pytestmark"]
 
 
-@pytest.fixture(autouse=True)
-def without_parameters(monkeypatch: Any) -> None:
-    monkeypatch.setattr(exporting, "parameters_of", lambda *_: Parameters((), {}))
+small_files = pytest.fixture(autouse=True)(without_parameters)
 
 
 class Slave3:

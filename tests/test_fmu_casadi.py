@@ -7,18 +7,14 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
-from lostmotion.portable import fmu as exporting
-from lostmotion.portable.parameters import Parameters
 from test_examples import example
-from test_fmu import pytestmark
+from test_fmu import pytestmark, without_parameters
 
 ca: Any = pytest.importorskip("casadi", reason="CasADi is missing: .venv/bin/pip install --group examples")
 __all__ = ["pytestmark"]
 
 
-@pytest.fixture(autouse=True)
-def without_parameters(monkeypatch: Any) -> None:
-    monkeypatch.setattr(exporting, "parameters_of", lambda *_: Parameters((), {}))
+small_files = pytest.fixture(autouse=True)(without_parameters)
 
 
 class Rates:

@@ -10,9 +10,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
-from lostmotion.portable import fmu as exporting
-from lostmotion.portable.parameters import Parameters
-from test_fmu import pytestmark
+from test_fmu import pytestmark, without_parameters
 
 fmpy: Any = pytest.importorskip("fmpy", reason="FMPy is missing: .venv/bin/pip install --group portable")
 __all__ = ["pytestmark"]
@@ -23,9 +21,7 @@ TOLERANCE = 1e-8
 ACCURACY = 2e-5
 
 
-@pytest.fixture(autouse=True)
-def without_parameters(monkeypatch: Any) -> None:
-    monkeypatch.setattr(exporting, "parameters_of", lambda *_: Parameters((), {}))
+small_files = pytest.fixture(autouse=True)(without_parameters)
 
 
 @pytest.fixture

@@ -10,9 +10,7 @@ from typer.testing import CliRunner
 
 import lostmotion as lm
 from lostmotion.cli import app
-from lostmotion.portable import fmu as exporting
-from lostmotion.portable.parameters import Parameters
-from test_fmu import Slave, pytestmark
+from test_fmu import Slave, pytestmark, without_parameters
 from test_fmu3 import Slave3
 from test_fmu_exchange import Model
 
@@ -21,9 +19,7 @@ fmi2: Any = pytest.importorskip("fmpy.fmi2")
 __all__ = ["pytestmark"]
 
 
-@pytest.fixture(autouse=True)
-def without_parameters(monkeypatch: Any) -> None:
-    monkeypatch.setattr(exporting, "parameters_of", lambda *_: Parameters((), {}))
+small_files = pytest.fixture(autouse=True)(without_parameters)
 
 
 def largest_error(got: Any, exact: Any, variable: str) -> float:

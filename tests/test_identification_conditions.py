@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
-from identification_logs import FRICTION, STIFFNESS, spring_task
+from identification_logs import released, spring_task
 from lostmotion.identification.identify import identify_task
 from lostmotion.reports.identification import identification_report
 
@@ -18,20 +18,15 @@ BEGIN = 0.01  # m
 MASSES = {"light": 95.0, "heavy": 120.0}  # kg, by folder
 
 
-def motion(mass: float) -> np.ndarray:
-    """Of m x'' + b x' + k x = 0, released at rest."""
-    decay = FRICTION / (2.0 * mass)
-    w = np.sqrt(STIFFNESS / mass - decay**2)
-    return np.asarray(BEGIN * np.exp(-decay * TIME) * (np.cos(w * TIME) + decay / w * np.sin(w * TIME)))
-
-
 @pytest.fixture
 def folders(tmp_path: Path) -> Path:
     """Two logs in each of two folders, the masses of which differ."""
     for folder, mass in MASSES.items():
         (tmp_path / folder).mkdir()
         for name, arm in (("a.csv", 1), ("b.csv", 2)):
-            rows = "\n".join(f"{t!r},{x!r}" for t, x in zip(TIME.tolist(), motion(mass).tolist(), strict=True))
+            rows = "\n".join(
+                f"{t!r},{x!r}" for t, x in zip(TIME.tolist(), released(TIME, BEGIN, mass).tolist(), strict=True)
+            )
             (tmp_path / folder / name).write_text(f"# arm: {arm}\ntime [s],pos [m]\n{rows}\n")
     return tmp_path
 
@@ -72,7 +67,7 @@ def test_a_header_with_the_key_file_counts(folders: Path) -> None:
 def test_the_error_of_a_condition_left_out_is_that_of_the_closed_form(folders: Path) -> None:
     """Without one folder the fit finds the mass of the other, with which the motion is off by what the closed forms differ."""
     result = run(folders, {"leave_out": ["folder", "arm"]})
-    apart = float(np.mean(np.abs(motion(MASSES["light"]) - motion(MASSES["heavy"]))))
+    apart = float(np.mean(np.abs(released(TIME, BEGIN, MASSES["light"]) - released(TIME, BEGIN, MASSES["heavy"]))))
     found = {c.name: c for c in result.conditions}
     assert list(found) == ["folder = heavy", "folder = light", "arm = 1", "arm = 2"]
     for name in ("folder = heavy", "folder = light"):

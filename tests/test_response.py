@@ -118,7 +118,9 @@ def test_linearisation_holds_where_the_input_sticks():
 
 
 def test_without_an_operating_point_only_a_drive_of_one_regime_is_linearized():
-    with pytest.raises(lm.InputError, match=r"\(dry friction, a loss map, hysteresis, a torsion curve of .*give one"):
+    with pytest.raises(
+        lm.InputError, match=r"\(dry contacts: input_contact, twist_contact, a torsion curve of .*give one"
+    ):
         lm.linearize(NONLINEAR)
     with pytest.raises(lm.InputError, match="depends on the operating point"):
         lm.linearize(NONLINEAR, command=0.4)

@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
-from lostmotion.servo.regimes import axis_of, regimes
-from lostmotion.servo.sampled import SampledLoop
+from test_servo import sampled
 
 T, J = 125e-6, 3e-3
 K_P, K_I, K_V, K_VI = 2.0, 300.0, 120.0, 900.0
@@ -37,12 +36,6 @@ def rigid(reference: str, **controller: Any) -> lm.Scenario:
         controllers={"m": axis},
         simulation={"duration": 0.1, "sample_interval": T},
     )
-
-
-def sampled(scenario: lm.Scenario, loop: str, cut: bool) -> SampledLoop:
-    axis = axis_of(scenario)
-    (regime,) = regimes(axis)
-    return SampledLoop(axis, regime, loop, cut)
 
 
 def tustin(numerator: list[float], denominator: list[float], frequency: float) -> Curve:
