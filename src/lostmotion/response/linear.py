@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +15,6 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Number, Time, Torque, argument, arguments
 from ..inputs.validation import did_you_mean, shown
 from ..model.drive import Drive
-from ..model.losses import ConstantEfficiency
 from ..model.signals import core_signal
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
@@ -228,30 +228,15 @@ def linearize(
     drive = drive_of(drive)
     if not isinstance(state, Initial | None):
         raise InputError("state: is that of a train; give an Initial")
-    if state is None:
-        _need_one_regime(
-            _why_several_regimes(drive), "Initial(motor_speed=100, load_speed=1, twist=2e-3) [SI], or Initial()"
-        )
-        state = Initial()
     ramps = [_ramp(command, rates["command_rate"]), _ramp(load_torque, rates["load_torque_rate"])]
-    core = drive.core()
-    start, of_train = start_values(drive.named_train(), state.of_train()), state.of_train()
-    capacities = dict(of_train.hysteresis_capacities)
-    case = _core.Case(core, inputs=ramps, start=start, hysteresis_capacities=capacities)
-    return _model(drive.train(), core, _core.linearize_at(case, 0.0))
+    such_as = "Initial(motor_speed=100, load_speed=1, twist=2e-3) [SI], or Initial()"
+    train, at = drive.named_train(), None if state is None else state.of_train()
+    return _model_at(train, drive.core(), ramps, at, partial(start_values, train), such_as)
 
 
 def _refuse(given: dict[str, bool], why: str) -> None:
     if names := [name for name, is_given in given.items() if is_given]:
         raise InputError(f"{', '.join(names)}: {why}; leave {'it' if len(names) == 1 else 'them'} out")
-
-
-def _need_one_regime(regimes: str, such_as: str) -> None:
-    if regimes:
-        raise InputError(
-            f"linearize: the linear model of this drive depends on the operating point ({regimes}); give one, such as "
-            f"{such_as} for the drive at rest"
-        )
 
 
 def _ramp(value: float, rate: float) -> _core.Signal:
@@ -290,9 +275,6 @@ def _model_of_train(
         core = what.core(sampled=False)
     if not isinstance(state, TrainInitial | None):
         raise InputError("state: is that of a drive; give a TrainInitial")
-    if state is None:
-        _need_one_regime(_why_several_regimes_of(train, core), "TrainInitial()")
-        state = TrainInitial()
     names = core.input_names()
     for which, values in (("inputs", inputs), ("input_rates", rates)):
         for name in values:
@@ -307,9 +289,27 @@ def _model_of_train(
         )
         for name in names
     ]
-    start = start_values(train, state) if what is train else what.start(state)
+    start = partial(start_values, train) if what is train else what.start
+    return _model_at(train, core, ramps, state, start, "TrainInitial()")
+
+
+def _model_at(
+    train: DriveTrain,
+    core: _core.Train,
+    ramps: list[_core.Signal],
+    state: TrainInitial | None,
+    start: Callable[[TrainInitial], dict[str, float]],
+    such_as: str,
+) -> LinearModel:
+    """The linear model at a state; without one it must be the same at all states."""
+    if state is None and (regimes := _why_several_regimes(train, core)):
+        raise InputError(
+            f"linearize: the linear model of this drive depends on the operating point ({regimes}); give one, such as "
+            f"{such_as} for the drive at rest"
+        )
+    state = state or TrainInitial()
     capacities = dict(state.hysteresis_capacities)
-    case = _core.Case(core, inputs=ramps, start=start, hysteresis_capacities=capacities)
+    case = _core.Case(core, inputs=ramps, start=start(state), hysteresis_capacities=capacities)
     return _model(train, core, _core.linearize_at(case, 0.0))
 
 
@@ -385,21 +385,7 @@ def train_model(
     )
 
 
-def _why_several_regimes(drive: Drive) -> str:
-    """Reason for more than one regime of a drive; empty if it has one."""
-    m, g = drive.motor, drive.gearbox
-    reasons = {
-        "dry friction": m.friction_torque > 0.0 or drive.load.friction_torque > 0.0,
-        "a loss map": not isinstance(g.losses, ConstantEfficiency),
-        "hysteresis": g.hysteresis is not None and g.hysteresis.efficiency < 1.0,
-        "a torsion curve of several pieces": not isinstance(g.stiffness, Rigid) and not g.stiffness.is_linear,
-        "a voltage limit": m.command_limit is not None,
-        "a mesh stiffness over the angle": g.mesh_stiffness is not None,
-    }
-    return ", ".join(reason for reason, holds in reasons.items() if holds)
-
-
-def _why_several_regimes_of(train: DriveTrain, core: _core.Train) -> str:
+def _why_several_regimes(train: DriveTrain, core: _core.Train) -> str:
     """Reason for more than one regime of a train; empty if it has one."""
     gears, motors, shafts = train.gears.values(), train.motors.values(), train.shafts.values()
     rigid = {f"{train.twist_of(name)}_contact" for name, g in train.gears.items() if isinstance(g.stiffness, Rigid)}
