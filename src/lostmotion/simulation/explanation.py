@@ -212,7 +212,7 @@ def explain(what: Scenario | Simulation, time: Time | None = None) -> Explanatio
     if not 0.0 <= time <= what.simulation.duration:
         raise InputError(f"time {time} s must lie between 0 and the duration, {what.simulation.duration} s")
     need_open_loop(what, "explain")
-    return _explanation(what.train(), what.core(), time, **_core.explain_at(core_case(what), time))
+    return _explanation(what.named_train(), what.core(), time, **_core.explain_at(core_case(what), time))
 
 
 def smallest_commands(drive: Drive, load_torque: float = 0.0) -> tuple[float, float]:
@@ -249,7 +249,7 @@ def _explanation(
         motor = train.motors[name]
         limits = (motor.command_limit, None if motor.torque_limit is None else motor.torque_limit / motor.rated_torque)
         limit = min(limit for limit in (*limits, math.inf) if limit is not None)
-        command = named["command" if core.short_form else f"{name}_command"]
+        command = named[train.command_of(name)]
         torque = named[train.motor_torque_of(name)]
         turned.append(MotorState(name, command, torque, forward, backward, limit, train.is_slide(motor.shaft)))
     locking = tuple(_verdicts(train, named, short=core.short_form))

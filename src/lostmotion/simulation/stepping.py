@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import itertools
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from copy import deepcopy
 from typing import Any, Self
 
@@ -215,8 +216,8 @@ class Simulation(SimulationAnswers):
         if self._scenario is not None:
             self._core.reset(self._scenario.start(start), self._scenario.capacities(start))
         else:
-            train = self._drive.named_train() if isinstance(self._drive, Drive) else self._drive
-            self._core.reset(start_values(train, start, self._core_train), dict(start.hysteresis_capacities))
+            values = start_values(self._train, start, self._core_train)
+            self._core.reset(values, dict(start.hysteresis_capacities))
         self._begin_motions(start)
         self._initial = start
         if self._bound is not None:
@@ -260,9 +261,7 @@ class Simulation(SimulationAnswers):
         return {**self._controllers, **(self._scenario.continuous() if self._scenario is not None else {})}
 
     def _controlled(self) -> set[str]:
-        if self._short:
-            return {"command"} if self._controllers else set()
-        return {f"{motor}_command" for motor in self._controllers}
+        return {self._train.command_of(motor) for motor in self._controllers}
 
     @property
     def time(self) -> float:
@@ -308,12 +307,12 @@ class Simulation(SimulationAnswers):
             The motion has no continuation; the message names the contact. The state stays as it was.
         """
         begin, end = self._begin_and_end(command, load_torque, inputs)
-        if mass_matrix is not None:
-            self._step_with_masses(interval, begin, end, motion, mass_matrix)
-        elif motion or self._motions:
+        if mass_matrix is None:
             self._step_with_motions(interval, begin, end, motion or {})
-        else:
-            self._step(interval, begin, end)
+            return
+        with self._turn, self._unless_refused():
+            self._change_masses(masses_given(self._masses, mass_matrix))
+            self._step_with_motions(interval, begin, end, motion or {})
 
     def _begin_and_end(
         self, command: Ramp, load_torque: Ramp, inputs: dict[str, Ramp]
@@ -336,22 +335,21 @@ class Simulation(SimulationAnswers):
             raise InputError(f"{', '.join(sorted(missing))}: missing; all commands and references are to be given")
         return begin, end
 
-    def _step_with_masses(self, interval: Any, begin: list[float], end: list[float], motion: Any, given: Any) -> None:
-        """With other mass matrices from the beginning of the interval on."""
-        with self._turn:
-            before = self.state
-            try:
-                self._change_masses(masses_given(self._masses, given))
-                if motion or self._motions:
-                    self._step_with_motions(interval, begin, end, motion or {})
-                else:
-                    self._step(interval, begin, end)
-            except (InputError, _core.SolverError):
-                self.state = before
-                raise
+    @contextmanager
+    def _unless_refused(self) -> Iterator[None]:
+        """What is refused leaves the state as it was."""
+        before = self.state
+        try:
+            yield
+        except (InputError, _core.SolverError):
+            self.state = before
+            raise
 
     def _step_with_motions(self, interval: Any, begin: list[float], end: list[float], motion: Any) -> None:
-        """In parts, in each of which all accelerations are straight lines."""
+        """In parts, in each of which all accelerations are straight lines; in one part if no motion is given."""
+        if not motion and not self._motions:
+            self._step(interval, begin, end)
+            return
         h = argument("interval", interval, "s")
         if not MIN_INTERVAL <= h <= MAX_INTERVAL:
             raise no_interval(self.time, h)
@@ -367,8 +365,7 @@ class Simulation(SimulationAnswers):
             name: motion_given(name, values, SLIDE_UNITS if self._train.is_slide(name) else UNITS)
             for name, values in motion.items()
         }
-        with self._turn:
-            before = self.state
+        with self._turn, self._unless_refused():
             values = self._idle().read()
             courses = {}
             for name, given in wanted.items():
@@ -385,19 +382,15 @@ class Simulation(SimulationAnswers):
                     interval=h,
                 )
             times = sorted({t for course in courses.values() for t in course.times()})
-            try:
-                for t0, t1 in itertools.pairwise(times):
-                    rows = []
-                    for t in (t0, t1):
-                        row = [a + (b - a) * (t / h) for a, b in zip(begin, end, strict=True)]
-                        for name, course in courses.items():
-                            speed, acceleration = self._motions[name]
-                            row[speed], row[acceleration] = course.speed(t), course.acceleration(t)
-                        rows.append(row)
-                    self._step(t1 - t0, rows[0], rows[1])
-            except (InputError, _core.SolverError):
-                self.state = before
-                raise
+            for t0, t1 in itertools.pairwise(times):
+                rows = []
+                for t in (t0, t1):
+                    row = [a + (b - a) * (t / h) for a, b in zip(begin, end, strict=True)]
+                    for name, course in courses.items():
+                        speed, acceleration = self._motions[name]
+                        row[speed], row[acceleration] = course.speed(t), course.acceleration(t)
+                    rows.append(row)
+                self._step(t1 - t0, rows[0], rows[1])
 
     def _of_drive(self, command: Ramp, load_torque: Ramp, others: dict[str, Ramp]) -> dict[str, Ramp]:
         """The inputs of a drive by name."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from .. import _core
-from ..errors import InputError
+from ..errors import InputError, prefixed
 from ..inputs.quantities import argument
 from ..inputs.validation import did_you_mean, shown
 from ..model.drive import Drive
@@ -27,8 +27,8 @@ MIN_INTERVAL, MAX_INTERVAL = 1e-12, 1e12
 def parts(
     what: Drive | Scenario | DriveTrain, loaded: Sequence[str] | None, given: Sequence[str] | None
 ) -> tuple[Drive | DriveTrain, DriveTrain, _core.Train, tuple[str, ...], tuple[str, ...], TrainInitial]:
-    """Parts of a simulation: its subject, the same as a train, the solver's train, the loadable shafts, the shafts
-    with given motion, and the start."""
+    """Parts of a simulation: its subject, the same as a train with the names of its variables, the solver's train, the
+    loadable shafts, the shafts with given motion, and the start."""
     if isinstance(what, DriveTrain) or (isinstance(what, Scenario) and not what.is_drive):
         train, shafts, moved = given_train(what, loaded, given)
         if isinstance(what, DriveTrain):
@@ -39,7 +39,7 @@ def parts(
     if given is not None:
         raise InputError("given: is for trains; give drive.train() for a drive whose motor or load has a given motion")
     start = what.begin() if isinstance(what, Scenario) else TrainInitial()
-    return drive_of(what), what.train(), what.core(), (), (), start
+    return drive_of(what), what.named_train(), what.core(), (), (), start
 
 
 def masses_given(masses: Mapping[str, MassMatrix], given: Any) -> dict[str, MassMatrix]:
@@ -51,10 +51,8 @@ def masses_given(masses: Mapping[str, MassMatrix], given: Any) -> dict[str, Mass
         if name not in masses:
             known = f"the mass matrices are {', '.join(masses) or 'none'}"
             raise InputError(f"mass_matrix.{shown(name)}: is none of this train; {did_you_mean(name, masses, known)}")
-        try:
+        with prefixed(f"mass_matrix.{name}"):
             found[name] = MassMatrix(shafts=masses[name].shafts, matrix=matrix)
-        except InputError as problem:
-            raise InputError(f"mass_matrix.{name}: {problem}") from None
     return found
 
 
