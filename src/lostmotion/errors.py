@@ -122,6 +122,21 @@ def inside(table: str) -> Iterator[None]:
         raise error.inside(table) from None
 
 
+@contextmanager
+def prefixed(where: object) -> Iterator[None]:
+    """Errors within begin with a file, log or function, or the key of a table of it.
+
+    Raises
+    ------
+    InputError
+    """
+    try:
+        yield
+    except InputError as error:
+        whole = f"{where}: {error.where}" if error.where else str(where)
+        raise InputError(where=whole, problems=error.problems, more=error.more) from None
+
+
 class ArgumentError(InputError, TypeError):
     """A call with an argument that the function does not have, or without one that it needs."""
 

@@ -134,7 +134,7 @@ def _known(
     loaded: Mapping[str, Scenario], files: Mapping[str, str], source: str | None, variable: str | None
 ) -> tuple[str, str]:
     """The unit of the input, and the name of the variable, which all of the scenarios must have."""
-    from ..errors import InputError
+    from ..errors import prefixed
     from ..response.plant import plant_or_loop
 
     units: list[str] = []
@@ -142,12 +142,8 @@ def _known(
     for title, scenario in loaded.items():
         with about(files[title]):
             plant = plant_or_loop(scenario)
-        try:
+        with prefixed(f"--input{f' {source}' if source else ''}"):
             units.append(plant.unit(plant.known_source(source)))
-        except InputError as error:
-            raise InputError(f"--input{f' {source}' if source else ''}: {error}") from None
-        try:
+        with prefixed(f"--variable {variable or ''.join(variables[:1])}"):
             variables.append(plant.known_output(variables[0] if variables else variable))
-        except InputError as error:
-            raise InputError(f"--variable {variable or variables[0]}: {error}") from None
     return "" if units[0] == "1" else units[0], variables[0]

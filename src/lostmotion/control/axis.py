@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import Any
 
 from .. import _core
-from ..errors import InputError
+from ..errors import InputError, inside
 from ..inputs.described import Described, ReferenceBlocks
 from ..inputs.validation import did_you_mean, shown
 from ..model.motor import Motor, MotorLaw
@@ -130,10 +130,8 @@ class _Place:
         if encoder is None:
             return None
         shaft = self.encoder_shaft(key)
-        try:
+        with inside(key):
             encoder.check_shaft(slides=self.train.is_slide(shaft))
-        except InputError as problem:
-            raise problem.inside(key) from None
         scale = self.ratio(target, shaft, f"{key}.shaft")
         return {**encoder.core_fields(), "scale": scale, "delay": encoder.delay * samples}
 
@@ -244,14 +242,12 @@ def core_control(
     axes = []
     for name, controller in controllers.items():
         place = _Place(train, name, controller)
-        try:
+        with inside(key.format(name).removesuffix(".")):
             samples = whole_multiple(controller.sample_time, base, "sample_time")
             axis = place.axis(samples)
             if name in laws:
                 laws[name].set(axis)
             axes.append(axis)
-        except InputError as problem:
-            raise problem.inside(key.format(name).removesuffix(".")) from None
     return base, axes
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from .. import _core
-from ..errors import InputError, need
+from ..errors import InputError, inside, need
 from ..inputs import described
 from ..inputs.arguments import checked
 from ..inputs.quantities import (
@@ -320,10 +320,8 @@ class ContinuousController(described.ContinuousControllerFields):
     @staticmethod
     def _curve(firmware: Firmware, motor: Motor) -> tuple[_core.TorsionCurve, float]:
         """Command of the motor over the error, and its fall with the speed of the motor [s/rad]."""
-        try:
+        with inside("firmware"):
             errors, torques, droop = firmware.curve()
-        except InputError as problem:
-            raise problem.inside("firmware") from None
         commands = [torque / motor.rated_torque for torque in torques]
         points = zip(itertools.pairwise(errors), itertools.pairwise(commands), strict=True)
         slopes = [(d - c) / (b - a) for (a, b), (c, d) in points]

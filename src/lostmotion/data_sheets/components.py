@@ -7,7 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from ..errors import InputError
+from ..errors import InputError, prefixed
 from ..inputs.arguments import RecordName, checked
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, Inertia, NotNegative, Number, Positive, Temperature, argument
@@ -249,10 +249,8 @@ def motor(name: RecordName, *, voltage_limit: float | None = None) -> Motor:
     'dc'
     """
     table = motor_table(name, {} if voltage_limit is None else {"voltage_limit": voltage_limit})
-    try:
+    with prefixed(f"motor {name}"):
         return Motor(**table)
-    except InputError as error:
-        raise InputError(f"motor {name}: {error}") from None
 
 
 @checked

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any
 
-from ..errors import InputError
+from ..errors import InputError, inside
 from ..inputs.part import Part
 from ..inputs.quantities import Force, Positive
 from ..inputs.validation import shortened, shown, unknown_key
@@ -92,7 +92,7 @@ def _at_preload(record: ScrewSheet, preload: Any, values: Mapping[str, Any], whe
     """
     from ..model.linear import RatedScrew
 
-    try:
+    with inside(where):
         force = ScrewConditions(nut_preload=preload).nut_preload
         assert force is not None
         if record.nut_preload is None or record.nut_stiffness is None:
@@ -108,6 +108,4 @@ def _at_preload(record: ScrewSheet, preload: Any, values: Mapping[str, Any], whe
         screw = RatedScrew(**values)
         if not record.drag_torque and (both := screw.efficiencies()) is not None:
             found["drag_torque"] = (1.0 / both[0] - both[1]) * force / screw.ratio()
-    except InputError as error:
-        raise error.inside(where) from None
     return found

@@ -9,7 +9,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from ..errors import InputError
+from ..errors import InputError, prefixed
 from ..inputs.arguments import checked
 from ..inputs.toml_files import is_in_file, read_toml
 from ..inputs.validation import names_like, shown, unknown_key
@@ -149,10 +149,8 @@ def _entries(data: dict[str, Any], where: str) -> Iterator[Entry]:
 
 
 def _made(kind: Kind, fields: Mapping[str, Any], which: str) -> Sheet:
-    try:
+    with prefixed(which):
         return kind(**fields)
-    except InputError as error:
-        raise InputError(f"{which}: {error}") from None
 
 
 def _tables(data: Mapping[str, Any], key: str, where: str) -> list[Mapping[str, Any]]:

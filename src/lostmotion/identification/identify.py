@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, prefixed
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count
 from ..simulation.scenario import Scenario
@@ -286,12 +286,10 @@ def identify(
     (6, True)
     """
     task, directory = load_identification(source)
-    try:
+    with prefixed(source):
         return identify_task(
             task, directory, threads=threads, profiles=profiles, notify=progress or _no_notice, resume=resume
         )
-    except InputError as error:
-        raise InputError(f"{source}: {error}") from None
 
 
 def identify_task(

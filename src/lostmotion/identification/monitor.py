@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, prefixed
 from ..inputs.arguments import checked
 from .changes import Change, find_change
 from .engine import Engine, Point
@@ -201,12 +201,10 @@ def monitor(
     if logs:
         files = tuple(str(Path(log).absolute()) for log in logs)
         task = task.model_copy(update={"logs": task.logs.model_copy(update={"files": files})})
-    try:
+    with prefixed(source):
         rig = Rig(task, directory)
         prepared, left_out = gathered(rig, directory)
         result = monitor_logs(rig, prepared, notify=progress)
-    except InputError as error:
-        raise InputError(f"{source}: {error}") from None
     result.left_out = {**left_out, **result.left_out}
     return result
 

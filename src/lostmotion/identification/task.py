@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from ..errors import InputError
+from ..errors import prefixed
 from ..inputs.arguments import checked
 from ..inputs.named import Elements, nothing
 from ..inputs.part import Part
@@ -315,7 +315,5 @@ def load_identification(path: str | Path) -> tuple[Identification, Path]:
     """
     path = Path(path)
     data = read_toml(path, "an identification")
-    try:
+    with prefixed(path):
         return Identification(**data), path.parent
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from .. import _core
-from ..errors import InputError
+from ..errors import InputError, prefixed
 from ..inputs.arguments import checked
 from ..inputs.quantities import Speed, Torque
 from ..inputs.validation import did_you_mean
@@ -242,10 +242,8 @@ def self_locking(
         )
     core = train.core(())
     part = train.gears[gear]
-    try:
+    with prefixed(f"key gears.{gear}"):
         at = _overrunning(core, list(train.gears).index(gear), part, load_torque, input_speed)
-    except InputError as error:
-        raise InputError(f"key gears.{gear}: {error}") from None
     speeds = _speeds(train, part, -at.input_speed)
     path = _path(train, part)
     torques = _torques(train, gear, path, at)

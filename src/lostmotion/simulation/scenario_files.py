@@ -11,7 +11,7 @@ from typing import Any
 from ..data_sheets.components import accessories_in, gearbox_table, record_in
 from ..data_sheets.linear_components import linear_table
 from ..data_sheets.train_components import RECORDS, without_record
-from ..errors import InputError
+from ..errors import InputError, prefixed
 from ..inputs.schema import follow, unit_in_schema
 from ..inputs.toml_files import RESULTS, no_such_file, read_toml
 from ..inputs.toml_text import toml_text, without_empty
@@ -59,12 +59,10 @@ def find_base(base: str, path: Path) -> Path:
     InputError
         There is none.
     """
-    try:
+    with prefixed(f"{path}: key base"):
         found = find_scenario(base, path.parent)
         if not os.path.lexists(found):
             raise no_such_file(found)
-    except InputError as error:
-        raise InputError(f"{path}: key base: {error}") from None
     return found
 
 
@@ -96,10 +94,8 @@ def changed(tables: dict[str, Any], path: Path) -> Scenario:
     InputError
         With one line that names the file, the key, the value and the remedy.
     """
-    try:
+    with prefixed(path):
         return Scenario(**tables)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
 
 
 def read_tables(path: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> dict[str, Any]:
@@ -126,10 +122,8 @@ def override(data: dict[str, Any], overrides: Mapping[str, Any] | Iterable[str],
     if not isinstance(overrides, Iterable) or not all(isinstance(entry, str) for entry in overrides):
         raise InputError(f'{shown(overrides)} must be changes by key, such as {{"command.amplitude": 0.1}}')
     items = overrides.items() if isinstance(overrides, Mapping) else [parse_override(text) for text in overrides]
-    try:
+    with prefixed(path):
         set_values(data, items)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
 
 
 def _read(path: Path, including: tuple[Path, ...]) -> dict[str, Any]:
@@ -152,10 +146,8 @@ def _read(path: Path, including: tuple[Path, ...]) -> dict[str, Any]:
             f"`lostmotion run {base} --set KEY=VALUE`"
         )
     based = _read(find_base(base, path), (*including, real))
-    try:
+    with prefixed(path):
         _change_voltages(based, data)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
     _change_what_turns(based, data)
     return _merge(based, data)
 
@@ -237,10 +229,8 @@ def read_series_files(
             raise InputError(f"{problem}: {shown(name)} must be the name of a CSV file with columns time [s] and value")
         if len(units) > 1:
             raise InputError(f"{problem}: {shown(name)} may hold {' or '.join(units)}; give {'.'.join(keys)}.kind too")
-        try:
+        with prefixed(problem):
             value["times"], value["values"] = read_series(path.parent / name, units[0])
-        except InputError as error:
-            raise InputError(f"{problem}: {error}") from None
 
 
 @cache
@@ -283,10 +273,8 @@ def gearbox_from_record(reference: str, overrides: Iterable[str] = ()) -> tuple[
     changes: dict[str, Any] = {}
     set_values(changes, ((key.removeprefix("gearbox."), value) for key, value in map(parse_override, overrides)))
     values, built = gearbox_table(reference, changes)
-    try:
+    with prefixed(f"gearbox {reference}"):
         return Gearbox(**values), built.notes if built else ()
-    except InputError as error:
-        raise InputError(f"gearbox {reference}: {error}") from None
 
 
 def screw_from_record(reference: str, overrides: Iterable[str] = ()) -> ScrewData:
@@ -299,7 +287,5 @@ def screw_from_record(reference: str, overrides: Iterable[str] = ()) -> ScrewDat
     changes: dict[str, Any] = {}
     set_values(changes, ((key.removeprefix("screw."), value) for key, value in map(parse_override, overrides)))
     values = linear_table("screw", reference, changes, "screw")
-    try:
+    with prefixed(f"screw {reference}"):
         return RatedScrew(**values)
-    except InputError as error:
-        raise InputError(f"screw {reference}: {error}") from None

@@ -14,7 +14,7 @@ from ..control.continuous import ContinuousController
 from ..control.controller import AnyController, Controller
 from ..control.references import MovesReference  # noqa: F401
 from ..data_sheets.train_components import CONDITIONS, RECORDS
-from ..errors import InputError
+from ..errors import InputError, inside
 from ..inputs import described
 from ..inputs.kept import kept
 from ..inputs.named import Elements, Named, nothing
@@ -263,10 +263,8 @@ def core_train(
     core = train.core(loaded, dict(laws), given)
     core.short_form = short
     for name, controller in continuous:
-        try:
+        with inside(f"controllers.{name}"):
             controller.add_to(core, train, name)
-        except InputError as problem:
-            raise problem.inside(f"controllers.{name}") from None
     return core
 
 

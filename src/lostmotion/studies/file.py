@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any, cast
 
-from ..errors import InputError
+from ..errors import InputError, prefixed
 from ..inputs.arguments import checked
 from ..inputs.toml_files import read_toml
 from ..simulation.axis_form import is_axis, long_form
@@ -55,12 +55,10 @@ def load_study(path: str | Path) -> Study:
     scenario = load(where, changes)
     written = {} if where.suffix in FORMATS else read_tables(where, changes)  # a result has all values written out
     written = long_form(written) if is_axis(written) else written
-    try:
+    with prefixed(path):
         for entry in data.get("vary", []) if isinstance(data.get("vary"), list) else []:
             find_sheets(entry, path.parent)
         return Study(scenario=cast("Any", scenario), written=written, **data)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
 
 
 def find_sheets(entry: Any, directory: Path) -> None:
