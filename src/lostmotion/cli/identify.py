@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .arguments import FiguresOption
-from .targets import need_directory, try_directory, writing
+from .targets import pictures_of, writing
 from .terminal import busy, fail
 
 if TYPE_CHECKING:
@@ -70,12 +70,7 @@ def identify(
     for option, value in (("DIR", directory), ("--rig", rig)):
         if value is not None:
             raise typer.BadParameter(f"{option} goes with `identify new`")
-    from ..reports.pictures import endings
-
-    pictures = endings(figures)
-    need_directory(figures, output)
-    if output is not None:
-        try_directory(output)
+    pictures = pictures_of(figures, output)
     from ..identification.identify import identify as run
 
     kept = None if output is None else output / PROGRESS

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .arguments import FiguresOption, ReportOption
-from .targets import need_directory, try_directory, writing
+from .targets import pictures_of, writing
 from .terminal import busy
 
 
@@ -34,12 +34,7 @@ def monitor(
     lostmotion monitor joint.toml logs/2026-*.csv -o joint-7
     lostmotion monitor examples/cycloidal/baseline.toml -o monitored
     """
-    from ..reports.pictures import endings
-
-    pictures = endings(figures)
-    need_directory(figures, output)
-    if output is not None:
-        try_directory(output)
+    pictures = pictures_of(figures, output)
     from ..identification.monitor import monitor as run
 
     with busy("Monitoring") as tell:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .arguments import FiguresOption, ReportOption
-from .targets import need_directory, try_directory, writing
+from .targets import pictures_of, writing
 from .terminal import progress
 
 
@@ -22,14 +22,11 @@ def reproduce(
     lostmotion reproduce -o out
     """
     from ..errors import need
-    from ..reports.pictures import endings
 
-    pictures = endings(figures)
-    need_directory(figures, output)
+    pictures = pictures_of(figures, output)
     if output is None:
         _print_results()
         return
-    try_directory(output)
     need("jinja2", "The report", "report")
     from ..paper.reproduce import WORK
     from ..paper.reproduce import reproduce as work

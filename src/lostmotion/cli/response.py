@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .arguments import FiguresOption, Overrides, ReportOption, SourceArgument, number
-from .targets import need_directory, try_directory, writing
+from .targets import pictures_of, writing
 from .terminal import about, busy, progress
 
 if TYPE_CHECKING:
@@ -72,11 +72,9 @@ def response(
     lostmotion response paper-2dof-nl-small --amplitudes 0.025,1 --frequencies 1..30:12 -o bode
     lostmotion response drive.toml --compare linear.toml --refine 0.5 -o bode
     """
-    from ..reports.pictures import endings
     from ..simulation.sources import load
 
-    pictures = endings(figures)
-    need_directory(figures, output)
+    pictures = pictures_of(figures, output)
     files = _titles(scenario, compare or ())
     name = next(iter(files))
     loaded = {title: load(file, (overrides or ()) if title == name else ()) for title, file in files.items()}
@@ -86,8 +84,6 @@ def response(
 
     wanted = parse_grid(amplitudes, "amplitudes", unit)
     grid = parse_grid(frequencies, "frequencies", "Hz")
-    if output is not None:
-        try_directory(output)
     responses = {}
     with progress(len(loaded) * len(wanted) * len(grid), "Response") as step:
         for title, s in loaded.items():

@@ -10,7 +10,7 @@ import typer
 
 from ..errors import InputError
 from .arguments import FiguresOption, ReportOption, complete_on_rig
-from .targets import need_directory, try_directory, writing
+from .targets import pictures_of, try_directory, writing
 from .terminal import busy, progress
 
 if TYPE_CHECKING:
@@ -65,14 +65,12 @@ def rig(
     """
     from ..data_sheets.linear_sheets import ScrewSheet
     from ..data_sheets.records import find_one_of
-    from ..reports.pictures import endings
 
-    pictures = endings(figures)
+    pictures = pictures_of(figures, output)
     if ripple is not None and logs is None:
         raise InputError("--ripple: is for the logs of a campaign; give --logs DIR, too")
-    need_directory(figures, output)
-    if (directory := output if logs is None else logs) is not None:
-        try_directory(directory)
+    if logs is not None:
+        try_directory(logs)
     sheet = find_one_of(name, ("gearbox", "screw"))
     if isinstance(sheet, ScrewSheet) and logs is not None:
         raise InputError(f"--logs: {sheet.name} is a screw, and logs are written of gearboxes; leave --logs out")

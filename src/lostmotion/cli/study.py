@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .arguments import FiguresOption, count
-from .targets import need_directory, try_directory, writing
+from .targets import pictures_of, try_directory, writing
 from .terminal import busy, fail, progress
 from .workers import workers
 
@@ -125,13 +125,9 @@ def compute(
 
 
 def _show(directory: Path, best: str | None, output: Path | None, figures: str | None) -> None:
-    from ..reports.pictures import endings
     from ..reports.study import best_lines, summary_lines, write_study
 
-    pictures = endings(figures)
-    need_directory(figures, output)
-    if output is not None:
-        try_directory(output)
+    pictures = pictures_of(figures, output)
     found = best_lines(directory, best) if best is not None else []
     print("\n".join([*summary_lines(directory), *found]))
     if output is None:

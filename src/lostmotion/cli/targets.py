@@ -75,7 +75,19 @@ def writing(directory: Path, then: str = "") -> Iterator[None]:
         raise InputError(f"{directory}: cannot be written: {error.strerror}{then}") from None
 
 
-def need_directory(figures: str | None, output: Path | None) -> None:
-    """Refuse pictures of a report that is not written."""
+def pictures_of(figures: str | None, output: Path | None) -> tuple[str, ...]:
+    """Endings of the pictures that are asked for beside a report, whose directory is tried.
+
+    Raises
+    ------
+    InputError
+        The directory cannot be written to, there is none, or an ending is unknown.
+    """
+    from ..reports.pictures import endings
+
+    pictures = endings(figures)
     if figures is not None and output is None:
         raise InputError(f"--figures {figures}: needs the directory of the report; add -o DIR")
+    if output is not None:
+        try_directory(output)
+    return pictures

@@ -140,6 +140,18 @@ REFRESH = 0.2  # [s]
 
 
 @contextmanager
+def _beside(watch: Callable[[], None], done: threading.Event) -> Iterator[None]:
+    """Run a function in another thread, which ends when it is done."""
+    beside = threading.Thread(target=watch, daemon=True)
+    beside.start()
+    try:
+        yield
+    finally:
+        done.set()
+        beside.join()
+
+
+@contextmanager
 def busy(what: str) -> Iterator[Callable[[str], None]]:
     """Show the present activity and its start on stderr, for work of unknown length; without a terminal, print a line now and then.
 
@@ -167,13 +179,8 @@ def busy(what: str) -> Iterator[Callable[[str], None]]:
             show()
 
     done = threading.Event()
-    shown = threading.Thread(target=wait, daemon=True)
-    shown.start()
-    try:
+    with _beside(wait, done):
         yield tell
-    finally:
-        done.set()
-        shown.join()
 
 
 @contextmanager
@@ -204,13 +211,8 @@ def simulating(what: str, scenario: Any, tolerance: float = 0.0) -> Iterator[Cal
                 if long or passed > LONG:
                     say(_progress(passed, expected.seconds))
 
-        watching = threading.Thread(target=watch, daemon=True)
-        watching.start()
-        try:
+        with _beside(watch, done):
             yield tell
-        finally:
-            done.set()
-            watching.join()
 
 
 def _progress(passed: float, expected: float) -> str:

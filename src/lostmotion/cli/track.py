@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .arguments import FiguresOption, Overrides, ReportOption, SourceArgument, number
-from .targets import need_directory, try_directory, writing
+from .targets import pictures_of, writing
 from .terminal import about, busy, console, progress
 
 if TYPE_CHECKING:
@@ -49,14 +49,10 @@ def track(
     lostmotion track axes.toml --view "traverse=6.65 deg" --view "elevation=5.27 deg" -o track
     """
     from ..errors import InputError
-    from ..reports.pictures import endings
     from ..simulation.sources import load
 
-    pictures = endings(figures)
+    pictures = pictures_of(figures, output)
     loaded = load(scenario, overrides or ())
-    need_directory(figures, output)
-    if output is not None:
-        try_directory(output)
     from ..pointing.budget import pointing_budget, runs_of
 
     angles = {}
