@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -156,34 +156,35 @@ def hunting_certificate(scenario: Scenario, *, largest_error: float | str | None
     except UndecidableError as why:
         return _without_map("not decided", str(why))
     except AtRestError as why:
-        if _comes_to_rest(loop):
-            return _without_map("does not hunt", str(why))
-        return _without_map("not decided", f"{why}, but the run of the scenario is not seen to come to rest")
+        return _at_rest(why, rests=_comes_to_rest(loop))
     largest = largest_error or _travel(train)
     proof = prove(of, largest)
     reached, fades = _reached(loop, of, proof)
+    points = _map(of, proof, largest)
+    found = _with_proof(proof, of.contact, reached, is_reached=fades or abs(reached) <= proof.largest)
+    fixed = tuple(_fixed_points(of, points)) if of.excess > 0.0 else ()
+    return replace(found, map=_dataset(of, points, found.verdict, train), fixed_points=fixed)
+
+
+def _with_proof(proof: Proof, contact: str, reached: float, *, is_reached: bool) -> HuntingCertificate:
+    """The certificate of a proof, which decides only if the run reaches the errors for which it holds."""
     verdict, reason = proof.verdict, proof.reason
-    if verdict == "does not hunt" and not (fades or abs(reached) <= proof.largest):
+    if verdict == "does not hunt" and not is_reached:
         verdict = "not decided"
         reason = f"from errors up to {proof.largest:.4g} it does not hunt, but the run of the scenario is not seen to reach them"
-    points = _map(of, proof, largest)
-    return HuntingCertificate(
-        verdict=verdict,
-        reason=reason,
-        contact=of.contact,
-        map=_dataset(of, points, verdict, train),
-        fixed_points=tuple(_fixed_points(of, points)) if of.excess > 0.0 else (),
-        largest_error=proof.largest,
-        band=proof.band,
-        ranges=proof.ranges,
-        factor=proof.factor,
-        reached=reached,
-    )
+    ends = proof.largest, proof.band, proof.ranges, proof.factor, reached
+    return HuntingCertificate(verdict, reason, contact, None, (), *ends)
 
 
 def _without_map(verdict: Certainty, reason: str) -> HuntingCertificate:
     none = math.nan
     return HuntingCertificate(verdict, reason, "", None, (), none, None, (), none, none)
+
+
+def _at_rest(why: AtRestError, *, rests: bool) -> HuntingCertificate:
+    if rests:
+        return _without_map("does not hunt", str(why))
+    return _without_map("not decided", f"{why}, but the run of the scenario is not seen to come to rest")
 
 
 def certified(axis: Axis, rests: Callable[[], bool], largest_error: float | None = None) -> HuntingCertificate:
@@ -214,26 +215,10 @@ def certified(axis: Axis, rests: Callable[[], bool], largest_error: float | None
     except UndecidableError as why:
         return _without_map("not decided", str(why))
     except AtRestError as why:
-        if rests():
-            return _without_map("does not hunt", str(why))
-        return _without_map("not decided", f"{why}, but the run of the scenario is not seen to come to rest")
-    verdict, reason = proof.verdict, proof.reason
-    reached = math.nan if verdict == "not decided" else reached_by_run(axis, of, proof.largest)
-    if verdict == "does not hunt" and not abs(reached) <= proof.largest:
-        verdict = "not decided"
-        reason = f"from errors up to {proof.largest:.4g} it does not hunt, but the run of the scenario is not seen to reach them"
-    return HuntingCertificate(
-        verdict=verdict,
-        reason=reason,
-        contact=of.contact,
-        map=_sampled_map(of, proof, train),
-        fixed_points=(),
-        largest_error=proof.largest,
-        band=proof.band,
-        ranges=proof.ranges,
-        factor=proof.factor,
-        reached=reached,
-    )
+        return _at_rest(why, rests=rests())
+    reached = math.nan if proof.verdict == "not decided" else reached_by_run(axis, of, proof.largest)
+    found = _with_proof(proof, of.contact, reached, is_reached=abs(reached) <= proof.largest)
+    return replace(found, map=_sampled_map(of, proof, train))
 
 
 def _sampled_travel(axis: Axis) -> float:
