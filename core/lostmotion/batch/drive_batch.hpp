@@ -77,7 +77,6 @@ class DriveBatch {
     static std::string error(const model::Train& train);
 
     std::size_t size() const { return drives_.size(); }
-    double step_length() const { return step_; }
     // Advances all drives. Those that cannot go on stay where they were; the first of them is reported.
     Failure step(const Input& command, const Input& load_torque, unsigned threads);
     // To t = 0. which: for each drive whether it is meant; nullptr: all. start: of each drive its states; nullptr:

@@ -1,7 +1,7 @@
 """Data sheets of ball screws, racks, toothed belts and linear motors."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import model_validator
 
@@ -30,6 +30,11 @@ Alternatives = tuple[tuple[tuple[str, ...], ...], ...]
 # Level of a linear motor whose winding is not known.
 FORCE_SOURCE = "force source"
 STIFFNESSES = (("stiffness",), ("stiffness_curve",))
+
+
+def _as_it_is(sheet: Any) -> Any:
+    """In place of the checks of a part, which has to be whole; a sheet need not be."""
+    return sheet
 
 
 class LinearSheet(Record):
@@ -102,13 +107,7 @@ class ScrewSheet(LinearSheet, RatedScrew):
         "nut_stiffness": ("nut_stiffness", "stiffness", "stiffness_curve"),
     }
 
-    @model_validator(mode="after")
-    def _compliance_is_clear(self) -> Self:
-        return self
-
-    @model_validator(mode="after")
-    def _is_a_screw(self) -> Self:
-        return self
+    _compliance_is_clear = _is_a_screw = model_validator(mode="after")(_as_it_is)
 
 
 class RackSheet(LinearSheet, RackData):
@@ -141,13 +140,7 @@ class RackSheet(LinearSheet, RackData):
     CHOICES: ClassVar[dict[str, str]] = {"teeth": "of the pinion"}
     NEEDS: ClassVar[dict[str, tuple[str, ...]]] = {"module": ("module", "travel_per_turn")}
 
-    @model_validator(mode="after")
-    def _compliance_is_clear(self) -> Self:
-        return self
-
-    @model_validator(mode="after")
-    def _is_a_rack(self) -> Self:
-        return self
+    _compliance_is_clear = _is_a_rack = model_validator(mode="after")(_as_it_is)
 
 
 class BeltSheet(LinearSheet, BeltData):
@@ -186,13 +179,7 @@ class BeltSheet(LinearSheet, BeltData):
         "specific_stiffness": ("specific_stiffness", "stiffness", "stiffness_curve"),
     }
 
-    @model_validator(mode="after")
-    def _compliance_is_clear(self) -> Self:
-        return self
-
-    @model_validator(mode="after")
-    def _is_a_belt(self) -> Self:
-        return self
+    _compliance_is_clear = _is_a_belt = model_validator(mode="after")(_as_it_is)
 
 
 class LinearMotorSheet(LinearSheet, LinearMotorData):
@@ -241,6 +228,4 @@ class LinearMotorSheet(LinearSheet, LinearMotorData):
             f"{self.name} runs as a force source, since its winding is not given: voltage and heat are not judged.",
         )
 
-    @model_validator(mode="after")
-    def _is_a_motor(self) -> Self:
-        return self
+    _is_a_motor = model_validator(mode="after")(_as_it_is)

@@ -120,29 +120,10 @@ def frequency_response(
     plant = plant.with_means(mean_command, mean_load_torque)
     if plant.closed is None and law is not None:
         raise InputError("law: the scenario has no controller with law = true; set it, or leave law out")
-    if plant.closed is not None:
-        compute = partial(
-            _of_closed_loop,
-            plant,
-            amplitudes,
-            source,
-            harmonics=harmonics,
-            max_periods=max_periods,
-            law=law,
-            threads=threads or os.cpu_count() or 1,
-            progress=progress,
-        )
-    else:
-        compute = partial(
-            _of_open_loop,
-            plant,
-            amplitudes,
-            source,
-            harmonics=harmonics,
-            max_periods=max_periods,
-            threads=threads,
-            progress=progress,
-        )
+    options: dict[str, Any] = {"harmonics": harmonics, "max_periods": max_periods, "progress": progress}
+    respond: Callable[..., xarray.Dataset] = _of_open_loop if plant.closed is None else _of_closed_loop
+    own = {"threads": threads} if plant.closed is None else {"law": law, "threads": threads or os.cpu_count() or 1}
+    compute = partial(respond, plant, amplitudes, source, **options, **own)
     result = compute(frequencies)
     for _ in range(4 if refine is not None else 0):
         assert refine is not None

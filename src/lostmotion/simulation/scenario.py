@@ -351,20 +351,15 @@ class Scenario:
         given
             Names of the shafts whose motion is given, if others than those of the scenario.
         """
-        if sampled and loaded is None and given is None:
-            return self._own_core()
-        return self._core_with(sampled=sampled, loaded=loaded, given=given)
+        whole = sampled and loaded is None and given is None
+        return self._own_core() if whole else self._core_with(loaded, given, sampled=sampled)
 
     @kept_while_used
     def _own_core(self) -> _core.Train:
-        return self._core_with()
+        return self._core_with(None, None, sampled=True)
 
     def _core_with(
-        self,
-        *,
-        sampled: bool = True,
-        loaded: Collection[str] | None = None,
-        given: Collection[str] | None = None,
+        self, loaded: Collection[str] | None, given: Collection[str] | None, *, sampled: bool
     ) -> _core.Train:
         continuous = self.continuous()
         return core_train(
