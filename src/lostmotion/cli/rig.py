@@ -99,7 +99,7 @@ def rig(
 
 
 def _measured(name: str, sheet: Record, overrides: Sequence[str]) -> tuple[RigReport | ScrewReport, tuple[str, ...]]:
-    """What the rig measures, and the notes of a gearbox's loss map."""
+    """Report of the rig, and the notes of a gearbox's loss map."""
     from ..data_sheets.gearbox_sheet import GearboxSheet
     from ..data_sheets.linear_sheets import ScrewSheet
     from ..simulation.scenario_files import gearbox_from_record, screw_from_record

@@ -337,7 +337,7 @@ class Simulation(SimulationAnswers):
 
     @contextmanager
     def _unless_refused(self) -> Iterator[None]:
-        """What is refused leaves the state as it was."""
+        """Restore the state where a step is refused."""
         before = self.state
         try:
             yield

@@ -27,8 +27,8 @@ MIN_INTERVAL, MAX_INTERVAL = 1e-12, 1e12
 def parts(
     what: Drive | Scenario | DriveTrain, loaded: Sequence[str] | None, given: Sequence[str] | None
 ) -> tuple[Drive | DriveTrain, DriveTrain, _core.Train, tuple[str, ...], tuple[str, ...], TrainInitial]:
-    """Parts of a simulation: its subject, the same as a train with the names of its variables, the solver's train, the
-    loadable shafts, the shafts with given motion, and the start."""
+    """Parts of a simulation: its subject, the train with the names of its variables, the solver's train, the loadable
+    shafts, the shafts with given motion, and the start."""
     if isinstance(what, DriveTrain) or (isinstance(what, Scenario) and not what.is_drive):
         train, shafts, moved = given_train(what, loaded, given)
         if isinstance(what, DriveTrain):
