@@ -67,7 +67,7 @@ class Statics {
     const Ties& ties_;
     std::vector<Row>& motion_;
     std::array<double, max_shafts> inertia_, pivot_;  // of each shaft: the diagonals of J and of D
-    std::vector<std::vector<double>> factor_;  // L, where J is not diagonal
+    std::vector<std::vector<double>> factor_;         // L, where J is not diagonal
     std::vector<MasslessSpeed> massless_;
 };
 
