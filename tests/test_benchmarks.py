@@ -27,4 +27,9 @@ def test_a_program_compiles(program: Path) -> None:
 @pytest.mark.parametrize("module", sorted({p.stem for p in BENCHMARKS.glob("*.py")} - FOREIGN))
 def test_a_module_can_be_imported(module: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(BENCHMARKS)
-    importlib.import_module(module)
+    try:
+        importlib.import_module(module)
+    except ModuleNotFoundError as missing:  # a peer, which only `make bench` installs
+        if (missing.name or "").split(".")[0] in {"lostmotion", *(p.stem for p in BENCHMARKS.glob("*.py"))}:
+            raise
+        pytest.skip(f"without {missing.name}")

@@ -17,7 +17,7 @@ Options = dict[str, Any]
 
 @kept
 def core_case(scenario: Scenario) -> _core.Case:
-    """What every run of the core begins with."""
+    """Train, inputs and start of every run of the core."""
     core, signals = scenario.core(), scenario.signals()
     inputs = [signals[name].core() for name in core.input_names()]
     return _core.Case(core, inputs=inputs, start=scenario.start(), hysteresis_capacities=scenario.capacities())
