@@ -24,10 +24,10 @@ Cost cost_of(const model::Train& train, const std::vector<Signal>& signals, doub
     options.duration = duration;
     options.energy = false;
     options.max_switchings = 0;
-    if (const TrainRun run(train); !run.error().empty()) throw std::runtime_error(run.error());
+    const TrainRun run(train);
+    if (!run.error().empty()) throw std::runtime_error(run.error());
     Cost cost;
     cost.first = best_ms(repeats, [&] { TrainRun(train).run(signals, {}, {}, options, nullptr); });
-    const TrainRun run(train);
     std::unique_ptr<AnyWorkspace> workspace;
     cost.again = best_ms(repeats, [&] {
         cost.switchings = run.run_exactly(signals, {}, {}, options, nullptr, workspace).switching_count;

@@ -228,7 +228,7 @@ inline void check_train_run(const TrainReport& report, const model::Assembly& a)
     if (const std::string error = error_text(report, a); !error.empty()) throw SolverError(error);
 }
 
-// What a run begins with. start: states by name; capacities: of the hysteresis of gears by name; what is left out is 0.
+// Train, inputs and start of a run. Its states and the hysteresis capacities of its gears go by name; 0 if left out.
 struct Case {
     std::shared_ptr<const SharedRun> train;
     std::vector<Signal> inputs;

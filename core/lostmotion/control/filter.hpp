@@ -69,7 +69,7 @@ struct Filter {
     // ((s/w_z)^2 + 2 D_z s/w_z + 1)/((s/w_n)^2 + 2 D_n s/w_n + 1). By Tustin's rule s/w = (z - 1)/(z + 1)/tan(w T/2),
     // under which both have the same value at w, the corner or w_z; below half the sampling frequency.
     void discretise(double loop_time);
-    // Of a transfer function in z, in controllable form.
+    // System of a transfer function in z, in controllable form.
     DiscreteSystem system() const;
 };
 

@@ -283,10 +283,9 @@ template <class Sizes>
 template <class Cache, class Now>
 Found SwitchedTrain<Sizes>::enumerate(Cache& cache, Now& now, const Event& event, const Key& from, Key& key) const {
     Key modes;
-    std::vector<int>& slips_of = slips_of_;  // one that allocates nothing
-    slips_of.resize(static_cast<std::size_t>(combinations(event)));
-    for (std::size_t number = 0; number < slips_of.size(); ++number)
-        slips_of[number] = combination(number, event, from, modes);
+    slips_of_.resize(static_cast<std::size_t>(combinations(event)));
+    for (std::size_t number = 0; number < slips_of_.size(); ++number)
+        slips_of_[number] = combination(number, event, from, modes);
     const auto before = now.memory;  // all that a trial may change
     Found worst = Found::inconsistent;
     const double limit = event.closest ? max_violation : std::numeric_limits<double>::infinity();
@@ -295,8 +294,8 @@ Found SwitchedTrain<Sizes>::enumerate(Cache& cache, Now& now, const Event& event
     auto of_closest = before;
     for (const bool at_limit : {false, true})
         for (int slips = 0; slips <= contacts(); ++slips)
-            for (std::size_t number = 0; number < slips_of.size(); ++number) {
-                if (slips_of[number] != slips) continue;
+            for (std::size_t number = 0; number < slips_of_.size(); ++number) {
+                if (slips_of_[number] != slips) continue;
                 combination(number, event, from, modes);
                 if (at_its_limit(modes) != at_limit) continue;
                 now.memory = before;

@@ -450,7 +450,8 @@ class SwitchedTrain {
         bool reached = false;
     };
     mutable std::array<Limit, 64> limits_;
-    mutable std::vector<int> slips_of_;  // each combination: how many contacts slip
+    // Of each combination, how many contacts slip. Its memory is used again.
+    mutable std::vector<int> slips_of_;
 };
 
 }  // namespace lostmotion::model

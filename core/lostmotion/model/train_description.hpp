@@ -48,7 +48,6 @@ class TrainDescription {
         });
     }
     void add_controller(LinearController c, const std::string& motor);
-    int shaft_number(const std::string& name) const { return place_of(name); }
 
  private:
     // -1 if there is none of that name, which the check of the train finds.

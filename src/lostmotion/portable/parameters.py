@@ -53,9 +53,14 @@ class Parameter:
     def core(self) -> dict[str, Any]:
         """Parameters as `write_description` of the core takes them."""
         limit = self.limit
-        law = {True: "reciprocal", False: "proportional"}
         effects = [
-            {"place": e.place, "law": law[e.reciprocal], "offset": e.offset, "slope": e.slope} for e in self.effects
+            {
+                "place": e.place,
+                "law": "reciprocal" if e.reciprocal else "proportional",
+                "offset": e.offset,
+                "slope": e.slope,
+            }
+            for e in self.effects
         ]
         bounds = {"above": limit.gt, "at_least": limit.ge, "at_most": limit.le}
         return {"key": self.key, "unit": self.unit, "value": self.value, **bounds, "effects": effects}
