@@ -54,13 +54,13 @@ class InputError(ValueError):
 
     Parameters
     ----------
-    text : str
+    text : str or Exception
         What is wrong, or the reason alone where keys are given.
-    keys : tuple of str
+    *keys : str
         Dotted keys of the values.
     table, record : str
         Where a record is at fault: the table that it fills, and its name.
-    where : str
+    where : str or Path
         File, log or function that the text begins with.
     problems : sequence of Problem, optional
         All that is wrong, in place of text and keys.
@@ -79,16 +79,15 @@ class InputError(ValueError):
 
     def __init__(
         self,
-        text: str = "",
-        *,
-        keys: tuple[str, ...] = (),
+        text: object = "",
+        *keys: str,
         table: str = "",
         record: str = "",
-        where: str = "",
+        where: object = "",
         problems: Sequence[Problem] | None = None,
         more: int = 0,
     ) -> None:
-        self.where, self.more = where, more
+        self.where, self.more = str(where), more
         self.problems = (Problem(keys, str(text), table, record),) if problems is None else tuple(problems)
         said = "; ".join(problem.sentence() for problem in self.problems) + (f"; and {more} more" if more else "")
         super().__init__(visible(f"{where}: {said}" if where else said))

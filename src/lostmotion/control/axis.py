@@ -57,15 +57,13 @@ class _Place:
             return default
         if shaft not in self.train.shafts:
             meant = did_you_mean(shaft, self.train.shafts, f"the shafts are {', '.join(self.train.shafts)}")
-            raise InputError(f"{shown(shaft)} is no shaft; {meant}", keys=(key,))
+            raise InputError(f"{shown(shaft)} is no shaft; {meant}", key)
         return shaft
 
     def ratio(self, start: str, end: str, key: str) -> float:
         i = turns(self.train, start, end)
         if i is None:
-            raise InputError(
-                f"no gear leads from the shaft {start} to {end}; name a shaft that the motor turns", keys=(key,)
-            )
+            raise InputError(f"no gear leads from the shaft {start} to {end}; name a shaft that the motor turns", key)
         return i
 
     def encoder_shaft(self, key: str) -> str:
@@ -78,9 +76,7 @@ class _Place:
         if self.train.is_slide(self.shaft):
             for key, there in (("camera", c.camera), ("reference.target", getattr(c.reference, "target", None))):
                 if there is not None:
-                    raise InputError(
-                        f"gives an angle, and {self.shaft} is a slide; leave it out, or name a shaft", keys=(key,)
-                    )
+                    raise InputError(f"gives an angle, and {self.shaft} is a slide; leave it out, or name a shaft", key)
         shafts = list(self.train.shafts)
         out = _core.Axis()
         out.set(
@@ -118,9 +114,7 @@ class _Place:
         if c.phase > 0.0:
             phase = whole_multiple(c.phase, c.sample_time, "phase") * samples
             if phase >= out["position_schedule"]["every"]:
-                raise InputError(
-                    f"{c.phase:g} s is not below the sample time of the position loop; take less", keys=("phase",)
-                )
+                raise InputError(f"{c.phase:g} s is not below the sample time of the position loop; take less", "phase")
             out["position_schedule"]["phase"] = phase
         return out
 
@@ -147,7 +141,7 @@ class _Place:
                 try:
                     out[key].append(discrete(f, c.loop_time("speed"))[2])
                 except InputError as problem:
-                    raise InputError(str(problem), keys=(f"speed.{key}[{k}]",)) from None
+                    raise InputError(str(problem), f"speed.{key}[{k}]") from None
         if c.inverse_model is not None:
             on_motor = self.encoder_shaft("encoder" if c.position_encoder is None else "position_encoder") != self.shaft
             fields = c.inverse_model.solver_fields(self.train, self.name, self.shaft, on_motor=on_motor)
@@ -176,7 +170,7 @@ class _Place:
         if m.electrical_time_constant is None or m.armature_voltage_constant is None or m.rated_speed is None:
             raise InputError(
                 '"pi" needs a motor with a winding, and this one is a torque source; take "ideal" or "first_order"',
-                keys=("current.kind",),
+                "current.kind",
             )
         return {key: getattr(m, key) for key in keys}
 
@@ -185,19 +179,19 @@ class _Place:
         if m.kind != "synchronous" or m.winding is None:
             raise InputError(
                 f'"field_oriented" needs a motor of kind "synchronous", and this one is a {m.kind}; take "pi", "ideal" or "first_order"',
-                keys=("current.kind",),
+                "current.kind",
             )
         if m.winding.max_current is None:
             raise InputError(
                 '"field_oriented" needs the largest current; give motor.winding.max_current_rms or max_current_peak',
-                keys=("current.kind",),
+                "current.kind",
             )
         phase, current = m.winding.phase_values(), math.sqrt(2.0) * m.winding.max_current
         if (phase.inductance_d - phase.inductance_q) * current >= phase.flux_linkage:
             raise InputError(
                 '"field_oriented": L_d - L_q times the largest current must be below the flux linkage; exchange '
                 "inductance_d and inductance_q, or lower the largest current",
-                keys=("current.kind",),
+                "current.kind",
             )
         c = self.controller
         times = {"sample_time": c.loop_time("current"), "delay_time": c.delay * c.sample_time}
@@ -305,6 +299,4 @@ def check_torques(controllers: Mapping[str, Controller], torques: Mapping[str, f
         kind = controller.current.kind
         if torques.get(name, 0.0) != 0.0 and TORQUE_SOURCE in (driven(controller) or ()):
             begins = "no current" if kind == "field_oriented" else "the torque that the controller asks for"
-            raise InputError(
-                f'with current.kind = "{kind}" a run begins with {begins}; leave it out', keys=(key.format(name),)
-            )
+            raise InputError(f'with current.kind = "{kind}" a run begins with {begins}; leave it out', key.format(name))

@@ -259,21 +259,21 @@ class ContinuousController(described.ContinuousControllerFields):
             remedy = 'make it a motor of kind "torque_source"' if motor.kind == "synchronous" else f"leave {key} out"
             raise InputError(
                 f'"{current.kind}" does not keep to the {key} of the motor; take "voltage" or a sampled controller, or {remedy}',
-                keys=("current.kind",),
+                "current.kind",
             )
         if math.isinf(limit):
             if self.anti_windup_time is not None:
-                raise InputError("nothing limits the output; give a limit, or leave it out", keys=("anti_windup_time",))
+                raise InputError("nothing limits the output; give a limit, or leave it out", "anti_windup_time")
             return
         pid = self.position or self.speed
         if pid is not None and pid.gains[0] == 0.0 < pid.gains[1] and self.anti_windup_time is None:
             raise InputError(
-                "is missing; an integrator behind a limit needs it where there is no gain", keys=("anti_windup_time",)
+                "is missing; an integrator behind a limit needs it where there is no gain", "anti_windup_time"
             )
         if self.state_space is not None and self.state_space.winds_up():
             raise InputError(
                 "has an integrator behind a limit, which would wind up; give back_calculation (zeros let it wind up)",
-                keys=("state_space",),
+                "state_space",
             )
 
     def add_to(self, core: _core.Train, train: DriveTrain, name: str) -> None:
@@ -287,7 +287,7 @@ class ContinuousController(described.ContinuousControllerFields):
         shaft = list(train.shafts)[-1] if self.shaft is None else self.shaft
         if shaft not in train.shafts:
             meant = did_you_mean(shaft, train.shafts, f"the shafts are {', '.join(train.shafts)}")
-            raise InputError(f"{shown(shaft)} is no shaft; {meant}", keys=("shaft",))
+            raise InputError(f"{shown(shaft)} is no shaft; {meant}", "shaft")
         motor = train.motors[name]
         limit = self.output_limit(motor)
         self._check_limits(motor, limit)

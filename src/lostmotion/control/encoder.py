@@ -55,18 +55,17 @@ class Encoder(described.EncoderDelayFields, EncoderFields):
         """
         if not slides and self.grating_period is not None:
             raise InputError(
-                "is that of a linear scale, and this encoder is on a shaft; give lines or bits",
-                keys=("grating_period",),
+                "is that of a linear scale, and this encoder is on a shaft; give lines or bits", "grating_period"
             )
         if slides:
             keys = ("lines", "error_periods", *(() if self.grating_period is not None else ("bits",)))
             for key in keys:
                 if getattr(self, key) is not None:
                     raise InputError(
-                        "counts a turn, and this encoder is on a slide; give grating_period, or resolution", keys=(key,)
+                        "counts a turn, and this encoder is on a slide; give grating_period, or resolution", key
                     )
             if self.error > 0.0 and self.grating_period is None:
-                raise InputError("has no period; give grating_period in place of resolution", keys=("error",))
+                raise InputError("has no period; give grating_period in place of resolution", "error")
 
     @property
     def step(self) -> float:

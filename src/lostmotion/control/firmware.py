@@ -88,12 +88,12 @@ class Firmware(FirmwareFields):
             if getattr(self, key):
                 raise InputError(
                     "acts from sample to sample; leave it out, give a reference that keeps to it, or take a sampled controller",
-                    keys=(key,),
+                    key,
                 )
         if self.supply_resistance > 0.0:
             raise InputError(
                 "makes the torque depend on error and speed together; leave it out, or take a sampled controller",
-                keys=("supply_resistance",),
+                "supply_resistance",
             )
         per_volt = self.torque_constant / self.resistance
         errors, torques = [0.0], [0.0]

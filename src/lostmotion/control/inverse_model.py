@@ -74,7 +74,7 @@ class InverseModel(InverseModelFields):
                 (gear.input, gear.output), "an inverse model takes each inertia by itself; leave inverse_model out"
             )
         except InputError as problem:
-            raise InputError(str(problem), keys=("inverse_model",)) from None
+            raise InputError(str(problem), "inverse_model") from None
         here, there, m = train.shafts[gear.input], train.shafts[gear.output], train.motors[motor]
         laws = {key: getattr(self, key) for key in ("loss_adaptation", "friction_adaptation", "load_observer")}
         own = {
@@ -88,7 +88,7 @@ class InverseModel(InverseModelFields):
                 raise InputError(
                     f"{[low, high]} N*m leave out the friction of the drive, "
                     f"{own['friction_torque']:g} N*m; widen them, or give friction_torque",
-                    keys=("inverse_model.friction_adaptation.limits",),
+                    "inverse_model.friction_adaptation.limits",
                 )
         losses = self._losses(gear)
         return own | {
@@ -106,8 +106,7 @@ class InverseModel(InverseModelFields):
             return None
         if gear.stiffness.has_gap and self.twist_rate is None:
             raise InputError(
-                "lacks twist_rate; the gear has a gap, and the motor needs a speed to pass it with",
-                keys=("inverse_model",),
+                "lacks twist_rate; the gear has a gap, and the motor needs a speed to pass it with", "inverse_model"
             )
         return {"curve": gear.stiffness.core()}
 
@@ -117,7 +116,7 @@ class InverseModel(InverseModelFields):
             raise InputError(
                 f"takes one gear from the shaft {motor_shaft} to {shaft} and no other at either; "
                 "take feedforward for other trains",
-                keys=("inverse_model",),
+                "inverse_model",
             )
         return between[0]
 

@@ -22,6 +22,6 @@ def whole_multiple(time: float, base: float, key: str) -> int:
         near = max(1, min(samples, MAX_SAMPLES)) * base
         raise InputError(
             f"{time:g} s is no whole multiple of the sample time {base:g} s; take {near:g} s, or another sample time",
-            keys=(key,),
+            key,
         )
     return samples

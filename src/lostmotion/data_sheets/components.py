@@ -57,7 +57,7 @@ def gearbox_table(
         if key not in known:
             schema = Gearbox.model_json_schema()
             inner = [".".join((where, *path)) for path in keys_within(schema, [schema])]
-            raise InputError(unknown_key(key, known, inner), keys=(f"{where}.{shortened(key)}",))
+            raise InputError(unknown_key(key, known, inner), f"{where}.{shortened(key)}")
     record = find(reference, "gearbox")
     assert isinstance(record, GearboxSheet)
     return _table_of_sheet(record, shown(reference), changes, where)
@@ -166,7 +166,7 @@ def _wear(table: dict[str, Any], changes: Mapping[str, Any], conditions: Conditi
         for key, default in (("loss_factor", 1.0), ("temperature", None)):
             if getattr(conditions, key) != default:
                 raise InputError(
-                    f"acts on the record's own losses; leave it out beside {where}.losses", keys=(f"{where}.{key}",)
+                    f"acts on the record's own losses; leave it out beside {where}.losses", f"{where}.{key}"
                 )
     if conditions.added_backlash == 0.0:
         return
@@ -176,7 +176,7 @@ def _wear(table: dict[str, Any], changes: Mapping[str, Any], conditions: Conditi
     elif curve is not None or _whole(table["stiffness"]):
         raise InputError(
             f'needs a torsion curve; leave it out, or give {where}.stiffness the kind "curve"',
-            keys=(f"{where}.added_backlash",),
+            f"{where}.added_backlash",
         )
 
 
@@ -381,7 +381,7 @@ def at_voltage(table: Mapping[str, Any], voltage: Any, given: Collection[str], w
     try:
         moved = motor.at_voltage(value)
     except InputError as error:
-        raise InputError(str(error), keys=(f"{where}.rated_voltage",)) from None
+        raise InputError(str(error), f"{where}.rated_voltage") from None
     follow = ("rated_speed", "armature_voltage_constant")
     return changed | {key: getattr(moved, key) for key in follow}
 
@@ -474,12 +474,10 @@ def use_records(data: dict[str, Any]) -> None:
         if "from" not in changes:
             for key in Conditions.model_fields if table == "gearbox" else ():
                 if key in changes:
-                    raise InputError("acts on a record; give gearbox.from, or leave it out", keys=(f"gearbox.{key}",))
+                    raise InputError("acts on a record; give gearbox.from, or leave it out", f"gearbox.{key}")
             continue
         changes = dict(changes)
         record = changes.pop("from")
         if not isinstance(record, str):
-            raise InputError(
-                f"{shown(record)} must be the name of a record, or of a file with one", keys=(f"{table}.from",)
-            )
+            raise InputError(f"{shown(record)} must be the name of a record, or of a file with one", f"{table}.from")
         data[table] = gearbox_table(record, changes)[0] if table == "gearbox" else motor_table(record, changes)

@@ -44,7 +44,7 @@ def linear_table(kind: str, reference: str, changes: Mapping[str, Any], where: s
     known = {*type(record).PART.model_fields, *conditions}
     for key in changes:
         if key not in known:
-            raise InputError(unknown_key(key, known), keys=(f"{where}.{shortened(key)}",))
+            raise InputError(unknown_key(key, known), f"{where}.{shortened(key)}")
     values = record.values()
     own = {key: value for key, value in changes.items() if key not in conditions}
     values = _without_replaced(record, values, own) | own
@@ -99,7 +99,7 @@ def _at_preload(record: ScrewSheet, preload: Any, values: Mapping[str, Any], whe
             raise InputError(
                 f"scales the stiffness that a record has at another preload, and {record.name} has none; leave it out, and give "
                 "nut_stiffness",
-                keys=("nut_preload",),
+                "nut_preload",
             )
         share = force / record.nut_preload
         found = {"drag_torque": record.drag_torque * share}

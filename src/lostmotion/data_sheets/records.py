@@ -135,7 +135,7 @@ def _entries(data: dict[str, Any], where: str) -> Iterator[Entry]:
     data = in_current_words(data)
     for key in data:
         if key not in known:
-            raise InputError(f"{where}: key {key}: {unknown_key(key, known)}")
+            raise InputError(unknown_key(key, known), key, where=where)
     common = {key: data[key] for key in COMMON if key in data}
     for table, kind in KINDS.items():
         for entry in _tables(data, table, where):
@@ -157,7 +157,7 @@ def _tables(data: Mapping[str, Any], key: str, where: str) -> list[Mapping[str, 
     """The tables of an array of tables; none if the key is not there."""
     entries = data.get(key, [])
     if not isinstance(entries, list) or not all(isinstance(entry, Mapping) for entry in entries):
-        raise InputError(f"{where}: key {key}: {shown(entries)} must be tables; write [[{key}]] with double brackets")
+        raise InputError(f"{shown(entries)} must be tables; write [[{key}]] with double brackets", key, where=where)
     return entries
 
 

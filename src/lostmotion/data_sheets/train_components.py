@@ -57,17 +57,15 @@ def _with_record(table: str, name: str, element: Any, written: Callable[[str], s
     if key not in element:
         for condition in CONDITIONS[table].model_fields if table in CONDITIONS else ():
             if condition in element:
-                raise InputError(f"acts on a record; give {from_key}, or leave it out", keys=(f"{where}.{condition}",))
+                raise InputError(f"acts on a record; give {from_key}, or leave it out", f"{where}.{condition}")
         return element
     record = element[key]
     if not isinstance(record, str):
-        raise InputError(f"{shown(record)} must be the name of a record, or of a file with one", keys=(from_key,))
+        raise InputError(f"{shown(record)} must be the name of a record, or of a file with one", from_key)
     try:
         values, kept = _values(table, record, element, where)
     except InputError as error:
-        raise (
-            error if error.problems[0].keys and not error.where else InputError(str(error), keys=(from_key,))
-        ) from None
+        raise (error if error.problems[0].keys and not error.where else InputError(str(error), from_key)) from None
     return values | kept
 
 

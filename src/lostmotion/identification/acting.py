@@ -31,7 +31,7 @@ def numbers_of_input(task: Identification, name: str, known: Mapping[str, Any]) 
     for key, value in zip(NUMBERS[3:], found[3:], strict=True):
         if not (value >= 0.0 if key == "filter_time" else value > 0.0):
             raise InputError(
-                f"key inputs.{name}.{key}: is {value:g}; it must be {'at least' if key == 'filter_time' else 'above'} 0"
+                f"is {value:g}; it must be {'at least' if key == 'filter_time' else 'above'} 0", f"inputs.{name}.{key}"
             )
     return found
 

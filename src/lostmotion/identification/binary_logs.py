@@ -67,7 +67,7 @@ def _begins_with(path: Path, text: bytes) -> bool:
         with path.open("rb") as file:
             return file.read(len(text)) == text
     except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", where=str(path)) from None
+        raise InputError(f"cannot be read: {error.strerror}", where=path) from None
 
 
 def _mat5_variables(path: Path) -> dict[str, Any]:
@@ -205,10 +205,10 @@ def read_mdf_log(path: Path, *, time: str = "") -> Log:
         except Exception as error:  # the library raises what its parts raise
             problem = reason(error)
     if problem:
-        raise InputError(f"is not an MDF file that asammdf reads ({problem})", where=str(path))
+        raise InputError(f"is not an MDF file that asammdf reads ({problem})", where=path)
     numbers = [signal for signal in signals if signal.samples.dtype.kind in "biuf" and signal.samples.ndim == 1]
     if not numbers:
-        raise InputError("has no channel of numbers", where=str(path))
+        raise InputError("has no channel of numbers", where=path)
     first = next((signal for signal in numbers if signal.name == time), numbers[0])
     clock = np.asarray(first.timestamps, dtype=float)
     channels = {
@@ -248,7 +248,7 @@ def _formulas(path: Path, file: Any) -> Formulas:
                 elif _has_formula(rule):
                     raise ValueError("is a table with a formula in it, which is not supported")
             except ValueError as error:
-                raise InputError(f"channel {channel.name}: its conversion {error}", where=str(path)) from None
+                raise InputError(f"channel {channel.name}: its conversion {error}", where=path) from None
     return found
 
 
@@ -345,7 +345,7 @@ def log_of_variables(path: Path, variables: Mapping[str, Any], units: Mapping[st
         known = [*vectors, *(column for columns in of_matrix.values() for column in columns)]
         meant = did_you_mean(name or "time", known, f"its vectors are {listed(known) or 'none'}")
         raise InputError(
-            f"has no vector of the time{f' {name}' if name else ''}; name it with logs.time; {meant}", where=str(path)
+            f"has no vector of the time{f' {name}' if name else ''}; name it with logs.time; {meant}", where=path
         )
     values = clock.astype(float) * {"ns": 1e-9, "us": 1e-6, "ms": 1e-3}.get(units.get(name, ""), 1.0)
     if units.get(name) == "ns":

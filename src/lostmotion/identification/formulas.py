@@ -117,7 +117,7 @@ def number(text: str | float, known: Mapping[str, Any], key: str) -> float:
     try:
         return float(formula(text).value(known))
     except ValueError as problem:
-        raise InputError(f"key {key}: {problem}") from None
+        raise InputError(problem, key) from None
 
 
 def _refuse(node: ast.AST, text: str) -> None:

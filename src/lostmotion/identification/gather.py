@@ -67,9 +67,7 @@ def _refuse_conditions(rig: Rig, logs: Sequence[Prepared]) -> None:
             for n in named
         )
         where = f", where {there}" if there else ""
-        raise InputError(
-            f"key {key}: {text!r} holds for none of the logs{where}; change the condition, or leave the key out"
-        )
+        raise InputError(f"{text!r} holds for none of the logs{where}; change the condition, or leave the key out", key)
 
 
 def distinct_names(paths: list[Path]) -> list[str]:

@@ -42,12 +42,13 @@ def _speed(task: Identification, log: Prepared, name: str) -> np.ndarray:
     if entry.smoothing == 0.0 and not is_angle:
         return x
     if entry.smoothing == 0.0:
-        raise InputError(f'key inputs.{name}: the channel {entry.channel} is an angle; give smoothing, such as "20 ms"')
+        raise InputError(f'the channel {entry.channel} is an angle; give smoothing, such as "20 ms"', f"inputs.{name}")
     width = 2 * round(0.5 * entry.smoothing / h) + 1
     if not LEAST <= width <= len(x):
         raise InputError(
-            f"key inputs.{name}.smoothing: {entry.smoothing:g} s has {width} samples of {log.name}; "
-            f"give {LEAST} or more, and not more than the {len(x)} of the log"
+            f"{entry.smoothing:g} s has {width} samples of {log.name}; "
+            f"give {LEAST} or more, and not more than the {len(x)} of the log",
+            f"inputs.{name}.smoothing",
         )
     even = np.linspace(log.time[0], log.time[-1], len(x))
     found = savgol_filter(np.interp(even, log.time, x), width, 3, deriv=int(is_angle), delta=even[1] - even[0])

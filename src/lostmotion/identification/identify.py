@@ -224,7 +224,8 @@ class IdentificationResult:
         table, _, name = self.task.record.partition(".")
         if table != "gear" or name not in self.scenario.gears:
             raise InputError(
-                f"key record: {self.task.record!r} must be gear.NAME with one of {', '.join(self.scenario.gears) or 'no gear'}"
+                f"{self.task.record!r} must be gear.NAME with one of {', '.join(self.scenario.gears) or 'no gear'}",
+                "record",
             )
         plain = "".join(c if c.isalnum() else "-" for c in name.lower()).strip("-")
         return sheet_text(

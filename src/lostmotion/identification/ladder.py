@@ -128,7 +128,7 @@ def climb(
     train = [log for log in logs if not log.held_out]
     if not train:
         raise InputError(
-            "key logs.held_out: holds for every log, so that none is left to fit; make the condition narrower"
+            "holds for every log, so that none is left to fit; make the condition narrower", "logs.held_out"
         )
     found: list[RungResult] = []
     point = start

@@ -77,11 +77,11 @@ def refuse_leave_out(task: Identification, logs: Sequence[Prepared]) -> None:
         if lacking:
             known = sorted(set().union(*(log.facts for log in train)))
             meant = did_you_mean(key, known, "give it with logs.header")
-            raise InputError(f"key fit.leave_out: {lacking[0]} has no {key!r} in its header; {meant}")
+            raise InputError(f"{lacking[0]} has no {key!r} in its header; {meant}", "fit.leave_out")
         values = {log.facts[key] for log in train}
         if len(values) < 2:
             only = ", ".join(map(str, values))
-            raise InputError(f"key fit.leave_out: {key!r} is {only} in all fitted logs; leave it out of the list")
+            raise InputError(f"{key!r} is {only} in all fitted logs; leave it out of the list", "fit.leave_out")
 
 
 def left_out_errors(

@@ -32,7 +32,7 @@ def as_refusal(path: Path, what: str, remedy: str = "") -> Iterator[None]:
     except (InputError, ImportError):
         raise
     except Exception as error:  # the library raises what its parts raise
-        raise InputError(f"{what} ({reason(error)}){remedy}", where=str(path)) from None
+        raise InputError(f"{what} ({reason(error)}){remedy}", where=path) from None
 
 
 @contextmanager

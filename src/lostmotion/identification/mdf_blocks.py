@@ -32,10 +32,10 @@ def check_mdf_blocks(path: Path) -> None:
     try:
         with path.open("rb") as file:
             if file.read(8).strip() not in (b"MDF", b"UnFinMF") or not file.read(8).startswith(b"4"):
-                raise InputError("is not an MDF 4 file; save it as MDF 4", where=str(path))
+                raise InputError("is not an MDF 4 file; save it as MDF 4", where=path)
             check_memory(_Blocks(path, file).needed(), str(path))
     except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", where=str(path)) from None
+        raise InputError(f"cannot be read: {error.strerror}", where=path) from None
 
 
 class _Blocks:
@@ -43,7 +43,7 @@ class _Blocks:
         self.path, self.file = path, file
 
     def damaged(self, why: str) -> InputError:
-        return InputError(f"is not an MDF file, or is damaged ({why}); record or copy it again", where=str(self.path))
+        return InputError(f"is not an MDF file, or is damaged ({why}); record or copy it again", where=self.path)
 
     def block(self, at: int) -> tuple[bytes, list[int], int]:
         """Id, links and length of the data of a block."""
@@ -146,7 +146,7 @@ class _Blocks:
             raise self.damaged(f"the block at byte {at} is cut off") from None
         if kind not in DEFLATE:
             raise InputError(
-                "has data compressed by another method than deflate; save it with deflate", where=str(self.path)
+                "has data compressed by another method than deflate; save it with deflate", where=self.path
             )
         check_memory(max(announced, length), str(self.path))
         if EXPANSION * length > announced:

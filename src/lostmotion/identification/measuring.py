@@ -139,10 +139,11 @@ def numbers_of(m: MeasuredChannel, known: Mapping[str, Any]) -> dict[str, float]
     """Scale, offset, delay and filter of a channel."""
     found = {key: number(getattr(m, key), known, key) for key in NUMBERS}
     if found["scale"] == 0.0:
-        raise InputError(f"key measured with the channel {m.channel}: scale is 0; it must be another number")
+        raise InputError("scale is 0; it must be another number", f"measured with the channel {m.channel}")
     if found["filter_time"] < 0.0:
         raise InputError(
-            f"key measured with the channel {m.channel}: filter_time is {found['filter_time']:g} s; it must be at least 0"
+            f"filter_time is {found['filter_time']:g} s; it must be at least 0",
+            f"measured with the channel {m.channel}",
         )
     return found
 

@@ -272,7 +272,7 @@ def _at_start(rig: Rig) -> _Reference:
     for name in task.monitor.watch:
         if name not in sought:
             raise InputError(
-                f'key monitor.watch.{name}: is not free in the model "{names[rung]}"; name another monitor.model'
+                f'is not free in the model "{names[rung]}"; name another monitor.model', f"monitor.watch.{name}"
             )
     values = {n: p.start if n in sought or p.fixed or p.off is None else p.off for n, p in task.parameters.items()}
     return _Reference(
@@ -288,9 +288,7 @@ def _with_priors(task: Identification, rung: int, values: Mapping[str, float]) -
             size = max(abs(values[name]), p.step)
             found[name] = p.model_copy(update={"start": values[name], "tolerance": 1.96 * size})
     if not found:
-        raise InputError(
-            "key monitor.constant: names all parameters, so that none is left to be watched; leave some out"
-        )
+        raise InputError("names all parameters, so that none is left to be watched; leave some out", "monitor.constant")
     return found
 
 

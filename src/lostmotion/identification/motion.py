@@ -93,7 +93,7 @@ def windows(rig: Rig, logs: Sequence[Prepared], point: Point, rung: int, length:
         shown = shown_motion(rig)
     except InputError as problem:
         raise InputError(
-            f"key fit.horizon: {problem}, and windows begin at a measured state; leave fit.horizon out"
+            f"{problem}, and windows begin at a measured state; leave fit.horizon out", "fit.horizon"
         ) from None
     return [_in_windows(rig, log, point, rung, length, shown) for log in logs]
 
@@ -104,16 +104,15 @@ def _in_windows(rig: Rig, log: Prepared, point: Point, rung: int, length: float,
     scenario = built.scenario
     if scenario.axes() or built.remembers or scenario.clutches or scenario.freewheels or scenario.dampers:
         raise InputError(
-            "key fit.horizon: the rig has a controller with states of its own, a clutch or a damper, whose state no channel shows; "
-            "leave fit.horizon out"
+            "the rig has a controller with states of its own, a clutch or a damper, whose state no channel shows; "
+            "leave fit.horizon out",
+            "fit.horizon",
         )
     time, course = measured_course(rig, log, shown.channel, known)
     starts = np.unique(np.searchsorted(log.time, np.arange(0.0, log.time[-1], length)))
     starts = starts[len(log.time) - starts >= LEAST]
     if length < LEAST * log.log.interval:
-        raise InputError(
-            f"key fit.horizon: {length:g} s has fewer than {LEAST} samples of {log.name}; give longer ones"
-        )
+        raise InputError(f"{length:g} s has fewer than {LEAST} samples of {log.name}; give longer ones", "fit.horizon")
     train = scenario.train()
     ratios = {s: turns(train, s, shown.shaft) for s in train.shafts}
     begins: dict[int, dict[str, FormulaText]] = {}

@@ -327,7 +327,7 @@ def _fact(text: Any, facts: Mapping[str, Any], log: Log, key: str) -> Any:
     try:
         return Formula(text).value(facts)
     except ValueError as problem:
-        raise InputError(f"key {key}: {problem}", where=log.name) from None
+        raise InputError(problem, key, where=log.name) from None
 
 
 def _segments(task: Identification, log: Log, facts: Mapping[str, Any]) -> tuple[Segment, ...]:
@@ -345,7 +345,8 @@ def _weights(task: Identification, log: Log, facts: Mapping[str, Any]) -> np.nda
     if not np.all(found > 0.0):
         k = int(np.argmin(found))
         raise InputError(
-            f"key logs.weight: {task.logs.weight!r} is {found[k]:g} at {log.time[k]:.4g} s; it must be positive",
+            f"{task.logs.weight!r} is {found[k]:g} at {log.time[k]:.4g} s; it must be positive",
+            "logs.weight",
             where=log.name,
         )
     return found
@@ -360,7 +361,7 @@ def _by_sample(text: FormulaText, log: Log, facts: Mapping[str, Any], key: str) 
     distinct, which = np.unique(rows, axis=0, return_inverse=True)
     if len(distinct) > 1000:
         raise InputError(
-            f"key {key}: {text!r} names a channel with {len(distinct)} values; name one that switches", where=log.name
+            f"{text!r} names a channel with {len(distinct)} values; name one that switches", key, where=log.name
         )
     values = [float(_fact(text, {**facts, **dict(zip(names, row, strict=True))}, log, key)) for row in distinct]
     return np.array(values)[which.ravel()]

@@ -80,17 +80,17 @@ def read_log(path: str | Path, *, time: str = "", decimal: str = "") -> Log:
     if decimal not in ("", ".", ","):
         raise InputError(f'argument decimal: {decimal!r} is neither "." nor ","; leave it out to have it found')
     if path.is_dir():
-        raise InputError("is a directory; name the logs in it", where=str(path))
+        raise InputError("is a directory; name the logs in it", where=path)
     if not path.exists():
-        raise InputError("there is no such file; check the name", where=str(path))
+        raise InputError("there is no such file; check the name", where=path)
     if not path.is_file():
-        raise InputError("is a device or a pipe; name a file", where=str(path))
+        raise InputError("is a device or a pipe; name a file", where=path)
     ending = path.suffix.lower()
     check_memory(path.stat().st_size, str(path))
     if ending == ".json":
         return read_servo_json(path, time=time)
     if ending not in TABLES:
-        raise InputError(f"is no log by its ending; logs end in {', '.join(ENDINGS)}", where=str(path))
+        raise InputError(f"is no log by its ending; logs end in {', '.join(ENDINGS)}", where=path)
     if TABLES[ending] is read_text_log:
         return read_text_log(path, time=time, decimal=decimal)
     return TABLES[ending](path, time=time)
@@ -113,13 +113,13 @@ def find_logs(patterns: Sequence[str], directory: Path) -> list[Path]:
                 matched = sorted(anchor.glob(str(path.relative_to(anchor)) if anchor == Path(path.anchor) else pattern))
             except (ValueError, NotImplementedError) as error:
                 raise InputError(
-                    f"key logs.files: {pattern!r} is no pattern ({error}); write one such as logs/**/*.json"
+                    f"{pattern!r} is no pattern ({error}); write one such as logs/**/*.json", "logs.files"
                 ) from None
         else:
             matched = [path]
         named = [p for m in matched for p in (_within(m) if m.is_dir() else [m] if m.is_file() else [])]
         if not named:
-            raise InputError(f"key logs.files: {pattern!r} names no log in {directory.resolve()}; check the name")
+            raise InputError(f"{pattern!r} names no log in {directory.resolve()}; check the name", "logs.files")
         found += named
     return list(dict.fromkeys(found))
 

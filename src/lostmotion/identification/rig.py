@@ -98,26 +98,26 @@ class Rig:
         self.units = self._units()
         for name, channel in task.inputs.items():
             if name.endswith("_given_acceleration") and name in self._signals():
-                raise InputError(f"key inputs.{name}: follows from the given speed; give that alone")
+                raise InputError("follows from the given speed; give that alone", f"inputs.{name}")
             if channel.interpolation == "hold" and name.endswith("_given_speed"):
-                raise InputError(f'key inputs.{name}.interpolation: "hold" would make the speed jump; leave it out')
+                raise InputError('"hold" would make the speed jump; leave it out', f"inputs.{name}.interpolation")
             if channel.smoothing > 0.0 and not name.endswith("_given_speed"):
-                raise InputError(f"key inputs.{name}.smoothing: is of a given speed alone; give filter_time")
+                raise InputError("is of a given speed alone; give filter_time", f"inputs.{name}.smoothing")
             if name not in self._signals():
                 meant = did_you_mean(name, self._signals(), f"what acts on the rig is {', '.join(self._signals())}")
-                raise InputError(f"key inputs.{name}: is nothing that acts on {task.scenario}; {meant}")
+                raise InputError(f"is nothing that acts on {task.scenario}; {meant}", f"inputs.{name}")
         for name, m in task.measured.items():
             if m.variable not in self.units:
                 meant = did_you_mean(m.variable, self.units, f"its variables are {', '.join(self.units)}")
                 raise InputError(
-                    f"key measured.{name}.variable: {m.variable!r} is no variable of {task.scenario}; {meant}"
+                    f"{m.variable!r} is no variable of {task.scenario}; {meant}", f"measured.{name}.variable"
                 )
             if isinstance(m.resolution, float) and m.resolution < 0.0:
-                raise InputError(f"key measured.{name}.resolution: {m.resolution:g} must be at least 0")
+                raise InputError(f"{m.resolution:g} must be at least 0", f"measured.{name}.resolution")
         table, _, gear = task.record.partition(".")
         if task.record and (table != "gear" or gear not in self.scenario.gears):
             raise InputError(
-                f"key record: {task.record!r} must be gear.NAME with one of {', '.join(self.scenario.gears) or 'no gear'}"
+                f"{task.record!r} must be gear.NAME with one of {', '.join(self.scenario.gears) or 'no gear'}", "record"
             )
         self._formulas: dict[tuple[int, int], dict[str, Any]] = {}
         self._keys: dict[tuple[str, int, int], list[str]] = {}
@@ -142,7 +142,8 @@ class Rig:
         for table, name in [*sought, *(("nuisance", name) for name in task.nuisance)]:
             if name not in entered:
                 raise InputError(
-                    f"key {table}.{name}: enters no formula of set, phases, ladder, inputs or measured; name it there, or leave it out"
+                    "enters no formula of set, phases, ladder, inputs or measured; name it there, or leave it out",
+                    f"{table}.{name}",
                 )
 
     def rungs(self) -> tuple[Rung, ...]:
@@ -313,4 +314,4 @@ def _value(node: Any, values: Mapping[str, Any], key: str) -> Any:
     try:
         return node.value(values)
     except ValueError as problem:
-        raise InputError(f"key set.{key}: {problem}") from None
+        raise InputError(problem, f"set.{key}") from None

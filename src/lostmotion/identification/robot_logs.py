@@ -78,7 +78,7 @@ def read_mcap_log(path: Path, *, time: str = "") -> Log:
         kinds = listed(sorted(set(recording.left_out.values()))) or "no message"
         raise InputError(
             f"has no topic in JSON or of ROS ({kinds}); record in one of these, or write its topics as CSV",
-            where=str(path),
+            where=path,
         )
     return _log(path, recording, time)
 
@@ -97,7 +97,7 @@ def read_ros_bag(path: Path, *, time: str = "") -> Log:
     need("rosbags", "Reading bags of ROS", "identify")
     recording = _read_bag(path)
     if not recording.topics:
-        raise InputError("has no message; record it again", where=str(path))
+        raise InputError("has no message; record it again", where=path)
     return _log(path, recording, time)
 
 
@@ -110,7 +110,7 @@ def _log(path: Path, recording: Recording, time: str) -> Log:
     stamped = topic not in topics and topic.endswith(STAMP)
     topic = topic.removesuffix(STAMP) if stamped else topic
     if topic not in topics:
-        raise InputError(f"has no topic {topic}; its topics are {listed(topics)}", where=str(path))
+        raise InputError(f"has no topic {topic}; its topics are {listed(topics)}", where=path)
     instants = np.array([at for at, _ in topics[topic]], dtype=np.int64)
     clock = _stamps(path, topic, topics[topic]) if stamped else instants
     long: set[str] = set()
@@ -120,7 +120,7 @@ def _log(path: Path, recording: Recording, time: str) -> Log:
         for name, course in _courses(path, of, rows, long).items()
     }
     if not channels:
-        raise InputError(f"the messages of {listed(topics)} have no number", where=str(path))
+        raise InputError(f"the messages of {listed(topics)} have no number", where=path)
     log = Log(path.name, 1e-9 * (clock - clock[0]), channels, recording.header)
     if recording.left_out:
         kinds = ", ".join(f"{t} ({e})" for t, e in recording.left_out.items())
@@ -340,7 +340,7 @@ def _decoded(path: Path, topic: str, decode: Callable[[bytes], Any], data: bytes
         return decode(data)
     except Exception as error:  # of what the message is not
         raise InputError(
-            f"topic {topic}: a message cannot be read ({reason(error)}); record it again", where=str(path)
+            f"topic {topic}: a message cannot be read ({reason(error)}); record it again", where=path
         ) from None
 
 
@@ -354,7 +354,7 @@ def _stamps(path: Path, topic: str, rows: list[tuple[int, Any]]) -> np.ndarray:
             raise InputError(
                 f"topic {topic}: message {k + 1} has no header.stamp with sec and nanosec; "
                 f"give logs.time = {topic!r} for the times of its messages",
-                where=str(path),
+                where=path,
             )
         out[k] = 1_000_000_000 * seconds + rest
     return out
@@ -383,7 +383,7 @@ def _shallow(path: Path, topic: str, message: Any, long: set[str]) -> Iterator[t
     except RecursionError:
         raise InputError(
             f"topic {topic}: a message has more than {MOST_LEVELS} lists and objects inside of each other",
-            where=str(path),
+            where=path,
         ) from None
 
 

@@ -40,22 +40,20 @@ def read_servo_json(path: Path, *, time: str = "") -> Log:
     except InputError:
         raise
     except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", where=str(path)) from None
+        raise InputError(f"cannot be read: {error.strerror}", where=path) from None
     except RecursionError:
-        raise InputError("is not a log, its lists are too deep; leave the file out", where=str(path)) from None
+        raise InputError("is not a log, its lists are too deep; leave the file out", where=path) from None
     except ValueError as error:  # of the encoding, of JSON, or of a number of thousands of digits
         raise InputError(
-            f"is not JSON ({reason(error)}); it may have been cut off, record or copy it again", where=str(path)
+            f"is not JSON ({reason(error)}); it may have been cut off, record or copy it again", where=path
         ) from None
     if not isinstance(data, dict) or not isinstance(data.get("entries"), list):
-        raise InputError(
-            "has no list entries; a servo log is an object with entries, one for each instant", where=str(path)
-        )
+        raise InputError("has no list entries; a servo log is an object with entries, one for each instant", where=path)
     entries = data["entries"]
     if not entries:
-        raise InputError("key entries: is empty; leave the file out", where=str(path))
+        raise InputError("is empty; leave the file out", "entries", where=path)
     if not all(isinstance(entry, dict) for entry in entries):
-        raise InputError("key entries: must be objects, each with a timestamp", where=str(path))
+        raise InputError("must be objects, each with a timestamp", "entries", where=path)
     header = {key.replace("-", "_"): as_number(value) for key, value in data.items() if key != "entries"}
     step = header.get("dt")
     if clock in entries[0]:
@@ -64,7 +62,7 @@ def read_servo_json(path: Path, *, time: str = "") -> Log:
         times = step * np.arange(len(entries))
     else:
         raise InputError(
-            f"entries[0] lacks {clock}; add it to each entry, or the interval dt [s] to the header", where=str(path)
+            f"entries[0] lacks {clock}; add it to each entry, or the interval dt [s] to the header", where=path
         )
     keys = [key for key in entries[0] if key != clock and any(_is_number(entry.get(key)) for entry in entries)]
     channels = {key: Channel(_column(path, entries, key)) for key in keys}
@@ -87,11 +85,11 @@ def _column(path: Path, entries: list[dict[str, Any]], key: str) -> np.ndarray:
     for k, entry in enumerate(entries):
         if key not in entry:
             raise InputError(
-                f"entries[{k}] lacks {key}, which entries[0] has; remove the entry, or add the value", where=str(path)
+                f"entries[{k}] lacks {key}, which entries[0] has; remove the entry, or add the value", where=path
             )
         value = entry[key]
         if value is not None and not _is_number(value):
-            raise InputError(f"entries[{k}].{key}: {value!r} is not a number; put one there, or null", where=str(path))
+            raise InputError(f"entries[{k}].{key}: {value!r} is not a number; put one there, or null", where=path)
         try:
             out[k] = np.nan if value is None else float(value)
         except OverflowError:

@@ -62,11 +62,11 @@ def _of_book(path: Path, book: Any, clock: str) -> Log:
         try:
             log = table_log(path, _chained(first, rows), _number, comments, clock)
         except UnreadError as problem:
-            raise InputError(f"sheet {sheet.title}, row {problem.row}: {problem}", where=str(path)) from None
+            raise InputError(f"sheet {sheet.title}, row {problem.row}: {problem}", where=path) from None
         others = [s.title for s in book.worksheets if s is not sheet]
         note = f"sheet {sheet.title} is read; left out are {listed(others)}"
         return log.noted(note) if others else log
-    raise InputError("has no sheet with values; save the log in the first sheet", where=str(path))
+    raise InputError("has no sheet with values; save the log in the first sheet", where=path)
 
 
 def _chained(first: Row, rows: Iterator[Row]) -> Iterator[Row]:
@@ -150,7 +150,7 @@ class _Part:
             parser.Parse(b"", True)
 
     def _refuse(self, *_: Any) -> None:
-        raise InputError(f"{self.name}: defines entities, which no workbook does; save it again", where=str(self.path))
+        raise InputError(f"{self.name}: defines entities, which no workbook does; save it again", where=self.path)
 
     def _begin(self, tag: str, attributes: dict[str, str]) -> None:
         tag = tag.rpartition(" ")[2]
@@ -162,7 +162,7 @@ class _Part:
             row = int(float(attributes.get("r", self._row + 1)))
             if not self._row < row <= MOST_ROWS:
                 raise InputError(
-                    f"{self.name}: row {row} comes after row {self._row}; save the file again", where=str(self.path)
+                    f"{self.name}: row {row} comes after row {self._row}; save the file again", where=self.path
                 )
             self._row = row
         elif not self._in_row:
@@ -173,7 +173,7 @@ class _Part:
             self.cells += 1
             if self._column > MOST_COLUMNS:
                 raise InputError(
-                    f"{self.name}: row {self._row} has a cell {letters}; save the file again", where=str(self.path)
+                    f"{self.name}: row {self._row} has a cell {letters}; save the file again", where=self.path
                 )
             self._formula, self._value = False, attributes.get("t") == "str"
         self._formula = self._formula or tag == "f"
@@ -192,7 +192,7 @@ class _Part:
             raise InputError(
                 f"{self.name}: row {self._row} has a formula without its value; open the file in a spreadsheet "
                 "program, and save it",
-                where=str(self.path),
+                where=self.path,
             )
         self._in_value = False
 

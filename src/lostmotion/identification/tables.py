@@ -124,14 +124,14 @@ def table_log(
     stamps = Stamps()
     table = _numbers(names, place, stamps, number, itertools.chain(ahead, rows))
     if len(table) < 2:
-        raise InputError(f"has {len(table)} rows of values; a log needs two rows at least", where=str(path))
+        raise InputError(f"has {len(table)} rows of values; a log needs two rows at least", where=path)
     header, units = _header(comments, number)
     units |= {name: unit for name, unit in columns if unit is not None}
     values = table[:, place]
     if stamps.count:
         if stamps.count < np.sum(np.isfinite(values)):
             raise InputError(
-                f"column {shortened(names[place])} has time stamps and numbers; write all alike", where=str(path)
+                f"column {shortened(names[place])} has time stamps and numbers; write all alike", where=path
             )
         if not stamps.zoned:
             notes.append("its time stamps have no zone; they are taken to be of one clock that is not set meanwhile")
@@ -241,9 +241,7 @@ def _time_column(row: int, names: list[str], wanted: str) -> int:
 
 def _seconds(path: Path, unit: str) -> float:
     if unit.strip() not in SECONDS:
-        raise InputError(
-            f"the unit {unit!r} of the time is none of {', '.join(filter(None, SECONDS))}", where=str(path)
-        )
+        raise InputError(f"the unit {unit!r} of the time is none of {', '.join(filter(None, SECONDS))}", where=path)
     return SECONDS[unit.strip()]
 
 

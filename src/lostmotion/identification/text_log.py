@@ -72,9 +72,9 @@ def read_text_log(path: Path, *, time: str = "", decimal: str = "") -> Log:
     try:
         text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", where=str(path)) from None
+        raise InputError(f"cannot be read: {error.strerror}", where=path) from None
     except UnicodeDecodeError as error:
-        raise InputError(f"is not UTF-8 text (byte {error.start}); save it as CSV in UTF-8", where=str(path)) from None
+        raise InputError(f"is not UTF-8 text (byte {error.start}); save it as CSV in UTF-8", where=path) from None
     cells = max(map(text.count, ",;\t ")) + text.count("\n") + 1
     check_memory(2 * sys.getsizeof(text) + PER_CELL * cells, str(path))
     problems: list[UnreadError] = []
@@ -90,7 +90,7 @@ def read_text_log(path: Path, *, time: str = "", decimal: str = "") -> Log:
             continue
         return log if decimal else _announced(path, log, reading)
     worst = max(problems, key=lambda problem: problem.row)
-    raise InputError(f"{f'line {worst.row}: ' if worst.row else ''}{worst}", where=str(path))
+    raise InputError(f"{f'line {worst.row}: ' if worst.row else ''}{worst}", where=path)
 
 
 def _announced(path: Path, log: Log, reading: Reading) -> Log:
@@ -102,7 +102,7 @@ def _announced(path: Path, log: Log, reading: Reading) -> Log:
         raise InputError(
             f"line {line}: {cell!r} may have a decimal comma, or one between thousands; "
             'give logs.decimal = ",", or write it without commas between thousands',
-            where=str(path),
+            where=path,
         )
     note = f'its commas are read as decimal commas, such as {cell!r} in line {line}; logs.decimal = "," says so'
     return replace(log, notes=(note, *log.notes))

@@ -51,17 +51,17 @@ def _collect(path: Path, group: Any, where: str, found: dict[str, Any], depth: i
     for name in group:
         at = f"{where}{name}"
         if not isinstance(group.get(name, getlink=True), h5py.HardLink):
-            raise InputError(f"{at}: is a link to another place or file; save the data itself", where=str(path))
+            raise InputError(f"{at}: is a link to another place or file; save the data itself", where=path)
         node = group[name]
         if isinstance(node, h5py.Group) and depth > 0:
             _collect(path, node, f"{at}/", found, depth - 1, seen)
         elif isinstance(node, h5py.Group) and where:
             raise InputError(
-                f"{at}: is a group within too many others; save its datasets nearer to the root", where=str(path)
+                f"{at}: is a group within too many others; save its datasets nearer to the root", where=path
             )
         elif isinstance(node, h5py.Dataset):
             if node.is_virtual or node.external:
-                raise InputError(f"{at}: refers to data in other files; save the data itself", where=str(path))
+                raise InputError(f"{at}: refers to data in other files; save the data itself", where=path)
             found[at] = node
 
 
@@ -78,9 +78,7 @@ def _check_filters(path: Path, node: Any, limit: int) -> None:
     properties = node.id.get_create_plist()
     used = {properties.get_filter(k)[0] for k in range(properties.get_nfilters())}
     if not used <= FILTERS:
-        raise InputError(
-            f"{node.name}: is compressed by a filter other than deflate; save it with deflate", where=str(path)
-        )
+        raise InputError(f"{node.name}: is compressed by a filter other than deflate; save it with deflate", where=path)
     if DEFLATE not in used:
         return
     for k in range(node.id.get_num_chunks()):
@@ -95,5 +93,5 @@ def _check_filters(path: Path, node: Any, limit: int) -> None:
                 continue  # the library reports it
             if made > announced:
                 raise InputError(
-                    f"{node.name}: has a chunk that is longer than it announces; save it again", where=str(path)
+                    f"{node.name}: has a chunk that is longer than it announces; save it again", where=path
                 )

@@ -140,5 +140,5 @@ def read_text(path: Path, *, per_byte: float = PER_BYTE, default: int = LOG) -> 
             length = path.stat().st_size
             if length > room:
                 check_memory(per_byte * length, str(path), default)
-            raise InputError(f"does not end after {shown_size(room)}; name a file that ends", where=str(path))
+            raise InputError(f"does not end after {shown_size(room)}; name a file that ends", where=path)
     return content.decode("utf-8-sig")

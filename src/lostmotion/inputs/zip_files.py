@@ -24,17 +24,17 @@ def members(path: Path, archive: zipfile.ZipFile, limit: int = LOG) -> dict[str,
     found = archive.infolist()
     if len(found) > MOST:
         raise InputError(
-            f"has {len(found)} members; {MOST} at most are read, leave out those that are no data", where=str(path)
+            f"has {len(found)} members; {MOST} at most are read, leave out those that are no data", where=path
         )
     check_memory(float(sum(member.file_size for member in found)), str(path), limit)
     for member in found:
         if member.flag_bits & ENCRYPTED:
-            raise InputError(f"{member.filename}: is encrypted; save the file without a password", where=str(path))
+            raise InputError(f"{member.filename}: is encrypted; save the file without a password", where=path)
         if member.compress_type not in METHODS:
             raise InputError(
                 f"{member.filename}: is compressed by a method other than deflate; save it with deflate",
-                where=str(path),
+                where=path,
             )
     if len({member.filename for member in found}) < len(found):
-        raise InputError("has two members of one name; save it again", where=str(path))
+        raise InputError("has two members of one name; save it again", where=path)
     return {member.filename: member for member in found}

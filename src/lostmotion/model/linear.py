@@ -196,8 +196,7 @@ class ScrewData(described.ScrewDataFields, LinearDrive):
                 )
         if (self.supported_length is None) != (self.core_diameter is None):
             raise InputError(
-                "one of them is missing; the stiffness of the screw needs both",
-                keys=("supported_length", "core_diameter"),
+                "one of them is missing; the stiffness of the screw needs both", "supported_length", "core_diameter"
             )
         series = [k for k in ("nut_stiffness", "bearing_stiffness", "supported_length") if getattr(self, k) is not None]
         for key in ("stiffness", "stiffness_curve"):
@@ -208,7 +207,7 @@ class ScrewData(described.ScrewDataFields, LinearDrive):
                 if getattr(self, key) is not None:
                     raise ValueError(f"has {key}, which belongs to supported_length and core_diameter; add them")
         if (self.diameter is None) != (self.length is None):
-            raise InputError("one of them is missing; the inertia of the screw needs both", keys=("diameter", "length"))
+            raise InputError("one of them is missing; the inertia of the screw needs both", "diameter", "length")
         if self.diameter is not None and self.inertia > 0.0:
             raise ValueError("has inertia and diameter, which say the same; give one")
         if self.diameter is None and self.density is not None:

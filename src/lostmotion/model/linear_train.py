@@ -57,19 +57,13 @@ class LinearElements(TrainElements):
         """
         for name in slides:
             if name in shafts:
-                raise InputError(
-                    "have the same name; rename one of them",
-                    keys=(f"shafts.{name}", f"slides.{name}"),
-                )
+                raise InputError("have the same name; rename one of them", f"shafts.{name}", f"slides.{name}")
         seen: dict[str, str] = {}
         for table in ("gears", *LINEAR_DRIVES, "motors", "linear_motors"):
             for name in getattr(self, table):
                 kind = "motor" if table in ("motors", "linear_motors") else "gear"
                 if (before := seen.setdefault(f"{kind} {name}", table)) != table:
-                    raise InputError(
-                        "have the same name; rename one of them",
-                        keys=(f"{before}.{name}", f"{table}.{name}"),
-                    )
+                    raise InputError("have the same name; rename one of them", f"{before}.{name}", f"{table}.{name}")
         for table in LINEAR_DRIVES:
             for name, drive in getattr(self, table).items():
                 _need(f"{table}.{name}.input", drive.input, shafts, slides, "shaft", "slide")
@@ -85,7 +79,7 @@ class LinearElements(TrainElements):
                     "gravity": f"give slides.{shaft}.inclination",
                     "springs": f"give slides.{shaft}.end_stops, or put it on a shaft",
                 }.get(table, "put it on a shaft")
-                raise InputError(f"{shown(shaft)} is a slide, and this acts on shafts, in N*m; {remedy}", keys=(key,))
+                raise InputError(f"{shown(shaft)} is a slide, and this acts on shafts, in N*m; {remedy}", key)
 
     def plain_elements(self, slides: Mapping[str, Any]) -> dict[str, Any]:
         """Tables of the drive train without its shafts: screws, racks and belts as gears, linear motors as sources of torque."""
@@ -117,9 +111,9 @@ def _need(key: str, name: str, wanted: Mapping[str, Any], other: Mapping[str, An
     if name in wanted:
         return
     if name in other:
-        raise InputError(f"{shown(name)} is a {not_what}; give the name of a {what}", keys=(key,))
+        raise InputError(f"{shown(name)} is a {not_what}; give the name of a {what}", key)
     known = f"the {what}s are {', '.join(wanted)}" if wanted else f"there is none; add [{what}s.{name}]"
-    raise InputError(f"{shown(name)} is no {what}; {did_you_mean(name, wanted, known)}", keys=(key,))
+    raise InputError(f"{shown(name)} is no {what}; {did_you_mean(name, wanted, known)}", key)
 
 
 def _with_friction(shaft: Shaft, torque: float) -> Shaft:

@@ -66,7 +66,7 @@ class Elastic(Part):
         if not curve.odd:
             raise InputError(
                 "differs between the two directions of twist, and here one curve is taken for both; make them the same",
-                keys=("stiffness",),
+                "stiffness",
             )
         return curve.side(forward=True)
 

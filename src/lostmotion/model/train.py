@@ -49,7 +49,7 @@ class TrainElements(Part):
         """
         if fault := core.check():
             table, name, reason = fault
-            raise InputError(reason, keys=(self.key_of(table, name),) if table else ())
+            raise InputError(reason, *((self.key_of(table, name),) if table else ()))
 
     def commanded(self) -> list[str]:
         """Names of what has a command: motors, brakes and friction clutches."""
@@ -128,7 +128,7 @@ class DriveTrain(TrainElements):
         for name, mass in self.mass_matrices.items():
             for one, other, _ in mass.couples():
                 if one in shafts or other in shafts:
-                    raise InputError(f"couples {other} and {one}; {what}", keys=(f"mass_matrices.{name}",))
+                    raise InputError(f"couples {other} and {one}; {what}", f"mass_matrices.{name}")
 
     def inertia_couplings(self) -> list[tuple[str, str, float]]:
         """(one, other, entry) of all that mass matrices couple, each pair once."""
@@ -198,18 +198,17 @@ class DriveTrain(TrainElements):
 
     @model_validator(mode="after")
     def _hangs_together(self) -> Self:
+        known = f"the shafts are {', '.join(self.shafts)}"
         unknown = [
-            f"key {key}: {shown(shaft)} is no shaft; "
-            + did_you_mean(shaft, self.shafts, f"the shafts are {', '.join(self.shafts)}")
+            (f"{shown(shaft)} is no shaft; {did_you_mean(shaft, self.shafts, known)}", key)
             for key, shaft in self.references()
             if shaft not in self.shafts
         ]
         if unknown:
-            raise InputError(unknown[0] + (f"; and {len(unknown) - 1} more" if len(unknown) > 1 else ""))
+            raise InputError(*unknown[0], more=len(unknown) - 1)
         if twice := [name for name in self.gravity if name in self.angle_torques]:
             raise InputError(
-                "have the same name; rename one of them",
-                keys=(f"gravity.{twice[0]}", f"angle_torques.{twice[0]}"),
+                "have the same name; rename one of them", f"gravity.{twice[0]}", f"angle_torques.{twice[0]}"
             )
         self.check(self.core(self.shafts))
         return self

@@ -276,8 +276,8 @@ def _check(scenario: Scenario, after: float) -> None:
     for motor, controller in scenario.axes().items():
         if controller.reference.kind != "position":
             raise InputError(
-                f"key controllers.{motor}.reference.kind: {shown(controller.reference.kind)} is not what an axis points by; "
-                'take "position"'
+                f'{shown(controller.reference.kind)} is not what an axis points by; take "position"',
+                f"controllers.{motor}.reference.kind",
             )
     if not 0.0 <= after < scenario.simulation.duration:
         raise InputError(

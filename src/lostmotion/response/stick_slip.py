@@ -123,7 +123,8 @@ def _motor(scenario: Scenario) -> str:
     ((motor, controller),) = found.items()
     if controller.reference.kind != "position":
         raise InputError(
-            f"controllers.{motor}.reference.kind: {controller.reference.kind}; the map is that of a position controller"
+            f"{controller.reference.kind}; the map is that of a position controller",
+            f"controllers.{motor}.reference.kind",
         )
     return motor
 

@@ -203,7 +203,7 @@ def certified(axis: Axis, rests: Callable[[], bool], largest_error: float | None
     train, kind = axis.scenario, axis.controller.reference.kind
     if kind != "position":
         raise InputError(
-            f"controllers.{axis.motor}.reference.kind: {kind}; the certificate is that of a position controller"
+            f"{kind}; the certificate is that of a position controller", f"controllers.{axis.motor}.reference.kind"
         )
     if name := moving_input(train):
         raise InputError(

@@ -172,7 +172,8 @@ def sampled_slip(axis: Axis) -> SampledSlip:
     controller, train = axis.controller, axis.train
     if controller.reference.kind != "position":
         raise InputError(
-            f"controllers.{axis.motor}.reference.kind: {controller.reference.kind}; the map is that of a position controller"
+            f"{controller.reference.kind}; the map is that of a position controller",
+            f"controllers.{axis.motor}.reference.kind",
         )
     if reasons := [*others(train), *_nonlinear(axis)]:
         raise UndecidableError(f"the slip is not one linear regime: it has {', '.join(reasons)}")

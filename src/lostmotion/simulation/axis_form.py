@@ -45,17 +45,17 @@ def long_form(tables: Mapping[str, Any]) -> dict[str, Any]:
     for key in tables:
         if key not in ("axis", *BESIDE):
             meant = did_you_mean(key, ("axis", *BESIDE), f"beside [axis] there may be {', '.join(BESIDE)}")
-            raise InputError(f"is not allowed beside [axis]; {meant}", keys=(key,))
+            raise InputError(f"is not allowed beside [axis]; {meant}", key)
     axis = tables["axis"]
     parts = (MOTOR, GEARBOX, *DRIVES, SLIDE)
     all_parts = f"they are {', '.join(parts)}"
     if not isinstance(axis, Mapping):
-        raise InputError(f"{shown(axis)} must be a table with {', '.join(parts)}", keys=("axis",))
+        raise InputError(f"{shown(axis)} must be a table with {', '.join(parts)}", "axis")
     for key, value in axis.items():
         if key not in parts:
-            raise InputError(f"is no part of an axis; {did_you_mean(key, parts, all_parts)}", keys=(f"axis.{key}",))
+            raise InputError(f"is no part of an axis; {did_you_mean(key, parts, all_parts)}", f"axis.{key}")
         if not isinstance(value, Mapping | str) or (isinstance(value, str) and key == SLIDE):
-            raise InputError(f"{shown(value)} must be a table", keys=(f"axis.{key}",))
+            raise InputError(f"{shown(value)} must be a table", f"axis.{key}")
     given = [kind for kind in DRIVES if kind in axis]
     if len(given) != 1:
         what = (
@@ -63,15 +63,12 @@ def long_form(tables: Mapping[str, Any]) -> dict[str, Any]:
             if given
             else f"lacks what moves the slide; add one of {', '.join(DRIVES)}"
         )
-        raise InputError(what, keys=("axis",))
+        raise InputError(what, "axis")
     for key in (MOTOR, SLIDE):
         if key not in axis:
-            raise InputError("is missing; add it", keys=(f"axis.{key}",))
+            raise InputError("is missing; add it", f"axis.{key}")
     if "controller" in tables and "command" in tables:
-        raise InputError(
-            "both turn the motor; leave one of them out",
-            keys=("command", "controller"),
-        )
+        raise InputError("both turn the motor; leave one of them out", "command", "controller")
     (kind,) = given
     table = {key: {"from": value} if isinstance(value, str) else dict(value) for key, value in axis.items()}
     shaft = MOTOR

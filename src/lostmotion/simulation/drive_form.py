@@ -81,7 +81,7 @@ def _check_continuous(tables: Mapping[str, Any]) -> None:
                 if key == "command"
                 else "a continuous controller is simulated, not judged for a task"
             )
-            raise InputError(f"keys {key}, controller: {why}; leave one of them out")
+            raise InputError(f"{why}; leave one of them out", key, "controller")
 
 
 def _without_load(initial: Any, angle: bool) -> Any:

@@ -185,7 +185,7 @@ def check_drive(scenario: Whole, written: DriveTables) -> None:
     if motor.kind == "torque_source" and written.initial.motor_torque != 0.0:
         raise ValueError("has initial.motor_torque, but a torque source has no such state; use command")
     if written.controller is not None and written.command != CommandSignal():
-        raise InputError("both turn the motor; leave one of them out", keys=("command", "controller"))
+        raise InputError("both turn the motor; leave one of them out", "command", "controller")
     check_torques(scenario.axes(), {MOTOR: written.initial.motor_torque}, "initial.motor_torque")
     scenario.control()
 

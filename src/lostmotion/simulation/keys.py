@@ -62,7 +62,7 @@ def set_values(data: dict[str, Any], changes: Iterable[tuple[str, Any]]) -> None
 
     for key, value in sorted(changes, key=rank):
         if key.count(".") > MAX_LEVELS:
-            raise InputError(f"key {shortened(key)}: has more than {MAX_LEVELS} levels; no table is as deep")
+            raise InputError(f"has more than {MAX_LEVELS} levels; no table is as deep", shortened(key))
         _change_what_follows(data, key, value, given, own)
         first, *rest = key.split(".")
         data[first] = _changed(data.get(first), rest, value, first, signals, own)
@@ -134,11 +134,11 @@ def _changed(node: Any, keys: list[str], value: Any, where: str, signals: re.Pat
         try:
             place = list_index(entries, key)
         except ValueError as error:
-            raise InputError(f"key {inner}: {error}") from None
+            raise InputError(error, inner) from None
         entries[place] = _changed(entries[place], rest, value, inner, signals, own)
         return entries
     if node is not None and not isinstance(node, dict):
-        raise InputError(f"key {inner}: {where} is the value {shown(node)}, not a table; it has no {key}")
+        raise InputError(f"{where} is the value {shown(node)}, not a table; it has no {key}", inner)
     fields = own.of(node or {})
     fields[key] = _changed(fields.get(key), rest, value, inner, signals, own)
     return fields

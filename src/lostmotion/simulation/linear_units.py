@@ -64,7 +64,7 @@ def _masses_in_si(name: str, mass: Any, slides: Mapping[str, Any]) -> Any:
         try:
             return Unit(unit).read(value)
         except ValueError as error:
-            raise InputError(f"{shown(value)} {error}", keys=(f"mass_matrices.{name}.matrix.{a}.{b}",)) from None
+            raise InputError(f"{shown(value)} {error}", f"mass_matrices.{name}.matrix.{a}.{b}") from None
 
     def row_in_si(a: int, row: Any) -> Any:
         return [read(a, b, value) for b, value in enumerate(row)] if isinstance(row, list | tuple) else row
@@ -148,7 +148,7 @@ class _Reader:
             return Unit(wanted).read(value) if wanted else value
         except ValueError as error:
             key = ".".join(("controllers", self.name, *map(str, path)))
-            raise InputError(f"{shown(value)} {error}", keys=(key,)) from None
+            raise InputError(f"{shown(value)} {error}", key) from None
 
     def _units(self, path: tuple[int | str, ...]) -> Iterator[str]:
         """SI units that a key has for a shaft, by the kinds of the tables around it."""

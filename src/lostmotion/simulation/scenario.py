@@ -443,7 +443,7 @@ class Scenario:
             if name not in known:
                 meant = did_you_mean(name, known, f"they are {', '.join(known) or 'none'}")
                 raise InputError(
-                    f"is no state of a controller of this train; {meant}", keys=(f"initial.controller_states.{name}",)
+                    f"is no state of a controller of this train; {meant}", f"initial.controller_states.{name}"
                 )
         return values | state.controller_states
 

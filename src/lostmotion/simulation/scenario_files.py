@@ -130,20 +130,22 @@ def _read(path: Path, including: tuple[Path, ...]) -> dict[str, Any]:
     data = read_toml(path, "a scenario")
     real = Path(os.path.realpath(path))
     if real in including:
-        raise InputError(f"{path}: key base: leads back to this file; break the circle")
+        raise InputError("leads back to this file; break the circle", "base", where=path)
     if len(including) > MAX_BASES:
-        raise InputError(f"{path}: key base: is the base of {MAX_BASES} files after one another; join some of them")
+        raise InputError(f"is the base of {MAX_BASES} files after one another; join some of them", "base", where=path)
     read_series_files(data, path, units_of_series)
     _find_records(data, path.parent)
     if "base" not in data:
         return data
     base = data.pop("base")
     if not isinstance(base, str):
-        raise InputError(f"{path}: key base: {shown(base)} must be the name of a scenario file")
+        raise InputError(f"{shown(base)} must be the name of a scenario file", "base", where=path)
     if Path(base).suffix in RESULTS:
         raise InputError(
-            f"{path}: key base: {shown(base)} has the ending of a saved result; name a scenario file (.toml), or change the result by "
-            f"`lostmotion run {base} --set KEY=VALUE`"
+            f"{shown(base)} has the ending of a saved result; name a scenario file (.toml), or change the result by "
+            f"`lostmotion run {base} --set KEY=VALUE`",
+            "base",
+            where=path,
         )
     based = _read(find_base(base, path), (*including, real))
     with prefixed(path):
@@ -222,14 +224,20 @@ def read_series_files(
         if not units or (len(units) > 1 and place != where):
             continue  # there is no such key, or no such kind: refused when the scenario is made
         name = value.pop("file")
-        problem = f"{path}: key {'.'.join(where)}.file"
+        at = f"{'.'.join(where)}.file"
         if points := [key for key in ("times", "values") if key in value]:
-            raise InputError(f"{problem}: {shown(name)} leaves no room for {', '.join(points)}; give the file alone")
+            raise InputError(
+                f"{shown(name)} leaves no room for {', '.join(points)}; give the file alone", at, where=path
+            )
         if not isinstance(name, str):
-            raise InputError(f"{problem}: {shown(name)} must be the name of a CSV file with columns time [s] and value")
+            raise InputError(
+                f"{shown(name)} must be the name of a CSV file with columns time [s] and value", at, where=path
+            )
         if len(units) > 1:
-            raise InputError(f"{problem}: {shown(name)} may hold {' or '.join(units)}; give {'.'.join(keys)}.kind too")
-        with prefixed(problem):
+            raise InputError(
+                f"{shown(name)} may hold {' or '.join(units)}; give {'.'.join(keys)}.kind too", at, where=path
+            )
+        with prefixed(f"{path}: key {at}"):
             value["times"], value["values"] = read_series(path.parent / name, units[0])
 
 

@@ -212,7 +212,7 @@ def run_cases(
     for row in _core.run_sensitive_trains(cases, channels, signals=signals, threads=threads):
         parameter, reason = row.pop("problem")
         if reason:
-            raise InputError(reason, keys=(parameter,) if parameter else (), where="sensitivities")
+            raise InputError(reason, *((parameter,) if parameter else ()), where="sensitivities")
         out.append(CoreDerivatives(**row))
     return out
 

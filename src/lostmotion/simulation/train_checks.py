@@ -42,12 +42,11 @@ def check_train(scenario: Whole) -> None:
 
 def _check_shafts(tables: TrainTables) -> None:
     if not tables.shafts and not tables.slides:
-        raise InputError("there is neither a shaft nor a slide; add [shafts.NAME] or [slides.NAME]", keys=("shafts",))
+        raise InputError("there is neither a shaft nor a slide; add [shafts.NAME] or [slides.NAME]", "shafts")
     for name, shaft in tables.shafts.items():
         if shaft.domain != "rotation":
             raise InputError(
-                f"is translation; write the slide as [slides.{name}], with its mass",
-                keys=(f"shafts.{name}.domain",),
+                f"is translation; write the slide as [slides.{name}], with its mass", f"shafts.{name}.domain"
             )
     tables.check_places(tables.shafts, tables.slides)
     for name, mass in tables.mass_matrices.items():
@@ -57,7 +56,8 @@ def _check_shafts(tables: TrainTables) -> None:
                     "the weight of a slide follows from its mass, "
                     "which the matrix holds; leave the inclination out and give the weight in slides."
                     f"{slide}.force",
-                    keys=(f"mass_matrices.{name}", f"slides.{slide}.inclination"),
+                    f"mass_matrices.{name}",
+                    f"slides.{slide}.inclination",
                 )
     for key, linear in LINEAR_INITIAL.items():
         of_slides = tables.linear_drives() if key in ("twists", "hysteresis_capacities") else tables.slides
@@ -65,36 +65,33 @@ def _check_shafts(tables: TrainTables) -> None:
             for name in getattr(tables.initial, given):
                 if (name in of_slides) == (given == key):
                     what = "moves along a straight line" if given == key else "is none that moves along a straight line"
-                    raise InputError(
-                        f"{shown(name)} {what}; give initial.{other}.{name}", keys=(f"initial.{given}.{name}",)
-                    )
+                    raise InputError(f"{shown(name)} {what}; give initial.{other}.{name}", f"initial.{given}.{name}")
 
 
 def _check_given(tables: TrainTables) -> None:
     for name in tables.given():
         key, shaft = tables.given_key(name), tables.movers()[name]
         if shaft.speed is not None and shaft.motion is not None:
-            raise InputError(
-                "both give the motion; leave one out",
-                keys=(f"{key.removesuffix('.motion')}.speed", key),
-            )
+            raise InputError("both give the motion; leave one out", f"{key.removesuffix('.motion')}.speed", key)
         if name in tables.initial.of_all("speeds"):
             how = "moves" if name in tables.slides else "turns"
             raise InputError(
                 f"both say how fast the {_kind(tables, name)} {how} at t = 0; leave the initial speed out",
-                keys=(key, tables.initial_key("speeds", name)),
+                key,
+                tables.initial_key("speeds", name),
             )
         if shaft.motion is None:
             continue
         if name in tables.initial.of_all("angles"):
             raise InputError(
                 f"both say where the {_kind(tables, name)} is at t = 0; leave the initial one out",
-                keys=(key, tables.initial_key("angles", name)),
+                key,
+                tables.initial_key("angles", name),
             )
         try:
             check_continuous(shaft.motion, "m" if name in tables.slides else "rad")
         except ValueError as problem:
-            raise InputError(str(problem), keys=(key,)) from None
+            raise InputError(str(problem), key) from None
 
 
 def _check_massless(scenario: Whole) -> None:
@@ -105,15 +102,13 @@ def _check_massless(scenario: Whole) -> None:
                 raise InputError(
                     f"{name} has no inertia, and its speed follows from the torques on it; leave "
                     "it out, or give an inertia",
-                    keys=(f"initial.{key}.{name}",),
+                    f"initial.{key}.{name}",
                 )
     for motor, controller in scenario.axes().items():
         encoders = [e.shaft for e in (controller.encoder, controller.position_encoder) if e is not None]
         for name in {train.motors[motor].shaft, tables.controlled(motor), *filter(None, encoders)}:
             if name in massless:
-                raise InputError(
-                    f"measures or turns {name}, which has no inertia; give it one", keys=(f"controllers.{motor}",)
-                )
+                raise InputError(f"measures or turns {name}, which has no inertia; give it one", f"controllers.{motor}")
 
 
 def _check_controllers(scenario: Whole) -> None:
@@ -122,11 +117,10 @@ def _check_controllers(scenario: Whole) -> None:
     for name in tables.controllers:
         if name not in motors:
             meant = did_you_mean(name, motors, f"the motors are {', '.join(motors) or 'none'}")
-            raise InputError(f"is no motor of this train; {meant}", keys=(f"controllers.{name}",))
+            raise InputError(f"is no motor of this train; {meant}", f"controllers.{name}")
         if name in tables.command:
             raise InputError(
-                "both turn the same motor; leave one of them out",
-                keys=(f"command.{name}", f"controllers.{name}"),
+                "both turn the same motor; leave one of them out", f"command.{name}", f"controllers.{name}"
             )
     check_torques(scenario.axes(), tables.initial.motor_torques, "initial.motor_torques.{}")
 
@@ -140,14 +134,14 @@ def _check_commands(scenario: Whole) -> None:
     for name in tables.command:
         if name not in known:
             meant = did_you_mean(name, known, f"those with a command are {', '.join(known) or 'none'}")
-            raise InputError(f"is no motor, brake or friction clutch of this train; {meant}", keys=(f"command.{name}",))
+            raise InputError(f"is no motor, brake or friction clutch of this train; {meant}", f"command.{name}")
     idle = [f"command.{name}" for name in known if name not in tables.command and name not in train.motors]
     if idle:
         verb = "is" if len(idle) == 1 else "are"
         reason = f"{verb} missing; add a number from 0 (open) to 1 (full torque), or a signal"
-        raise InputError(reason, keys=tuple(idle))
+        raise InputError(reason, *idle)
     for name in known:
         try:
             tables.acting(name)
         except ValueError as problem:
-            raise InputError(str(problem), keys=(f"command.{name}",)) from None
+            raise InputError(str(problem), f"command.{name}") from None

@@ -46,7 +46,7 @@ def start_values(train: DriveTrain, initial: TrainInitial, core: _core.Train | N
     _check("hysteresis_capacities", initial.hysteresis_capacities, lossy, "gear with hysteresis")
     _check("hysteresis_forces", initial.hysteresis_forces, lossy, "screw, rack or belt with hysteresis")
     if problem := (core or train.core(())).check_start([speeds.get(name, 0.0) for name in train.shafts]):
-        raise InputError(str(problem), keys=("initial.speeds",))
+        raise InputError(str(problem), "initial.speeds")
     _check_flanks(train, speeds, twists)
     values = {f"{name}_speed": v for name, v in speeds.items()}
     values |= {train.angle_of(s): v for s, v in angles_at_start(train, initial.of_all("angles"), twists).items()}
@@ -67,7 +67,7 @@ def _check_flanks(train: DriveTrain, speeds: Mapping[str, float], twists: Mappin
             raise InputError(
                 f"the flanks begin {'beyond' if abs(twist) > reach else 'with an impact at'} the end of "
                 f"their gap, {reach:g} rad; give a twist inside it",
-                keys=(f"initial.twists.{name}",),
+                f"initial.twists.{name}",
             )
 
 
@@ -76,7 +76,7 @@ def _check(key: str, given: Iterable[str], known: Iterable[str], what: str) -> N
     for name in given:
         if name not in known:
             meant = did_you_mean(name, known, f"there are {', '.join(known)}" if known else "there is none")
-            raise InputError(f"is no {what} of this train; {meant}", keys=(f"initial.{key}.{name}",))
+            raise InputError(f"is no {what} of this train; {meant}", f"initial.{key}.{name}")
 
 
 def angles_at_start(train: DriveTrain, given: Mapping[str, float], twists: Mapping[str, float]) -> dict[str, float]:
@@ -114,7 +114,7 @@ def angles_at_start(train: DriveTrain, given: Mapping[str, float], twists: Mappi
                 a, b = (f"{given[s]} {train.angle_unit(s)}" for s in (two, one))
                 raise InputError(
                     f"{a} does not fit {one} = {b} through the gear {name} and its twist; give one of them",
-                    keys=(f"initial.{key}.{two}",),
+                    f"initial.{key}.{two}",
                 )
     return angles
 

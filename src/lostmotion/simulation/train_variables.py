@@ -197,7 +197,5 @@ def check_names(
             tables = ("shafts", "slides", *LinearElements.model_fields)
             keys = [f"{table}.{name}" for table in tables for name in getattr(written or train, table, ())]
             both = [key for key in keys if variable.name.startswith(f"{key.partition('.')[2]}_")]
-            raise InputError(
-                f"keys {', '.join(both)}: have a result variable of the same name, {variable.name}; rename one of them"
-            )
+            raise InputError(f"have a result variable of the same name, {variable.name}; rename one of them", *both)
         seen.add(variable.name)

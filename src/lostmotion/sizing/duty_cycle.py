@@ -156,12 +156,14 @@ def duty_cycle(
         return found
     if period < found.duration * (1.0 - 1e-9):
         raise InputError(
-            f"task.cycle: {period:.6g} s is shorter than the motion of {found.duration:.6g} s; it is the period after which the "
-            "motion repeats, pause included"
+            f"{period:.6g} s is shorter than the motion of {found.duration:.6g} s; it is the period after which the "
+            "motion repeats, pause included",
+            "task.cycle",
         )
     if not rests and period > found.duration * (1.0 + 1e-9):
         raise InputError(
-            f"task.cycle: {period:.6g} s leaves a pause after the {found.duration:.6g} s of the run, but the motor still turns at "
-            "its end; lengthen simulation.duration until it rests, or leave task.cycle out"
+            f"{period:.6g} s leaves a pause after the {found.duration:.6g} s of the run, but the motor still turns at "
+            "its end; lengthen simulation.duration until it rests, or leave task.cycle out",
+            "task.cycle",
         )
     return found

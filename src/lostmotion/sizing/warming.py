@@ -194,8 +194,9 @@ def warm_up(
     """
     if scenario.axes():
         raise InputError(
-            f"warm_up: key {scenario.controller_key(next(iter(scenario.axes())))} is a sampled controller, whose state an update does "
-            "not keep; give commands, or a continuous controller"
+            "is a sampled controller, whose state an update does not keep; give commands, or a continuous controller",
+            scenario.controller_key(next(iter(scenario.axes()))),
+            where="warm_up",
         )
     name, driven = _motor(scenario, motor)
     if magnet_coefficient and driven.kind != "dc":

@@ -121,32 +121,28 @@ class AxisTask(Task, Duty):
     def _rules_are_known(self) -> Self:
         for rule in self.safety_factors:
             if rule not in SOURCES:
-                raise InputError(unknown_key(rule, list(SOURCES)), keys=(f"safety_factors.{rule}",))
+                raise InputError(unknown_key(rule, list(SOURCES)), f"safety_factors.{rule}")
         if self.gravity is not None and self.linear is not None:
-            raise InputError("is of a rotary load; give slide.inclination in its place", keys=("gravity",))
+            raise InputError("is of a rotary load; give slide.inclination in its place", "gravity")
         for k, payload in enumerate(self.payload):
             if payload.end > self.cycle * (1.0 + WHOLE):
                 raise InputError(
-                    f"{payload.end:g} s is after its cycle of {self.cycle:g} s; shorten it", keys=(f"payload[{k}].end",)
+                    f"{payload.end:g} s is after its cycle of {self.cycle:g} s; shorten it", f"payload[{k}].end"
                 )
             if self.linear is not None and payload.inertia > 0.0:
-                raise InputError(
-                    "a slide has no use for it; give the mass of the payload", keys=(f"payload[{k}].inertia",)
-                )
+                raise InputError("a slide has no use for it; give the mass of the payload", f"payload[{k}].inertia")
             if self.linear is None and payload.mass > 0.0 and payload.radius is None:
-                raise InputError(
-                    "is missing; give the radius of the payload from the axis", keys=(f"payload[{k}].radius",)
-                )
+                raise InputError("is missing; give the radius of the payload from the axis", f"payload[{k}].radius")
         if self.amplifier is not None and self.supply is not None and self.supply.continuous_current is not None:
-            raise InputError("says the same as amplifier; leave it out", keys=("supply.continuous_current",))
+            raise InputError("says the same as amplifier; leave it out", "supply.continuous_current")
         wanted = "torques" if self.linear is None else "forces"
         for k, process in enumerate(self.process):
             if getattr(process, wanted) is None:
                 what = "a rotary load" if self.linear is None else "a slide"
-                raise InputError(f"is missing; {what} needs it", keys=(f"process[{k}].{wanted}",))
+                raise InputError(f"is missing; {what} needs it", f"process[{k}].{wanted}")
             if process.times is not None and process.times[-1] > self.cycle * (1.0 + WHOLE):
                 raise InputError(
-                    f"the last one is after its cycle of {self.cycle:g} s; shorten them", keys=(f"process[{k}].times",)
+                    f"the last one is after its cycle of {self.cycle:g} s; shorten them", f"process[{k}].times"
                 )
         return self
 
@@ -194,7 +190,7 @@ class AxisTask(Task, Duty):
     @model_validator(mode="after")
     def _window_and_time(self) -> Self:
         if self.max_settling_time is not None and self.settling_window is None:
-            raise InputError("needs settling_window: how near the load must stay; add it", keys=("max_settling_time",))
+            raise InputError("needs settling_window: how near the load must stay; add it", "max_settling_time")
         return self
 
     def limits(self) -> dict[str, Bound]:
@@ -218,11 +214,10 @@ class AxisTask(Task, Duty):
         for key in ("max_reversal_error", "settling_window"):
             if getattr(self, key) is not None and not reference.moves:
                 raise InputError(
-                    "is of the rest between moves, and controller.reference has no moves; leave it out",
-                    keys=(f"task.{key}",),
+                    "is of the rest between moves, and controller.reference has no moves; leave it out", f"task.{key}"
                 )
         if self.max_reversal_error is not None and not turns_back(reference):
-            raise InputError(f"{ONE_WAY}; leave it out", keys=("task.max_reversal_error",))
+            raise InputError(f"{ONE_WAY}; leave it out", "task.max_reversal_error")
 
 
 def turns_back(reference: PositionReference) -> bool:
@@ -261,15 +256,13 @@ def _periodic(signal: TimeFunction[Any], cycle: float, key: str) -> None:
     """Sees that a signal is made of what can be repeated."""
     for name in ("steps", "ramps", "chirp"):
         if getattr(signal, name, None):
-            raise InputError(
-                f"acts once and cannot be repeated; write the cycle as {key}.samples", keys=(f"{key}.{name}",)
-            )
+            raise InputError(f"acts once and cannot be repeated; write the cycle as {key}.samples", f"{key}.{name}")
     for _, frequency, _ in signal.sine_list():
         turns = cycle * frequency
         if round(turns) < 1 or not math.isclose(turns, round(turns), rel_tol=WHOLE):
             raise InputError(
                 f"a sine of {frequency:g} Hz has {turns:.6g} periods in the cycle of {cycle:g} s; take a whole number",
-                keys=(key,),
+                key,
             )
 
 
@@ -278,8 +271,7 @@ def _tiled(samples: Any, cycle: float, count: int, step: float, key: str) -> dic
     times, values = np.array(samples.times), np.array(samples.values)
     if times[-1] > cycle * (1.0 + WHOLE):
         raise InputError(
-            f"the last one is at {times[-1]:g} s, after the cycle of {cycle:g} s; lengthen task.cycle",
-            keys=(f"{key}.samples",),
+            f"the last one is at {times[-1]:g} s, after the cycle of {cycle:g} s; lengthen task.cycle", f"{key}.samples"
         )
     again = slice(1 if times[0] == 0.0 and math.isclose(times[-1], cycle, rel_tol=WHOLE) else 0, None)
     all_times = [*times, *(t + k * cycle for k in range(1, count) for t in times[again])]
@@ -308,8 +300,7 @@ def repeated(reference: PositionReference, cycle: float, count: int) -> Position
     begin, end = reference.intervals()[0][0], reference.intervals()[-1][1]
     if end > cycle * (1.0 + WHOLE):
         raise InputError(
-            f"the last one ends at {end:.6g} s, after the cycle of {cycle:g} s; lengthen task.cycle",
-            keys=(f"{key}.moves",),
+            f"the last one ends at {end:.6g} s, after the cycle of {cycle:g} s; lengthen task.cycle", f"{key}.moves"
         )
     dwells = [reference.dwell if move.dwell is None else move.dwell for move in reference.moves]
     dwells[-1] = max(cycle - end, 0.0) + begin

@@ -47,7 +47,7 @@ def load_study(path: str | Path) -> Study:
     data = read_toml(path, "a study")
     base = data.pop("base", None)
     if not isinstance(base, str):
-        raise InputError(f"{path}: key base: must name the scenario file, or the saved result, that is varied")
+        raise InputError("must name the scenario file, or the saved result, that is varied", "base", where=path)
     changes = data.pop("set", {})
     if not isinstance(changes, dict):
         raise InputError(f'{path}: key set: must be a table, such as set = {{ "load.inertia" = 2 }}')

@@ -222,15 +222,15 @@ class Study(Part):
         for column in select.named():
             if column not in units:
                 near = did_you_mean(column, units, f"they are {', '.join(units)}")
-                raise InputError(f"{column!r} is no column of numbers; {near}", keys=("select",))
+                raise InputError(f"{column!r} is no column of numbers; {near}", "select")
         check_bounds(select, units)
         if self.axis is not None:
             reference = reference_of(self.drive)
             if "reversal_error" in select.named() and not turns_back(reference):
-                raise InputError(f"reversal_error {ONE_WAY}; leave it out", keys=("select",))
+                raise InputError(f"reversal_error {ONE_WAY}; leave it out", "select")
             if "settling_time" in select.named() and (self.axis.settling_window is None or not reference.moves):
                 raise InputError(
-                    "settling_time needs task.settling_window, and moves; add them, or leave it out", keys=("select",)
+                    "settling_time needs task.settling_window, and moves; add them, or leave it out", "select"
                 )
 
     @property
@@ -341,7 +341,7 @@ class Study(Part):
             return brake
         record = next((r for kind, r in self.records(row).items() if kind in ("motor", *WHOLE)), None)
         if record is None:
-            raise InputError('task.brake: "of the motor" needs the record of a motor; give torque and inertia')
+            raise InputError('"of the motor" needs the record of a motor; give torque and inertia', "task.brake")
         return HoldingBrake(**built_in_brake(record.name))
 
     def _keep_whole(self, kind: str, k: int, row: np.ndarray) -> None:

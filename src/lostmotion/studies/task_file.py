@@ -116,12 +116,12 @@ def task_of(tables: dict[str, Any], directory: Path = Path()) -> Study:
     """
     for key in tables:
         if key not in TABLES:
-            raise InputError(f"key {key}: {unknown_key(key, TABLES)}")
+            raise InputError(unknown_key(key, TABLES), key)
     tables = _relative(_with_candidates(tables), directory)
     linear = linear_axis(tables)
     for key in ("task", "load" if linear is None else "slide", "controller"):
         if not isinstance(tables.get(key), dict):
-            raise InputError(f"key {key}: must be a table [{key}]; add it")
+            raise InputError(f"must be a table [{key}]; add it", key)
     tables = {**tables, "task": use_accessories(tables["task"])}
     given = tables["task"]
     if linear is not None:
@@ -151,7 +151,7 @@ def task_of(tables: dict[str, Any], directory: Path = Path()) -> Study:
         written |= {"motor": NO_PAIR, "gearbox": DIRECT.model_dump()}
     select = tables.get("select", {})
     if not isinstance(select, dict):
-        raise InputError(f"key select: {shown(select)} must be a table, such as [select]")
+        raise InputError(f"{shown(select)} must be a table, such as [select]", "select")
     limits = {name: bound.model_dump(exclude_none=True) for name, bound in task.limits().items()}
     usual = OF_TORQUE_SOURCES if _torque_sources(written, vary) else OBJECTIVES
     with inside("select"):
@@ -191,13 +191,13 @@ def _with_candidates(tables: dict[str, Any]) -> dict[str, Any]:
         return tables
     given, vary = tables["candidates"], tables.get("vary", [])
     if not isinstance(given, dict):
-        raise InputError(f"key candidates: {shown(given)} must be a table, such as [candidates]")
+        raise InputError(f"{shown(given)} must be a table, such as [candidates]", "candidates")
     entries = list(vary) if isinstance(vary, list) else vary
     for key, values in given.items():
         if key not in CANDIDATES:
-            raise InputError(f"key candidates.{key}: {unknown_key(key, CANDIDATES)}")
+            raise InputError(unknown_key(key, CANDIDATES), f"candidates.{key}")
         if _varied(tables, key):
-            raise InputError(f"key candidates.{key}: is in [[vary]] too; keep one of them")
+            raise InputError("is in [[vary]] too; keep one of them", f"candidates.{key}")
         if isinstance(entries, list):
             entries.append({"key": key, "values": list(values) if isinstance(values, list) else [values]})
     return {key: value for key, value in tables.items() if key != "candidates"} | {"vary": entries}
@@ -255,25 +255,25 @@ def linear_axis(tables: dict[str, Any]) -> dict[str, Any] | None:
     if "slide" not in tables and not given and not direct:
         return None
     if "load" in tables:
-        raise InputError("keys load, slide: the load turns or slides; leave one of them out")
+        raise InputError("the load turns or slides; leave one of them out", "load", "slide")
     slope = argument("slide.inclination", tables.get("slide", {}).get("inclination", 0.0), "rad")
     own: dict[str, Any] = {"rise": sin(slope)}
     if (friction := tables.get("slide", {}).get("friction_coefficient")) is not None:
         own["guide_friction"] = argument("slide.friction_coefficient", friction, "1")
         if own["guide_friction"] < 0.0:
-            raise InputError(f"key slide.friction_coefficient: {shown(friction)} must be at least 0")
+            raise InputError(f"{shown(friction)} must be at least 0", "slide.friction_coefficient")
     if direct and not given:
         return own
     if len(given) != 1:
         what = (
             f"has {' and '.join(given)}; keep one" if given else f"lacks one of {', '.join((*STAGES, *LINEAR))}; add it"
         )
-        raise InputError(f"key slide: what moves it {what}")
+        raise InputError(f"what moves it {what}", "slide")
     (kind,) = given
     stage = tables.get(kind, {})
     stage = {"from": stage} if isinstance(stage, str) else stage
     if not isinstance(stage, dict):
-        raise InputError(f"key {kind}: {shown(stage)} must be a table [{kind}], or the name of a record")
+        raise InputError(f"{shown(stage)} must be a table [{kind}], or the name of a record", kind)
     if not _varied(tables, kind):
         with inside(kind):
             stage_of(kind, stage)
@@ -298,7 +298,7 @@ def in_translation(tables: dict[str, Any]) -> dict[str, Any]:
     slide = tables["slide"]
     for key in slide:
         if key not in SLIDE_KEYS:
-            raise InputError(f"key slide.{key}: {unknown_key(key, SLIDE_KEYS)}")
+            raise InputError(unknown_key(key, SLIDE_KEYS), f"slide.{key}")
     own = Slide(**{key: value for key, value in slide.items() if key not in ("force", "friction_coefficient")})
     given = slide.get("force", 0.0)
     force = ForceSignal(**given) if isinstance(given, dict) else ForceSignal(mean=given)
@@ -356,7 +356,7 @@ def _table(tables: dict[str, Any], key: str) -> dict[str, Any]:
     if isinstance(given, str):
         return {"from": given}
     if not isinstance(given, dict):
-        raise InputError(f"key {key}: {shown(given)} must be a table [{key}], or the name of a record")
+        raise InputError(f"{shown(given)} must be a table [{key}], or the name of a record", key)
     return dict(given)
 
 
@@ -365,7 +365,7 @@ def _controller(given: dict[str, Any]) -> dict[str, Any]:
     for loop, gains in (("position", ("gain",)), ("speed", ("gain", "integral_gain", "integral_time"))):
         for key in gains:
             if isinstance(given.get(loop), dict) and key in given[loop]:
-                raise InputError(f"key controller.{loop}.{key}: follows from the rule for each pair; leave it out")
+                raise InputError("follows from the rule for each pair; leave it out", f"controller.{loop}.{key}")
     out = CONTROLLER | given
     out["position"] = POSITION | given.get("position", {}) | GAINS["position"]
     out["speed"] = given.get("speed", {}) | GAINS["speed"]
@@ -401,7 +401,7 @@ def _vary(tables: dict[str, Any], directory: Path) -> list[Any]:
             *(_entry_of(tables, kind) for kind in WHOLE if kind in tables and not _varied(tables, kind)),
         ]
     if not isinstance(entries, list):
-        raise InputError(f"key vary: {shown(entries)} must be tables; write [[vary]] with double brackets")
+        raise InputError(f"{shown(entries)} must be tables; write [[vary]] with double brackets", "vary")
     for entry in entries:
         find_sheets(entry, directory)
     return entries
@@ -425,7 +425,7 @@ def _beside_whole(tables: dict[str, Any]) -> dict[str, dict[str, Any]]:
     for kind, table in given.items():
         for key in table:
             if key not in ("from", *BESIDE[kind]):
-                raise InputError(f"key {kind}.{key}: {unknown_key(key, BESIDE[kind])}")
+                raise InputError(unknown_key(key, BESIDE[kind]), f"{kind}.{key}")
     return {kind: {key: value for key, value in table.items() if key != "from"} for kind, table in given.items()}
 
 
@@ -436,7 +436,7 @@ def _has_pairs(tables: dict[str, Any], vary: list[Any]) -> bool:
         return True
     stage = next((kind for kind in STAGES if kind in {*keys, *tables}), None)
     if stage is not None and "actuator" not in keys:
-        raise InputError(f"key {stage}: linear motors need none; add candidates of motor, or leave it out")
+        raise InputError("linear motors need none; add candidates of motor, or leave it out", stage)
     return False
 
 
@@ -450,7 +450,8 @@ def _need_scale(controller: dict[str, Any], vary: list[Any]) -> None:
     """
     if controller.get("position_encoder") is None and _varied({"vary": vary}, "linear_motor"):
         raise InputError(
-            'key controller.position_encoder: a linear motor needs a scale; add it, such as { grating_period = "20 um", bits = 10 }'
+            'a linear motor needs a scale; add it, such as { grating_period = "20 um", bits = 10 }',
+            "controller.position_encoder",
         )
 
 
