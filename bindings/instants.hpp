@@ -8,18 +8,23 @@
 
 namespace lostmotion::binding {
 
-// Values of the channels; of each contact: name, mode, speed, torque, capacity forward and backward, and by element the
-// shares of these; of each motor: name, command from which on it turns forward, and backward.
+// Values of the channels; contacts, whose shares are the capacities forward and backward by element; motors.
 inline Record explain_point(const model::Assembly& a, const TrainPoint& p) {
     nb::list contacts, motors;
     for (const ContactReport& c : explain_contacts(a, p)) {
-        nb::list shares;
-        for (const model::CapacityShare& s : c.shares) shares.append(nb::make_tuple(s.element, s.forward, s.backward));
-        contacts.append(
-            nb::make_tuple(c.name, c.mode, c.speed, c.torque, c.capacity_forward, c.capacity_backward, shares));
+        nb::dict one, shares;
+        for (const model::CapacityShare& s : c.shares)
+            shares[s.element.c_str()] = nb::make_tuple(s.forward, s.backward);
+        one["name"] = c.name, one["mode"] = c.mode, one["speed"] = c.speed, one["torque"] = c.torque;
+        one["capacity_forward"] = c.capacity_forward, one["capacity_backward"] = c.capacity_backward;
+        one["shares"] = shares;
+        contacts.append(one);
     }
-    for (const MotorReport& m : explain_motors(a, p))
-        motors.append(nb::make_tuple(m.name, m.command_forward, m.command_backward));
+    for (const MotorReport& m : explain_motors(a, p)) {
+        nb::dict one;
+        one["name"] = m.name, one["command_forward"] = m.command_forward, one["command_backward"] = m.command_backward;
+        motors.append(one);
+    }
     Record out;
     out["values"] = p.values, out["contacts"] = contacts, out["motors"] = motors;
     return out;

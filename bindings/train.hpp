@@ -373,9 +373,12 @@ inline void bind_train(nb::module_& m) {
         "dry_friction",
         [](const Record& fields) {
             const auto f = described<signals::FrictionTable>(fields).law();
-            return std::tuple(f.torque, f.breakaway_torque, f.speeds, f.torques);
+            Record out;
+            out["torque"] = f.torque, out["breakaway_torque"] = f.breakaway_torque;
+            out["speeds"] = f.speeds, out["torques"] = f.torques;
+            return out;
         },
-        "fields"_a, "(T_C, T_S, speeds, torques); the lists are empty where there is no curve.");
+        "fields"_a, "By its fields in the core; the lists are empty where there is no curve.");
 
     nb::class_<TrainDescription>(m, "Train", nb::is_weak_referenceable())
         .def(nb::init<>())

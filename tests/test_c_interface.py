@@ -78,12 +78,11 @@ class Train:
         self.lib, self.train = library, c.c_void_p(library.lm_train_new())
         train = scenario.train()
         for name, s in train.shafts.items():
-            torque, breakaway, speeds, _ = s.friction()
-            assert not speeds
+            law = s.friction()
+            assert not law["speeds"]
             assert s.drag is None
-            self.add(
-                "lm_add_shaft", name, s.inertia, s.viscous_friction, torque, breakaway, None, name in scenario.loaded()
-            )
+            own = (s.inertia, s.viscous_friction, law["torque"], law["breakaway_torque"])
+            self.add("lm_add_shaft", name, *own, None, name in scenario.loaded())
         for name, mass in train.mass_matrices.items():
             shafts = (c.c_char_p * len(mass.shafts))(*(shaft.encode() for shaft in mass.shafts))
             self.add("lm_add_mass_matrix", name, shafts, len(mass.shafts), doubles(np.ravel(mass.matrix)))

@@ -211,9 +211,9 @@ def harmonic(fields: dict[str, Any]) -> PeriodicCurve: ...
 
 def quadratic_drag(fields: dict[str, Any]) -> TorsionCurve: ...
 
-def dry_friction(fields: dict[str, Any]) -> tuple[float, float, list[float], list[float]]:
+def dry_friction(fields: dict[str, Any]) -> dict[str, Any]:
     """
-    (T_C, T_S, speeds, torques); the lists are empty where there is no curve.
+    By its fields in the core; the lists are empty where there is no curve.
     """
 
 class Train:

@@ -78,7 +78,7 @@ class InverseModel(InverseModelFields):
         here, there, m = train.shafts[gear.input], train.shafts[gear.output], train.motors[motor]
         laws = {key: getattr(self, key) for key in ("loss_adaptation", "friction_adaptation", "load_observer")}
         own = {
-            "friction_torque": m.friction_torque + here.friction()[0],
+            "friction_torque": m.friction_torque + here.friction()["torque"],
             "load_inertia": train.inertia_of(gear.output),
             **{key: value for key, value in self.core_fields().items() if value is not None},
         }

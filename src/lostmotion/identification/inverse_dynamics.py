@@ -97,8 +97,8 @@ def missing_torque(rig: Rig, s: Stretch, known: Mapping[str, Any], rung: int, sh
     for name, shaft in train.shafts.items():
         n = ratios[name]
         inertia, viscous = inertia + n**2 * train.inertia_of(name), viscous + n**2 * shaft.viscous_friction
-        slipping, _, speeds, torques = shaft.friction()
-        dry += abs(n) * (np.interp(np.abs(n * s.speed), speeds, torques) if speeds else slipping)
+        law = shaft.friction()
+        dry += abs(n) * np.interp(np.abs(n * s.speed), law["speeds"] or [0.0], law["torques"] or [law["torque"]])
         if name in scenario.loads():
             other += n * _acting(rig, s, known, scenario, train.load_torque_of(name))
     for one, other_shaft, coupling in train.inertia_couplings():

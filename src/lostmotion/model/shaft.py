@@ -178,10 +178,9 @@ class Shaft(described.DragFields, described.DryFrictionFields, described.ShaftFi
 
     def core_fields(self) -> dict[str, Any]:
         """Fields for the core, in SI units."""
-        keys = ("torque", "breakaway_torque", "speeds", "torques")
-        own = {"friction": dict(zip(keys, self.friction(), strict=True)), "domain": self.domain}
+        own = {"friction": self.friction(), "domain": self.domain}
         return super().core_fields() | own | ({} if self.drag is None else {"drag": self.drag.core()})
 
-    def friction(self) -> tuple[float, float, list[float], list[float]]:
-        """(T_C, T_S, speeds [rad/s], torques [N·m]) of its dry friction; the lists are empty where there is no curve."""
+    def friction(self) -> dict[str, Any]:
+        """Dry friction by its fields in the core: torque and breakaway_torque [N·m], speeds [rad/s] and torques of a curve."""
         return _core.dry_friction(self.fields_of(described.DryFrictionFields))

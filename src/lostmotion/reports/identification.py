@@ -405,12 +405,13 @@ def friction_curve(scenario: Scenario, name: str, label: str) -> Curve | None:
     """Friction of a shaft and of the bearings of its motors over speed; none without any."""
     train = scenario.train()
     shaft = train.shafts[name]
-    slipping, at_rest, speeds, torques = shaft.friction()
+    law = shaft.friction()
     usual = 0.1 if train.is_slide(name) else 1.0
-    w = usual * 1e-3 + (max([5.0 * usual, *speeds]) if len(speeds) else 10.0 * usual) * np.linspace(0.0, 1.0, 200)
-    dry = np.interp(w, speeds, torques) if len(speeds) else np.full(200, slipping)
+    last = max(5.0 * usual, *law["speeds"]) if law["speeds"] else 10.0 * usual
+    w = usual * 1e-3 + last * np.linspace(0.0, 1.0, 200)
+    dry = np.interp(w, law["speeds"] or [0.0], law["torques"] or [law["torque"]])
     bearings = sum(m.friction_torque for m in train.motors.values() if m.shaft == name)
-    if max(float(np.max(dry)), at_rest, bearings, shaft.viscous_friction) <= 0.0:
+    if max(float(np.max(dry)), law["breakaway_torque"], bearings, shaft.viscous_friction) <= 0.0:
         return None
     return Curve(label, w, dry + bearings + shaft.viscous_friction * w, look(0))
 

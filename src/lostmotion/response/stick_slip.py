@@ -142,14 +142,14 @@ def only_contact(
     zeros = [core_signal([(0.0, 0.0, 0.0)]) for _ in core.input_names()]
     case = _core.Case(core, inputs=zeros, start=start, hysteresis_capacities=capacities)
     contacts = _core.explain_at(case, 0.0)["contacts"]
-    dry = [(name, ahead, back) for name, _, _, _, ahead, back, _ in contacts if math.isfinite(ahead)]
+    dry = [contact for contact in contacts if math.isfinite(contact["capacity_forward"])]
     if not dry:
         raise UndecidableError("it has no dry contact that could stick")
     if len(dry) > 1:
         raise UndecidableError(
-            f"it has {len(dry)} dry contacts, {', '.join(name for name, *_ in dry)}, and the map is that of one"
+            f"it has {len(dry)} dry contacts, {', '.join(contact['name'] for contact in dry)}, and the map is that of one"
         )
-    name, ahead, back = dry[0]
+    name, ahead, back = (dry[0][key] for key in ("name", "capacity_forward", "capacity_backward"))
     shaft = name.removesuffix("_contact")
     if shaft not in train.shafts or ahead != back:
         raise UndecidableError(f"{name} is not the dry friction of a shaft, the same in both directions")
@@ -159,7 +159,7 @@ def only_contact(
 def others(train: DriveTrain) -> Iterator[str]:
     """Elements with which a slip is more than one linear regime."""
     for name, shaft in train.shafts.items():
-        if shaft.friction()[2]:
+        if shaft.friction()["speeds"]:
             yield f"friction of {name} that varies with speed"
         if shaft.drag is not None:
             yield f"drag of {name}"

@@ -218,8 +218,8 @@ def explain(what: Scenario | Simulation, time: Time | None = None) -> Explanatio
 def smallest_commands(drive: Drive, load_torque: float = 0.0) -> tuple[float, float]:
     """Constant commands beyond which the load moves from rest, forward and backward, against a load torque [N·m]."""
     inputs = [core_signal([(0.0, value, 0.0)]) for value in (0.0, load_torque)]
-    ((_, forward, backward),) = _core.explain_at(_core.Case(drive.core(), inputs=inputs), 0.0)["motors"]
-    return forward, backward
+    (motor,) = _core.explain_at(_core.Case(drive.core(), inputs=inputs), 0.0)["motors"]
+    return motor["command_forward"], motor["command_backward"]
 
 
 def _explanation(
@@ -227,11 +227,10 @@ def _explanation(
     core: _core.Train,
     time: float,
     values: list[float],
-    contacts: list[tuple[Any, ...]],
-    motors: list[tuple[str, float, float]],
+    contacts: list[dict[str, Any]],
+    motors: list[dict[str, Any]],
 ) -> Explanation:
     named = dict(zip((name for name, *_ in core.channels()), values, strict=True))
-    states = []
     slides = tuple(name for name in train.shafts if train.is_slide(name))
     sliding = {f"{name}_contact" for name in slides}
     sliding |= {f"{train.twist_of(n)}_contact" for n, gear in train.gears.items() if train.is_slide(gear.output)}
@@ -240,18 +239,18 @@ def _explanation(
         for n, gear in train.gears.items()
         if isinstance(gear.stiffness, Rigid) and gear.stiffness.strikes
     }
-    for name, mode, speed, torque, forward, backward, elements in contacts:
-        shares = {element: (one, other) for element, one, other in elements}
-        gap = flanks.get(name, (None, 0.0))
-        states.append(ContactState(name, mode, speed, torque, forward, backward, shares, name in sliding, *gap))
+    states = []
+    for contact in contacts:
+        reach, twist = flanks.get(contact["name"], (None, 0.0))
+        states.append(ContactState(**contact, slides=contact["name"] in sliding, reach=reach, twist=twist))
     turned = []
-    for name, forward, backward in motors:
-        motor = train.motors[name]
+    for commands in motors:
+        name, motor = commands["name"], train.motors[commands["name"]]
         limits = (motor.command_limit, None if motor.torque_limit is None else motor.torque_limit / motor.rated_torque)
         limit = min(limit for limit in (*limits, math.inf) if limit is not None)
-        command = named[train.command_of(name)]
-        torque = named[train.motor_torque_of(name)]
-        turned.append(MotorState(name, command, torque, forward, backward, limit, train.is_slide(motor.shaft)))
+        command, torque = named[train.command_of(name)], named[train.motor_torque_of(name)]
+        own: dict[str, Any] = {"command_limit": limit, "slides": train.is_slide(motor.shaft)}
+        turned.append(MotorState(**commands, **own, command=command, torque=torque))
     locking = tuple(_verdicts(train, named, short=core.short_form))
     return Explanation(time, named, tuple(states), tuple(turned), tuple(train.shafts), locking, slides)
 
