@@ -411,6 +411,10 @@ def test_what_is_wrong_is_said_in_one_line(library: c.CDLL, worm: Simulation) ->
     assert "brake 'b'" in train.error()
     assert train.attempt("lm_add_brake", "worm", "worm", 1.0, 0.0) == INVALID
     assert train.error() == "the name 'worm' is taken; use another one"
+    assert train.attempt("lm_add_clutch", "k", "worm", "load", -1.0, 0.0) == INVALID
+    assert train.error() == "clutch 'k': torque is -1; it must be finite and > 0"
+    assert train.attempt("lm_add_spring", "k", "worm", None, 0.0) == INVALID
+    assert train.error() == "spring 'k': has no numbers"
     assert train.attempt("lm_set_housing", "nix", "worm") == INVALID
     assert train.error() == "there is no gear 'nix'"
     assert train.attempt("lm_set_housing", "coupling", "nix") == INVALID

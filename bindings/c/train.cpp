@@ -13,10 +13,6 @@ namespace lm = lostmotion;
 
 namespace {
 
-std::string about(const std::string& what, const std::string& wrong) {
-    return wrong.empty() ? wrong : what + ": " + wrong;
-}
-
 std::string name_error(const lm_train& train, const char* name) {
     if (name == nullptr || *name == '\0') return "an element has no name";
     const auto taken = [&](const auto& elements) {
@@ -33,20 +29,9 @@ std::string name_error(const lm_train& train, const char* name) {
     return {};
 }
 
-std::string read(const lm_curve& c, const std::string& what, lm::TorsionCurve& to) {
-    NumberLists sides;
-    for (int side = 0; side < 2; ++side) sides.list(c.breaks, c.n_breaks).list(c.slopes, c.n_breaks + 1);
-    return about(what, sides.read(to));
-}
-std::string read(const lm_periodic_curve& c, const std::string& what, lm::model::PeriodicCurve& to) {
-    NumberLists numbers;
-    numbers.number(c.period).list(c.angles, c.n).list(c.values, c.n);
-    return about(what, numbers.number(0.0).number(1.0).number(0.0).read(to));  // of no sine
-}
-std::string read(const lm_loss_map& m, const std::string& what, lm::LossMap& to) {
+NumberLists numbers_of(const lm_loss_map& m) {
     NumberLists axes;
-    axes.list(m.speeds, m.n_speeds).list(m.loads, m.n_loads).list(m.values, m.n_speeds * m.n_loads);
-    return about(what, axes.read(to));
+    return axes.list(m.speeds, m.n_speeds).list(m.loads, m.n_loads).list(m.values, m.n_speeds * m.n_loads);
 }
 
 // use(element): of this name, which returns what is wrong.
@@ -70,15 +55,24 @@ std::string read(const lm_parameter* parameters, std::size_t n, const std::strin
     return {};
 }
 
-template <class Element>
-int add_coupling(lm_train& train, Element element, const char* name, const char* input, const char* output) {
-    return train.attempt([&] {
-        std::string wrong = name_error(train, name);
+// An element with the numbers of its description, on a shaft or between two.
+template <class Element, class... Shafts>
+int add(lm_train* train, const char* kind, const char* name, const NumberLists& numbers, Shafts... shafts) {
+    return train->attempt([&] {
+        Element element;
+        std::string wrong = name_error(*train, name);
+        if (wrong.empty()) wrong = numbers.read(element, kind + (" '" + text(name) + "'"));
         if (!wrong.empty()) return wrong;
         element.name = name;
-        train.description.add(std::move(element), text(input), text(output));
+        train->description.add(std::move(element), text(shafts)...);
         return wrong;
     });
+}
+
+int add_clutch(lm_train* train, const char* name, const char* input, const char* output, double torque,
+               double breakaway_torque, bool safety) {
+    const NumberLists numbers = NumberLists().number(torque).number(breakaway_torque).number(safety);
+    return add<lm::model::Clutch>(train, safety ? "safety clutch" : "clutch", name, numbers, input, output);
 }
 
 }  // namespace
@@ -104,12 +98,15 @@ int lm_add_shaft(lm_train* train, const char* name, double inertia, double visco
     return train->attempt([&] {
         std::string wrong = name_error(*train, name);
         lm::model::Shaft s;
-        if (wrong.empty() && drag != nullptr) wrong = read(*drag, "shaft '" + text(name) + "': drag", s.drag);
+        const std::string what = "shaft '" + text(name) + "'";
+        const NumberLists own = NumberLists().number(inertia).number(viscous_friction);
+        const NumberLists friction =
+            NumberLists().number(friction_torque).number(breakaway_torque).list(nullptr, 0).list(nullptr, 0);
+        if (wrong.empty()) wrong = own.read(s, what);
+        if (wrong.empty()) wrong = friction.read(s.friction, what + ": friction");
+        if (wrong.empty() && drag != nullptr) wrong = NumberLists().curve(drag).read(s.drag, what + ": drag");
         if (!wrong.empty()) return wrong;
         s.name = name;
-        s.inertia = inertia;
-        s.viscous_friction = viscous_friction;
-        s.friction = {friction_torque, breakaway_torque, {}, {}};
         s.loaded = loaded != 0;
         train->description.add_shaft(std::move(s));
         return wrong;
@@ -143,14 +140,15 @@ int lm_add_gear(lm_train* train, const char* name, const char* input, const char
         if (wrong.empty()) wrong = read(parameters, n, what, drive);
         if (wrong.empty() && stiffness != nullptr) {
             law.compliance = lm::Gearbox::torsion_curve;
-            wrong = read(*stiffness, what + ": stiffness", law.curve);
+            wrong = NumberLists().curve(stiffness).read(law.curve, what + ": stiffness");
         }
         if (wrong.empty() && losses != nullptr) {
             law.losses = lm::Gearbox::loss_map;
-            wrong = read(*losses, what + ": losses", law.map);
+            wrong = numbers_of(*losses).read(law.map, what + ": losses");
         }
         if (wrong.empty() && transmission_error != nullptr)
-            wrong = read(*transmission_error, what + ": transmission error", gear.transmission_error);
+            wrong =
+                NumberLists().curve(transmission_error).read(gear.transmission_error, what + ": transmission error");
         if (!wrong.empty()) return wrong;
         if (efficiencies != nullptr) gear.efficiencies.emplace(efficiencies[0], efficiencies[1]);
         gear.name = name;
@@ -168,7 +166,7 @@ int lm_limit_mesh_damping(lm_train* train, const char* gear) {
 
 int lm_set_mesh_stiffness(lm_train* train, const char* gear, const lm_periodic_curve* factors) {
     return with_named(*train, train->description.train.gears, "gear", gear, [&](lm::model::Gear& g) {
-        return read(*factors, "gear '" + g.name + "': mesh stiffness", g.mesh_stiffness);
+        return NumberLists().curve(factors).read(g.mesh_stiffness, "gear '" + g.name + "': mesh stiffness");
     });
 }
 
@@ -215,56 +213,32 @@ int lm_set_housing(lm_train* train, const char* gear, const char* shaft) {
 }
 
 int lm_add_brake(lm_train* train, const char* name, const char* shaft, double torque, double breakaway_torque) {
-    return train->attempt([&] {
-        std::string wrong = name_error(*train, name);
-        if (wrong.empty()) train->description.add(lm::model::Brake{name, 0, torque, breakaway_torque}, text(shaft));
-        return wrong;
-    });
+    return add<lm::model::Brake>(train, "brake", name, NumberLists().number(torque).number(breakaway_torque), shaft);
 }
-
 int lm_add_clutch(lm_train* train, const char* name, const char* input, const char* output, double torque,
                   double breakaway_torque) {
-    return add_coupling(*train, lm::model::Clutch{"", 0, 0, torque, breakaway_torque}, name, input, output);
+    return add_clutch(train, name, input, output, torque, breakaway_torque, false);
 }
 int lm_add_safety_clutch(lm_train* train, const char* name, const char* input, const char* output, double torque,
                          double breakaway_torque) {
-    return add_coupling(*train, lm::model::Clutch{"", 0, 0, torque, breakaway_torque, true}, name, input, output);
+    return add_clutch(train, name, input, output, torque, breakaway_torque, true);
 }
 int lm_add_freewheel(lm_train* train, const char* name, const char* input, const char* output) {
-    return add_coupling(*train, lm::model::Freewheel{}, name, input, output);
+    return add<lm::model::Freewheel>(train, "freewheel", name, NumberLists(), input, output);
 }
-
 int lm_add_damper(lm_train* train, const char* name, const char* input, const char* output, double viscous_friction,
                   const lm_curve* drag) {
-    lm::model::Damper damper;
-    damper.viscous_friction = viscous_friction;
-    if (drag != nullptr) {
-        const auto curve = [&] { return read(*drag, "damper '" + text(name) + "': drag", damper.drag); };
-        if (train->attempt(curve) != LM_OK) return LM_INVALID;
-    }
-    return add_coupling(*train, std::move(damper), name, input, output);
+    const double slope = 0.0;
+    const lm_curve none{nullptr, &slope, 0};
+    return add<lm::model::Damper>(train, "damper", name,
+                                  NumberLists().number(viscous_friction).curve(drag != nullptr ? drag : &none), input,
+                                  output);
 }
-
 int lm_add_angle_torque(lm_train* train, const char* name, const char* shaft, const lm_periodic_curve* torque) {
-    return train->attempt([&] {
-        std::string wrong = name_error(*train, name);
-        lm::model::PeriodicCurve curve;
-        if (wrong.empty() && torque == nullptr) wrong = "angle torque '" + text(name) + "' has no curve";
-        if (wrong.empty()) wrong = read(*torque, "angle torque '" + text(name) + "'", curve);
-        if (wrong.empty()) train->description.add(lm::model::AngleTorque{name, 0, curve}, text(shaft));
-        return wrong;
-    });
+    return add<lm::model::AngleTorque>(train, "angle torque", name, NumberLists().curve(torque), shaft);
 }
-
 int lm_add_spring(lm_train* train, const char* name, const char* shaft, const lm_curve* curve, double rest_angle) {
-    return train->attempt([&] {
-        std::string wrong = name_error(*train, name);
-        lm::model::Spring spring{name, 0, {}, rest_angle};
-        if (wrong.empty() && curve == nullptr) wrong = "spring '" + text(name) + "' has no curve";
-        if (wrong.empty()) wrong = read(*curve, "spring '" + text(name) + "'", spring.curve);
-        if (wrong.empty()) train->description.add(std::move(spring), text(shaft));
-        return wrong;
-    });
+    return add<lm::model::Spring>(train, "spring", name, NumberLists().curve(curve).number(rest_angle), shaft);
 }
 
 }  // extern "C"

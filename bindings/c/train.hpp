@@ -59,13 +59,29 @@ class NumberLists {
         if (from != nullptr) numbers_.insert(numbers_.end(), from, from + n * width);
         return *this;
     }
-    // The part that is described so, or what is wrong with it.
+    // The same in both directions. NULL: missing.
+    NumberLists& curve(const lm_curve* c) {
+        missing_ = missing_ || c == nullptr;
+        for (int side = 0; side < 2 && c != nullptr; ++side)
+            list(c->breaks, c->n_breaks).list(c->slopes, c->n_breaks + 1);
+        return *this;
+    }
+    NumberLists& curve(const lm_periodic_curve* c) {
+        missing_ = missing_ || c == nullptr;
+        if (c != nullptr) number(c->period).list(c->angles, c->n).list(c->values, c->n);
+        return number(0.0).number(1.0).number(0.0);  // of no sine
+    }
+    // What is wrong with the part that is described so.
     template <class Part>
-    std::string read(Part& to) const {
-        if (missing_) return "has no numbers";
+    std::string read(Part& to, const std::string& what = {}) const {
+        const std::string about = what.empty() ? what : what + ": ";
+        if (missing_) return about + "has no numbers";
         lostmotion::FieldReader f(numbers_);
-        describe(f, to);
-        return f.error();
+        if constexpr (requires { to.describe(f); })
+            to.describe(f);
+        else
+            describe(f, to);
+        return f.well() ? std::string() : about + f.error();
     }
 
  private:
