@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache, lru_cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, get_args
 
 from ..errors import InputError, prefixed
 from ..inputs.arguments import checked
@@ -33,17 +34,9 @@ Sheet: TypeAlias = (
 )
 Kind: TypeAlias = type[Sheet]
 Entry: TypeAlias = tuple[Kind, dict[str, Any], str]
-# The table of a record in a sheet file.
+# The table of a record in a sheet file has the name of its sheet, such as linear_motor.
 KINDS: dict[str, Kind] = {
-    "gearbox": GearboxSheet,
-    "motor": MotorSheet,
-    "screw": ScrewSheet,
-    "rack": RackSheet,
-    "belt": BeltSheet,
-    "linear_motor": LinearMotorSheet,
-    "actuator": ActuatorSheet,
-    "brake": BrakeSheet,
-    "amplifier": AmplifierSheet,
+    re.sub("(?<=[a-z])(?=[A-Z])", "_", kind.__name__.removesuffix("Sheet")).lower(): kind for kind in get_args(Sheet)
 }
 
 
