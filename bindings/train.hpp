@@ -401,6 +401,12 @@ inline void bind_train(nb::module_& m) {
             [](TrainDescription& t, bool v) { t.train.short_form = v; },
             "Whether results have the names of a drive: `twist`, not `gearbox_twist`.")
         .def("kernel", [](const TrainDescription& t) { return t.run()->kernel(); })
+        .def(
+            "guards",
+            [](const TrainDescription& t) {
+                return t.run()->in_kernel([]<class D>(const auto&) { return D::guards; });
+            },
+            "How many guards its kernel has room for.")
         .def("massless_shafts", &TrainDescription::massless_shafts)
         .def("check_start", &TrainDescription::check_start, "speeds"_a)
         .def("channels", &TrainDescription::channels, "Name, symbol, unit, meaning.")

@@ -256,6 +256,9 @@ class Train:
 
     def kernel(self) -> str: ...
 
+    def guards(self) -> int:
+        """How many guards its kernel has room for."""
+
     def massless_shafts(self) -> list[str]: ...
 
     def check_start(self, speeds: Sequence[float]) -> str: ...

@@ -55,8 +55,6 @@ PLATFORMS: Mapping[int, Mapping[str, tuple[str, str]]] = {
     },
 }
 LIBRARIES = Path(__file__).parents[1] / "fmu_libraries"
-# How many guards the kernels of the core have room for; event indicators beyond those of a regime are 1.
-GUARDS = {"drive": 16, "narrow": 32, "middle": 64, "wide": 64}
 
 
 @checked
@@ -296,7 +294,7 @@ def _model(
         if windings or positions
         else [_fine(by_name.get(s) or Declared(s, "1", "state of a controller", 0.0)) for s in states],
         state_starts=[] if windings or positions else [_start_of(scenario, s) for s in states],
-        indicators=GUARDS[core.kernel()],
+        indicators=core.guards(),  # those beyond the guards of a regime are 1
         parameters=list(parameters),
         references_given=references_given,
         positions=positions,
