@@ -114,8 +114,9 @@ void each_drag(Use&& use) {
                   "by which they depart from it at most; left out, 0.1 % of the peak torque"});
     });
     use("Drag", [](auto& f) {
-        f.table({"drag", "", "", any, may_be_left_out, "torque against the motion over speed"},
-                "DragCurve|QuadraticDrag|EddyCurrentDrag");
+        f.table(
+            {"drag", "", "", any, may_be_left_out, "torque over speed against the motion, of dampers over the slip"},
+            "DragCurve|QuadraticDrag|EddyCurrentDrag");
     });
 }
 

@@ -1,15 +1,15 @@
 """Dampers between two shafts: viscous and fluid couplings, eddy-current couplings, torsional vibration dampers."""
 
-from typing import Annotated, Any, Self
+from typing import Self
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from ..inputs.described import DamperFields
 from .couplings import BetweenShafts
-from .shaft import DragCurve, EddyCurrentDrag, QuadraticDrag
+from .shaft import WithDrag
 
 
-class Damper(DamperFields, BetweenShafts):
+class Damper(WithDrag, DamperFields, BetweenShafts):
     """A torque over the slip, the speed of the input less that of the output: it drives the output and brakes the
     input.
 
@@ -20,15 +20,8 @@ class Damper(DamperFields, BetweenShafts):
     0.1
     """
 
-    drag: Annotated[DragCurve | QuadraticDrag | EddyCurrentDrag, Field(discriminator="kind")] | None = None
-    """torque over the magnitude of the slip, in addition"""
-
     @model_validator(mode="after")
     def _has_a_torque(self) -> Self:
         if self.drag is None and not self.viscous_friction:
             raise ValueError("has no torque at any slip; give viscous_friction or drag")
         return self
-
-    def core_fields(self) -> dict[str, Any]:
-        """Fields for the core, in SI units."""
-        return super().core_fields() | {"drag": self.drag and self.drag.core()}

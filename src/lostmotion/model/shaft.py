@@ -154,7 +154,15 @@ def _departure(a: float, b: float) -> float:
     return max(abs(f[k] - (f[0] + (f[-1] - f[0]) * k / 32.0)) for k in range(33))
 
 
-class Shaft(described.DragFields, described.DryFrictionFields, described.ShaftFields):
+class WithDrag(described.DragFields):
+    """Base of the elements that a drag acts on."""
+
+    def core_fields(self) -> dict[str, Any]:
+        """Fields for the core, in SI units."""
+        return super().core_fields() | ({} if self.drag is None else {"drag": self.drag.core()})
+
+
+class Shaft(WithDrag, described.DryFrictionFields, described.ShaftFields):
     """A shaft of a drive train. Rotors of motors and inertias of gears on it are added to it.
 
     Examples
@@ -178,8 +186,7 @@ class Shaft(described.DragFields, described.DryFrictionFields, described.ShaftFi
 
     def core_fields(self) -> dict[str, Any]:
         """Fields for the core, in SI units."""
-        own = {"friction": self.friction(), "domain": self.domain}
-        return super().core_fields() | own | ({} if self.drag is None else {"drag": self.drag.core()})
+        return super().core_fields() | {"friction": self.friction(), "domain": self.domain}
 
     def friction(self) -> dict[str, Any]:
         """Dry friction by its fields in the core: torque and breakaway_torque [N·m], speeds [rad/s] and torques of a curve."""
