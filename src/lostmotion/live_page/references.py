@@ -9,10 +9,10 @@ from typing import Any
 from ..control.controller import Controller
 from ..control.references import PositionReference, Reference
 from ..simulation.linear_units import of_slides
+from ..simulation.train_variables import REFERENCE_UNITS
 from . import sliders
 from .sliders import Place, Range, Slider
 
-UNITS = {"position": "rad", "speed": "rad/s", "torque": "N*m"}
 LIMITS = (("speed", "rad/s"), ("acceleration", "rad/s^2"), ("jerk", "rad/s^3"))
 
 
@@ -60,7 +60,7 @@ def reference_sliders(
     """
     reference = controller.reference
     positions = sliding[1] and reference.kind != "torque"
-    unit = of_slides(UNITS[reference.kind], positions=positions, forces=sliding[0])
+    unit = of_slides(REFERENCE_UNITS[reference.kind], positions=positions, forces=sliding[0])
     if isinstance(reference, PositionReference) and reference.moves:
         yield from _of_moves(reference, key, group, number, slides=sliding[1])
         return

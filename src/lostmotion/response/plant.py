@@ -16,12 +16,10 @@ from ..model.drive import Drive
 from ..model.signals import Signal
 from ..simulation.needs import need_free_motion, need_open_loop
 from ..simulation.scenario import Scenario
-from ..simulation.train_variables import axis_variables
+from ..simulation.train_variables import REFERENCE_UNITS, axis_variables
 from ..simulation.variables import Variable
 
 AnyReference = PositionReference | SpeedReference | TorqueReference
-UNITS = {"position": "rad", "speed": "rad/s", "torque": "N*m"}
-"""of references"""
 
 
 @dataclass(frozen=True)
@@ -84,7 +82,7 @@ class Plant:
     def unit(self, source: str) -> str:
         """Unit of an input."""
         if source in self.references:
-            return UNITS[self.references[source].kind]
+            return REFERENCE_UNITS[self.references[source].kind]
         return next(v.unit for v in self.variables if v.name == source)
 
     def with_means(self, command: float | None, load_torque: float | None) -> Plant:
@@ -140,7 +138,10 @@ def plant_or_loop(drive: Drive | Scenario) -> Plant:
         controller.reference.kind
     ]
     own = (
-        *(Variable(name, "", UNITS[r.kind], f"{r.kind} that the controller follows") for name, r in references.items()),
+        *(
+            Variable(name, "", REFERENCE_UNITS[r.kind], f"{r.kind} that the controller follows")
+            for name, r in references.items()
+        ),
         *shown_by,
     )
     return replace(

@@ -55,14 +55,13 @@ def train_variables(train: DriveTrain, core: _core.Train) -> tuple[Variable, ...
 
 
 ALL_SIGNALS = tuple(name for name, _, _ in _core.axis_signals())
-# Those that its loops have.
-LOOP_SIGNALS = {
-    "position": ("position_reference", "measured_position", "speed_reference", "measured_speed", "torque_reference"),
-    "speed": ("speed_reference", "measured_speed", "torque_reference"),
-    "torque": ("torque_reference",),
+REFERENCE_UNITS = {
+    name.removesuffix("_reference"): unit for name, unit, _ in _core.axis_signals() if name.endswith("_reference")
 }
-
-
+"""units of references, by their kinds"""
+# Those that its loops have, by the kind of the outermost: position, speed, torque.
+_OF_LOOPS = ALL_SIGNALS[: ALL_SIGNALS.index("torque_reference") + 1]
+LOOP_SIGNALS = {kind: _OF_LOOPS[_OF_LOOPS.index(f"{kind}_reference") :] for kind in REFERENCE_UNITS}
 WINDING_SIGNALS = tuple(name for name, _, _ in _core.winding_signals())
 
 
