@@ -141,7 +141,7 @@ class _Place:
                 try:
                     out[key].append(discrete(f, c.loop_time("speed"))[2])
                 except InputError as problem:
-                    raise InputError(str(problem), f"speed.{key}[{k}]") from None
+                    raise InputError(problem, f"speed.{key}[{k}]") from None
         if c.inverse_model is not None:
             on_motor = self.encoder_shaft("encoder" if c.position_encoder is None else "position_encoder") != self.shaft
             fields = c.inverse_model.solver_fields(self.train, self.name, self.shaft, on_motor=on_motor)

@@ -74,7 +74,7 @@ class InverseModel(InverseModelFields):
                 (gear.input, gear.output), "an inverse model takes each inertia by itself; leave inverse_model out"
             )
         except InputError as problem:
-            raise InputError(str(problem), "inverse_model") from None
+            raise InputError(problem, "inverse_model") from None
         here, there, m = train.shafts[gear.input], train.shafts[gear.output], train.motors[motor]
         laws = {key: getattr(self, key) for key in ("loss_adaptation", "friction_adaptation", "load_observer")}
         own = {

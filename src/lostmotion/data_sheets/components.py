@@ -85,7 +85,7 @@ def _table_of_sheet(
         sheet = GearboxSheet(**_given(record) | scalars) if scalars else record
         conditions = Conditions(**{key: changes[key] for key in Conditions.model_fields if key in changes})
     except InputError as error:
-        raise InputError(str(error), table=where, record=name) from None
+        raise InputError(error, table=where, record=name) from None
     for key, hint in sheet.missing().items():
         if key not in changes:
             lacks = f"the record lacks {key}, {hint}; give {where}.{key} beside {_naming(where)}"
@@ -381,7 +381,7 @@ def at_voltage(table: Mapping[str, Any], voltage: Any, given: Collection[str], w
     try:
         moved = motor.at_voltage(value)
     except InputError as error:
-        raise InputError(str(error), f"{where}.rated_voltage") from None
+        raise InputError(error, f"{where}.rated_voltage") from None
     follow = ("rated_speed", "armature_voltage_constant")
     return changed | {key: getattr(moved, key) for key in follow}
 

@@ -65,7 +65,7 @@ def _with_record(table: str, name: str, element: Any, written: Callable[[str], s
     try:
         values, kept = _values(table, record, element, where)
     except InputError as error:
-        raise (error if error.problems[0].keys and not error.where else InputError(str(error), from_key)) from None
+        raise (error if error.problems[0].keys and not error.where else InputError(error, from_key)) from None
     return values | kept
 
 

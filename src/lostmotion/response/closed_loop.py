@@ -19,11 +19,11 @@ import numpy as np
 
 from .. import _core
 from ..control.axis import Bound
-from ..control.controller import Controller
+from ..control.controller import AnyReference, Controller
 from ..control.references import PositionReference
 from ..simulation.scenario import Scenario
 from ..simulation.stepping import Simulation
-from .plant import AnyReference, Plant
+from .plant import Plant
 from .windows import Window
 
 DEPTHS = (2, 6, 12, 24)  # windows followed before the limit is extrapolated, the first times; then the last number

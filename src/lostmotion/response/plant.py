@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..control.references import PositionReference, SpeedReference, TorqueReference
+from ..control.controller import AnyReference
 from ..errors import InputError
 from ..inputs.validation import listed, shown
 from ..model.drive import Drive
@@ -18,8 +18,6 @@ from ..simulation.needs import need_free_motion, need_open_loop
 from ..simulation.scenario import Scenario
 from ..simulation.train_variables import REFERENCE_UNITS, axis_variables
 from ..simulation.variables import Variable
-
-AnyReference = PositionReference | SpeedReference | TorqueReference
 
 
 @dataclass(frozen=True)

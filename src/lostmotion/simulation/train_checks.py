@@ -91,7 +91,7 @@ def _check_given(tables: TrainTables) -> None:
         try:
             check_continuous(shaft.motion, "m" if name in tables.slides else "rad")
         except ValueError as problem:
-            raise InputError(str(problem), key) from None
+            raise InputError(problem, key) from None
 
 
 def _check_massless(scenario: Whole) -> None:
@@ -144,4 +144,4 @@ def _check_commands(scenario: Whole) -> None:
         try:
             tables.acting(name)
         except ValueError as problem:
-            raise InputError(str(problem), f"command.{name}") from None
+            raise InputError(problem, f"command.{name}") from None

@@ -46,7 +46,7 @@ def start_values(train: DriveTrain, initial: TrainInitial, core: _core.Train | N
     _check("hysteresis_capacities", initial.hysteresis_capacities, lossy, "gear with hysteresis")
     _check("hysteresis_forces", initial.hysteresis_forces, lossy, "screw, rack or belt with hysteresis")
     if problem := (core or train.core(())).check_start([speeds.get(name, 0.0) for name in train.shafts]):
-        raise InputError(str(problem), "initial.speeds")
+        raise InputError(problem, "initial.speeds")
     _check_flanks(train, speeds, twists)
     values = {f"{name}_speed": v for name, v in speeds.items()}
     values |= {train.angle_of(s): v for s, v in angles_at_start(train, initial.of_all("angles"), twists).items()}
