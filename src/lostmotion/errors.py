@@ -88,7 +88,8 @@ class InputError(ValueError):
         more: int = 0,
     ) -> None:
         self.where, self.more = str(where), more
-        self.problems = (Problem(keys, str(text), table, record),) if problems is None else tuple(problems)
+        own = Problem(tuple(map(str, keys)), str(text), table, record)
+        self.problems = (own,) if problems is None else tuple(problems)
         said = "; ".join(problem.sentence() for problem in self.problems) + (f"; and {more} more" if more else "")
         super().__init__(visible(f"{where}: {said}" if where else said))
 
