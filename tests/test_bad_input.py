@@ -722,7 +722,7 @@ def test_an_error_carries_keys_and_reasons_as_data(tmp_path: Path) -> None:
     assert [(p.keys, p.reason) for p in one.value.problems] == [(("inertia",), "-1.0 must be greater than 0")]
     again = pickle.loads(pickle.dumps(one.value))
     assert (str(again), again.problems) == (str(one.value), one.value.problems)
-    assert str(again.inside("load")) == "key load.inertia: -1.0 must be greater than 0"
+    assert str(again.with_keys("load.{}".format)) == "key load.inertia: -1.0 must be greater than 0"
     with pytest.raises(lm.InputError) as several:
         lm.Motor(kind="dc", rotor_inertia=-1.0, friction_torque=-2.0)
     keys = {key for problem in several.value.problems for key in problem.keys}

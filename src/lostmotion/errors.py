@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from importlib.util import find_spec
 from typing import NamedTuple
 from unicodedata import category
@@ -98,10 +98,6 @@ class InputError(ValueError):
         """The text without `where`."""
         return visible(str(InputError(problems=self.problems, more=self.more))) if self.where else str(self)
 
-    def inside(self, table: str) -> InputError:
-        """The same error of values within a table."""
-        return self.with_keys(lambda key: f"{table}.{key}")
-
     def with_keys(self, change: Callable[[str], str]) -> InputError:
         """The same error of values that have other keys."""
         problems = [p._replace(keys=tuple(map(change, p.keys))) for p in self.problems]
@@ -109,32 +105,36 @@ class InputError(ValueError):
 
 
 @contextmanager
-def inside(table: str) -> Iterator[None]:
+def _raised_as(change: Callable[[InputError], InputError]) -> Iterator[None]:
+    try:
+        yield
+    except InputError as error:
+        raise change(error) from None
+
+
+def inside(table: str) -> AbstractContextManager[None]:
     """Errors of values within a table have its name before their keys.
 
     Raises
     ------
     InputError
     """
-    try:
-        yield
-    except InputError as error:
-        raise error.inside(table) from None
+    return _raised_as(lambda error: error.with_keys(lambda key: f"{table}.{key}"))
 
 
-@contextmanager
-def prefixed(where: object) -> Iterator[None]:
+def prefixed(where: object) -> AbstractContextManager[None]:
     """Errors within begin with a file, log or function, or the key of a table of it.
 
     Raises
     ------
     InputError
     """
-    try:
-        yield
-    except InputError as error:
+
+    def change(error: InputError) -> InputError:
         whole = f"{where}: {error.where}" if error.where else str(where)
-        raise InputError(where=whole, problems=error.problems, more=error.more) from None
+        return InputError(where=whole, problems=error.problems, more=error.more)
+
+    return _raised_as(change)
 
 
 class ArgumentError(InputError, TypeError):
