@@ -15,16 +15,11 @@ namespace {
 // From here on reactions that come first lose more than three of the sixteen digits.
 constexpr double much_lighter = 1e3;
 
-// f -= factor * row. What cancels to within rounding is zero: of a torque that is zero, such as that of a shaft at rest
-// that nothing turns, no rounding may be left whose sign would mean something. (Of two shafts nothing is.)
+// f -= factor * row.
 template <class F, class R>
-void subtract(F& f, double factor, const R& row, bool two_shafts) {
-    constexpr double few_roundings = 8.0 * std::numeric_limits<double>::epsilon();
+void subtract(F& f, double factor, const R& row) {
     const std::size_t columns = std::is_same_v<F, R> ? row.c.size() : static_cast<std::size_t>(max_columns);
-    for (std::size_t k = 0; k < columns; ++k) {
-        const double a = f.c[k], b = factor * row.c[k];
-        f.c[k] = !two_shafts && std::fabs(a - b) <= few_roundings * std::fabs(a) ? 0.0 : a - b;
-    }
+    for (std::size_t k = 0; k < columns; ++k) f.c[k] -= factor * row.c[k];
 }
 
 using Matrix = std::vector<std::vector<double>>;
@@ -107,7 +102,7 @@ void Statics::divide_by_inertias() {
         if (is_given(b) && !is_given(a)) motion_[a] -= c.value * motion_[b];
     }
     const auto subtract_row = [&](std::size_t to, double factor, std::size_t from) {
-        if (factor != 0.0) subtract(motion_[to], factor, motion_[from], false);
+        if (factor != 0.0) subtract(motion_[to], factor, motion_[from]);
     };
     for (std::size_t k = 0; k < n && !factor_.empty(); ++k)
         for (std::size_t s = k + 1; s < n; ++s) subtract_row(s, factor_[s][k], k);
@@ -173,8 +168,8 @@ bool Statics::solve_reactions(const std::vector<int>& of, const std::vector<Row*
         contacts_[of[k]].each_shaft([&](int s, double per) { rows[k] += per * motion_[s]; });
         unknowns.push_back(unknown(of[k]));
     }
-    const bool free = moves_freely(of, rows), two_shafts = shafts() == 2;
-    const auto take = [&](Row& f, double factor, const Row& row) { subtract(f, factor, row, two_shafts); };
+    const bool free = moves_freely(of, rows);
+    const auto take = [](Row& f, double factor, const Row& row) { subtract(f, factor, row); };
     if (!eliminate(rows, unknowns, n, take)) return false;
     for (Row* f : forms) substitute(*f, rows, unknowns, n, take);
     for (Row& f : motion_) substitute(f, rows, unknowns, n, take);
@@ -226,7 +221,7 @@ bool Statics::solve_balances(const std::vector<int>& of, const std::vector<Row*>
         });
     }
     const bool free = balances_move_freely(of, heavy);
-    const auto take = [](auto& f, double factor, const Balance& row) { subtract(f, factor, row, false); };
+    const auto take = [](auto& f, double factor, const Balance& row) { subtract(f, factor, row); };
     if (!eliminate(rows, unknowns, rows.size(), take)) return false;
     const auto put = [&](Row& f) {
         follow(f, heavy);
