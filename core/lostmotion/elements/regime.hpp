@@ -129,6 +129,8 @@ struct Regime {
     std::vector<Row> gear_hysteresis;  // H of each gear [N m]
     std::vector<Row> contact_torque;   // what each contact takes [N m]
     std::vector<Row> drive_torque;     // of each given motion: what it turns its shaft with [N m]
+    std::vector<Row> motion;           // of each shaft: the net torque, then its acceleration
+    std::vector<Row> loss;             // of each gear: what acts on the contact of its input shaft [N m]
     std::vector<MasslessSpeed> massless;
     std::array<bool, max_contacts> at_rest{};  // contacts whose speeds this regime keeps at zero
     Ties ties;
@@ -142,8 +144,8 @@ struct Regime {
 
     // Keeps but its memory.
     void clear() {
-        for (auto* rows :
-             {&rate, &motor_torque, &output_torque, &input_torque, &gear_hysteresis, &contact_torque, &drive_torque})
+        for (auto* rows : {&rate, &motor_torque, &output_torque, &input_torque, &gear_hysteresis, &contact_torque,
+                           &drive_torque, &motion, &loss})
             rows->clear();
         guards.clear();
         massless.clear();

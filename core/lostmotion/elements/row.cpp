@@ -20,10 +20,24 @@ auto Row::unit(int term, double factor) -> Row {
     return f;
 }
 
+void Coefficients::grow(std::size_t size) {
+    const std::size_t before = this->size(), whole = (size + 3) / 4 * 4;
+    if (many_ == nullptr) {
+        many_ = room_for_all();
+        copy(few_.data(), before, many_->data());
+    }
+    std::fill(many_->data() + before, many_->data() + whole, 0.0);
+    size_ = whole;
+}
+
 // Calls use(k) for each four of the coefficients.
 template <class Use>
 static void each_four(std::size_t size, Use&& use) {
-    for (std::size_t k = 0; k < size; k += 4) use(k);
+    if (size == Coefficients::few)
+#pragma GCC unroll 5
+        for (std::size_t k = 0; k < Coefficients::few; k += 4) use(k);
+    else
+        for (std::size_t k = 0; k < size; k += 4) use(k);
 }
 
 auto Row::operator+=(const Row& o) -> Row& {
@@ -40,6 +54,21 @@ auto Row::operator-=(const Row& o) -> Row& {
     const double* from = o.c.begin();
     each_four(o.c.size(), [&](std::size_t k) { (Four::load(to + k) + -1.0 * Four::load(from + k)).store(to + k); });
     return *this;
+}
+
+auto Row::operator+=(Scaled&& o) -> Row& {
+    c.reach(o.row.c.size());
+    double* to = c.data();
+    const double* from = o.row.c.begin();
+    each_four(o.row.c.size(),
+              [&](std::size_t k) { (Four::load(to + k) + o.factor * Four::load(from + k)).store(to + k); });
+    return *this;
+}
+
+Row::Row(Scaled&& of) {
+    double* to = c.as_many_as(of.row.c);
+    const double* from = of.row.c.begin();
+    each_four(c.size(), [&](std::size_t k) { (of.factor * Four::load(from + k)).store(to + k); });
 }
 
 auto Row::operator*=(double a) -> Row& {

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstring>
 #include <memory>
+#include <type_traits>
 #include <utility>
 
 namespace lostmotion::model {
@@ -22,41 +23,43 @@ struct Layout {
     void arrange();
 };
 
-// Coefficients of a form, as many as have been asked for: what lies beyond is zero.
+// Coefficients of a form. The first few are there always; the others, as many as have been asked for: what lies beyond
+// is zero.
 class Coefficients {
  public:
-    Coefficients() {}
+    static constexpr std::size_t few = 20;
+
+    Coefficients() = default;
     Coefficients(const Coefficients& o) { *this = o; }
     Coefficients(Coefficients&& o) noexcept { *this = std::move(o); }
     Coefficients& operator=(const Coefficients& o) {
-        size_ = o.size_;
-        if (size_ > few && many_ == nullptr) many_ = room_for_all();
-        copy(o.begin(), size_, data());
+        if (many_ == nullptr && o.many_ == nullptr)
+            few_ = o.few_;
+        else
+            copy(o.begin(), o.size(), as_many_as(o));
         return *this;
     }
     Coefficients& operator=(Coefficients&& o) noexcept {
         if (o.many_ == nullptr) return *this = std::as_const(o);
-        size_ = o.size_;
+        std::swap(size_, o.size_);
         std::swap(many_, o.many_);
-        if (o.many_ == nullptr) o.size_ = 0;
         return *this;
     }
 
-    std::size_t size() const { return size_; }
+    std::size_t size() const { return many_ == nullptr ? few : size_; }
+    // As many as others, whose values are to follow.
+    double* as_many_as(const Coefficients& o) {
+        if (o.many_ != nullptr && many_ == nullptr) many_ = room_for_all();
+        size_ = o.size();
+        return data();
+    }
     // Makes room for as many and, so that loops need no remainder, up to three more.
     void reach(std::size_t size) {
-        if (size <= size_) return;
-        const std::size_t whole = (size + 3) / 4 * 4;
-        if (whole > few && many_ == nullptr) {
-            many_ = room_for_all();
-            copy(few_.data(), size_, many_->data());
-        }
-        for (double *to = data() + size_, *end = data() + whole; to != end; to += 4) std::fill_n(to, 4, 0.0);
-        size_ = whole;
+        if (size > this->size()) grow(size);
     }
     template <class Index>
     double operator[](Index k) const {
-        return static_cast<std::size_t>(k) < size_ ? begin()[k] : 0.0;
+        return static_cast<std::size_t>(k) < size() ? begin()[k] : 0.0;
     }
     template <class Index>
     double& operator[](Index k) {
@@ -64,50 +67,73 @@ class Coefficients {
         return data()[k];
     }
     const double* begin() const { return many_ == nullptr ? few_.data() : many_->data(); }
-    const double* end() const { return begin() + size_; }
+    const double* end() const { return begin() + size(); }
     double* data() { return many_ == nullptr ? few_.data() : many_->data(); }
 
  private:
-    static constexpr std::size_t few = 20;
     static_assert(few % 4 == 0 && max_columns % 4 == 0);
     static void copy(const double* from, std::size_t size, double* to) {  // in fours
         for (std::size_t k = 0; k < size; k += 4) std::memcpy(to + k, from + k, 4 * sizeof(double));
     }
     using Many = std::array<double, max_columns>;
     static std::unique_ptr<Many> room_for_all() { return std::make_unique_for_overwrite<Many>(); }
+    void grow(std::size_t size);
 
-    // As far as size_; the many, once there have been more than a few.
+    std::array<double, few> few_{};  // where there are not many
+    std::unique_ptr<Many> many_;     // as far as size_
     std::size_t size_ = 0;
-    std::unique_ptr<Many> many_;
-    std::array<double, few> few_;
 };
 
 // sum_k c[k] * term[k]
 struct Row {
+    // A multiple of a row that outlives it: sums add it without a copy.
+    struct Scaled {
+        double factor;
+        const Row& row;
+    };
+    template <class T>
+    static constexpr bool is_summand =
+        std::is_same_v<std::remove_cvref_t<T>, Row> || std::is_same_v<std::remove_cvref_t<T>, Scaled>;
+
     Coefficients c;
 
+    Row() = default;
+    Row(Scaled&& of);
     static Row unit(int term, double factor = 1.0);
     Row& operator+=(const Row& o);
     Row& operator-=(const Row& o);
+    Row& operator+=(Scaled&& o);
+    Row& operator-=(Scaled&& o) { return *this += Scaled{-o.factor, o.row}; }
     Row& operator*=(double a);
-    friend Row operator+(const Row& a, const Row& b) {
-        return copy(a, [&](Row& out) { out += b; });
-    }
-    friend Row operator-(const Row& a, const Row& b) {
-        return copy(a, [&](Row& out) { out -= b; });
-    }
-    friend Row operator*(double a, const Row& f) {
-        return copy(f, [&](Row& out) { out *= a; });
-    }
-    friend Row operator/(const Row& f, double a) { return 1.0 / a * f; }
-    friend Row operator-(const Row& f) { return -1.0 * f; }
-
- private:
-    template <class Change>
-    static Row copy(const Row& f, Change&& change) {
-        Row out = f;
-        change(out);
+    template <class A, class B>
+        requires is_summand<A> && is_summand<B>
+    friend Row operator+(A&& a, B&& b) {
+        Row out = std::forward<A>(a);
+        out += std::forward<B>(b);
         return out;
+    }
+    template <class A, class B>
+        requires is_summand<A> && is_summand<B>
+    friend Row operator-(A&& a, B&& b) {
+        Row out = std::forward<A>(a);
+        out -= std::forward<B>(b);
+        return out;
+    }
+    friend Scaled operator*(double a, const Row& f) { return {a, f}; }
+    friend Row operator*(double a, Scaled&& f) {
+        Row out = std::move(f);
+        out *= a;
+        return out;
+    }
+    template <class A>
+        requires is_summand<A>
+    friend auto operator/(A&& f, double a) {
+        return 1.0 / a * std::forward<A>(f);
+    }
+    template <class A>
+        requires is_summand<A>
+    friend auto operator-(A&& f) {
+        return -1.0 * std::forward<A>(f);
     }
 };
 

@@ -178,8 +178,15 @@ class FormTable {
     using Inputs = InputsOf<D>;
     using Memory = typename D::Memory;
 
-    FormTable() {
-        for (int row = 0; row < N; ++row) place(row, D::one) = 1.0;  // forms that are not there are 1
+    FormTable() { clear(); }
+
+    // Forms that are not there are 1.
+    void clear() {
+        block_ = {};
+        for (int row = 0; row < N; ++row) place(row, D::one) = 1.0;
+        rows_ = 0;
+        driven_ = false;
+        depends_on_ = {};
     }
 
     void set(int row, const LinearForm& f) {
@@ -269,9 +276,9 @@ class FormTable {
     double& place(int row, int term) { return block_[row / vec_width][term][row % vec_width]; }
 
     // Term by term the coefficients of the forms of one vector, vector by vector: what is used lies together.
-    alignas(64) std::array<std::array<std::array<double, vec_width>, D::terms>, N / vec_width> block_{};
-    int rows_ = 0;
-    bool driven_ = false;
+    alignas(64) std::array<std::array<std::array<double, vec_width>, D::terms>, N / vec_width> block_;
+    int rows_;
+    bool driven_;
     [[no_unique_address]] DependsOn<D> depends_on_;
 };
 

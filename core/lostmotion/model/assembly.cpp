@@ -10,17 +10,13 @@ void Assembly::build(const Key& key, Regime& r) const {
         r.at_rest[c] = (places().contacts[c].flanks == nowhere || key.modes[c] == 0) &&
                        (r.ties.redundant[c] || kept_at_rest(places().contacts[c], r.ties));
 
-    std::vector<Row> motion(train().shafts.size());
-    equations_.compose(key, r, motion);
-    for (const int s : places().driven) r.drive_torque.push_back(equations_.drive_torque(s, motion[s]));
-    std::vector<Row*> forms;
-    for (std::vector<Row>* rows :
-         {&r.motor_torque, &r.output_torque, &r.input_torque, &r.gear_hysteresis, &r.contact_torque, &r.drive_torque})
-        for (Row& f : *rows) forms.push_back(&f);
-    Statics statics(places(), key, r.ties, motion);
-    r.solvable = statics.solve(forms);
+    equations_.compose(key, r);
+    for (const int s : places().driven) r.drive_torque.push_back(equations_.drive_torque(s, r.motion[s]));
+    Statics statics(places(), key, r.ties, r.motion);
+    r.solvable = statics.solve(
+        {r.motor_torque, r.output_torque, r.input_torque, r.gear_hysteresis, r.contact_torque, r.drive_torque});
     r.massless = statics.massless();
-    equations_.set_rates(key, motion, r);
+    equations_.set_rates(key, r);
     equations_.add_coupled_inertias(r);
     RegimeGuards(equations_, *this, r).add_all();
     for (Guard& g : r.guards) r.put_massless_speeds(g.form);

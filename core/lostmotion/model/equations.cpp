@@ -2,28 +2,29 @@
 
 namespace lostmotion::model {
 
-void Equations::compose(const Key& key, Regime& r, std::vector<Row>& motion) const {
+void Equations::compose(const Key& key, Regime& r) const {
     const std::size_t gears = train_.gears.size();
     r.output_torque.resize(gears);
     r.input_torque.resize(gears);
     r.gear_hysteresis.resize(gears);
     r.contact_torque.resize(places_.contacts.size());
-    std::vector<Row> loss(gears);
+    r.motion.resize(train_.shafts.size());
+    r.loss.resize(gears);
     compose_motors(key, r);
-    for (std::size_t g = 0; g < gears; ++g) compose_gear(static_cast<int>(g), key, r, loss);
+    for (std::size_t g = 0; g < gears; ++g) compose_gear(static_cast<int>(g), key, r);
     for (const auto& c : places_.couplings)
         if (c->is_dry()) compose_coupling(*c, key, r);
     for (std::size_t s = 0; s < train_.shafts.size(); ++s) {
         const int c = places_.shafts[s].contact;
-        if (c != nowhere) r.contact_torque[c] = shaft_friction(static_cast<int>(s), key, r, loss);
+        if (c != nowhere) r.contact_torque[c] = shaft_friction(static_cast<int>(s), key, r);
     }
-    for (std::size_t s = 0; s < train_.shafts.size(); ++s) motion[s] = net_torque(static_cast<int>(s), key, r);
+    for (std::size_t s = 0; s < train_.shafts.size(); ++s) r.motion[s] = net_torque(static_cast<int>(s), key, r);
     r.locked.clear();
     for (std::size_t c = places_.contacts.size(); c-- > 0;)
         if (r.ties.redundant[c] && places_.contacts[c].locked != nowhere)
             r.locked.push_back(locked_torque(static_cast<int>(c), key, r));
     // From here on the torque at the input includes the losses.
-    for (std::size_t g = 0; g < gears; ++g) r.input_torque[g] += loss[g];
+    for (std::size_t g = 0; g < gears; ++g) r.input_torque[g] += r.loss[g];
 }
 
 void Equations::compose_motors(const Key& key, Regime& r) const {
@@ -47,7 +48,7 @@ void Equations::compose_motors(const Key& key, Regime& r) const {
 
 // T_2 = P(d) + H, with damping while the flanks touch, of a limited one at most another P; T_1 without the losses that
 // act on the contact of the input shaft, which are `loss`: M_2B sign(w)/i with M_2B of one cell of the loss law (12).
-void Equations::compose_gear(int gear, const Key& key, Regime& r, std::vector<Row>& loss) const {
+void Equations::compose_gear(int gear, const Key& key, Regime& r) const {
     const Gear& g = train_.gears[gear];
     const GearPlace& p = places_.gears[gear];
     const double i = g.law.ratio;
@@ -82,7 +83,7 @@ void Equations::compose_gear(int gear, const Key& key, Regime& r, std::vector<Ro
     }
     const double s = mode(key, places_.shafts[g.input].contact);
     if (s == 0.0) return;
-    loss[gear] = forms_.losses(gear, T_2).turning(g.loss_plane(key.branch[p.cell]), s) / g.reduction();
+    r.loss[gear] = forms_.losses(gear, T_2).turning(g.loss_plane(key.branch[p.cell]), s) / g.reduction();
 }
 
 // What its dry contact takes.
@@ -97,7 +98,7 @@ void Equations::compose_coupling(const CouplingElement& c, const Key& key, Regim
 }
 
 // What the dry contact of a shaft takes. One that "slips" while others keep it at rest gives all that it holds.
-Row Equations::shaft_friction(int shaft, const Key& key, const Regime& r, const std::vector<Row>& loss) const {
+Row Equations::shaft_friction(int shaft, const Key& key, const Regime& r) const {
     const ShaftPlace& p = places_.shafts[shaft];
     if (mode(key, p.contact) == 0) return held(p.contact, r);
     Row F;
@@ -109,7 +110,7 @@ Row Equations::shaft_friction(int shaft, const Key& key, const Regime& r, const 
             if (e->is_dry() && e->shaft == shaft) F += forms_.dry_torque(*e, key);
     }
     for (std::size_t g = 0; g < train_.gears.size(); ++g)
-        if (train_.gears[g].input == shaft && train_.gears[g].has_dry_losses()) F += loss[g];
+        if (train_.gears[g].input == shaft && train_.gears[g].has_dry_losses()) F += r.loss[g];
     return F;
 }
 
@@ -204,7 +205,7 @@ void Equations::add_coupled_inertias(Regime& r) const {
     }
 }
 
-void Equations::set_rates(const Key& key, const std::vector<Row>& acceleration, Regime& r) const {
+void Equations::set_rates(const Key& key, Regime& r) const {
     r.rate.resize(layout_.states);
     for (std::size_t m = 0; m < train_.motors.size(); ++m) {
         const Motor& motor = train_.motors[m].law;
@@ -219,9 +220,9 @@ void Equations::set_rates(const Key& key, const std::vector<Row>& acceleration, 
         if (r.ties.at_rest[s] || places_.shafts[s].massless != nowhere) continue;
         Row& rate = r.rate[places_.shafts[s].speed];
         if (!r.ties.follows(static_cast<int>(s)))
-            rate = acceleration[s];
+            rate = r.motion[s];
         else
-            r.ties.each_share(static_cast<int>(s), [&](int k, double share) { rate += share * acceleration[k]; });
+            r.ties.each_share(static_cast<int>(s), [&](int k, double share) { rate += share * r.motion[k]; });
     }
     for (std::size_t g = 0; g < train_.gears.size(); ++g) {
         const GearPlace& p = places_.gears[g];

@@ -24,7 +24,7 @@ class Equations {
           terms_(forms.terms()) {}
 
     // Torques, and the net torque of each shaft, in terms of the reactions of the stuck contacts as well.
-    void compose(const Key& key, Regime& r, std::vector<Row>& motion) const;
+    void compose(const Key& key, Regime& r) const;
     // What the given motion of a shaft turns it with, beside all that else acts on it: J w' less that.
     Row drive_torque(int shaft, const Row& others) const {
         const ShaftPlace& p = places_.shafts[shaft];
@@ -34,13 +34,13 @@ class Equations {
     // and of shafts at rest.
     void add_coupled_inertias(Regime& r) const;
     // Rates of the states, from accelerations without reactions.
-    void set_rates(const Key& key, const std::vector<Row>& acceleration, Regime& r) const;
+    void set_rates(const Key& key, Regime& r) const;
 
  private:
     void compose_motors(const Key& key, Regime& r) const;
-    void compose_gear(int gear, const Key& key, Regime& r, std::vector<Row>& loss) const;
+    void compose_gear(int gear, const Key& key, Regime& r) const;
     void compose_coupling(const CouplingElement& c, const Key& key, Regime& r) const;
-    Row shaft_friction(int shaft, const Key& key, const Regime& r, const std::vector<Row>& loss) const;
+    Row shaft_friction(int shaft, const Key& key, const Regime& r) const;
     Row net_torque(int shaft, const Key& key, const Regime& r) const;
     LockedTorque<Row> locked_torque(int contact, const Key& key, const Regime& r) const;
     void add_held_shaft(int shaft, const Key& key, const Regime& r, LockedTorque<Row>& locked) const;

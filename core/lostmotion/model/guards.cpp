@@ -3,8 +3,13 @@
 namespace lostmotion::model {
 
 auto RegimeGuards::add(const Row& form, Guard::Kind kind, int contact, int branch, int neighbour) -> Guard& {
-    regime_.guards.push_back(Guard{form, kind, contact, branch, neighbour});
-    return regime_.guards.back();
+    Guard& guard = regime_.guards.emplace_back();
+    guard.form = form;
+    guard.kind = kind;
+    guard.contact = contact;
+    guard.branch = branch;
+    guard.neighbour = neighbour;
+    return guard;
 }
 
 void RegimeGuards::add_all() {
@@ -173,10 +178,9 @@ void RegimeGuards::add_driver(int contact) {
     stuck.key = regime_.key;
     stuck.key.modes[contact] = 0;
     stuck.ties = places_.ties(stuck.key.modes.data());
-    std::vector<Row> motion(train_.shafts.size());
-    equations_.compose(stuck.key, stuck, motion);
+    equations_.compose(stuck.key, stuck);
     Row& overcome = stuck.contact_torque[contact];
-    if (!Statics(places_, stuck.key, stuck.ties, motion).solve({&overcome})) return;
+    if (!Statics(places_, stuck.key, stuck.ties, stuck.motion).solve({{&overcome, 1}})) return;
     // The torque that its rest leaves open in addition.
     int open = 0;
     while (open < layout_.contacts && (!stuck.ties.redundant[open] || regime_.ties.redundant[open])) ++open;

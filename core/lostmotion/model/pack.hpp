@@ -48,23 +48,21 @@ using PackedForm = LinearFormOf<D>;
 
 template <class D, class F = PackedForm<D>>
 F pack(const Row& f, const Layout& n) {
-    F out{};
+    F out;
     const int known = static_cast<int>(f.c.size());
-    const auto copy = [&](int from, int count, int to) {
-        std::copy_n(f.c.begin() + from, std::clamp(known - from, 0, count), out.c.begin() + to);
+    // Most often as many as there is room for.
+    const auto copy = [&]<int room>(std::integral_constant<int, room>, int from, int count, int to) ALWAYS_INLINE {
+        const double* c = f.c.begin() + from;
+        if (count == room && from + room <= known)
+            std::copy_n(c, room, out.c.begin() + to);
+        else
+            for (int k = 0; k < std::min(count, known - from); ++k) out.c[to + k] = c[k];
     };
-    // With the same places in the kernel, in fours, as a form has them.
-    if (n.coupled == D::coupled && n.angles == D::angles && n.memory == D::memory && n.inputs == D::inputs) {
-        constexpr int whole = D::terms / 4 * 4;
-        for (int k = 0; k < std::min(known, whole); k += 4) std::copy_n(f.c.begin() + k, 4, out.c.begin() + k);
-        if (known > whole) std::copy_n(f.c.begin() + whole, D::terms - whole, out.c.begin() + whole);
-        return out;
-    }
-    copy(0, n.coupled, 0);
-    copy(n.coupled, n.angles, D::coupled);
-    copy(n.one, 1, D::one);
-    copy(n.first_memory, n.memory, D::first_memory);
-    copy(n.first_input, n.inputs, D::first_input);
+    copy(std::integral_constant<int, D::coupled>{}, 0, n.coupled, 0);
+    copy(std::integral_constant<int, D::angles>{}, n.coupled, n.angles, D::coupled);
+    copy(std::integral_constant<int, 1>{}, n.one, 1, D::one);
+    copy(std::integral_constant<int, D::memory>{}, n.first_memory, n.memory, D::first_memory);
+    copy(std::integral_constant<int, D::inputs>{}, n.first_input, n.inputs, D::first_input);
     return out;
 }
 

@@ -15,13 +15,6 @@ namespace {
 // From here on reactions that come first lose more than three of the sixteen digits.
 constexpr double much_lighter = 1e3;
 
-// f -= factor * row.
-template <class F, class R>
-void subtract(F& f, double factor, const R& row) {
-    const std::size_t columns = std::is_same_v<F, R> ? row.c.size() : static_cast<std::size_t>(max_columns);
-    for (std::size_t k = 0; k < columns; ++k) f.c[k] -= factor * row.c[k];
-}
-
 using Matrix = std::vector<std::vector<double>>;
 
 // 0 if the matrix is singular.
@@ -102,7 +95,7 @@ void Statics::divide_by_inertias() {
         if (is_given(b) && !is_given(a)) motion_[a] -= c.value * motion_[b];
     }
     const auto subtract_row = [&](std::size_t to, double factor, std::size_t from) {
-        if (factor != 0.0) subtract(motion_[to], factor, motion_[from]);
+        if (factor != 0.0) motion_[to] -= factor * motion_[from];
     };
     for (std::size_t k = 0; k < n && !factor_.empty(); ++k)
         for (std::size_t s = k + 1; s < n; ++s) subtract_row(s, factor_[s][k], k);
@@ -152,14 +145,14 @@ bool Statics::has_light_shafts() const {
     return false;
 }
 
-bool Statics::solve(const std::vector<Row*>& forms) {
+bool Statics::solve(Forms forms) {
     const std::vector<int> of = stuck();
     if (has_light_shafts()) return solve_balances(of, forms);
     divide_by_inertias();
     return solve_reactions(of, forms);
 }
 
-bool Statics::solve_reactions(const std::vector<int>& of, const std::vector<Row*>& forms) {
+bool Statics::solve_reactions(const std::vector<int>& of, Forms forms) {
     const std::size_t n = of.size();
     if (n == 0) return true;
     std::vector<Row> rows(n);
@@ -169,9 +162,10 @@ bool Statics::solve_reactions(const std::vector<int>& of, const std::vector<Row*
         unknowns.push_back(unknown(of[k]));
     }
     const bool free = moves_freely(of, rows);
-    const auto take = [](Row& f, double factor, const Row& row) { subtract(f, factor, row); };
+    const auto take = [](Row& f, double factor, const Row& row) { f -= factor * row; };
     if (!eliminate(rows, unknowns, n, take)) return false;
-    for (Row* f : forms) substitute(*f, rows, unknowns, n, take);
+    for (const std::span<Row> some : forms)
+        for (Row& f : some) substitute(f, rows, unknowns, n, take);
     for (Row& f : motion_) substitute(f, rows, unknowns, n, take);
     return free;
 }
@@ -199,7 +193,7 @@ void Statics::follow(Row& f, const Ties& heavy) const {
     }
 }
 
-bool Statics::solve_balances(const std::vector<int>& of, const std::vector<Row*>& forms) {
+bool Statics::solve_balances(const std::vector<int>& of, Forms forms) {
     const int all = static_cast<int>(shafts());
     const Ties heavy = places_.ties(key_.modes.data(), inertia_.data());
     const auto is_free = [&](int s) { return (heavy.free[s] >> s & 1) != 0; };
@@ -221,13 +215,17 @@ bool Statics::solve_balances(const std::vector<int>& of, const std::vector<Row*>
         });
     }
     const bool free = balances_move_freely(of, heavy);
-    const auto take = [](auto& f, double factor, const Balance& row) { subtract(f, factor, row); };
+    const auto take = []<class F>(F& f, double factor, const Balance& row) {
+        const std::size_t columns = std::is_same_v<F, Row> ? static_cast<std::size_t>(max_columns) : row.c.size();
+        for (std::size_t k = 0; k < columns; ++k) f.c[k] -= factor * row.c[k];
+    };
     if (!eliminate(rows, unknowns, rows.size(), take)) return false;
     const auto put = [&](Row& f) {
         follow(f, heavy);
         substitute(f, rows, unknowns, in_forms, take);
     };
-    for (Row* f : forms) put(*f);
+    for (const std::span<Row> some : forms)
+        for (Row& f : some) put(f);
     for (const int s : places_.massless) {
         massless_.push_back({places_.shafts[s].speed, Row::unit(places_.shafts[s].speed)});
         put(massless_.back().form);

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <array>
+#include <initializer_list>
+#include <span>
 #include <vector>
 
 #include "../kernel/elimination.hpp"
@@ -24,8 +26,10 @@ class Statics {
     // input: J is infinite there.
     Statics(const Places& places, const Key& key, const Ties& ties, std::vector<Row>& motion);
 
+    // Some lists of forms.
+    using Forms = std::initializer_list<std::span<Row>>;
     // Eliminates the reactions from the motion and the forms. False if they have no unique solution.
-    bool solve(const std::vector<Row*>& forms);
+    bool solve(Forms forms);
     // Speeds of shafts without inertia, once it is solved.
     const std::vector<MasslessSpeed>& massless() const { return massless_; }
 
@@ -43,8 +47,8 @@ class Statics {
         use(s, is_given(shaft) ? 1.0 : inertia_[shaft]);
         if (!is_given(shaft)) places_.each_coupled_inertia(s, use);
     }
-    bool solve_reactions(const std::vector<int>& of, const std::vector<Row*>& forms);
-    bool solve_balances(const std::vector<int>& of, const std::vector<Row*>& forms);
+    bool solve_reactions(const std::vector<int>& of, Forms forms);
+    bool solve_balances(const std::vector<int>& of, Forms forms);
     // Does a torque that the gears of a rigidly tied part pass on turn it forward or, while a contact of it is at its
     // limit, wind it up? Without friction the matrix of accelerations over reactions, C J^-1 C^T, is positive definite.
     // Friction that changes the sign of its determinant jams: no motion or several (Painleve). That sign is also that

@@ -39,16 +39,16 @@ class RegimeCache {
         Regime regime;
         LinearRatesOf<D> rates;
         GuardTable guards;
-        std::array<Guards, D::contacts> speeds{};  // the guards of each contact's speed
-        Guards contacts = 0;                       // those that say whether a contact goes on in its mode
-        Guards behind = 0;                         // edges that a twist slips away from, so that it does not reach them
+        std::array<Guards, D::contacts> speeds;  // the guards of each contact's speed
+        Guards contacts;                         // those that say whether a contact goes on in its mode
+        Guards behind;                           // edges that a twist slips away from, so that it does not reach them
         // The twists that move: the state, and the guard of its rate that also ends the regime by touching zero.
         struct Twist {
             int state, grazing_guard;
         };
         std::array<Twist, D::twists> twists;
-        int n_twists = 0;
-        bool may_graze = false;  // has one of them such a guard?
+        int n_twists;
+        bool may_graze;  // has one of them such a guard?
         // The guards that are multiples of the rate of a twist: its own speed, and that of one end while the other
         // is at rest.
         struct TwistSpeed {
@@ -56,19 +56,19 @@ class RegimeCache {
             double factor;
         };
         std::array<TwistSpeed, D::contacts> twist_speeds;
-        int n_twist_speeds = 0;
-        std::array<States, D::inputs> reached{};  // the states that each input acts on, by way of others, too
-        bool followed = false;                    // does the speed of a state follow another?
-        typename GuardTable::Values near_event;   // what each guard exceeds where it is far from an event
+        int n_twist_speeds;
+        std::array<States, D::inputs> reached;   // the states that each input acts on, by way of others, too
+        bool followed;                           // does the speed of a state follow another?
+        typename GuardTable::Values near_event;  // what each guard exceeds where it is far from an event
         Propagator<D> propagator;
-        std::array<Entry*, D::guards> neighbour{};  // what lies beyond each guard, as far as it is known
+        std::array<Entry*, D::guards> neighbour;  // what lies beyond each guard, as far as it is known
 
         void set(const System& system, const Key& key) {
             system.build(key, regime);
             const Regime& r = regime;
             new (&rates) LinearRatesOf<D>(r.rate);
             if constexpr (requires { r.given; }) rates.given = r.given.empty() ? nullptr : &r.given;
-            guards = {};
+            guards.clear();
             neighbour = {};
             speeds = {};
             contacts = behind = 0;
@@ -171,7 +171,11 @@ class RegimeCache {
 
     // Forgets all regimes, since the system has changed. The memory of so many is kept for others.
     void forget(std::size_t kept = max_kept) {
-        if (entries_.size() > kept) entries_.resize(kept);
+        left_ = std::max(left_, used_);
+        if (left_ > kept) {
+            blocks_.resize(kept / per_block);
+            left_ = per_block * blocks_.size();
+        }
         std::ranges::fill(slots_, nullptr);
         used_ = 0;
         last_ = nullptr;
@@ -181,24 +185,23 @@ class RegimeCache {
     PhaseRotations& serve(double unit, std::vector<InputBasis> basis) {
         if (used_ > max_kept) forget();
         if (!rotations_ || unit != rotations_->unit() || basis != rotations_->basis()) {
-            for (std::size_t k = 0; k < used_; ++k) entries_[k]->propagator.reset();
+            for (std::size_t k = 0; k < used_; ++k) entry(k).propagator.reset();
             rotations_ = std::make_unique<PhaseRotations>(unit, std::move(basis));
         }
         return *rotations_;
     }
 
  private:
-    static constexpr std::size_t max_kept = 4000;  // from run to run; each takes about 12 kilobytes
+    static constexpr std::size_t max_kept = 4000;  // from run to run; each of a drive takes about 12 kilobytes
 
     [[gnu::noinline]] Entry& find(const Key& key) {
         std::size_t k = slot(key);
         if (slots_[k] == nullptr) {
             if (2 * (used_ + 1) > slots_.size()) k = grow(key);
-            if (used_ == entries_.size())
-                entries_.push_back(std::make_unique_for_overwrite<Entry>());
-            else
-                entries_[used_]->regime = {};
-            slots_[k] = entries_[used_++].get();
+            if (used_ == per_block * blocks_.size())
+                blocks_.push_back(std::make_unique_for_overwrite<Entry[]>(per_block));
+            if (used_ < left_) entry(used_).regime = {};
+            slots_[k] = &entry(used_++);
             slots_[k]->set(system_, key);
         }
         return *(last_ = slots_[k]);
@@ -213,15 +216,20 @@ class RegimeCache {
     // Makes room for more; returns the slot of a key anew.
     std::size_t grow(const Key& key) {
         slots_.assign(2 * slots_.size(), nullptr);
-        for (std::size_t n = 0; n < used_; ++n) slots_[slot(entries_[n]->regime.key)] = entries_[n].get();
+        for (std::size_t n = 0; n < used_; ++n) slots_[slot(entry(n).regime.key)] = &entry(n);
         return slot(key);
     }
 
+    // In the order in which they were made.
+    Entry& entry(std::size_t k) const { return blocks_[k / per_block][k % per_block]; }
+    // As many as are allocated at once.
+    static constexpr std::size_t per_block = std::clamp<std::size_t>(65536 / sizeof(Entry), 1, 8);
+
     const System& system_;
     std::unique_ptr<PhaseRotations> rotations_;
-    Entry* last_ = nullptr;                        // the one asked for last
-    std::vector<std::unique_ptr<Entry>> entries_;  // those in use, then such as only keep their memory
-    std::size_t used_ = 0;
+    Entry* last_ = nullptr;  // the one asked for last
+    std::vector<std::unique_ptr<Entry[]>> blocks_;
+    std::size_t used_ = 0, left_ = 0;  // those in use come first, then those that `forget` has left
     std::vector<Entry*> slots_ = std::vector<Entry*>(256, nullptr);  // a power of two, by hash, at most half full
 };
 
