@@ -48,13 +48,7 @@ auto Row::operator+=(const Row& o) -> Row& {
     return *this;
 }
 
-auto Row::operator-=(const Row& o) -> Row& {
-    c.reach(o.c.size());
-    double* to = c.data();
-    const double* from = o.c.begin();
-    each_four(o.c.size(), [&](std::size_t k) { (Four::load(to + k) + -1.0 * Four::load(from + k)).store(to + k); });
-    return *this;
-}
+auto Row::operator-=(const Row& o) -> Row& { return *this += Scaled{-1.0, o}; }
 
 auto Row::operator+=(Scaled&& o) -> Row& {
     c.reach(o.row.c.size());
