@@ -22,7 +22,7 @@ PACKAGE = ROOT / "src" / "lostmotion"
 # Each package may import only from those in layers below its own, each module of the root counts as a package. The way of
 # the data: units -> parts -> scenario -> run -> dataset -> analysis -> figures and reports -> command line.
 LAYERS = [
-    {"errors", "namespace", "version", "_instruction_set"},
+    {"errors", "namespace", "verdict", "version", "_instruction_set"},
     {"_core", "atomic_writer"},
     {"reproducible", "worker_threads"},
     {"units"},

@@ -161,7 +161,7 @@ def test_the_command_writes_a_page_and_ends_with_1_where_something_has_changed(w
     assert run.exit_code == 1, run.output
     assert "backlash: changed since 006.csv" in run.output
     page = (tmp_path / "out" / "monitor.html").read_text()
-    assert "Verdict: not in order" in page
+    assert "Verdict: does not fit" in page
     assert len(page) < 2e6
     rows = (tmp_path / "out" / "values.csv").read_text().splitlines()
     assert rows[0] == "log,place,residual,parameter,value,low,high,told"

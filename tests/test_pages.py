@@ -51,7 +51,7 @@ def identify(directory: Path) -> str:
 
 PAGES: dict[str, tuple[Callable[[Path], str], set[tuple[str, str]]]] = {
     "rig": (rig, {("tr", "differs"), ("td", "number"), ("th", "number")}),
-    "servo": (servo, {("tr", "differs"), ("td", "number"), ("th", "number"), ("section", "bad")}),
+    "servo": (servo, {("tr", "differs"), ("td", "number"), ("th", "number"), ("section", "misses")}),
     "pointing": (track, {("tr", "chosen"), ("td", "number"), ("th", "number")}),
     "identification": (identify, {("tr", "chosen"), ("td", "number"), ("th", "number"), ("td", "cell")}),
 }

@@ -17,7 +17,7 @@ from lostmotion.reports import page as pages
 from lostmotion.reports.contours import contours
 from lostmotion.reports.looks import LOOKS, STYLES, look
 from lostmotion.reports.packed import packed
-from lostmotion.reports.page import Headline, Report, Table, render
+from lostmotion.reports.page import Report, Table, render
 from lostmotion.reports.panels import Bars, Contacts, Curve, Flows, Ground, Group, Mark, Matrix, Panel
 from lostmotion.reports.pictures import endings
 from lostmotion.reports.run import run_report
@@ -25,6 +25,7 @@ from lostmotion.reports.servo import servo_report, write_servo
 from lostmotion.reports.static import svg_of
 from lostmotion.reports.thinning import simplified
 from lostmotion.units.practical import practical
+from lostmotion.verdict import Verdict
 
 X = np.geomspace(1.0, 1000.0, 50)
 PANEL = Panel("gain", "frequency [Hz]", "[-]", (Curve("one", X, 10.0 / X, look(0)),), log_x=True, log_y=True, level=1.0,
@@ -42,7 +43,7 @@ def script(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def report(*charts: object, table: Table | None = None) -> Report:
     group = Group("main", "Main", "", charts)  # type: ignore[arg-type]
     parts = () if table is None else (table,)
-    return Report("A <title>", "of `it`", Headline("good", ("in order",)), group, parts)
+    return Report("A <title>", "of `it`", Verdict("fits", ("in order",)), group, parts)
 
 
 @pytest.fixture(scope="module")

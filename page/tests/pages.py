@@ -16,12 +16,13 @@ import lostmotion as lm
 from lostmotion.live_page.page import write_page
 from lostmotion.reports.drive_check import check_report
 from lostmotion.reports.looks import DOTS, look
-from lostmotion.reports.page import Headline, Prose, Report, Table, render
+from lostmotion.reports.page import Prose, Report, Table, render
 from lostmotion.reports.panels import Bars, Contacts, Curve, Flows, Ground, Group, Histogram, Mark, Matrix, Panel
 from lostmotion.reports.response import response_report
 from lostmotion.reports.run import run_report
 from lostmotion.reports.servo import servo_report
 from lostmotion.sizing.drive_check import check_drive
+from lostmotion.verdict import Verdict
 
 # Page -> scenario, and what the test changes on it by its address.
 PAGES = {
@@ -116,7 +117,7 @@ def write_reports(directory: Path) -> None:
     )
     table = Table("Values", ("what", "value [N·m]"), [["one", "1.5"], ["two", "2"]], marked=frozenset({1}))
     words = Prose("What is computed", ("All of it, from `x`.",))
-    verdict = Headline("bad", ("Something is wrong.",))
+    verdict = Verdict("does not fit", ("Something is wrong.",))
     page = Report("All charts", "Each kind of chart.", verdict, Group("main", "Charts", "", charts), (table, words))
     (directory / "charts.html").write_text(render(page))
     numbers = {"x": x.tolist(), "y": [None if math.isnan(v) else v for v in y]}

@@ -40,11 +40,11 @@ def reproduce(
 def _print_results() -> None:
     """The verdict of the report, without its figures."""
     from ..paper.facts import facts
-    from ..paper.report import TITLE, verdict_of
+    from ..paper.report import TITLE, agreement
     from ..paper.runs import WORK, compute
 
     with progress(WORK, "Reproducing") as step:
         found = facts(compute(step))
     print(TITLE)
-    print(*(f"  {line}" for line in verdict_of(found).lines), sep="\n")
+    print(*(f"  {line}" for line in agreement(found)), sep="\n")
     print("All figures on a page: lostmotion reproduce -o out")

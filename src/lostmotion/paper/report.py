@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from ..reports.page import Headline, cards, document, verdict
+from ..reports.page import cards, document, verdict
 from ..reports.pages import render_page
 from ..reports.panels import Chart, scientific
 from .drive import AMPLITUDES, MODELS, Constant
@@ -46,20 +46,17 @@ def render(specs: list[FigureSpec], table: list[Constant], facts: Facts, *, live
         live=live,
     )
     lead = "A DC motor turns a load through a gearbox; three models of the gearbox are compared at two amplitudes."
-    return document(TITLE, lead, f"{verdict(verdict_of(facts))}\n{glance}\n{body}", charts)
+    return document(TITLE, lead, f"{verdict(agreement(facts))}\n{glance}\n{body}", charts)
 
 
-def verdict_of(facts: Facts) -> Headline:
+def agreement(facts: Facts) -> tuple[str, ...]:
     """Agreement and disagreement of the three models."""
     stuck = {model: f"{100.0 * facts.stuck[model, 'small']:.0f} %" for model in MODELS}
     traditional = " and ".join(f"{stuck[model]} ({model})" for model in MODELS if model != "2-DOF-NL")
-    return Headline(
-        "open",
-        (
-            f"At rated voltage the motor torque of the three models differs by at most {100.0 * facts.torque_gap:.0f} % of its peak.",
-            f"At a fortieth of it the motor shaft of 2-DOF-NL is stuck for {stuck['2-DOF-NL']} of the time, in the traditional models for {traditional}.",
-            "The loss table is a stand-in, since the paper prints its own only as a picture: curves of 2-DOF-NL compare in shape, not in digits.",
-        ),
+    return (
+        f"At rated voltage the motor torque of the three models differs by at most {100.0 * facts.torque_gap:.0f} % of its peak.",
+        f"At a fortieth of it the motor shaft of 2-DOF-NL is stuck for {stuck['2-DOF-NL']} of the time, in the traditional models for {traditional}.",
+        "The loss table is a stand-in, since the paper prints its own only as a picture: curves of 2-DOF-NL compare in shape, not in digits.",
     )
 
 

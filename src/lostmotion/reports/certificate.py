@@ -10,8 +10,9 @@ import numpy as np
 
 from ..servo.certificate import HuntingCertificate, certified_in_words
 from ..units.practical import practical
+from ..verdict import State, Verdict
 from .looks import FAINT, look
-from .page import Headline, Prose, Report, Table
+from .page import Prose, Report, Table
 from .pages import write_report
 from .panels import Curve, Group, Mark, Panel
 
@@ -29,7 +30,7 @@ WITHOUT_STEPS = (
     "The error that a slip leaves, with an encoder without steps. Where the curve crosses the line of equal and opposite errors there is a "
     "limit cycle; the band in the table holds with the steps."
 )
-STATES = {"hunts": "bad", "does not hunt": "good", "not decided": "open"}
+STATES: dict[str, State] = {"hunts": "does not fit", "does not hunt": "fits", "not decided": "not decided"}
 
 
 def certificate_rows(certificate: HuntingCertificate) -> list[tuple[str, str]]:
@@ -93,7 +94,7 @@ def certificate_report(name: str, title: str, certificate: HuntingCertificate) -
         title=title or name,
         lead=f"Certificate of hunting of `{name}`"
         + (f", contact `{certificate.contact}`." if certificate.contact else "."),
-        verdict=Headline(STATES[certificate.verdict], lines),  # type: ignore[arg-type]
+        verdict=Verdict(STATES[certificate.verdict], lines),
         main=Group("hunting", "From break-away to break-away", CAPTION, () if panel is None else (panel,), 1),
         parts=(Table("Hunting", ("quantity", "value"), rows), Prose("What is computed", COMPUTED)),
     )

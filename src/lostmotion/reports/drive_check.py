@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..sizing.finding import Finding
-from .page import Headline, Report, Table
+from ..verdict import State, Verdict
+from .page import Report, Table
 from .panels import Bars, Group
 
 FINDINGS = "“ok” means within the limit, “not judged” that the limit or a datum is not given. A blank remark means that there is none."
@@ -19,7 +20,7 @@ def counted(findings: Sequence[Finding]) -> str:
     return f"{text} {unknown} not judged (?)." if unknown else text
 
 
-def _verdict(findings: Sequence[Finding]) -> Headline:
+def _verdict(findings: Sequence[Finding]) -> Verdict:
     warnings = [f for f in findings if f.verdict == "warning"]
     lines = [counted(findings).replace(" (?)", "")]
     lines += [f"{f.what}: {f.value}{f' ({f.remark})' if f.remark else ''}." for f in warnings[:1]]
@@ -29,7 +30,8 @@ def _verdict(findings: Sequence[Finding]) -> Headline:
         lines.append(f"The most used limit is {most.what}: {100.0 * (most.use or 0.0):.3g} %.")
     unknown = [f.what for f in findings if f.verdict == "unknown"]
     lines += [f"Not judged: {'; '.join(unknown)}."] if unknown else []
-    return Headline("bad" if warnings else "open" if unknown else "good", tuple(lines[:3]))
+    state: State = "does not fit" if warnings else "fits with a reservation" if unknown else "fits"
+    return Verdict(state, tuple(lines[:3]))
 
 
 def check_report(name: str, findings: Sequence[Finding], title: str = "") -> Report:

@@ -20,8 +20,9 @@ from ..model.train import DriveTrain
 from ..simulation.scenario import Scenario
 from ..units.conversion import si_factor
 from ..units.practical import printed
+from ..verdict import State, Verdict
 from .looks import FAINT, MEASURED, PALETTE, look
-from .page import Headline, Prose, Report, Table
+from .page import Prose, Report, Table
 from .pages import table_csv, write_report, write_text
 from .panels import Curve, Group, Matrix, Panel
 
@@ -131,7 +132,7 @@ INTERVALS = (
 )
 
 
-def _verdict(result: IdentificationResult) -> Headline:
+def _verdict(result: IdentificationResult) -> Verdict:
     """Warnings, the model that is taken, and what the logs leave open."""
     warnings, rung = result.warnings(), result.rungs[result.chosen]
     unit = f" {result.error_unit}".rstrip()
@@ -141,7 +142,8 @@ def _verdict(result: IdentificationResult) -> Headline:
     known = "All parameters are determined by the logs." if not open_ends else f"{open_ends[0].rstrip('.')}."
     more = f" {len(open_ends) - 1} more below." if len(open_ends) > 1 else ""
     lines = [f"{' '.join(warnings)}", *found, f"{known}{more}"] if warnings else [*found, f"{known}{more}"]
-    return Headline("bad" if warnings else "open" if open_ends else "good", tuple(lines))
+    state: State = "does not fit" if warnings else "fits with a reservation" if open_ends else "fits"
+    return Verdict(state, tuple(lines))
 
 
 def error_rows(result: IdentificationResult) -> list[list[str]]:

@@ -13,8 +13,9 @@ from ..identification.monitor import RESIDUAL, MonitorResult, Watched
 from ..identification.parameters import in_unit
 from ..units.conversion import si_factor
 from ..units.practical import printed
+from ..verdict import Verdict
 from .looks import FAINT, PALETTE
-from .page import Headline, Prose, Report, Table
+from .page import Prose, Report, Table
 from .pages import table_csv, write_report
 from .panels import Curve, Group, Mark, Panel
 
@@ -83,24 +84,24 @@ TELLS = (
 )
 
 
-def _verdict(result: MonitorResult) -> Headline:
+def _verdict(result: MonitorResult) -> Verdict:
     """Alarms, what is not decided, or that nothing has changed."""
     alarms = result.alarms
     undecided = [w for w in result.watched.values() if not w.decided and not w.alarm]
     if alarms:
         more = f" {len(alarms) - 2} more below." if len(alarms) > 2 else ""
-        return Headline("bad", tuple(f"{w.text}.{more if k == 1 else ''}" for k, w in enumerate(alarms[:2])))
+        return Verdict("does not fit", tuple(f"{w.text}.{more if k == 1 else ''}" for k, w in enumerate(alarms[:2])))
     if undecided:
         names = ", ".join(w.name for w in undecided)
-        return Headline(
-            "open",
+        return Verdict(
+            "not decided",
             (
                 f"Not decided: {names}.",
                 f"An example of the reasons: {undecided[0].text}.",
                 "All findings are listed below.",
             ),
         )
-    return Headline("good", ("No watched value has changed, and none is beyond its limits.",))
+    return Verdict("fits", ("No watched value has changed, and none is beyond its limits.",))
 
 
 def _row(result: MonitorResult, w: Watched) -> list[str]:

@@ -8,13 +8,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
 from ..atomic_writer import write_bytes
 from ..errors import InputError
 from ..portable.checkout import made_here
+from ..verdict import State, Verdict
 from .packed import packed
 from .panels import Bars, Chart, Contacts, Drawing, Flows, Ground, Group, Histogram, Matrix, Panel
 from .static import svg_of, swatch
@@ -25,19 +25,17 @@ NO_SCRIPT = (
     "The charts do not move on this page: its script was not built. `make page-report` builds it; it needs node."
 )
 STILL = 40  # charts of a page from which on they are not drawn for readers without JavaScript
+COLOURS: dict[State, str] = {
+    "fits": "fits",
+    "fits with a reservation": "reserved",
+    "does not fit": "misses",
+    "not decided": "undecided",
+}
 ALIKE = re.compile(r"[+\-−±]?(\d|\.\d|nan|inf)")
 
 
 class Html(str):
     """Text that is already HTML."""
-
-
-@dataclass(frozen=True)
-class Headline:
-    """Headline of a report, in at most three lines."""
-
-    state: Literal["good", "bad", "open"]
-    lines: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -71,7 +69,8 @@ class Report:
 
     title: str
     lead: str
-    verdict: Headline
+    verdict: Verdict | tuple[str, ...]
+    """in at most three lines; lines alone where nothing is asked, so that there is nothing to judge"""
     main: Group
     parts: tuple[Table | Group | Prose, ...]
 
@@ -98,11 +97,14 @@ def render(report: Report) -> str:
     return document(report.title, report.lead, "\n".join(parts), charts)
 
 
-def verdict(found: Headline) -> str:
-    """Headline of a report as HTML."""
-    state = {"good": "Verdict", "bad": "Verdict: not in order", "open": "Verdict, with reservations"}[found.state]
-    lines = "".join(f"<p>{_text(_sentence(line))}</p>\n" for line in found.lines)
-    return f'<section class="verdict {found.state}"><h2>{state}</h2>\n{lines}</section>'
+def verdict(found: Verdict | tuple[str, ...]) -> str:
+    """Verdict of a report as HTML, its heading and colour by its state; a result where nothing is judged."""
+    if isinstance(found, Verdict):
+        kind, heading, lines = COLOURS[found.state], f"Verdict: {found.heading}", found.lines
+    else:
+        kind, heading, lines = "plain", "Result", found
+    shown = "".join(f"<p>{_text(_sentence(line))}</p>\n" for line in lines)
+    return f'<section class="verdict {kind}"><h2>{heading}</h2>\n{shown}</section>'
 
 
 def _sentence(text: str) -> str:

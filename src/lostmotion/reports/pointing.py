@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..pointing.budget import Errors, PointingBudget, PointingError
+from ..verdict import Verdict
 from .looks import look
-from .page import Headline, Prose, Report, Table
+from .page import Prose, Report, Table
 from .pages import table_csv, write_report
 from .panels import Bars, Curve, Group, Panel
 
@@ -175,7 +176,7 @@ def _bars(budget: PointingBudget) -> Group:
     return Group("contributions", "Contributions of the causes", CONTRIBUTED, charts, max(1, len(charts)))
 
 
-def _verdict(budget: PointingBudget) -> Headline:
+def _verdict(budget: PointingBudget) -> Verdict:
     """The error of each axis, what causes most of it, how long the target is in view."""
     errors, causes = [], []
     for axis, e in budget.whole.items():
@@ -195,7 +196,7 @@ def _verdict(budget: PointingBudget) -> Headline:
     lines += [f"Largest contribution, {'; '.join(causes)}."] if causes else []
     last = f"The target is {view}; {budget.after_line}." if view else f"{budget.after_line.capitalize()}."
     seen = budget.view is None or budget.view.share == 1.0
-    return Headline("good" if seen else "open", (*lines, last))
+    return Verdict("fits" if seen else "fits with a reservation", (*lines, last))
 
 
 BUDGET = (

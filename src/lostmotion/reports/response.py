@@ -15,7 +15,7 @@ from ..response.crossovers import characteristics
 from ..simulation.scenario import Scenario
 from ..units.practical import printed
 from .looks import step
-from .page import Headline, Prose, Report, Table
+from .page import Prose, Report, Table
 from .pages import table_csv, write_report
 from .panels import Curve, Ground, Group, Panel
 
@@ -172,13 +172,12 @@ def _closed_loop_lines(result: xarray.Dataset) -> list[str]:
     return lines
 
 
-def _verdict(response: xarray.Dataset, found: xarray.Dataset) -> Headline:
+def _verdict(response: xarray.Dataset, found: xarray.Dataset) -> tuple[str, ...]:
     lines = amplitude_lines(found)
     count = found.sizes["amplitude"]
     ends = [lines[0], *([lines[count - 1]] if count > 1 else [])]
-    state: Any = "open" if np.any(response["reason"].values != "") else "good"
     told = ["; ".join(ends), *dead_zone_line(found), motion_lines(response)[0]]
-    return Headline(state, tuple(f"{line[0].upper()}{line[1:]}." for line in told))
+    return tuple(f"{line[0].upper()}{line[1:]}." for line in told)
 
 
 # --- the page ---

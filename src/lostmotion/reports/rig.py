@@ -14,8 +14,9 @@ from ..test_rig.comparison import Comparison
 from ..test_rig.measurement import RigReport
 from ..test_rig.rig import LOST_MOTION_LOAD
 from ..units.practical import RPM, practical
+from ..verdict import Verdict
 from .looks import DOTS, step
-from .page import Headline, Prose, Report, Table
+from .page import Prose, Report, Table
 from .pages import table_csv, write_report
 from .panels import Curve, Group, Panel
 from .sheet_rows import rows_of, rows_of_part
@@ -156,7 +157,7 @@ def largest_difference(comparisons: Sequence[Comparison]) -> str:
     return f"{counted}; the largest difference is {percent(worst.difference)} ({worst.quantity})."
 
 
-def _verdict(report: RigReport) -> Headline:
+def _verdict(report: RigReport) -> Verdict:
     """Agreement of rig and data sheet, torsion and locking, in words."""
     lines = [largest_difference(report.comparisons)]
     differs = [c for c in report.comparisons if c.remark]
@@ -170,7 +171,7 @@ def _verdict(report: RigReport) -> Headline:
         (f"{what} {value}" for what, value in rows.items() if what.startswith("lost motion")), "no lost motion: rigid"
     )
     lines.append(f"{lost[0].upper()}{lost[1:]}; self-locking: {rows['self-locking at rated load and speed']}.")
-    return Headline("open" if differs or not report.comparisons else "good", tuple(lines))
+    return Verdict("fits with a reservation" if differs or not report.comparisons else "fits", tuple(lines))
 
 
 def percent(share: float) -> str:

@@ -14,6 +14,7 @@ from ..simulation.switchings import ATTRIBUTE as SWITCHINGS
 from ..simulation.switchings import MESH_STEP, names_in, unpacked
 from ..simulation.windings import errors_of
 from ..units.practical import charted, practical, printed
+from ..verdict import Verdict
 
 if TYPE_CHECKING:
     import xarray
@@ -172,7 +173,7 @@ def run_report(name: str, result: xarray.Dataset) -> Report:
     InputError
         The dataset is no run.
     """
-    from .page import Headline, Prose, Report
+    from .page import Prose, Report
     from .panels import Flows, Group
     from .run_charts import gear_charts, run_charts
 
@@ -190,10 +191,11 @@ def run_report(name: str, result: xarray.Dataset) -> Report:
     more = gear_charts(result)
     flows = [Flows("Energy of the whole run", e)] if e else []
     gears = [Group("gears", "Torsion, losses and energy", "", (*more, *flows))] if more or flows else []
+    shown = (first, *_motion_lines(result), *told)[:3]
     return Report(
         title=result.attrs.get("title") or name,
         lead=f"Run of `{name}`.",
-        verdict=Headline("open" if "warning" in result.attrs else "good", (first, *_motion_lines(result), *told)[:3]),
+        verdict=Verdict("fits with a reservation", shown) if "warning" in result.attrs else shown,
         main=Group("run", "The run", "Drag over a chart to zoom, double-click to see all of it.", tuple(charts)),
         parts=(
             *gears,

@@ -11,8 +11,9 @@ from ..data_sheets.linear_sheets import ScrewSheet
 from ..test_rig.rig import LOST_MOTION_LOAD
 from ..test_rig.screw_measurement import RATED, ScrewReport
 from ..units.practical import RPM
+from ..verdict import Verdict
 from .looks import DOTS, step
-from .page import Headline, Report
+from .page import Report
 from .pages import table_csv, write_report
 from .panels import Curve, Group, Panel
 from .rig import compared_rows, largest_difference, rig_parts
@@ -89,7 +90,7 @@ def summary_rows(report: ScrewReport) -> list[tuple[str, str]]:
     return rows
 
 
-def _verdict(report: ScrewReport) -> Headline:
+def _verdict(report: ScrewReport) -> Verdict:
     rows = summary_rows(report)
     lines = [
         largest_difference(report.comparisons),
@@ -97,7 +98,7 @@ def _verdict(report: ScrewReport) -> Headline:
         f"Drag torque {rows[1][1]}; back-driving force {rows[4][1]}.",
     ]
     differs = any(c.remark for c in report.comparisons)
-    return Headline("open" if differs or not report.comparisons else "good", tuple(lines))
+    return Verdict("fits with a reservation" if differs or not report.comparisons else "fits", tuple(lines))
 
 
 def screw_report(name: str, report: ScrewReport, sheet: ScrewSheet | None = None, notes: Iterable[str] = ()) -> Report:

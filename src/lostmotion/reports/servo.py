@@ -12,9 +12,10 @@ import numpy as np
 from ..servo.commission import LoopSheet, ServoReport, decibels
 from ..servo.motion import LimitCycle, StepResponse
 from ..units.practical import charted
+from ..verdict import State, Verdict
 from .certificate import certificate_parts
 from .looks import FAINT, look
-from .page import Headline, Prose, Report, Table
+from .page import Prose, Report, Table
 from .pages import table_csv, write_report
 from .panels import Curve, Group, Mark, Panel
 
@@ -97,21 +98,21 @@ def _cycle_table(report: ServoReport, cycle: LimitCycle) -> Table:
 # --- verdict ---
 
 
-def _verdict(report: ServoReport) -> Headline:
+def _verdict(report: ServoReport) -> Verdict:
     """Stability and margins; error and settling; stiffness and hunting."""
     found = report.instabilities()
     rows = dict(report.summary())
     cycle = report.limit_cycle
-    state = "bad" if found or (cycle is not None and cycle.whole.cycles) else "good"
-    if state == "good" and cycle is not None and cycle.whole.verdict == "not decided":
-        state = "open"
+    state: State = "does not fit" if found or (cycle is not None and cycle.whole.cycles) else "fits"
+    if state == "fits" and cycle is not None and cycle.whole.verdict == "not decided":
+        state = "not decided"
     lines = (
         f"{_sentence(rows['verdict'])} Worst margins: {rows['worst margins']}.",
         f"Following error over the run: {rows['following error']}."
         + (f" Settled: {rows['settling']}." if "settling" in rows else ""),
         (f"Stiffness: {rows['stiffness']}. " if "stiffness" in rows else "") + f"At rest: {rows['at rest']}.",
     )
-    return Headline(state, lines)  # type: ignore[arg-type]
+    return Verdict(state, lines)
 
 
 def _sentence(text: str) -> str:

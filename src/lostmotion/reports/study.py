@@ -14,8 +14,9 @@ from ..studies.study import Study
 from ..studies.table import labelled, read_table
 from ..studies.vary import Vary
 from ..units.practical import printed
+from ..verdict import Verdict
 from .looks import PALETTE
-from .page import Headline, Prose, Report, Table
+from .page import Prose, Report, Table
 from .pages import table_csv, write_report
 from .panels import Bars, Curve, Group, Histogram, Panel
 from .study_selection import show_selection
@@ -226,7 +227,7 @@ def _study_page(study: Study, table: pa.Table, name: str) -> tuple[Report, dict[
         parts.append(bars("sobol", "Sobol indices", indices, "Sobol index [-]", ("first order", "total")))
     parts.append(scatter(table, study))
     tables = {"statistics.csv": table_csv(["value", *STATISTICS], rows)}
-    verdict = _verdict(table, study, ranks)
+    verdict: Verdict | tuple[str, ...] = _result(table, study, ranks)
     if study.select is not None:
         selected = show_selection(table, study)
         tables, verdict = tables | selected.tables, selected.verdict
@@ -237,7 +238,7 @@ def _study_page(study: Study, table: pa.Table, name: str) -> tuple[Report, dict[
     return Report(study.title or name, lead, verdict, distributions(table, study), tuple(parts)), tables
 
 
-def _verdict(table: pa.Table, study: Study, ranks: dict[str, dict[str, float]]) -> Headline:
+def _result(table: pa.Table, study: Study, ranks: dict[str, dict[str, float]]) -> tuple[str, ...]:
     """The spread of the first values, and what they depend on most."""
     lines = []
     for name in list(study.keep)[:2]:
@@ -251,8 +252,7 @@ def _verdict(table: pa.Table, study: Study, ranks: dict[str, dict[str, float]]) 
         lines.append(
             f"{labelled(table, name)}: mean {x.mean():.5g}, 90 % of the runs within {low:.5g} and {high:.5g}{depends}."
         )
-    whole = table.num_rows == study.total and not _failures(table)
-    return Headline("good" if whole else "open", (f"{_counted(table, study)}.", *lines))
+    return f"{_counted(table, study)}.", *lines
 
 
 def study_report(directory: Path) -> tuple[Report, dict[str, str]]:

@@ -16,8 +16,9 @@ from ..studies.select import TASK_SHARES, USE, Selection
 from ..studies.selection import NOT_RUN, Candidate, Price, candidates, pareto_front, prices
 from ..studies.study import Study
 from ..studies.table import labelled
+from ..verdict import Verdict
 from .looks import OTHERS, PALETTE, look
-from .page import Headline, Table
+from .page import Table
 from .pages import table_csv
 from .panels import Curve, Group, Panel
 
@@ -39,7 +40,7 @@ class Shown:
     """A selection as text, as parts of a page, and as the text of CSV files by their names."""
 
     lines: list[str]
-    verdict: Headline
+    verdict: Verdict
     parts: tuple[Table | Group, ...]
     tables: dict[str, str]
 
@@ -94,7 +95,7 @@ def show_selection(table: pa.Table, study: Study) -> Shown:
 
 def _verdict(
     table: pa.Table, ranked: list[Candidate], costs: list[Price], select: Selection, near: list[Miss]
-) -> Headline:
+) -> Verdict:
     """Number of pairs that fit, the best one, and the limit that costs most."""
     fitting = [c for c in ranked if c.fits]
     failed = sum(NOT_RUN in c.violated for c in ranked)
@@ -114,7 +115,7 @@ def _verdict(
     if dear:
         p = max(dear, key=lambda price: price.gain)
         lines.append(f"Without the limit {p.limit} the best would be {100.0 * p.gain:.3g} % better.")
-    return Headline("good" if fitting else "bad", tuple(lines))
+    return Verdict("fits" if fitting else "does not fit", tuple(lines))
 
 
 def _ranking_tables(table: pa.Table, ranked: list[Candidate], front: list[Candidate], select: Selection) -> list[Table]:
