@@ -348,7 +348,7 @@ class _Climbed:
     engine: Engine
     logs: list[Prepared]
     start: Regression
-    ways: list[str]
+    ways: dict[str, str]
     rungs: list[RungResult]
     best: int
     odd: list[OddLog]
@@ -359,11 +359,17 @@ def _climbed(
 ) -> _Climbed:
     """All models fitted to logs; the intervals wait until no log is left out any more.
 
-    Without a few of many logs the models continue from the values that they had before.
+    Models are compared under one course of inputs between samples. If the model that is taken turns an input to the other course,
+    all models are fitted again, each from its own start. Without a few of many logs the models continue from the values that they
+    had before, under the same course.
     """
-    rig, logs, point, start, ways, undecided = _begun(rig, logs, threads, notify)
     near = before is not None and len(logs) >= MANY * (len(before.logs) - len(logs))
-    kept = {rung.name: (rung.fit.point, rung.minima) for rung in before.rungs} if before and near else {}
+    rig, point, start, ways, undecided = _begun(rig, logs, threads, notify)
+    kept: dict[str, tuple[Point, list[Point]]] = {}
+    if before is not None and near:
+        kept = {rung.name: (rung.fit.point, rung.minima) for rung in before.rungs}
+        rig, ways, undecided = before.engine.rig, before.ways, ()
+    logs = [replace(log, cache={}) for log in logs]
     while True:
         engine = Engine(rig, threads)
         rungs = climb(rig, engine, logs, point, notify, progress.of(rig.task, logs, kept))
@@ -371,19 +377,18 @@ def _climbed(
         turned = _turned(engine, logs, rungs[best].fit, best, undecided)
         if turned is None:
             break
-        rig, point, words = turned
-        ways |= words
-        undecided = ()  # each way has been fitted from values that explain the logs best
-        kept = {}
+        rig, words = turned
+        ways, undecided = ways | words, ()
         logs = [replace(log, cache={}) for log in logs]
+        point, start = _start(rig, logs, threads)
     odd = odd_logs(rig, engine, logs, point, rungs[best].fit, best)
-    return _Climbed(engine, logs, start, list(ways.values()), rungs, best, odd)
+    return _Climbed(engine, logs, start, ways, rungs, best, odd)
 
 
 def _turned(
     engine: Engine, logs: list[Prepared], fit: Fit, rung: int, undecided: Collection[str]
-) -> tuple[Rig, Point, dict[str, str]] | None:
-    """(rig, where the search goes on, words) if inputs go the other way between their samples, seen from the values of a fit.
+) -> tuple[Rig, dict[str, str]] | None:
+    """(rig, words) if inputs go the other way between their samples, seen from the values of a fit.
 
     The way was chosen at the first values, which may be so far off that the residuals of both ways say nothing.
     """
@@ -397,8 +402,8 @@ def _turned(
             problem_of(other, Engine(other, engine.threads), some, rung), point, iterations=rig.task.fit.iterations
         )
 
-    other, point, words = nearer_ways(rig, train, ways, fit.point, fitted)
-    return None if other is rig else (other, point, words)
+    other, _, words = nearer_ways(rig, train, ways, fit.point, fitted)
+    return None if other is rig else (other, words)
 
 
 def _answer(found_by: _Climbed, profiles: bool) -> IdentificationResult:
@@ -428,30 +433,34 @@ def _answer(found_by: _Climbed, profiles: bool) -> IdentificationResult:
         found_by.start,
         rig,
         logs,
-        inputs=found_by.ways,
+        inputs=list(found_by.ways.values()),
         misfits=[m for m in misfit if m.large or m.structured],
     )
 
 
 def _begun(
     rig: Rig, logs: list[Prepared], threads: int | None, notify: Notify
-) -> tuple[Rig, list[Prepared], Point, Regression, dict[str, str], Collection[str]]:
-    """(rig and logs with a way for each input, where the search begins, why there, words on the inputs, those that runs decide)."""
+) -> tuple[Rig, Point, Regression, dict[str, str], Collection[str]]:
+    """(rig with a way for each input, where the search begins, why there, words on the inputs, those that runs decide)."""
     rig, ways, undecided = as_recorded(rig, logs)
-    point, start = start_point(rig.task, logs), Regression()
+    point, start = _start(rig, logs, threads)
     train = [log for log in logs if not log.held_out]
-    few = begun_with(rig.task, train)
-    if rig.task.fit.regression and train:
-        point, start = regressed(rig, Engine(rig, threads), few, point, free_on(rig.task, 0))
     if undecided and train:
 
         def fitted(rig: Rig, logs: list[Prepared], start: Point) -> Fit:
             return first_fit(rig, Engine(rig, threads), logs, start, notify)
 
-        rig, point, more = nearer_ways(rig, few, undecided, point, fitted)
+        rig, point, more = nearer_ways(rig, begun_with(rig.task, train), undecided, point, fitted)
         ways |= more
-        logs = [replace(log, cache={}) for log in logs]
-    return rig, logs, point, start, ways, undecided if train else ()
+    return rig, point, start, ways, undecided if train else ()
+
+
+def _start(rig: Rig, logs: list[Prepared], threads: int | None) -> tuple[Point, Regression]:
+    """Start of the lowest model, with the parameters of the others off: by regression, where the task wants it."""
+    point, train = start_point(rig.task, logs), [log for log in logs if not log.held_out]
+    if not rig.task.fit.regression or not train:
+        return point, Regression()
+    return regressed(rig, Engine(rig, threads), begun_with(rig.task, train), point, free_on(rig.task, 0))
 
 
 def _intervals(
