@@ -96,6 +96,19 @@ def test_heat_into_the_bodies_is_stored_or_leaves_them() -> None:
     assert abs(ledger["residual"]) <= 1e-9 * ledger["turned_over"]
 
 
+def test_the_heat_of_a_ripple_does_not_depend_on_the_samples() -> None:
+    """A sine of 0.3 Hz with a mean, over five periods: mean square 0.1² + 0.03²/2, whatever the samples."""
+    fine, coarse = (
+        lm.sizing.warm_up(scenario(**{"simulation.sample_interval": h}), update=4.0, winding=25.0) for h in (0.02, 2.0)
+    )
+    heats = [json.loads(found.attrs["heat"])["winding"] for found in (fine, coarse)]
+    assert heats[1] == pytest.approx(heats[0], rel=1e-9)
+    t = 16.0 * 2.0 * math.pi * 0.3
+    square = 0.1**2 + 0.03**2 * (0.5 - math.sin(2.0 * t) / (4.0 * t)) + 0.006 * (1.0 - math.cos(t)) / t
+    assert heats[0] >= 1.5 / 0.05**2 * square * 16.0  # and what the winding's resistance grows by
+    assert heats[0] == pytest.approx(1.5 / 0.05**2 * square * 16.0, rel=0.03)
+
+
 def test_without_anything_that_depends_on_the_temperature_the_motion_is_that_of_one_run() -> None:
     plain, hot = lm.simulate(scenario()), lm.sizing.warm_up(scenario(), update=2.0)
     assert hot.sizes["time"] == plain.sizes["time"]

@@ -17,6 +17,7 @@ from ..model.motor import Motor
 from ..simulation.results import RunArrays, scenario_of
 from .motor_check import command_of_run, current_voltage_power
 from .thermal import COPPER, mean_square, need_two_bodies, rms
+from .torque_squares import squares_of
 
 if TYPE_CHECKING:
     import xarray
@@ -76,8 +77,7 @@ def motor_current(result: xarray.Dataset, motor: str | None = None) -> xarray.Da
 
 def phase_amplitudes(result: xarray.Dataset | RunArrays, where: str) -> list[np.ndarray] | None:
     """Currents i_d, i_q [A] and voltages u_d, u_q [V] under field-oriented control; None without."""
-    prefix = "" if where == "motor" else f"{where.removeprefix('motors.')}_"
-    names = [f"{prefix}{axis}_{what}" for what in ("current", "voltage") for axis in ("direct", "quadrature")]
+    names = [f"{_prefix(where)}{axis}_{what}" for what in ("current", "voltage") for axis in ("direct", "quadrature")]
     if any(name not in result for name in names):
         return None
     return [np.asarray(result[name]) for name in names]
@@ -132,8 +132,9 @@ def temperatures(
     -------
     xarray.Dataset
         Over ``time`` [s]: `winding_temperature` and `case_temperature` [°C] and `copper_loss` [W]; `rms_torque` [N·m], and `headroom`
-        [K] if the limits have a largest temperature. The attribute `error_bound` [K] bounds the error of the temperatures that
-        results from the linear interpolation of the torque between the samples.
+        [K] if the limits have a largest temperature. The heat of each interval between samples is that of the exact run, from a
+        second run. The attribute `error_bound` [K] bounds the error that results from its course within an interval. It is infinite
+        for a run with a law of its own, which cannot be repeated: the torque is then taken as straight between the samples.
 
     Raises
     ------
@@ -148,24 +149,22 @@ def temperatures(
     True
     """
     m, where, (_, torque, _) = _motor_of(result, motor)
-    heating = torque
-    if m.winding is not None and (oriented := oriented_amplitudes(result, where)) is not None:
-        heating = m.winding.phase_values().torque_constant * oriented[0]  # with all of the current across the magnets
     if ambient is None:
         ambient = scenario_of(result).task.ambient_temperature
     bodies = need_two_bodies(m, ambient, 0.0 if constant_resistance else COPPER, where)
     time = result["time"].values
     if len(time) < 2:
         raise InputError("temperatures: the result has a single sample; shorten simulation.sample_interval")
+    heating, squares, lead, of_torque = _heating(result, m, where, torque)
     if repeated:
         if (winding, case) != (None, None):
             raise InputError(
                 "temperatures: a motion that has been repeated for ever has no beginning; leave winding and case out"
             )
-        course = bodies.repeated(time, mean_square(heating))
+        course = bodies.repeated(time, squares)
     else:
         start = (ambient if winding is None else winding, ambient if case is None else case)
-        course = bodies.course(time, mean_square(heating), start)
+        course = bodies.course(time, squares, start)
     if course is None:
         raise InputError(
             "temperatures: repeated, the winding has no end to its heat: its loss grows faster than it is carried off"
@@ -177,7 +176,7 @@ def temperatures(
         "winding_temperature": (of_winding, "degC", "temperature of the winding"),
         "case_temperature": (of_case, "degC", "temperature of the case"),
         "copper_loss": (loss, "W", "heat of the winding"),
-        "rms_torque": (rms(time, torque), "N*m", "motor torque, root mean square"),
+        "rms_torque": (of_torque, "N*m", "motor torque, root mean square"),
     }
     if m.limits is not None and m.limits.max_winding_temperature is not None:
         found["headroom"] = (
@@ -185,7 +184,31 @@ def temperatures(
             "K",
             "below the largest temperature of the winding",
         )
-    return _dataset(result, found, {"ambient": ambient, "error_bound": bodies.error_bound(time, heating, hottest)})
+    return _dataset(result, found, {"ambient": ambient, "error_bound": bodies.error_bound(lead, hottest)})
+
+
+def _heating(
+    result: xarray.Dataset, m: Motor, where: str, torque: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, float, float]:
+    """Torque that heats as the motor does [N·m], mean of its square over each interval, what the heat leads by at most
+    (`Squares.lead`), and the rms torque."""
+    scenario, time = scenario_of(result), result["time"].values
+    if any(controller.law for controller in scenario.axes().values()):
+        return torque, mean_square(torque), math.inf, rms(time, torque)
+    name = next(name for name in scenario.named_train().motors if scenario.motor_key(name) == where)
+    if m.winding is None or (oriented := oriented_amplitudes(result, where)) is None:
+        found = squares_of(scenario, name, time)
+        return torque, found.square, found.lead, found.rms
+    phase = m.winding.phase_values()
+    heat = result[f"{_prefix(where)}copper_heat"].values
+    square = phase.torque_constant**2 * np.diff(heat) / (1.5 * phase.resistance * np.diff(time))
+    lead = float((square * np.diff(time)).max(initial=0.0))  # no heat is negative
+    return phase.torque_constant * oriented[0], square, lead, rms(time, torque)
+
+
+def _prefix(where: str) -> str:
+    """Prefix of the variables of a motor, by its table."""
+    return "" if where == "motor" else f"{where.removeprefix('motors.')}_"
 
 
 def _dataset(

@@ -4,8 +4,8 @@
     C_c dT_c/dt = (T_w - T_c)/R_wc - (T_c - T_a)/R_ca,      C_c = tau_m/R_ca
     P = p M² (1 + alpha (T_w - T_r))
 
-with p M² the copper loss at the temperature T_r. Between two samples M is straight and M² is replaced by its mean: the energy is
-exact, and each step is the exact solution of a linear system.
+with p M² the copper loss at the temperature T_r. Over each interval M² is replaced by its mean: the energy is exact, and each step
+is the exact solution of a linear system.
 """
 
 from __future__ import annotations
@@ -106,17 +106,24 @@ class TwoBodies:
         every = self.ambient + np.vstack([x, F @ x + g])
         return every[:, 0], every[:, 1]
 
-    def error_bound(self, time: np.ndarray, torque: np.ndarray, hottest: float) -> float:
-        """Error bound of the temperatures [K], through the mean of M² over each interval.
+    def error_bound(self, lead: float, hottest: float) -> float:
+        """Error bound of the temperatures at the ends of intervals [K], where the heat of each is spread evenly.
 
-        In an interval h, values within dP of each other make the heat lead or lag by at most h dP/4. The temperature
-        that one joule leaves decays. So the error is h dP/(4 C_w), and as much again within an interval.
+        Parameters
+        ----------
+        lead
+            Largest integral from the start of an interval of M² less its mean [(N·m)² s].
+        hottest
+            Highest temperature of the winding [°C].
+
+        Notes
+        -----
+        With the heat e(t) by which the even course is behind, and the response K of a body to one joule, the error is the integral
+        of K de = -e dK, since e is 0 at the ends of intervals. K of the winding is at most 1/C_w and falls; K of the case rises to
+        less than that and falls.
         """
-        square = torque**2
-        low = np.where(torque[1:] * torque[:-1] < 0.0, 0.0, np.minimum(square[1:], square[:-1]))
-        spread = (np.maximum(square[1:], square[:-1]) - low) * np.diff(time)
         factor = 1.0 + self.alpha * max(hottest - self.reference, 0.0)
-        return float(factor * self.loss * spread.max(initial=0.0) / (2.0 * self.winding_time / self.winding_case))
+        return float(2.0 * factor * self.loss * lead * self.winding_case / self.winding_time)
 
 
 def needed(motor: Motor) -> list[str]:

@@ -31,7 +31,8 @@ from ..simulation.core_runs import core_case
 from ..simulation.results import raw_result
 from ..simulation.run import MAX_SWITCHINGS, check_memory
 from ..simulation.scenario import Scenario
-from .thermal import COPPER, TwoBodies, mean_square, need_two_bodies
+from .thermal import COPPER, TwoBodies, need_two_bodies
+from .torque_squares import squares
 
 if TYPE_CHECKING:
     import xarray
@@ -280,7 +281,8 @@ def _course(law: _Law, each: int, start: tuple[float, float]) -> _Course:
     names, signals = scenario.core().input_names(), scenario.signals()
     state, capacities = scenario.start(), scenario.capacities()
     last = table.samples - 1
-    torque = [name for name, *_ in scenario.core().channels()].index(scenario.train().motor_torque_of(law.name))
+    fastest = max((f for name in names for _, f, _ in signals[name].sine_list()), default=0.0)
+    torque = scenario.named_train().motor_torque_of(law.name)
     now, results, temperatures = start, [], [np.array([start])]
     heat = dict.fromkeys(("winding", "housing", "stored", "ambient"), 0.0)
     for first in range(0, last, each):
@@ -292,7 +294,9 @@ def _course(law: _Law, each: int, start: tuple[float, float]) -> _Course:
         case = _core.Case(core, inputs=inputs, start=state, hysteresis_capacities=capacities)
         result = _core.run(case, **grid, energy=True, max_switchings=MAX_SWITCHINGS)
         state, capacities = _end(result["end_state"], capacities, short=scenario.core().short_form)
-        square = float(np.mean(mean_square(np.asarray(result["values"][torque])))) / law.magnet_factor(now[1]) ** 2
+        breaks = [p[0] - begin for name in names for p in signals[name].breakpoint_list()]
+        torques = squares(case, torque, np.array([0.0, length]), breaks=breaks, fastest=fastest)
+        square = float(torques.square[0]) / law.magnet_factor(now[1]) ** 2
         losses = math.fsum(result["energy"][entry] for entry in law.heating) / length
         now, course = _warmed(law.bodies, square, losses, now, np.arange(1, samples + 1) * table.sample_interval, heat)
         temperatures.append(course)
