@@ -2,8 +2,9 @@ from .actuated import Actuated as Actuated
 from .actuated import ActuatedSnapshot as ActuatedSnapshot
 from .actuated import ActuatedState as ActuatedState
 from .attaching import attach as attach
+from .mjcf import JointActuator as JointActuator
+from .mjcf import from_mjcf as from_mjcf
 from .plugin import load_plugin as load_plugin
 from .plugin import write_drive as write_drive
 from .reduction import Reduction as Reduction
-from .reduction import from_mjcf as from_mjcf
 from .reduction import reduce as reduce

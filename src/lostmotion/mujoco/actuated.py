@@ -12,7 +12,8 @@ import numpy as np
 from ..errors import InputError
 from ..inputs.validation import did_you_mean, listed, shown
 from ..simulation.joint_trains import Driven, JointDrive, JointTrains, joint_drive
-from .joints import joint_id
+from .joints import acts, joint_id
+from .mjcf import JointActuator
 
 if TYPE_CHECKING:
     import mujoco
@@ -60,7 +61,7 @@ class Actuated:
         substep is at most 0.5.
     """
 
-    def __init__(self, model: mujoco.MjModel, given: Mapping[str, Driven], substeps: int | None) -> None:
+    def __init__(self, model: mujoco.MjModel, given: Mapping[str, JointActuator], substeps: int | None) -> None:
         import mujoco
 
         self._mj = mujoco
@@ -77,9 +78,10 @@ class Actuated:
         mujoco.mj_fullM(model, self.data, mass)
         inertias = 1.0 / np.diag(np.linalg.inv(mass))[self._dofs]
         made = [
-            joint_drive(name, drive, float(inertia), step)
-            for (name, drive), inertia in zip(given.items(), inertias, strict=True)
+            joint_drive(name, actuator.drive, float(inertia), step)
+            for (name, actuator), inertia in zip(given.items(), inertias, strict=True)
         ]
+        self._actuators = tuple(given.values())
         self._drives: dict[str, JointDrive] = dict(zip(self.joints, made, strict=True))
         self.substeps = _substeps(made, step) if substeps is None else substeps
         if self.substeps > MAX_SUBSTEPS:
@@ -121,7 +123,7 @@ class Actuated:
             row_length=m.M_rownnz,
             row_begin=m.M_rowadr,
             column=m.M_colind,
-            damping=m.dof_damping.reshape(m.nv, -1)[:, 0].tolist(),
+            damping=(m.dof_damping if acts(m, "DAMPER") else np.zeros(m.nv)).tolist(),
             trained=self._dofs.tolist(),
             others=[k for k in range(m.nv) if k not in set(self._dofs)],
             place=self._addresses.tolist(),
@@ -161,10 +163,8 @@ class Actuated:
 
     @property
     def gear_loss(self) -> np.ndarray:
-        """Power that the friction of each gearbox takes now [W]: w_M (T_1 - T_2/i)."""
-        ratios = np.array([d.train.gears["gearbox"].ratio for d in self._drives.values()])
-        loss: np.ndarray = self["motor_speed"] * (self["input_torque"] - self["output_torque"] / ratios)
-        return loss
+        """Power that the friction of the gears of each drive takes now [W]: of each gear w_1 (T_1 - T_2/i)."""
+        return np.array([d.gear_loss for d in self._drives.values()])
 
     @property
     def counts(self) -> dict[str, int]:
@@ -223,7 +223,7 @@ class Actuated:
         ctrl
             One number for each joint, in the order of `joints` or by name: the torque on the motor's shaft [N·m] of a torque
             source, the command (share of the rated voltage) of a DC or synchronous motor, the reference of a controller
-            (position [rad] or speed [rad/s]). Left out, zero.
+            (position [rad] or speed [rad/s]), the control in MuJoCo of a `JointActuator`. Left out, zero.
 
         Raises
         ------
@@ -356,7 +356,7 @@ class Actuated:
             raise InputError(
                 f"ctrl: {shown(ctrl)} must be {len(self.joints)} finite numbers, for {listed(self.joints)}"
             )
-        return values
+        return [actuator.given(value) for actuator, value in zip(self._actuators, values, strict=True)]
 
     @property
     def state(self) -> ActuatedState:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from ..control.controller import Controller
 from ..data_sheets.actuator_sheet import ActuatorSheet
@@ -19,14 +18,17 @@ from ..inputs.validation import did_you_mean, shown
 from ..model.drive import Drive
 from ..model.load import Load
 from ..model.motor import Motor
+from ..model.signals import CommandSignal
 from ..model.train import DriveTrain
 from ..simulation.exact_batches import controlled
 from ..simulation.joint_trains import Driven
 from ..simulation.scenario import Scenario
 from ..simulation.shipped import shipped_scenarios
-from ..simulation.sources import load_drive
+from ..simulation.sources import load
 from .actuated import MAX_SUBSTEPS, Actuated
-from .joints import joint_id
+from .joints import acts, joint_id
+from .mjcf import JointActuator
+from .overlaps import clear, without_weight
 
 if TYPE_CHECKING:
     import mujoco
@@ -41,14 +43,14 @@ def drive_of_joint(joint: str, given: Any, controller: Controller | None) -> Dri
     """
     if isinstance(given, str | Path):
         given = _named(joint, str(given))
-    if isinstance(given, Scenario) and given.is_drive and given.controller is None:
-        given = given.drive()
-    if not isinstance(given, Drive | DriveTrain) and not (isinstance(given, Scenario) and given.is_drive):
+    if not isinstance(given, Drive | DriveTrain | Scenario):
         raise InputError(
             f"joint {joint!r}: {shown(given)} is no drive; give a Drive, a DriveTrain, a scenario, or the name of a gearbox or an actuator of the catalogue"
         )
     if controller is None:
         return given
+    if isinstance(given, Scenario) and given.is_drive and given.controller is None:
+        return given.model_copy(update={"command": CommandSignal(), "controller": controller})
     if not isinstance(given, Drive):
         raise InputError(
             f"joint {joint!r}: controllers are for drives; give a Drive, or a scenario with its controller"
@@ -59,7 +61,7 @@ def drive_of_joint(joint: str, given: Any, controller: Controller | None) -> Dri
 def _named(joint: str, name: str) -> Drive | Scenario:
     """Shipped scenario or scenario file by its name; an actuator of the catalogue; a gearbox, with an ideal torque source."""
     if name.endswith(".toml") or name in shipped_scenarios():
-        return load_drive(name)
+        return load(name)
     record = next((record for record in catalogue() if record.name == name), None)
     if record is None:
         meant = did_you_mean(name, [record.name for record in catalogue()], "`lostmotion catalogue` lists its names")
@@ -95,13 +97,14 @@ def attach(
         A `mujoco.MjSpec`, a `mujoco.MjModel`, or an MJCF file. The drives are attached to a copy.
     drives
         By the name of a hinge: a `Drive` or a `DriveTrain`, whose load's inertia the robot takes the place of; a scenario or its
-        name, whose controller then turns the motor; the name of an actuator of the catalogue; or that of a gearbox, which an
-        ideal torque source without inertia then turns.
+        name, whose controller then turns the motor; what `from_mjcf` has returned; the name of an actuator of the catalogue; or
+        that of a gearbox, which an ideal torque source without inertia then turns.
     controllers
         By the name of a hinge: a controller for its drive, which acts at its own sample instants within the steps.
     replace
-        Take the armature, the damping, the friction loss and the actuators off these joints, which describe a drive in MuJoCo
-        and would otherwise count twice.
+        Take what would count twice off. These joints lose what describes a drive in MuJoCo: armature, damping, friction loss,
+        actuators and the limit of their torque, and with a spring in the drive their stiffness. The drives lose load torques, and on the shaft of the
+        joint gravity and torques once a turn, which the robot has.
     substeps
         Substeps of the drives within a step; left out, chosen by the natural frequency of the stiffest mesh.
 
@@ -113,8 +116,8 @@ def attach(
     Raises
     ------
     InputError
-        A joint is unknown, no hinge, or has an actuator, armature, damping or friction loss (see `replace`); a drive cannot be
-        used; the timestep would take more than 1000 substeps; the model has actuators with states of their own.
+        A joint is unknown or no hinge; robot and drive both have something (see `replace`); a drive cannot be used; the timestep
+        would take more than 1000 substeps; the model has parts with states of their own.
     MissingLibraryError
         MuJoCo is not installed.
 
@@ -147,47 +150,27 @@ def attach(
     for name in controllers or {}:
         if name not in drives:
             raise InputError(f"controllers: joint {shown(name)} has no drive; name it in drives")
-    if compiled.na:
-        raise InputError(
-            "model: has actuators with states of their own (activations), which are not supported; use such without"
-        )
+        if isinstance(drives[name], JointActuator):
+            raise InputError(
+                f"controllers: joint {shown(name)} has a JointActuator, which is turned by its control; leave it out"
+            )
+    for what, count in (
+        ("actuators with states of their own (activations)", compiled.na),
+        ("actuators with a delay", (compiled.actuator_delay > 0.0).any()),
+        ("springs that yield", compiled.nplastic),
+        ("plugins with states of their own", compiled.npluginstate),
+    ):
+        if count:
+            raise InputError(f"model: has {what}, which are not supported; use such without")
     if substeps is not None and not 1 <= substeps <= MAX_SUBSTEPS:
         raise InputError(f"substeps: {shown(substeps)} must lie between 1 and {MAX_SUBSTEPS}")
-    for name in drives:
-        _clear(compiled, name, replace=replace)
-    given = {name: drive_of_joint(name, drive, (controllers or {}).get(name)) for name, drive in drives.items()}
-    return Actuated(compiled, given, substeps)
-
-
-def _clear(model: mujoco.MjModel, name: str, *, replace: bool) -> None:
-    """Remove MuJoCo's own description of the drive of a joint.
-
-    Raises
-    ------
-    InputError
-        There is such a thing, and it is not to be replaced.
-    """
-    import mujoco
-
-    joint = joint_id(model, name)
-    dof = model.jnt_dofadr[joint]
-    kinds = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
-    actuators = [
-        k for k in range(model.nu) if model.actuator_trnid[k, 0] == joint and model.actuator_trntype[k] in kinds
-    ]
-    values = {
-        "armature": model.dof_armature,
-        "damping": model.dof_damping,
-        "frictionloss": model.dof_frictionloss,
-    }
-    own = [key for key, array in values.items() if np.any(array[dof] != 0.0)]
-    own += [f"the actuator {model.actuator(int(k)).name!r}" for k in actuators]
-    if own and not replace:
-        raise InputError(
-            f"joint {name!r}: has {' and '.join(own)}, which would count twice beside its drive; give replace=True, or take it off the model"
-        )
-    for array in values.values():
-        array[dof] = 0.0
-    for k in actuators:  # they stay, so that the numbers of the others do
-        model.actuator_gainprm[k] = 0.0
-        model.actuator_biasprm[k] = 0.0
+    weighs = bool(compiled.opt.gravity.any()) and acts(compiled, "GRAVITY")
+    made: dict[str, JointActuator] = {}
+    for name, given in drives.items():
+        joint_id(compiled, name)
+        actuator = given if isinstance(given, JointActuator) else JointActuator(given)
+        drive = drive_of_joint(name, actuator.drive, (controllers or {}).get(name))
+        drive = without_weight(name, drive, replace=replace, weighs=weighs)
+        clear(compiled, name, drive, replace=replace)
+        made[name] = dataclasses.replace(actuator, drive=drive)
+    return Actuated(compiled, made, substeps)

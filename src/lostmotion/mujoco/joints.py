@@ -32,3 +32,20 @@ def joint_id(model: mujoco.MjModel, name: str) -> int:
     if model.jnt_type[found] != int(mujoco.mjtJoint.mjJNT_HINGE):
         raise InputError(f"joint {name!r}: is no hinge; a drive turns a hinge")
     return int(found)
+
+
+def actuators_of(model: mujoco.MjModel, joint: int) -> list[int]:
+    """Numbers of the actuators on a joint."""
+    import mujoco
+
+    kinds = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+    return [
+        k for k in range(model.nactuator) if model.actuator_trnid[k, 0] == joint and model.actuator_trntype[k] in kinds
+    ]
+
+
+def acts(model: mujoco.MjModel, flag: str) -> bool:
+    """Whether a part of the physics, such as ``"GRAVITY"``, is not disabled by option.flag."""
+    import mujoco
+
+    return not model.opt.disableflags & int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag}"))

@@ -9,13 +9,14 @@ from ..control.controller import Controller
 from ..errors import InputError, need
 from ..inputs.arguments import checked
 from ..inputs.validation import shown
-from ..model.drive import Drive
+from ..model.train import DriveTrain
 from ..portable.checkout import made_here
 from ..portable.descriptions import description
 from ..simulation.exact_batches import controlled
 from ..simulation.joint_trains import joint_drive
 from ..simulation.scenario import Scenario
 from .attaching import drive_of_joint
+from .overlaps import without_weight
 
 LIBRARY = Path(__file__).parent / "plugin_library"
 
@@ -86,8 +87,9 @@ def write_drive(drive: Any, path: str | Path, *, controller: Controller | None =
     <plugin joint="JOINT" plugin="lostmotion.drive"><config key="scenario" value=".../elbow.drive"/></plugin>
     """
     given = drive_of_joint(str(path), drive, controller)
-    if not isinstance(given, Drive | Scenario):
+    if isinstance(given, DriveTrain) or (isinstance(given, Scenario) and not given.is_drive):
         raise InputError(f"drive: {shown(drive)} is a train; use lostmotion.mujoco.attach")
+    without_weight(str(path), given, replace=False, weighs=True)
     scenario = given if isinstance(given, Scenario) else controlled(given, None)
     armature = joint_drive(str(path), given, scenario.load.inertia, 1e-3).reflected_inertia
     numbers = description(scenario, parameters=False)

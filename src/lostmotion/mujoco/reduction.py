@@ -1,30 +1,21 @@
-"""Drives as the numbers that MuJoCo and URDF have for a joint, and back."""
+"""Drives as the numbers that MuJoCo and URDF have for a joint."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError, need
+from ..errors import InputError
 from ..inputs.arguments import checked
-from ..inputs.quantities import Angle, Frequency, Number, Torque
+from ..inputs.quantities import Angle, Frequency, Torque
 from ..inputs.validation import shown
 from ..model.drive import Drive
-from ..model.gearbox import Gearbox
-from ..model.load import Load
-from ..model.losses import ConstantEfficiency
 from ..model.motor import Motor
-from ..model.torsion import Rigid
 from ..simulation.joint_trains import joint_drive
 from ..simulation.scenario import Scenario, drive_of
 from ..simulation.stepping import Simulation
-from .joints import joint_id
-
-if TYPE_CHECKING:
-    import mujoco
 
 STEPS_PER_PERIOD = 2000
 FASTEST_SHARE = 0.1
@@ -188,78 +179,3 @@ def _not_negative(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
             out[kept] = found
             return out
         kept.pop(int(found.argmin()))
-
-
-@checked
-def from_mjcf(model: mujoco.MjSpec | mujoco.MjModel, joint: str, *, ratio: Number | None = None) -> Drive:
-    """Return the drive that a joint of a MuJoCo model describes: a rigid gear without losses, its friction on the load.
-
-    Parameters
-    ----------
-    model
-        With the joint and perhaps an actuator on it.
-    joint
-        Name of the hinge. Its armature is the rotor's inertia at the joint, damping and frictionloss act on the load.
-    ratio
-        Of the gear; left out, the gear of the actuator of the joint.
-
-    Returns
-    -------
-    Drive
-        With a load of 1 kg·m², which `attach` replaces.
-
-    Raises
-    ------
-    InputError
-        The joint is unknown, has no armature, or has no actuator and no ratio is given.
-    MissingLibraryError
-        MuJoCo is not installed.
-
-    Examples
-    --------
-    >>> import lostmotion as lm
-    >>> import mujoco
-    >>> body = "<body><joint name='elbow' armature='0.4'/><geom size='0.1'/></body>"
-    >>> spec = mujoco.MjSpec.from_string(f"<mujoco><worldbody>{body}</worldbody></mujoco>")
-    >>> lm.mujoco.from_mjcf(spec, "elbow", ratio=100).gearbox.ratio
-    100.0
-    """
-    need("mujoco", "lostmotion.mujoco", "mujoco")
-    import mujoco
-
-    if isinstance(model, mujoco.MjSpec):
-        model = model.copy().compile()
-    number = joint_id(model, joint)
-    dof = model.jnt_dofadr[number]
-    if ratio is None:
-        gears = [
-            float(model.actuator_gear[k, 0])
-            for k in range(model.nu)
-            if model.actuator_trntype[k] == int(mujoco.mjtTrn.mjTRN_JOINT) and model.actuator_trnid[k, 0] == number
-        ]
-        if not gears:
-            raise InputError(f"joint {joint!r}: has no actuator that says the gear; give ratio=")
-        ratio = gears[0]
-    if ratio == 0.0:
-        raise InputError(f"joint {joint!r}: has the ratio 0; give speed of the motor / speed of the joint")
-    values: dict[str, Any] = {
-        key: float(np.ravel(array[dof])[0])
-        for key, array in (
-            ("armature", model.dof_armature),
-            ("damping", model.dof_damping),
-            ("frictionloss", model.dof_frictionloss),
-        )
-    }
-    if not values["armature"] > 0.0:
-        raise InputError(f"joint {joint!r}: has no armature, which is the inertia of the rotor; give the joint one")
-    return Drive(
-        motor=Motor(kind="torque_source", rotor_inertia=values["armature"] / (ratio * ratio)),
-        gearbox=Gearbox(
-            ratio=ratio,
-            rated_input_speed=1.0,
-            rated_output_torque=1.0,
-            stiffness=Rigid(),
-            losses=ConstantEfficiency(efficiency=1.0),
-        ),
-        load=Load(inertia=1.0, viscous_friction=values["damping"], friction_torque=values["frictionloss"]),
-    )

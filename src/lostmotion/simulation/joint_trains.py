@@ -73,9 +73,55 @@ class JointDrive:
             total += gear.inertia * ratios[gear.input] * ratios[gear.input]
         return total
 
+    @property
+    def gear_loss(self) -> float:
+        """Power that the friction of the gears takes now [W], w_1 (T_1 - T_2/i) of each, with the speed against its housing."""
+        s, train, total = self.simulation, self.simulation._train, 0.0
+        for name, gear in train.gears.items():
+            speed = s[train.speed_of(gear.input)] - (s[train.speed_of(gear.housing)] if gear.housing else 0.0)
+            total += speed * (s[train.input_torque_of(name)] - s[train.output_torque_of(name)] / gear.ratio)
+        return total
+
     def ratios(self) -> dict[str, float]:
         """Speed of each shaft over that of the joint, all meshes stiff."""
         return {name: turns(self.train, name, self.shaft) or 0.0 for name in self.train.shafts}
+
+    def own_torque(self, angle: float) -> float:
+        """Torque [N·m] of the drive's springs and of its torques over the angle [rad] on the joint."""
+        total = 0.0
+        for spring in self.train.springs.values():
+            if spring.shaft == self.shaft:
+                total -= spring.stiffness.core().torque(angle - spring.rest_angle)
+        for torque in (*self.train.gravity.values(), *self.train.angle_torques.values()):
+            if torque.shaft == self.shaft:
+                total += torque.core()(angle)
+        return total
+
+    def twists_under(self, torque: float) -> tuple[dict[str, float], dict[str, float]]:
+        """By gear: the twists [rad] under a torque [N·m] on the joint, and the hysteresis capacities [N·m] that such a torque leaves.
+
+        Gears hand the torque on without losses: at rest these leave open how much of it each carries.
+
+        Raises
+        ------
+        InputError
+            The train is no chain of gears.
+        """
+        twists: dict[str, float] = {}
+        capacities: dict[str, float] = {}
+        if torque == 0.0:
+            return twists, capacities
+        gears, ratios = self.train.gears, self.ratios()
+        chain = len(gears) == len(self.train.shafts) - 1 == len({gear.output for gear in gears.values()})
+        if not chain or any(gear.housing is not None for gear in gears.values()):
+            raise InputError(f"joint {self.name!r}: held=True is for chains of gears; start this train without it")
+        for name, gear in gears.items():
+            if isinstance(gear.stiffness, Elastic):
+                carried = torque / ratios[gear.output]
+                twists[name] = gear.stiffness.core().twist(carried)
+                if gear.hysteresis is not None:
+                    capacities[name] = 0.5 * (1.0 - gear.hysteresis.efficiency) * abs(carried)
+        return twists, capacities
 
 
 def joint_drive(name: str, drive: Driven, inertia: float, step: float) -> JointDrive:
@@ -84,50 +130,83 @@ def joint_drive(name: str, drive: Driven, inertia: float, step: float) -> JointD
     Raises
     ------
     InputError
-        It is not clear which shaft the joint is.
+        It is not clear which shaft the joint is, or it is a slide; another inertia than that of the robot moves with it; an element needs
+        a command that `step` does not give.
     """
-    if isinstance(drive, Scenario):
-        changed: Driven = drive.replace(**{"load.inertia": inertia})
-    elif isinstance(drive, Drive):
+    train = drive if isinstance(drive, DriveTrain) else drive.train()
+    shaft = output_of(name, train)
+    _check_commands(name, drive, train)
+    if mass := next((key for key, mass in train.mass_matrices.items() if shaft in mass.shafts), None):
+        raise InputError(
+            f"joint {name!r}: mass_matrices.{mass} has the inertia of {shaft!r}, which comes from the robot; leave it out"
+        )
+    if isinstance(drive, Drive):
         load = drive.load
-        changed = Drive(
+        changed: Driven = Drive(
             motor=drive.motor,
             gearbox=drive.gearbox,
             load=Load(inertia=inertia, viscous_friction=load.viscous_friction, friction_torque=load.friction_torque),
         )
+    elif isinstance(drive, Scenario):
+        key = "load" if drive.is_drive else f"shafts.{shaft}"
+        changed = drive.replace(**{f"{key}.inertia": inertia})
     else:
-        drive.refuse_coupled(drive.shafts, f"joint {name!r} gets its inertia from the robot; leave the matrix out")
-        shaft = _output_of(name, drive)
         shafts = {n: s.model_copy(update={"inertia": inertia}) if n == shaft else s for n, s in drive.shafts.items()}
         changed = drive.model_copy(update={"shafts": shafts})
-    if isinstance(changed, DriveTrain):
-        train, shaft = changed, _output_of(name, changed)
-        simulation = Simulation(changed, step=step, loaded=[shaft])
-    else:
-        train, shaft = changed.train(), "load"
-        simulation = Simulation(changed, step=step)
-    names = simulation._core_train.input_names()
-    controlled = getattr(changed, "controller", None) is not None
-    command, scale = None, 1.0
-    if not controlled:
-        if len(train.motors) != 1:
-            raise InputError(f"joint {name!r}: its train has {len(train.motors)} motors; a joint is turned by one")
-        (motor,) = train.motors
-        command = names.index("command" if "command" in names else f"{motor}_command")
-        one = train.motors[motor]
-        scale = 1.0 / one.rated_torque if one.kind == "torque_source" else 1.0
+    short = isinstance(changed, Drive) or (isinstance(changed, Scenario) and changed.is_drive)
+    simulation = Simulation(changed, step=step, loaded=None if short else [shaft])
+    train = changed if isinstance(changed, DriveTrain) else changed.train()
+    command, scale = _command(changed, train, simulation._core_train.input_names())
     return JointDrive(name, changed, simulation, train, shaft, command, scale)
 
 
-def _output_of(name: str, train: DriveTrain) -> str:
-    """The shaft that gears turn and that turns none."""
-    inner = {gear.input for gear in train.gears.values()}
-    found = [gear.output for gear in train.gears.values() if gear.output not in inner]
-    if len(set(found)) != 1:
+def _command(drive: Driven, train: DriveTrain, inputs: Sequence[str]) -> tuple[int | None, float]:
+    """Place of the command of the only motor among the inputs of the solver, None for a sampled controller, and from what `step` is
+    given to it."""
+    ((name, motor),) = train.motors.items()
+    if isinstance(drive, Scenario) and drive.axes():
+        return None, 1.0
+    if isinstance(drive, Scenario) and drive.continuous():
+        return inputs.index(f"{name}_reference"), 1.0
+    command = "command" if "command" in inputs else f"{name}_command"
+    return inputs.index(command), 1.0 / motor.rated_torque if motor.kind == "torque_source" else 1.0
+
+
+def _check_commands(name: str, drive: Driven, train: DriveTrain) -> None:
+    """Refuse what `step` cannot command: all but one motor, or the reference of its controller."""
+    if len(train.motors) != 1:
+        raise InputError(f"joint {name!r}: its train has {len(train.motors)} motors; a joint is turned by one")
+    others = [key for key in train.commanded() if key not in train.motors]
+    if others:
+        table = "brakes" if others[0] in train.brakes else "clutches"
         raise InputError(
-            f"joint {name!r}: the train must have one shaft that gears turn and that turns none, and has {len(set(found))}"
+            f"joint {name!r}: {table}.{others[0]} needs a command, and step gives one to the motor alone; leave it out"
         )
-    return found[0]
+    if not isinstance(drive, Scenario):
+        return
+    if given := drive.tables.given():
+        raise InputError(f"joint {name!r}: {drive.tables.given_key(given[0])} gives a motion, which the robot has")
+    for motor, controller in drive.continuous().items():
+        if "reference_rate" in controller.system().signals:
+            raise InputError(
+                f"joint {name!r}: controllers.{motor} takes the rate of its reference, which step holds; give derivative_weight = 0"
+            )
+
+
+def output_of(name: str, train: DriveTrain) -> str:
+    """The shaft that gears, clutches or freewheels turn and that turns none."""
+    joined = [(gear.input, gear.output) for gear in train.gears.values()]
+    joined += [(one, other) for one, other, _ in train.held_together()]
+    inner = {one for one, _ in joined}
+    found = {other for _, other in joined if other not in inner}
+    if len(found) != 1:
+        raise InputError(
+            f"joint {name!r}: the train must have one shaft that gears turn and that turns none, and has {len(found)}"
+        )
+    (shaft,) = found
+    if train.is_slide(shaft):
+        raise InputError(f"joint {name!r}: is a hinge, and {shaft!r} is a slide; give a drive that turns a shaft")
+    return shaft
 
 
 class JointTrains:
@@ -231,43 +310,31 @@ class JointTrains:
         Parameters
         ----------
         held
-            By the number of a joint the torque [N·m] that its gear carries, with the hysteresis that such a torque leaves.
+            By the number of a joint the torque [N·m] that keeps it at rest, which its gear and its own springs give, with the
+            hysteresis that such a torque leaves.
 
         Raises
         ------
         InputError
-            A torque is held by a gear for which there is no twist of that torque.
+            A train that is no chain of gears is held.
         """
         for k, drive in enumerate(self.drives):
-            torque = held.get(k, 0.0)
-            twist, capacity = _twist_under(drive, torque) if torque else (0.0, 0.0)
-            if isinstance(drive.drive, DriveTrain):
-                if torque:
-                    raise InputError(f"joint {drive.name!r}: held=True is for drives; start a train without it")
-                ratios = drive.ratios()
-                drive.simulation.reset(
-                    TrainInitial(speeds={n: speeds[k] * r for n, r in ratios.items()}, angles={drive.shaft: angles[k]})
+            carried = held[k] - drive.own_torque(angles[k]) if k in held else 0.0
+            twists, capacities = drive.twists_under(carried)
+            if drive.simulation._short:
+                initial: Initial | TrainInitial = Initial(
+                    motor_speed=drive.train.gears["gearbox"].ratio * speeds[k],
+                    load_speed=speeds[k],
+                    load_angle=angles[k],
+                    twist=twists.get("gearbox", 0.0),
+                    hysteresis_capacity=capacities.get("gearbox", 0.0),
                 )
             else:
-                gearbox = drive.train.gears["gearbox"]
-                drive.simulation.reset(
-                    Initial(
-                        motor_speed=gearbox.ratio * speeds[k],
-                        load_speed=speeds[k],
-                        load_angle=angles[k],
-                        twist=twist,
-                        hysteresis_capacity=capacity,
-                    )
+                initial = TrainInitial(
+                    speeds={n: speeds[k] * r for n, r in drive.ratios().items()},
+                    angles={drive.shaft: angles[k]},
+                    twists=twists,
+                    hysteresis_capacities=capacities,
                 )
+            drive.simulation.reset(initial)
         self.read()
-
-
-def _twist_under(drive: JointDrive, torque: float) -> tuple[float, float]:
-    """The twist [rad] of a gearbox under a torque [N·m], and the hysteresis capacity [N·m] there."""
-    if isinstance(drive.drive, DriveTrain):
-        return 0.0, 0.0
-    gear = drive.train.gears["gearbox"]
-    if not isinstance(gear.stiffness, Elastic):
-        return 0.0, 0.0
-    capacity = 0.0 if gear.hysteresis is None else 0.5 * (1.0 - gear.hysteresis.efficiency) * abs(torque)
-    return gear.stiffness.core().twist(torque), capacity

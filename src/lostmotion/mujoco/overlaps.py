@@ -1,0 +1,158 @@
+"""Parts that a robot and the drive of one of its joints both have, which would act twice."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from typing import TYPE_CHECKING, Any
+
+from ..errors import InputError
+from ..inputs.named import Named
+from ..model.angle_torques import PeriodicTorque
+from ..model.drive import Drive
+from ..model.train import DriveTrain
+from ..simulation.joint_trains import Driven, output_of
+from ..simulation.scenario import Scenario
+from .joints import actuators_of, joint_id
+
+if TYPE_CHECKING:
+    import mujoco
+
+POINTS = 720
+"""Angles of a turn at which a torque is compared with a weight."""
+SHARE_OF_WEIGHT = 1e-3
+"""Part of first order in a torque over the angle, over its largest value, above which it may be a weight."""
+
+
+def without_weight(name: str, drive: Driven, *, replace: bool, weighs: bool) -> Driven:
+    """The drive of a joint without the loads and weights on it, which the robot has.
+
+    Parameters
+    ----------
+    name
+        Of the joint.
+    replace
+        Whether to take them off the drive.
+    weighs
+        Whether gravity acts in the robot.
+
+    Raises
+    ------
+    InputError
+        The drive has such, and it is not to be replaced.
+    """
+    weights = _weights(name, drive) if weighs else []
+    keys = [*_loads(drive), *map(".".join, weights)]
+    if keys and not replace:
+        raise InputError(
+            "would count twice: load and weight of the joint come from the robot; give replace=True, or leave it out",
+            *keys,
+            where=f"joint {name!r}",
+        )
+    if isinstance(drive, Scenario) and drive.is_drive and drive.controller is None:
+        own: Drive = drive.drive()
+        return own
+    if not weights:
+        return drive  # load torques of scenarios are not used
+    changed = {
+        table: Named({key: part for key, part in getattr(drive, table).items() if (table, key) not in weights})
+        for table in ("gravity", "angle_torques")
+    }
+    assert not isinstance(drive, Drive)
+    lighter: Driven = drive.model_copy(update=changed)
+    return lighter
+
+
+def _loads(drive: Driven) -> list[str]:
+    """Keys of the load torques of a scenario."""
+    if not isinstance(drive, Scenario):
+        return []
+    train = drive.named_train()
+    return [
+        drive.written.input_key(train.load_torque_of(shaft))
+        for shaft, signal in drive.tables.loads().items()
+        if signal != type(signal)()
+    ]
+
+
+def _weights(name: str, drive: Driven) -> list[tuple[str, str]]:
+    """Table and name of what may be a weight on the shaft of the joint."""
+    train = drive if isinstance(drive, DriveTrain) else drive.train()
+    shaft = output_of(name, train)
+    found = [("gravity", key) for key, part in train.gravity.items() if part.shaft == shaft]
+    torques = train.angle_torques.items()
+    found += [("angle_torques", key) for key, part in torques if part.shaft == shaft and _turns_once(part)]
+    return found
+
+
+def _turns_once(torque: PeriodicTorque) -> bool:
+    """Whether a torque over the angle has a part of first order, as weights have."""
+    order = getattr(torque, "order", None)
+    if order is not None:
+        return bool(abs(order) == 1.0)
+    turns = torque.period / (2.0 * math.pi)  # type: ignore[attr-defined]
+    if abs(turns - round(turns)) > 1e-9 * turns or round(turns) < 1:
+        return False
+    curve, count = torque.core(), POINTS * round(turns)
+    angles = [2.0 * math.pi * (k + 0.5) / POINTS for k in range(count)]
+    values = [curve(angle) for angle in angles]
+    first = sum(value * cmath.exp(1j * angle) for value, angle in zip(values, angles, strict=True))
+    return bool(2.0 * abs(first) / count > SHARE_OF_WEIGHT * max(map(abs, values)))
+
+
+def clear(model: mujoco.MjModel, name: str, drive: Driven, *, replace: bool) -> None:
+    """Remove MuJoCo's own description of the drive of a joint.
+
+    Raises
+    ------
+    InputError
+        There is such a thing, and it is not to be replaced or cannot be.
+    """
+    import mujoco
+
+    joint = joint_id(model, name)
+    dof, actuators = model.jnt_dofadr[joint], actuators_of(model, joint)
+    values: dict[str, list[tuple[Any, int]]] = {
+        "armature": [(model.dof_armature, dof)],
+        "damping": [(model.dof_damping, dof), (model.dof_dampingpoly, dof)],
+        "frictionloss": [(model.dof_frictionloss, dof)],
+        "actuatorfrcrange": [(model.jnt_actfrclimited, joint)],
+    }
+    if _has_spring(name, drive):
+        values["stiffness"] = [(array, joint) for array in (model.jnt_stiffness, model.jnt_stiffnesspoly)]
+    own = [key for key, places in values.items() if any((array[k] != 0).any() for array, k in places)]
+    own += [f"the actuator {model.actuator(k).name!r}" for k in actuators]
+    if own and not replace:
+        raise InputError(
+            f"joint {name!r}: has {' and '.join(own)}, which would count twice beside its drive; give replace=True, or take it off the model"
+        )
+    for k in actuators:
+        if model.actuator_plugin[k] >= 0:
+            raise InputError(
+                f"joint {name!r}: the actuator {model.actuator(k).name!r} is a plugin, which would act beside its drive; take it off the model"
+            )
+    if model.jnt_actgravcomp[joint] and model.ngravcomp:
+        raise InputError(
+            f"joint {name!r}: has actuatorgravcomp, a torque of its actuators beside its drive; take gravcomp off the model"
+        )
+    for places in values.values():
+        for array, k in places:
+            array[k] = 0
+    for k in actuators:  # they stay, so that the numbers of the others do
+        model.actuator_gaintype[k] = int(mujoco.mjtGain.mjGAIN_FIXED)
+        model.actuator_biastype[k] = int(mujoco.mjtBias.mjBIAS_NONE)
+        model.actuator_forcelimited[k] = False  # whose range may lack 0
+        for array in (
+            model.actuator_gainprm,
+            model.actuator_biasprm,
+            model.actuator_armature,
+            model.actuator_damping,
+            model.actuator_dampingpoly,
+        ):
+            array[k] = 0.0
+
+
+def _has_spring(name: str, drive: Driven) -> bool:
+    train = drive if isinstance(drive, DriveTrain) else drive.train()
+    shaft = output_of(name, train)
+    return any(spring.shaft == shaft for spring in train.springs.values())
