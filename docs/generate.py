@@ -253,7 +253,7 @@ def commands() -> str:
         "",
         "This page is for users of the command line. It lists every command with its arguments and options.",
         "",
-        "Every command takes `-h` or `--help`. The exit code is 0 only if all went well; errors are one line on the standard error.",
+        "Every command takes `-h` or `--help`. A command that judges ends with one verdict. Its exit code is 0 for what fits, with or without a reservation, 1 for what does not fit and for errors, 3 for what is not decided. Errors are one line on the standard error.",
         "`lostmotion --install-completion` installs the completion of commands, options, scenarios and gearboxes for your shell.",
         "",
     ]

@@ -15,6 +15,8 @@ from html_pages import Page
 from lostmotion.cli import app
 from lostmotion.data_sheets.records import find
 from lostmotion.paper import paper_scenario
+from lostmotion.reports.drive_check import check_report
+from lostmotion.reports.page import render
 from lostmotion.sizing.drive_check import check_drive
 from lostmotion.sizing.duty_cycle import DutyCycle, duty_cycle
 from lostmotion.sizing.finding import RULES, Finding
@@ -304,9 +306,44 @@ def test_every_scenario_can_be_checked(path):
 def test_the_command_line_says_what_is_wrong():
     path = ROOT / "scenarios" / "overrunning-load.toml"
     done = CliRunner().invoke(app, ["drive", "check", str(path)])
-    assert done.exit_code == 0
+    assert done.exit_code == 1
     assert "WARNING  holding 20 N·m with command 0: the load torque drives the load" in done.output
-    assert "No warnings" not in done.output
+    assert re.search(r"^Verdict: does not fit: \S", done.output, re.MULTILINE)
+
+
+def test_nothing_judged_is_not_decided_and_what_is_not_judged_is_a_reservation():
+    whole = lm.check_drive(lm.load("catalogue-robot-joint"))
+    kept = lm.sizing.Findings(f for f in whole if f.verdict == "ok")
+    unknown = lm.sizing.Findings(f for f in whole if f.verdict == "unknown")
+    assert (len(kept), len(unknown)) == (13, 3)
+    assert [f.verdict.state for f in (kept, whole, unknown)] == ["fits", "fits with a reservation", "not decided"]
+    assert all(f.what in whole.verdict.lines[0] for f in unknown)
+    done = CliRunner().invoke(app, ["drive", "check", "vertical-axis-with-brake"])
+    assert done.exit_code == 3
+    assert re.search(r"^Verdict: not decided: none of \d+ points is judged", done.output, re.MULTILINE)
+
+
+def test_a_verdict_that_depends_on_estimated_losses_is_not_decided():
+    findings = lm.check_drive(lm.load("catalogue-robot-joint"))
+    turned = lm.sizing.Finding(
+        "estimated_losses", "estimated losses", "not decided by them: x (ok to warning)", "unknown"
+    )
+    assert lm.sizing.Findings([*findings, turned]).verdict.state == "not decided"
+
+
+def test_a_limit_that_is_missed_by_far_leaves_the_other_bars_to_be_seen(tmp_path: Path):
+    """An inertia ratio of 72, beside limits that are used by less than 100 %."""
+    scenario = lm.load("catalogue-robot-joint", {"task.max_lost_motion": "0.0908 arcmin"})
+    findings = lm.check_drive(scenario)
+    uses = {f.what: 100.0 * f.use for f in findings if f.use is not None}
+    assert max(uses.values()) == pytest.approx(720.0, rel=0.01)
+    bars = re.findall(r'width="([\d.]+)" height="15\.0".*?<title>([^<:]*): ', render(check_report("joint", findings)))
+    widths = {name: float(width) for width, name in bars}
+    assert len(widths) == len(uses)
+    first, *others = sorted(uses, key=lambda name: -uses[name])
+    for name in others:
+        assert widths[name] / widths[first] == pytest.approx(uses[name] / 200.0, abs=0.01)
+    assert f"{uses[first]:.6g} →" in render(check_report("joint", findings))
 
 
 def test_no_mean_is_judged_ok_by_waiting_while_the_load_sinks():

@@ -9,7 +9,7 @@ import typer
 
 from .arguments import Overrides, SourceArgument
 from .targets import try_page
-from .terminal import about, simulating
+from .terminal import about, conclude, simulating
 
 
 def check(
@@ -30,7 +30,7 @@ def check(
     lostmotion drive check drive.toml --set task.cycle="2 s"
     lostmotion drive check catalogue-robot-joint --report check.html
     """
-    from ..reports.drive_check import check_report, counted
+    from ..reports.drive_check import check_report
     from ..simulation.sources import load
     from ..sizing.drive_check import check_drive
 
@@ -42,7 +42,7 @@ def check(
     print(loaded.title or scenario)
     for finding in findings:
         print(f"  {finding if finding.verdict == 'warning' else finding.in_short}")
-    print(counted(findings))
+    print(f"Verdict: {findings.verdict}")
     if report is not None:
         from ..reports.page import write_page
 
@@ -51,3 +51,4 @@ def check(
         print(f"Next: lostmotion run {scenario} --plot run.png")
     else:
         print(f"All rules with their sources on a page: lostmotion drive check {scenario} --report check.html")
+    conclude(findings.verdict)

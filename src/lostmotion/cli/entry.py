@@ -10,6 +10,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
+from ..verdict import EXIT_HELP
 from ..version import __version__
 from . import (
     catalogue,
@@ -39,7 +40,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
     help="Dynamics of geared servo drives: lost motion, sticking and load-dependent losses, solved exactly.",
-    epilog="Exit code 0 only if all went well; errors are one line on stderr.",
+    epilog=f"{EXIT_HELP} Errors are one line on stderr.",
 )
 
 
@@ -132,6 +133,8 @@ def common(
     """Dynamics of geared servo drives: lost motion, sticking and load-dependent losses, solved exactly."""
 
 
+JUDGES = (servo.servo, select.select, study.study, track.track, run.run, identify.identify, monitor.monitor)
+"""commands that end in a verdict"""
 for command in (
     reproduce.reproduce,
     run.run,
@@ -148,8 +151,8 @@ for command in (
     identify.identify,
     monitor.monitor,
 ):
-    app.command()(command)
+    app.command(epilog=EXIT_HELP if command in JUDGES else None)(command)
 drive_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Check a drive against its task.")
-drive_app.command()(drive.check)
+drive_app.command(epilog=EXIT_HELP)(drive.check)
 app.add_typer(drive_app, name="drive")
 app.command()(scenarios.schema)

@@ -9,7 +9,7 @@ import typer
 
 from .arguments import FiguresOption, count
 from .targets import pictures_of, try_directory, writing
-from .terminal import busy, fail, progress
+from .terminal import busy, conclude, fail, progress
 from .workers import workers
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def study(
     """Run many variants: vary parameters, store results, resume.
 
     The directory given by -o holds Parquet files, one row a run, that pandas, DuckDB and polars open directly. Prints a summary.
-    Failed runs have their reasons in the column error, and the exit code is 1. `show` prints the summary of a directory; with -o,
+    Failed runs have their reasons in the column error, and the exit code is 1. A study with a table [select] has a verdict. `show` prints the summary of a directory; with -o,
     it writes study.html (one page) and its tables into another one.
 
     \b
@@ -125,29 +125,36 @@ def compute(
 
 
 def _show(directory: Path, best: str | None, output: Path | None, figures: str | None) -> None:
-    from ..reports.study import best_lines, summary_lines, write_study
+    from ..reports.study import best_lines, summary, write_study
 
     pictures = pictures_of(figures, output)
     found = best_lines(directory, best) if best is not None else []
-    print("\n".join([*summary_lines(directory), *found]))
+    lines, verdict = summary(directory)
+    print("\n".join([*lines, *found]))
     if output is None:
         print(f"All charts on a page: lostmotion study show {directory} -o {directory.resolve().name}-report")
-        return
-    with writing(output), busy("Writing"):
-        page = write_study(directory, output, pictures)
-    print(f"Report written to {page}")
-    print(f"The same in the terminal: lostmotion study show {directory}")
+    else:
+        with writing(output), busy("Writing"):
+            page = write_study(directory, output, pictures)
+        print(f"Report written to {page}")
+        print(f"The same in the terminal: lostmotion study show {directory}")
+    conclude(verdict)
 
 
 def print_outcome(directory: Path, total: int) -> None:
-    """Print the summary, the directory of the runs, and the failed ones."""
-    from ..reports.study import summary_lines
+    """Print the summary, the directory of the runs, and the failed ones; the exit code is that of the verdict, if runs are selected."""
+    from ..reports.study import summary
     from ..studies.table import failures
+    from ..units.practical import counted
 
-    print("\n".join(summary_lines(directory)))
+    lines, verdict = summary(directory)
+    print("\n".join(lines))
     print(
-        f"{total} runs written to {directory}\nAll charts on a page: lostmotion study show {directory} -o {directory.resolve().name}-report"
+        f"{counted(total, 'run')} written to {directory}\nAll charts on a page: lostmotion study show {directory} -o {directory.resolve().name}-report"
     )
     failed = failures(directory)
     if failed:
-        fail(f"{len(failed)} of {total} runs failed, such as: {failed[0]}; the column `error` has all reasons")
+        fail(
+            f"{len(failed)} of {counted(total, 'run')} failed, such as: {failed[0]}; the column `error` has all reasons"
+        )
+    conclude(verdict)

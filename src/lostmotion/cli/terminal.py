@@ -10,7 +10,10 @@ from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, Protocol, TextIO
 
+import typer
+
 from ..errors import InputError, visible
+from ..verdict import Verdict
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -49,6 +52,17 @@ def fail(text: str, code: int = 1) -> NoReturn:
         text = f"{text[: MAX_LINE // 2]} ... {text[-MAX_LINE // 2 + 5 :]}"
     print(f"lostmotion: {text}", file=sys.stderr)
     sys.exit(code)
+
+
+def conclude(verdict: Verdict | None) -> None:
+    """End a command with the exit code of its verdict; the last call of the command.
+
+    Raises
+    ------
+    typer.Exit
+    """
+    if verdict is not None:
+        raise typer.Exit(verdict.exit_code)
 
 
 @contextmanager

@@ -10,7 +10,7 @@ import typer
 
 from .arguments import FiguresOption, Overrides, ReportOption, SourceArgument, number
 from .targets import pictures_of, writing
-from .terminal import about, busy, console, progress
+from .terminal import about, busy, conclude, console, progress
 
 if TYPE_CHECKING:
     from ..pointing.budget import PointingBudget
@@ -49,6 +49,7 @@ def track(
     lostmotion track axes.toml --view "traverse=6.65 deg" --view "elevation=5.27 deg" -o track
     """
     from ..errors import InputError
+    from ..reports.pointing import verdict_of
     from ..simulation.sources import load
 
     pictures = pictures_of(figures, output)
@@ -66,13 +67,14 @@ def track(
     _print_summary(loaded.title or Path(scenario).stem, budget)
     if output is None:
         print(f"All charts on a page: lostmotion track {scenario} -o track")
-        return
-    with writing(output), busy("Writing"):
-        from ..reports.pointing import write_pointing
+    else:
+        with writing(output), busy("Writing"):
+            from ..reports.pointing import write_pointing
 
-        page = write_pointing(output, Path(scenario).stem, budget, pictures)
-    print(f"Report written to {page}")
-    print(f"Next: lostmotion run {scenario} --report {Path(scenario).stem}.html")
+            page = write_pointing(output, Path(scenario).stem, budget, pictures)
+        print(f"Report written to {page}")
+        print(f"Next: lostmotion run {scenario} --report {Path(scenario).stem}.html")
+    conclude(verdict_of(budget))
 
 
 ROWS = 24  # of the table in a terminal; a longer one is without the runs of one cause alone, which are on the page
@@ -82,7 +84,7 @@ def _print_summary(title: str, budget: PointingBudget) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from ..reports.pointing import budget_rows, header, view_line
+    from ..reports.pointing import budget_rows, header, verdict_of, view_line
 
     print(title)
     table = Table(box=None, pad_edge=False)
@@ -95,4 +97,4 @@ def _print_summary(title: str, budget: PointingBudget) -> None:
     console(sys.stdout, 160).print(table)
     print(f"  {budget.after_line}")
     if budget.view is not None:
-        print(f"  {view_line(budget)}")
+        print(f"  {view_line(budget)}\nVerdict: {verdict_of(budget)}")

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..pointing.budget import Errors, PointingBudget, PointingError
-from ..verdict import Verdict
+from ..units.practical import excess
+from ..verdict import Point, Verdict
 from .looks import look
 from .page import Prose, Report, Table
 from .pages import table_csv, write_report
@@ -176,8 +178,20 @@ def _bars(budget: PointingBudget) -> Group:
     return Group("contributions", "Contributions of the causes", CONTRIBUTED, charts, max(1, len(charts)))
 
 
-def _verdict(budget: PointingBudget) -> Verdict:
-    """The error of each axis, what causes most of it, how long the target is in view."""
+def verdict_of(budget: PointingBudget) -> Verdict | None:
+    """Whether the target stays in view, where there is an angle of view."""
+    if budget.view is None:
+        return None
+    out = 1.0 - budget.view.share
+    if out > 0.0:
+        point = Point("does not fit", f"the target is out of view for {excess(out)} of the time")
+    else:
+        point = Point("fits", "the target is in view all the time")
+    return Verdict.of([point])
+
+
+def _verdict(budget: PointingBudget) -> Verdict | tuple[str, ...]:
+    """Whether the target stays in view; the error of each axis, and what causes most of it."""
     errors, causes = [], []
     for axis, e in budget.whole.items():
         factor, unit = _unit(budget, axis)
@@ -191,12 +205,10 @@ def _verdict(budget: PointingBudget) -> Verdict:
                 f"{axis}: {name}, {100.0 * part / e.rms**2:.3g} % of the mean square; without any cause "
                 f"{factor * budget.ideal[axis].rms:.4g} {unit} rms remain"
             )
-    view = view_line(budget)
-    lines = [f"Error, {'; '.join(errors)}."]
+    lines = [f"Error, {'; '.join(errors)}; {budget.after_line}."]
     lines += [f"Largest contribution, {'; '.join(causes)}."] if causes else []
-    last = f"The target is {view}; {budget.after_line}." if view else f"{budget.after_line.capitalize()}."
-    seen = budget.view is None or budget.view.share == 1.0
-    return Verdict("fits" if seen else "fits with a reservation", (*lines, last))
+    found = verdict_of(budget)
+    return tuple(lines) if found is None else replace(found, lines=(*found.lines, *lines))
 
 
 BUDGET = (

@@ -13,14 +13,15 @@ from ..model.torsion import Rigid
 from ..test_rig.comparison import Comparison
 from ..test_rig.measurement import RigReport
 from ..test_rig.rig import LOST_MOTION_LOAD
-from ..units.practical import RPM, practical
-from ..verdict import Verdict
+from ..units.practical import RPM, counted, practical
+from ..verdict import Point, Verdict
 from .looks import DOTS, step
 from .page import Prose, Report, Table
 from .pages import table_csv, write_report
 from .panels import Curve, Group, Panel
 from .sheet_rows import rows_of, rows_of_part
 
+PRINTED = 0.05  # half of the last of two digits, to which data sheets print at least
 MEASURED = (
     "Steady state: a flywheel keeps the input at its speed, a torque holds the load; input and output torque are read once nothing changes. Torsion: the input is "
     "locked and the load torque goes through slow ramps. Break-away: a slow ramp of torque on the input, or on the output with the input free, until the shaft turns.",
@@ -148,30 +149,27 @@ def _overrunning_rows(report: RigReport) -> list[tuple[str, str]]:
 # --- the page ---
 
 
-def largest_difference(comparisons: Sequence[Comparison]) -> str:
-    """Largest difference between the rig and the data sheet."""
+def agreement(comparisons: Sequence[Comparison], lines: Iterable[str]) -> Verdict | tuple[str, ...]:
+    """Whether the rig agrees with the data sheet; lines alone where no datum is to compare with."""
     if not comparisons:
-        return "There is no data sheet to compare with."
+        return "There is no datum of a data sheet to compare with.", *lines
     worst = max(comparisons, key=lambda c: abs(c.difference))
-    counted = f"{len(comparisons)} quantities of the data sheet are measured"
-    return f"{counted}; the largest difference is {percent(worst.difference)} ({worst.quantity})."
+    measured = f"{counted(len(comparisons), 'value')} of the data sheet measured"
+    largest = f"{measured}; the largest difference is {percent(worst.difference)} ({worst.quantity})"
+    points = [Point("fits with a reservation", f"{c.quantity}: {c.remark}") for c in comparisons if c.remark]
+    if abs(worst.difference) > PRINTED:
+        points.append(Point("fits with a reservation", largest))
+    more = [f"{largest}."] if points and points[0].sentence != largest else []
+    return Verdict.of([*points, Point("fits", largest)], [*more, *lines])
 
 
-def _verdict(report: RigReport) -> Verdict:
+def _verdict(report: RigReport) -> Verdict | tuple[str, ...]:
     """Agreement of rig and data sheet, torsion and locking, in words."""
-    lines = [largest_difference(report.comparisons)]
-    differs = [c for c in report.comparisons if c.remark]
-    for c in differs[:1]:
-        more = f", and {len(differs) - 1} more below" if len(differs) > 1 else ""
-        lines.append(f"With a remark: {c.quantity}: {c.remark}{more}.")
-    if len(lines) < 2:
-        lines.append(f"Starting torque at the input {report.starting_torque:.4g} N·m.")
     rows = dict(summary_rows(report))
     lost = next(
         (f"{what} {value}" for what, value in rows.items() if what.startswith("lost motion")), "no lost motion: rigid"
     )
-    lines.append(f"{lost[0].upper()}{lost[1:]}; self-locking: {rows['self-locking at rated load and speed']}.")
-    return Verdict("fits with a reservation" if differs or not report.comparisons else "fits", tuple(lines))
+    return agreement(report.comparisons, [f"{lost}; self-locking: {rows['self-locking at rated load and speed']}."])
 
 
 def percent(share: float) -> str:

@@ -16,7 +16,7 @@ from .looks import DOTS, step
 from .page import Report
 from .pages import table_csv, write_report
 from .panels import Curve, Group, Panel
-from .rig import compared_rows, largest_difference, rig_parts
+from .rig import agreement, compared_rows, rig_parts
 
 MEASURED = (
     "Deflection: the input is locked and the force on the slide goes through slow ramps. Efficiency: a flywheel keeps the screw at its speed against the force; it "
@@ -90,15 +90,13 @@ def summary_rows(report: ScrewReport) -> list[tuple[str, str]]:
     return rows
 
 
-def _verdict(report: ScrewReport) -> Verdict:
+def _verdict(report: ScrewReport) -> Verdict | tuple[str, ...]:
     rows = summary_rows(report)
     lines = [
-        largest_difference(report.comparisons),
         f"Lost motion {rows[0][1]} at ±{100 * LOST_MOTION_LOAD:.0f} % of {report.load:.4g} N; axial stiffness {rows[2][1]}.",
         f"Drag torque {rows[1][1]}; back-driving force {rows[4][1]}.",
     ]
-    differs = any(c.remark for c in report.comparisons)
-    return Verdict("fits with a reservation" if differs or not report.comparisons else "fits", tuple(lines))
+    return agreement(report.comparisons, lines)
 
 
 def screw_report(name: str, report: ScrewReport, sheet: ScrewSheet | None = None, notes: Iterable[str] = ()) -> Report:

@@ -247,10 +247,14 @@ def _bars(bars: Bars) -> str:
         parts.append(f'<text class="tick end" x="{left - 6:.1f}" y="{top + 15:.1f}">{escape(name)}</text>')
         thick = 16.0 / len(bars.values[name])
         for n, value in enumerate(bars.values[name]):
-            a, b = sorted((float(to_x(0.0)), float(to_x(value))))
+            cut = bars.limit is not None and value > limits[1]  # its length would flatten all others
+            a, b = sorted((float(to_x(0.0)), float(to_x(limits[1] if cut else value))))
             colour = "warning" if bars.limit is not None and value > bars.limit else ("first", "second")[n % 2]
             box = f'x="{a:.1f}" y="{top + 4 + n * thick:.1f}" width="{b - a:.1f}" height="{thick - 1:.1f}"'
             parts.append(f'<rect {box} fill="var(--{colour})"><title>{escape(name)}: {_shown(value)}</title></rect>')
+            if cut:
+                end = f'x="{b - 6:.1f}" y="{top + 15:.1f}"'
+                parts.append(f'<text class="tick end" {end} style="fill: var(--surface)">{_shown(value)} →</text>')
     if bars.limit is not None:
         end = f"{float(to_x(bars.limit)):.1f}"
         parts.append(f'<path d="M{end} {TOP}V{height - BOTTOM}" stroke="var(--text)" stroke-dasharray="4 3"/>')

@@ -13,7 +13,7 @@ from ..studies.engine import study_of
 from ..studies.study import Study
 from ..studies.table import labelled, read_table
 from ..studies.vary import Vary
-from ..units.practical import printed
+from ..units.practical import counted, printed
 from ..verdict import Verdict
 from .looks import PALETTE
 from .page import Prose, Report, Table
@@ -182,7 +182,7 @@ def _failures(table: pa.Table) -> list[str]:
 
 def _counted(table: pa.Table, study: Study) -> str:
     failed = sum(bool(e) for e in table["error"].to_pylist())
-    return f"{table.num_rows} of {study.total} runs, {failed} failed"
+    return f"{table.num_rows} of {counted(study.total, 'run')}, {failed} failed"
 
 
 def _task_page(study: Study, table: pa.Table, name: str) -> tuple[Report, dict[str, str]]:
@@ -207,7 +207,7 @@ def _study_lines(study: Study, table: pa.Table, name: str) -> list[str]:
     for kept, by_parameter in _whole_indices(table, study).items():
         shares = ", ".join(f"{p} {s1:.3f} ({st:.3f})" for p, (s1, st) in by_parameter.items())
         lines.append(f"  Sobol indices of {kept}, first order (total): {shares}")
-    return lines if study.select is None else [*lines, *show_selection(table, study).lines]
+    return lines
 
 
 def _whole_indices(table: pa.Table, study: Study) -> dict[str, dict[str, tuple[float, float]]]:
@@ -262,8 +262,8 @@ def study_report(directory: Path) -> tuple[Report, dict[str, str]]:
     return make(study, table, directory.resolve().name)
 
 
-def summary_lines(directory: Path) -> list[str]:
-    """The lines to print of a study in a directory.
+def summary(directory: Path) -> tuple[list[str], Verdict | None]:
+    """The lines to print of a study in a directory, and its verdict if it selects.
 
     Raises
     ------
@@ -273,8 +273,13 @@ def summary_lines(directory: Path) -> list[str]:
     need("pyarrow", "Showing a study", "study")
     study, table = study_of(directory), read_table(directory)
     if study.axis is not None:
-        return [study.title, *show_selection(table, study).lines]
-    return _study_lines(study, table, directory.resolve().name)
+        shown = show_selection(table, study)
+        return [study.title, *shown.lines], shown.verdict
+    lines = _study_lines(study, table, directory.resolve().name)
+    if study.select is None:
+        return lines, None
+    shown = show_selection(table, study)
+    return [*lines, *shown.lines], shown.verdict
 
 
 def write_study(directory: Path, target: Path, pictures: Sequence[str] = ()) -> Path:

@@ -16,7 +16,8 @@ from ..studies.select import TASK_SHARES, USE, Selection
 from ..studies.selection import NOT_RUN, Candidate, Price, candidates, pareto_front, prices
 from ..studies.study import Study
 from ..studies.table import labelled
-from ..verdict import Verdict
+from ..units.practical import counted
+from ..verdict import Point, Verdict
 from .looks import OTHERS, PALETTE, look
 from .page import Table
 from .pages import table_csv
@@ -68,18 +69,20 @@ def show_selection(table: pa.Table, study: Study) -> Shown:
     near = misses(study, ranked, NEAREST) if study.axis is not None else []
     unknown, rules = not_judged(ranked), rules_not_judged(ranked)
     told = _misses(near) if near else _misfits(ranked)
+    verdict = _verdict(table, ranked, costs, select, near)
     lines = [
         *_ranking(table, ranked, front, select),
         *_costs(table, costs, objective),
         *told,
         *_unknown(unknown, RECORDS_LACK),
         *_unknown(rules, RULES_LACK),
+        f"Verdict: {verdict}",
     ]
     several = len(select.objectives) > 1 and any(all(map(math.isfinite, c.values.values())) for c in ranked)
     chart = [Group("pareto", "", PARETO, (pareto_panel(table, ranked, front, select),), 1)] if several else []
     return Shown(
         lines=lines,
-        verdict=_verdict(table, ranked, costs, select, near),
+        verdict=verdict,
         parts=(
             *chart,
             *_ranking_tables(table, ranked, front, select),
@@ -96,11 +99,13 @@ def show_selection(table: pa.Table, study: Study) -> Shown:
 def _verdict(
     table: pa.Table, ranked: list[Candidate], costs: list[Price], select: Selection, near: list[Miss]
 ) -> Verdict:
-    """Number of pairs that fit, the best one, and the limit that costs most."""
+    """Whether a candidate fits: with a reservation if a rule or its losses are open for the best one, not decided if none of those fits that
+    can be judged, and others cannot."""
     fitting = [c for c in ranked if c.fits]
-    failed = sum(NOT_RUN in c.violated for c in ranked)
-    cannot = f", {failed} cannot be run" if failed else ""
-    lines = [f"{len(fitting)} of {len(ranked)} candidates fit{cannot}."]
+    count = f"{len(fitting)} of {counted(len(ranked), 'candidate')} {'fits' if len(fitting) == 1 else 'fit'}"
+    open_ones = sum(bool({NO_DATA, NOT_RUN} & set(c.violated)) for c in ranked)
+    count += f", {open_ones} cannot be judged" if open_ones else ""
+    lines, points = list[str](), list[Point]()
     objective, direction = next(iter(select.objectives.items()))
     if fitting:
         best = fitting[0]
@@ -108,14 +113,32 @@ def _verdict(
         lines.append(
             f"Best: {best.name}, {labelled(table, objective)} {best.values[objective]:.5g} ({direction}){tightest}."
         )
-    elif near:
+        if open_points := _reservations(best, fitting):
+            points.append(Point("fits with a reservation", f"{count}; of the best one, {'; '.join(open_points)}"))
+        points.append(Point("fits", count))
+    else:
+        points.append(Point("not decided" if open_ones else "does not fit", count))
+    if near and not fitting:
         lines.append(f"Nearest: {near[0].candidate.name}: {near[0]}.")
         lines.append(f"The limit {costs[0].limit} excludes most: {costs[0].excludes}.")
     dear = [p for p in costs if math.isfinite(p.gain) and p.gain > 0.0]
     if dear:
         p = max(dear, key=lambda price: price.gain)
         lines.append(f"Without the limit {p.limit} the best would be {100.0 * p.gain:.3g} % better.")
-    return Verdict("fits" if fitting else "does not fit", tuple(lines))
+    return Verdict.of(points, lines)
+
+
+def _reservations(best: Candidate, fitting: list[Candidate]) -> list[str]:
+    """What is open about the best candidate that fits."""
+    never = set.intersection(*(set(c.not_judged.split()) for c in fitting))
+    rules = best.not_judged.split()
+    names = [f"{rule} (of none that fits)" if rule in never and len(fitting) > 1 else rule for rule in rules]
+    out = [f"not judged: {', '.join(names)}"] if names else []
+    if best.estimated and best.estimated != HOLDS:
+        out.append(f"the losses are estimated and the verdict {_estimated(best)}")
+    if out and (whole := next((c for c in fitting if not c.not_judged and c.estimated in ("", HOLDS)), None)):
+        out.append(f"the first without a reservation is {whole.name}")
+    return out
 
 
 def _ranking_tables(table: pa.Table, ranked: list[Candidate], front: list[Candidate], select: Selection) -> list[Table]:
@@ -253,7 +276,8 @@ def _selection_csv(table: pa.Table, study: Study, ranked: list[Candidate], front
 def _ranking(table: pa.Table, ranked: list[Candidate], front: list[Candidate], select: Selection) -> list[str]:
     fitting = [c for c in ranked if c.fits]
     failed = sum(NOT_RUN in c.violated for c in ranked)
-    lines = [f"Selection: {len(fitting)} of {len(ranked)} fit" + (f", {failed} cannot be run" if failed else "")]
+    fit = "fits" if len(fitting) == 1 else "fit"
+    lines = [f"Selection: {len(fitting)} of {len(ranked)} {fit}" + (f", {failed} cannot be run" if failed else "")]
     if not fitting:
         return lines
     width = max(len(c.name) for c in fitting[:MAX_LINES]) + 2

@@ -14,9 +14,9 @@ import numpy as np
 from ..model.duty import HoldingBrake
 from ..model.gearbox import Gearbox
 from ..model.linear import RatedScrew
-from ..units.practical import RPM
+from ..units.practical import ROUNDING, RPM, excess, share_of_limit, told_apart
 from .duty_cycle import integral
-from .finding import Finding, Verdict, within
+from .finding import Finding, Mark, within
 from .formulas import (
     belt_force,
     buckling_force,
@@ -32,18 +32,19 @@ from .required_motion import InputDemand, RequiredMotion
 from .stages import BeltStage, RackStage, Stage
 
 HOUR = 3600.0
-PLACES = 4
 BRAKE = "torque that the holding brake carries"
 
 
 def least(rule: str, what: str, value: float, wanted: float, unit: str, name: str) -> Finding:
     """Compares a value with the least one that is wanted; `use` is their quotient, above 1 where the value is too small."""
     if math.isinf(value):
-        return Finding(rule, what, f"without end of {wanted:.{PLACES}g} {unit} wanted", "ok", "", 0.0)
+        return Finding(rule, what, f"without end of {wanted:.4g} {unit} wanted", "ok", "", 0.0)
     use = math.inf if value <= 0.0 else wanted / value
-    remark = "" if use <= 1.0 else f"is {100.0 * (1.0 - value / wanted):.0f} % short of the {name}"
-    text = f"{value:.{PLACES}g} of {wanted:.{PLACES}g} {unit} wanted"
-    return Finding(rule, what, text, "ok" if use <= 1.0 else "warning", remark, use)
+    short = use > 1.0 + ROUNDING
+    remark = f"is {excess(1.0 - value / wanted)} short of the {name}" if short else ""
+    shown_value, shown_wanted = told_apart(value, wanted, short)
+    text = f"{shown_value} of {shown_wanted} {unit} wanted"
+    return Finding(rule, what, text, "warning" if short else "ok", remark, use)
 
 
 def missing(rule: str, what: str, key: str) -> Finding:
@@ -267,5 +268,6 @@ def with_safety(findings: list[Finding], factors: Mapping[str, float]) -> list[F
 def _tightened(finding: Finding, factor: float, why: str) -> Finding:
     assert finding.use is not None
     use = finding.use * factor
-    verdict: Verdict = "warning" if use > 1.0 else finding.verdict
-    return finding.noted(f"{why}: {100.0 * use:.0f} % of the limit", use=use, verdict=verdict)
+    exceeded = use > 1.0 + ROUNDING
+    verdict: Mark = "warning" if exceeded else finding.verdict
+    return finding.noted(f"{why}: {share_of_limit(use)} of the limit", use=use, verdict=verdict)

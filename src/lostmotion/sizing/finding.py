@@ -8,9 +8,11 @@ from typing import Any, Literal, Self
 
 from ..errors import InputError
 from ..inputs.validation import shown
+from ..units.practical import ROUNDING, counted, excess, told_apart
+from ..verdict import Point, Verdict
 from .duty_cycle import DutyCycle
 
-Verdict = Literal["ok", "warning", "unknown"]
+Mark = Literal["ok", "warning", "unknown"]
 
 # Each rule of the check and where it comes from.
 RULES = {
@@ -60,6 +62,7 @@ TASK_RULES = {
     "lead_time": "lead_time in the data sheets of the parts",
 }
 SOURCES = RULES | TASK_RULES
+LISTED = 3  # points that are not judged, in a verdict
 
 
 @dataclass(frozen=True)
@@ -70,7 +73,7 @@ class Finding:
     """key of `SOURCES`"""
     what: str
     value: str
-    verdict: Verdict
+    verdict: Mark
     remark: str = ""
     use: float | None = None
     """share of the limit that is used; above 1 it is exceeded"""
@@ -81,11 +84,15 @@ class Finding:
         return SOURCES[self.rule]
 
     @property
+    def sentence(self) -> str:
+        """Value and remark, as verdicts have them."""
+        return f"{self.what}: {self.value}" + (f" ({self.remark})" if self.remark else "")
+
+    @property
     def in_short(self) -> str:
         """Verdict, value and remark in one line, without the source of the rule."""
         mark = {"ok": "ok     ", "warning": "WARNING", "unknown": "?      "}[self.verdict]
-        remark = f" ({self.remark})" if self.remark else ""
-        return f"{mark}  {self.what}: {self.value}{remark}"
+        return f"{mark}  {self.sentence}"
 
     def noted(self, remark: str, **changes: Any) -> Finding:
         """The same with one more remark, and other changes."""
@@ -106,6 +113,8 @@ class Findings(tuple[Finding, ...]):
     >>> findings = lm.check_drive(lm.load("catalogue-robot-joint"))
     >>> {finding.verdict for finding in findings} <= {"ok", "warning", "unknown"}
     True
+    >>> findings.verdict.state
+    'fits with a reservation'
     """
 
     __slots__ = ()
@@ -116,6 +125,31 @@ class Findings(tuple[Finding, ...]):
             if not isinstance(finding, Finding):
                 raise InputError(f"findings: {shown(finding)} is no Finding; give those of a check")
         return super().__new__(cls, kept)
+
+    @property
+    def verdict(self) -> Verdict:
+        """Verdict of all: an exceeded limit decides, then losses whose range does not decide, then what is not judged."""
+        by = {mark: [f for f in self if f.verdict == mark] for mark in ("ok", "warning", "unknown")}
+        points = [Point("does not fit", f.sentence) for f in by["warning"]]
+        points += [Point("not decided", f.sentence) for f in by["unknown"] if f.rule == "estimated_losses"]
+        unknown, judged = by["unknown"], len(by["ok"]) + len(by["warning"])
+        if judged == 0:
+            why = f", such as: {unknown[0].sentence}" if unknown else ""
+            points.append(Point("not decided", f"none of {counted(len(self), 'point')} is judged{why}"))
+        elif unknown:
+            names = "; ".join(f.what for f in unknown[:LISTED])
+            more = f"; and {len(unknown) - LISTED} more" if len(unknown) > LISTED else ""
+            points.append(
+                Point("fits with a reservation", f"{len(unknown)} of {len(self)} points not judged: {names}{more}")
+            )
+        points.append(Point("fits", f"all {counted(len(self), 'point')} within the limits"))
+        lines = [
+            f"{counted(len(by['warning']), 'limit')} exceeded, {len(by['ok'])} kept, {len(by['unknown'])} not judged"
+        ]
+        if used := [f for f in self if f.use is not None]:
+            most = max(used, key=lambda f: f.use or 0.0)
+            lines.append(f"the most used limit is {most.what}: {100.0 * (most.use or 0.0):.3g} %")
+        return Verdict.of(points, lines)
 
 
 def within(
@@ -134,6 +168,8 @@ def within(
     if limit is None:
         return Finding(rule, what, f"{value:.4g} {unit}{over}", "unknown", f"no {name} is given: {key}")
     use = value / limit
-    share = f"{value:.4g} of {limit:.4g} {unit}{over}"
-    remark = "" if use <= 1.0 else f"exceeds the {name} by {100.0 * (use - 1.0):.0f} %"
-    return Finding(rule, what, share, "ok" if use <= 1.0 else "warning", remark, use)
+    exceeded = use > 1.0 + ROUNDING
+    shown_value, shown_limit = told_apart(value, limit, exceeded)
+    share = f"{shown_value} of {shown_limit} {unit}{over}"
+    remark = f"exceeds the {name} by {excess(use - 1.0)}" if exceeded else ""
+    return Finding(rule, what, share, "warning" if exceeded else "ok", remark, use)

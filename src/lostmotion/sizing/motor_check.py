@@ -11,9 +11,9 @@ from ..control.continuous import ContinuousController
 from ..control.controller import Controller
 from ..control.loops import FirstOrderCurrent
 from ..model.motor import Motor
-from ..units.practical import RPM
+from ..units.practical import ROUNDING, RPM, told_apart
 from .duty_cycle import DutyCycle
-from .finding import Finding, Verdict, within
+from .finding import Finding, Mark, within
 from .thermal import TwoBodies, mean_square, steady_rise
 
 
@@ -74,10 +74,12 @@ def heat(
             *findings,
             Finding("winding_temperature", what, f"thermal runaway, {cycle}", "warning", remark, math.inf),
         ]
-    value = f"{ambient + rise:.0f} of {permissible:.0f} °C in the long run at {ambient:.0f} °C ambient, {cycle}"
     use = rise / (permissible - ambient) if permissible > ambient else math.inf
-    remark = f"reserve {permissible - ambient - rise:.0f} K"
-    verdict: Verdict = "ok" if use <= 1.0 else "warning"
+    verdict: Mark = "ok" if use <= 1.0 + ROUNDING else "warning"
+    hottest, limit = told_apart(ambient + rise, permissible, verdict == "warning", digits=3)
+    value = f"{hottest} of {limit} °C in the long run at {ambient:.3g} °C ambient, {cycle}"
+    reserve = permissible - ambient - rise
+    remark = f"reserve {reserve:.3g} K" if verdict == "ok" else f"{-reserve:.3g} K too hot"
     return [*findings, Finding("winding_temperature", what, value, verdict, remark, use)]
 
 

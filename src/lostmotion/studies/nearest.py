@@ -11,6 +11,7 @@ import numpy as np
 
 from ..control.references import PositionReference
 from ..errors import InputError
+from ..units.practical import excess, told_apart
 from .axis import AxisTask, reference_of
 from .axis_rows import NO_DATA, Axes
 from .choice import CHOICE
@@ -18,12 +19,13 @@ from .selection import WINDOW, Candidate
 from .study import Study
 
 SLOWEST = 10.0  # times as long as the cycle of the task, the longest that is tried
-STEPS = 12  # halvings: the factor is found to 0.3 % at most
+STEPS = 12  # halvings: what the factor is beyond 1 is found to 0.4 % of itself
 FITS = "fits if"  # begins what is said of a cycle that fits
 AT_ANY_TIME = (*CHOICE, "inertia_ratio", "lost_motion", "output_bearing", "holding_brake", "amplifier_voltage")
 """limits of what does not depend on the time of the cycle"""
 TRIES = (1.02, 1.05, 1.1, 1.2, 1.5, 2.0, 3.0)  # factors for a candidate whose run violates a limit
-DIGITS = 100.0  # of a factor: it is rounded up to hundredths
+NEAR = (0.5, 1.0, 2.0, 5.0)  # times the share by which it is violated: the first factors for one that is nearly kept
+LEAST = 1e-5  # by which a longer cycle is longer
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,7 @@ class Miss:
         return max(self.lacks.values(), default=math.inf)
 
     def __str__(self) -> str:
-        short = ", ".join(f"{name} {100.0 * x:.3g} % over its limit" for name, x in self.lacks.items())
+        short = ", ".join(f"{name} {excess(x)} over its limit" for name, x in self.lacks.items())
         return f"{short or self.candidate.why}{'; ' if self.then else ''}{self.then}"
 
 
@@ -159,7 +161,12 @@ def _tried(study: Study, miss: Miss) -> Miss:
 def _run_slower(study: Study, miss: Miss, row: np.ndarray, least: float = 1.0) -> Miss:
     """With the first of some factors above the `least` whose run fits: errors of runs need not fall steadily with the time, so that
     none is sought between."""
-    for factor in (math.ceil(DIGITS * least * share) / DIGITS for share in TRIES):
+    near = (
+        [1.0 + share * miss.worst for share in NEAR if share * miss.worst < TRIES[0] - 1.0]
+        if miss.candidate.ran
+        else []
+    )
+    for factor in (_rounded_up(least * share) for share in (*near, *TRIES)):
         slower = slowed(study, factor)
         if Axes(slower).refused(row) is None and (said := _said(study, slower, row, factor)).startswith(FITS):
             return replace(miss, slower=factor, then=said)
@@ -169,19 +176,26 @@ def _run_slower(study: Study, miss: Miss, row: np.ndarray, least: float = 1.0) -
 
 
 def least_factor(study: Study, row: np.ndarray) -> float | None:
-    """The least factor in hundredths by which the cycle has to be longer, so that the rules pass; None if none up to `SLOWEST` does."""
+    """The least factor by which the cycle has to be longer, so that the rules pass, to two digits of what it is beyond 1; None if none
+    up to `SLOWEST` does."""
 
     def passes(factor: float) -> bool:
         return Axes(slowed(study, factor)).refused(row) is None
 
     if not passes(SLOWEST):
         return None
-    low, high = 1.0, SLOWEST
+    low, high = LEAST, SLOWEST - 1.0  # beyond 1
     for _ in range(STEPS):
         middle = math.sqrt(low * high)
-        low, high = (low, middle) if passes(middle) else (middle, high)
-    factor = math.ceil(high * DIGITS * (1.0 - 1e-12)) / DIGITS
-    return factor if passes(factor) else high
+        low, high = (low, middle) if passes(1.0 + middle) else (middle, high)
+    factor = _rounded_up(1.0 + high)
+    return factor if passes(factor) else 1.0 + high
+
+
+def _rounded_up(factor: float) -> float:
+    """A factor whose part beyond 1 has two digits, hundredths at most."""
+    digits = max(2, 1 - math.floor(math.log10(factor - 1.0)))
+    return 1.0 + math.ceil(10.0**digits * (factor - 1.0) * (1.0 - 1e-9)) / 10.0**digits
 
 
 def _said(study: Study, slower: Study, row: np.ndarray, factor: float) -> str:
@@ -191,12 +205,14 @@ def _said(study: Study, slower: Study, row: np.ndarray, factor: float) -> str:
     assert after is not None
     moves = reference_of(study.drive).intervals()
     longest = max((b - a for a, b in moves), default=0.0)
-    what = f"its longest move {factor * longest:.4g} s instead of {longest:.4g} s" if longest else ""
-    times = f"the cycle takes {after.cycle:.4g} s instead of {before.cycle:.4g} s{', ' if what else ''}{what}"
+    slow, now = told_apart(factor * longest, longest)
+    what = f", its longest move {slow} s instead of {now} s" if longest else ""
+    slow, now = told_apart(after.cycle, before.cycle)
+    times = f"the cycle takes {slow} s instead of {now} s{what}"
     axes = Axes(slower)
     over = axes.over(axes.measured(row)[0])
     if over:
-        return f"passes the rules if {times}; the run then violates {', '.join(over)}"
+        return f"keeps the rules if {times}, but its run then violates {', '.join(over)}"
     return f"{FITS} {times}"
 
 

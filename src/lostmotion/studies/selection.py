@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..units.practical import practical
+from ..units.practical import practical, share_of_limit, told_apart
 from .check import BETWEEN, ESTIMATED, MISSING
 from .choice import CHOICE
 from .records import shown_name
@@ -124,7 +124,7 @@ def _candidate(
             why.append(f"{column} has no value")
         uses = {rule: use for rule in TASK_SHARES if math.isfinite(use := row.get(f"{USE}{rule}", math.nan))}
         critical = max(uses, key=lambda rule: uses[rule], default="")
-        tightest = f"{critical} {100.0 * uses[critical]:.0f} %" if critical else ""
+        tightest = f"{critical} {share_of_limit(uses[critical])}" if critical else ""
     return Candidate(
         run=row["run"],
         name=name,
@@ -162,7 +162,7 @@ def _beyond(column: str, row: dict[str, Any], bound: tuple[float, float], study:
         why = f"settling_time: the load does not settle before the next move; it rests {rests} off, with a window of {wide}"
         return why, {WINDOW: row["rest_error"] / window - 1.0}
     unit = study.kept_units.get(column, "") if study.axis is not None else ""
-    found, most = (practical(x, unit, 6) for x in (value, limit))
+    found, most = told_apart(value, limit, show=lambda x, digits: practical(x, unit, digits), digits=6)
     why = f"{column} {found} is {'above' if value > bound[1] else 'below'} {most}"
     return why, _excess(column, value, *bound)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 RPM = 30.0 / math.pi  # of one rad/s
@@ -21,6 +22,7 @@ PRACTICAL = {
     "degC": ("°C", 1.0),
     "ohm": ("Ω", 1.0),
 }
+MOST_DIGITS = 12  # of a printed number
 PRINTED = (("*", "·"), ("^2", "²"), ("^3", "³"))
 
 
@@ -40,6 +42,35 @@ def printed(unit: str) -> str:
 def counted(number: int, noun: str) -> str:
     """A number of things as text: 1 sample, 2 samples."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+ROUNDING = 1e-9
+"""share of a limit within which a value is at the limit: both may have been converted from other units"""
+
+
+def excess(share: float) -> str:
+    """Share of a limit by which it is missed, in percent, never rounded to 0."""
+    percent = 100.0 * share
+    return f"{percent:.0f} %" if percent >= 10.0 else f"{percent:.2g} %" if percent >= 1e-4 else "less than 0.0001 %"
+
+
+def told_apart(
+    value: float,
+    limit: float,
+    differ: bool = True,
+    show: Callable[[float, int], str] = "{:.{}g}".format,
+    digits: int = 4,
+) -> tuple[str, str]:
+    """A value and its limit as text, with as many more digits as are needed where their texts have to differ."""
+    while differ and digits < MOST_DIGITS and show(value, digits) == show(limit, digits):
+        digits += 1
+    return show(value, digits), show(limit, digits)
+
+
+def share_of_limit(use: float) -> str:
+    """Share of a limit that is used, in percent: 100 % only where it is not exceeded."""
+    percent, _ = told_apart(100.0 * use, 100.0, use > 1.0 + ROUNDING, "{:.{}f}".format, 0)
+    return f"{percent} %"
 
 
 def charted(unit: str, *, small: bool = False) -> tuple[str, float]:
