@@ -54,7 +54,22 @@ def angles(torque: np.ndarray, h: float, *, coulomb: float, viscous: float = 0.0
     return np.array(found)
 
 
-def write_log(path: Path, time: np.ndarray, torque: np.ndarray, angle: np.ndarray) -> None:
+def write_log(path: Path, time: np.ndarray, torque: np.ndarray, angle: np.ndarray, header: str = "") -> None:
     """A CSV file of a log."""
     rows = "\n".join(f"{t:.6g},{u:.9g},{q:.9g}" for t, u, q in zip(time, torque, angle, strict=True))
-    path.write_text(f"time [s],torque [N*m],position [rad]\n{rows}\n")
+    path.write_text(f"{header}time [s],torque [N*m],position [rad]\n{rows}\n")
+
+
+WEAR = Path(__file__).parents[1] / "examples" / "wear" / "logs"
+
+
+def wear_logs(directory: Path = WEAR) -> None:
+    """Logs of ``examples/wear``: the friction is a quarter larger from the 13th log on."""
+    time = np.arange(200) / 100
+    for k in range(18):
+        draw = np.random.default_rng(k)
+        coulomb = (0.1 if k < 12 else 0.125) * (1.0 + 0.02 * draw.standard_normal())
+        viscous = 0.02 * (1.0 + 0.02 * draw.standard_normal())
+        torque = np.round(0.5 * np.sin(7 * time + k) + 0.25 * np.sin(20 * time + 2 * k), 3)
+        angle = angles(torque, 1e-2, coulomb=coulomb, viscous=viscous) + 1e-3 * draw.standard_normal(len(time))
+        write_log(directory / f"{k + 1:02d}.csv", time, torque, np.round(angle, 5), f"# hours: {50 * k}\n")

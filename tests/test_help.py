@@ -60,7 +60,7 @@ def test_the_help_of_a_command_has_an_example_that_runs(
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     words = [*examples[0], "--no-open"] if name == ("live",) else examples[0]
     done = CliRunner().invoke(app, words)
-    assert done.exit_code == 0, done.output
+    assert done.exit_code == (1 if name == ("monitor",) else 0), done.output  # the axis of the example has worn
     left = {path.name for path in tmp_path.iterdir()} - {"examples"}
     assert left <= {Path(word).name for word in words} | {"drive.html", "paper-2dof-nl-small.html"}
     if name != ("schema",):  # which is for programs
@@ -93,7 +93,7 @@ UNASKED = [
     ("run", "paper-2dof-nl-small"),
     ("drive", "check", "catalogue-robot-joint"),
     ("reproduce",),
-    ("monitor", str(ROOT / "examples" / "cycloidal" / "baseline.toml")),
+    ("monitor", str(ROOT / "examples" / "wear" / "monitor.toml")),
 ]
 
 
@@ -103,7 +103,7 @@ def test_a_command_writes_only_what_it_is_asked_for_and_names_the_next_one(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     done = CliRunner().invoke(app, list(call))
-    assert done.exit_code == 0, done.output
+    assert done.exit_code == (1 if call[0] == "monitor" else 0), done.output  # the example of wear has worn
     assert list(tmp_path.iterdir()) == []
     lines = done.stdout.splitlines()
     assert len(lines) <= SCREEN

@@ -28,11 +28,12 @@ def monitor(
     Estimates backlash, friction, stiffness and losses over the life of the drive.
 
     Prints the findings; with -o, writes monitor.html (one page), values.csv (each log) and watched.csv (trends, changes, limits).
-    Exit code 1 if a value has changed or is beyond its limit.
+    Does not fit, exit code 1: a value has changed or is beyond its limit. Not decided, exit code 3: too few logs, or an interval
+    that contains the limit.
 
     \b
     lostmotion monitor joint.toml logs/2026-*.csv -o joint-7
-    lostmotion monitor examples/cycloidal/baseline.toml -o monitored
+    lostmotion monitor examples/wear/monitor.toml -o monitored
     """
     pictures = pictures_of(figures, output)
     from ..identification.monitor import monitor as run
@@ -40,6 +41,7 @@ def monitor(
     with busy("Monitoring") as tell:
         result = run(file, logs or (), progress=lambda log, k, count: tell(f"log {k} of {count}, {log}"))
     print(result.task.title or "Monitor")
+    print(result.verdict)
     print(result)
     unused = {e.log: e.why for e in result.logs if e.why} | result.left_out
     if unused:
@@ -54,5 +56,5 @@ def monitor(
             page = write_monitor(output, file.stem, result, pictures)
         print(f"Report written to {page}")
         print(f"Next: lostmotion identify {file} -o identified")
-    if result.alarms:
-        raise typer.Exit(1)
+    if result.verdict.exit_code:
+        raise typer.Exit(result.verdict.exit_code)

@@ -9,10 +9,10 @@ from .intervals import Interval as Interval
 from .ladder import RungResult as RungResult
 from .logs import Channel as Channel
 from .logs import Log as Log
-from .monitor import LogEstimate as LogEstimate
 from .monitor import MonitorResult as MonitorResult
-from .monitor import Watched as Watched
 from .new_task import first_task as first_task
 from .readers import read_log as read_log
 from .task import Identification as Identification
 from .task import load_identification as load_identification
+from .trends import LogEstimate as LogEstimate
+from .trends import Watched as Watched

@@ -34,9 +34,20 @@ SIZES = (1.0, 3.0, 10.0)  # prior standard deviations of a change, in those of t
 RAMPS = (1, 30, 300)  # values within which a change is complete; 1: a step
 CONFIRMED = 2  # values in a row with evidence above the limit: one value that is wrong makes no alarm
 POWER = 1.2816  # 90 % point of the normal distribution
-CREDIBLE = 0.95  # of the instant at which a change began
+CREDIBLE = 0.95  # of the instant at which a change began, and of the present value
+RECENT = 10  # values at the end, of which the present one is the mean if nothing changes
+LARGEST = 40.0  # deviations of a step, beyond which a series is too short for finding it
 
 Direction = Literal["up", "down", "both"]
+
+
+@dataclass(frozen=True)
+class Present:
+    """Present value of a series, of what follows the baseline alone, with its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
 
 
 @dataclass(frozen=True)
@@ -56,7 +67,14 @@ class Change:
     deviation: float
     """standard deviation of a value of typical variance around the level of the baseline"""
     detectable: float
-    """step over the last ten values that would have been found with a probability of 90 %"""
+    """step over the last values behind the baseline, ten at most, that would have been found with a probability of 90 %; infinite if
+    these are too few for any step"""
+    needed: int
+    """values behind the baseline from which on a step would be found"""
+    before: float
+    """level of the baseline at its mean conditions"""
+    present: tuple[Present, ...]
+    """present value at the end, and as it was without the last value; empty without a value behind the baseline"""
 
 
 def find_change(
@@ -114,7 +132,78 @@ def find_change(
     alarm = confirmed[0] if confirmed else None
     begins, ramp = (None, 1) if alarm is None else _began(logs[n - 1, : n - baseline], baseline)
     deviation = rows.deviation(baseline)
-    return Change(evidence, limit, alarm, begins, ramp, deviation, rows.detectable(limit * within) * deviation)
+    factor = limit * within
+    step = rows.detectable(factor, min(RECENT, n - baseline))
+    needed = next((m for m in range(2, within + 1) if _rows_of(baseline, m).detectable(factor, m) <= LARGEST), within)
+    before, present = _present(x, variances, conditions, baseline, logs, deviation)
+    detectable = step * deviation if step <= LARGEST else math.inf
+    return Change(evidence, limit, alarm, begins, ramp, deviation, detectable, needed, before, present)
+
+
+def _present(
+    x: np.ndarray, variances: np.ndarray, conditions: np.ndarray, baseline: int, logs: np.ndarray, deviation: float
+) -> tuple[float, tuple[Present, ...]]:
+    """(level of the baseline, present values).
+
+    Either nothing changes behind the baseline, or a step or a ramp begins at one of the values there. Both have the same prior
+    probability, and so has each beginning and shape. Each of these hypotheses has a least squares estimate of the present value with
+    the deviation of the baseline. The interval is that of their mixture.
+    """
+    centre = conditions[:baseline].mean(axis=0)
+    rows = _Rows(x, variances, conditions - centre)
+    free = baseline - np.linalg.matrix_rank(rows.columns[:baseline])
+    before = float(np.linalg.lstsq(rows.columns[:baseline], rows.x[:baseline], rcond=None)[0][0])
+    found = []
+    for n in range(len(x), max(baseline, len(x) - CONFIRMED), -1):
+        constant = np.zeros(n)
+        constant[baseline:] = 1.0
+        shapes, weights = [(max(baseline, n - RECENT), constant)], [1.0]
+        evidence = np.exp(np.minimum(logs[n - 1, : n - baseline], 600.0)).mean(axis=2) / (n - baseline) / len(RAMPS)
+        for j in range(baseline, n):
+            for shape, ramp in enumerate(RAMPS):
+                shapes.append((0, np.clip((np.arange(n) - j + 1.0) / ramp, 0.0, 1.0)))
+                weights.append(float(evidence[j - baseline, shape]))
+        estimates = np.array([_at_end(rows, *shape) for shape in shapes])
+        likely = np.array(weights) / sum(weights)
+        found.append(_mixture(likely, estimates[:, 0], np.maximum(estimates[:, 1] * deviation, 1e-300), int(free)))
+    return before, tuple(found)
+
+
+def _at_end(rows: _Rows, first: int, d: np.ndarray) -> tuple[float, float]:
+    """(value at the end at the mean conditions, its deviation in those of the series) if a change has the course d.
+
+    Parameters
+    ----------
+    first
+        First value behind the baseline that is used; the baseline gives the effect of the conditions.
+    """
+    n = len(d)
+    used = (np.arange(n) >= first) | (d == 0.0)
+    A = np.column_stack([rows.columns[:n], d * rows.scale[:n]])[used]
+    inverse = np.linalg.pinv(A.T @ A, hermitian=True)
+    at = np.zeros(A.shape[1])
+    at[0], at[-1] = 1.0, d[-1]
+    return float(at @ inverse @ A.T @ rows.x[:n][used]), math.sqrt(max(float(at @ inverse @ at), 0.0))
+
+
+def _mixture(weights: np.ndarray, values: np.ndarray, deviations: np.ndarray, freedom: int) -> Present:
+    """Mean and 95 % interval of a mixture of Student's t distributions."""
+    from scipy.optimize import brentq
+    from scipy.special import stdtr
+
+    def above(x: float, level: float) -> float:
+        return float(weights @ stdtr(freedom, (x - values) / deviations)) - level
+
+    reach = 1e3 * deviations.max() + np.ptp(values)
+    low, high = float(values.min() - reach), float(values.max() + reach)
+    ends = [float(brentq(above, low, high, (level,))) for level in (0.5 * (1.0 - CREDIBLE), 0.5 * (1.0 + CREDIBLE))]
+    return Present(float(weights @ values), *ends)
+
+
+def _rows_of(baseline: int, more: int) -> _Rows:
+    """Series of typical values without conditions."""
+    n = baseline + more
+    return _Rows(np.zeros(n), np.ones(n), np.zeros((n, 0)))
 
 
 def _began(logs: np.ndarray, baseline: int) -> tuple[tuple[int, int, int], int]:
@@ -141,19 +230,30 @@ class _Rows:
         rest = x - A @ np.linalg.lstsq(A, x, rcond=None)[0]
         return math.sqrt(float(rest @ rest) / max(1, count - np.linalg.matrix_rank(A)))
 
-    def detectable(self, factor: float, last: int = 10) -> float:
-        """Step over the last values, in deviations, that the evidence of a step of the middle size finds with 90 %."""
-        n = len(self.x)
-        d = np.where(np.arange(n) >= n - last, self.scale, 0.0)
-        A = self.columns
+    def detectable(self, factor: float, last: int) -> float:
+        """Step over the last values, in deviations, that is found with 90 %; infinite if no step is.
+
+        An alarm needs evidence at two values in a row. So the evidence without the last value must be above the limit already.
+        The change adds ``b^2/q`` to the squares R. Therefore the evidence of a series of finite length is bounded. The other squares,
+        which are a chi-square, are taken at their 90 % point as well.
+        """
+        from scipy.special import chdtri
+
+        n = len(self.x) - CONFIRMED + 1
+        A = self.columns[:n]
+        d = np.where(np.arange(n) >= len(self.x) - last, self.scale[:n], 0.0)
         d = d - A @ np.linalg.lstsq(A, d, rcond=None)[0]
-        q = float(d @ d)
-        if q <= 0.0:
+        q, freedom = float(d @ d), n - np.linalg.matrix_rank(A)
+        if last < CONFIRMED or freedom < 2 or q <= 1e-9:
             return math.inf
-        s2 = SIZES[1] ** 2
-        needed = math.log(factor) + math.log(len(SIZES) * len(RAMPS)) + 0.5 * math.log1p(s2 * q)
-        t2 = 2.0 * needed * (1.0 + s2 * q) / (s2 * q)
-        return (math.sqrt(max(t2, 0.0)) + POWER) / math.sqrt(q)
+        found = [math.inf]
+        for s2 in (s**2 for s in SIZES):
+            needed = math.log(factor) + math.log(len(SIZES) * len(RAMPS)) + 0.5 * math.log1p(s2 * q)
+            share = -math.expm1(-2.0 * needed / freedom)
+            gained = s2 / (1.0 + s2 * q) - share / q
+            if gained > 0.0:
+                found.append(math.sqrt(share * chdtri(freedom - 1, 0.1) / gained) / q + POWER / math.sqrt(q))
+        return min(found)
 
 
 def _log_factors(

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -18,87 +19,28 @@ import numpy as np
 
 from ..errors import InputError, prefixed
 from ..inputs.arguments import checked
-from .changes import Change, find_change
+from ..verdict import Point as Answer
+from ..verdict import State, Verdict
 from .engine import Engine, Point
 from .fit import Fit, Problem, search
 from .formulas import number
 from .gather import gathered
-from .intervals import Interval, bootstrap
+from .intervals import bootstrap
 from .ladder import free_on, grown, is_rough, problem_of, start_point
 from .misfit import LARGE, explained, hidden, misfits
-from .monitor_task import Watch
 from .odd_logs import ODD
-from .parameters import FreeParameter, in_unit
+from .parameters import FreeParameter
 from .pauses import split_at_pauses
 from .prepare import Prepared
+from .recorded import as_recorded, nearer_ways
 from .rig import Rig
 from .task import Identification, load_identification
+from .trends import RESIDUAL, LogEstimate, Watched, watched
 
 ITERATIONS = 15
 TOLD = 0.5  # of the prior's deviation, which is the size of the value: up to here a log tells a value
-FEWEST = 5  # logs of the baseline that tell a value
-RECENT = 10  # logs at the end, of which the present level is the mean
-RESIDUAL = "residual"
+FIRST = 3  # logs of the baseline by which the course of the inputs is decided
 Notify = Callable[[str, int, int], None]
-
-
-@dataclass(frozen=True)
-class LogEstimate:
-    """Parameter values of one log, with their intervals."""
-
-    log: str
-    """name of the log"""
-    at: float
-    """place in the order: its number, or the value of ``monitor.order``"""
-    values: Mapping[str, float]
-    """SI, by parameter"""
-    deviations: Mapping[str, float]
-    """standard deviations of the values by the residuals of this log alone, SI"""
-    intervals: Mapping[str, Interval]
-    """95 % intervals of the values, widened by what structured residuals may hide"""
-    residual: float
-    """root mean square of the residuals, in those of the baseline; NaN of a log that cannot be used"""
-    conditions: tuple[float, ...] = ()
-    """values of ``monitor.conditions``"""
-    told: frozenset[str] = frozenset()
-    """parameters of which the motion of this log says something"""
-    why: str = ""
-    """why the log is not used; empty if it is"""
-
-
-@dataclass(frozen=True)
-class Watched:
-    """The series of one parameter, and what it comes to."""
-
-    name: str
-    unit: str
-    """in which values are shown"""
-    logs: tuple[int, ...]
-    """numbers of the logs that determine it"""
-    change: Change | None
-    """None if too few baseline logs determine it"""
-    begins: int | None
-    """number of the log at which the change most likely began"""
-    level: Interval | None
-    """95 % interval of the present value, SI"""
-    before: float
-    """mean of the baseline, SI; NaN if too few baseline logs determine it"""
-    now: float
-    """mean of the last logs, SI"""
-    beyond: bool | None
-    """whether the present value is beyond a limit; None if its interval contains the limit"""
-    text: str
-    """one sentence: change, present value, limits"""
-
-    @property
-    def alarm(self) -> bool:
-        """Whether the value has changed or is beyond a limit."""
-        return bool(self.beyond) or (self.change is not None and self.change.alarm is not None)
-
-    @property
-    def decided(self) -> bool:
-        """Whether the logs decide about changes and limits."""
-        return self.change is not None and self.beyond is not None
 
 
 @dataclass
@@ -114,6 +56,10 @@ class MonitorResult:
     """medians of the baseline, from which each log was estimated, SI"""
     left_out: dict[str, str] = field(default_factory=dict)
     """by log that cannot be used: why"""
+    noise: dict[str, tuple[float, str]] = field(default_factory=dict)
+    """by channel without a stated deviation: that of the residuals of the baseline, with its SI unit"""
+    inputs: list[str] = field(default_factory=list)
+    """course of inputs between samples, if the task leaves it open, with the reason"""
 
     @property
     def alarms(self) -> list[Watched]:
@@ -151,15 +97,39 @@ class MonitorResult:
     def __str__(self) -> str:
         return "\n".join(self.lines())
 
+    @property
+    def verdict(self) -> Verdict:
+        """Changes and limits, what is not decided, and logs that are not used."""
+        points = []
+        for w in self.watched.values():
+            state: State = "does not fit" if w.alarm else "fits" if w.decided else "not decided"
+            points.append(Answer(state, w.text.replace(": not decided; ", ": ")))
+        if unused := {e.log: e.why for e in self.logs if e.why} | self.left_out:
+            name, why = next(iter(unused.items()))
+            text = f"no change, but {len(unused)} of {len(self.logs) + len(self.left_out)} logs are not used; {name}: {why}"
+            points.append(Answer("fits with a reservation", text))
+        verdict = Verdict.of(points)
+        if verdict.state == "fits":
+            return Verdict("fits", ("no watched value has changed, and none is beyond its limits",))
+        more = [p.sentence for p in points if p.state == verdict.state and p.sentence != verdict.lines[0]]
+        return replace(
+            verdict, lines=(*verdict.lines, *more[:1], *([f"{len(more) - 1} more below"] if more[1:] else []))
+        )
+
     def lines(self) -> list[str]:
         """The answer as text."""
         m = self.task.monitor
         used = sum(not e.why for e in self.logs)
+        baseline = sum(not e.why for e in self.logs[: m.baseline])
         found = [
-            f"{used} logs, {min(m.baseline, used)} of them as the baseline; the probability of a false alarm is at most "
+            f"{used} logs, {baseline} of them as the baseline; the probability of a false alarm is at most "
             f"{m.false_alarms:.2g} within {m.within} logs"
         ]
-        return [*found, *(f"  {w.text}" for w in self.watched.values())]
+        noise = [
+            f"{name}: noise of {value:.4g}{f' {unit}' if unit else ''}, estimated from the residuals of the baseline, since measured.{name}.deviation is not given"
+            for name, (value, unit) in self.noise.items()
+        ]
+        return [*found, *(f"  {text}" for text in [*(w.text for w in self.watched.values()), *noise, *self.inputs])]
 
 
 @checked
@@ -193,9 +163,11 @@ def monitor(
     Examples
     --------
     >>> import lostmotion as lm
-    >>> result = lm.monitor("examples/cycloidal/baseline.toml")
-    >>> result.watched["friction"].text
-    'friction: not decided; 3 of the 3 baseline logs determine it, 5 are needed'
+    >>> result = lm.monitor("examples/wear/monitor.toml")
+    >>> [(w.name, result.logs[w.begins].log) for w in result.alarms]
+    [('friction', '13.csv')]
+    >>> result.verdict.state
+    'does not fit'
     """
     task, directory = load_identification(source)
     if logs:
@@ -214,6 +186,7 @@ def monitor_logs(rig: Rig, logs: Sequence[Prepared], *, notify: Notify | None = 
     order = _in_order(rig.task, logs)
     count = rig.task.monitor.baseline
     rig, parts, left_out = split_at_pauses(rig, [log for log, _ in order])
+    rig, courses = _with_courses(rig, parts)
     estimator = _Estimator(_at_start(rig))
     estimates: list[LogEstimate] = []
 
@@ -233,10 +206,29 @@ def monitor_logs(rig: Rig, logs: Sequence[Prepared], *, notify: Notify | None = 
             for i in estimator.far_off(estimates):  # the start values were worse than the medians are
                 estimates[i] = estimate(i)
     estimates = _in_units_of_baseline(estimates, count)
-    free = list(estimator.reference.free)
-    return MonitorResult(
-        rig.task, estimates, watched(rig.task, estimates, free), dict(estimator.reference.values), left_out
-    )
+    reference, trends = estimator.reference, watched(rig.task, estimates, list(estimator.reference.free))
+    noise: dict[str, tuple[float, str]] = {}
+    if not reference.given and reference.deviations is not None:
+        for (name, m), value in zip(rig.task.measured.items(), reference.deviations.tolist(), strict=True):
+            noise[name] = value, rig.units.get(m.variable, "")
+    return MonitorResult(rig.task, estimates, trends, dict(reference.values), left_out, noise, courses)
+
+
+def _with_courses(rig: Rig, parts: Sequence[Prepared]) -> tuple[Rig, list[str]]:
+    """(rig with a course of each input between samples, words on those that the task leaves open), by the first logs."""
+    rig, words, undecided = as_recorded(rig, parts)
+    if undecided:
+        reference, some = _at_start(rig), [replace(part, held_out=False) for part in parts[:FIRST]]
+
+        def fitted(other: Rig, logs: list[Prepared], point: Point) -> Fit:
+            problem = problem_of(other, Engine(other, 1), logs, reference.rung)
+            return search(replace(problem, parameters=reference.free), point, iterations=ITERATIONS)
+
+        with suppress(InputError):  # a log without a run: it is named with its estimate
+            start = Point(dict(reference.values), start_point(rig.task, some).nuisance)
+            rig, _, more = nearer_ways(rig, some, undecided, start, fitted)
+            words |= more
+    return rig, list(words.values())
 
 
 def _in_order(task: Identification, logs: Sequence[Prepared]) -> list[tuple[Prepared, float]]:
@@ -262,6 +254,8 @@ class _Reference:
     free: Mapping[str, FreeParameter]
     deviations: np.ndarray | None
     """deviations of the residuals of the measured channels, SI; None: by those of the log"""
+    given: bool
+    """whether the task states them, so that residuals are in units of them"""
 
 
 def _at_start(rig: Rig) -> _Reference:
@@ -275,9 +269,8 @@ def _at_start(rig: Rig) -> _Reference:
                 f'is not free in the model "{names[rung]}"; name another monitor.model', f"monitor.watch.{name}"
             )
     values = {n: p.start if n in sought or p.fixed or p.off is None else p.off for n, p in task.parameters.items()}
-    return _Reference(
-        rig, rung, values, _with_priors(task, rung, values), problem_of(rig, Engine(rig, 1), [], rung).given
-    )
+    deviations = problem_of(rig, Engine(rig, 1), [], rung).given
+    return _Reference(rig, rung, values, _with_priors(task, rung, values), deviations, deviations is not None)
 
 
 def _with_priors(task: Identification, rung: int, values: Mapping[str, float]) -> dict[str, FreeParameter]:
@@ -344,7 +337,7 @@ class _Estimator:
         deviations = {name: (i.high - i.low) / (2.0 * 1.96) for name, i in own.items()}
         told = {name for name, s in deviations.items() if s <= TOLD * (free[name].deviation or math.inf)}
         values = {name: fit.point.values[name] for name in free}
-        residual = _size(problem, fit, residuals)
+        residual = self._size(problem, residuals)
         if residual < ODD * self._smallest:
             self._told.append({name: values[name] for name in told})
             self._deviations.append(fit.deviations)
@@ -367,7 +360,7 @@ class _Estimator:
         last = self._told[-1] if self._told else {}
         for there in (replace(start, values=start.values | last), grown(problem, start)):
             again = self._searched(problem, there)
-            if _size(problem, *again) < _size(problem, *best):
+            if self._size(problem, again[1]) < self._size(problem, best[1]):
                 best = again
             if self._as_before(problem, best):
                 break
@@ -379,14 +372,13 @@ class _Estimator:
 
     def _as_before(self, problem: Problem, found: tuple[Fit, list[np.ndarray]]) -> bool:
         """Whether the residuals are noise, or as small as those of other logs."""
-        return _size(problem, *found) < LARGE * self._smallest or explained(problem, found[1])
+        return self._size(problem, found[1]) < LARGE * self._smallest or explained(problem, found[1])
 
-
-def _size(problem: Problem, fit: Fit, residuals: Sequence[np.ndarray]) -> float:
-    """Root mean square of the residuals, in their deviations if these are given, else in SI."""
-    unit = np.ones(len(fit.deviations)) if problem.given is None else fit.deviations
-    scaled = [(r / unit[:, None]).ravel() for r in problem.compared(residuals)]
-    return math.sqrt(np.nanmean(np.concatenate(scaled) ** 2))
+    def _size(self, problem: Problem, residuals: Sequence[np.ndarray]) -> float:
+        """Root mean square of the residuals: in SI, or in the deviations that the task states, of all logs alike."""
+        deviations = self.reference.deviations if self.reference.given else None
+        unit = np.ones((len(residuals[0]), 1)) if deviations is None else deviations[:, None]
+        return math.sqrt(np.nanmean(np.concatenate([(r / unit).ravel() for r in problem.compared(residuals)]) ** 2))
 
 
 def _in_units_of_baseline(estimates: list[LogEstimate], baseline: int) -> list[LogEstimate]:
@@ -404,165 +396,3 @@ def _in_units_of_baseline(estimates: list[LogEstimate], baseline: int) -> list[L
         why = f"residuals are {ratio:.3g} times those of the baseline" if odd else e.why
         found.append(replace(e, residual=ratio, why=why))
     return found
-
-
-def watched(task: Identification, estimates: list[LogEstimate], free: list[str]) -> dict[str, Watched]:
-    """Trend and alarms of each watched value over the estimates of logs, in their order."""
-    names = [name for name in free if not task.monitor.watch or name in task.monitor.watch]
-    rate = task.monitor.false_alarms / (len(names) + 1)
-    found = {}
-    for name in names:
-        p, watch = task.parameters[name], task.monitor.watch.get(name, Watch())
-        logs = [k for k, e in enumerate(estimates) if name in e.told and not e.why]
-        values = np.array([estimates[k].values[name] for k in logs])
-        deviations = np.array([estimates[k].deviations[name] for k in logs])
-        series = _Series(task, estimates, logs, values, deviations)
-        found[name] = series.watched(name, p, watch, rate)
-    logs = [k for k, e in enumerate(estimates) if math.isfinite(e.residual)]
-    values = np.log([estimates[k].residual for k in logs])
-    series = _Series(task, estimates, logs, values, np.zeros(len(logs)))
-    found[RESIDUAL] = series.residual(rate)
-    return found
-
-
-class _Series:
-    """Estimates of one value over the logs that determine it."""
-
-    def __init__(
-        self,
-        task: Identification,
-        estimates: list[LogEstimate],
-        logs: list[int],
-        values: np.ndarray,
-        deviations: np.ndarray,
-    ) -> None:
-        self.task, self.estimates, self.logs, self.values = task, estimates, logs, values
-        self.count = sum(k < task.monitor.baseline for k in logs)
-        self.conditions = np.array([estimates[k].conditions for k in logs]).reshape(len(logs), -1)
-        self.enough = self.count >= FEWEST + self.conditions.shape[1]
-        self.variances = _variances(values, deviations, self.count) if self.enough else np.ones(len(logs))
-
-    def change(self, direction: str, rate: float) -> Change | None:
-        """Change of the series; None if the baseline is too short."""
-        if not self.enough:
-            return None
-        return find_change(
-            self.values,
-            self.variances,
-            self.conditions,
-            self.count,
-            direction=direction,  # type: ignore[arg-type]
-            false_alarms=rate,
-            within=self.task.monitor.within,
-        )
-
-    def levels(self, change: Change) -> tuple[float, float, float]:
-        """(level of the baseline, present level, half its 95 % interval by the scatter of the logs)."""
-        from scipy.special import stdtrit
-
-        steady = len(self.values) if change.begins is None else max(self.count, change.begins[1])
-        centre = self.conditions[: self.count].mean(axis=0)
-        A = np.column_stack([np.ones(steady), self.conditions[:steady] - centre])
-        w = 1.0 / np.sqrt(self.variances[:steady])
-        effect = np.linalg.lstsq(A * w[:, None], self.values[:steady] * w, rcond=None)[0]
-        values = self.values - (self.conditions - centre) @ effect[1:]
-        weights = 1.0 / self.variances
-        first = change.begins[0] if change.begins is not None and change.ramp == 1 else 0
-        last = slice(max(first, len(values) - RECENT), None)
-        before = float(np.average(values[: self.count], weights=weights[: self.count]))
-        now = float(np.average(values[last], weights=weights[last]))
-        t = float(stdtrit(self.count - A.shape[1], 0.975))
-        return before, now, t * change.deviation / math.sqrt(float(weights[last].sum()))
-
-    def watched(self, name: str, p: FreeParameter, watch: Watch, rate: float) -> Watched:
-        """With the sentence on a parameter."""
-        change = self.change(watch.direction, rate)
-        if change is None:
-            many = min(self.task.monitor.baseline, len(self.estimates))
-            text = f"{name}: not decided; {self.count} of the {many} baseline logs determine it, {FEWEST} are needed"
-            return Watched(name, p.unit, tuple(self.logs), None, None, None, math.nan, math.nan, None, text)
-        before, now, half = self.levels(change)
-        level = Interval(now - half, now + half, "logs")
-        beyond, limits = _against_limits(name, p, watch, level)
-        unit = f" {p.unit}" if p.unit else ""
-        shown = f"{p.shown(now)}{unit} ({p.shown(level.low)} to {p.shown(level.high)})"
-        if change.alarm is None:
-            step = p.shown(change.detectable)
-            words = f"{shown}, no change; a step of {step}{unit} over the last {RECENT} logs would have been found with 90 %"
-        else:
-            words = f"{self._since(change)} from {p.shown(before)} to {shown}"
-        return Watched(
-            name,
-            p.unit,
-            tuple(self.logs),
-            change,
-            self._first(change),
-            level,
-            before,
-            now,
-            beyond,
-            f"{name}: {words}{limits}",
-        )
-
-    def residual(self, rate: float) -> Watched:
-        """With the sentence on the residuals."""
-        change = self.change("up", rate)
-        if change is None:
-            text = f"{RESIDUAL}: not decided; {self.count} baseline logs can be used, {FEWEST} are needed"
-            return Watched(RESIDUAL, "", tuple(self.logs), None, None, None, math.nan, math.nan, None, text)
-        before, now, half = (float(x) for x in self.levels(change))
-        level = Interval(math.exp(now - half), math.exp(now + half), "logs")
-        now = math.exp(now)
-        if change.alarm is not None and level.low > LARGE * math.exp(before):
-            text = f"{RESIDUAL}: {self._since(change)}: the model does not describe the drive any more"
-        else:
-            change = replace(change, alarm=None)
-            text = f"{RESIDUAL}: {now:.3g} times that of the baseline; the model describes the drive as it did"
-        first = self._first(change)
-        return Watched(RESIDUAL, "", tuple(self.logs), change, first, level, math.exp(before), now, False, text)
-
-    def _first(self, change: Change) -> int | None:
-        return None if change.alarm is None or change.begins is None else self.logs[change.begins[0]]
-
-    def _since(self, change: Change) -> str:
-        assert change.begins is not None
-        assert change.alarm is not None
-        at, low, high = (self.estimates[self.logs[k]].log for k in change.begins)
-        kind = "changed" if change.ramp == 1 else "drifts"
-        return f"{kind} since {at} ({low} to {high}, seen with {self.estimates[self.logs[change.alarm]].log})"
-
-
-def _variances(values: np.ndarray, deviations: np.ndarray, count: int) -> np.ndarray:
-    """Relative variances: those of the logs, and the one that their values have beyond these (DerSimonian and Laird 1986)."""
-    s2 = deviations**2
-    if not np.all(s2 > 0.0):
-        return np.ones(len(values))
-    w = 1.0 / s2[:count]
-    mean = np.average(values[:count], weights=w)
-    beyond = float(np.sum(w * (values[:count] - mean) ** 2)) - (count - 1)
-    between = max(0.0, beyond / float(w.sum() - np.sum(w**2) / w.sum()))
-    found = s2 + between
-    return np.asarray(found / np.median(found[:count]))
-
-
-def _against_limits(name: str, p: FreeParameter, watch: Watch, level: Interval) -> tuple[bool | None, str]:
-    """(whether the level is beyond a limit, words on it)."""
-    states: list[bool | None] = []
-    words = ""
-    for end, sign, side in (("min", -1.0, "least"), ("max", 1.0, "largest")):
-        limit = in_unit(getattr(watch, end), p.unit, f"monitor.watch.{name}.{end}")
-        if limit is None:
-            continue
-        inner, outer = (level.low, level.high) if sign > 0.0 else (level.high, level.low)
-        shown = f"the {side} permitted value {p.shown(limit)}{f' {p.unit}' if p.unit else ''}"
-        if sign * (inner - limit) > 0.0:
-            states.append(True)
-            words += f"; beyond {shown}"
-        elif sign * (outer - limit) < 0.0:
-            states.append(False)
-            words += f"; within {shown}"
-        else:
-            states.append(None)
-            words += f"; not decided whether beyond {shown}"
-    beyond = True if True in states else None if None in states else False
-    return beyond, words

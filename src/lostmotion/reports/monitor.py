@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from ..identification.monitor import RESIDUAL, MonitorResult, Watched
+from ..identification.monitor import MonitorResult
 from ..identification.parameters import in_unit
+from ..identification.trends import RESIDUAL, Watched
 from ..units.conversion import si_factor
 from ..units.practical import printed
-from ..verdict import Verdict
 from .looks import FAINT, PALETTE
 from .page import Prose, Report, Table
 from .pages import table_csv, write_report
@@ -55,7 +55,7 @@ def monitor_report(name: str, result: MonitorResult) -> Report:
     return Report(
         title=result.task.title or name,
         lead=f"{result.lines()[0]}.",
-        verdict=_verdict(result),
+        verdict=result.verdict,
         main=Group("trends", "Trends", TRENDS, tuple(_trend(result, w) for w in watched)),
         parts=(
             Table("Watched values", WATCHED, [_row(result, w) for w in watched], BLANK, marked),
@@ -84,26 +84,6 @@ TELLS = (
 )
 
 
-def _verdict(result: MonitorResult) -> Verdict:
-    """Alarms, what is not decided, or that nothing has changed."""
-    alarms = result.alarms
-    undecided = [w for w in result.watched.values() if not w.decided and not w.alarm]
-    if alarms:
-        more = f" {len(alarms) - 2} more below." if len(alarms) > 2 else ""
-        return Verdict("does not fit", tuple(f"{w.text}.{more if k == 1 else ''}" for k, w in enumerate(alarms[:2])))
-    if undecided:
-        names = ", ".join(w.name for w in undecided)
-        return Verdict(
-            "not decided",
-            (
-                f"Not decided: {names}.",
-                f"An example of the reasons: {undecided[0].text}.",
-                "All findings are listed below.",
-            ),
-        )
-    return Verdict("fits", ("No watched value has changed, and none is beyond its limits.",))
-
-
 def _row(result: MonitorResult, w: Watched) -> list[str]:
     """A watched value as text."""
     p = result.task.parameters.get(w.name)
@@ -114,7 +94,9 @@ def _row(result: MonitorResult, w: Watched) -> list[str]:
     unit = printed(w.unit)
     if w.level is None or w.change is None:
         return [w.name, "", "", "", "", unit, "not decided", "not decided"]
-    change = "none" if w.begins is None else f"since {result.logs[w.begins].log}"
+    change = "none" if math.isfinite(w.change.detectable) else "not decided"
+    if w.begins is not None:
+        change = f"since {result.logs[w.begins].log}"
     limit = {True: "beyond", False: "within", None: "not decided"}[w.beyond]
     if p is None or w.name not in result.task.monitor.watch or not _limits(result, w):
         limit = "none given"
