@@ -167,6 +167,46 @@ def under_controllers() -> list[str]:
     return ["lm.SimulationBatch, position loops of 8 kHz", f"{1 / spent:.2f}", *shown, memory, f"{COMPARED} drives"]
 
 
+USUAL = 512  # drives
+STEPS = (1e-3, 2e-3, 5e-3)  # [s]
+
+
+def random_commands(report: Report) -> None:
+    """Rates under commands that are drawn anew for each step, as those of a policy that explores."""
+    report.add(
+        "",
+        f"{USUAL} drives under commands of uniform distribution up to an amplitude, drawn anew for each drive and step: thousands of steps per second "
+        "of processor time on one core, best of five parts after 100 steps, and switchings of a drive in a step. Own parameters: inertia and friction within 20 %.",
+        "",
+    )
+    rows = []
+    for name in ("catalogue-robot-joint", "paper-2dof-nl-small"):
+        for own in (False, True):
+            rows += [[name, "own" if own else "equal", f"{a:g}", *random_rates(name, a, own)] for a in (0.05, 0.3, 1.0)]
+    steps = [f"{1e3 * step:g} ms" for step in STEPS]
+    head = [f"{word} {step}" for step in steps for word in ("k steps/s,", "switchings,")]
+    report.table(["drive", "parameters", "amplitude", *head], rows)
+
+
+def random_rates(name: str, amplitude: float, own: bool) -> list[str]:
+    """Rate and switchings for each length of the steps."""
+    drive, generator, cells = lm.load(name).drive(), np.random.default_rng(4), []
+    spread = generator.uniform(0.8, 1.2, (2, USUAL))
+    vary = {
+        "load.inertia": drive.load.inertia * spread[0],
+        "motor.friction_torque": drive.motor.friction_torque * spread[1],
+    }
+    for step in STEPS:
+        many = lm.SimulationBatch(drive, step, count=USUAL, vary=vary if own else {}, threads=1)
+        for command in generator.uniform(-amplitude, amplitude, (100, USUAL)):
+            many.step(command)
+        before = many.counts
+        spent = step_time(many.step, generator.uniform(-amplitude, amplitude, (50, USUAL)))
+        changes = {key: many.counts[key] - before[key] for key in ("steps", "switchings")}
+        cells += [f"{1e3 / spent:.0f}", f"{changes['switchings'] / changes['steps']:.1f}"]
+    return cells
+
+
 def section(report: Report) -> None:
     report.section(
         "Drive batches",
@@ -235,6 +275,7 @@ def section(report: Report) -> None:
         ]
     )
     report.table(["", "M steps/s", "error of the angle", "error of the speed", "memory of a drive", ""], rows)
+    random_commands(report)
     threads = os.cpu_count() or 1
     shared = batch(COUNT, values, threads)
     given = torques(300, COUNT, 0.0)
