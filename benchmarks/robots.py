@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from typing import Any
 
 import mujoco
@@ -53,11 +54,29 @@ def two_hinges(step: float, gap: float, end: float) -> np.ndarray:
     return np.array([data.qpos[0] + data.qpos[1], data.qpos[2] + data.qpos[3]])
 
 
-def exact(step: float, stiffness: float, gap: float, end: float = END, substeps: int | None = None) -> np.ndarray:
+def exact(
+    step: float,
+    stiffness: float,
+    gap: float,
+    end: float = END,
+    substeps: int | None = None,
+    torques: Callable[[float], np.ndarray] = arms.motor_torques,
+) -> np.ndarray:
     robot = arms.robot(step, arms.drive(stiffness, gap), substeps=substeps)
     for k in range(round(end / step)):
-        robot.step(arms.motor_torques((k + 0.5) * step))
+        robot.step(torques((k + 0.5) * step))
     return np.array(robot.data.qpos)
+
+
+def jump_errors(step: float) -> list[str]:
+    """Errors [rad] under torques that jump at t = 0 and stay constant."""
+    errors = []
+    for torque in ((0.3, 0.12), (0.6, 0.2), (-0.1, 0.05), (1.0, 0.3)):
+        held = np.array(torque)
+        right = arms.reference(step, END, STIFFNESS, torques=lambda _t, held=held: held)  # type: ignore[misc]
+        found = exact(step, STIFFNESS, 0.0, torques=lambda _t, held=held: held)  # type: ignore[misc]
+        errors.append(shown(np.abs(found - right).max()))
+    return errors
 
 
 def energy_error(step: float, stiffness: float, gap: float) -> float:
@@ -119,6 +138,10 @@ def section(report: Report) -> None:
         found += [explicit(step, STIFFNESS, 1e-3, end), two_hinges(step, 1e-3, end)]
         rows.append([f"gap of 1 mrad, {1e3 * step:g} ms, 0.1 s", *(shown(np.abs(f - q).max()) for f in found)])
     report.table(["", "lm.mujoco", "with 20 substeps", "by hand", "two hinges"], rows)
+    report.table(
+        ["constant torques from rest [N m]", "0.3, 0.12", "0.6, 0.2", "-0.1, 0.05", "1, 0.3"],
+        [[f"lm.mujoco, {1e3 * step:g} ms", *jump_errors(step)] for step in (4e-3, 2e-3, 1e-3)],
+    )
     wall = {step: arms.force_on_wall(step, 1e5, 1e-3)[-1] for step in (5e-3, 1e-4)}
     report.table(
         ["", "lm.mujoco"],

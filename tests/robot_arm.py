@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import mujoco
@@ -85,7 +86,13 @@ def motor_torques(t: float) -> np.ndarray:
     return np.array([0.3, 0.12]) * np.sin(2.0 * math.pi * np.array([1.0, 1.7]) * t)
 
 
-def reference(step: float, end: float, stiffness: float, gap: float = 0.0) -> np.ndarray:
+def reference(
+    step: float,
+    end: float,
+    stiffness: float,
+    gap: float = 0.0,
+    torques: Callable[[float], np.ndarray] = motor_torques,
+) -> np.ndarray:
     """Angles of the joints, by DOP853 from switching to switching, with motor torques held over each step."""
 
     def rates(_t: float, y: np.ndarray, motor: np.ndarray, side: np.ndarray) -> np.ndarray:
@@ -99,7 +106,7 @@ def reference(step: float, end: float, stiffness: float, gap: float = 0.0) -> np
     y = np.zeros(8)
     side = np.zeros(2)
     for k in range(round(end / step)):
-        motor, t = motor_torques((k + 0.5) * step), 0.0
+        motor, t = torques((k + 0.5) * step), 0.0
         while t < step:
             events = []
             for j in range(2) if gap else ():
