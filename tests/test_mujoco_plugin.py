@@ -20,19 +20,33 @@ def plugin() -> Path:
     return lm.mujoco.load_plugin()
 
 
-def arm(step: float, given: lm.Drive, where: Path, *, armature: float = ROTOR * RATIO**2, key: str = "") -> Any:
+def arm(
+    step: float,
+    given: lm.Drive,
+    where: Path,
+    *,
+    armature: float = ROTOR * RATIO**2,
+    key: str = "",
+    joint: str = "",
+    actuator: str = "",
+    before: str = "",
+) -> Any:
     """The arm of the tests of `attach`, its drives as plugins."""
     file = where / "drive"
     lm.mujoco.write_drive(given, file)
-    text = ARM.format(step=step, world="", tip="").replace('type="hinge"', f'type="hinge" armature="{armature!r}"')
+    text = ARM.format(step=step, world="", tip="").replace(
+        'type="hinge"', f'type="hinge" armature="{armature!r}" {joint}'
+    )
     config = f'<config key="scenario" value="{key or file}"/>'
     actuators = "".join(
-        f'<plugin name="{joint}" joint="{joint}" plugin="lostmotion.drive">{config}</plugin>'
-        for joint in ("shoulder", "elbow")
+        f'<plugin name="{name}" joint="{name}" plugin="lostmotion.drive" {actuator}>{config}</plugin>'
+        for name in ("shoulder", "elbow")
     )
     extension = '<extension><plugin plugin="lostmotion.drive"/></extension>'
     text = text.replace("<worldbody>", extension + "<worldbody>", 1)
-    return mujoco.MjModel.from_xml_string(text.replace("</mujoco>", f"<actuator>{actuators}</actuator></mujoco>"))
+    return mujoco.MjModel.from_xml_string(
+        text.replace("</mujoco>", f"<actuator>{before}{actuators}</actuator></mujoco>")
+    )
 
 
 def swing(model: Any, duration: float) -> np.ndarray:
@@ -90,6 +104,10 @@ def test_an_arm_that_friction_holds_does_not_creep(tmp_path: Path) -> None:
     ("options", "message"),
     [
         ({"armature": 0.0}, "lostmotion.drive .*: the joint has the armature 0; give it 0.1, the inertia of the drive"),
+        ({"joint": 'damping="0.1"'}, "the joint has damping, which would act beside the drive"),
+        ({"joint": 'frictionloss="0.1"'}, "the joint has a frictionloss, which would act beside the drive"),
+        ({"joint": 'actuatorfrcrange="-1 1"'}, "the joint has an actuatorfrcrange, which would act beside the drive"),
+        ({"actuator": 'forcerange="-1 1"'}, "the actuator has a forcerange, which would act beside the drive"),
         ({"key": "/no/such"}, "scenario /no/such: is no file of lostmotion.mujoco.write_drive"),
     ],
 )
@@ -97,3 +115,21 @@ def test_a_wrong_configuration_ends_in_one_clear_line(options: dict[str, Any], m
     with pytest.raises((mujoco.FatalError, ValueError), match=message) as raised:
         mujoco.MjData(arm(1e-3, drive(), tmp_path, **options))
     assert "\n" not in str(raised.value).strip()
+
+
+def test_controls_are_limited_and_found_behind_an_actuator_of_two(tmp_path: Path) -> None:
+    limited = arm(1e-3, drive(), tmp_path, actuator='ctrlrange="-0.1 0.1"')
+    behind = arm(1e-3, drive(), tmp_path, before='<pid name="first" joint="elbow" kp="0" kv="0" input="pos vel"/>')
+    ends = []
+    for model, controls in (
+        (limited, [3.0, -3.0]),
+        (behind, [0.0, 0.0, 0.1, -0.1]),
+        (arm(1e-3, drive(), tmp_path), [0.1, -0.1]),
+    ):
+        data = mujoco.MjData(model)
+        assert model.nu == len(controls)
+        data.ctrl[:] = controls
+        mujoco.mj_step(model, data, 20)
+        ends.append(data.qpos.tolist())
+    assert ends[0] == ends[2]
+    assert ends[1] == ends[2]

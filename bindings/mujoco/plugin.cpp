@@ -88,14 +88,23 @@ struct Drive {
     lm::LoadShaft shaft;
     std::vector<double> inputs;
     std::size_t load = 0;
-    double scale = 1.0;  // from the control of MuJoCo to the command
-    int actuator = -1, dof = -1;
+    double scale = 1.0;                       // from the control of MuJoCo to the command
+    int control = -1, output = -1, dof = -1;  // places in mjData
     bool controlled = false;
     double armature = 0.0;         // A
     std::unique_ptr<Group> group;  // of the first drive of a model
     std::size_t numbers = 0;
     lm::LoadAnswer answer;
 };
+
+// The control as the engine limits it, in the units of the drive.
+double given(const mjModel* m, const mjData* d, const Drive& drive) {
+    double control = d->ctrl[drive.control];
+    const mjtNum* range = m->actuator_ctrlrange + 2 * drive.control;
+    if (m->actuator_ctrllimited[drive.control] && !(m->opt.disableflags & mjDSBL_CLAMPCTRL))
+        control = std::clamp(control, range[0], range[1]);
+    return drive.scale * control;
+}
 
 Drive& drive_of(const mjData* d, int instance) { return *reinterpret_cast<Drive*>(d->plugin_data[instance]); }
 
@@ -104,9 +113,28 @@ int state_size(const mjModel* m, int instance) {
     return static_cast<int>(simulation.state_size()) + 2;
 }
 
+// What the engine would do to the force of the actuator, and what joint and actuator have of a drive.
+void refuse_limits(const mjModel* m, int instance, int actuator, int joint) {
+    const int dof = m->jnt_dofadr[joint];
+    const auto any = [](const mjtNum* values, int n) {
+        return std::any_of(values, values + n, [](mjtNum x) { return x != 0.0; });
+    };
+    const auto refuse = [&](const char* what) {
+        fail(m, instance, std::string("the ") + what + ", which would act beside the drive; take it off the model");
+    };
+    if (m->actuator_forcelimited[actuator]) refuse("actuator has a forcerange");
+    if (m->jnt_actfrclimited[joint]) refuse("joint has an actuatorfrcrange");
+    if (m->actuator_delay[actuator] != 0.0) refuse("actuator has a delay");
+    if (m->actuator_armature[actuator] != 0.0) refuse("actuator has an armature");
+    if (m->actuator_damping[actuator] != 0.0 || any(m->actuator_dampingpoly + mjNPOLY * actuator, mjNPOLY))
+        refuse("actuator has damping");
+    if (m->dof_damping[dof] != 0.0 || any(m->dof_dampingpoly + mjNPOLY * dof, mjNPOLY)) refuse("joint has damping");
+    if (m->dof_frictionloss[dof] != 0.0) refuse("joint has a frictionloss");
+}
+
 int init(const mjModel* m, mjData* d, int instance) {
     int actuator = -1, count = 0;
-    for (int k = 0; k < m->nu; ++k)
+    for (int k = 0; k < m->nactuator; ++k)
         if (m->actuator_plugin[k] == instance) {
             actuator = k;
             ++count;
@@ -115,7 +143,9 @@ int init(const mjModel* m, mjData* d, int instance) {
     const int joint = m->actuator_trnid[2 * actuator];
     if (m->actuator_trntype[actuator] != mjTRN_JOINT || m->jnt_type[joint] != mjJNT_HINGE)
         fail(m, instance, "must turn a hinge; give joint");
-    if (m->actuator_gear[6 * actuator] != 1.0) fail(m, instance, "the actuator has a gear; the drive has its own");
+    const int control = m->actuator_ctrladr[actuator], output = m->actuator_outadr[actuator];
+    if (m->actuator_gear[6 * output] != 1.0) fail(m, instance, "the actuator has a gear; the drive has its own");
+    refuse_limits(m, instance, actuator, joint);
     if (m->opt.integrator == mjINT_RK4) fail(m, instance, "needs another integrator than RK4");
     lm::Scenario scenario = scenario_of(m, instance);
     const int dof = m->jnt_dofadr[joint];
@@ -131,7 +161,8 @@ int init(const mjModel* m, mjData* d, int instance) {
     const double whole = 1.0 / m->dof_invweight0[dof];
     scenario.train.shafts[static_cast<std::size_t>(scenario.train.gears[0].output)].inertia = whole - given;
     auto made = std::make_unique<Drive>(scenario, m->opt.timestep);
-    made->actuator = actuator;
+    made->control = control;
+    made->output = output;
     made->dof = dof;
     made->armature = given;
     made->numbers = made->simulation.state_size();
@@ -164,7 +195,7 @@ void reset(const mjModel*, mjtNum* state, void* data, int) { place(*static_cast<
 template <class Equation>
 void solve(const mjModel* m, const mjData* d, int instance, double load, Equation&& equation) {
     Drive& drive = drive_of(d, instance);
-    std::ranges::fill(drive.inputs, drive.scale * d->ctrl[drive.actuator]);
+    std::ranges::fill(drive.inputs, given(m, d, drive));
     for (int n = 0;; ++n) {
         if (!drive.simulation.set_state(d->plugin_state + m->plugin_stateadr[instance]))
             fail(m, instance, "plugin_state is not that of this drive");
@@ -232,7 +263,7 @@ void compute(const mjModel* m, mjData* d, int instance, int) {
         // The speed has been changed from outside.
         if (d->qvel[drive.dof] != state[drive.numbers + 1]) place(drive, state, d->qvel[drive.dof]);
         if (!drive.simulation.set_state(state)) fail(m, group->instances[k], "plugin_state is not that of this drive");
-        const double control = drive.scale * d->ctrl[drive.actuator];
+        const double control = given(m, d, drive);
         std::ranges::fill(group->trains->inputs(k), control);
         if (drive.controlled) drive.simulation.with([&](auto& s) { s.set_reference(0, control, 0.0); });
         group->trains->set_guess(k, {state[drive.numbers], 0.0});
@@ -266,7 +297,7 @@ void compute(const mjModel* m, mjData* d, int instance, int) {
     for (std::size_t k = 0; k < n; ++k) {
         const Drive& drive = *group->drives[k];
         const auto& joint = group->trains->joints()[k];
-        d->actuator_force[drive.actuator] = joint.torque + drive.armature * joint.acceleration;
+        d->actuator_force[drive.output] = joint.torque + drive.armature * joint.acceleration;
         d->plugin_state[m->plugin_stateadr[group->instances[k]] + static_cast<int>(drive.numbers)] =
             group->trains->guess(k).torque;
     }
