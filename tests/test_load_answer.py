@@ -55,6 +55,27 @@ def test_two_masses_on_a_spring_answer_as_in_closed_form(interval: float) -> Non
     assert found.torque == pytest.approx(2.0 - 2.0 * LOAD * compliance, rel=1e-9, abs=1e-9)
 
 
+def test_after_restore_answers_have_the_same_bits() -> None:
+    """All of them, whatever steps were kept before: a state is what determines all that follows."""
+    simulation = lm.Simulation(drive(lm.model.TorsionCurve(slopes=[2e4]), friction=0.02), step=2e-3)
+
+    def answers() -> list[tuple[float, ...]]:
+        return [
+            (found.acceleration, found.torque, found.derivative, simulation["load_speed"])
+            for k in range(40)
+            for found in (simulation.answer(2e-3, 0.2 * math.sin(0.05 * k), 10.0 * math.cos(0.07 * k)),)
+        ]
+
+    begin = simulation.snapshot()
+    first = answers()
+    simulation.restore(begin)
+    assert answers() == first
+    simulation.answer(7e-4, 0.1, 1.0)
+    simulation.restore(begin)
+    assert answers() == first
+    assert [a for _, _, a, _ in first[:2]] != [0.0, 0.0]
+
+
 def test_a_load_that_friction_holds_takes_any_torque() -> None:
     held = drive(lm.model.Rigid(), friction=0.1)
     found = lm.Simulation(held).answer(1e-3, 0.0, 2.0)

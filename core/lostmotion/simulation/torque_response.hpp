@@ -9,6 +9,8 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
+#include <cstdint>
 #include <optional>
 
 #include "../model/components.hpp"
@@ -43,12 +45,12 @@ class TorqueResponse final : public Observer<System> {
         regime_ = &r;
         x_ = s.x_end;
         memory_ = s.memory;
-        const double length = s.end - s.begin;
+        // Without the rounding of the instants: then nearly all steps are of one regime and one length, and what is
+        // kept of the last one is what any other would find.
+        const double length = rounded(s.end - s.begin);
         if (!(length > 0.0)) return true;
-        // Nearly all steps are of one regime and one length.
         const bool first = segments_++ == 0;
-        if (first && last_entry_ == &s.entry && last_key_ == r.key &&
-            std::fabs(length - last_length_) < 1e-9 * length) {
+        if (first && last_entry_ == &s.entry && last_key_ == r.key && length == last_length_) {
             derivative_ = last_;
             return true;
         }
@@ -111,6 +113,11 @@ class TorqueResponse final : public Observer<System> {
     }
 
  private:
+    // To 30 bits, which the rounding of instants does not reach.
+    static double rounded(double length) {
+        constexpr std::uint64_t least = std::uint64_t{1} << 23;
+        return std::bit_cast<double>((std::bit_cast<std::uint64_t>(length) + least / 2) & ~(least - 1));
+    }
     static Components flow(const Regime& r, const State& x, const typename D::Memory& m, const InputsOf<D>& u) {
         Components f{};
         for (int k = 0; k < D::states; ++k) f[k] = evaluate<D>(r.rate[k], x, m, u);
