@@ -6,6 +6,8 @@ import tomllib
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicHermiteSpline
+from scipy.special import ellipk
 
 import lostmotion as lm
 from conftest import ROOT
@@ -266,6 +268,30 @@ def test_cogging_of_a_linear_motor_has_its_pole_pitch():
     curve = motor.cogging().core()
     for x in np.linspace(-0.05, 0.05, 101):
         assert curve(x) == pytest.approx(8.0 * math.sin(2.0 * math.pi * x / 0.024), abs=8e-3)
+
+
+def test_cogging_swings_as_a_pendulum():
+    """m x'' = F sin(2 pi x/tau): the period of a pendulum, by the elliptic integral, from chords as fine as they are told, and from the sine."""
+    force, mass, tau, begin = 30.0, 4.0, 0.024, 0.3 * 0.024
+    omega = math.sqrt(force / mass * 2.0 * math.pi / tau)
+    period = 4.0 * ellipk(math.sin((math.pi - 2.0 * math.pi * begin / tau) / 2.0) ** 2) / omega
+    for solver, error, within in (("exact", None, 1e-3), ("exact", 3e-5, 1e-6), ("dormand-prince", None, 1e-8)):
+        motor = {"slide": "x", "rated_force": 100.0, "cogging_force": force, "cogging_error": error, "pole_pitch": tau}
+        swinging = lm.Scenario(
+            slides={"x": {"mass": mass}},
+            linear_motors={"coil": motor},
+            initial={"positions": {"x": begin}},
+            simulation={"duration": 20.0 * period, "sample_interval": period / 200.0},
+        )
+        options = {} if solver == "exact" else {"relative_tolerance": 1e-12}
+        result = lm.simulate(swinging, solver=solver, **options)
+        course = CubicHermiteSpline(result.time, result["x_position"] - 0.5 * tau, result["x_speed"])
+        crossings = course.roots(extrapolate=False)[::2]
+        # The cubics between samples err by (2 pi/200)^4/384 of the amplitude, alike in each period.
+        found = (crossings[-1] - crossings[0]) / (len(crossings) - 1)
+        assert found == pytest.approx(period, rel=within)
+    with pytest.raises(lm.InputError, match="cogging_error"):
+        lm.model.LinearMotor(slide="x", rated_force=1.0, cogging_error=0.1)
 
 
 def test_position_gain_in_metres_a_minute_to_a_millimetre():

@@ -14,8 +14,7 @@ namespace lostmotion::model {
 
 // amplitude * sin(order * phi + phase) that a curve stands for, if its amplitude is not 0.
 struct SineOfAngle {
-    double amplitude = 0.0;
-    int order = 1;
+    double amplitude = 0.0, order = 1.0;
     double phase = 0.0;
 };
 
@@ -31,7 +30,7 @@ class PeriodicCurve {
     }
 
     // amplitude * sin(n phi + phase), by chords that depart from it by at most `error` everywhere.
-    static PeriodicCurve sine(double amplitude, int n, double phase, double error) {
+    static PeriodicCurve sine(double amplitude, double n, double phase, double error) {
         // Nodes on a circle of radius c: off by c - 1 there and by 1 - c cos(h/2) between, both tan^2(h/4) if
         // c = 2/(1 + cos(h/2)).
         const double a = std::fabs(amplitude), share = std::min(error, a) / a;

@@ -93,7 +93,7 @@ void each_motor(Use&& use) {
 
 // amplitude * sin(order * phi + phase) over the angle phi of a shaft.
 struct HarmonicLaw {
-    double amplitude = 0.0, phase = 0.0, error = 0.0;
+    double amplitude = 0.0, phase = 0.0, error = 0.0, period = 0.0;  // period: in place of order
     int order = 1;
 
     template <class F>
@@ -112,10 +112,12 @@ struct HarmonicLaw {
     void describe(F& f) {
         describe_angle(f);
         describe_size(f, "", "");
+        f.number("period", period);
     }
     model::PeriodicCurve curve() const {
         const double usual = signals::usual_error * std::fabs(amplitude);
-        return model::PeriodicCurve::sine(amplitude, order, phase, error > 0.0 ? error : usual);
+        const double n = period > 0.0 ? 2.0 * std::numbers::pi / period : order;
+        return model::PeriodicCurve::sine(amplitude, n, phase, error > 0.0 ? error : usual);
     }
 };
 

@@ -68,7 +68,7 @@ void describe(F& f, PeriodicCurve& curve) {
     f.list("angles", angles, Range::not_negative);
     f.list("values", values);
     f.number("amplitude", sine.amplitude);
-    f.integer("order", sine.order, 1, 1000000);
+    f.number("order", sine.order, Range::positive);
     f.number("phase", sine.phase);
     if constexpr (F::reads) {
         if (!f.well()) return;

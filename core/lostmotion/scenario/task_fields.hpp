@@ -94,6 +94,10 @@ void each_linear_part(Use&& use) {
         f.number({"friction_force", "", "N", not_negative, has_default, "dry friction"});
         f.number(above_zero("cogging_force", "N", "amplitude, over the position with the period pole_pitch"));
         f.number(
+            above_zero("cogging_error", "N",
+                       "by which the straight lines depart from the sine of the cogging at most; left out, 0.1 % of "
+                       "cogging_force"));
+        f.number(
             above_zero("pole_pitch", "m", "tau, from a north pole to the next south pole: half a magnetic period"));
     });
     use("StiffnessCurve", [](auto& f) {

@@ -18,7 +18,7 @@ from scipy.signal import savgol_filter
 
 from ..control.turning import turns
 from ..errors import InputError
-from ..model.angle_torques import STANDARD_GRAVITY, AngleTorque, Gravity, TorqueHarmonic
+from ..model.angle_torques import STANDARD_GRAVITY, AngleTorque, Gravity, PositionHarmonic, TorqueHarmonic
 from ..model.losses import ConstantEfficiency, MeshEfficiency
 from ..model.motor import ShaftMotor
 from ..simulation.scenario import Scenario
@@ -123,12 +123,14 @@ def missing_torque(rig: Rig, s: Stretch, known: Mapping[str, Any], rung: int, sh
     return np.asarray(r[s.blocks].mean(axis=1))
 
 
-def _over_angle(t: Gravity | AngleTorque, angle: np.ndarray) -> np.ndarray:
+def _over_angle(t: Gravity | AngleTorque | PositionHarmonic, angle: np.ndarray) -> np.ndarray:
     """A torque over the angle; sines as such, since the number of their straight lines may depend on the parameters."""
     if isinstance(t, Gravity):
         return np.asarray(-t.mass * STANDARD_GRAVITY * t.radius * np.sin(angle + t.angle))
     if isinstance(t, TorqueHarmonic):
         return np.asarray(t.amplitude * np.sin(t.order * angle + t.phase))
+    if isinstance(t, PositionHarmonic):
+        return np.asarray(t.amplitude * np.sin(2.0 * np.pi / t.period * angle))
     curve = t.core()
     return np.array([curve(phi) for phi in angle.tolist()])
 

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 from .. import _core
 from ..inputs import described
 from ..inputs.breakpoints import check_apart
+from ..inputs.part import Part
 
 STANDARD_GRAVITY = 9.80665  # [m/s^2]
 
@@ -83,6 +84,18 @@ class TorqueCurve(PeriodicTorque, described.TorqueCurveFields, AngleCurve):
 
     shaft: str
     """on which it acts, in the direction of its angle"""
+
+
+class PositionHarmonic(PeriodicTorque, Part):
+    """A force on a slide ``amplitude * sin(2 pi x / period)`` over its position, by straight lines."""
+
+    shaft: str
+    amplitude: float
+    period: float
+    error: float | None = None
+
+    def core(self) -> _core.PeriodicCurve:
+        return _core.harmonic({key: getattr(self, key) for key in ("amplitude", "period", "error")})
 
 
 class ErrorHarmonic(described.ErrorHarmonicFields, Harmonic):

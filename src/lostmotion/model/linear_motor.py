@@ -6,11 +6,8 @@ from typing import Self
 from pydantic import model_validator
 
 from ..inputs import described
-from ..reproducible import sin
-from .angle_torques import TorqueCurve
+from .angle_torques import PositionHarmonic
 from .motor import ShaftMotor
-
-COGGING_POINTS = 72  # in a period: chords that depart from the sine by less than 0.1 % of its amplitude
 
 
 class LinearMotorData(described.LinearMotorDataFields):
@@ -40,6 +37,8 @@ class LinearMotorData(described.LinearMotorDataFields):
             )
         if (self.cogging_force is None) != (self.pole_pitch is None):
             raise ValueError("has one of cogging_force and pole_pitch; the cogging needs both")
+        if self.cogging_error is not None and self.cogging_force is None:
+            raise ValueError("has a cogging_error without cogging_force; add it, or leave the error out")
         return self
 
     def forces(self) -> tuple[float, float]:
@@ -79,14 +78,10 @@ class LinearMotor(LinearMotorData):
             torque_limit=None if math.isinf(peak) else peak,
         )
 
-    def cogging(self) -> TorqueCurve | None:
+    def cogging(self) -> PositionHarmonic | None:
         """Its cogging as a force over the position; None without."""
         if self.cogging_force is None or self.pole_pitch is None:
             return None
-        share = [k / COGGING_POINTS for k in range(COGGING_POINTS)]
-        return TorqueCurve(
-            shaft=self.slide,
-            period=self.pole_pitch,
-            angles=tuple(self.pole_pitch * x for x in share),
-            torques=tuple(self.cogging_force * sin(2.0 * math.pi * x) for x in share),
+        return PositionHarmonic(
+            shaft=self.slide, amplitude=self.cogging_force, period=self.pole_pitch, error=self.cogging_error
         )

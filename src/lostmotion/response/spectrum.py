@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Number, Time
 from ..inputs.validation import did_you_mean, shown
-from ..model.angle_torques import AngleCurve, Harmonic
+from ..model.angle_torques import AngleCurve, Harmonic, PositionHarmonic
 from ..model.train import DriveTrain
 from ..simulation.run import run
 from ..simulation.scenario import Scenario
@@ -420,8 +420,8 @@ def _order(law: Any) -> tuple[float, bool]:
     """Periods per turn, and whether there are multiples of it."""
     if isinstance(law, Harmonic):
         return float(law.order), False
-    assert isinstance(law, AngleCurve)
-    return 2.0 * math.pi / law.period, True
+    assert isinstance(law, AngleCurve | PositionHarmonic)
+    return 2.0 * math.pi / law.period, isinstance(law, AngleCurve)
 
 
 def _practical(value: float, unit: str) -> str:
