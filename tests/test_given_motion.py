@@ -459,6 +459,50 @@ def test_what_needs_a_train_that_torques_move_says_so(use: Any) -> None:
     assert "key shafts.crank.speed gives the motion of a shaft" in str(caught.value)
 
 
+def test_a_given_angle_begins_at_zero_or_where_it_is_told() -> None:
+    """Also with a twist behind it: angles over which a mesh error or a torque acts are not shifted."""
+    tables: dict[str, Any] = {
+        "shafts": {"a": {"inertia": 1.0, "speed": {"mean": 2.0}}, "b": {"inertia": 0.1}},
+        "gears": {"g": {"input": "a", "output": "b", "ratio": 3, "stiffness": {"kind": "linear", "stiffness": 1e3}}},
+        "initial": {"twists": {"g": 0.01}, "speeds": {"b": 2.0 / 3.0}},
+    }
+    for angles, first in (({}, 0.0), ({"a": 0.5}, 0.5), ({"b": 0.2}, 3.0 * (0.2 + 0.01))):
+        r = lm.simulate(scenario(**tables | {"initial": {**tables["initial"], "angles": angles}}))
+        assert np.allclose(r.a_angle, first + 2.0 * r.time, rtol=1e-13, atol=1e-13)
+        assert float(r.b_angle[0]) == pytest.approx(first / 3.0 - 0.01, rel=1e-13)
+    tables["gears"]["g"]["transmission_error"] = {"kind": "sine", "order": 1, "amplitude": 1e-3, "phase": 1.0}
+    tables["initial"] = {"speeds": {"b": 2.0 / 3.0}, "twists": {"g": 0.01}}
+    r = lm.simulate(scenario(**tables))
+    assert np.allclose(r.a_angle, 2.0 * r.time, rtol=1e-13, atol=1e-13)
+
+
+@pytest.mark.parametrize("ratio", [4.0, 0.5])
+def test_a_given_shaft_needs_no_inertia_behind_backlash(ratio: float) -> None:
+    """Its speed follows from no balance: all others move as with any inertia of it, and its torque is what the mesh takes."""
+    tables: dict[str, Any] = {
+        "shafts": {
+            "p": {"speed": {"amplitude": 5.0, "frequency": 1.3}},
+            "x": {"inertia": 15.0, "friction_torque": 1.0},
+        },
+        "gears": {
+            "g": {
+                "input": "p",
+                "output": "x",
+                "ratio": ratio,
+                "stiffness": {"kind": "curve", "slopes": [1e4], "backlash": 1e-3},
+                "mesh_damping": 30.0,
+            }
+        },
+    }
+    alone = lm.simulate(scenario(**tables))
+    heavy = lm.simulate(
+        scenario(**tables | {"shafts": {**tables["shafts"], "p": {**tables["shafts"]["p"], "inertia": 2.0}}})
+    )
+    for name in ("x_speed", "x_angle", "g_twist", "p_speed"):
+        assert np.allclose(alone[name], heavy[name], rtol=1e-10, atol=1e-12)
+    assert np.allclose(alone.p_drive_torque, alone.g_output_torque / ratio, rtol=1e-12, atol=1e-12)
+
+
 def test_a_wave_of_speed_is_continuous() -> None:
     assert SpeedSignal(mean=2.0, amplitude=1.0, frequency=1.0, phase=0.5).at_start() == pytest.approx(
         2.0 + math.sin(0.5)

@@ -196,8 +196,25 @@ class DriveTrain(TrainElements):
         names = {table: ", ".join(getattr(self, table)) for table in ("shafts", *TrainElements.model_fields)}
         return f"DriveTrain({'; '.join(f'{table} {listed}' for table, listed in names.items() if listed)})"
 
+    @classmethod
+    def of_tables(cls, **parts: Any) -> Self:
+        """The train of parts that are not checked again. Whether it moves is left to a check that knows given motions.
+
+        Raises
+        ------
+        InputError
+        """
+        made = cls.model_construct(None, **parts)
+        made._names_what_it_has()
+        return made
+
     @model_validator(mode="after")
     def _hangs_together(self) -> Self:
+        self._names_what_it_has()
+        self.check(self.core(self.shafts))
+        return self
+
+    def _names_what_it_has(self) -> None:
         known = f"the shafts are {', '.join(self.shafts)}"
         unknown = [
             (f"{shown(shaft)} is no shaft; {did_you_mean(shaft, self.shafts, known)}", key)
@@ -210,8 +227,6 @@ class DriveTrain(TrainElements):
             raise InputError(
                 "have the same name; rename one of them", f"gravity.{twice[0]}", f"angle_torques.{twice[0]}"
             )
-        self.check(self.core(self.shafts))
-        return self
 
     def core(
         self, loaded: Collection[str], driven: Mapping[str, MotorLaw | None] = {}, given: Collection[str] = ()

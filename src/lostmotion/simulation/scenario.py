@@ -430,8 +430,9 @@ class Scenario:
         """
         train = self.named_train()
         state = self.begin() if initial is None else initial.of_train()
-        values = start_values(train, state, self.core())
-        angles = angles_at_start(train, state.of_all("angles"), state.of_all("twists"))
+        driven = self.tables.given()
+        values = start_values(train, state, self.core(), driven)
+        angles = angles_at_start(train, state.of_all("angles"), state.of_all("twists"), driven)
         known = []
         for name, controller in self.continuous().items():
             shaft = self.tables.controlled(name)

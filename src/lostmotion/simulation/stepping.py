@@ -216,7 +216,7 @@ class Simulation(SimulationAnswers):
         if self._scenario is not None:
             self._core.reset(self._scenario.start(start), self._scenario.capacities(start))
         else:
-            values = start_values(self._train, start, self._core_train)
+            values = start_values(self._train, start, self._core_train, self._given)
             self._core.reset(values, dict(start.hysteresis_capacities))
         self._begin_motions(start)
         self._initial = start

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from .. import _core
@@ -20,13 +20,17 @@ if TYPE_CHECKING:
 ROUNDING = 1e-12  # relative, between values that belong together
 
 
-def start_values(train: DriveTrain, initial: TrainInitial, core: _core.Train | None = None) -> dict[str, float]:
+def start_values(
+    train: DriveTrain, initial: TrainInitial, core: _core.Train | None = None, driven: Collection[str] = ()
+) -> dict[str, float]:
     """Values at t = 0 by the name of their result variable; what is not among them is 0.
 
     Parameters
     ----------
     core
         The solver's train, if there is one already.
+    driven
+        Names of the shafts whose motion is given.
 
     Raises
     ------
@@ -49,7 +53,9 @@ def start_values(train: DriveTrain, initial: TrainInitial, core: _core.Train | N
         raise InputError(problem, "initial.speeds")
     _check_flanks(train, speeds, twists)
     values = {f"{name}_speed": v for name, v in speeds.items()}
-    values |= {train.angle_of(s): v for s, v in angles_at_start(train, initial.of_all("angles"), twists).items()}
+    values |= {
+        train.angle_of(s): v for s, v in angles_at_start(train, initial.of_all("angles"), twists, driven).items()
+    }
     values |= {train.twist_of(name): v for name, v in twists.items()}
     values |= {train.motor_torque_of(name): v for name, v in initial.motor_torques.items()}
     return values
@@ -79,8 +85,15 @@ def _check(key: str, given: Iterable[str], known: Iterable[str], what: str) -> N
             raise InputError(f"is no {what} of this train; {meant}", f"initial.{key}.{name}")
 
 
-def angles_at_start(train: DriveTrain, given: Mapping[str, float], twists: Mapping[str, float]) -> dict[str, float]:
+def angles_at_start(
+    train: DriveTrain, given: Mapping[str, float], twists: Mapping[str, float], driven: Collection[str] = ()
+) -> dict[str, float]:
     """The angles of all shafts [rad], from those that are given through the gears to the others.
+
+    Parameters
+    ----------
+    driven
+        Names of the shafts whose motion is given, which are at 0 before others are.
 
     Raises
     ------
@@ -89,7 +102,8 @@ def angles_at_start(train: DriveTrain, given: Mapping[str, float], twists: Mappi
     """
     angles, origin = dict(given), {shaft: shaft for shaft in given}
     waiting = list(given)
-    unreached = list(train.shafts)  # where none is given, the last shaft of a chain is at 0
+    # Where none is given, a shaft of given motion is at 0, or else the last shaft of a chain.
+    unreached = [*(s for s in train.shafts if s not in driven), *(s for s in reversed(train.shafts) if s in driven)]
     while waiting or unreached:
         if not waiting:
             start = unreached.pop()

@@ -97,7 +97,7 @@ class TrainTables(ScenarioTables, LinearElements):
 
     @kept
     def train(self) -> DriveTrain:
-        return DriveTrain.of_parts(shafts=Named(self.plain_shafts()), **self.elements())
+        return DriveTrain.of_tables(shafts=Named(self.plain_shafts()), **self.elements())
 
     def named_train(self) -> DriveTrain:
         return self.train()
