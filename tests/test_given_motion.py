@@ -561,3 +561,23 @@ def test_a_train_alone_takes_the_given_shafts_by_name() -> None:
     assert simulation["load_speed"] == 2.0
     with pytest.raises(lm.InputError, match='given: "cranc" is no shaft of this train'):
         lm.Simulation(train, given=["cranc"])
+
+
+@pytest.mark.parametrize("inertia", [1e10, 1e12, 1e15])
+def test_a_freewheel_on_a_great_inertia_is_one_on_a_given_motion(inertia: float) -> None:
+    """The limit of a shaft that nothing slows down: it overtakes, takes along and lets go at the instants of a given speed."""
+    tables: dict[str, Any] = {
+        "shafts": {
+            "a": {"inertia": inertia, "torque": {"amplitude": 0.5 * inertia, "frequency": 0.5}},
+            "b": {"inertia": 1.0, "friction_torque": 0.2, "torque": {"amplitude": 1.0, "frequency": 1.3}},
+        },
+        "freewheels": {"f": {"input": "a", "output": "b"}},
+        "gears": {},
+        "simulation": {"duration": 5.0, "sample_interval": 0.01},
+    }
+    heavy = lm.simulate(scenario(**tables))
+    # a' = -0.5 sin(pi t)
+    speed = {"mean": -0.5 / math.pi, "amplitude": 0.5 / math.pi, "frequency": 0.5, "phase": 0.5 * math.pi}
+    given = lm.simulate(scenario(**tables | {"shafts": {**tables["shafts"], "a": {"speed": speed}}}))
+    assert int(heavy.attrs["switching_count"]) == int(given.attrs["switching_count"]) > 10
+    assert np.allclose(heavy.b_speed, given.b_speed, rtol=0.0, atol=10.0 / inertia + 1e-11)

@@ -197,13 +197,15 @@ bool Statics::solve_balances(const std::vector<int>& of, Forms forms) {
     const int all = static_cast<int>(shafts());
     const Ties heavy = places_.ties(key_.modes.data(), inertia_.data());
     const auto is_free = [&](int s) { return (heavy.free[s] >> s & 1) != 0; };
+    // Accelerations first, each from the balance of a heavy shaft: what reactions are then is the share of the light
+    // shafts, and no difference of two torques on the heavy one.
     std::vector<int> unknowns;
+    for (int s = 0; s < all; ++s)
+        if (is_free(s) && !places_.moves_no_inertia(s, heavy)) unknowns.push_back(max_columns + s);
+    const std::size_t accelerations = unknowns.size();
     for (const int c : of) unknowns.push_back(unknown(c));
     for (const int s : places_.massless)
         if (is_free(s) && places_.moves_no_inertia(s, heavy)) unknowns.push_back(places_.shafts[s].speed);
-    const std::size_t in_forms = unknowns.size();
-    for (int s = 0; s < all; ++s)
-        if (is_free(s) && !places_.moves_no_inertia(s, heavy)) unknowns.push_back(max_columns + s);
     if (unknowns.size() != shafts()) return false;
     for (Row& f : motion_) follow(f, heavy);
     std::vector<Balance> rows(shafts());
@@ -222,7 +224,8 @@ bool Statics::solve_balances(const std::vector<int>& of, Forms forms) {
     if (!eliminate(rows, unknowns, rows.size(), take)) return false;
     const auto put = [&](Row& f) {
         follow(f, heavy);
-        substitute(f, rows, unknowns, in_forms, take);
+        substitute(f, std::span(rows).subspan(accelerations), std::span(unknowns).subspan(accelerations),
+                   unknowns.size() - accelerations, take);
     };
     for (const std::span<Row> some : forms)
         for (Row& f : some) put(f);
