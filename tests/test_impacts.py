@@ -398,6 +398,8 @@ def test_functions_without_impacts_say_so() -> None:
     scenario = pair(0.5)
     for call in (
         lambda: lm.linearize(scenario),
+        lambda: lm.linearize(scenario.train(), lm.TrainInitial()),
+        lambda: lm.linearize(lm.Simulation(scenario.train())),
         lambda: lm.simulate(scenario, sensitivities=["shafts.a.inertia"]),
         lambda: lm.check_drive(scenario),
     ):

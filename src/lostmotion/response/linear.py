@@ -20,7 +20,7 @@ from ..model.torsion import Rigid
 from ..model.train import DriveTrain
 from ..simulation.core_runs import core_case
 from ..simulation.drive_tables import Initial
-from ..simulation.needs import need_free_motion, need_open_loop
+from ..simulation.needs import need_free_motion, need_no_impacts, need_open_loop
 from ..simulation.scenario import Scenario, drive_of
 from ..simulation.stepping import Simulation
 from ..simulation.train_parts import NO_CONTACT
@@ -246,6 +246,8 @@ def _ramp(value: float, rate: float) -> _core.Signal:
 def _model_now(simulation: Simulation) -> LinearModel:
     if simulation._scenario is not None:
         need_free_motion(simulation._scenario, "linearize")
+    else:
+        need_no_impacts(simulation._train, "linearize")
     with simulation._turn:
         regime = simulation._idle().linearize()
     return _model(simulation._train, simulation._core_train, regime)
@@ -269,6 +271,7 @@ def _model_of_train(
 ) -> LinearModel:
     train, loaded = loaded_train(what)
     if isinstance(what, DriveTrain):
+        need_no_impacts(what, "linearize")
         core = train.core(loaded)
     else:
         need_free_motion(what, "linearize")

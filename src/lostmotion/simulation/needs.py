@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ..errors import InputError
 from ..model.torsion import Rigid
+from ..model.train import DriveTrain
 from .scenario import Scenario
 
 
@@ -24,14 +25,18 @@ def need_open_loop(scenario: Scenario, function: str) -> None:
         )
 
 
-def need_no_impacts(scenario: Scenario, function: str) -> None:
+def need_no_impacts(scenario: Scenario | DriveTrain, function: str) -> None:
     """Refuses a train with rigid flanks that strike, for what takes motions without impacts.
 
     Raises
     ------
     InputError
     """
-    for key, gear in scenario.gears_by_key().items():
+    if isinstance(scenario, Scenario):
+        gears = scenario.gears_by_key()
+    else:
+        gears = {f"gears.{name}": gear for name, gear in scenario.gears.items()}
+    for key, gear in gears.items():
         if isinstance(gear.stiffness, Rigid) and gear.stiffness.strikes:
             raise InputError(
                 f"{function}: {key}.stiffness has rigid flanks with backlash, and this takes no impacts; give a stiffness to the "
