@@ -97,9 +97,11 @@ Found SwitchedTrain<Sizes>::start(Cache& cache, Now& now, Key& key) const {
         double speed = 0.0, size = 0.0;
         p.each_shaft([&](int s, double per) {
             speed += per * now.x[places().shafts[s].speed];
-            size += std::fabs(per * now.x[places().shafts[s].speed]);
+            size += std::fabs(per) *
+                    std::fmax(std::fabs(now.x[places().shafts[s].speed]), rated_speed(train(), static_cast<int>(s)));
         });
-        // Speeds that differ by rounding are the same: a state that a run has ended with may be that of the next.
+        // Speeds that differ by rounding are the same: a state that a run has ended with may be that of the next. A
+        // speed that has passed through zero there has the rounding of what it was before.
         const bool same = std::fabs(speed) <= few_roundings * size;
         if (p.one_way && p.flanks == nowhere && speed > 0.0 && !same) return Found::inconsistent;
         key.modes[c] = p.one_way || speed < 0.0 ? -1 : +1;
