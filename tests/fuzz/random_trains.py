@@ -1,4 +1,4 @@
-"""Random trains: shafts joined by gears, clutches, freewheels and dampers, with brakes, springs and motors."""
+"""Random trains of all elements: what joins shafts, what acts on them, laws over the angle, given motions, mass matrices."""
 
 from __future__ import annotations
 
@@ -50,9 +50,35 @@ def train(random: Random) -> dict[str, Any]:
     if random.random() < 0.3:
         stiffness = {"kind": "linear", "stiffness": spread(random, 1.0, 1e4)}
         made["springs"] = {"k": {"shaft": random.choice(names), "stiffness": stiffness}}
+    if random.random() < 0.3:
+        made["gravity"] = {"g": {"shaft": random.choice(names), "mass": spread(random, 0.01, 10.0), "radius": 0.1}}
+    if random.random() < 0.3:
+        made["angle_torques"] = {"c": {"shaft": random.choice(names), **harmonic(random, spread(random, 1e-3, 1.0))}}
+    if random.random() < 0.15:
+        driven = random.choice(names)
+        made["shafts"][driven]["speed"] = signal(random, spread(random, 0.1, 100.0))
+    if count > 2 and random.random() < 0.15:
+        coupled = random.sample(names, 2)
+        made["mass_matrices"] = {"j": {"shafts": coupled, "matrix": matrix(random, coupled, made["shafts"])}}
     duration = spread(random, 0.02, 1.0)
     made["simulation"] = {"duration": duration, "sample_interval": duration / 100.0}
     return made
+
+
+def harmonic(random: Random, amplitude: float) -> dict[str, Any]:
+    return {
+        "kind": "sine",
+        "amplitude": amplitude,
+        "order": random.choice((1, 2, 7)),
+        "phase": random.uniform(-3.0, 3.0),
+    }
+
+
+def matrix(random: Random, coupled: list[str], shafts: dict[str, Any]) -> list[list[float]]:
+    """Of inertias that the shafts then have no more of their own."""
+    one, other = (shafts[name].pop("inertia") for name in coupled)
+    beside = random.uniform(-0.9, 0.9) * (one * other) ** 0.5
+    return [[one, beside], [beside, other]]
 
 
 def shaft(random: Random, low: float, high: float) -> dict[str, Any]:
@@ -63,6 +89,9 @@ def shaft(random: Random, low: float, high: float) -> dict[str, Any]:
             made["breakaway_torque"] = 1.5 * made["friction_torque"]
     if random.random() < 0.4:
         made["viscous_friction"] = spread(random, 1e-4, 1.0)
+    if "friction_torque" not in made and random.random() < 0.3:
+        speeds = [0.0, *sorted(spread(random, 0.1, 300.0) for _ in range(3))]
+        made["friction_curve"] = {"speeds": speeds, "torques": [spread(random, 1e-3, 1.0) for _ in speeds]}
     if random.random() < 0.4:
         made["torque"] = signal(random, spread(random, 0.1, 10.0))
     return made
@@ -103,9 +132,17 @@ def gear(random: Random) -> dict[str, Any]:
             made["stiffness"] = {"kind": "curve", "backlash": spread(random, 1e-4, 1e-2), "slopes": [stiff]}
             if random.random() < 0.4:
                 made["hysteresis"] = {"efficiency": random.uniform(0.5, 1.0)}
-    if "stiffness" in made and random.random() < 0.4:
+            elif random.random() < 0.3:
+                made["transmission_error"] = harmonic(random, spread(random, 1e-5, 1e-3))
+            elif random.random() < 0.2:
+                fewer = {"contact_ratio": random.uniform(1.1, 1.9), "fewer_pairs": random.uniform(0.5, 0.95)}
+                made["mesh_stiffness"] = {"teeth": random.choice((1, 9, 30)), **fewer}
+        case 3 if random.random() < 0.3:
+            backlash, restitution = spread(random, 1e-4, 1e-2), random.choice((0.0, 0.4, 0.8, 1.0))
+            return made | {"stiffness": {"kind": "rigid", "backlash": backlash, "restitution": restitution}}
+    if "stiffness" in made and "hysteresis" not in made and random.random() < 0.4:
         made["mesh_damping"] = spread(random, 1e-2, 1e2)
-        made["damping_limited"] = random.random() < 0.3
+        made["damping_limited"] = "backlash" in made["stiffness"] and random.random() < 0.3
     match random.randrange(3):
         case 0:
             forward, backward = random.uniform(0.5, 1.0), random.uniform(-0.3, 0.95)
