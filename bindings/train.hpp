@@ -342,11 +342,20 @@ inline Record run_batch(const std::vector<const Case*>& cases, const std::vector
     return out;
 }
 
-// A reduction of each row.
-inline Array reduce_rows(int how, const Values& values) {
+// The instants of a record.
+inline Array sample_times(double duration, double interval) {
+    const SampleTimes times(interval, sample_count(duration, interval), duration);
+    auto data = std::make_unique_for_overwrite<double[]>(times.count);
+    for (std::size_t k = 0; k < times.count; ++k) data[k] = times[k];
+    return as_array(std::move(data), {times.count});
+}
+
+// A reduction of each row; last: the share of an interval that its last value stands for.
+inline Array reduce_rows(int how, const Values& values, double last) {
     const std::size_t rows = values.shape(0), n = values.shape(1);
     auto data = std::make_unique_for_overwrite<double[]>(rows);
-    for (std::size_t k = 0; k < rows; ++k) data[k] = reduce(static_cast<Reduction>(how), values.data() + k * n, n);
+    for (std::size_t k = 0; k < rows; ++k)
+        data[k] = reduce(static_cast<Reduction>(how), values.data() + k * n, n, last);
     return as_array(std::move(data), {rows});
 }
 
@@ -434,7 +443,9 @@ inline void bind_train(nb::module_& m) {
           "channels"_a, "pause"_a, "enough"_a);
     m.def("run_batch", &run_batch, "cases"_a, nb::kw_only(), "fields"_a, "values"_a, "duration"_a, "sample_interval"_a,
           "samples"_a, "energies"_a, "channels"_a, "kept"_a, "threads"_a, "progress"_a = nb::none());
-    m.def("reduce_rows", &reduce_rows, "how"_a, "values"_a);
+    m.def("reduce_rows", &reduce_rows, "how"_a, "values"_a, "last"_a = 1.0);
+    m.def("sample_count", &sample_count, "duration"_a, "interval"_a);
+    m.def("sample_times", &sample_times, "duration"_a, "interval"_a);
 }
 
 }  // namespace lostmotion::binding

@@ -210,3 +210,18 @@ def test_what_cannot_be_used_is_said_in_one_line(given: dict[str, Any], said: st
 def test_a_sampled_controller_is_refused() -> None:
     with pytest.raises(lm.InputError, match="controller"):
         lm.sizing.warm_up(lm.load("position-axis"), update="10 ms")
+
+
+def test_temperatures_reach_an_end_that_is_no_multiple_of_the_interval() -> None:
+    """As with an interval that the duration is a multiple of: heat over the same intervals of frozen temperatures."""
+    part, whole = (
+        lm.sizing.warm_up(
+            scenario(command={"motor": 0.1}, simulation={"duration": 15.99, "sample_interval": h}),
+            update=0.4,
+            lubricant=OIL,
+        )
+        for h in (0.02, 0.01)
+    )
+    assert part.time.values[-2:].tolist() == [15.98, 15.99]
+    for body in ("winding_temperature", "housing_temperature"):
+        assert float(part[body][-1]) == pytest.approx(float(whole[body][-1]), abs=1e-5)

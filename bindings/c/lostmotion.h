@@ -115,7 +115,8 @@ LM_API size_t lm_result_switchings(const lm_result* result); /* how many are kep
 LM_API size_t lm_result_switching_count(const lm_result* result);
 
 typedef enum {
-    LM_SAMPLES,   /* of the variables: one variable after the other, lm_result_samples() values each, from t = 0 on */
+    LM_SAMPLES,   /* of the variables: one variable after the other, lm_result_samples() values each, at the
+                   multiples of the interval from t = 0 on and, where it is none of them, at the end */
     LM_ENERGIES,  /* [J], one value each */
     LM_END_STATE, /* one value each */
     LM_SWITCHINGS /* one switching after the other, with these columns: instant [s], number of the cause, contacts */
@@ -357,7 +358,8 @@ LM_API int lm_accept(lm_simulation* simulation);
 /* --- a train in one go --- */
 
 /* Runs to `duration` from these states and capacities. inputs: one signal each. variables: at k * interval for
- * k < samples, one variable after the other. The simulation itself is then at t = 0, at these states. */
+ * k < samples, the last of them no later than at `duration`, one variable after the other. The simulation itself is
+ * then at t = 0, at these states. */
 LM_API int lm_run(lm_simulation* simulation, const lm_signal* inputs, const double* states, const double* capacities,
                   double duration, double interval, size_t samples, double* variables);
 

@@ -84,7 +84,7 @@ int lm_run(lm_simulation* simulation, const lm_signal* inputs, const double* sta
     if (!(std::isfinite(duration) && duration > 0.0 && std::isfinite(interval) && interval > 0.0))
         return simulation->failed("duration and interval must be > 0 and finite");
     if (samples > 0 && variables == nullptr) return simulation->failed("there is no place for the samples");
-    if (static_cast<double>(samples) > 1.0 + duration / interval * (1.0 + 1e-12))
+    if (!(static_cast<double>(samples) <= 2.0 + duration / interval) || samples > lm::sample_count(duration, interval))
         return simulation->failed("there are more samples than intervals in the duration");
     std::vector<lm::Signal> signals(names.size());
     for (std::size_t i = 0; i < names.size(); ++i)

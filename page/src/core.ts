@@ -71,7 +71,7 @@ export class Core {
       if (result === 0) throw this.error("lm_scenario_error", scenario);
       try {
         if (this.call("lm_result_status", result) !== 0) throw this.error("lm_result_error", result);
-        return this.taken_out(result, input.interval, begun);
+        return this.taken_out(result, input, begun);
       } finally {
         this.call("lm_result_free", result);
       }
@@ -149,14 +149,16 @@ export class Core {
     must(this.call("lm_scenario_set_times", scenario, input.duration, input.interval));
   }
 
-  private taken_out(result: number, interval: number, begun: number): Run {
+  private taken_out(result: number, { interval, duration }: CoreInput, begun: number): Run {
     const samples = this.call("lm_result_samples", result);
     const names = this.names(result, SAMPLES);
     const all = this.numbers(this.call("lm_result_values", result, SAMPLES), names.length * samples).slice();
     const energies = this.names(result, ENERGIES);
     const joules = this.numbers(this.call("lm_result_values", result, ENERGIES), energies.length);
     return {
-      time: Float64Array.from({ length: samples }, (_, k) => k * interval),
+      time: Float64Array.from({ length: samples }, (_, k) =>
+        k * interval > duration * (1 + 1e-12) ? duration : k * interval,
+      ),
       values: new Map(names.map((name, k) => [name, all.subarray(k * samples, (k + 1) * samples)])),
       units: new Map(names.map((name, k) => [name, this.text(this.call("lm_result_unit", result, k))])),
       energies: new Map(energies.map((name, k) => [name, joules[k]!])),

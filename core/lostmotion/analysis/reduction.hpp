@@ -56,8 +56,9 @@ double best_of(const double* v, std::size_t n, Better&& better, Seen&& seen) {
     return best;
 }
 
-// NaN without samples; undefined if one of them is NaN.
-double reduce(Reduction r, const double* v, std::size_t n);
+// last: the share of an interval that the last sample is behind the one before, which is its weight in a mean. NaN
+// without samples; undefined if one of them is NaN.
+double reduce(Reduction r, const double* v, std::size_t n, double last = 1.0);
 
 // One number to keep of each run: a reduction of the samples of a channel, by its place among those of the run.
 struct Kept {
@@ -66,8 +67,8 @@ struct Kept {
 };
 
 // samples: channels x n.
-inline void reduce_all(std::span<const Kept> kept, const double* samples, std::size_t n, double* out) {
-    for (std::size_t k = 0; k < kept.size(); ++k) out[k] = reduce(kept[k].how, samples + kept[k].channel * n, n);
+inline void reduce_all(std::span<const Kept> kept, const double* samples, std::size_t n, double last, double* out) {
+    for (std::size_t k = 0; k < kept.size(); ++k) out[k] = reduce(kept[k].how, samples + kept[k].channel * n, n, last);
 }
 
 }  // namespace lostmotion

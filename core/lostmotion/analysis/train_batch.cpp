@@ -73,7 +73,7 @@ TrainRow run_case(const TrainCase& one, const TrainBatch& batch, TrainOptions op
         std::ranges::fill(numbers, nan);
         return row;
     }
-    reduce_all(batch.kept, samples, options.samples, out);
+    reduce_all(batch.kept, samples, options.samples, options.times().last_share(), out);
     row.switchings = static_cast<double>(report.switching_count);
     if (batch.energies.empty()) return row;
     const NamedInOrder ledger = named_ledger(report, run.assembly());

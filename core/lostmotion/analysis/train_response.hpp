@@ -57,7 +57,7 @@ class TrainPlant {
     const PowerChannels& powers() const { return powers_; }
     SamplerOf<System, TrainReader<D>, Model> sampler(Workspace&, double interval, std::size_t count,
                                                      double* out) const {
-        return {model_, 0.0, interval, count, out, numbers_};
+        return {model_, {interval, count}, out, numbers_};
     }
     bool spoiled(const Workspace& w) const { return w.system.overflowed(); }
     std::vector<NamedComponent> components() const { return train_components<D>(model_.assembly); }

@@ -27,7 +27,7 @@ struct Scenario {
     std::string prefix(const ControlledAxis& axis) const {
         return train.short_form ? "" : train.motors[static_cast<std::size_t>(axis.motor)].name + "_";
     }
-    std::size_t samples() const { return static_cast<std::size_t>(duration / sample_interval * (1.0 + 1e-12)) + 1; }
+    std::size_t samples() const { return sample_count(duration, sample_interval); }
 };
 
 inline constexpr double max_samples = 1e8;

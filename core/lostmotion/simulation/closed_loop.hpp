@@ -9,6 +9,7 @@
 
 #include "../solver/components.hpp"
 #include "../solver/exact_solver.hpp"
+#include "sample_times.hpp"
 #include "winding_coupling.hpp"
 
 namespace lostmotion {
@@ -74,21 +75,20 @@ inline std::array<double, control::n_winding_signals> winding_signals_of(const c
 // The signals of the axes at the instants of a record: out[(axis * signals + signal) * count + k] at k * interval.
 class ControlRecord {
  public:
-    ControlRecord(double interval, std::size_t count, int signals, double* out)
-        : interval_(interval), count_(count), signals_(signals), out_(out) {}
+    ControlRecord(const SampleTimes& times, int signals, double* out) : times_(times), signals_(signals), out_(out) {}
 
     // What holds before time `end`.
     template <class D>
     void hold_until(double end, const ClosedLoop<D>& loop, const ControlCourse& course) {
-        for (; next_ < count_ && static_cast<double>(next_) * interval_ < end; ++next_) {
+        for (; next_ < times_.count && times_[next_] < end; ++next_) {
             const double* slot = course.slots.data();
             double* to = out_ + next_;
             for (const control::Axis& a : loop.axes) {
-                for (int s = 0; s < control::n_axis_signals; ++s, to += count_) *to = a.signal(s, slot);
+                for (int s = 0; s < control::n_axis_signals; ++s, to += times_.count) *to = a.signal(s, slot);
                 if (signals_ > control::n_axis_signals)
-                    for (const double v : winding_signals_of(a, static_cast<double>(next_) * interval_, slot)) {
+                    for (const double v : winding_signals_of(a, times_[next_], slot)) {
                         *to = v;
-                        to += count_;
+                        to += times_.count;
                     }
                 slot += a.slots();
             }
@@ -96,8 +96,7 @@ class ControlRecord {
     }
 
  private:
-    double interval_;
-    std::size_t count_;
+    SampleTimes times_;
     int signals_;
     double* out_;
     std::size_t next_ = 0;
@@ -284,7 +283,7 @@ class ClosedLoopRun {
 struct RunRequest {
     double duration = 1.0;          // [s]
     double sample_interval = 1e-3;  // [s]
-    std::size_t samples = 0;        // instants k * sample_interval to record, from k = 0
+    std::size_t samples = 0;        // instants to record: k * sample_interval, from k = 0, and no later than the end
     bool energy = true;
     std::size_t max_switchings = 100000;  // kept; all are counted
     bool (*interrupted)(void*) = nullptr;
@@ -294,6 +293,8 @@ struct RunRequest {
     // Of a run under controllers, the sample at which the observer may end it; 0: none. Up to there the run is the one
     // that ends there, and it goes on as if there was no pause.
     std::size_t pause = 0;
+
+    SampleTimes times() const { return {sample_interval, samples, duration}; }
 };
 
 // From a start to the end of the run, open loop or under the controllers of the request. make_loop(laws): these in the
@@ -310,8 +311,8 @@ Status run_recorded(Solver& solver, const StartOf<typename Solver::D>& start, co
     auto loop = make_loop(laws);
     loop.ticks.sample_interval = request.sample_interval;
     ClosedLoopRun<Solver> run(solver, loop);
-    ControlRecord record(request.sample_interval, request.control_out == nullptr ? 0 : request.samples,
-                         request.control.signals(), request.control_out);
+    ControlRecord record(request.control_out == nullptr ? SampleTimes() : request.times(), request.control.signals(),
+                         request.control_out);
     const Status begun = run.begin(start.x, start.memory, observer);
     if (begun != Status::done) return begun;
     if (request.pause > 0) {

@@ -15,8 +15,7 @@
 
 namespace lostmotion {
 
-// Writes `count` samples at begin + k * interval, or at the instants of a list, channel by channel:
-// out[c * count + k] is that of channels[c].
+// Writes samples at some instants, channel by channel: out[c * count + k] is that of channels[c].
 // Reader(model, regime, memory) reads them.
 template <class System, class Reader, class Model>
 class SamplerOf : public Observer<System> {
@@ -24,14 +23,8 @@ class SamplerOf : public Observer<System> {
     using D = typename System::Dims;
     using Instants = InstantsOf<D>;
 
-    SamplerOf(const Model& model, double begin, double interval, std::size_t count, double* out,
-              std::span<const int> channels)
-        : model_(model), begin_(begin), interval_(interval), count_(count), out_(out), channels_(channels) {}
-
     SamplerOf(const Model& model, const SampleTimes& times, double* out, std::span<const int> channels)
-        : SamplerOf(model, 0.0, times.interval, times.count, out, channels) {
-        listed_ = times.listed;
-    }
+        : model_(model), times_(times), out_(out), channels_(channels) {}
 
     Interruption interruption;
 
@@ -48,13 +41,13 @@ class SamplerOf : public Observer<System> {
             p.constant = s.constant;
             p.first = next_;
             p.end = next_ = end;
-            p.at_once = listed_.empty() && LongStep<D>::pays(s.entry.propagator, s.end - s.begin);
+            p.at_once = times_.listed.empty() && LongStep<D>::pays(s.entry.propagator, s.end - s.begin);
             if (p.at_once) {
                 p.cursor = s.at;
-                if (instant(p.first) > s.begin) p.cursor.leap_to(instant(p.first));
+                if (times_[p.first] > s.begin) p.cursor.leap_to(times_[p.first]);
                 p.rest = 0.0;
             } else {
-                p.rest = p.cursor.advance_by_levels(s.at, instant(p.first) - s.begin);
+                p.rest = p.cursor.advance_by_levels(s.at, times_[p.first] - s.begin);
             }
             p.cursor.keep(p.constant);
         }
@@ -88,19 +81,20 @@ class SamplerOf : public Observer<System> {
 
     [[gnu::noinline]] bool write(Piece& p) {
         auto& propagator = p.entry->propagator;
-        const int level = listed_.empty() ? propagator.level_of(interval_) : -1;
+        const int level = times_.listed.empty() ? propagator.level_of(times_.interval) : -1;
         if (level < 0 && p.at_once) return write_at_once(p);
         const Reader reader(model_, p.entry->regime, p.memory);
         for (std::size_t next = p.first;;) {
-            const int n =
+            int n =
                 static_cast<int>(std::min<std::size_t>(p.end - next, Instants::max_count - next % Instants::max_count));
+            if (n > 1 && times_.is_early(next + static_cast<std::size_t>(n) - 1)) --n;
             if (level >= 0) {
                 stride_.place(propagator, level, p.constant, p.cursor);
                 stride_.run(n, instants_);
             } else {
                 instants_.set(0, load(p.cursor.x()), p.cursor.input().values());
                 for (int k = 1; k < n; ++k) {
-                    p.cursor.advance(instant(next + k) - p.cursor.time());
+                    p.cursor.advance(times_[next + k] - p.cursor.time());
                     instants_.set(k, load(p.cursor.x()), p.cursor.input().values());
                 }
             }
@@ -109,8 +103,8 @@ class SamplerOf : public Observer<System> {
             next += static_cast<std::size_t>(n);
             if (next == p.end) return true;
             if (interruption()) return false;
-            if (level >= 0) p.cursor.move_to(instant(next - 1), stride_.x());
-            p.cursor.advance(instant(next) - p.cursor.time());
+            if (level >= 0) p.cursor.move_to(times_[next - 1], stride_.x());
+            p.cursor.advance(times_[next] - p.cursor.time());
         }
     }
 
@@ -121,7 +115,7 @@ class SamplerOf : public Observer<System> {
         for (const GivenState& g : *given)
             for (int k = 0; k < n; ++k)
                 instants_.x[static_cast<std::size_t>(g.state)][static_cast<std::size_t>(k)] =
-                    p.cursor.input().given_at(g, instant(first + static_cast<std::size_t>(k)));
+                    p.cursor.input().given_at(g, times_[first + static_cast<std::size_t>(k)]);
     }
 
     // By one long step from sample to sample.
@@ -132,7 +126,7 @@ class SamplerOf : public Observer<System> {
         for (std::size_t next = p.first;;) {
             const int n = static_cast<int>(std::min<std::size_t>(p.end - next, Instants::max_count));
             for (int k = 0; k < n; ++k) {
-                if (k > 0) p.cursor.leap_to(instant(next + static_cast<std::size_t>(k)), step);
+                if (k > 0) leap_to(p, next + static_cast<std::size_t>(k), step);
                 instants_.set(k, load(p.cursor.x()), p.cursor.input().values());
             }
             write(reader, next, n);
@@ -141,38 +135,41 @@ class SamplerOf : public Observer<System> {
             if (interruption()) return false;
             if ((next - p.first) % (1024 * Instants::max_count) == 0) {  // so that rounding does not add up
                 p.cursor = first;
-                p.cursor.leap_to(instant(next));
+                p.cursor.leap_to(times_[next]);
             } else {
-                p.cursor.leap_to(instant(next), step);
+                leap_to(p, next, step);
             }
         }
     }
+    void leap_to(Piece& p, std::size_t k, LongStep<D>& step) const {
+        if (times_.is_early(k))
+            p.cursor.leap_to(times_[k]);
+        else
+            p.cursor.leap_to(times_[k], step);
+    }
     // As much of the interval as lies between any two of the samples, as the clock shows them.
     double whole_interval(const Piece& p) const {
-        const double end = instant(p.end), tick = std::nextafter(end, 2.0 * end) - end;
-        const double whole = tick * std::floor(interval_ / tick);
-        return whole < interval_ ? whole - tick : whole;
-    }
-    double instant(std::size_t k) const {
-        return listed_.empty() ? begin_ + static_cast<double>(k) * interval_ : listed_[k];
+        const double end = times_[p.end], tick = std::nextafter(end, 2.0 * end) - end;
+        const double whole = tick * std::floor(times_.interval / tick);
+        return whole < times_.interval ? whole - tick : whole;
     }
     // The number of the first sample after a segment.
     std::size_t due(const Segment<System>& s) const {
         const auto within = [&](std::size_t k) {
-            const double t = instant(k);
+            const double t = times_[k];
             return t < s.end || (s.last && t <= s.end * (1.0 + 4.0 * std::numeric_limits<double>::epsilon()));
         };
         std::size_t k = next_;
-        if (listed_.empty()) k = std::clamp(static_cast<std::size_t>((s.end - begin_) * per_interval_), next_, count_);
+        if (times_.listed.empty()) k = std::clamp(static_cast<std::size_t>(s.end * per_interval_), next_, times_.count);
         while (k > next_ && !within(k - 1)) --k;
-        while (k < count_ && within(k)) ++k;
+        while (k < times_.count && within(k)) ++k;
         return k;
     }
     // All channels at n instants, of which the first is the sample `at`. What goes beyond these is written again by the
     // segment that they belong to, but must not go beyond the channel.
     void write(const Reader& reader, std::size_t at, int n) {
         double* to = out_ + at;
-        const bool has_room = at + static_cast<std::size_t>(n + vec_width - 1) / vec_width * vec_width <= count_;
+        const bool has_room = at + static_cast<std::size_t>(n + vec_width - 1) / vec_width * vec_width <= times_.count;
         for (const int c : channels_) {
             if (has_room) {
                 reader.read(c, instants_, n, to);
@@ -181,15 +178,14 @@ class SamplerOf : public Observer<System> {
                 reader.read(c, instants_, n, values.data());
                 std::copy_n(values.begin(), n, to);
             }
-            to += count_;
+            to += times_.count;
         }
     }
 
     const Model& model_;
-    double begin_, interval_;
-    double per_interval_ = 1.0 / interval_;  // rounded
-    std::size_t count_, next_ = 0;
-    std::span<const double> listed_;  // [s]; none: equidistant
+    SampleTimes times_;
+    double per_interval_ = 1.0 / times_.interval;  // rounded
+    std::size_t next_ = 0;
     double* out_;
     std::span<const int> channels_;
     std::array<std::optional<Piece>, max_pieces> pieces_;

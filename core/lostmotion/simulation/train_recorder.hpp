@@ -113,7 +113,7 @@ class TrainRecorder final : public Observer<model::TrainSystem<D>> {
           channels_(options.channels ? *options.channels : all(m)),
           sampler_(m, options.times(), out, channels_),
           meter_(m.assembly),
-          dense_samples_(options.sample_interval, options.samples) {
+          dense_samples_(options.RunRequest::times()) {
         sampler_.interruption = meter_.interruption() = {options.interrupted, options.interrupted_context};
     }
 

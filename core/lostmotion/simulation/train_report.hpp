@@ -39,7 +39,7 @@ struct TrainOptions : RunRequest {
     std::function<bool()> enough;              // whether the samples up to the pause, which is written, suffice
     double tolerance = 0.0;                    // relative, of the adaptive solver; 0: the exact one
 
-    SampleTimes times() const { return {sample_interval, instants.empty() ? samples : instants.size(), instants}; }
+    SampleTimes times() const { return instants.empty() ? RunRequest::times() : SampleTimes(instants); }
 };
 
 struct TrainSwitching {

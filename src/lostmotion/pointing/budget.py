@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from ..inputs.quantities import argument
 from ..inputs.validation import did_you_mean, shown
 from ..simulation.pointing_error import pointing_errors, pointing_names
 from ..simulation.run import run
+from ..simulation.sampling import weights
 from ..simulation.scenario import Scenario
 from ..worker_threads import thread_pool
 from .causes import CAUSES, VARIANTS, present, without
@@ -343,15 +345,15 @@ def _run(scenario: Scenario) -> Found:
 def _numbers(found: Found, after: float) -> Errors:
     time, errors, measured = found
     counted = time >= after
-    numbers = {}
+    mean, numbers = partial(np.average, weights=weights(time[counted])), {}
     for motor, error in errors.items():
         e = error[counted]
         numbers[motor] = PointingError(
-            rms=float(np.sqrt(np.mean(e**2))),
+            rms=math.sqrt(mean(e**2)),
             peak=float(np.abs(e).max()),
-            mean=float(e.mean()),
-            probable=PROBABLE * float(e.std()),
-            measured_rms=float(np.sqrt(np.mean(measured[motor][counted] ** 2))),
+            mean=float(mean(e)),
+            probable=PROBABLE * math.sqrt(mean((e - mean(e)) ** 2)),
+            measured_rms=math.sqrt(mean(measured[motor][counted] ** 2)),
         )
     return numbers
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import visible
 from ..simulation.results import RunArrays, energy_of, is_train_result, whole
+from ..simulation.sampling import weights
 from ..simulation.scenario import Scenario
 from ..simulation.switchings import ATTRIBUTE as SWITCHINGS
 from ..simulation.switchings import MESH_STEP, names_in, unpacked
@@ -208,17 +209,21 @@ def run_report(name: str, result: xarray.Dataset) -> Report:
 def _motion_lines(result: xarray.Dataset) -> list[str]:
     """Following error of controlled axes, and which contacts are stuck."""
     errors: dict[str, str] = {}
+    share = weights(result["time"].values)
     for name in sorted(n for n in map(str, result) if n.endswith(("position_reference", "speed_reference"))):
         axis, _, quantity = name.removesuffix("_reference").rpartition("_")
         measured = f"{axis}_measured_{quantity}".removeprefix("_")
         if axis not in errors and measured in result:  # the position, where there is one
             error = result[name].values - result[measured].values
             unit = str(result[name].attrs.get("units", ""))
-            peak, rms = (practical(float(v), unit, 4) for v in (np.abs(error).max(), np.sqrt(np.mean(error**2))))
+            peak, rms = (
+                practical(float(v), unit, 4)
+                for v in (np.abs(error).max(), np.sqrt(np.average(error**2, weights=share)))
+            )
             of = f"{axis.replace('_', ' ')} " if axis else ""
             errors[axis] = f"{of}{quantity} peak {peak}, rms {rms}"
     stuck = [
-        f"{name.removesuffix('_contact').replace('_', ' ')} {100.0 * float(np.mean(result[name].values == 0)):.0f} %"
+        f"{name.removesuffix('_contact').replace('_', ' ')} {100.0 * float(np.average(result[name].values == 0, weights=share)):.0f} %"
         for name in map(str, result)
         if name.endswith("_contact")
     ]
@@ -230,14 +235,20 @@ def _variables(result: xarray.Dataset) -> Table:
     """Each variable at the end, and what it reaches."""
     from .page import Table
 
-    rows = []
+    rows, share = [], weights(result["time"].values)
     for name in map(str, result):
         values = result[name].values.astype(float)
         if values.ndim != 1 or name.endswith("_contact"):
             continue
-        known = values[np.isfinite(values)]
+        here = np.isfinite(values)
+        known = values[here]
         if len(known):
-            numbers = (float(values[-1]), float(known.min()), float(known.max()), float(np.sqrt(np.mean(known**2))))
+            numbers = (
+                float(values[-1]),
+                float(known.min()),
+                float(known.max()),
+                float(np.sqrt(np.average(known**2, weights=None if share is None else share[here]))),
+            )
             unit = printed(str(result[name].attrs.get("units", "")))
             size = max(map(abs, numbers[1:3]))
             rows.append([name, *(_digits(v, size) for v in numbers), "" if unit == "1" else unit])

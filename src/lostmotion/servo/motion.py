@@ -18,6 +18,7 @@ from ..model.torsion import TorsionCurve
 from ..response.closed_loop import slowest
 from ..response.standstill import Verdict, Watch, decide, moving_input
 from ..simulation.run import run
+from ..simulation.sampling import weights
 from ..simulation.scenario import Scenario
 from .data import inertias
 from .regimes import Axis, speed_of
@@ -220,7 +221,7 @@ def following(axis: Axis) -> Following:
     if reference.kind == "speed":
         name, unit = f"{axis.shaft}_speed", axis.train.speed_unit(axis.shaft)
     error = wanted - data[name]
-    rms = math.sqrt(float(np.mean(error**2)))
+    rms = math.sqrt(float(np.average(error**2, weights=weights(time))))
     encoder = encoder_shaft(axis)
     unseen = np.zeros_like(error)
     if reference.kind == "position" and encoder != axis.shaft:

@@ -172,7 +172,7 @@ def _frame(scenario: Scenario) -> xarray.Dataset:
 
 
 def _time(scenario: Scenario) -> np.ndarray:
-    return np.arange(scenario.simulation.samples) * scenario.simulation.sample_interval
+    return scenario.simulation.instants()
 
 
 @kept

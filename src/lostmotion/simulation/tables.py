@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Protocol, Self
 
+import numpy as np
 from pydantic import model_validator
 
 from .. import _core
@@ -53,7 +54,7 @@ def check_on_reference(initial: Any, controllers: Mapping[str, Controller], keys
 
 
 class SimulationTable(Part):
-    """Duration and instants of the result. Neither affects the motion."""
+    """Duration and instants of the result: the multiples of the interval, and the end. They do not affect the motion."""
 
     duration: Annotated[Time, Positive]
     sample_interval: Annotated[Time, Positive]
@@ -68,8 +69,12 @@ class SimulationTable(Part):
 
     @property
     def samples(self) -> int:
-        """Number of instants 0, sample_interval, ... up to the duration."""
-        return int(self.duration / self.sample_interval * (1.0 + 1e-12)) + 1
+        """Number of instants."""
+        return _core.sample_count(self.duration, self.sample_interval)
+
+    def instants(self) -> np.ndarray:
+        """0, sample_interval, ... and, where it is no multiple of the interval, the duration [s]."""
+        return _core.sample_times(self.duration, self.sample_interval)
 
     def grid(self) -> dict[str, Any]:
         """Duration, sample interval and number of samples, as runs of the core take them."""

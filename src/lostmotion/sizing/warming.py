@@ -287,7 +287,10 @@ def _course(law: _Law, each: int, start: tuple[float, float]) -> _Course:
     heat = dict.fromkeys(("winding", "housing", "stored", "ambient"), 0.0)
     for first in range(0, last, each):
         samples = min(each, last - first)
-        begin, length = first * table.sample_interval, samples * table.sample_interval
+        begin, times = first * table.sample_interval, np.arange(1, samples + 1) * table.sample_interval
+        if first + samples == last and table.instants()[-1] < last * table.sample_interval:
+            times[-1] = table.duration - begin
+        length = float(times[-1])
         core = law.at(*now).core()
         inputs = [_later(signals[name], begin) for name in names]
         grid: dict[str, Any] = {"duration": length, "sample_interval": table.sample_interval, "samples": samples + 1}
@@ -298,7 +301,7 @@ def _course(law: _Law, each: int, start: tuple[float, float]) -> _Course:
         torques = squares(case, torque, np.array([0.0, length]), breaks=breaks, fastest=fastest)
         square = float(torques.square[0]) / law.magnet_factor(now[1]) ** 2
         losses = math.fsum(result["energy"][entry] for entry in law.heating) / length
-        now, course = _warmed(law.bodies, square, losses, now, np.arange(1, samples + 1) * table.sample_interval, heat)
+        now, course = _warmed(law.bodies, square, losses, now, times, heat)
         temperatures.append(course)
         results.append(result)
     both = np.vstack(temperatures).T

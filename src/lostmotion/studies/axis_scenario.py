@@ -73,7 +73,7 @@ class Cycles:
     @cached_property
     def time(self) -> np.ndarray:
         """Instants of the samples, one in each sample time of the controller [s]."""
-        return np.arange(self.simulation.samples) * self.simulation.sample_interval
+        return self.simulation.instants()
 
     @property
     def last(self) -> slice:

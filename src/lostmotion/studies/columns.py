@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .. import _core
 from ..response.crossovers import bandwidth
 from ..simulation.scenario import Scenario
 from ..simulation.variables import CHANNEL_NAMES, add_efficiency
@@ -68,11 +69,11 @@ def _with_derived(study: Study, runs: Runs) -> dict[str, np.ndarray]:
 
 
 @lru_cache(maxsize=4)
-def _instants(samples: int, interval: float) -> Any:
+def _instants(duration: float, interval: float) -> Any:
     """The coordinate of the samples; making its index takes longer than many a reduction."""
     import xarray as xr
 
-    return xr.Coordinates({"time": np.arange(samples) * interval})
+    return xr.Coordinates({"time": _core.sample_times(duration, interval)})
 
 
 def _names(study: Study, data: dict[str, np.ndarray], runs: Runs, threads: int) -> dict[str, Any]:
@@ -82,7 +83,7 @@ def _names(study: Study, data: dict[str, np.ndarray], runs: Runs, threads: int) 
     def each_run(values: np.ndarray) -> xr.DataArray:
         return xr.DataArray(values, dims="run")
 
-    instants = _instants(study.scenario.simulation.samples, study.scenario.simulation.sample_interval)
+    instants = _instants(study.scenario.simulation.duration, study.scenario.simulation.sample_interval)
     names: dict[str, Any] = {
         name: xr.DataArray(data[name], instants, ("run", "time")) for name in used(study) & data.keys()
     }

@@ -12,6 +12,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from .. import _core
+from ..simulation.sampling import last_share, weights
 from .measures import Measure, measure, one_of, plain, power, product, reduced
 
 REDUCTIONS = tuple(_core.reductions())
@@ -41,35 +42,33 @@ class Function(NamedTuple):
 # --- reductions ---
 
 
-def _over_time(plain_reduction: Callable[..., Any], careful: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """A reduction of xarray that leaves out NaN. Most variables have none, and it is the search for them that takes long.
+def _reduced(name: str, careful: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """A reduction by the core, so that a chunk that the core has reduced has the same bits.
 
-    plain_reduction
-        Of values and axis; may pass over NaN, or give NaN.
     careful
-        Of an array of xarray, where the plain one has met NaN.
+        Of an array of xarray, without NaN. Most variables have none, and it is the search for them that takes long.
     """
+    how = REDUCTIONS.index(name)
+
+    def by_core(values: np.ndarray, axis: int, last: float) -> np.ndarray:
+        along = np.moveaxis(values, axis, -1)
+        rows = np.ascontiguousarray(along, dtype=float).reshape(-1, along.shape[-1])
+        return _core.reduce_rows(how, rows, last).reshape(along.shape[:-1])
 
     def reduce(x: Any) -> Any:
-        found = x.reduce(plain_reduction, "time")
+        found = x.reduce(by_core, "time", last=last_share(x["time"].values))
         return found if np.isfinite(found.values).all() else careful(x)
 
     return reduce
 
 
-def _reduced(name: str, careful: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """A reduction by the core, so that a chunk that the core has reduced has the same bits."""
-    how = REDUCTIONS.index(name)
-
-    def by_core(values: np.ndarray, axis: int) -> np.ndarray:
-        along = np.moveaxis(values, axis, -1)
-        rows = np.ascontiguousarray(along, dtype=float).reshape(-1, along.shape[-1])
-        return _core.reduce_rows(how, rows).reshape(along.shape[:-1])
-
-    return _over_time(by_core, careful)
+def _weighted(x: Any) -> Any:
+    """The same with the weight that its last sample has in a mean."""
+    weight = weights(x["time"].values)
+    return x if weight is None else x.weighted(x["time"].copy(data=weight))
 
 
-_rms = _reduced("rms", lambda x: (x**2).mean("time") ** 0.5)
+_rms = _reduced("rms", lambda x: _weighted(x**2).mean("time") ** 0.5)
 
 
 def _dead_time(x: Any, share: float = 0.01) -> Any:
@@ -104,7 +103,7 @@ def _reduction(of_values: Callable[..., Any], of_measures: Callable[..., Measure
 FUNCTIONS = {
     "peak": Function((X,), _reduced("peak", lambda x: abs(x).max("time")), _same),
     "rms": Function((X,), _rms, _same),
-    "mean": Function((X,), _reduced("mean", lambda x: x.mean("time")), _same),
+    "mean": Function((X,), _reduced("mean", lambda x: _weighted(x).mean("time")), _same),
     "final": Function((X,), lambda x: x.isel(time=-1), _same),
     "least": Function((X,), _reduced("least", lambda x: x.min("time")), _same),
     "largest": Function((X,), _reduced("largest", lambda x: x.max("time")), _same),
@@ -123,13 +122,13 @@ FUNCTIONS = {
 """functions, of variables and of what is made of them"""
 
 METHODS = {
-    "mean": _reduction(lambda x: x.mean("time")),
+    "mean": _reduction(lambda x: _weighted(x).mean("time")),
     "max": _reduction(lambda x: x.max("time")),
     "min": _reduction(lambda x: x.min("time")),
     "sum": _reduction(lambda x: x.sum("time")),
     "median": _reduction(lambda x: x.median("time")),
-    "std": _reduction(lambda x: x.std("time")),
-    "var": _reduction(lambda x: x.var("time"), lambda x: reduced(x, 2)),
+    "std": _reduction(lambda x: _weighted(x).std("time")),
+    "var": _reduction(lambda x: _weighted(x).var("time"), lambda x: reduced(x, 2)),
     "quantile": Function((X, Parameter("q", "share"), TIME), _quantile, lambda x, q: reduced(x)),  # noqa: ARG005
     "integrate": Function(
         (X, Parameter("coord", "time", needed=False)),

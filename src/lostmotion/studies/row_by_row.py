@@ -138,7 +138,7 @@ def _samples(
     if wanted == list(made):
         return {name: spread(values, where, len(errors)) for name, values in made.items()}
     table = study.scenario.simulation
-    time = np.arange(table.samples) * table.sample_interval
+    time = table.instants()
     out = {name: np.full((len(errors), table.samples), np.nan) for name in wanted}
     for place, (k, scenario) in enumerate(trains.items()):
         if errors[k]:
