@@ -317,6 +317,13 @@ def test_a_drive_without_what_a_reduction_lacks_is_described_whole(load_torque: 
     assert f'friction="{found.frictionloss:.6g}"' in found.urdf("elbow")
 
 
+def test_the_load_torque_of_a_scenario_is_not_dropped_from_a_reduction() -> None:
+    joint = lm.load("catalogue-robot-joint")
+    with pytest.raises(lm.InputError) as caught:
+        lm.mujoco.reduce(joint.replace(**{"load.torque": 10.0}), 0.5, 1.0)
+    assert caught.value.problems[0].keys == ("load.torque",)
+
+
 def test_what_a_reduction_costs_is_stated() -> None:
     found = lm.mujoco.reduce(lm.load("catalogue-robot-joint"), 0.5, 1.0, 10.0)
     assert found.gear < 100.0  # the losses that depend on the load

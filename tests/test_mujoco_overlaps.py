@@ -115,8 +115,9 @@ def test_the_load_torque_of_a_short_form_is_refused() -> None:
 def test_the_weight_of_a_drive_acts_where_the_robot_has_none() -> None:
     # The chords of the weight depart from the sine by at most 1e-4 of it.
     right = crossing(lm.mujoco.attach(model(), {"arm": scenario()}))
-    arm = lm.mujoco.attach(model(gravity=0.0), {"arm": scenario(gravity={"arm": WEIGHT})})
-    assert crossing(arm) == pytest.approx(right, rel=1e-4)
+    for weightless in (model(gravity=0.0), model(body='gravcomp="1"')):
+        arm = lm.mujoco.attach(weightless, {"arm": scenario(gravity={"arm": WEIGHT})})
+        assert crossing(arm) == pytest.approx(right, rel=1e-4)
 
 
 def test_cogging_on_the_joint_and_unbalance_of_the_motor_are_no_weight_of_the_robot() -> None:

@@ -164,7 +164,8 @@ def attach(
             raise InputError(f"model: has {what}, which are not supported; use such without")
     if substeps is not None and not 1 <= substeps <= MAX_SUBSTEPS:
         raise InputError(f"substeps: {shown(substeps)} must lie between 1 and {MAX_SUBSTEPS}")
-    weighs = bool(compiled.opt.gravity.any()) and acts(compiled, "GRAVITY")
+    heavy = (compiled.body_mass > 0.0) & (compiled.body_gravcomp != 1.0)
+    weighs = bool(compiled.opt.gravity.any() and heavy.any()) and acts(compiled, "GRAVITY")
     made: dict[str, JointActuator] = {}
     for name, given in drives.items():
         joint_id(compiled, name)

@@ -42,7 +42,7 @@ def without_weight(name: str, drive: Driven, *, replace: bool, weighs: bool) -> 
         The drive has such, and it is not to be replaced.
     """
     weights = _weights(name, drive) if weighs else []
-    keys = [*_loads(drive), *map(".".join, weights)]
+    keys = [*loads_of(drive), *map(".".join, weights)]
     if keys and not replace:
         raise InputError(
             "would count twice: load and weight of the joint come from the robot; give replace=True, or leave it out",
@@ -63,7 +63,7 @@ def without_weight(name: str, drive: Driven, *, replace: bool, weighs: bool) -> 
     return lighter
 
 
-def _loads(drive: Driven) -> list[str]:
+def loads_of(drive: Driven) -> list[str]:
     """Keys of the load torques of a scenario."""
     if not isinstance(drive, Scenario):
         return []

@@ -16,6 +16,7 @@ from ..model.motor import Motor
 from ..simulation.joint_trains import joint_drive
 from ..simulation.scenario import Scenario, drive_of
 from ..simulation.stepping import Simulation
+from .overlaps import loads_of
 
 STEPS_PER_PERIOD = 2000
 FASTEST_SHARE = 0.1
@@ -92,7 +93,8 @@ def reduce(
     Raises
     ------
     InputError
-        The drive does not follow the motion, or its gearbox swings too slowly for it.
+        The drive does not follow the motion, its gearbox swings too slowly for it, or a scenario has a load torque and `load_torque`
+        is left out.
 
     Examples
     --------
@@ -105,6 +107,8 @@ def reduce(
     for name, value in (("amplitude", amplitude), ("frequency", frequency)):
         if not value > 0.0:
             raise InputError(f"{name}: {shown(value)} must be positive")
+    if load_torque == 0.0 and (loads := loads_of(drive)):
+        raise InputError("is not taken over; give load_torque, or leave the key out", *loads)
     drive = drive_of(drive)
     columns, target = _along_sines(drive, amplitude, frequency, load_torque)
     if load_torque == 0.0:
