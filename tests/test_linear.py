@@ -548,3 +548,50 @@ def test_the_tutorial_prints_what_the_run_prints(tmp_path):
     on_motor = {"controller.position_encoder": {"shaft": "motor", "bits": 20}}
     beside = lm.simulate(lm.load(tmp_path / "my-axis.toml", on_motor))["slide_position"][-1]
     assert float(beside) == pytest.approx(1e-6 + 40.0 / 100e6, abs=0.1e-6)
+
+
+# --- one speed of what is tied together ---
+
+FALLING = {
+    "shafts": {"motor": {"inertia": 1e-4}, "screw": {}},
+    "slides": {"head": {"mass": 30.0, "inclination": "90 deg"}},
+    "gears": {"gear": {"input": "motor", "output": "screw", "ratio": 2.0, "stiffness": {"kind": "rigid"}}},
+    "screws": {"spindle": {"input": "screw", "output": "head", "lead": "20 mm", "efficiency": 0.9}},
+    "motors": {"servo": {"shaft": "motor", "kind": "torque_source", "rotor_inertia": 6e-4, "rated_torque": 1.0}},
+    "simulation": {"duration": 0.1, "sample_interval": 0.01},
+}
+TRAVEL = 0.02 / (2.0 * math.pi)
+
+
+@pytest.mark.parametrize(
+    "initial",
+    [
+        {"slide_speeds": {"head": -0.3}},
+        {"speeds": {"motor": -2.0 * 0.3 / TRAVEL}},
+        {"speeds": {"screw": -0.3 / TRAVEL}, "slide_speeds": {"head": -0.3}},
+    ],
+)
+def test_one_speed_of_a_rigid_train_says_the_others(initial):
+    """30 kg fall behind a screw that gives back 2 - 1/0.9 of the force: a = g/(1 + J (i/s)²/(m eta_b))."""
+    result = lm.simulate(lm.Scenario(**FALLING, initial=initial))
+    back = 2.0 - 1.0 / 0.9
+    a = 9.80665 / (1.0 + 7e-4 * (2.0 / TRAVEL) ** 2 / (30.0 * back))
+    t = result["time"].values
+    assert result["head_speed"].values == pytest.approx(-0.3 - a * t, rel=1e-9)
+    assert result["motor_speed"].values == pytest.approx((-0.3 - a * t) * 2.0 / TRAVEL, rel=1e-9)
+
+
+def test_speeds_that_contradict_each_other_are_refused_with_both():
+    with pytest.raises(lm.InputError, match=r"head: -0.3 m/s does not fit motor = 5 rad/s") as error:
+        lm.Scenario(**FALLING, initial={"speeds": {"motor": 5.0}, "slide_speeds": {"head": -0.3}})
+    assert f"{5.0 * TRAVEL / 2.0:.10g} m/s" in str(error.value)
+
+
+def test_one_speed_of_a_rigid_drive_says_the_other():
+    drive = lm.load("lossy-rigid-gear")
+    for key in ("motor_speed", "load_speed"):
+        result = lm.simulate(drive.replace(**{f"initial.{key}": 7.0}))
+        assert float(result[key][0]) == 7.0
+        assert float(result["motor_speed"][0]) == drive.gearbox.ratio * float(result["load_speed"][0])
+    with pytest.raises(lm.InputError, match=r"7.*6"):
+        drive.replace(**{"initial.motor_speed": 7.0, "initial.load_speed": 6.0})

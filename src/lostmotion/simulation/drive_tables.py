@@ -48,7 +48,7 @@ class Initial(described.InitialFields):
     def of_train(self) -> TrainInitial:
         """The same state of the drive as a train; what follows from a reference, or is 0, is left out."""
         motion: dict[str, Any] = {
-            "speeds": {MOTOR: self.motor_speed, LOAD: self.load_speed},
+            "speeds": {name: speed for name, speed in ((MOTOR, self.motor_speed), (LOAD, self.load_speed)) if speed},
             "angles": {LOAD: self.load_angle},
         }
         others = {
@@ -176,8 +176,10 @@ def check_drive(scenario: Whole, written: DriveTables) -> None:
     if isinstance(written.gearbox.stiffness, Rigid):
         if written.initial.twist != 0.0:
             raise ValueError(f"has initial.twist = {written.initial.twist} rad, but the gearbox is rigid; leave it out")
-        speed, load_speed = speeds[MOTOR], speeds[LOAD]
-        if abs(speed / written.gearbox.ratio - load_speed) > 1e-12 * abs(load_speed):
+        speed, load_speed = (speeds.get(name) for name in (MOTOR, LOAD))  # one alone says the other
+        if None not in (speed, load_speed) and abs(speed / written.gearbox.ratio - load_speed) > 1e-12 * abs(
+            load_speed
+        ):
             raise ValueError(
                 f"has initial.motor_speed = {speed} rad/s and initial.load_speed = {load_speed} rad/s, but the gearbox is "
                 "rigid; their quotient must be its ratio"

@@ -437,7 +437,7 @@ class Scenario:
         for name, controller in self.continuous().items():
             shaft = self.tables.controlled(name)
             position = controller.reference.kind == "position"
-            measured = angles[shaft] if position else state.of_all("speeds").get(shaft, 0.0)
+            measured = angles[shaft] if position else values.get(train.speed_of(shaft), 0.0)
             values |= controller.start(name, measured)
             known += [f"{name}_{variable}" for variable in controller.system().states]
         for name in state.controller_states:

@@ -40,7 +40,7 @@ def start_values(
     stiff = [name for name, g in train.gears.items() if not isinstance(g.stiffness, Rigid) or g.stiffness.strikes]
     lossy = [name for name in stiff if (h := train.gears[name].hysteresis) is not None and h.efficiency < 1.0]
     electric = [name for name, m in train.motors.items() if m.kind != "torque_source"]
-    speeds, twists = initial.of_all("speeds"), initial.of_all("twists")
+    speeds, twists = tied_speeds(train, initial.of_all("speeds")), initial.of_all("twists")
     for keys, what in ((("speeds", "angles"), "shaft"), (("slide_speeds", "positions"), "slide")):
         for key in keys:
             _check(key, getattr(initial, key), train.shafts, what)
@@ -50,6 +50,7 @@ def start_values(
     _check("hysteresis_capacities", initial.hysteresis_capacities, lossy, "gear with hysteresis")
     _check("hysteresis_forces", initial.hysteresis_forces, lossy, "screw, rack or belt with hysteresis")
     if problem := (core or train.core(())).check_start([speeds.get(name, 0.0) for name in train.shafts]):
+        _refuse_contradiction(train, initial.of_all("speeds"))
         raise InputError(problem, "initial.speeds")
     _check_flanks(train, speeds, twists)
     values = {f"{name}_speed": v for name, v in speeds.items()}
@@ -59,6 +60,26 @@ def start_values(
     values |= {train.twist_of(name): v for name, v in twists.items()}
     values |= {train.motor_torque_of(name): v for name, v in initial.motor_torques.items()}
     return values
+
+
+def _refuse_contradiction(train: DriveTrain, given: Mapping[str, float]) -> None:
+    """Refuses two given speeds, one of which says the other through what is rigid between them."""
+    for one, speed in given.items():
+        tied = tied_speeds(train, {one: speed})
+        for other in (name for name in given if name in tied and name != one):
+            if math.isclose(given[other], tied[other], rel_tol=ROUNDING, abs_tol=ROUNDING):
+                continue
+            a, wanted = (f"{x:.10g} {_speed_unit(train, other)}" for x in (given[other], tied[other]))
+            b = f"{speed:.10g} {_speed_unit(train, one)}"
+            key = "slide_speeds" if train.is_slide(other) else "speeds"
+            raise InputError(
+                f"{a} does not fit {one} = {b} through what is rigid between them, which makes it {wanted}; give one of them",
+                f"initial.{key}.{other}",
+            )
+
+
+def _speed_unit(train: DriveTrain, shaft: str) -> str:
+    return "m/s" if train.is_slide(shaft) else "rad/s"
 
 
 def _check_flanks(train: DriveTrain, speeds: Mapping[str, float], twists: Mapping[str, float]) -> None:
@@ -135,9 +156,15 @@ def angles_at_start(
 
 def given_speeds(train: DriveTrain, motions: Mapping[str, tuple[Signal[Any], Signal[Any]]]) -> dict[str, float]:
     """Speeds at t = 0 [rad/s, m/s] of shafts and slides with a given motion, and of others that rigid gears tie to them."""
-    rigid = [(g.input, g.output, g.ratio) for g in train.fixed_gears().values() if isinstance(g.stiffness, Rigid)]
-    speeds = {name: speed.at_start() for name, (speed, _) in motions.items()}
-    waiting = list(speeds)
+    return tied_speeds(train, {name: speed.at_start() for name, (speed, _) in motions.items()})
+
+
+def tied_speeds(train: DriveTrain, given: Mapping[str, float]) -> dict[str, float]:
+    """Speeds [rad/s, m/s] that are given, and those of other shafts and slides that rigid gears tie to them."""
+    gears = train.fixed_gears().values()
+    tied = [g for g in gears if isinstance(g.stiffness, Rigid) and not g.stiffness.strikes]
+    rigid = [(g.input, g.output, g.ratio) for g in tied]
+    speeds, waiting = dict(given), list(given)
     while waiting:
         shaft = waiting.pop()
         for one, other, ratio in rigid:
