@@ -28,15 +28,24 @@ RATE = 2e-3  # by which the sample time of a log may differ from that of most
 SAMPLE = re.compile(r", such as '.*' in line \d+")  # in notes: differs from log to log
 MOST_LINES = 40  # of doubts of one kind
 COMMANDS = ("goal", "command", "cmd", "reference", "ref", "setpoint", "target", "desired", "demand", "set")
+MOTIONS = {"rad": "angle", "m": "position", "rad/s": "speed", "m/s": "speed"}
 QUANTITIES = {
     "rad": ("position", "pos", "angle", "theta", "encoder", "deg"),
     "rad/s": ("speed", "velocity", "vel", "omega", "rpm"),
     "N*m": ("torque", "moment"),
     "A": ("current",),
     "V": ("voltage", "volts", "volt"),
+    "N": ("force",),
 }
 PLACEHOLDER = "RIG.toml"
-SOUGHT = ("inertia", "rotor_inertia", "viscous_friction", "friction_torque")  # keys of shafts and motors
+SOUGHT = (
+    "inertia",
+    "rotor_inertia",
+    "mass",
+    "viscous_friction",
+    "friction_torque",
+    "friction_force",
+)  # of shafts, slides, motors
 
 
 @dataclass
@@ -78,8 +87,7 @@ class _Seen:
             unit = channel_unit("", self.unit, "", "")[1] if self.unit else ""
         except InputError:
             unit = ""
-        unit = SAME.get(unit, unit)
-        if unit in QUANTITIES:
+        if unit in QUANTITIES or unit in MOTIONS:
             return unit
         return next((unit for unit, names in QUANTITIES.items() if any(word in names for word in self.words)), "")
 
@@ -197,11 +205,11 @@ def _channels(logs: Sequence[Log]) -> list[_Seen]:
 
 def _roles(seen: Sequence[_Seen]) -> tuple[list[_Seen], list[_Seen]]:
     """(channels to compare, channels that act) by their quantities and names; without any sign the first is compared."""
-    motion = [c for c in seen if c.quantity in ("rad", "rad/s") and not c.is_command]
+    motion = [c for c in seen if c.quantity in MOTIONS and not c.is_command]
     commands = [c for c in seen if c.is_command]
-    drives = [c for c in seen if c.quantity in ("N*m", "A", "V") and not c.is_command]
+    drives = [c for c in seen if c.quantity in ("N*m", "N", "A", "V") and not c.is_command]
     measured = (
-        [c for c in motion if c.quantity == "rad"]
+        [c for c in motion if c.quantity in ("rad", "m")]
         or motion
         or [c for c in seen if c not in commands][:1]
         or list(seen[:1])
@@ -343,7 +351,7 @@ def _input_lines(inputs: Sequence[_Seen], scenario: Scenario | None) -> list[str
             '# Doubt: no channel is known to act on the rig; if one does, add [inputs.NAME] with channel = "..."',
             "",
         ]
-    kinds = {"rad": "_reference", "rad/s": "_reference", "N*m": "_command", "A": "_command", "V": "_command"}
+    kinds = dict.fromkeys(MOTIONS, "_reference")
     free = _signals(scenario)
     lines: list[str] = []
     for k, c in enumerate(inputs):
@@ -377,17 +385,18 @@ def _signals(scenario: Scenario | None) -> list[str]:
 
 
 def _measured_lines(measured: Sequence[_Seen], scenario: Scenario | None) -> list[str]:
-    shafts = list(scenario.shafts) if scenario is not None else []
     lines: list[str] = []
     for c, key in zip(measured, _keyed(c.name for c in measured), strict=True):
-        kind = "speed" if c.quantity == "rad/s" else "angle"
-        named = [shaft for shaft in shafts if shaft.lower() in c.words]
-        shaft = (named or shafts[-1:] or ["SHAFT"])[0]
-        lines += [f"[measured.{key}]", f"channel = {_text(c.name)}", f'variable = "{shaft}_{kind}"', *_about_unit(c)]
-        if c.quantity not in ("rad", "rad/s"):
+        table, bodies = _bodies(scenario, c)
+        named = [body for body in bodies if body.lower() in c.words]
+        body = (named or bodies[-1:] or ["SHAFT"])[0]
+        kind = MOTIONS.get(c.quantity if SAME.get(c.quantity, c.quantity) == "rad/s" else "", "angle")
+        kind = "position" if table == "slides" and kind == "angle" else kind
+        lines += [f"[measured.{key}]", f"channel = {_text(c.name)}", f'variable = "{body}_{kind}"', *_about_unit(c)]
+        if c.quantity not in MOTIONS:
             lines.append("# Doubt: neither its name nor its unit says that it is an angle or a speed")
-        if len(shafts) > 1 and not named:
-            lines.append(_comment(f"Doubt: it may be that of another shaft: {listed(shafts[:-1])}"))
+        if len(bodies) > 1 and not named:
+            lines.append(_comment(f"Doubt: it may be that of another of the {table}: {listed(bodies[:-1])}"))
         if len(measured) > 1:
             noise = float(np.median(c.noise)) if c.noise else 0.0
             factor = _factor(c.unit)
@@ -400,6 +409,15 @@ def _measured_lines(measured: Sequence[_Seen], scenario: Scenario | None) -> lis
     return lines
 
 
+def _bodies(scenario: Scenario | None, c: _Seen) -> tuple[str, list[str]]:
+    """(table, its names) of what a channel may show the motion of: slides if it is in metres, or named as one of them."""
+    if scenario is None:
+        return "shafts", []
+    slides, shafts = list(scenario.slides), list(scenario.shafts)
+    linear = c.quantity in ("m", "m/s") or any(name.lower() in c.words for name in slides)
+    return ("slides", slides) if slides and (linear or not shafts) else ("shafts", shafts)
+
+
 def _factor(unit: str) -> float:
     try:
         return channel_unit("", unit, "", "")[0]
@@ -409,8 +427,8 @@ def _factor(unit: str) -> float:
 
 def _parameter_lines(scenario: Scenario | None) -> list[str]:
     found: dict[str, float] = {}
-    for table, parts in (("shafts", scenario.shafts), ("motors", scenario.motors)) if scenario is not None else ():
-        for name, part in parts.items():
+    for table in ("shafts", "slides", "motors") if scenario is not None else ():
+        for name, part in getattr(scenario, table).items():
             for key in SOUGHT:
                 value = getattr(part, key, None)
                 if isinstance(value, float) and value > 0.0:

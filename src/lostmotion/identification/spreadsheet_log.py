@@ -16,6 +16,7 @@ from ..inputs.limits import check_memory
 from ..inputs.validation import listed
 from ..inputs.zip_files import members
 from .logs import Log, as_refusal
+from .odd_tables import odd_table_log
 from .tables import Row, UnreadError, plain_number, table_log
 
 PER_ELEMENT = 1500  # bytes of memory for an element of a part that describes the workbook, measured of styles
@@ -60,13 +61,24 @@ def _of_book(path: Path, book: Any, clock: str) -> Log:
         if first is None:
             continue
         try:
-            log = table_log(path, _chained(first, rows), _number, comments, clock)
+            log = _table(path, [*_chained(first, rows)], comments, clock)
         except UnreadError as problem:
             raise InputError(f"sheet {sheet.title}, row {problem.row}: {problem}", where=path) from None
         others = [s.title for s in book.worksheets if s is not sheet]
         note = f"sheet {sheet.title} is read; left out are {listed(others)}"
         return log.noted(note) if others else log
     raise InputError("has no sheet with values; save the log in the first sheet", where=path)
+
+
+def _table(path: Path, rows: list[Row], comments: list[str], time: str) -> Log:
+    """The log of a sheet, without the lines and cells that cannot be read."""
+    try:
+        return table_log(path, iter(rows), _number, comments, time)
+    except UnreadError as problem:
+        try:
+            return odd_table_log(path, rows, _number, comments, time)[1]
+        except UnreadError:
+            raise problem from None
 
 
 def _chained(first: Row, rows: Iterator[Row]) -> Iterator[Row]:

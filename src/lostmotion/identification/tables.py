@@ -157,7 +157,7 @@ def _columns(
     if all(blank) or not all(b or _is_value(cell, number) for cell, b in zip(cells, blank, strict=True)):
         columns = named_columns([str(cell if cell is not None else "").strip() for cell in cells])
         below = next(rows, None)
-        units = _units(below, len(columns), number) if below is not None else None
+        units = units_below(below, len(columns), number) if below is not None else None
         if units is not None:
             return (
                 [(name, unit if own is None else own) for (name, own), unit in zip(columns, units, strict=True)],
@@ -176,7 +176,7 @@ def _is_value(cell: Any, number: Callable[[Any], float | None]) -> bool:
     return number(cell) is not None or _nanoseconds(cell) is not None
 
 
-def _units(row: Row, count: int, number: Callable[[Any], float | None]) -> list[str | None] | None:
+def units_below(row: Row, count: int, number: Callable[[Any], float | None]) -> list[str | None] | None:
     """Units in the row below a heading; None where it is no such row."""
     texts = [str(cell if cell is not None else "").strip() for cell in row[1]]
     if len(texts) != count or not any(texts) or any(_is_value(text, number) for text in texts):
@@ -278,13 +278,14 @@ def _numbers(
                     raise UnreadError(row, str(problem)) from None
             if value is None and cell is not None and str(cell).strip():
                 raise UnreadError(
-                    row, f"{str(cell).strip()[:40]!r} in column {shortened(names[j])} is not a number{_remedy(cell)}"
+                    row,
+                    f"{str(cell).strip()[:40]!r} in column {shortened(names[j])} is not a number{remedy_for_cell(cell)}",
                 )
             found.append(math.nan if value is None else value)
     return np.frombuffer(found).reshape(-1, max(1, len(names)))
 
 
-def _remedy(cell: Any) -> str:
+def remedy_for_cell(cell: Any) -> str:
     """Remedy for a cell that is not a number."""
     if _nanoseconds(cell) is not None:
         return "; if it is the time, name the column with logs.time"

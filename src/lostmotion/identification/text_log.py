@@ -7,6 +7,7 @@ import itertools
 import re
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from typing import Any
 from ..errors import InputError
 from ..inputs.limits import check_memory
 from .logs import Log, reason
+from .odd_tables import odd_table_log
 from .tables import Row, UnreadError, plain_number, split_at_spaces, table_log
 
 PER_CELL = 11  # bytes of memory for a value while the table grows, measured
@@ -37,7 +39,7 @@ class Reading:
         """Cells of a line."""
         if self.separator == " ":
             return split_at_spaces(line)
-        return next(csv.reader([line], delimiter=self.separator))
+        return next(csv.reader([line], delimiter=self.separator, skipinitialspace=True))
 
     def number(self, cell: Any) -> float | None:
         """Number in a cell; None if the cell has no number."""
@@ -78,16 +80,29 @@ def read_text_log(path: Path, *, time: str = "", decimal: str = "") -> Log:
     cells = max(map(text.count, ",;\t ")) + text.count("\n") + 1
     check_memory(2 * sys.getsizeof(text) + PER_CELL * cells, str(path))
     problems: list[UnreadError] = []
-    for sign, separator in itertools.product(decimal or ".,", ";\t, "):
-        if sign == separator:
-            continue
-        reading = Reading(separator, sign)
+    ways = [
+        Reading(separator, sign) for sign, separator in itertools.product(decimal or ".,", ";\t, ") if sign != separator
+    ]
+    for reading in ways:
         comments: list[str] = []
         try:
             log = table_log(path, _rows(text, comments, reading), reading.number, comments, time)
         except UnreadError as problem:
             problems.append(problem)
             continue
+        return log if decimal else _announced(path, log, reading)
+    found: list[tuple[int, Log, Reading]] = []
+    for reading in ways:
+        comments = []
+        with suppress(UnreadError):
+            rows = list(_rows(text, comments, reading))
+            lost, log = odd_table_log(path, rows, reading.number, comments, time)
+            cell = reading.first[1]
+            if cell:
+                reading.first = next((n, cell) for n, cells in rows if cell in (c.strip() for c in cells))
+            found.append((lost, log, reading))
+    if found:
+        _, log, reading = min(found, key=lambda way: way[0])
         return log if decimal else _announced(path, log, reading)
     worst = max(problems, key=lambda problem: problem.row)
     raise InputError(f"{f'line {worst.row}: ' if worst.row else ''}{worst}", where=path)
