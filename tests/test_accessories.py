@@ -64,7 +64,7 @@ def test_an_actuator_is_judged_at_its_output():
     assert motor.rotor_inertia == pytest.approx(2.6e-4)
     gearbox = task_of(ARM).part("gearbox", np.array([0.0]))
     assert 1.0 + gearbox.losses.core()(1.0, 1.0) == pytest.approx(1.0 / 0.97, rel=1e-9)
-    assert np.abs(Axes(task_of(ARM)).motion().torque).max() == pytest.approx(peak, rel=1e-4)
+    assert np.abs(Axes(task_of(ARM)).motion(np.zeros(1)).torque).max() == pytest.approx(peak, rel=1e-4)
     assert found["inertia_ratio"].use == pytest.approx(0.08 / (81.0 * 2.6e-4) / 10.0, rel=1e-9)
 
 

@@ -111,7 +111,7 @@ def test_a_measured_motion_comes_from_a_file(tmp_path, slides: bool):
             'kind = "position"\n', 'kind = "position"\nsamples = { file = "profile.csv", interpolation = "cubic" }\n'
         )
     )
-    motion = Axes(lm.studies.load_task(file)).motion()
+    motion = Axes(lm.studies.load_task(file)).motion(np.zeros(1))
     amplitude = 0.045 if slides else math.radians(45.0)
     assert motion.position.max() == pytest.approx(2.0 * amplitude, rel=1e-4)
     assert at(motion, 1.0, motion.torque) == pytest.approx(-2.0 * amplitude * math.pi**2, rel=2e-3)

@@ -49,20 +49,19 @@ def test_the_sizing_example_that_hiwin_prints(tmp_path):
     study = task_of(tables)
     found = rules(study)
     force = found["motor_torque"].use * 1.8 * 33.8
-    # The guide carries 4 kg here, and 5 kg there: 0.1 N of friction less.
-    assert force == pytest.approx(41.92, abs=0.06)
+    assert force == pytest.approx(41.92, abs=0.02)
     assert force / 33.8 == pytest.approx(1.24, abs=5e-3)
     assert found["motor_torque"].use == pytest.approx(0.6889, abs=2e-3)
-    peak = 5.0 * 14.0625 + 0.01 * 4.0 * G
+    peak = 5.0 * 14.0625 + 0.01 * 5.0 * G
     assert found["current"].value.startswith(f"{peak / 33.8:.4g} A")
-    assert peak == pytest.approx(70.79, abs=0.1)
+    assert peak == pytest.approx(70.79, abs=0.02)
     assert {"inertia_ratio", "guide_friction"} & set(found) == set()
 
 
 def test_forces_voltage_and_heat_of_a_record():
     """Attraction presses on the guide; at the end of the acceleration the voltage of a phase is largest."""
     found = rules(task_of(TASK))
-    friction = 0.01 * (5.0 * G + PULL)
+    friction = 0.01 * ((5.0 + COIL) * G + PULL)
     peak = (5.0 + COIL) * 14.0625 + friction
     assert 187.0 * found["motor_peak_torque"].use == pytest.approx(peak, rel=1e-9)
     third = 0.5 / 1.875 / 2.0
@@ -99,14 +98,25 @@ def test_a_payload_presses_on_the_guide():
     assert tilted.drive.load.friction_torque == pytest.approx(0.01 * 5.0 * G * 0.5)
 
 
+@pytest.mark.parametrize("slope", [0.0, 30.0, 90.0])
+def test_the_coils_ride_on_the_guide(slope: float):
+    """They are accelerated, weigh on the guide and along its slope, and the brake holds them: 5 kg and 0.8 kg alike."""
+    tables = changed(slide={"inclination": f"{slope} deg"}, task={"brake": {"force": "60 N"}})
+    found, mass = rules(task_of(tables)), 5.0 + COIL
+    along, across = mass * G * math.sin(math.radians(slope)), mass * G * math.cos(math.radians(slope))
+    peak = mass * 14.0625 + 0.01 * (across + PULL) + along
+    assert 187.0 * found["motor_peak_torque"].use == pytest.approx(peak, rel=1e-9)
+    assert 60.0 * found["holding_brake"].use == pytest.approx(along, rel=1e-9, abs=1e-9)
+
+
 def test_a_vertical_linear_motor_needs_a_brake_on_its_slide():
     tables = changed(slide={"inclination": "90 deg"})
     missing = rules(task_of(tables))["holding_brake"]
     assert missing.verdict == "unknown"
     assert "task.brake.force" in missing.remark
     braked = rules(task_of({**tables, "task": tables["task"] | {"brake": {"force": "60 N"}}}))["holding_brake"]
-    # The brake holds the slide; the moving part of the motor is a part of it that the slide's mass does not contain.
-    assert 60.0 * braked.use == pytest.approx(5.0 * G, rel=1e-9)
+    # The brake holds the slide and the coils that ride on it.
+    assert 60.0 * braked.use == pytest.approx((5.0 + COIL) * G, rel=1e-9)
 
 
 def test_a_run_is_that_of_the_long_form_and_its_energy_closes():
@@ -114,7 +124,7 @@ def test_a_run_is_that_of_the_long_form_and_its_energy_closes():
     row = study.parameters(0, 1)[0]
     scenario = study.axis_at(row, 2)
     short = lm.simulate(scenario, energy=False)
-    slide = {"mass": 5.0, "friction_force": 0.01 * (5.0 * G + PULL)}
+    slide = {"mass": 5.0, "friction_force": 0.01 * ((5.0 + COIL) * G + PULL)}
     train = lm.Scenario(
         slides={"slide": slide},
         linear_motors={"coil": {"slide": "slide", "mass": COIL, "rated_force": 96.0, "peak_force": 187.0}},

@@ -170,7 +170,7 @@ def test_peak_current_voltage_and_inertia_ratio(demand: Any):
     findings = {f.rule: f for f in check_motor(demand, MOTOR, J, 25.0, 10.0)}
     peak = max(map(abs, motor_torques()))
     assert findings["current"].use == pytest.approx(peak / 0.1 / 20.0, rel=1e-7)
-    assert findings["inertia_ratio"].use == pytest.approx(J / RATIO**2 / (1e-5 + INERTIA_1) / 10.0, rel=1e-12)
+    assert findings["inertia_ratio"].use == pytest.approx((J / RATIO**2 + INERTIA_1) / 1e-5 / 10.0, rel=1e-12)
     # (2) at the end of acceleration, without the inductance: k_N E = M/M_R + (k_N - 1) w/w_R
     volts = 48.0 * (motor_torques()[0] / 0.4 + 9.0 * RATIO * SPEED / 400.0) / 10.0
     assert findings["voltage"].use == pytest.approx(volts / 48.0, rel=1e-6)
@@ -372,7 +372,7 @@ def test_ratios_of_one_s_own():
     for k in range(ran.sizes["pair"]):
         motor = lm.motor(str(ran["motor"].values[k]))
         i = float(ran["gearbox.ratio"][k])
-        by_hand = J / (i**2 * (motor.rotor_inertia + INERTIA_1))
+        by_hand = (J / i**2 + INERTIA_1) / motor.rotor_inertia
         assert float(ran["inertia_ratio"][k]) == pytest.approx(by_hand, rel=1e-12)
 
 

@@ -25,7 +25,7 @@ def task(name: str) -> Study:
 
 
 def motion(name: str) -> Any:
-    return Axes(task(name)).motion()
+    return Axes(task(name)).motion(task(name).parameters(0, 1)[0])
 
 
 def peak(values: np.ndarray) -> float:
@@ -185,7 +185,7 @@ FITS = {
     "conveyor": "bonfiglioli-lc070p-2-20, yaskawa-sgmuh-10da",
     "delta-joint": "bonfiglioli-lc070p-2-20, yaskawa-sgmph-04a",
     "indexing-table": "bonfiglioli-mp080-2-35, yaskawa-sgmph-04a",
-    "pick-and-place": "yaskawa-sgmah-04a",
+    "pick-and-place": "yaskawa-sgmsh-10aa",
     "press-feed": "bonfiglioli-sl070p-1-7, yaskawa-sgmsh-10aa",
     "rack-gantry": "bonfiglioli-tqf070-1-4, yaskawa-sgm7a-15a",
     "robot-shoulder": "harmonic-drive-shg-40-160-2uh, yaskawa-sgmsh-10aa",

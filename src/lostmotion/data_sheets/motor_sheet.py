@@ -64,6 +64,8 @@ class MotorSheet(described.MotorHeatFields, Record):
     """k_N, where it is known itself"""
     electrical_time_constant: Annotated[Time, Positive] | None = None
     max_speed: Annotated[Speed, Positive] | None = None
+    max_inertia_ratio: Annotated[Number, Positive] | None = None
+    """largest inertia of the load relative to that of the rotor"""
 
     @model_validator(mode="after")
     def _fits_kind(self) -> Self:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import model_validator
 
@@ -11,9 +11,7 @@ from ..errors import InputError
 from ..inputs import described
 from ..inputs.arguments import checked
 from ..inputs.described import MotorFields, ShaftMotorFields
-from ..inputs.quantities import (
-    Voltage,
-)
+from ..inputs.quantities import Number, Positive, Voltage
 from ..reproducible import total
 from ..units.practical import practical
 from .synchronous_motor import PhaseValues, Winding
@@ -24,6 +22,9 @@ MotorLaw = tuple[tuple[str, Any], ...]
 
 class MotorLimits(described.MotorHeatFields, described.MotorLimitsFields):
     """Limits of a motor. No run depends on them; the drive check compares with them."""
+
+    max_inertia_ratio: Annotated[Number, Positive] | None = None
+    """largest inertia of the load, gearbox included, at the motor relative to that of the rotor"""
 
     @model_validator(mode="after")
     def _one_resistance(self) -> Self:

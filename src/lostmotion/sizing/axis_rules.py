@@ -14,6 +14,7 @@ import numpy as np
 from ..model.duty import HoldingBrake
 from ..model.gearbox import Gearbox
 from ..model.linear import RatedScrew
+from ..model.motor import Motor
 from ..units.practical import ROUNDING, RPM, excess, share_of_limit, told_apart
 from .duty_cycle import integral
 from .finding import Finding, Mark, within
@@ -33,6 +34,8 @@ from .stages import BeltStage, RackStage, Stage
 
 HOUR = 3600.0
 BRAKE = "torque that the holding brake carries"
+STATIC = "static capacity of the screw"
+BUCKLING = "load at which the screw may buckle"
 
 
 def least(rule: str, what: str, value: float, wanted: float, unit: str, name: str) -> Finding:
@@ -89,18 +92,67 @@ def output_bearing(g: Gearbox, radial: float | None, axial: float | None) -> lis
     return found
 
 
-def emergency_stop(motion: RequiredMotion, g: Gearbox, deceleration: float) -> Finding:
-    """Torque at the gearbox output while the load is stopped at a rate from anywhere in the cycle: |T_hold - sgn(w) J a|.
+def stopping_torque(motion: RequiredMotion, deceleration: float, more: float = 0.0) -> float:
+    """Torque [N·m], of a slide force [N], that stops the load at a rate from anywhere in the cycle: |T_hold - sgn(w) J a|.
 
-    The friction of the load, which helps, is left out. Source: Harmonic Drive, selection procedure: momentary peak torque.
+    `more` is inertia that moves with the load. The friction of the load, which helps, is left out.
     """
     moving = motion.speed != 0.0
-    stop = motion.holding - np.sign(motion.speed) * motion.inertia * deceleration
-    peak = float(np.abs(stop[moving]).max(initial=0.0))
-    what = "output torque in an emergency stop"
+    stop = motion.holding - np.sign(motion.speed) * (motion.inertia + more) * deceleration
+    return float(np.abs(stop[moving]).max(initial=0.0))
+
+
+def emergency_stop(motion: RequiredMotion, g: Gearbox, deceleration: float) -> Finding:
+    """Torque at the gearbox output in an emergency stop. Source: Harmonic Drive, selection procedure: momentary peak torque."""
+    peak, what = stopping_torque(motion, deceleration), "output torque in an emergency stop"
     limit = g.limits and (g.limits.momentary_output_torque or g.limits.peak_output_torque)
     name, key = "momentary torque of the gearbox", "gearbox.limits.momentary_output_torque"
     return against("emergency_stop", what, peak, limit or None, "N·m", name, key)
+
+
+def stage_stop(motion: RequiredMotion, stage: Stage, deceleration: float) -> list[Finding]:
+    """Force on the stage in an emergency stop of its slide, with the ratings for the largest force of the cycle."""
+    force, rule = stopping_torque(motion, deceleration), "emergency_stop"
+
+    def judged(word: str, limit: float | None, name: str, key: str) -> Finding:
+        return against(rule, f"{word} in an emergency stop", force, limit, "N", name, key)
+
+    if isinstance(stage, RackStage):
+        return [judged("force along the rack", stage.peak_force or stage.rated_force, *_of_rack(stage))]
+    if isinstance(stage, BeltStage):
+        what, name = "force of the belt with pretension, in an emergency stop", "force of the belt in operation"
+        strained = belt_force(force, stage.pretension)
+        return [against(rule, what, strained, stage.rated_force, "N", name, "belt.rated_force")]
+    found = [judged("axial load of the screw", stage.static_capacity, STATIC, "screw.static_capacity")]
+    if stage.core_diameter is not None and stage.supported_length is not None:
+        found.append(judged("axial load of the screw against buckling,", _buckling(stage), BUCKLING, ""))
+    return found
+
+
+def motor_stop(motion: RequiredMotion, motor: Motor, deceleration: float) -> Finding:
+    """Force of a linear motor in an emergency stop, of the slide with its coils, with its peak force."""
+    force = stopping_torque(motion, deceleration, motor.rotor_inertia)
+    limit = None if motor.limits is None else motor.limits.peak_torque
+    name, key = "peak force of the motor", "linear_motor.peak_force"
+    return against("emergency_stop", "force of the motor in an emergency stop", force, limit, "N", name, key)
+
+
+def _of_rack(rack: RackStage) -> tuple[str, str]:
+    return f"{'peak' if rack.peak_force else 'rated'} force of the rack", "rack.rated_force"
+
+
+def _buckling(screw: RatedScrew) -> float:
+    """Largest axial load of a screw [N]."""
+    assert screw.core_diameter is not None
+    assert screw.supported_length is not None
+    longest = buckling_force(screw.core_diameter, screw.supported_length, screw.mounting)
+    return min(longest, compression_force(screw.core_diameter))
+
+
+def without_part(rule: str, part: str, key: str) -> Finding:
+    """A demand of a task that nothing of a candidate can be compared with."""
+    remark = f"the candidate has no {part}, which {key} is of; leave it out, or judge it apart"
+    return Finding(rule, rule.replace("_", " "), "not judged", "unknown", remark)
 
 
 def holding_brake(demand: InputDemand, brake: HoldingBrake | None, slide: RequiredMotion | None = None) -> Finding:
@@ -201,8 +253,8 @@ def screw_rules(load: AxialLoad, screw: RatedScrew, wanted_life: float | None, *
             found.append(missing("screw_life", what, f"{key}.dynamic_capacity"))
         else:
             found.append(least("screw_life", what, life / HOUR, wanted_life / HOUR, "h", "wanted life"))
-    what, name = "axial load of the screw, largest", "static capacity of the screw"
-    found.append(against("screw_static", what, peak, screw.static_capacity, "N", name, f"{key}.static_capacity"))
+    what = "axial load of the screw, largest"
+    found.append(against("screw_static", what, peak, screw.static_capacity, "N", STATIC, f"{key}.static_capacity"))
     what = "axial load of the screw against buckling"
     if screw.core_diameter is None or screw.supported_length is None:
         lacks = f"{key}.{'core_diameter' if screw.core_diameter is None else 'supported_length'}"
@@ -212,8 +264,7 @@ def screw_rules(load: AxialLoad, screw: RatedScrew, wanted_life: float | None, *
         ]
     else:
         d, length = screw.core_diameter, screw.supported_length
-        limit = min(buckling_force(d, length, screw.mounting), compression_force(d))
-        found.append(within("buckling", what, peak, limit, "N", "load at which the screw may buckle"))
+        found.append(within("buckling", what, peak, _buckling(screw), "N", BUCKLING))
         limit = critical_speed(d, length, screw.mounting)
         what, name = "speed of the screw against bending", "critical speed"
         found.append(within("critical_speed", what, RPM * fastest, RPM * limit, "rpm", name))
@@ -239,8 +290,7 @@ def belt_rules(motion: RequiredMotion, belt: BeltStage) -> list[Finding]:
 def rack_rules(motion: RequiredMotion, rack: RackStage) -> list[Finding]:
     """Largest force along a rack against its peak force, or else its rated one. Source: the data sheet."""
     peak, limit = float(np.abs(motion.torque).max()), rack.peak_force or rack.rated_force
-    what, name = "force along the rack, largest", f"{'peak' if rack.peak_force else 'rated'} force of the rack"
-    return [against("rack_force", what, peak, limit, "N", name, "rack.rated_force")]
+    return [against("rack_force", "force along the rack, largest", peak, limit, "N", *_of_rack(rack))]
 
 
 def derated(findings: list[Finding], share: float) -> list[Finding]:

@@ -25,7 +25,7 @@ RULES = {
     "winding_temperature": "maxon, Formulae Handbook, thermal behaviour; copper 0.39 %/K",
     "voltage": "voltage equation of the motor, u = R i + k w, without inductance",
     "current": "torque / torque constant",
-    "inertia_ratio": "rule of thumb of servo manufacturers: at most 10",
+    "inertia_ratio": "the motor's data sheet, or the rule of thumb of servo manufacturers: at most 10",
     "resonance": "two-mass oscillator; a command within a factor of 1.5",
     "dead_zone": "the run, and the commands that move the load from rest",
     "lost_motion": "virtual test rig; the limit is that of the task",
@@ -40,7 +40,7 @@ RULES = {
 TASK_RULES = {
     "gearbox_life": "L10h from the rated point, cubic or with limits.life_exponent: Harmonic Drive, CSF & CSG catalogue; ISO 281",
     "output_bearing": "the gearbox's data sheet",
-    "emergency_stop": "momentary peak torque: Harmonic Drive, CSF & CSG catalogue, selection procedure",
+    "emergency_stop": "momentary peak torque: Harmonic Drive, CSF & CSG catalogue, selection procedure; ratings of the stage",
     "holding_brake": "static torque of the brake against the load without friction: data sheets of servo motors",
     "screw_life": "L10h of the cubic mean load: ISO 3408-5; THK general catalogue, A-735",
     "screw_static": "static capacity against the largest load: THK general catalogue, A-733",

@@ -26,18 +26,34 @@ def load_torques(result: RunArrays) -> list[float]:
 
 
 def inertia(scenario: Scenario) -> Finding:
-    """Inertia of the load relative to that of the motor side."""
+    """Inertia of the load relative to that of the rotor."""
     return inertia_ratio(scenario.motor, scenario.gearbox, scenario.load.inertia)
 
 
-def inertia_ratio(motor: Motor, gearbox: Gearbox, load_inertia: float, largest: float = INERTIA_RATIO) -> Finding:
-    """The same, of parts, with the largest permissible ratio."""
-    ratio = load_inertia / (gearbox.ratio**2 * (motor.rotor_inertia + gearbox.inertia))
+def ratio_of_inertias(motor: Motor, gearbox: Gearbox, load_inertia: float) -> float:
+    """Inertia of all that the rotor moves, at the motor, over that of the rotor with its brake.
+
+    The limits of manufacturers are for this ratio: screw, coupling, pulleys and gearbox belong to the load.
+    Source: Yaskawa, selection examples of servo motors, J_L = J_table + J_screw + J_coupling + J_gear.
+    """
+    return (load_inertia / gearbox.ratio**2 + gearbox.inertia) / motor.rotor_inertia
+
+
+def inertia_ratio(motor: Motor, gearbox: Gearbox, load_inertia: float, wanted: float | None = None) -> Finding:
+    """The same, of parts, with the largest permissible ratio: the one that is wanted and that of the manufacturer, or else 10."""
+    ratio = ratio_of_inertias(motor, gearbox, load_inertia)
+    printed = None if motor.limits is None else motor.limits.max_inertia_ratio
+    largest = min((limit for limit in (wanted, printed) if limit is not None), default=INERTIA_RATIO)
     far = ratio > largest
-    remark = f"above {largest:g} the load is hard to control from the motor side" if far else ""
+    whose = (
+        ", the limit of the motor's manufacturer"
+        if largest == printed
+        else " the load is hard to control from the motor"
+    )
+    remark = f"above {largest:g}{whose}" if far else ""
     return Finding(
         "inertia_ratio",
-        "inertia of the load / of the motor side",
+        "inertia of load and gearbox / of the rotor",
         f"{ratio:.3g}",
         "warning" if far else "ok",
         remark,

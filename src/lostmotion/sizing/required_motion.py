@@ -183,12 +183,12 @@ def check_motor(
     motor: Motor,
     load_inertia: float,
     ambient: float,
-    largest: float | None,
+    largest: float | None = None,
     *,
     slides: bool = False,
 ) -> list[Finding]:
-    """The rules for a motor at this gearbox, or with `slides` for a linear motor. `largest` is the largest permissible ratio of
-    the inertias; None: it is not judged."""
+    """The rules for a motor at this gearbox, or with `slides` for a linear motor, whose ratio of inertias is not judged. `largest` is
+    the largest wanted ratio of the inertias."""
     torque = demand.motor_torque(motor)
     cycle = demand.cycle(torque)
     rise = rms_rise(motor, cycle.rms_motor_torque, ambient)
@@ -198,5 +198,5 @@ def check_motor(
         *heat(motor, cycle, ambient, rise=rise, slides=slides),
         voltage(motor, needed_command(motor, torque, demand.speed), torque, demand.speed),
         current(motor, torque),
-        *([] if largest is None else [inertia_ratio(motor, demand.whole, load_inertia, largest)]),
+        *([] if slides else [inertia_ratio(motor, demand.whole, load_inertia, largest)]),
     ]

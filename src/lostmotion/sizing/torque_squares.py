@@ -1,7 +1,7 @@
 """Mean and variance of a motor's torque over intervals of the exact run, whatever the samples of a result are.
 
 Between switchings, input breakpoints and sample instants of controllers the torque is analytic. There its square is integrated by the
-Gauss-Kronrod pair of 3 and 7 points, at instants that a run of their own records; where both rules differ, the piece is halved.
+Gauss-Kronrod pair of 3 and 7 points, at instants that a run of their own records. Where both rules differ, the piece is halved.
 """
 
 from __future__ import annotations

@@ -28,13 +28,14 @@ from ..inputs.quantities import (
     Whole,
 )
 from ..inputs.validation import unknown_key
+from ..model.angle_torques import STANDARD_GRAVITY
 from ..model.duty import Amplifier, Duty, HoldingBrake, Supply
 from ..model.motor import Motor, MotorLimits
 from ..model.signals import TimeFunction, TorqueSignal
 from ..model.task import Task
+from ..simulation.drive_tables import LoadTable
 from ..simulation.scenario import Scenario
 from ..sizing.finding import SOURCES
-from ..sizing.motion_check import INERTIA_RATIO
 from .select import Bound
 
 REPEATS = 0.01  # relative difference of two cycles, within which the motion repeats
@@ -62,6 +63,13 @@ class LinearAxis(Part):
     rise: Annotated[Number, Limit(ge=-1.0, le=1.0)] = 0.0
     """sine of the slide's inclination"""
 
+    def carrying(self, load: LoadTable, mass: float) -> LoadTable:
+        """The load with the weight of a mass [kg] that rides on the slide: along the slope, and on the guide with its friction."""
+        weight = mass * STANDARD_GRAVITY
+        friction = (self.guide_friction or 0.0) * weight * math.sqrt(1.0 - self.rise * self.rise)
+        torque = load.torque.model_copy(update={"mean": load.torque.mean + weight * self.rise})
+        return load.model_copy(update={"torque": torque, "friction_torque": load.friction_torque + friction})
+
 
 class InnerLoop(Part):
     """The current loop of a task, apart from its controller."""
@@ -76,8 +84,8 @@ class AxisTask(Task, Duty):
     """after which the motion repeats, pause included"""
     max_cycles: Annotated[Whole, Field(ge=FEWEST, le=1000)] = 4
     """largest number of cycles to run, until two of them agree within 1 %"""
-    max_inertia_ratio: Annotated[Number, Positive] = INERTIA_RATIO
-    """largest inertia of the load relative to the motor side"""
+    max_inertia_ratio: Annotated[Number, Positive] | None = None
+    """largest inertia of load, stage and gearbox at the motor relative to the rotor; left out, that of the motor's manufacturer, or else 10"""
     max_tracking_error: Annotated[Angle, Positive] | None = None
     """largest tracking error of the load over the cycle"""
     max_reversal_error: Annotated[Angle, Positive] | None = None
@@ -131,6 +139,8 @@ class AxisTask(Task, Duty):
                 )
             if self.linear is not None and payload.inertia > 0.0:
                 raise InputError("a slide has no use for it; give the mass of the payload", f"payload[{k}].inertia")
+            if self.linear is not None and payload.radius is not None:
+                raise InputError("a slide has no use for it; leave it out", f"payload[{k}].radius")
             if self.linear is None and payload.mass > 0.0 and payload.radius is None:
                 raise InputError("is missing; give the radius of the payload from the axis", f"payload[{k}].radius")
         if self.amplifier is not None and self.supply is not None and self.supply.continuous_current is not None:

@@ -33,7 +33,7 @@ COLUMNS = {
     "output_torque_mean": ("N*m", "cubic mean of that torque, weighted with speed: what its life depends on"),
     "input_speed_peak": ("rad/s", "largest speed of the gearbox input"),
     "input_speed_mean": ("rad/s", "mean speed of the gearbox input"),
-    "inertia_ratio": ("1", "inertia of the load / of the motor side"),
+    "inertia_ratio": ("1", "inertia of the load with its payload, stage and gearbox at the motor / of the rotor"),
     "tracking_error_peak": ("rad", "largest distance of the load from its reference"),
     "tracking_error_rms": ("rad", "rms distance of the load from its reference"),
     "reversal_error": ("rad", "load at rest after forward moves less that after backward ones, magnitude"),
@@ -75,7 +75,6 @@ OF_ROTARY_MOTORS = (
     "output_torque_mean",
     "input_speed_peak",
     "input_speed_mean",
-    "inertia_ratio",
     "speed_gain",
     "integral_gain",
 )
@@ -149,13 +148,23 @@ def temperatures_of(motor: Motor, time: np.ndarray, square: np.ndarray, ambient:
     return math.nan if rise is None else ambient + rise, math.nan
 
 
+def columns_of_gearbox(duty: DutyCycle) -> dict[str, float]:
+    """Torque and speed of the gearbox over a cycle."""
+    return {
+        "output_torque_peak": float(np.abs(duty.output_torque).max()),
+        "output_torque_mean": duty.mean_output_torque,
+        "input_speed_peak": duty.peak_input_speed,
+        "input_speed_mean": duty.mean_input_speed,
+    }
+
+
 def row_of(run: Repeated, *, slides: bool = False) -> dict[str, float]:
     """The columns of one run; `slides`: of a linear motor, which has no torque, no input shaft and no ratio of inertias."""
     scenario, result, here, duty = run.scenario, run.result, run.cycles.last, run.duty
     time = result.time[here]
     e = Electrical.of(scenario, result, here)
     winding, case = temperatures_of(scenario.motor, time, e.heating_square, run.cycles.task.ambient_temperature)
-    g, torque = scenario.gearbox, result["motor_torque"][here]
+    torque = result["motor_torque"][here]
     power = torque * result["motor_speed"][here]
     given = 0.5 * (power[1:] + power[:-1]) * np.diff(time)
     controller = scenario.controller
@@ -173,11 +182,7 @@ def row_of(run: Repeated, *, slides: bool = False) -> dict[str, float]:
         "motor_torque_rms": mean,
         "winding_temperature": winding,
         "case_temperature": case,
-        "output_torque_peak": float(np.abs(duty.output_torque).max()),
-        "output_torque_mean": duty.mean_output_torque,
-        "input_speed_peak": duty.peak_input_speed,
-        "input_speed_mean": duty.mean_input_speed,
-        "inertia_ratio": scenario.load.inertia / (g.ratio**2 * (scenario.motor.rotor_inertia + g.inertia)),
+        **columns_of_gearbox(duty),
         "tracking_error_peak": float(np.abs(error).max()),
         "tracking_error_rms": rms(error),
         **_at_rest(run.cycles, error),

@@ -12,21 +12,25 @@ import numpy as np
 from ..data_sheets.linear_sheets import LinearMotorSheet
 from ..errors import InputError, Problem
 from ..model.gearbox import Gearbox
+from ..model.linear import RatedScrew
 from ..model.motor import Motor
-from ..simulation.scenario import Scenario
 from ..sizing.axis_rules import (
     derated,
     emergency_stop,
     gearbox_life,
     holding_brake,
     missing,
+    motor_stop,
     output_bearing,
     stage_rules,
+    stage_stop,
     with_safety,
+    without_part,
 )
 from ..sizing.finding import Finding
 from ..sizing.formulas import derating
 from ..sizing.gearbox_check import input_speeds, loads, lost_motion
+from ..sizing.motion_check import ratio_of_inertias
 from ..sizing.motor_check import command_of_run, current, heat, largest_speed, peak_torque, voltage
 from ..sizing.motor_run import oriented_amplitudes
 from ..sizing.required_motion import (
@@ -41,7 +45,7 @@ from ..sizing.stages import DIRECT, Stage, at_input, together
 from ..sizing.supply import amplifier_rules, effective_current, electrical_power, returned, supply_rules
 from ..worker_threads import thread_pool
 from .axis import AxisTask, reference_of
-from .axis_columns import COLUMNS, Repeated, row_of
+from .axis_columns import COLUMNS, Repeated, columns_of_gearbox, row_of
 from .axis_run import until_it_repeats
 from .check import BETWEEN, ESTIMATED, MISSING, columns_of
 from .check import TASK_COLUMNS as CHECKS
@@ -71,18 +75,15 @@ class Axes:
         assert task is not None
         return task
 
-    def motion(self) -> RequiredMotion:
-        """One cycle at the load of the base scenario."""
-        base, task = self._base, self.task
+    def motion(self, row: np.ndarray) -> RequiredMotion:
+        """One cycle of the load of a row."""
+        base, task = self.study.base_of(row), self.task
+        of_coils = self.study.part_key("motor", row) if self.study.slides_itself(row) else ()
         found = self._once(
-            ("motion",), lambda: required_motion(reference_of(base), base.load, task.cycle, task, task.rise)
+            ("motion", of_coils), lambda: required_motion(reference_of(base), base.load, task.cycle, task, task.rise)
         )
         assert isinstance(found, RequiredMotion)
         return found
-
-    @property
-    def _base(self) -> Scenario:
-        return self.study.drive
 
     def _once(self, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
         """Value that is made at most once; an error is kept as such."""
@@ -120,7 +121,7 @@ class Axes:
 
     def _stage(self, row: np.ndarray) -> tuple[Stage, RequiredMotion, list[Finding]]:
         stage: Stage = self.study.part("stage", row)
-        motion = self.motion()
+        motion = self.motion(row)
         return stage, at_input(motion, stage), stage_rules(motion, stage, self.task.life)
 
     def _demand(self, row: np.ndarray) -> tuple[InputDemand, list[Finding]]:
@@ -128,7 +129,7 @@ class Axes:
         stage, task = self.stage(row), self.task
         findings: list[Finding] = []
         if stage is None:
-            demand = input_demand(self.motion(), g)
+            demand = input_demand(self.motion(row), g)
         else:
             demand = input_demand(stage[1], g, together(g, stage[0]))
             findings += stage[2]
@@ -140,9 +141,23 @@ class Axes:
                 rate = task.emergency_stop * (1.0 if stage is None else stage[0].ratio())
                 findings.append(emergency_stop(demand.motion, g, rate))
             findings += output_bearing(g, task.radial_force, task.axial_force)
+        else:
+            findings += self._without_gearbox(stage is not None and isinstance(stage[0], RatedScrew))
+        if stage is not None and task.emergency_stop is not None:
+            findings += stage_stop(self.motion(row), stage[0], task.emergency_stop)
         if task.max_lost_motion is not None:
             findings.append(lost_motion(demand.whole, task.max_lost_motion, slides=task.linear is not None))
         return demand, findings
+
+    def _without_gearbox(self, screw: bool) -> list[Finding]:
+        """Findings for demands of the task on a gearbox that a candidate does not have."""
+        task, found = self.task, list[Finding]()
+        for key in ("radial_force", "axial_force"):
+            if getattr(task, key) is not None:
+                found.append(without_part("output_bearing", "gearbox", f"task.{key}"))
+        if task.life is not None and not screw:
+            found.append(without_part("gearbox_life", "gearbox or screw", "task.life"))
+        return found
 
     def motor(self, row: np.ndarray) -> Motor | InputError:
         """The motor of a row."""
@@ -165,12 +180,19 @@ class Axes:
             )
         if lacking:
             return InputError(problems=[Problem((), text) for text in lacking])
-        task, load, slides = self.task, float(self.motion().inertia.max()), self.study.slides_itself(row)
-        largest = None if slides else task.max_inertia_ratio
-        found = check_motor(demand, motor, load, task.ambient_temperature, largest, slides=slides)
+        task, load, slides = self.task, float(self.motion(row).inertia.max()), self.study.slides_itself(row)
+        found = check_motor(demand, motor, load, task.ambient_temperature, task.max_inertia_ratio, slides=slides)
         if slides:
             found += self._attraction(row)
-        return self._under_task([*findings, *found, *self._supplied(demand, motor)], motor)
+            if task.emergency_stop is not None:
+                found.append(motor_stop(self.motion(row), motor, task.emergency_stop))
+            if task.max_inertia_ratio is not None:
+                found.append(without_part("inertia_ratio", "shaft", "task.max_inertia_ratio"))
+        found = [*findings, *found, *self._supplied(demand, motor)]
+        judged = {f.rule for f in found}
+        for rule in (rule for rule in task.safety_factors if rule not in judged):
+            found.append(without_part(rule, "finding by this rule", f"task.safety_factors.{rule}"))
+        return self._under_task(found, motor)
 
     def _braked(self, row: np.ndarray, demand: InputDemand) -> list[Finding]:
         """The rule of the holding brake, where the load has to be held or a brake is given."""
@@ -180,7 +202,7 @@ class Axes:
         brake = (
             None if self.study.slides_itself(row) and not (task.brake and task.brake.force) else self.study.brake(row)
         )
-        return [holding_brake(demand, brake, None if task.linear is None else self.motion())]
+        return [holding_brake(demand, brake, None if task.linear is None else self.motion(row))]
 
     def _attraction(self, row: np.ndarray) -> list[Finding]:
         """Not judged: the friction that the attraction of a linear motor causes on a guide of unknown friction."""
@@ -197,6 +219,15 @@ class Axes:
         records = self.study.records(row)
         return {column: value_of(column, records) for column in CHOICE}
 
+    def _without_run(self, row: np.ndarray) -> Row:
+        """The columns that need no run."""
+        known = {column: value for column, (value, _) in self.choice(row).items()}
+        gearbox, motor = self.gearbox(row), self.motor(row)
+        if isinstance(gearbox, InputError) or isinstance(motor, InputError) or self.study.slides_itself(row):
+            return known
+        ratio = ratio_of_inertias(motor, gearbox[0].whole, float(self.motion(row).inertia.max()))
+        return known | {"inertia_ratio": ratio}
+
     def _chosen(self, row: np.ndarray, findings: list[Finding]) -> tuple[list[Finding], list[str]]:
         """Findings with those of the limits of the choice, and what the records lack for limits and objectives."""
         task, select = self.task, self.study.select
@@ -210,7 +241,10 @@ class Axes:
             if kinds and (limit is not None or column in named):
                 by = f"task.{CHOICE[column].limit}" if limit is not None else f"select for {column}"
                 lacking.append(lacks(column, kinds, by))
-            elif limit is not None and not math.isnan(value):
+            elif limit is not None and math.isnan(value):
+                part = f"part that is a record with {CHOICE[column].key}"
+                found.append(without_part(column, part, f"task.{CHOICE[column].limit}"))
+            elif limit is not None:
                 found.append(judged_choice(column, value, limit))
         return found, lacking
 
@@ -228,7 +262,9 @@ class Axes:
             found += amplifier_rules(motion.time, current, motion.cycle, amplifier, bus)
         if supply is None:
             return found
-        if supply.voltage_limit is not None or supply.capacitance is not None:
+        used = ("voltage_limit", "capacitance", "brake_resistance", "brake_power")
+        asked = any(getattr(supply, key) is not None for key in used)
+        if asked or (supply.max_voltage is not None and (amplifier is None or amplifier.max_dc_voltage is None)):
             power = electrical_power(demand, motor)
             unknown = bool(np.isnan(power).any())
             back = None if unknown else returned(demand.motion.time, power, demand.motion.cycle)
@@ -250,7 +286,19 @@ class Axes:
             return CHECKS | {"violated": NO_DATA, "why": str(found), MISSING: lacking}
         if not any(f.verdict == "warning" for f in found):
             return None
-        return columns_of(found, CHECKS) | {column: value for column, (value, _) in self.choice(row).items()}
+        return columns_of(found, CHECKS) | self._without_run(row) | self._required(row)
+
+    def _required(self, row: np.ndarray) -> Row:
+        """The columns of a pair that is not run, for the motion that the task requires."""
+        gearbox, motor = self.gearbox(row), self.motor(row)
+        if isinstance(gearbox, InputError) or isinstance(motor, InputError):
+            return {}
+        torque = gearbox[0].motor_torque(motor)
+        cycle = gearbox[0].cycle(torque)
+        slides = self.study.slides_itself(row)
+        of_motor, peak = f"motor_{'force' if slides else 'torque'}", float(np.abs(torque).max())
+        found = {f"{of_motor}_peak": peak, f"{of_motor}_rms": cycle.rms_motor_torque}
+        return found if slides else found | columns_of_gearbox(cycle)
 
     def verdict_at_ends(self, row: np.ndarray, own: tuple[str, ...]) -> str:
         """Verdict over the range of estimated losses; empty where the losses are printed.
@@ -316,8 +364,7 @@ class Axes:
         made = until_it_repeats(self.study, row)
         columns = row_of(made, slides=self.study.slides_itself(row))
         found = self._after_run(row, made, columns["winding_temperature"])
-        chosen = {column: value for column, (value, _) in self.choice(row).items()}
-        return columns_of(found, CHECKS) | columns | chosen, int(made.result.attrs["switching_count"])
+        return columns_of(found, CHECKS) | columns | self._without_run(row), int(made.result.attrs["switching_count"])
 
     def _after_run(self, row: np.ndarray, made: Repeated, winding: float) -> list[Finding]:
         """The same rules, of the cycle that was run, and the temperature of its winding [°C]; those that only the required motion
@@ -352,14 +399,24 @@ class Axes:
 
 def run_axes(study: Study, parameters: np.ndarray, threads: int) -> Runs:
     """The pairs of a piece: first the rules for all of them, then the runs of those that pass, on several threads."""
-    axes, n = Axes(study), len(parameters)
-    rows = [axes.refused(row) for row in parameters]
+    n = len(parameters)
+    rows: list[Row | None] = [None] * n
     errors, switchings = [""] * n, np.zeros(n)
+    tasks: list[tuple[Axes, np.ndarray]] = []
+    for k, parameter in enumerate(parameters):
+        try:
+            one, own = study.at(parameter)
+        except InputError as error:
+            one, own, errors[k], rows[k] = study, parameter, str(error), dict(CHECKS)
+        tasks.append((Axes(one), own))
+        if not errors[k]:
+            rows[k] = tasks[k][0].refused(own)
     waiting = [k for k, row in enumerate(rows) if row is None]
 
     def measure(k: int) -> Row:
+        axes, own = tasks[k]
         try:
-            row, switchings[k] = axes.measured(parameters[k])
+            row, switchings[k] = axes.measured(own)
         except (RuntimeError, ValueError) as error:
             errors[k] = str(error)
             return dict(CHECKS)
@@ -369,7 +426,7 @@ def run_axes(study: Study, parameters: np.ndarray, threads: int) -> Runs:
         for k, row in zip(waiting, pool.map(measure, waiting), strict=True):
             rows[k] = row
         judged = [k for k, row in enumerate(rows) if row is not None and not errors[k] and row["violated"] != NO_DATA]
-        ends = pool.map(lambda k: axes.verdict_at_ends(parameters[k], axes.over(rows[k] or {})), judged)
+        ends = pool.map(lambda k: tasks[k][0].verdict_at_ends(tasks[k][1], tasks[k][0].over(rows[k] or {})), judged)
         for k, verdict in zip(judged, ends, strict=True):
             rows[k] = {**(rows[k] or {}), ESTIMATED: verdict}
     whole = [row or {} for row in rows]

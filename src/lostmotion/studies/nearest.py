@@ -143,8 +143,8 @@ def _tried(study: Study, miss: Miss) -> Miss:
     """With the least factor by which the cycle has to be longer, if there is one, and what rules and run say of it."""
     if same := dict.fromkeys("its parts" if limit in CHOICE else limit for limit in miss.lacks if limit in AT_ANY_TIME):
         return replace(miss, then=f"a slower cycle does not change {', '.join(same)}")
-    row = study.parameters(miss.candidate.run, miss.candidate.run + 1)[0]
     try:
+        study, row = study.at(study.parameters(miss.candidate.run, miss.candidate.run + 1)[0])
         if miss.candidate.ran:
             return _run_slower(study, miss, row)
         factor = least_factor(study, row)

@@ -188,7 +188,7 @@ def prices(ranked: list[Candidate], select: Selection) -> list[Price]:
     out = []
     for limit in limits:
         alone = [c for c in ranked if set(c.violated) == {limit}]
-        known = [c for c in alone if not math.isnan(c.values[objective])]  # what the rules refuse has no run
+        known = [c for c in alone if c.ran and not math.isnan(c.values[objective])]
         without = min(known + ([best] if best else []), key=lambda c: _rank(c, select), default=None)
         gain = math.nan
         if best is not None and without is not None and best.values[objective] != 0.0:

@@ -2,8 +2,8 @@
 
 import itertools
 import math
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
@@ -27,6 +27,7 @@ from .axis_scenario import axis_scenario, with_scale_alone
 from .check import ESTIMATED
 from .design import unit_cube
 from .expressions import Expression, read_expression
+from .own_keys import COMMON, with_value
 from .records import is_condition, kind_of_record, name_key, names_a_record, owner_of, with_records
 from .select import SHARES, TASK_SHARES, USE, Selection, check_bounds
 from .vary import Vary, base_value, check_key, check_spelling, scaled
@@ -62,7 +63,7 @@ class Study(Part):
     runs: Annotated[Whole, Field(ge=1, le=MAX_RUNS)] | None = None
     """number of runs of a random design; for saltelli the base samples, a power of two"""
     seed: Annotated[Whole, Field(ge=0)] = 0
-    vary: tuple[Vary, ...] = Field(min_length=1)
+    vary: tuple[Vary, ...] = ()
     keep: dict[str, str] = Field(default={})
     """column = expression of the result variables, such as peak(load_speed) or energy.gear_losses"""
     trajectories: Trajectories | None = None
@@ -70,7 +71,11 @@ class Study(Part):
     """criteria of the runs that fit the task, and of the best of these"""
     axis: AxisTask | None = None
     """each run is a cycle of this task, under gains by rule; it keeps the columns of `axis_columns.COLUMNS`"""
+    task_tables: dict[str, Any] = Field(default={})
+    """tables of the task, where keys of its own vary"""
 
+    of_tables: ClassVar[Callable[[dict[str, Any]], "Study"]]
+    """makes the study of the tables of a task; set by `task_file`, which knows them"""
     _bases: dict[tuple[Any, ...], Scenario] = PrivateAttr(default_factory=dict)
     _vocabulary: Vocabulary | None = PrivateAttr(default=None)
     _kept: dict[Any, Any] = PrivateAttr(default_factory=dict)
@@ -88,6 +93,8 @@ class Study(Part):
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
+        if not self.vary and self.axis is None:
+            raise ValueError("lacks [[vary]], which says what differs from run to run; add one")
         self._check_names()
         self._check_keys()
         self._check_design()
@@ -116,14 +123,38 @@ class Study(Part):
             raise ValueError(
                 "is the task of a drive train, but only a drive can be selected; write the short form"
             ) from None
-        for key in (key for v in self.vary for key in v.all_keys):
-            if key.split(".", maxsplit=1)[0] not in ("gearbox", "motor") and not self._is_own(key):
-                raise ValueError(f"varies {key}, but of a task motor, gearbox and stage vary; change it in the task")
         task.check(drive)
 
     def _is_own(self, key: str) -> bool:
-        """Whether it is a key of a task alone: that of a whole drive, or of the last stage of a linear one."""
-        return self.axis is not None and (key in WHOLE or key == self.axis.stage_kind)
+        """Whether it is a key of a task, and none of its motor or gearbox."""
+        return self.axis is not None and key.split(".", maxsplit=1)[0] not in ("gearbox", "motor")
+
+    def at(self, row: np.ndarray) -> tuple["Study", np.ndarray]:
+        """The study with the values of a row at keys that are none of motor or gearbox, and the row without these.
+
+        Raises
+        ------
+        InputError
+            There is no such task.
+        """
+        own = [k for k, v in enumerate(self.vary) if v.unit_of_values is not None]
+        if not own:
+            return self, row
+        values = [(k, float(row[k])) for k in own if not math.isnan(row[k])]
+        key = ("at", *values)
+        if key not in self.kept:
+            tables = self.task_tables
+            for k, value in values:
+                tables = with_value(tables, self.vary[k].model_dump(), value)
+            entries = [v for k, v in enumerate(tables["vary"]) if k not in own]
+            try:
+                self.kept[key] = type(self).of_tables({**tables, "vary": entries})
+            except InputError as error:
+                self.kept[key] = error
+        found = self.kept[key]
+        if isinstance(found, InputError):
+            raise found
+        return found, np.delete(row, own)
 
     def _check_names(self) -> None:
         titles = [v.title for v in self.vary]
@@ -268,6 +299,9 @@ class Study(Part):
         InputError
             There is no such scenario.
         """
+        one, row = self.at(row)
+        if one is not self:
+            return one.axis_at(row, cycles)
         motor, gearbox = self.part("motor", row), self.part("gearbox", row)
         assert self.axis is not None
         if self.axis.linear is not None and not self.slides_itself(row):
@@ -275,8 +309,16 @@ class Study(Part):
         return axis_scenario(self.base_of(row), motor, gearbox, self.axis, cycles)
 
     def base_of(self, row: np.ndarray) -> Scenario:
-        """The base of a row of a task: of a linear motor with the scale alone."""
-        return with_scale_alone(self.drive) if self.slides_itself(row) else self.drive
+        """The base of a row of a task: of a linear motor with the scale alone, and the weight of its coils on the guide."""
+        if not self.slides_itself(row):
+            return self.drive
+        key = ("base", self.part_key("motor", row))
+        if key not in self.kept:
+            assert self.axis is not None
+            assert self.axis.linear is not None
+            base, coils = with_scale_alone(self.drive), float(self.part("motor", row).rotor_inertia)
+            self.kept[key] = base.model_copy(update={"load": self.axis.linear.carrying(base.load, coils)})
+        return self.kept[key]  # type: ignore[no-any-return]
 
     def _with_stage(self, gearbox: Any, row: np.ndarray) -> Any:
         """A gearbox and the stage of a row behind it as one, made once."""
@@ -447,9 +489,18 @@ class Study(Part):
         places = {k: v.all_keys[0] for k, v in enumerate(self.vary)}
         if self.axis is None:
             return [list(places)]
-        pairs = [k for k, key in places.items() if key not in WHOLE]
-        stages = [k for k, key in places.items() if key == self.axis.stage_kind]
-        whole = [[*(() if key in LINEAR else stages), k] for k, key in places.items() if key in WHOLE]
+        table = {k: key.split(".")[0] for k, key in places.items()}
+        pairs = [k for k in places if table[k] not in WHOLE]
+        stages = [k for k in places if table[k] == self.axis.stage_kind]
+        whole = [
+            [
+                *(k for k in places if table[k] in COMMON or (table[k] == key and k != place)),
+                *(() if key in LINEAR else stages),
+                place,
+            ]
+            for place, key in places.items()
+            if key in WHOLE
+        ]
         return ([pairs] if self.axis.pairs else []) + whole
 
     def _size(self, grid: list[int]) -> int:

@@ -28,6 +28,7 @@ from ..sizing.stages import DIRECT, STAGES, stage_of
 from ..sizing.whole_drives import BESIDE, LINEAR, WHOLE
 from .axis import AxisTask, InnerLoop
 from .file import find_sheets
+from .own_keys import with_first
 from .records import kind_of_record, names_that_fit
 from .select import Selection
 from .study import Study
@@ -117,18 +118,19 @@ def task_of(tables: dict[str, Any], directory: Path = Path()) -> Study:
     for key in tables:
         if key not in TABLES:
             raise InputError(unknown_key(key, TABLES), key)
-    tables = _relative(_with_candidates(tables), directory)
+    given = _relative(_with_candidates(tables), directory)
+    tables = with_first(given)
     linear = linear_axis(tables)
     for key in ("task", "load" if linear is None else "slide", "controller"):
         if not isinstance(tables.get(key), dict):
             raise InputError(f"must be a table [{key}]; add it", key)
     tables = {**tables, "task": use_accessories(tables["task"])}
-    given = tables["task"]
+    wanted = tables["task"]
     if linear is not None:
         tables = {**tables, **in_translation(tables)}
-        given = tables["task"] | {"linear": linear}
+        wanted = tables["task"] | {"linear": linear}
     with inside("task"):
-        task = AxisTask(**given)
+        task = AxisTask(**wanted)
     controller = _controller(tables["controller"])
     current, controller = _apart(controller)
     vary = _vary(tables, directory)
@@ -149,21 +151,28 @@ def task_of(tables: dict[str, Any], directory: Path = Path()) -> Study:
         _with_parts(written, vary, linear=linear is not None)
     else:
         written |= {"motor": NO_PAIR, "gearbox": DIRECT.model_dump()}
-    select = tables.get("select", {})
-    if not isinstance(select, dict):
-        raise InputError(f"{shown(select)} must be a table, such as [select]", "select")
-    limits = {name: bound.model_dump(exclude_none=True) for name, bound in task.limits().items()}
-    usual = OF_TORQUE_SOURCES if _torque_sources(written, vary) else OBJECTIVES
-    with inside("select"):
-        chosen = Selection(**{"objectives": usual} | select | {"limits": limits | select.get("limits", {})})
     return Study(
         title=written["title"],
         scenario=Scenario(**written),
         written=written,
         vary=tuple(vary),
         axis=task,
-        select=chosen,
+        select=_selection(tables, task, usual=OF_TORQUE_SOURCES if _torque_sources(written, vary) else OBJECTIVES),
+        task_tables={**given, "vary": vary} if any("unit_of_values" in entry for entry in vary) else {},
     )
+
+
+Study.of_tables = staticmethod(task_of)
+
+
+def _selection(tables: dict[str, Any], task: AxisTask, *, usual: dict[str, str]) -> Selection:
+    """The table `[select]` with the limits of the task, or the usual objectives."""
+    select = tables.get("select", {})
+    if not isinstance(select, dict):
+        raise InputError(f"{shown(select)} must be a table, such as [select]", "select")
+    limits = {name: bound.model_dump(exclude_none=True) for name, bound in task.limits().items()}
+    with inside("select"):
+        return Selection(**{"objectives": usual} | select | {"limits": limits | select.get("limits", {})})
 
 
 def _with_parts(written: dict[str, Any], vary: list[Any], *, linear: bool) -> None:
@@ -220,9 +229,9 @@ def _torque_sources(written: dict[str, Any], vary: list[Any]) -> bool:
         find(name, entry["key"]).level() in (FORCE_SOURCE, TORQUE_SOURCE) for entry in whole for name in _names(entry)
     ):
         return True
-    varied = [entry for entry in vary if isinstance(entry, dict) and str(entry.get("key")).split(".")[0] == "motor"]
-    names = [name for entry in varied if kind_of_record(str(entry["key"])) for name in _names(entry)]
-    if not varied:
+    records = [entry for entry in vary if isinstance(entry, dict) and kind_of_record(str(entry.get("key"))) == "motor"]
+    names = [name for entry in records for name in _names(entry)]
+    if not records:
         given = written["motor"]
         if "from" not in given:
             return bool(given.get("kind") == "torque_source")

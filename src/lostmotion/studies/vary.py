@@ -52,6 +52,8 @@ class Vary(Part):
     """column in the result; the first key if left out"""
     relative: Switch = False
     """the value multiplies what the base scenario has (of a list, each entry)"""
+    unit_of_values: str | None = None
+    """SI unit of the values, where the key alone does not say it; of a task"""
     values: tuple[float | str, ...] | None = None
     """values as they are, or names of records; in a random design each is equally likely"""
     grid: tuple[float, float, int] | None = None
@@ -68,7 +70,7 @@ class Vary(Part):
         if not isinstance(data, dict):
             return data
         key = str(data.get("key") or next(iter(data.get("keys") or ()), ""))
-        unit = "" if data.get("relative") else unit_of_key(key)
+        unit = "" if data.get("relative") else data.get("unit_of_values") or unit_of_key(key)
         try:
             if (kind := kind_of_record(key)) is not None:
                 return _with_names(data, kind)
@@ -122,6 +124,8 @@ class Vary(Part):
     @property
     def unit(self) -> str:
         """Unit of the values."""
+        if self.unit_of_values is not None and not self.relative:
+            return self.unit_of_values
         return (unit_of_key(self.all_keys[0]) if not self.relative else None) or "1"
 
     def value(self, number: float) -> float | str:
@@ -226,6 +230,7 @@ def check_spelling(scenario: Scenario, entries: Any) -> None:
             if (
                 isinstance(key, str)
                 and key
+                and entry.get("unit_of_values") is None
                 and unit_of_key(key) is None
                 and not (kind_of_record(key) or is_condition(key))
             ):
