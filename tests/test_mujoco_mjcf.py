@@ -226,6 +226,15 @@ def test_a_dc_motor_of_mujoco_is_refused_by_name() -> None:
     assert caught.value.problems[0].keys[0] in ("gaintype", "biastype", "dyntype")
 
 
+def test_an_actuator_on_a_tendon_of_the_joint_is_refused_by_name() -> None:
+    tendon = '<tendon><fixed name="rope"><joint joint="arm" coef="9"/></fixed></tendon>'
+    motor = '<actuator><motor name="a" tendon="rope"/></actuator>'
+    made = mujoco.MjSpec.from_string(f"<mujoco><worldbody>{JOINT}</worldbody>{tendon}{motor}</mujoco>")
+    with pytest.raises(lm.InputError, match="is not taken over") as caught:
+        lm.mujoco.from_mjcf(made, "arm")
+    assert caught.value.problems[0].keys == ("trntype",)
+
+
 def test_a_second_actuator_and_a_disabled_one_are_refused() -> None:
     made = spec("motor")
     made.add_actuator(name="other", target="arm", trntype=mujoco.mjtTrn.mjTRN_JOINT)

@@ -148,14 +148,17 @@ ACTUATORS = {
     "velocity": '<velocity name="a" joint="arm" kv="4"/>',
     "damper": '<damper name="a" joint="arm" kv="4" ctrlrange="0 1"/>',
     "dcmotor": '<dcmotor name="a" joint="arm" motorconst="0.05 0.05" resistance="2"/>',
+    "tendon": '<motor name="a" tendon="rope"/>',
     "pid": '<pid name="a" joint="arm" kp="40" kv="3"/>',
 }
 
 
 @pytest.mark.parametrize("kind", ACTUATORS)
 def test_nothing_of_an_actuator_stays_beside_its_drive(kind: str) -> None:
+    tendon = '<tendon><fixed name="rope"><joint joint="arm" coef="9"/></fixed></tendon>'
     given = model(
-        joint='damping="0.1 0.2 0.3" actuatorfrcrange="-1 1"', actuator=f"<actuator>{ACTUATORS[kind]}</actuator>"
+        joint='damping="0.1 0.2 0.3" actuatorfrcrange="-1 1"',
+        actuator=f"{tendon}<actuator>{ACTUATORS[kind]}</actuator>",
     )
     with pytest.raises(
         lm.InputError, match="damping and actuatorfrcrange and the actuator 'a', which would count twice"

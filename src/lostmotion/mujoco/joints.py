@@ -35,13 +35,19 @@ def joint_id(model: mujoco.MjModel, name: str) -> int:
 
 
 def actuators_of(model: mujoco.MjModel, joint: int) -> list[int]:
-    """Numbers of the actuators on a joint."""
+    """Numbers of the actuators on a joint, or on a tendon of this joint alone."""
     import mujoco
 
-    kinds = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
-    return [
-        k for k in range(model.nactuator) if model.actuator_trnid[k, 0] == joint and model.actuator_trntype[k] in kinds
-    ]
+    on_joint = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+
+    def moves(k: int) -> bool:
+        kind, target = model.actuator_trntype[k], model.actuator_trnid[k, 0]
+        if kind == int(mujoco.mjtTrn.mjTRN_TENDON) and model.tendon_num[target] == 1:
+            wrap = model.tendon_adr[target]
+            return bool(model.wrap_type[wrap] == int(mujoco.mjtWrap.mjWRAP_JOINT) and model.wrap_objid[wrap] == joint)
+        return kind in on_joint and bool(target == joint)
+
+    return [k for k in range(model.nactuator) if moves(k)]
 
 
 def acts(model: mujoco.MjModel, flag: str) -> bool:

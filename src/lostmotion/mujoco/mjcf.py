@@ -34,7 +34,7 @@ TAKEN_OVER = {
 WITHOUT_EFFECT = {
     *("acc0", "length0", "lengthrange", "actadr", "ctrladr", "outadr", "historyadr", "history"),  # of the compiler
     *("group", "user", "ctrlspec"),
-    *("trntype", "trnid"),  # by which the actuator is found; for a hinge the two kinds are one
+    *("trntype", "trnid"),  # by which the actuator is found; for a hinge the two kinds of joints are one
     *("dynprm", "actlimited", "actrange", "actearly"),  # of activations, which have a dyntype
 }
 Range = tuple[float, float]
@@ -200,6 +200,8 @@ def _law(model: mujoco.MjModel, joint: str, k: int) -> _Law:
             raise refuse(field, value)
     if bias[0] != 0.0 or bias[1] > 0.0 or bias[2] > 0.0:
         raise refuse("biasprm", bias[:3])
+    if model.actuator_trntype[k] == int(mujoco.mjtTrn.mjTRN_TENDON):
+        raise refuse("trntype", model.actuator_trntype[k])
     address, number = model.actuator_ctrladr[k], model.actuator_trnid[k, 0]
     gear = float(model.actuator_gear[model.actuator_outadr[k], 0])
     control = model.actuator_ctrlrange[address]
