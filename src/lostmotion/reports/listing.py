@@ -153,7 +153,7 @@ def _rated_force(record: Sheet) -> float | None:
 
 
 def _current(record: Sheet) -> float | None:
-    """[A]."""
+    """[A rms]."""
     return record.continuous_current if isinstance(record, AmplifierSheet) else None
 
 
@@ -173,7 +173,7 @@ def _line(record: Sheet) -> str:
     elif isinstance(record, MotorSheet):
         speed = record.rated_speed
     first = f"{ratio:.4g}" if ratio else f"{1e3 * lead:.4g} mm" if lead else ""
-    rated = f"{torque:.4g} N·m" if torque else f"{force:.4g} N" if force else f"{current:.4g} A" if current else "?"
+    rated = f"{torque:.4g} N·m" if torque else f"{force:.4g} N" if force else f"{current:.4g} A rms" if current else "?"
     turns = isinstance(record, GearboxSheet | MotorSheet)
     rpm = f"{RPM * speed:.0f}" if speed else "?" if turns else ""
     missing = ", ".join(record.missing())

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..data_sheets.gearbox_sheet import StiffnessData
+from ..data_sheets.accessory_sheets import AmplifierSheet
+from ..data_sheets.actuator_sheet import ActuatorSheet
+from ..data_sheets.gearbox_sheet import GearboxSheet, StiffnessData
 from ..data_sheets.sheet import WORDS, Record
 from ..inputs.part import Part
 from ..inputs.schema import unit_in_schema
@@ -16,6 +18,7 @@ def rows_of(record: Record) -> list[tuple[str, str, str]]:
     """(quantity, value, status of its source) of all data of a record."""
     fields = type(record).model_json_schema()["properties"]
     out: list[tuple[str, str, str]] = []
+    effective = isinstance(record, AmplifierSheet | ActuatorSheet) or record.kind in ("ironcore", "ironless", "tubular")
 
     def add(key: str, label: str, text: str) -> None:
         source = record.source_of(key)
@@ -34,7 +37,7 @@ def rows_of(record: Record) -> list[tuple[str, str, str]]:
                 add(name, "scatter of the stiffness", f"±{100 * value.scatter:.0f} %")
         elif name == "rigid":
             add(name, "torsional stiffness", "rigid: no twist")
-        elif name == "losses":
+        elif name == "losses" and isinstance(record, GearboxSheet):
             _add_losses(value, add)
         elif isinstance(value, tuple) and all(isinstance(x, str) for x in value):
             add(name, label, ", ".join(value))
@@ -44,7 +47,8 @@ def rows_of(record: Record) -> list[tuple[str, str, str]]:
                 if (datum := getattr(value, key)) is not None and key in value.model_fields_set:
                     add(f"{name}.{key}", key.replace("_", " "), practical(datum, unit_in_schema(units[key]) or ""))
         else:
-            add(name, label, practical(value, unit_in_schema(fields[name]) or ""))
+            unit = unit_in_schema(fields[name]) or ""
+            add(name, label, practical(value, unit) + (" rms" if unit.endswith("A") and effective else ""))
     return out
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from ..errors import InputError, need
 from ..inputs.arguments import ScenarioName, checked
@@ -17,6 +17,9 @@ from ..simulation.keys import parse_override
 from ..simulation.linear_units import unit_of_slides
 from ..simulation.scenario import Scenario
 from ..units.practical import printed
+
+Amperes = Literal["peak", "dc", "of the data sheet"]
+"""amplitude of a phase, current of an armature, or not known"""
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,8 @@ class Tuning:
     """old and new value [SI] of each key of the scenario that differs; None where there is none"""
     linear_motor: bool = False
     """whether the motor moves a slide: gains in [N·s/m] and [N/m]"""
+    amperes: Amperes = "of the data sheet"
+    """amperes of `torque_constant`"""
 
     @property
     def integral_time(self) -> float:
@@ -49,9 +54,8 @@ class Tuning:
 
     def conventions(self) -> list[tuple[str, str, str]]:
         """The same gains as manufacturers of drives write them: (what, value with unit, where it is written so)."""
-        return conventions(
-            self.gain, self.integral_gain, self.position_gain, self.filter_time, self.torque_constant, self.linear_motor
-        )
+        gains = self.gain, self.integral_gain, self.position_gain, self.filter_time
+        return conventions(*gains, self.torque_constant, self.linear_motor, self.amperes)
 
     def changes(self) -> list[tuple[str, str, str]]:
         """Changes by the tuning: (key of the scenario, old value, new value), with units.
@@ -123,20 +127,35 @@ def conventions(
     filter_time: float,
     torque_constant: float | None,
     linear_motor: bool = False,
+    amperes: Amperes = "of the data sheet",
 ) -> list[tuple[str, str, str]]:
-    """Gains in the words of manufacturers: (what, value with unit, where it is written so)."""
+    """Gains in the words of manufacturers: (what, value with unit, where it is written so). Currents of a winding are in amperes rms of a
+    phase, as data sheets print them, and as amplitudes."""
     if linear_motor:
         rows = [("speed loop, gain", f"{gain:.5g} N/(m/s)", "force of the motor per speed of the motor")]
     else:
         rows = [("speed loop, gain", f"{gain:.5g} N·m/(rad/s)", "torque at the motor per speed of the motor")]
         rows.append(("", f"{gain * math.pi / 30.0:.5g} N·m/rpm", "the same per revolution in a minute"))
     if torque_constant is not None:
-        amps = gain / torque_constant
-        if linear_motor:
-            rows.append(("", f"{amps:.5g} A/(m/s)", f"with {torque_constant:.4g} N/A"))
-        else:
-            rows.append(("", f"{amps:.5g} A/(rad/s)", f"with {torque_constant:.4g} N·m/A"))
-            rows.append(("", f"{1e3 * amps * math.pi / 30.0:.5g} mA/rpm", "the same per revolution in a minute"))
+        amps, force, speed = (
+            gain / torque_constant,
+            "N" if linear_motor else "N·m",
+            "(m/s)" if linear_motor else "(rad/s)",
+        )
+        unit = "A"
+        if amperes == "peak":
+            rows.append(
+                ("", f"{amps:.5g} A peak/{speed}", f"amplitude of a phase, with {torque_constant:.4g} {force}/A peak")
+            )
+            amps, torque_constant, unit = amps / math.sqrt(2.0), torque_constant * math.sqrt(2.0), "A rms"
+        of = {
+            "peak": "current of a phase",
+            "dc": "current of the armature",
+            "of the data sheet": "amperes as in limits.torque_constant",
+        }
+        rows.append(("", f"{amps:.5g} {unit}/{speed}", f"{of[amperes]}, with {torque_constant:.4g} {force}/{unit}"))
+        if not linear_motor:
+            rows.append(("", f"{1e3 * amps * math.pi / 30.0:.5g} m{unit}/rpm", "the same per revolution in a minute"))
     if integral_gain:
         time = gain / integral_gain
         rows.append(("speed loop, integral time", f"{1e3 * time:.5g} ms", "K_p/K_i, reset time T_N"))

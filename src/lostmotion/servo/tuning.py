@@ -29,7 +29,7 @@ from .margins import STABLE, bandwidth_of, frequencies, margins
 from .motion import with_controller
 from .regimes import Axis, Regime, axis_of, regimes
 from .sampled import SampledLoop
-from .tuned import Tuning, aligned, conventions, differences
+from .tuned import Amperes, Tuning, aligned, conventions, differences
 
 RULES = (
     "suited",
@@ -58,9 +58,9 @@ def drive_units(scenario: Scenario, motor: str | None = None) -> list[str]:
     filters = [f for f in speed.reference_filters if isinstance(f, LowPass)]
     time = 1.0 / (2.0 * math.pi * filters[0].frequency) if len(filters) == 1 else 0.0
     K_v = None if position is None else position.gain
-    return aligned(
-        conventions(speed.gain, speed.k_i, K_v, time, _torque_constant(axis), axis.train.is_slide(axis.motor_shaft))
-    )
+    gains = speed.gain, speed.k_i, K_v, time
+    slides = axis.train.is_slide(axis.motor_shaft)
+    return aligned(conventions(*gains, _torque_constant(axis), slides, _amperes(axis)))
 
 
 @checked
@@ -367,6 +367,12 @@ def _torque_constant(axis: Axis) -> float | None:
     return None if motor.limits is None else motor.limits.torque_constant
 
 
+def _amperes(axis: Axis) -> Amperes:
+    """The amperes of that constant."""
+    motor = axis.train.motors[axis.motor]
+    return "peak" if motor.winding is not None else "dc" if motor.kind == "dc" else "of the data sheet"
+
+
 def _tuning(
     scenario: Scenario,
     axis: Axis,
@@ -385,4 +391,4 @@ def _tuning(
     constant = _torque_constant(axis)
     slides = axis.train.is_slide(axis.motor_shaft)
     found = (gains.gain, gains.integral_gain, K_v, gains.filter_time, constant)
-    return Tuning(rule, why, changed, *found, changes, slides)
+    return Tuning(rule, why, changed, *found, changes, slides, _amperes(axis))

@@ -177,7 +177,7 @@ def voltage(
     if m.winding is not None:
         limit = None if m.dc_voltage is None else m.phase_voltage
         what = "voltage of a phase, largest amplitude"
-        return within("voltage", what, peak, limit, "V", "dc voltage / √3", key=f"{where}.dc_voltage")
+        return within("voltage", what, peak, limit, "V peak", "dc voltage / √3", key=f"{where}.dc_voltage")
     if m.kind == "dc" and m.rated_voltage is None:
         return Finding("voltage", "voltage, largest", "not known", "unknown", f"{where}.rated_voltage is missing")
     if math.isnan(peak):
@@ -194,10 +194,14 @@ def current(m: Motor, torque: np.ndarray, where: str = "motor") -> Finding:
     if m.winding is not None:
         rms = float(abs(torque).max()) / m.winding.phase_values().torque_constant / math.sqrt(2.0)
         name, key = "limit of motor and amplifier", f"{where}.winding.max_current_rms"
-        return within("current", "current, largest, rms", rms, m.winding.max_current, "A", name, key=key)
+        what = "current of a phase, largest, as effective value"
+        return within("current", what, rms, m.winding.max_current, "A rms", name, key=key)
     if limits is None or limits.torque_constant is None:
         missing = f"{where}.limits.torque_constant is missing"
         return Finding("current", "current, largest", "not known", "unknown", missing)
     peak = float(abs(torque).max()) / limits.torque_constant
     name, key = "limit of motor and amplifier", f"{where}.limits.max_current"
-    return within("current", "current, largest", peak, limits.max_current, "A", name, key=key)
+    what = (
+        "current, largest" if m.kind == "dc" else f"current, largest, in the amperes of {where}.limits.torque_constant"
+    )
+    return within("current", what, peak, limits.max_current, "A", name, key=key)

@@ -130,7 +130,13 @@ def supply_rules(back: Returned | None, supply: Bus) -> list[Finding]:
 
 
 def amplifier_rules(
-    time: np.ndarray, current: np.ndarray, cycle: float, amplifier: Amplifier, bus: float | None, where: str = "motor"
+    time: np.ndarray,
+    current: np.ndarray,
+    cycle: float,
+    amplifier: Amplifier,
+    bus: float | None,
+    where: str = "motor",
+    unit: str = "A",
 ) -> list[Finding]:
     """Rules of an amplifier: rms and largest current, the longest time above the continuous one, and the voltage of the bus.
 
@@ -144,6 +150,8 @@ def amplifier_rules(
         Largest voltage of the DC bus before energy returns [V].
     where
         Table of the motor.
+    unit
+        Of the current: of a motor with a winding ``"A rms"``.
     """
     what, continuous = "current, rms over the cycle", amplifier.continuous_current
     if np.isnan(current).any():
@@ -151,12 +159,14 @@ def amplifier_rules(
     else:
         square = integral(time, current**2) / cycle
         found = [
-            within("amplifier_current", what, math.sqrt(square), continuous, "A", "continuous current of the amplifier")
+            within(
+                "amplifier_current", what, math.sqrt(square), continuous, unit, "continuous current of the amplifier"
+            )
         ]
         if amplifier.peak_current is not None:
             peak, name = float(np.abs(current).max()), "peak current of the amplifier"
             found.append(
-                within("amplifier_peak", "current of the amplifier, largest", peak, amplifier.peak_current, "A", name)
+                within("amplifier_peak", "current of the amplifier, largest", peak, amplifier.peak_current, unit, name)
             )
         if amplifier.peak_time is not None:
             longest = longest_above(time, np.abs(current), continuous)
@@ -177,7 +187,9 @@ def amplifier_of_a_run(
     assert task.amplifier is not None
     time, bus = result.time, None if task.supply is None else task.supply.start()
     current = effective_current(motor, torque, speed)
-    return amplifier_rules(time, current, task.cycle or float(time[-1] - time[0]), task.amplifier, bus, where)
+    return amplifier_rules(
+        time, current, task.cycle or float(time[-1] - time[0]), task.amplifier, bus, where, amperes(motor)
+    )
 
 
 def longest_above(time: np.ndarray, values: np.ndarray, limit: float) -> float:
@@ -189,6 +201,11 @@ def longest_above(time: np.ndarray, values: np.ndarray, limit: float) -> float:
     if len(each) > 1 and each[0] > 0.0 and each[-1] > 0.0:
         each[0] += each.pop()
     return max(each, default=0.0)
+
+
+def amperes(motor: Motor) -> str:
+    """Unit of that current."""
+    return "A" if motor.winding is None else "A rms"
 
 
 def effective_current(motor: Motor, torque: np.ndarray, speed: np.ndarray) -> np.ndarray:

@@ -20,9 +20,9 @@ from .axis_scenario import Cycles, last_cycle
 
 COLUMNS = {
     "current_peak": ("A", "largest current of the motor; of a synchronous one amplitude of a phase"),
-    "current_rms": ("A", "rms current of the motor"),
+    "current_rms": ("A", "rms current of the motor over the cycle; of a synchronous one effective current of a phase"),
     "voltage_peak": ("V", "largest voltage of the motor; of a synchronous one amplitude of a phase"),
-    "voltage_rms": ("V", "rms voltage of the motor"),
+    "voltage_rms": ("V", "rms voltage of the motor over the cycle; of a synchronous one effective voltage of a phase"),
     "motor_torque_peak": ("N*m", "largest torque of the motor"),
     "motor_torque_rms": ("N*m", "rms torque of the motor"),
     "motor_force_peak": ("N", "largest force of the linear motor"),
@@ -173,11 +173,12 @@ def row_of(run: Repeated, *, slides: bool = False) -> dict[str, float]:
     assert controller.speed is not None
     error = result["load_angle"][here] - run.cycles.position
     peak, mean = float(np.abs(torque).max()), math.sqrt(float(e.torque_square.mean()))
+    effective = 1.0 if scenario.motor.winding is None else math.sqrt(0.5)  # of amplitudes
     columns = {
         "current_peak": float(np.abs(e.current).max()),
-        "current_rms": e.current_rms,
+        "current_rms": effective * e.current_rms,
         "voltage_peak": float(np.abs(e.voltage).max()),
-        "voltage_rms": rms(e.voltage),
+        "voltage_rms": effective * rms(e.voltage),
         "motor_torque_peak": peak,
         "motor_torque_rms": mean,
         "winding_temperature": winding,

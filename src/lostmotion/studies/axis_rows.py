@@ -42,7 +42,7 @@ from ..sizing.required_motion import (
     required_motion,
 )
 from ..sizing.stages import DIRECT, Stage, at_input, together
-from ..sizing.supply import amplifier_rules, effective_current, electrical_power, returned, supply_rules
+from ..sizing.supply import amperes, amplifier_rules, effective_current, electrical_power, returned, supply_rules
 from ..worker_threads import thread_pool
 from .axis import AxisTask, reference_of
 from .axis_columns import COLUMNS, Repeated, columns_of_gearbox, row_of
@@ -259,7 +259,7 @@ class Axes:
         if amplifier is not None:
             current = effective_current(motor, demand.motor_torque(motor), demand.speed)
             motion, bus = demand.motion, None if supply is None else supply.start()
-            found += amplifier_rules(motion.time, current, motion.cycle, amplifier, bus)
+            found += amplifier_rules(motion.time, current, motion.cycle, amplifier, bus, unit=amperes(motor))
         if supply is None:
             return found
         used = ("voltage_limit", "capacitance", "brake_resistance", "brake_power")

@@ -1,0 +1,85 @@
+"""Whether currents are effective values or amplitudes: gains of drives, rules, columns and data sheets, by arithmetic."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import lostmotion as lm
+from lostmotion.cli import app
+from lostmotion.data_sheets.accessory_sheets import AmplifierSheet
+from lostmotion.data_sheets.records import catalogue
+from lostmotion.model.duty import Amplifier
+from lostmotion.reports.listing import record_text
+from lostmotion.servo.tuning import drive_units
+from lostmotion.sizing.supply import amperes, amplifier_rules
+
+GAIN = 0.48  # N·m/(rad/s), of scenarios/field-weakening.toml
+RMS = 0.88  # N·m to one ampere rms, printed for its motor: 1FT7044-.AK7, (3/sqrt 2) p psi
+
+
+def currents(lines: list[str]) -> dict[str, float]:
+    """Values whose unit has amperes, by unit."""
+    found = (re.match(r".{31}([\d.]+) (m?A.*?)  ", line) for line in lines)
+    return {match[2].strip(): float(match[1]) for match in found if match}
+
+
+def test_gains_in_amperes_of_a_synchronous_motor_are_effective_values_with_the_amplitude_beside() -> None:
+    found = currents(drive_units(lm.load("field-weakening")))
+    assert found == {
+        "A rms/(rad/s)": pytest.approx(GAIN / RMS, rel=1e-4),
+        "A peak/(rad/s)": pytest.approx(math.sqrt(2.0) * GAIN / RMS, rel=1e-4),
+        "mA rms/rpm": pytest.approx(1e3 * GAIN / RMS * math.pi / 30.0, rel=1e-4),
+    }
+
+
+def test_the_constant_to_one_ampere_rms_is_that_of_the_flux_linkage() -> None:
+    """1FT7042: (3/sqrt 2) p psi with psi = sqrt(2/3) 87 V/krpm/(104.72 p) is 1.439 N·m to one ampere rms."""
+    psi = math.sqrt(2.0 / 3.0) * 87.0 / (1000.0 * 2.0 * math.pi / 60.0) / 3.0
+    winding = {
+        "poles": 6,
+        "resistance_phase": 3.66,
+        "inductance_phase": 21e-3,
+        "flux_linkage": psi,
+        "max_current_rms": 30.0,
+    }
+    data = lm.load("field-weakening").model_dump(exclude_none=True)
+    motor = {**data["motors"]["m"], "winding": winding}
+    found = drive_units(lm.Scenario(**{**data, "motors": {"m": motor}}))
+    constant = 3.0 / math.sqrt(2.0) * 3.0 * psi
+    assert constant == pytest.approx(1.439, abs=5e-4)
+    assert currents(found)["A rms/(rad/s)"] == pytest.approx(GAIN / constant, rel=1e-4)
+    assert any("1.439 N·m/A rms" in line for line in found)
+
+
+def test_gains_in_amperes_of_a_dc_motor_are_those_of_its_armature() -> None:
+    """maxon EC 40 with block commutation, as its equivalent DC motor."""
+    scenario = lm.load("position-axis", {"motor.limits.torque_constant": 0.05})
+    found = currents(drive_units(scenario))
+    gain = scenario.controller.speed.gain
+    assert found == {
+        "A/(rad/s)": pytest.approx(gain / 0.05, rel=1e-4),
+        "mA/rpm": pytest.approx(1e3 * gain / 0.05 * math.pi / 30.0, rel=1e-4),
+    }
+
+
+def test_the_amplifier_of_a_synchronous_motor_is_compared_in_amperes_rms() -> None:
+    motor = lm.load("field-weakening").motors["m"]
+    amplifier = Amplifier(continuous_current=5.0, peak_current=10.0)
+    time, current = np.linspace(0.0, 1.0, 11), np.full(11, 4.0)
+    found = amplifier_rules(time, current, 1.0, amplifier, None, unit=amperes(motor))
+    assert [f.value for f in found] == ["4 of 5 A rms", "4 of 10 A rms"]
+
+
+@pytest.mark.parametrize("record", [r for r in catalogue() if isinstance(r, AmplifierSheet)], ids=lambda r: r.name)
+def test_currents_of_amplifiers_are_printed_as_effective_values(record: AmplifierSheet) -> None:
+    lines = [line for line in record_text(record.name).splitlines() if re.match(r"  \w+ current ", line)]
+    assert lines
+    assert all(re.search(r"[\d.]+ A rms ", line) for line in lines)
+
+
+def test_the_list_of_amplifiers_says_rms() -> None:
+    listed = CliRunner().invoke(app, ["catalogue", "--kind", "amplifier", "--all"]).stdout
+    assert listed.count(" A rms ") == len(re.findall(r" [\d.]+ A\b", listed)) > 5
