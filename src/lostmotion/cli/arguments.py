@@ -4,24 +4,53 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+if TYPE_CHECKING:
+    from ..simulation.scenario import Scenario
 
-def number(unit: str = "") -> Callable[[str], float]:
-    """Reads the value of an option: a bare number in `unit`, or one with a unit, as in a scenario."""
+
+def number(unit: str = "", option: str = "") -> Callable[[str], float]:
+    """Reads the value of an option: a bare number in `unit`, which is printed back, or one with a unit, as in a scenario."""
 
     def read(text: str) -> float:
         from ..inputs.validation import shown
         from ..units.conversion import si_value
 
         try:
-            return si_value(text, unit)
+            value = si_value(text, unit)
         except ValueError as error:
             raise typer.BadParameter(f"{shown(text)} {error}") from None
+        print_bare(option, text, unit)
+        return value
 
     return read
+
+
+def print_bare(what: str, text: str, unit: str | None) -> None:
+    """Print a bare number of an option with the unit in which it is read; nothing of text with a unit, or of a plain number."""
+    from ..inputs.doubts import read_as
+
+    try:
+        value = float(text)
+    except ValueError:
+        return
+    if unit:
+        print(f"{what}: {read_as(value, unit)}; a bare number is read in SI units")
+
+
+def load_scenario(source: str, overrides: list[str] | None) -> Scenario:
+    """The scenario of a command. Bare numbers of `--set` are printed with the unit in which they are read."""
+    from ..simulation.sources import load
+    from ..simulation.units_of_keys import unit_for
+
+    loaded = load(source, overrides or ())
+    for text in overrides or ():
+        key, _, value = text.partition("=")
+        print_bare(key.strip(), value, unit_for(loaded, key.strip()))
+    return loaded
 
 
 def count(text: str) -> int:

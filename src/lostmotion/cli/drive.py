@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .arguments import Overrides, SourceArgument
+from .arguments import Overrides, SourceArgument, load_scenario
 from .targets import try_page
 from .terminal import about, conclude, simulating
 
@@ -31,12 +31,11 @@ def check(
     lostmotion drive check catalogue-robot-joint --report check.html
     """
     from ..reports.drive_check import check_report
-    from ..simulation.sources import load
     from ..sizing.drive_check import check_drive
 
     if report is not None:
         try_page(report)
-    loaded = load(scenario, overrides or ())
+    loaded = load_scenario(scenario, overrides)
     with about(scenario), simulating("Checking", loaded):
         findings = check_drive(loaded)
     print(loaded.title or scenario)

@@ -6,6 +6,7 @@ import gc
 import os
 import re
 import sys
+import warnings
 from typing import Annotated, Any, NoReturn
 
 import typer
@@ -50,8 +51,14 @@ def main() -> None:
         100_000
     )  # loading makes many objects that stay; looking through them again and again takes a tenth of it
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # a search of all that is installed
+    warnings.showwarning = _show_warning
     with harmless_output():
         _run()
+
+
+def _show_warning(message: Warning | str, *_: Any) -> None:
+    """One line for a doubtful value, without the place in the code."""
+    print(f"warning: {message}")
 
 
 def _run() -> NoReturn:

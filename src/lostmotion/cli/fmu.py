@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .arguments import Overrides, SourceArgument
+from .arguments import Overrides, SourceArgument, load_scenario
 from .targets import try_file
 from .terminal import about, busy
 
@@ -64,12 +64,11 @@ def fmu(
     """
     from ..errors import InputError
     from ..portable.fmu import export_fmu
-    from ..simulation.sources import load
 
     if output.suffix != ".fmu":
         raise InputError(f"{output}: must end in .fmu")
     try_file(output)
-    loaded = load(scenario, overrides or ())
+    loaded = load_scenario(scenario, overrides)
     with about(scenario), busy("Finding out what its parameters change"):
         replaced = export_fmu(
             loaded,

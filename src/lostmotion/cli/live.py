@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .arguments import Overrides, SourceArgument
+from .arguments import Overrides, SourceArgument, load_scenario
 from .targets import try_file
 from .terminal import about, busy
 
@@ -30,13 +30,12 @@ def live(
     """
     from ..errors import InputError
     from ..live_page.page import write_page
-    from ..simulation.sources import load
 
     path = Path(f"{Path(scenario).stem}.html") if output is None else output
     if path.suffix not in (".html", ".htm"):
         raise InputError(f"{path}: the ending {path.suffix or '(none)'} is not known; it must be .html")
     try_file(path)
-    loaded = load(scenario, overrides or ())
+    loaded = load_scenario(scenario, overrides)
     with about(scenario), busy("Writing"):
         write_page(path, loaded)
     print(f"Page written to {path}")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .arguments import FiguresOption, Overrides, ReportOption, SourceArgument, number
+from .arguments import FiguresOption, Overrides, ReportOption, SourceArgument, load_scenario, number
 from .targets import pictures_of, writing
 from .terminal import about, busy, progress
 
@@ -72,12 +72,10 @@ def response(
     lostmotion response paper-2dof-nl-small --amplitudes 0.025,1 --frequencies 1..30:12 -o bode
     lostmotion response drive.toml --compare linear.toml --refine 0.5 -o bode
     """
-    from ..simulation.sources import load
-
     pictures = pictures_of(figures, output)
     files = _titles(scenario, compare or ())
     name = next(iter(files))
-    loaded = {title: load(file, (overrides or ()) if title == name else ()) for title, file in files.items()}
+    loaded = {title: load_scenario(file, overrides if title == name else None) for title, file in files.items()}
     unit, variable = _known(loaded, files, source, variable)
     from ..response.harmonic import frequency_response
     from .grids import parse_grid

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .arguments import Overrides, SourceArgument, number
+from .arguments import Overrides, SourceArgument, load_scenario, number
 from .targets import try_file, try_page
 from .terminal import about, busy, simulating
 
@@ -49,7 +49,7 @@ def run(
         typer.Option(
             "--explain",
             metavar="TIME",
-            parser=number("s"),
+            parser=number("s", "--explain"),
             help="Print which contacts are stuck at this instant [s], what they hold, and what would free them.",
         ),
     ] = None,
@@ -78,11 +78,10 @@ def run(
     """
     from ..errors import InputError
     from ..simulation.needs import need_open_loop
-    from ..simulation.sources import load
 
     _try_files(output, plot, report)
     _check_figure(figure, plot)
-    loaded = load(scenario, overrides or ())
+    loaded = load_scenario(scenario, overrides)
     if explain is not None and not 0.0 <= explain <= loaded.simulation.duration:
         raise InputError(
             f"--explain {explain}: must lie between 0 and simulation.duration, {loaded.simulation.duration} s"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .arguments import FiguresOption, Overrides, SourceArgument
+from .arguments import FiguresOption, Overrides, SourceArgument, load_scenario, print_bare
 from .targets import try_directory, try_file, writing
 from .terminal import about, busy, console, fail, progress
 
@@ -76,7 +76,6 @@ def servo(
     """
     from ..errors import InputError
     from ..reports.pictures import endings
-    from ..simulation.sources import load
 
     pictures = endings(figures)
     files, directories = _targets(output or [], rule)
@@ -84,7 +83,7 @@ def servo(
         raise InputError(f"--figures {figures}: needs the directory of the report; add -o DIR")
     if feedforward and rule is None:
         raise InputError("--feedforward: goes with --tune RULE; add a rule")
-    loaded = load(scenario, overrides or ())
+    loaded = load_scenario(scenario, overrides)
     for path in files:
         try_file(path)
     for path in directories:
@@ -173,10 +172,13 @@ def _settled(scenario: Scenario, motor: str | None, window: str) -> float:
     from ..units.conversion import si_value
 
     axis = axis_of(scenario, motor)
+    unit = axis.train.angle_unit(axis.shaft)
     try:
-        return si_value(window, axis.train.angle_unit(axis.shaft))
+        value = si_value(window, unit)
     except ValueError as error:
         raise InputError(f"--window: {shown(window)} {error}") from None
+    print_bare("--window", window, unit)
+    return value
 
 
 def _targets(output: list[Path], rule: str | None) -> tuple[list[Path], list[Path]]:

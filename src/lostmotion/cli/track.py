@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .arguments import FiguresOption, Overrides, ReportOption, SourceArgument, number
+from .arguments import FiguresOption, Overrides, ReportOption, SourceArgument, load_scenario, number
 from .targets import pictures_of, writing
 from .terminal import about, busy, conclude, console, progress
 
@@ -24,7 +24,7 @@ def track(
         typer.Option(
             "--after",
             metavar="TIME",
-            parser=number("s"),
+            parser=number("s", "--after"),
             help='From which on errors count, e.g. "2 s"; left out, from the end of the start-up transient.',
         ),
     ] = None,
@@ -50,10 +50,9 @@ def track(
     """
     from ..errors import InputError
     from ..reports.pointing import verdict_of
-    from ..simulation.sources import load
 
     pictures = pictures_of(figures, output)
-    loaded = load(scenario, overrides or ())
+    loaded = load_scenario(scenario, overrides)
     from ..pointing.budget import pointing_budget, runs_of
 
     angles = {}

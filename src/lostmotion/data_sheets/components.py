@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from ..errors import InputError, prefixed
 from ..inputs.arguments import RecordName, checked
+from ..inputs.doubts import doubt
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, Inertia, NotNegative, Number, Positive, Temperature, argument
 from ..inputs.schema import keys_within
@@ -214,6 +215,7 @@ def gearbox(
     >>> gearbox.ratio, round(gearbox.rated_output_torque, 1)
     (10.0, 81.0)
     """
+    doubt("added_backlash", added_backlash)
     changes: dict[str, Any] = {"added_backlash": added_backlash, "loss_factor": loss_factor}
     if temperature is not None:
         changes["temperature"] = temperature

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from .doubts import doubt_all
 from .limits import read_text
 
 PER_BYTE = 16  # bytes of memory for each byte of a TOML file, measured
@@ -73,13 +74,15 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     try:
         if _DEEP_KEY.search(text):
             raise RecursionError
-        return shallow(tomllib.loads(text))
+        data = shallow(tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path}: is not valid TOML: {error}") from None
     except RecursionError:
         raise InputError(
             f"{path}: has more than {MAX_LEVELS} levels of tables and lists; write {what} with fewer"
         ) from None
+    doubt_all(data, path)
+    return data
 
 
 def shallow(data: dict[str, Any]) -> dict[str, Any]:

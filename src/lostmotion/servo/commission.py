@@ -11,6 +11,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..inputs.arguments import checked
+from ..inputs.doubts import doubt_window
 from ..inputs.quantities import Angle
 from ..response.standstill import moving_input
 from ..simulation.scenario import Scenario
@@ -273,6 +274,8 @@ def commission(
         progress()
     followed = following(axis)
     wide = default_window(axis) if window is None else window
+    if window is not None:
+        doubt_window(window, float(np.ptp(followed.reference)), followed.unit, "window")
     progress()
     stiffness = tuple(_stiffness(axis, regime) for regime in points) if axis.loops[-1] == "position" else ()
     cycle = limit_cycle(axis)

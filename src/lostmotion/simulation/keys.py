@@ -10,6 +10,7 @@ from typing import Any
 from ..data_sheets.components import as_torque_source, at_voltage
 from ..data_sheets.train_components import RECORDS, without_record
 from ..errors import InputError
+from ..inputs.doubts import doubt
 from ..inputs.toml_files import MAX_LEVELS, shallow
 from ..inputs.validation import shortened, shown
 from ..units.scalars import is_number, plain
@@ -31,7 +32,10 @@ def parse_override(text: str) -> tuple[str, Any]:
         raise InputError(f"--set {key.strip()}: has too many levels of tables and lists; write it with fewer") from None
     except tomllib.TOMLDecodeError:
         return key.strip(), value.strip()
-    return key.strip(), parsed["value"] if len(parsed) == 1 else value.strip()
+    if len(parsed) > 1:
+        return key.strip(), value.strip()
+    doubt(key.strip(), parsed["value"], "--set")
+    return key.strip(), parsed["value"]
 
 
 # Keys that others depend on, in the order in which they are changed: a part as a whole, its record, and what other values

@@ -12,6 +12,7 @@ from ..data_sheets.components import accessories_in, gearbox_table, record_in
 from ..data_sheets.linear_components import linear_table
 from ..data_sheets.train_components import RECORDS, without_record
 from ..errors import InputError, prefixed
+from ..inputs.doubts import doubt_all
 from ..inputs.schema import follow, unit_in_schema
 from ..inputs.toml_files import RESULTS, no_such_file, read_toml
 from ..inputs.toml_text import toml_text, without_empty
@@ -121,7 +122,11 @@ def override(data: dict[str, Any], overrides: Mapping[str, Any] | Iterable[str],
     overrides = [overrides] if isinstance(overrides, str) else overrides
     if not isinstance(overrides, Iterable) or not all(isinstance(entry, str) for entry in overrides):
         raise InputError(f'{shown(overrides)} must be changes by key, such as {{"command.amplitude": 0.1}}')
-    items = overrides.items() if isinstance(overrides, Mapping) else [parse_override(text) for text in overrides]
+    if isinstance(overrides, Mapping):
+        doubt_all(overrides, path)
+        items: Iterable[tuple[str, Any]] = overrides.items()
+    else:
+        items = [parse_override(text) for text in overrides]
     with prefixed(path):
         set_values(data, items)
 

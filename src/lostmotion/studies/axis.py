@@ -12,6 +12,7 @@ from ..control.controller import AnyCurrent
 from ..control.references import Move, PositionReference
 from ..control.sample_times import whole_multiple
 from ..errors import InputError
+from ..inputs.doubts import doubt_window
 from ..inputs.part import Part
 from ..inputs.quantities import (
     Acceleration,
@@ -165,6 +166,12 @@ class AxisTask(Task, Duty):
     def rise(self) -> float | None:
         """Sine of the slope of a slide; None of a rotary load."""
         return None if self.linear is None else self.linear.rise
+
+    def doubt_window(self, reference: PositionReference, unit: str, where: str) -> None:
+        """Warn of a settling window in which all of the motion lies."""
+        if self.settling_window is not None:
+            positions = reference.at(np.linspace(0.0, self.cycle, 1001))[0]
+            doubt_window(self.settling_window, float(np.ptp(positions)), unit, where)
 
     def amplifier_of_task(self) -> Amplifier | None:
         """The amplifier, also where `supply` alone says its continuous current."""

@@ -26,7 +26,7 @@ from ..simulation.scenario_files import read_series_files, units_of_series
 from ..simulation.train_tables import train_schema
 from ..sizing.stages import DIRECT, STAGES, stage_of
 from ..sizing.whole_drives import BESIDE, LINEAR, WHOLE
-from .axis import AxisTask, InnerLoop
+from .axis import AxisTask, InnerLoop, reference_of
 from .file import find_sheets
 from .own_keys import with_first
 from .records import kind_of_record, names_that_fit
@@ -95,7 +95,12 @@ def load_task(path: str | Path) -> Study:
     try:
         tables = read_toml(path, "a task")
         read_series_files(tables, path, _units_on_a_slide if "slide" in tables else units_of_series)
-        return task_of(tables, path.parent)
+        study = task_of(tables, path.parent)
+        assert study.axis is not None
+        study.axis.doubt_window(
+            reference_of(study.drive), study.kept_units["rest_error"], f"{path}: key task.settling_window"
+        )
+        return study
     except InputError as error:
         text = str(error)
         raise error if text.startswith(f"{path}:") else InputError(f"{path}: {text}") from None

@@ -1,0 +1,88 @@
+"""Bare numbers that no drive has, mostly since another unit was meant: a warning names the unit in which they are read."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+from ..units.scalars import is_number
+
+
+class Usual(NamedTuple):
+    """Largest value that a drive may have, with its unit, and the unit that is usual for it."""
+
+    most: float
+    unit: str
+    meant: str
+
+
+GAP = Usual(math.radians(5.0), "rad", "arcmin")
+SPEED = Usual(1e5 * math.pi / 30.0, "rad/s", "rpm")
+TICK = Usual(1.0, "s", "us")
+LARGEST: dict[str, Usual] = {
+    **dict.fromkeys(("backlash", "added_backlash", "hysteresis_loss", "max_lost_motion", "settling_window"), GAP),
+    **dict.fromkeys(("max_tracking_error", "max_reversal_error"), GAP),
+    **dict.fromkeys(("rated_speed", "max_speed", "no_load_speed", "max_input_speed", "rated_input_speed"), SPEED),
+    **dict.fromkeys(("sample_time", "electrical_time_constant"), TICK),
+    "rotor_inertia": Usual(10.0, "kg*m^2", "kg*cm^2"),
+    "ambient_temperature": Usual(150.0, "degC", "K"),
+}
+"""by key; gaps and errors of slides are in m, of which 0.09 is as much too large"""
+
+
+class ValueWarning(UserWarning):
+    """A bare number that no drive has in the unit in which it is read."""
+
+
+def doubt(key: str, value: Any, where: object = "") -> None:
+    """Warn of a bare number that no drive has.
+
+    Parameters
+    ----------
+    key
+        Dotted key, whose last part says what it is.
+    value
+        As it was written; text has a unit of its own and is not doubted.
+    where
+        File or function that the warning begins with.
+    """
+    usual = LARGEST.get(key.rpartition(".")[2])
+    if usual is None or not is_number(value) or not abs(value) > usual.most:
+        return
+    begin = f"{where}: key {key}" if where else key
+    slide = " or, of a slide, m" if usual is GAP else ""
+    text = f"{begin}: {value:g} is read as {read_as(value, usual.unit)}{slide}; write it with its unit, such as"
+    warnings.warn(f'{text} "{value:g} {usual.meant}"', ValueWarning, stacklevel=3)
+
+
+def doubt_window(window: float, travel: float, unit: str, where: str) -> None:
+    """Warn of a window of settling in which all of the motion lies."""
+    if window >= travel > 0.0:
+        text = f"{where}: {read_as(window, unit)} is no less than the whole motion, {read_as(travel, unit)}; write it with its unit, "
+        warnings.warn(f'{text}such as "1 {"arcmin" if unit == "rad" else "um"}"', ValueWarning, stacklevel=3)
+
+
+def doubt_all(data: Mapping[str, Any], where: object) -> None:
+    """Warn of all such numbers in the tables of a file."""
+    for key, value in _numbers(data, ""):
+        doubt(key, value, where)
+
+
+def read_as(value: float, unit: str) -> str:
+    """A value in an SI unit, with angles in degrees beside: 1 rad (57.3 deg)."""
+    name = "°C" if unit == "degC" else unit
+    return f"{value:g} {name}" + (f" ({math.degrees(value):.3g} deg)" if unit == "rad" else "")
+
+
+def _numbers(data: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, Any]]:
+    for key, value in data.items():
+        if isinstance(value, Mapping):
+            yield from _numbers(value, f"{prefix}{key}.")
+        elif isinstance(value, list) and value and isinstance(value[0], Mapping):
+            for k, entry in enumerate(value):
+                if isinstance(entry, Mapping):
+                    yield from _numbers(entry, f"{prefix}{key}.{k}.")
+        elif str(key).rpartition(".")[2] in LARGEST:
+            yield f"{prefix}{key}", value

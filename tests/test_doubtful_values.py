@@ -1,0 +1,111 @@
+"""Bare numbers that no drive has: a warning names the unit in which they are read; options print theirs back."""
+
+import math
+import re
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import lostmotion as lm
+from conftest import ROOT
+from lostmotion.cli import app
+from lostmotion.inputs.doubts import LARGEST, ValueWarning
+
+JOINT = "catalogue-robot-joint"
+
+
+def test_a_gap_of_3_is_said_to_be_172_degrees() -> None:
+    """3 rad are 3 · 180/pi = 171.9 degrees."""
+    for call in (
+        lambda: lm.load(JOINT, {"gearbox.added_backlash": 3}),
+        lambda: lm.load(JOINT, ["gearbox.added_backlash=3"]),
+        lambda: lm.gearbox("schaeffler-rt1-h-20-100", added_backlash=3),
+    ):
+        with pytest.warns(ValueWarning, match=r'added_backlash: 3 is read as 3 rad \(172 deg\).*"3 arcmin"'):
+            call()
+
+
+@pytest.mark.parametrize("gap", ["3 arcmin", "6 deg", 1e-3, math.radians(4.9)])
+def test_a_gap_with_a_unit_and_one_that_a_gear_has_are_not_doubted(gap: str | float) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        lm.load(JOINT, {"gearbox.added_backlash": gap})
+
+
+@pytest.mark.parametrize("key", LARGEST)
+def test_a_doubtful_number_in_a_file_is_said_with_its_file_key_and_unit(key: str, tmp_path: Path) -> None:
+    from lostmotion.inputs.toml_files import read_toml
+
+    usual, file = LARGEST[key], tmp_path / "drive.toml"
+    file.write_text(f"[[a.b]]\n{key} = {1.01 * usual.most!r}\n")
+    with pytest.warns(ValueWarning) as found:
+        read_toml(file, "a scenario")
+    (text,) = (str(warning.message) for warning in found)
+    assert str(file) in text
+    assert f"key a.b.0.{key}" in text
+    assert usual.unit.replace("degC", "°C") in text
+    file.write_text(f"[[a.b]]\n{key} = {0.99 * usual.most!r}\n")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        read_toml(file, "a scenario")
+
+
+def test_no_shipped_file_is_doubted() -> None:
+    from lostmotion.inputs.toml_files import read_toml
+
+    files = [*(ROOT / "scenarios").glob("*.toml"), *(ROOT / "src/lostmotion/catalogue").glob("*.toml")]
+    assert len(files) > 50
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for file in files:
+            read_toml(file, "a file")
+
+
+def test_a_window_that_holds_the_whole_move_is_doubted() -> None:
+    """The shipped axis moves by 45 degrees."""
+    with pytest.warns(
+        ValueWarning, match=r"window: 2 rad \(115 deg\) is no less than the whole motion, .* rad \(45 deg\)"
+    ):
+        lm.commission(lm.load("position-axis"), window=2.0)
+
+
+def test_the_settling_window_of_a_task_is_compared_with_its_motion(tmp_path: Path) -> None:
+    text = (ROOT / "examples" / "select-axis.toml").read_text()
+    wide = re.sub(r'settling_window = "[^"]*"', 'settling_window = "300 deg"', text)
+    assert wide != text
+    (tmp_path / "task.toml").write_text(wide)
+    with pytest.warns(
+        ValueWarning, match=r"key task.settling_window: 5\.23599 rad \(300 deg\) is no less than the whole"
+    ):
+        lm.studies.load_task(tmp_path / "task.toml")
+
+
+def test_options_print_bare_numbers_back_with_their_unit() -> None:
+    run = CliRunner().invoke
+    said = run(app, ["run", JOINT, "--set", "load.inertia=2", "--explain", "0.5"]).output
+    assert "load.inertia: 2 kg*m^2; a bare number is read in SI units" in said
+    assert "--explain: 0.5 s; a bare number is read in SI units" in said
+    quiet = run(app, ["run", JOINT, "--set", "load.inertia=2 kg*m^2", "--explain", "500 ms"]).output
+    assert "bare number" not in quiet
+
+
+def test_a_command_prints_a_warning_as_one_line_without_the_place_in_the_code() -> None:
+    call = [sys.executable, "-m", "lostmotion", "run", JOINT, "--set", "gearbox.added_backlash=3"]
+    done = subprocess.run(call, capture_output=True, text=True, check=True)
+    lines = [line for line in done.stdout.splitlines() if line.startswith("warning: ")]
+    assert len(lines) == 1
+    assert "3 rad (172 deg)" in lines[0]
+    assert done.stderr == ""
+
+
+@pytest.mark.parametrize("value", ["96", "96.0"])
+def test_an_efficiency_of_96_is_refused_with_both_ways_to_write_it(value: str) -> None:
+    with pytest.raises(lm.InputError) as found:
+        lm.load("paper-2dof-l-small", [f"gearbox.losses.efficiency={value}"])
+    assert found.value.problems[0].keys == ("gearbox.losses.efficiency",)
+    assert '0.96, or "96 %"' in str(found.value)
+    assert lm.load("paper-2dof-l-small", ["gearbox.losses.efficiency=96 %"]).gearbox.losses.efficiency == 0.96
