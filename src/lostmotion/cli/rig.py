@@ -109,7 +109,7 @@ def _measured(name: str, sheet: Record, overrides: Sequence[str]) -> tuple[RigRe
 
         screw = screw_from_record(name, overrides)
         with progress(WORK, "Measuring") as step:
-            return measure_screw(screw, sheet, progress=step), ()
+            return measure_screw(screw, sheet, progress=step), tuple(filter(None, [sheet.note]))
     from ..test_rig.measurement import WORK, measure
 
     assert isinstance(sheet, GearboxSheet)

@@ -17,6 +17,7 @@ from ..inputs.toml_files import is_in_file
 from ..inputs.validation import shortened, shown, unknown_key
 from ..model.gearbox import Gearbox
 from ..model.motor import DC_KEYS, Motor
+from ..model.notes import forget_stale
 from ..model.torsion import LinearStiffness, TorsionCurve
 
 if TYPE_CHECKING:
@@ -128,7 +129,8 @@ def _whole(table: Any) -> bool:
 
 
 def _change(table: dict[str, Any], changes: Mapping[str, Any]) -> None:
-    """Puts changes into a part's values; a table without a kind changes single keys."""
+    """Puts changes into a part's values; a table without a kind changes single keys. What no longer holds goes."""
+    forget_stale(table, changes)
     for key, value in changes.items():
         if key in Conditions.model_fields:
             continue

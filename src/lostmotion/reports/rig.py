@@ -227,8 +227,7 @@ def rig_parts(
 ) -> tuple[Table | Group | Prose, ...]:
     """The tables below the charts: comparison, notes, further measurements, the data sheet, and the method."""
     parts = comparison_table(comparisons)
-    told = [sheet.note] if sheet is not None and sheet.note else []
-    if notes := [*told, *notes]:
+    if notes := list(notes):
         parts.append(Prose("", notes, noted=True))
     return (*parts, *sheet_parts(sheet, measured, own), Prose("Method", how))
 

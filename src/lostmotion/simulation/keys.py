@@ -13,6 +13,7 @@ from ..errors import InputError
 from ..inputs.doubts import doubt
 from ..inputs.toml_files import MAX_LEVELS, shallow
 from ..inputs.validation import shortened, shown
+from ..model.notes import forget_stale
 from ..units.scalars import is_number, plain
 
 
@@ -144,6 +145,7 @@ def _changed(node: Any, keys: list[str], value: Any, where: str, signals: re.Pat
     if node is not None and not isinstance(node, dict):
         raise InputError(f"{where} is the value {shown(node)}, not a table; it has no {key}", inner)
     fields = own.of(node or {})
+    forget_stale(fields, [key])
     fields[key] = _changed(fields.get(key), rest, value, inner, signals, own)
     return fields
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from ..data_sheets.components import accessories_in, gearbox_table, record_in
 from ..data_sheets.linear_components import linear_table
+from ..data_sheets.records import find
 from ..data_sheets.train_components import RECORDS, without_record
 from ..errors import InputError, prefixed
 from ..inputs.doubts import doubt_all
@@ -19,6 +20,7 @@ from ..inputs.toml_text import toml_text, without_empty
 from ..inputs.validation import names_like, shortened, shown
 from ..model.gearbox import Gearbox
 from ..model.linear import RatedScrew, ScrewData
+from ..model.notes import forget_stale
 from .axis_form import file_schema
 from .keys import parse_override, set_values
 from .scenario import Scenario
@@ -256,6 +258,7 @@ def units_of_series(place: tuple[str, ...]) -> list[str]:
 def _merge(base: dict[str, Any], changes: dict[str, Any], where: tuple[str, ...] = ()) -> dict[str, Any]:
     """Tables are merged; one of another `kind`, or with a record, takes the place of the old one."""
     merged = dict(base)
+    forget_stale(merged, changes)
     for key, value in changes.items():
         old = base.get(key)
         if not isinstance(value, dict) or not isinstance(old, dict):
@@ -277,7 +280,7 @@ def scenario_text(scenario: Scenario, comment: str) -> str:
 
 
 def gearbox_from_record(reference: str, overrides: Iterable[str] = ()) -> tuple[Gearbox, tuple[str, ...]]:
-    """A record's gearbox with ``KEY=VALUE`` changes, as in `[gearbox]`, and the notes of its loss map.
+    """A record's gearbox with ``KEY=VALUE`` changes, as in `[gearbox]`, and its notes.
 
     Raises
     ------
@@ -287,7 +290,9 @@ def gearbox_from_record(reference: str, overrides: Iterable[str] = ()) -> tuple[
     set_values(changes, ((key.removeprefix("gearbox."), value) for key, value in map(parse_override, overrides)))
     values, built = gearbox_table(reference, changes)
     with prefixed(f"gearbox {reference}"):
-        return Gearbox(**values), built.notes if built else ()
+        gearbox = Gearbox(**values)
+    told = find(reference, "gearbox").note
+    return gearbox, tuple(note for note in (told, *(built.notes if built else ())) if note and note in gearbox.note)
 
 
 def screw_from_record(reference: str, overrides: Iterable[str] = ()) -> ScrewData:
