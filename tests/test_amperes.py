@@ -58,7 +58,7 @@ def test_gains_in_amperes_of_a_dc_motor_are_those_of_its_armature() -> None:
     """maxon EC 40 with block commutation, as its equivalent DC motor."""
     scenario = lm.load("position-axis", {"motor.limits.torque_constant": 0.05})
     found = currents(drive_units(scenario))
-    gain = scenario.controller.speed.gain
+    gain = float(scenario.controller.speed.gain)  # type: ignore[union-attr]
     assert found == {
         "A/(rad/s)": pytest.approx(gain / 0.05, rel=1e-4),
         "mA/rpm": pytest.approx(1e3 * gain / 0.05 * math.pi / 30.0, rel=1e-4),

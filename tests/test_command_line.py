@@ -355,8 +355,10 @@ def test_a_command_imports_what_it_needs_alone(tmp_path: Path, call: str) -> Non
     (tmp_path / "study.toml").write_text(STUDY.format(design="random"))
     done = subprocess.run(
         [sys.executable, "-c", WITHOUT_WHAT_XARRAY_FINDS, *call.split()],
-        cwd=tmp_path, capture_output=True, text=True, check=True,
+        cwd=tmp_path, capture_output=True, text=True, check=False,
     )  # fmt: skip
+    assert done.returncode in (0, 1, 3), done.stderr  # a verdict, which an error has not
+    assert "lostmotion: " not in done.stderr
     imported = set(done.stderr.splitlines()[-1].split()[1:])
     assert "pydantic" in imported
     assert imported & SLOW <= MAY_IMPORT[call]

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import warnings
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
@@ -108,4 +109,5 @@ def test_an_efficiency_of_96_is_refused_with_both_ways_to_write_it(value: str) -
         lm.load("paper-2dof-l-small", [f"gearbox.losses.efficiency={value}"])
     assert found.value.problems[0].keys == ("gearbox.losses.efficiency",)
     assert '0.96, or "96 %"' in str(found.value)
-    assert lm.load("paper-2dof-l-small", ["gearbox.losses.efficiency=96 %"]).gearbox.losses.efficiency == 0.96
+    losses: Any = lm.load("paper-2dof-l-small", ["gearbox.losses.efficiency=96 %"]).gearbox.losses
+    assert losses.efficiency == 0.96

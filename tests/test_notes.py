@@ -35,7 +35,8 @@ def with_base(tmp_path: Path) -> lm.Scenario:
 WAYS: dict[str, Callable[[Path], lm.Scenario]] = {
     "overrides": lambda _: lm.load("paper-2dof-nl-small", {"gearbox.losses": MAP}),
     "one key": lambda _: lm.load(
-        "paper-2dof-nl-small", {"gearbox.losses.values": lm.load("paper-2dof-nl-small").gearbox.losses.values}
+        "paper-2dof-nl-small",
+        {"gearbox.losses.values": lm.load("paper-2dof-nl-small").gearbox.losses.model_dump()["values"]},
     ),
     "replace": lambda _: lm.load("paper-2dof-nl-small").replace(**{"gearbox.losses": MAP}),
     "base": with_base,
@@ -84,8 +85,7 @@ def test_losses_that_replace_estimated_ones_are_no_estimate() -> None:
         record.name
         for record in lm.catalogue()
         if record.name.startswith("harmonic")
-        or getattr(record, "loss_estimate", lambda: None)() is not None
-        and not record.missing()
+        or (getattr(record, "loss_estimate", lambda: None)() is not None and not record.missing())
     )
     scenario = lm.load("catalogue-robot-joint", {"gearbox": {"from": estimated}})
     assert scenario.gearbox.loss_range is not None

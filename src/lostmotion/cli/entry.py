@@ -56,7 +56,7 @@ def main() -> None:
         _run()
 
 
-def _show_warning(message: Warning | str, *_: Any) -> None:
+def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     """One line for a doubtful value, without the place in the code."""
     print(f"warning: {message}")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from ..units.scalars import is_number
@@ -66,23 +66,18 @@ def doubt_window(window: float, travel: float, unit: str, where: str) -> None:
 
 def doubt_all(data: Mapping[str, Any], where: object) -> None:
     """Warn of all such numbers in the tables of a file."""
-    for key, value in _numbers(data, ""):
-        doubt(key, value, where)
+    tables: list[tuple[str, Any]] = [("", data)]
+    while tables:
+        prefix, table = tables.pop()
+        entries = table.items() if isinstance(table, Mapping) else enumerate(table)
+        for key, value in entries:
+            if isinstance(value, Mapping) or (isinstance(value, list) and isinstance(next(iter(value), None), Mapping)):
+                tables.append((f"{prefix}{key}.", value))
+            elif str(key).rpartition(".")[2] in LARGEST:
+                doubt(f"{prefix}{key}", value, where)
 
 
 def read_as(value: float, unit: str) -> str:
     """A value in an SI unit, with angles in degrees beside: 1 rad (57.3 deg)."""
     name = "°C" if unit == "degC" else unit
     return f"{value:g} {name}" + (f" ({math.degrees(value):.3g} deg)" if unit == "rad" else "")
-
-
-def _numbers(data: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, Any]]:
-    for key, value in data.items():
-        if isinstance(value, Mapping):
-            yield from _numbers(value, f"{prefix}{key}.")
-        elif isinstance(value, list) and value and isinstance(value[0], Mapping):
-            for k, entry in enumerate(value):
-                if isinstance(entry, Mapping):
-                    yield from _numbers(entry, f"{prefix}{key}.{k}.")
-        elif str(key).rpartition(".")[2] in LARGEST:
-            yield f"{prefix}{key}", value

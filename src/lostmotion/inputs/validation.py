@@ -12,7 +12,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, Problem
-from ..units.scalars import is_number, scalar
+from ..units.scalars import scalar
 from .schema import follow, keys_within
 
 if TYPE_CHECKING:
@@ -256,10 +256,10 @@ class _Problem:
             case "less_than":
                 return f"must be less than {c['lt']:g}"
             case "less_than_equal":
-                percent = c["le"] == 1 and is_number(self.value) and 1.0 < self.value <= 100.0
-                return f"must be at most {c['le']:g}" + (
-                    f'; write {self.value / 100.0:g}, or "{self.value:g} %"' if percent else ""
-                )
+                text = f"must be at most {c['le']:g}"
+                if c["le"] == 1 and isinstance(self.value, int | float) and 1.0 < self.value <= 100.0:
+                    text += f'; write {self.value / 100.0:g}, or "{self.value:g} %"'
+                return text
             case "finite_number":
                 return "must be a finite number"
             case "literal_error" | "enum":

@@ -7,6 +7,7 @@ from typing import Any
 from ..data_sheets.accessory_sheets import AmplifierSheet
 from ..data_sheets.actuator_sheet import ActuatorSheet
 from ..data_sheets.gearbox_sheet import GearboxSheet, StiffnessData
+from ..data_sheets.linear_sheets import LinearMotorSheet
 from ..data_sheets.sheet import WORDS, Record
 from ..inputs.part import Part
 from ..inputs.schema import unit_in_schema
@@ -18,7 +19,9 @@ def rows_of(record: Record) -> list[tuple[str, str, str]]:
     """(quantity, value, status of its source) of all data of a record."""
     fields = type(record).model_json_schema()["properties"]
     out: list[tuple[str, str, str]] = []
-    effective = isinstance(record, AmplifierSheet | ActuatorSheet) or record.kind in ("ironcore", "ironless", "tubular")
+    effective = isinstance(record, AmplifierSheet | ActuatorSheet) or (
+        isinstance(record, LinearMotorSheet) and record.kind != "voice_coil"
+    )
 
     def add(key: str, label: str, text: str) -> None:
         source = record.source_of(key)

@@ -99,8 +99,10 @@ def show_selection(table: pa.Table, study: Study) -> Shown:
 def _verdict(
     table: pa.Table, ranked: list[Candidate], costs: list[Price], select: Selection, near: list[Miss]
 ) -> Verdict:
-    """Whether a candidate fits: with a reservation if a rule or its losses are open for the best one, not decided if none of those fits that
-    can be judged, and others cannot."""
+    """Whether a candidate fits.
+
+    It is a reservation if a rule or the losses of the best one are open. If none fits and some cannot be judged, it is not decided.
+    """
     fitting = [c for c in ranked if c.fits]
     count = f"{len(fitting)} of {counted(len(ranked), 'candidate')} {'fits' if len(fitting) == 1 else 'fit'}"
     open_ones = sum(bool({NO_DATA, NOT_RUN} & set(c.violated)) for c in ranked)
@@ -129,7 +131,7 @@ def _verdict(
 
 
 def _reservations(best: Candidate, fitting: list[Candidate]) -> list[str]:
-    """What is open about the best candidate that fits."""
+    """Open points of the best candidate that fits."""
     never = set.intersection(*(set(c.not_judged.split()) for c in fitting))
     rules = best.not_judged.split()
     names = [f"{rule} (of none that fits)" if rule in never and len(fitting) > 1 else rule for rule in rules]

@@ -176,8 +176,10 @@ def _run_slower(study: Study, miss: Miss, row: np.ndarray, least: float = 1.0) -
 
 
 def least_factor(study: Study, row: np.ndarray) -> float | None:
-    """The least factor by which the cycle has to be longer, so that the rules pass, to two digits of what it is beyond 1; None if none
-    up to `SLOWEST` does."""
+    """The least factor by which the cycle has to be longer, so that the rules pass; None if none up to `SLOWEST` does.
+
+    Its excess over 1 has two digits.
+    """
 
     def passes(factor: float) -> bool:
         return Axes(slowed(study, factor)).refused(row) is None
