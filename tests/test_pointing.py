@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,8 @@ from typer.testing import CliRunner
 
 import lostmotion as lm
 from lostmotion.cli import app
-from lostmotion.pointing.budget import first_gap
+from lostmotion.pointing.budget import View, first_gap
+from lostmotion.reports.pointing import verdict_of
 
 ROOT = Path(__file__).parent.parent
 IDEAL = {"ideal": True}
@@ -211,6 +213,22 @@ def test_two_axes_in_one_scenario_are_those_of_two() -> None:
         for variable in (f"{axis}_angle", f"{axis}_drive_torque_reference"):
             gap = np.abs(alone[variable].values - together[variable].values).max()
             assert gap <= 1e-9 * np.abs(alone[variable].values).max()
+
+
+@pytest.mark.parametrize(
+    ("share", "state", "said"),
+    [
+        (1.0, "fits", "all the time"),
+        (0.97, "does not fit", "for 3 % of"),
+        (1.0 - 2e-5, "does not fit", "for 0.002 % of"),
+    ],
+)
+def test_a_target_that_leaves_the_view_does_not_fit(share: float, state: str, said: str) -> None:
+    found = verdict_of(SimpleNamespace(view=View(share, 0.5)))  # type: ignore[arg-type]
+    assert found is not None
+    assert found.state == state
+    assert said in found.lines[0]
+    assert verdict_of(SimpleNamespace(view=None)) is None  # type: ignore[arg-type]
 
 
 def test_the_command_writes_its_sheet(tmp_path: Path) -> None:

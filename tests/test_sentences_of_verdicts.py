@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 
 from lostmotion.sizing.axis_rules import least, with_safety
 from lostmotion.sizing.finding import Finding, within
+from lostmotion.studies.nearest import Miss, _rounded_up
+from lostmotion.studies.selection import Candidate
 from lostmotion.units.practical import ROUNDING, counted, excess, share_of_limit, told_apart
 
 LIMITS = st.floats(1e-6, 1e6)
@@ -92,3 +94,19 @@ def test_texts_that_need_not_differ_have_four_digits() -> None:
 
 def test_one_thing_has_no_plural() -> None:
     assert (counted(1, "run"), counted(2, "run"), counted(0, "run")) == ("1 run", "2 runs", "0 runs")
+
+
+@given(excess_of_factor=st.floats(1e-5, 9.0))
+@example(excess_of_factor=2e-5)
+def test_a_cycle_is_longer_by_no_more_than_a_miss_needs(excess_of_factor: float) -> None:
+    """Two digits of what the factor is beyond 1 are 10 % of it at most, and hundredths above 0.1."""
+    found = _rounded_up(1.0 + excess_of_factor) - 1.0
+    assert excess_of_factor * (1.0 - 1e-5) <= found
+    assert found <= excess_of_factor + max(0.01 if excess_of_factor >= 0.1 else 0.0, 0.1 * excess_of_factor) + 1e-9
+
+
+@given(share=st.floats(2e-9, 1e3))
+def test_a_miss_is_never_0_percent_over_its_limit(share: float) -> None:
+    miss = Miss(Candidate(0, "pair", ("current",), "", "", {}), {"current": share}, None)
+    (percent,) = percents(str(miss))
+    assert percent > 0.0

@@ -1,0 +1,61 @@
+"""The verdict of a selection: a fit, a reservation, no fit, or not decided, and what each says first."""
+
+import pytest
+
+from lostmotion.reports.study_selection import _verdict
+from lostmotion.studies.axis_rows import HOLDS, NO_DATA
+from lostmotion.studies.select import Selection
+from lostmotion.studies.selection import NOT_RUN, Candidate, prices
+from lostmotion.verdict import Verdict
+
+pa = pytest.importorskip("pyarrow")
+SELECT = Selection(objectives={"mass": "least"})
+
+
+def candidate(run: int, *violated: str, not_judged: str = "", estimated: str = "") -> Candidate:
+    mass = {"mass": 1.0 + run}
+    return Candidate(run, f"pair {run}", violated, " ".join(violated), not_judged, mass, estimated=estimated)
+
+
+def verdict(*ranked: Candidate) -> Verdict:
+    table = pa.table({"mass": [c.values["mass"] for c in ranked]})
+    return _verdict(table, list(ranked), prices(list(ranked), SELECT), SELECT, [])
+
+
+def test_a_pair_that_keeps_all_limits_fits() -> None:
+    found = verdict(candidate(0), candidate(1, "current"))
+    assert (found.state, found.exit_code, found.lines[0]) == ("fits", 0, "1 of 2 candidates fits")
+
+
+def test_what_was_judged_for_no_pair_is_a_reservation() -> None:
+    """Voltage is judged for none of those that fit."""
+    found = verdict(
+        candidate(0, not_judged="voltage"), candidate(1, not_judged="voltage current"), candidate(2, "current")
+    )
+    assert (found.state, found.exit_code) == ("fits with a reservation", 0)
+    assert "not judged: voltage (of none that fits)" in found.lines[0]
+
+
+def test_a_reservation_names_the_first_pair_that_has_none() -> None:
+    found = verdict(candidate(0, not_judged="voltage"), candidate(1))
+    assert found.state == "fits with a reservation"
+    assert "the first without a reservation is pair 1" in found.lines[0]
+
+
+@pytest.mark.parametrize(
+    ("estimated", "state"), [(HOLDS, "fits"), ("not decided: fits to violates", "fits with a reservation")]
+)
+def test_estimated_losses_that_turn_the_verdict_are_a_reservation(estimated: str, state: str) -> None:
+    assert verdict(candidate(0, estimated=estimated)).state == state
+
+
+def test_no_pair_that_fits_does_not_fit() -> None:
+    found = verdict(candidate(0, "current"), candidate(1, "voltage", "current"))
+    assert (found.state, found.exit_code, found.lines[0]) == ("does not fit", 1, "0 of 2 candidates fit")
+
+
+@pytest.mark.parametrize("why", [NO_DATA, NOT_RUN])
+def test_no_pair_that_fits_is_not_decided_while_one_cannot_be_judged(why: str) -> None:
+    found = verdict(candidate(0, "current"), candidate(1, why))
+    assert (found.state, found.exit_code) == ("not decided", 3)
+    assert found.lines[0] == "0 of 2 candidates fit, 1 cannot be judged"
