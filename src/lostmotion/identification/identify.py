@@ -26,7 +26,7 @@ from .leave_out import ConditionError, left_out_errors
 from .misfit import Misfit, explained, hidden, misfits, with_shapes
 from .odd_logs import OddLog, odd_logs
 from .pauses import split_at_pauses
-from .prepare import DEFAULT, Prepared
+from .prepare import Prepared, alike
 from .progress import Progress
 from .record import gear_sheet, sheet_text
 from .recorded import Way, as_recorded, nearer_ways
@@ -503,21 +503,16 @@ def _with_model_error(
 
 
 def _notes(logs: list[Prepared]) -> dict[str, tuple[str, ...]]:
-    """By log; a value of `logs.header` that several logs take is noted once, with their number."""
-    takers: dict[str, list[str]] = {}
+    """By log; a note that several logs share is given once, with their number and the numbers of the first."""
+    takers: dict[str, list[tuple[str, str]]] = {}
     for log in logs:
         for note in log.log.notes:
-            if note.startswith(DEFAULT):
-                takers.setdefault(note, []).append(log.name)
-    shared = {note for note, names in takers.items() if len(names) > 1}
+            takers.setdefault(alike(note), []).append((log.name, note))
     found: dict[str, tuple[str, ...]] = {}
-    for note, names in takers.items():
-        if note in shared:
-            where = f"{names[0]} and {len(names) - 1} more"
-            found[where] = (*found.get(where, ()), note)
-    for log in logs:
-        if own := tuple(note for note in log.log.notes if note not in shared):
-            found[log.name] = own
+    for same in takers.values():
+        name, note = same[0]
+        where = name if len(same) == 1 else f"{name} and {len({n for n, _ in same}) - 1} more"
+        found[where] = (*found.get(where, ()), note)
     return found
 
 

@@ -19,7 +19,7 @@ from ..inputs.validation import listed
 from ..simulation.scenario import Scenario
 from ..simulation.scenario_files import find_scenario, load
 from .logs import Log
-from .prepare import SAME, channel_unit
+from .prepare import SAME, alike, channel_unit
 from .readers import ENDINGS, read_log
 from .screening import screened
 
@@ -221,7 +221,7 @@ def _doubts(
     logs: Sequence[tuple[Path, Log]], seen: Sequence[_Seen], measured: Sequence[_Seen], inputs: Sequence[_Seen]
 ) -> list[str]:
     """Defects of logs, and differences between them."""
-    notes: dict[str, list[str]] = {}
+    notes: dict[str, tuple[str, list[str]]] = {}
     for path, log in logs:
         own = [c.name for c in measured if c.name in log.channels]
         acting = [c.name for c in inputs if c.name in log.channels]
@@ -230,8 +230,9 @@ def _doubts(
         except InputError as problem:
             found = [problem.reason]
         for note in found:
-            notes.setdefault(SAMPLE.sub("", note), []).append(path.name)
-    doubts = [f"{names[0]}{f' and {len(names) - 1} more' if len(names) > 1 else ''}: {n}" for n, names in notes.items()]
+            _, names = notes.setdefault(alike(SAMPLE.sub("", note)), (SAMPLE.sub("", note), []))
+            names.append(path.name)
+    doubts = [f"{n[0]}{f' and {len(n) - 1} more' if len(n) > 1 else ''}: {note}" for note, n in notes.values()]
     for c in seen:
         if len(c.units) > 1:
             doubts += [_about_units(c, unit, names) for unit, names in c.units.items() if unit != c.unit]

@@ -21,7 +21,7 @@ from .ladder import problem_of
 from .misfit import explained
 from .prepare import Prepared
 from .rig import Rig
-from .screening import constant_stretches, wrapped_by
+from .screening import MOTION, frozen_stretches, wrapped_by
 
 SUSPECT = 3.0  # times the median residual of the other logs, from which on the faults are tried
 ODD = 6.0  # the same, from which on a log that no fault explains is reported
@@ -305,7 +305,8 @@ def _ratios(rig: Rig, log: Prepared, sizes: _Sizes) -> Mapping[float, str]:
 def _recording_faults(rig: Rig, log: Prepared, channel: str) -> Iterator[tuple[str, Prepared]]:
     """Faults of a measured channel that its own samples show."""
     x = log.log.values(channel)
-    if stretches := constant_stretches(x):
+    others = [log.log.channels[m.channel] for m in rig.task.measured.values() if m.channel != channel]
+    if stretches := frozen_stretches(x, [c.values for c in others if c.unit in MOTION]):
         masked = x.copy()
         for begin, end in stretches:
             masked[begin + 1 : end] = np.nan

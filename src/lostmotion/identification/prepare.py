@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -20,6 +21,7 @@ from .screening import screened
 from .task import FormulaText, Identification, InputChannel, MeasuredChannel
 
 DEFAULT = "taken from logs.header: "  # how a note on such a value begins
+NUMBER = re.compile(r"-?\d[\d.e+-]*%?")
 KINDS = ("rad", "rad/s", "N*m", "A", "V", "N", "m", "m/s", "s", "K", "rad/s^2", "m/s^2", "W", "Pa")
 SAME = {"m": "rad", "m/s": "rad/s", "N": "N*m"}  # a linear axis may be written with shafts
 
@@ -151,6 +153,11 @@ def channel_unit(written: str, of_file: str, unit: str, where: str) -> tuple[flo
     raise InputError(
         f"the unit {text!r} is not known ({problem}); write it with measured or inputs ... unit", where=where
     )
+
+
+def alike(note: str) -> str:
+    """What a note has in common with notes of other logs: all but its numbers, and with the value of `logs.header` that it names."""
+    return note if note.startswith(DEFAULT) else NUMBER.sub("#", note)
 
 
 def is_unit(text: str) -> bool:

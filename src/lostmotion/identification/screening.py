@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,6 +25,11 @@ WRAP = 20.0  # times the usual change between samples (99th percentile), that do
 SAME = 0.1  # share by which jumps of one counter may differ: it moves while it wraps
 NOISY = 0.9  # share of samples at which a channel changes, from which on one that does not is taken to be frozen
 FROZEN = 20  # samples in a row
+MOTION = ("rad", "m", "rad/s", "m/s")  # units of channels that show whether the rig moves
+MOVING = 0.2  # of the usual change of another channel of the motion, from which on the rig moves in a stretch
+SLOWER = (
+    0.7  # of the change before, up to which a motion comes to rest: with a constant deceleration it is at most a third
+)
 CONTRADICTION = 0.03  # share by which the mean of a channel may depart from what the header says
 
 
@@ -58,7 +63,7 @@ def screened(log: Log, measured: Iterable[str], inputs: Iterable[str], stated: d
         if np.ptp(there) == 0.0:
             log = log.noted(f"{name} stays at {there[0]:.6g} all through; it says nothing of the motion")
     for name in measured:
-        log = _noted(log, name)
+        log = _noted(log, name, measured)
     log = _stalls(log)
     for key, channel in (stated or {}).items():
         log = _compared(log, key, channel)
@@ -194,16 +199,19 @@ def _without_glitches(log: Log, name: str, acts: bool) -> Log:
     return _without(log, name, glitch, acts, f"{note} ({log.values(name)[k]:.6g})")
 
 
-def _noted(log: Log, name: str) -> Log:
+def _noted(log: Log, name: str, measured: Sequence[str]) -> Log:
     """Notes on a channel that wraps, is frozen for a while, ends at a limit, or is slower than its samples."""
     x = log.values(name)[np.isfinite(log.values(name))]
     if (period := wrapped_by(x)) is not None:
         log = log.noted(
             f"{name} jumps by {period:.6g} between two samples, as a counter that wraps; unwrap it in the file"
         )
-    for begin, end in constant_stretches(log.values(name)):
-        text = f"{name} is {log.values(name)[begin]:.6g} from {log.time[begin]:.4g} to {log.time[end - 1]:.4g} s and changes at all"
-        log = log.noted(f"{text} other samples; the sensor may have been frozen")
+    others = [c.values for n in measured if n != name and (c := log.channels[n]).unit in MOTION]
+    if stretches := frozen_stretches(log.values(name), others):
+        begin, end = max(stretches, key=lambda s: s[1] - s[0])
+        more = f" and {len(stretches) - 1} times more" if len(stretches) > 1 else ""
+        text = f"{name} is {log.values(name)[begin]:.6g} from {log.time[begin]:.4g} to {log.time[end - 1]:.4g} s{more}, in the middle of"
+        log = log.noted(f"{text} a motion; the sensor may have been frozen")
     changes = int(np.sum(np.diff(x) != 0.0))
     if changes <= SLOW:
         return log
@@ -249,6 +257,44 @@ def constant_stretches(x: np.ndarray) -> list[tuple[int, int]]:
     if not found or np.sum(moved) < NOISY * (len(moved) - within):
         return []
     return found
+
+
+def frozen_stretches(x: np.ndarray, others: Sequence[np.ndarray] = ()) -> list[tuple[int, int]]:
+    """Constant stretches in the middle of a motion; a load that comes to rest and begins to move again is not frozen.
+
+    Parameters
+    ----------
+    others
+        Other channels that show the motion: if they change as usual in a stretch the sensor is frozen, else the load is at rest.
+    """
+    return [stretch for stretch in constant_stretches(x) if not _at_rest(x, *stretch, others)]
+
+
+def _at_rest(x: np.ndarray, begin: int, end: int, others: Sequence[np.ndarray]) -> bool:
+    """Whether a channel is constant since nothing moves: it slows down before and speeds up behind, and has no noise elsewhere."""
+    if others:
+        return not any(_moves(other, begin, end) for other in others)
+    step = np.abs(np.diff(x))
+    jumped = begin > 0 and step[begin - 1] > 2.0 * float(
+        np.nanmax(np.delete(step, [begin - 1, min(end, len(x) - 1) - 1]))
+    )
+    if abs(x[begin]) <= 1e-9 * float(np.nanmax(np.abs(x))) and not jumped:
+        return True  # a speed of zero, or an angle that has not left its zero
+    second, third = (float(np.nanmedian(np.abs(np.diff(x[np.isfinite(x)], order)))) for order in (2, 3))
+    # Third differences of white noise are 1.8 times the second ones; those of a smooth motion are far smaller.
+    resolution = float(np.min(step[step > 0.0]))
+    if third > 0.9 * second and second > 4.0 * resolution:
+        return False
+    stops = begin < 2 or step[begin - 1] <= SLOWER * step[begin - 2] + 1.01 * resolution
+    starts = end + 1 >= len(x) or step[end - 1] <= step[end] + 1.01 * resolution
+    return bool(stops and starts)
+
+
+def _moves(x: np.ndarray, begin: int, end: int) -> bool:
+    """Whether a channel changes in a stretch as it does elsewhere."""
+    step = np.abs(np.diff(x))
+    within, elsewhere = step[begin : end - 1], np.concatenate([step[:begin], step[end:]])
+    return bool(np.nanmedian(within) > MOVING * np.nanmedian(elsewhere)) if len(elsewhere) else False
 
 
 def _stalls(log: Log) -> Log:
