@@ -20,12 +20,13 @@ from lostmotion.identification.engine import Engine, Point
 from lostmotion.identification.fit import search
 from lostmotion.identification.formulas import Formula
 from lostmotion.identification.identifiability import Undetermined
-from lostmotion.identification.identify import IdentificationResult, _notes, identify_task
+from lostmotion.identification.identify import _notes, identify_task
 from lostmotion.identification.intervals import reach
 from lostmotion.identification.ladder import RungResult, chosen, climb, free_on, problem_of, start_point
 from lostmotion.identification.logs import Channel
 from lostmotion.identification.prepare import prepared
 from lostmotion.identification.progress import Progress
+from lostmotion.identification.result import IdentificationResult
 from lostmotion.identification.rig import Rig
 from lostmotion.identification.task import Identification
 from lostmotion.reports import plots

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from identification_logs import AXIS
-from lostmotion.identification.identify import IdentificationResult, identify_logs
+from lostmotion.identification.identify import identify_logs
 from lostmotion.identification.logs import Channel, Log
 from lostmotion.identification.prepare import prepared
+from lostmotion.identification.result import IdentificationResult
 from lostmotion.identification.rig import Rig
 from lostmotion.identification.task import Identification
 from lostmotion.identification.virtual import virtual_log

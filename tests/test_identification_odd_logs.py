@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from lostmotion.errors import InputError
-from lostmotion.identification.identify import IdentificationResult, identify_logs
+from lostmotion.identification.identify import identify_logs
 from lostmotion.identification.logs import Channel, Log
 from lostmotion.identification.prepare import prepared
+from lostmotion.identification.result import IdentificationResult
 from lostmotion.identification.rig import Rig
 from lostmotion.identification.screening import constant_stretches, wrapped_by
 from lostmotion.identification.task import Identification

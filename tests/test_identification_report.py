@@ -11,8 +11,9 @@ import pytest
 from identification_logs import POSITION_NOISE, released, spring_task
 from lostmotion.identification.engine import Point
 from lostmotion.identification.gather import gathered
-from lostmotion.identification.identify import IdentificationResult, identify_task
+from lostmotion.identification.identify import identify_task
 from lostmotion.identification.progress import Progress
+from lostmotion.identification.result import IdentificationResult
 from lostmotion.identification.rig import Rig
 from lostmotion.identification.task import Identification
 from lostmotion.reports.identification import write_identification

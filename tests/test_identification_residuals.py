@@ -11,7 +11,7 @@ import pytest
 from lostmotion import Simulation, load
 from lostmotion.identification.engine import Engine, Point
 from lostmotion.identification.fit import Fit, Problem
-from lostmotion.identification.identify import IdentificationResult, identify_logs
+from lostmotion.identification.identify import identify_logs
 from lostmotion.identification.intervals import bootstrap
 from lostmotion.identification.ladder import problem_of, start_point
 from lostmotion.identification.logs import Channel, Log
@@ -19,6 +19,7 @@ from lostmotion.identification.misfit import misfits
 from lostmotion.identification.parameters import FreeParameter
 from lostmotion.identification.prepare import prepared
 from lostmotion.identification.recorded import course_of
+from lostmotion.identification.result import IdentificationResult
 from lostmotion.identification.rig import Rig
 from lostmotion.identification.task import FitOptions, Identification
 from lostmotion.identification.virtual import virtual_log

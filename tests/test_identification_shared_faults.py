@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from dry_friction import angles
+import lostmotion as lm
+from dry_friction import RIG, TASK, angles, write_log
 from lostmotion.identification.logs import Channel, Log
 from lostmotion.identification.screening import frozen_stretches, screened
 
@@ -46,3 +49,59 @@ def test_another_channel_that_moves_tells_a_frozen_sensor_from_a_load_at_rest() 
     moving = np.sin(3.0 * TIME)
     assert (begin, end) in frozen_stretches(angle, [moving])
     assert frozen_stretches(angle, [angle]) == []
+
+
+PARAMETERS = """
+[parameters]
+viscous = { start = 0.03, max = 1.0 }
+coulomb = { start = 0.08, max = 2.0 }
+"""
+RATE = 6.0  # N·m/s, of the limit that the amplifier has and the model lacks
+
+
+def limited_logs(directory: Path, steps: int, sines: int) -> Path:
+    """Logs of an amplifier that limits the rate of its torque: sines below the limit, and steps that it makes into ramps."""
+    (directory / "rig.toml").write_text(RIG)
+    time, fine = np.arange(300) / 200, np.arange(300 * 20) / 4000
+    for k in range(steps + sines):
+        draw = np.random.default_rng(k)
+        if k < steps:
+            goal = (0.45 + 0.05 * k) * np.sign(np.sin(2 * np.pi * 1.3 * time + 0.1 + k))
+        else:
+            goal = 0.5 * np.sin(2 * np.pi * 1.2 * time + k) + 0.08 * np.sin(2 * np.pi * 3.0 * time)
+        course = np.empty(len(fine))
+        course[0] = goal[0]
+        for n in range(1, len(fine)):  # held between samples, then limited
+            course[n] = course[n - 1] + np.clip(goal[(n - 1) // 20] - course[n - 1], -RATE / 4000, RATE / 4000)
+        angle = angles(course, 1 / 4000, coulomb=0.1)[::20] + 1e-3 * draw.standard_normal(len(time))
+        header = f"# trajectory: {'steps' if k < steps else 'sines'}\n# mass: {0.5 if k % 2 else 1.0}\n"
+        write_log(directory / f"l{k:02d}.csv", time, goal, angle, header)
+    task = TASK.replace('channel = "torque"', 'channel = "torque"\ninterpolation = "hold"')
+    (directory / "i.toml").write_text(task + PARAMETERS)
+    return directory / "i.toml"
+
+
+def test_logs_that_a_limit_of_the_rate_makes_late_stay_and_the_limit_is_proposed(tmp_path: Path) -> None:
+    path = limited_logs(tmp_path, 4, 12)
+    found = lm.identify(path, threads=1)
+    assert found.left_out == {}
+    assert len(found.logs) == 16
+    (shared,) = found.shared
+    assert set(shared.logs) == {f"l{k:02d}.csv" for k in range(4)}
+    assert "trajectory = steps (4 of 4 such logs)" in shared.common or "largest step" in shared.common
+    words = shared.candidate.split()
+    assert words[0] == "inputs.m_command.rate_limit"
+    assert float(words[2].rstrip(",")) == pytest.approx(RATE, rel=0.1)
+    assert sum("late" in line for line in found.warnings()) <= 1
+    table = {(k.key, k.value): k for k in found.kinds}
+    assert table["trajectory", "steps"].odd == table["trajectory", "steps"].logs == 4
+    assert table["trajectory", "sines"].odd == 0
+    assert table["trajectory", "steps"].mae > 2.0 * table["trajectory", "sines"].mae
+    path.write_text(
+        path.read_text().replace('channel = "torque"', 'channel = "torque"\nrate_limit = "rate"')
+        + "rate = { start = 5.0, min = 1.0, max = 100.0 }\n"
+    )
+    better = lm.identify(path, threads=1)
+    assert better.shared == [] and better.odd == []
+    assert better.values["rate"] == pytest.approx(RATE, rel=0.02)
+    assert better.values["coulomb"] == pytest.approx(0.1, rel=0.02)

@@ -15,7 +15,7 @@ from .targets import pictures_of, writing
 from .terminal import busy, fail
 
 if TYPE_CHECKING:
-    from ..identification.identify import IdentificationResult
+    from ..identification.result import IdentificationResult
 
 NOTES = 10  # lines of them in the terminal
 PROGRESS = "identify-progress.json"
@@ -57,6 +57,9 @@ def identify(
     scenario), identified.html (one page), errors.csv (of each log), parameters.csv and, with the key record, gearbox.toml (a data
     sheet). An interrupted command with -o keeps its fitted models in identify-progress.json, and continues with the next one.
 
+    Exit code 0: the model describes the logs, with or without a reservation; 1: it leaves more than half of the motion, or an
+    error; 3: the logs determine none of the parameters.
+
     `new` looks at the logs in DIR and writes a first identification file: channels, units, sample times, and what is in doubt about
     them. A file that exists is never overwritten.
 
@@ -93,13 +96,14 @@ def identify(
     sys.stdout.flush()
     if output is None:
         print(f"The scenario and all charts: lostmotion identify {file} -o identified")
-        return
+        raise typer.Exit(result.verdict.exit_code)
     with writing(output), busy("Writing"):
         from ..reports.identification import write_identification
 
         page = write_identification(output, file.stem, result, pictures, all_logs=all_logs)
     print(f"Report written to {page}")
     print(f"Next: lostmotion run {output / 'identified.toml'} --plot run.png")
+    raise typer.Exit(result.verdict.exit_code)
 
 
 def _new(directory: Path | None, rig: str | None, output: Path | None) -> None:
@@ -128,6 +132,7 @@ def _new(directory: Path | None, rig: str | None, output: Path | None) -> None:
 
 def _print_summary(result: IdentificationResult) -> None:
     print(result.task.title or "Identification")
+    print(result.verdict)
     print(*(f"  {text}" for text in result.warnings()), sep="\n", end="\n" if result.warnings() else "")
     unit = f" {result.error_unit}".rstrip()
     for k, rung in enumerate(result.rungs):

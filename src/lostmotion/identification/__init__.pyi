@@ -4,7 +4,6 @@ from .design import Candidate as Candidate
 from .design import design_experiment as design_experiment
 from .errors_of_logs import LogError as LogError
 from .identifiability import Undetermined as Undetermined
-from .identify import IdentificationResult as IdentificationResult
 from .intervals import Interval as Interval
 from .ladder import RungResult as RungResult
 from .logs import Channel as Channel
@@ -12,6 +11,9 @@ from .logs import Log as Log
 from .monitor import MonitorResult as MonitorResult
 from .new_task import first_task as first_task
 from .readers import read_log as read_log
+from .result import IdentificationResult as IdentificationResult
+from .shared_faults import KindError as KindError
+from .shared_faults import SharedFault as SharedFault
 from .task import Identification as Identification
 from .task import load_identification as load_identification
 from .trends import LogEstimate as LogEstimate

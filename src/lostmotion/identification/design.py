@@ -12,10 +12,10 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from .engine import Engine, Point
 from .fit import slope_of
-from .identify import IdentificationResult
 from .ladder import free_on
 from .logs import Log
 from .prepare import prepared
+from .result import IdentificationResult
 from .virtual import virtual_log
 
 PRIOR = 1e-3  # information on a scaled parameter that nothing else is known of: it may change by about 30 of its scales

@@ -72,11 +72,13 @@ class OddLog:
     """residuals with the fault undone, SI; NaN without a fault"""
     held_out: bool
     """whether the log was held out of the fit anyway"""
+    shared: bool = False
+    """whether other logs have the same fault, so that it is the model's"""
 
     @property
     def left_out(self) -> bool:
         """Whether the log is left out of the fit."""
-        return bool(self.fault) and not self.held_out
+        return bool(self.fault) and not self.held_out and not self.shared
 
     @property
     def text(self) -> str:
@@ -91,8 +93,10 @@ class OddLog:
 UNEXPLAINED = "no sign, unit, delay, clock, wrap, frozen or slow channel explains it, so that it stays in the fit"
 
 
-def odd_logs(rig: Rig, engine: Engine, logs: Sequence[Prepared], start: Point, fit: Fit, rung: int) -> list[OddLog]:
-    """Logs that disagree with the others, those fitted and those held out.
+def odd_logs(
+    rig: Rig, engine: Engine, logs: Sequence[Prepared], start: Point, fit: Fit, rung: int
+) -> tuple[list[OddLog], Point]:
+    """Logs that disagree with the others, those fitted and those held out, and the point that fits the others.
 
     Parameters
     ----------
@@ -107,10 +111,11 @@ def odd_logs(rig: Rig, engine: Engine, logs: Sequence[Prepared], start: Point, f
     -------
     list of OddLog
         Empty if all logs agree, or if fewer than three were fitted.
+    Point
     """
     train = [log for log in logs if not log.held_out]
     if len(train) < FEWEST:
-        return []
+        return [], fit.point
     agreeing, point = _agreeing(rig, engine, train, start, fit, rung)
     sizes = _Sizes(rig, engine, agreeing, point, rung)
     found = []
@@ -126,7 +131,7 @@ def odd_logs(rig: Rig, engine: Engine, logs: Sequence[Prepared], start: Point, f
             unit = log.log.channels[rig.task.measured[channel].channel].unit
             own = float(mended[k]) if fault else math.nan
             found.append(OddLog(log.name, channel, unit, float(rows[k]), ratio, fault, own, log.held_out))
-    return found
+    return found, point
 
 
 class _Sizes:

@@ -62,7 +62,7 @@ class InputChannel(Part):
     scale: FormulaText = 1.0
     """factor on it"""
     offset: FormulaText = 0.0
-    """added to it after the factor"""
+    """added to it after the factor: what acts is scale*channel + offset"""
     delay: FormulaText = 0.0
     """by which it acts later: dead time [s]"""
     interpolation: Literal["hold", "linear"] | None = None
@@ -87,7 +87,7 @@ class MeasuredChannel(Part):
     """unit of the channel; default: the unit in its file, else SI"""
     scale: FormulaText = 1.0
     offset: FormulaText = 0.0
-    """SI"""
+    """reading of the channel where the variable is 0, SI: the channel is scale*variable + offset, as recorded"""
     delay: FormulaText = 0.0
     """from the quantity until its sample [s]"""
     filter_time: FormulaText = 0.0

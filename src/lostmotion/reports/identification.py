@@ -10,17 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from ..identification.identify import IdentificationResult, residual_table
+from ..identification.identify import residual_table
 from ..identification.ladder import RungResult, free_on
 from ..identification.misfit import shape_variables
 from ..identification.prepare import Prepared
+from ..identification.result import IdentificationResult
 from ..model.gear import Gear
 from ..model.losses import LossMap, MeshEfficiency, WormMesh, efficiency_map
 from ..model.train import DriveTrain
 from ..simulation.scenario import Scenario
 from ..units.conversion import si_factor
 from ..units.practical import printed
-from ..verdict import State, Verdict
 from .looks import FAINT, MEASURED, PALETTE, look
 from .page import Prose, Report, Table
 from .pages import table_csv, write_report, write_text
@@ -92,13 +92,14 @@ def identification_report(name: str, result: IdentificationResult, *, all_logs: 
     notes = [[log, line] for log, lines in result.notes.items() for line in lines]
     lists = {
         "Unidentifiable parameters": [*(u.text for u in result.undetermined), *result.at_bounds, *result.differences()],
+        "Odd logs and residuals": result.warnings(),
         "Interpolated inputs and start values": [*result.inputs, *result.starts()],
         "Models without a result": [*result.failures(), *result.passed_over()],
     }
     return Report(
         title=result.task.title or name,
         lead=f"{result.source()}.",
-        verdict=_verdict(result),
+        verdict=result.verdict,
         main=main,
         parts=(
             Table(
@@ -111,6 +112,7 @@ def identification_report(name: str, result: IdentificationResult, *, all_logs: 
                 "Values", ("parameter", "value", "from", "to", "unit", "interval"), parameter_rows(result), INTERVALS
             ),
             *([_conditions(result)] if result.conditions else []),
+            *([_kinds(result)] if result.kinds else []),
             *(Prose(title, texts, listed=True) for title, texts in lists.items() if texts),
             *[group for group in groups if not group.name.startswith("overlays")],
             Table(
@@ -130,20 +132,6 @@ INTERVALS = (
     "Values and 95 % intervals. The bootstrap draws blocks of half a second of the residuals, and with five or more logs whole logs. "
     "If residuals are structured, the interval also contains the value of the neighbouring model, and is marked. A blank unit means a plain number."
 )
-
-
-def _verdict(result: IdentificationResult) -> Verdict:
-    """Warnings, the model that is taken, and what the logs leave open."""
-    warnings, rung = result.warnings(), result.rungs[result.chosen]
-    unit = f" {result.error_unit}".rstrip()
-    held_out = "" if math.isnan(rung.held_out) else f", held out {rung.held_out:.5g}{unit}"
-    found = [f"Model {rung.name}: mean absolute error {rung.train:.5g}{unit}{held_out}."]
-    open_ends = [*(u.text for u in result.undetermined), *result.at_bounds]
-    known = "All parameters are determined by the logs." if not open_ends else f"{open_ends[0].rstrip('.')}."
-    more = f" {len(open_ends) - 1} more below." if len(open_ends) > 1 else ""
-    lines = [f"{' '.join(warnings)}", *found, f"{known}{more}"] if warnings else [*found, f"{known}{more}"]
-    state: State = "does not fit" if warnings else "fits with a reservation" if open_ends else "fits"
-    return Verdict(state, tuple(lines))
 
 
 def error_rows(result: IdentificationResult) -> list[list[str]]:
@@ -167,6 +155,17 @@ def _conditions(result: IdentificationResult) -> Table:
     heading = ("condition", "logs", f"mean absolute error, fitted{unit}", f"fitted without them{unit}")
     return Table(
         "Leave one condition out", heading, rows, "For each condition the model is fitted again without its logs."
+    )
+
+
+def _kinds(result: IdentificationResult) -> Table:
+    """Errors of the logs by the values of their headers."""
+    channel = next(iter(result.task.measured))
+    unit = f" [{printed(result.unit(channel))}]" if result.unit(channel) else ""
+    rows = [[f"{k.key} = {k.value}", str(k.logs), f"{k.mae:.5g}", str(k.odd)] for k in result.kinds]
+    heading = ("logs with", "number", f"mean absolute error of {channel}{unit}", "odd logs")
+    return Table(
+        "Errors by kind of log", heading, rows, "A kind with a far larger error shows an effect that the model lacks."
     )
 
 
