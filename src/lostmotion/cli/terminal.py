@@ -207,6 +207,7 @@ def simulating(what: str, scenario: Any, tolerance: float = 0.0) -> Iterator[Cal
         Relative one of the adaptive solver; 0: the exact solver.
     """
     from ..simulation.forecast import forecast
+    from ..units.practical import counted
 
     with busy(what) as tell:
         expected = forecast(scenario, tolerance)
@@ -218,7 +219,7 @@ def simulating(what: str, scenario: Any, tolerance: float = 0.0) -> Iterator[Cal
         def watch() -> None:
             if long := expected.seconds > LONG:
                 say(
-                    f"takes {_span(expected.seconds)} by estimate; its first {expected.part:.3g} s have {expected.switchings} switchings"
+                    f"takes {_span(expected.seconds)} by estimate; its first {expected.part:.3g} s have {counted(expected.switchings, 'switching')}"
                 )
             while not done.wait(REFRESH if terminal else EVERY):
                 passed = time.monotonic() - begin

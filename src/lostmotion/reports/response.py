@@ -13,7 +13,7 @@ import numpy as np
 from ..atomic_writer import write_bytes
 from ..response.crossovers import characteristics
 from ..simulation.scenario import Scenario
-from ..units.practical import printed
+from ..units.practical import counted, printed
 from .looks import step
 from .page import Prose, Report, Table
 from .pages import table_csv, write_report
@@ -150,9 +150,9 @@ def motion_lines(result: xarray.Dataset) -> list[str]:
         if repeating.any()
         else ""
     )
-    lines = [f"{result['reason'].size - len(reasons)} of {result['reason'].size} motions found{within}"]
+    lines = [f"{result['reason'].size - len(reasons)} of {counted(result['reason'].size, 'motion')} found{within}"]
     lines += _closed_loop_lines(result) if "spread" in result else []
-    return lines + [f"not found at {reasons.count(r)} point(s): {r}" for r in dict.fromkeys(reasons)]
+    return lines + [f"not found at {counted(reasons.count(r), 'point')}: {r}" for r in dict.fromkeys(reasons)]
 
 
 def _closed_loop_lines(result: xarray.Dataset) -> list[str]:
@@ -164,10 +164,10 @@ def _closed_loop_lines(result: xarray.Dataset) -> list[str]:
             f"{(off > 1e-9).sum()} of {len(f)} frequencies moved to the nearest that fits the sample times, by {off.max():.1%} at most"
         )
     spread = result["spread"].values
-    if (spread > 0.0).any():
+    if count := int((spread > 0.0).sum()):
         lines.append(
-            f"{(spread > 0.0).sum()} motions do not repeat, as the encoder has steps: means over many periods, whose first harmonics "
-            f"vary by {spread[spread > 0.0].max():.2g} of their mean at most"
+            f"{counted(count, 'motion')} {'does' if count == 1 else 'do'} not repeat, as the encoder has steps: means over many periods, "
+            f"whose first harmonics vary by {spread[spread > 0.0].max():.2g} of their mean at most"
         )
     return lines
 

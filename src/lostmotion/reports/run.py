@@ -14,7 +14,7 @@ from ..simulation.scenario import Scenario
 from ..simulation.switchings import ATTRIBUTE as SWITCHINGS
 from ..simulation.switchings import MESH_STEP, names_in, unpacked
 from ..simulation.windings import errors_of
-from ..units.practical import charted, practical, printed
+from ..units.practical import charted, counted, practical, printed
 from ..verdict import Verdict
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def summary(result: xarray.Dataset | RunArrays) -> str:
     stuck = float(np.mean(np.asarray(result["input_contact"]) == 0))
     lines = [
         visible(result.attrs["title"]) or "(no title)",
-        f"  {last('time'):g} s, {result.attrs['switching_count']} events, solver {result.attrs['solver']}",
+        f"  {last('time'):g} s, {counted(result.attrs['switching_count'], 'event')}, solver {result.attrs['solver']}",
         f"  at the end: motor {last('motor_speed'):.4g} rad/s, load {last('load_speed'):.4g} rad/s "
         f"at {last('load_angle'):.4g} rad, twist {1e3 * last('twist'):.4g} mrad",
         f"  peak: motor torque {peak('motor_torque'):.4g} N·m, output torque "
@@ -99,7 +99,7 @@ def mesh_lines(result: xarray.Dataset | RunArrays) -> list[str]:
     causes = unpacked(result.attrs)[:, names_in(result.attrs).index("cause")]
     count = int(np.sum(causes == MESH_STEP))
     each = ", ".join(f"{name} {mesh.teeth * mesh.steps():g}" for name, mesh in meshes.items())
-    return [f"  steps of the mesh stiffness: {count} events; in a turn of the input shaft {each}"]
+    return [f"  steps of the mesh stiffness: {counted(count, 'event')}; in a turn of the input shaft {each}"]
 
 
 def error_lines(result: xarray.Dataset | RunArrays) -> list[str]:
@@ -127,7 +127,7 @@ def train_summary(result: xarray.Dataset | RunArrays) -> str:
     time = float(np.asarray(result["time"])[-1])
     lines = [
         visible(result.attrs["title"]) or "(no title)",
-        f"  {time:g} s, {result.attrs['switching_count']} events, solver {result.attrs['solver']}; at the end:",
+        f"  {time:g} s, {counted(result.attrs['switching_count'], 'event')}, solver {result.attrs['solver']}; at the end:",
     ]
     for name in train.motors:
         unit = train.torque_unit(train.motors[name].shaft)
@@ -186,9 +186,7 @@ def run_report(name: str, result: xarray.Dataset) -> Report:
     e = energy_of(result) if "energy" in result.attrs else {}
     closes = f"; the energy balance closes to {closes_to(result)}" if e.get("turned_over") else ""
     last = float(result["time"][-1])
-    first = (
-        f"{last:g} s with {result.attrs['switching_count']} switchings, by the {result.attrs['solver']} solver{closes}."
-    )
+    first = f"{last:g} s with {counted(result.attrs['switching_count'], 'switching')}, by the {result.attrs['solver']} solver{closes}."
     more = gear_charts(result)
     flows = [Flows("Energy of the whole run", e)] if e else []
     gears = [Group("gears", "Torsion, losses and energy", "", (*more, *flows))] if more or flows else []

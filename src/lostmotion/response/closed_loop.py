@@ -23,6 +23,7 @@ from ..control.controller import AnyReference, Controller
 from ..control.references import PositionReference
 from ..simulation.scenario import Scenario
 from ..simulation.stepping import Simulation
+from ..units.practical import counted
 from .plant import Plant
 from .windows import Window
 
@@ -206,7 +207,7 @@ class Search:
             return best
         change = math.inf if best is None else best.residual
         periods = loop.windows * loop.window.periods
-        return f"not periodic after {periods} periods: the variables still change by {change:.1e}"
+        return f"not periodic after {counted(periods, 'period')}: the variables still change by {change:.1e}"
 
     def _approach(self, depth: int) -> None:
         """Follows the motion for so many windows, and goes on from their limit if that repeats better."""

@@ -17,6 +17,7 @@ from ..model.signals import CommandSignal, Signal, TorqueSignal
 from ..simulation.drive_tables import Initial
 from ..simulation.scenario import Scenario
 from ..simulation.train_tables import TrainInitial
+from ..units.practical import counted
 from .plant import Plant, plant_of
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ def reason_of(result: dict[str, Any], k: int) -> str:
     if error := str(result["error"][k]):
         return error
     if not result["converged"][k]:
-        return f"not periodic after {int(result['periods'][k])} periods: the states still change by {result['residual'][k]:.1e}"
+        return f"not periodic after {counted(int(result['periods'][k]), 'period')}: the states still change by {result['residual'][k]:.1e}"
     return ""
 
 

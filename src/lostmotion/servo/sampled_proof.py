@@ -19,6 +19,7 @@ from ..control.turning import turns
 from ..response.hunting_proof import MARGIN, WIDER, Proof
 from ..response.standstill import Watch
 from ..response.stick_slip import UndecidableError
+from ..units.practical import counted
 from .regimes import Axis
 from .sampled_slip import SampledSlip, never_rests
 from .slip_boxes import Flow, starts
@@ -133,7 +134,7 @@ def _decided(of: SampledSlip, left: dict[int, set[int]]) -> Proof:
         lasting -= less
     top = (max(left) + 0.5) * of.step
     if ending >= set(left) and min(left) == 1:
-        text = f"from each reading of the encoder up to {max(left)} steps from the reference the slips end at the reference"
+        text = f"from each reading of the encoder up to {counted(max(left), 'step')} from the reference the slips end at the reference"
         return Proof("does not hunt", text, top)
     if lasting and len(lasting) == max(lasting) - min(lasting) + 1:
         band = ((min(lasting) - 0.5) * of.step, (max(lasting) + 0.5) * of.step)

@@ -24,6 +24,7 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Angle, Number
 from ..inputs.validation import did_you_mean, shown
 from ..simulation.scenario import Scenario
+from ..units.practical import counted
 from .data import frictions, inertias, lag_sum, two_inertias
 from .margins import STABLE, bandwidth_of, frequencies, margins
 from .motion import with_controller
@@ -233,7 +234,7 @@ def _by_margins(axis: Axis, phase_margin: float) -> tuple[SpeedGains, str]:
     degrees = math.degrees(phase_margin)
     return gains(
         rounded(kept)
-    ), f"phase margin {degrees:.4g} degrees and gain margin {GAIN_MARGIN:g} kept in {len(points)} regimes"
+    ), f"phase margin {degrees:.4g} degrees and gain margin {GAIN_MARGIN:g} kept in {counted(len(points), 'regime')}"
 
 
 def _by_search(axis: Axis, goal: str, peak: float) -> tuple[SpeedGains, str, float | None]:
@@ -276,7 +277,7 @@ def _by_search(axis: Axis, goal: str, peak: float) -> tuple[SpeedGains, str, flo
     gains, K_v = tuned(np.array(best))
     return (
         gains,
-        f"greatest {goal} with a peak of sensitivity of at most {peak:g} in {len(points)} regimes, {len(known)} tried",
+        f"greatest {goal} with a peak of sensitivity of at most {peak:g} in {counted(len(points), 'regime')}, {len(known)} tried",
         K_v,
     )
 

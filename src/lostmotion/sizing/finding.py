@@ -140,7 +140,10 @@ class Findings(tuple[Finding, ...]):
             names = "; ".join(f.what for f in unknown[:LISTED])
             more = f"; and {len(unknown) - LISTED} more" if len(unknown) > LISTED else ""
             points.append(
-                Point("fits with a reservation", f"{len(unknown)} of {len(self)} points not judged: {names}{more}")
+                Point(
+                    "fits with a reservation",
+                    f"{len(unknown)} of {counted(len(self), 'point')} not judged: {names}{more}",
+                )
             )
         points.append(Point("fits", f"all {counted(len(self), 'point')} within the limits"))
         lines = [
