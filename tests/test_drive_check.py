@@ -318,7 +318,7 @@ def test_nothing_judged_is_not_decided_and_what_is_not_judged_is_a_reservation()
     assert (len(kept), len(unknown)) == (13, 3)
     assert [f.verdict.state for f in (kept, whole, unknown)] == ["fits", "fits with a reservation", "not decided"]
     assert all(f.what in whole.verdict.lines[0] for f in unknown)
-    done = CliRunner().invoke(app, ["drive", "check", "vertical-axis-with-brake"])
+    done = CliRunner().invoke(app, ["drive", "check", "two-motors-one-ring"])
     assert done.exit_code == 3
     assert re.search(r"^Verdict: not decided: none of \d+ points is judged", done.output, re.MULTILINE)
 

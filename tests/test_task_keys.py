@@ -12,6 +12,7 @@ import pytest
 import lostmotion as lm
 from lostmotion.model.angle_torques import STANDARD_GRAVITY as G
 from lostmotion.model.duty import Supply
+from lostmotion.model.task import Task
 from lostmotion.sizing.finding import TASK_RULES
 from lostmotion.studies.axis import AxisTask
 from lostmotion.studies.axis_rows import Axes
@@ -209,6 +210,95 @@ def test_the_inertia_ratio_has_all_that_is_not_the_rotor_and_the_limit_of_the_ma
     assert 5.0 * found({"max_inertia_ratio": 5}).use == pytest.approx(right, rel=1e-9)
     assert 3.0 * found({"max_inertia_ratio": 5}, max_inertia_ratio=3).use == pytest.approx(right, rel=1e-9)
     assert "manufacturer" in found({"max_inertia_ratio": 0.1}).remark
+
+
+# --- tasks of scenarios ---
+
+VERTICAL: dict[str, Any] = {
+    "axis": {
+        "motor": {
+            "kind": "torque_source",
+            "rotor_inertia": 3e-4,
+            "rated_torque": 2.4,
+            "limits": {"torque_constant": 0.4},
+        },
+        "gearbox": {"ratio": 2.0, "inertia": 1e-5, "stiffness": {"kind": "rigid"}},
+        "screw": {"lead": "20 mm", "inertia": 2e-5, "efficiency": 0.9, "stiffness": "100 N/um"},
+        "slide": {"mass": "30 kg", "inclination": "30 deg"},
+    },
+    "command": 0.0,
+    "initial": {"speeds": {"motor": 1.0}},
+    "simulation": {"duration": 0.02, "sample_interval": 0.001},
+}
+SCENARIOS = {
+    "drive": lambda task: lm.load("catalogue-robot-joint").replace(**{f"task.{key}": v for key, v in task.items()}),
+    "axis": lambda task: lm.Scenario(**VERTICAL, task=task),
+    "train": lambda task: lm.Scenario(**lm.Scenario(**VERTICAL).model_dump() | {"task": task}),
+}
+OF_SCENARIOS = {
+    "supply": ({"max_voltage": 320.0}, "bus_voltage"),
+    "amplifier": ({"continuous_current": 10.0}, "amplifier_current"),
+    "brake": ({"torque": 2.0}, "holding_brake"),
+    "max_lost_motion": (1e-4, "lost_motion"),
+    "hold_without_power": (False, "holding"),
+}
+
+
+@pytest.mark.parametrize("form", SCENARIOS)
+@pytest.mark.parametrize("key", OF_SCENARIOS)
+def test_a_key_of_the_task_of_a_scenario_is_judged_or_refused(key: str, form: str) -> None:
+    value, rule = OF_SCENARIOS[key]
+    try:
+        scenario = SCENARIOS[form]({key: value})
+    except lm.InputError as error:
+        assert form != "drive"
+        assert f"task.{key}" in str(error)
+        return
+    assert [f for f in lm.check_drive(scenario) if f.rule == rule]
+
+
+def test_every_key_of_the_task_of_a_scenario_is_covered_here() -> None:
+    assert set(Task.model_fields) == {*OF_SCENARIOS, "cycle", "ambient_temperature"}
+
+
+@pytest.mark.parametrize("form", ["axis", "train"])
+@pytest.mark.parametrize("brake", [{"torque": 0.2}, {"force": 100.0}])
+def test_an_axis_is_judged_by_the_rules_of_drives(form: str, brake: dict[str, float]) -> None:
+    """m g sin s/i at the motor; (m s²/i² + J_screw/i² + J_gear)/J_rotor; two masses on the stiffness of the screw."""
+    found = {f.rule: f for f in lm.check_drive(SCENARIOS[form]({"brake": brake}))}
+    s, weight = 0.02 / (2.0 * math.pi), 30.0 * G * 0.5
+    need = weight * s / 2.0 / 0.2 if "torque" in brake else weight / 100.0
+    assert found["holding_brake"].use == pytest.approx(need, rel=1e-9)
+    assert found["holding"].verdict == found["holding_brake"].verdict == "warning"
+    ratio = (30.0 * s**2 / 4.0 + 2e-5 / 4.0 + 1e-5) / 3e-4
+    assert 10.0 * found["inertia_ratio"].use == pytest.approx(ratio, rel=1e-9)
+    before = (3e-4 + 1e-5 + 2e-5 / 4.0) * (2.0 / s) ** 2
+    resonance = math.sqrt(1e8 * (1.0 / before + 1.0 / 30.0)) / (2.0 * math.pi)
+    assert found["resonance"].value.startswith(
+        f"{resonance:.4g} Hz, anti-resonance {math.sqrt(1e8 / 30.0) / 2.0 / math.pi:.4g}"
+    )
+    assert found["lost_motion"].remark
+
+
+def test_a_fast_sine_between_the_samples_heats_the_motor() -> None:
+    """A command of 0.3 at 400 Hz, of which samples at every second period are 0: rms 0.3/sqrt(2) of the rated torque."""
+    still = lm.Scenario(
+        shafts={"s": {"inertia": 1.0, "friction_torque": 1e12}},
+        motors={"m": {"shaft": "s", "kind": "torque_source", "rotor_inertia": 1e-3, "rated_torque": 1.0, "limits": {"continuous_torque": 0.1}}},
+        command={"m": {"amplitude": 0.3, "frequency": 400.0}},
+        simulation={"duration": 100.0, "sample_interval": 5e-3},
+    )  # fmt: skip
+    (found,) = [f for f in lm.check_drive(still) if f.rule == "motor_torque"]
+    assert 0.1 * (found.use or 0.0) == pytest.approx(0.3 / math.sqrt(2.0), rel=0.01)
+
+
+def test_lost_motion_without_a_gearbox_is_under_the_rated_torque_of_the_motor() -> None:
+    """Backlash and what ±3 % of 5 N m through the screw deflect 200 N/um by."""
+    tables = changed("screw", task={"max_lost_motion": "20 um"}, screw={"backlash": "10 um"})
+    study = task_of(tables)
+    (found,) = [f for f in Axes(study).judged(study.parameters(0, 1)[0]) if f.rule == "lost_motion"]
+    force = 0.03 * 5.0 * 2.0 * math.pi / 0.01
+    assert 20e-6 * found.use == pytest.approx(10e-6 + 2.0 * force / 200e6, rel=0.02)
 
 
 # --- varied keys ---

@@ -11,10 +11,9 @@ class TrainTask(described.TrainTaskFields):
     """DC bus that feeds all motors, and takes what they return"""
     amplifier: Amplifier | None = None
     """amplifier that feeds the motor, also as the name of a record; for one motor"""
+    brake: HoldingBrake | None = None
+    """holding brake on the motor, also as the name of a record, or "of the motor"; or on the slide, with a force"""
 
 
 class Task(described.TaskFields, TrainTask):
     """Requirements of a drive. No run depends on them; the drive check compares with them."""
-
-    brake: HoldingBrake | None = None
-    """holding brake on the motor, also as the name of a record, or "of the motor" """

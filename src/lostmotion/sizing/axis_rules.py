@@ -34,6 +34,7 @@ from .stages import BeltStage, RackStage, Stage
 
 HOUR = 3600.0
 BRAKE = "torque that the holding brake carries"
+SLIDE_BRAKE = "force that the brake of the slide carries"
 STATIC = "static capacity of the screw"
 BUCKLING = "load at which the screw may buckle"
 
@@ -162,20 +163,21 @@ def holding_brake(demand: InputDemand, brake: HoldingBrake | None, slide: Requir
     Source: data sheets of servo motors; friction of gearbox and load, which may vanish by vibration, is not counted.
     """
     if slide is not None and (demand.motion is slide or (brake is not None and brake.force is not None)):
-        force, what = float(np.abs(slide.holding).max()), "force that the brake of the slide carries"
-        return _held_by(None if brake is None else brake.force, what, force, "N", "force")
+        force = float(np.abs(slide.holding).max())
+        return held_by(None if brake is None else brake.force, SLIDE_BRAKE, force, "N", "force")
     need = float(np.abs(demand.motion.holding).max()) / abs(demand.gearbox.ratio)
-    return _held_by(None if brake is None else brake.torque, BRAKE, need, "N·m", "torque")
+    return held_by(None if brake is None else brake.torque, BRAKE, need, "N·m", "torque")
 
 
-def _held_by(limit: float | None, what: str, need: float, unit: str, word: str) -> Finding:
+def held_by(limit: float | None, what: str, need: float, unit: str, word: str) -> Finding:
+    """A holding torque or force against that of a brake."""
     told = what if limit is not None else f"{what}: {need:.4g} {unit}"
     return against("holding_brake", told, need, limit, unit, f"{word} of the brake", f"task.brake.{word}")
 
 
 def brake_of_a_run(brake: HoldingBrake, need: float) -> Finding:
     """Static torque of a brake against the largest load torque of a run at the motor [N·m], without friction."""
-    found = _held_by(brake.torque, BRAKE, need, "N·m", "torque")
+    found = held_by(brake.torque, BRAKE, need, "N·m", "torque")
     if brake.torque is None or brake.inertia == 0.0:
         return found
     told = f"its inertia of {brake.inertia:.4g} kg·m² is not in the run; add it to motor.rotor_inertia"

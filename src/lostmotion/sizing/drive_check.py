@@ -82,7 +82,7 @@ def _findings(scenario: Scenario) -> list[Finding]:
         voltage(m, command, torque, speed, oriented=None if oriented is None else oriented[1]),
         current(m, torque),
         inertia(scenario),
-        *resonance(scenario),
+        *resonance(m, g, scenario.load.inertia, scenario.command),
         dead_zone(scenario, result),
         lost_motion(g, task.max_lost_motion),
         *holdings(scenario, result),
@@ -170,7 +170,9 @@ def _sinking(result: RunArrays) -> tuple[float, float]:
 def _finely_sampled(scenario: Scenario) -> RunArrays:
     """The run with samples so close that no peak is missed; of a very long one only the beginning, since long ones end in rest."""
     table = scenario.simulation
-    fastest = max((f for _, f, _ in resonances(scenario)), default=0.0)
+    parts = scenario.motor, scenario.gearbox, scenario.load.inertia
+    excited = [f for signal in scenario.signals().values() for _, f, _ in signal.sine_list()]
+    fastest = max((*excited, *(f for _, f, _ in resonances(*parts))), default=0.0)
     fewest = SAMPLES[0] if scenario.task.supply is None else ON_BUS
     fine = min(table.sample_interval, table.duration / fewest, 1.0 / (POINTS * fastest) if fastest else math.inf)
     if table.duration <= fine * SAMPLES[1]:

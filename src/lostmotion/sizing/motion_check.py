@@ -7,6 +7,7 @@ import math
 from .. import _core
 from ..model.gearbox import Gearbox
 from ..model.motor import Motor
+from ..model.signals import CommandSignal
 from ..model.torsion import Rigid
 from ..simulation.explanation import smallest_commands
 from ..simulation.results import RunArrays
@@ -61,30 +62,27 @@ def inertia_ratio(motor: Motor, gearbox: Gearbox, load_inertia: float, wanted: f
     )
 
 
-def resonances(scenario: Scenario) -> list[tuple[str, float, float]]:
+def resonances(motor: Motor, g: Gearbox, load_inertia: float) -> list[tuple[str, float, float]]:
     """(segment, resonance, anti-resonance) [Hz] of the softest and the stiffest segment of the torsion curve."""
-    g = scenario.gearbox
-    J_1 = g.ratio**2 * (scenario.motor.rotor_inertia + g.inertia)
+    J_1 = g.ratio**2 * (motor.rotor_inertia + g.inertia)
     slopes = [] if isinstance(g.stiffness, Rigid) else [k for k in g.stiffness.all_slopes() if k > 0.0]
     pieces = {"softest": min(slopes, default=0.0), "stiffest": max(slopes, default=0.0)}
     return [
         (
             name,
-            math.sqrt(k / J_1 + k / scenario.load.inertia) / (2.0 * math.pi),
-            math.sqrt(k / scenario.load.inertia) / (2.0 * math.pi),
+            math.sqrt(k / J_1 + k / load_inertia) / (2.0 * math.pi),
+            math.sqrt(k / load_inertia) / (2.0 * math.pi),
         )
         for name, k in pieces.items()
         if k > 0.0 and not (name == "stiffest" and len(slopes) == 1)
     ]
 
 
-def resonance(scenario: Scenario) -> list[Finding]:
+def resonance(motor: Motor, g: Gearbox, load_inertia: float, command: CommandSignal | None) -> list[Finding]:
     """Whether a sine of the command excites one."""
-    excited = {s.frequency for s in scenario.command.sines}
-    if scenario.command.frequency is not None:
-        excited.add(scenario.command.frequency)
+    excited = [] if command is None else [frequency for _, frequency, _ in command.sine_list()]
     out = []
-    for name, f_r, f_a in resonances(scenario):
+    for name, f_r, f_a in resonances(motor, g, load_inertia):
         near = [f for f in excited if f_a / NEAR_RESONANCE < f < f_r * NEAR_RESONANCE]
         value = f"{f_r:.4g} Hz, anti-resonance {f_a:.4g} Hz"
         remark = f"the command has {near[0]:g} Hz" if near else ""

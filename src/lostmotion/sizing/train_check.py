@@ -20,10 +20,10 @@ from .gearbox_check import input_speeds, loads, locks, loss_map
 from .motor_check import command_of_run, current, heat, largest_speed, peak_torque, voltage
 from .motor_run import oriented_amplitudes
 from .supply import amplifier_of_a_run, bus_findings, power_in_run
+from .train_axis import axis_rules
 
-SAMPLES = 20_000  # the fewest of a run
-
-NOT_JUDGED = ("inertia_ratio", "resonance", "dead_zone", "lost_motion", "holding")
+SAMPLES, MOST = 20_000, 200_000  # of a run
+POINTS = 40  # samples to a period of the fastest sine that acts
 
 
 def check_train(scenario: Scenario) -> tuple[Finding, ...]:
@@ -36,7 +36,9 @@ def check_train(scenario: Scenario) -> tuple[Finding, ...]:
     """
     need_no_impacts(scenario, "drive check")
     table = scenario.simulation
-    interval = min(table.sample_interval, table.duration / SAMPLES)
+    sines = (f for signal in scenario.signals().values() for _, f, _ in signal.sine_list())
+    finest = 1.0 / (POINTS * max(sines, default=POINTS / table.duration))
+    interval = min(table.sample_interval, table.duration / SAMPLES, max(finest, table.duration / MOST))
     result = run(scenario.replace(**{"simulation.sample_interval": interval}), energy=False)
     train = scenario.train()
     findings = [f for name in train.gears for f in _gear(scenario, name, result)]
@@ -50,11 +52,7 @@ def check_train(scenario: Scenario) -> tuple[Finding, ...]:
     findings += _amplifier(scenario, result)
     if any(isinstance(g.losses, LossMap) for g in train.gears.values()):
         findings.append(loss_map(result))
-    what = "judged only in the short form: [motor], [gearbox], [load]"
-    findings += [
-        Finding(rule, rule.replace("_", " "), "not judged of a drive train", "unknown", what) for rule in NOT_JUDGED
-    ]
-    return tuple(findings)
+    return (*findings, *axis_rules(scenario, result))
 
 
 def _amplifier(scenario: Scenario, result: RunArrays) -> list[Finding]:

@@ -145,8 +145,6 @@ class Axes:
             findings += self._without_gearbox(stage is not None and isinstance(stage[0], RatedScrew))
         if stage is not None and task.emergency_stop is not None:
             findings += stage_stop(self.motion(row), stage[0], task.emergency_stop)
-        if task.max_lost_motion is not None:
-            findings.append(lost_motion(demand.whole, task.max_lost_motion, slides=task.linear is not None))
         return demand, findings
 
     def _without_gearbox(self, screw: bool) -> list[Finding]:
@@ -182,6 +180,8 @@ class Axes:
             return InputError(problems=[Problem((), text) for text in lacking])
         task, load, slides = self.task, float(self.motion(row).inertia.max()), self.study.slides_itself(row)
         found = check_motor(demand, motor, load, task.ambient_temperature, task.max_inertia_ratio, slides=slides)
+        if task.max_lost_motion is not None:
+            found.append(self._lost_motion(row, demand, motor, task.max_lost_motion))
         if slides:
             found += self._attraction(row)
             if task.emergency_stop is not None:
@@ -193,6 +193,13 @@ class Axes:
         for rule in (rule for rule in task.safety_factors if rule not in judged):
             found.append(without_part(rule, "finding by this rule", f"task.safety_factors.{rule}"))
         return self._under_task(found, motor)
+
+    def _lost_motion(self, row: np.ndarray, demand: InputDemand, motor: Motor, limit: float) -> Finding:
+        """Lost motion under a share of the rated torque: that of the gearbox, or without one that of the motor."""
+        stage, whole = self.stage(row), demand.whole
+        if stage is not None and demand.gearbox == DIRECT:
+            whole = together(DIRECT.model_copy(update={"rated_output_torque": motor.rated_torque}), stage[0])
+        return lost_motion(whole, limit, slides=self.task.linear is not None)
 
     def _braked(self, row: np.ndarray, demand: InputDemand) -> list[Finding]:
         """The rule of the holding brake, where the load has to be held or a brake is given."""
