@@ -119,12 +119,13 @@ class ComponentLaws<model::TrainSystem<D>> {
         std::array<std::int8_t, model::max_contacts> modes{};
         for (std::size_t c = 0; c < contacts().size(); ++c) modes[c] = r.before.at_rest[c] ? 0 : 1;
         if (r.switching.guard >= 0 && r.switching.kind == model::Guard::speed) modes[r.switching.contact] = 0;
-        const model::Ties t = ties(modes);
+        const model::Ties t = ties(modes), rest = ties(r.after.key.modes);
         const auto& shafts = assembly_.places().shafts;
         for (std::size_t s = 0; s < shafts.size(); ++s) {
             const int shaft = static_cast<int>(s);
-            if (!t.at_rest[s] && !t.follows(shaft)) continue;
+            if (!t.at_rest[s] && !t.follows(shaft) && !rest.at_rest[s]) continue;
             jump.row[shafts[s].speed] = {};
+            if (rest.at_rest[s]) continue;  // also where a gear has locked
             t.each_share(shaft, [&](int k, double share) { jump.row[shafts[s].speed][shafts[k].speed] = share; });
         }
         for (std::size_t g = 0; g < gears().size(); ++g) {

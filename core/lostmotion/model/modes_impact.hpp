@@ -1,171 +1,101 @@
-// Impacts of rigid flanks: Newton's law at the ends of the gap, and the end of impacts that accumulate.
+// What impulses do: impacts of rigid flanks, the end of impacts that accumulate, and rigid gears that lock in motion.
 //
-// Let u be the approach speed of the flanks of a gear, the rate at which its gap closes. An impulse P >= 0 between them
-// leaves u+ <= -e max(u-, 0), with equality where P > 0. All flanks that touch take part, so the impulses solve a
-// linear complementarity problem with the matrix G M^-1 G^T: M is the mass matrix of the speeds that rigid gears leave
-// free, G the approach speeds by these. Torques of friction, springs and motors are finite and have no impulse. The
-// impulses change the kinetic energy by -sum (u- + u+) P/2, which is never above 0.
-//
-// With an approach acceleration a > 0, flanks that part at the speed v meet again after 2 v/a, at the speed v, and the
-// sum of all further flights is 2 v/(a (1 - e)). Flights that are less high than a millionth of the backlash are
+// With an approach acceleration a > 0, flanks of one gear that part at the speed v meet again after 2 v/a, at the speed
+// v, and the sum of all further flights is 2 v/(a (1 - e)). Flights that are less high than a share of the backlash are
 // replaced by contact with the same mean torque: a clock runs for the sum of their durations, and then they touch.
+//
+// Flanks of several gears strike in turn. Let K be the kinetic energy of their approach speeds u, delta their gaps,
+// lambda the torques that would press them if all touched. K + sum lambda delta is constant in flight and falls with
+// each impact, so that no later gap of a gear exceeds (K + sum lambda delta)/lambda.
 #pragma once
 
-#include <numeric>
-
-#include "../kernel/elimination.hpp"
+#include "impulses.hpp"
 #include "switched_train.hpp"
 
 namespace lostmotion::model {
 
-// A row of linear equations: coefficients of the unknowns, then right sides.
-struct ImpactRow {
-    std::vector<double> c;
-    friend ImpactRow operator/(ImpactRow row, double a) {
-        for (double& v : row.c) v /= a;
-        return row;
-    }
-};
-// Solves for as many unknowns as there are rows; their values take the place of the right sides. False: there is no
-// unique solution.
-inline bool solve_impacts(std::vector<ImpactRow>& rows) {
-    std::vector<std::size_t> unknowns(rows.size());
-    std::iota(unknowns.begin(), unknowns.end(), std::size_t{0});
-    return eliminate(rows, unknowns, rows.size(), [](ImpactRow& f, double factor, const ImpactRow& row) {
-        for (std::size_t k = 0; k < f.c.size(); ++k) f.c[k] -= factor * row.c[k];
-    });
-}
-
+// Flanks have a gap if it is more than rounding makes of it, in space or in time.
 template <class Sizes>
 template <class Now>
-auto SwitchedTrain<Sizes>::strike(Now& now, const Key& key, int contact, double restitution) const -> MovedShafts {
-    constexpr double few_roundings = 8.0 * std::numeric_limits<double>::epsilon();
-    std::array<std::int8_t, max_contacts> modes{};
-    for (int c = 0; c < contacts(); ++c) modes[c] = places().contacts[c].bilateral ? 0 : 1;
-    const Ties ties = places().ties(modes.data());
-    const int shafts = static_cast<int>(train().shafts.size());
-    std::vector<int> free;
-    for (int s = 0; s < shafts; ++s)
-        if ((ties.free[s] >> s & 1) != 0 && !places().moves_no_inertia(s, ties)) free.push_back(s);
-    const std::size_t n = free.size();
-    const auto share = [&](int s, int k) { return (ties.free[s] >> k & 1) != 0 ? ties.share[s][k] : 0.0; };
+bool SwitchedTrain<Sizes>::has_gap(int contact, const Now& now) const {
+    const ContactPlace& p = places().contacts[contact];
+    return p.reach - std::fabs(now.x[p.flanks]) >
+           rounding * 2.0 * p.reach + time_rounding * std::fabs(now.time * speed_of(contact, now));
+}
 
-    struct Flank {
-        int contact;
-        double before, target;  // approach speed
-        std::vector<double> per;
-    };
+// Those that touch, and those that have no gap to be seen.
+template <class Sizes>
+template <class Now>
+Impulses SwitchedTrain<Sizes>::impulses(const Now& now, const Key& key) const {
+    std::array<double, max_shafts> speeds{};
+    for (std::size_t s = 0; s < train().shafts.size(); ++s) speeds[s] = now.x[places().shafts[s].speed];
     std::vector<Flank> flanks;
     for (int c = 0; c < contacts(); ++c) {
         const ContactPlace& p = places().contacts[c];
-        if (p.flanks == nowhere || !p.may_rest(now.x)) continue;
-        const double side = now.x[p.flanks] > 0.0 ? 1.0 : -1.0;
-        Flank f{c, 0.0, 0.0, std::vector<double>(n)};
-        double size = 0.0;
-        p.each_shaft([&](int s, double per) {
-            const double speed = side * per * now.x[places().shafts[s].speed];
-            f.before += speed;
-            size += std::fabs(speed);
-            for (std::size_t k = 0; k < n; ++k) f.per[k] += side * per * share(s, free[k]);
-        });
-        if (key.modes[c] == 0 || std::fabs(f.before) <= few_roundings * size) f.before = 0.0;
-        const double e = c == contact ? restitution : train().gears[static_cast<std::size_t>(p.element)].restitution;
-        f.target = -e * std::fmax(f.before, 0.0);
-        flanks.push_back(std::move(f));
+        if (p.flanks == nowhere) continue;
+        const bool apart = has_gap(c, now);
+        if (apart && p.reach - std::fabs(now.x[p.flanks]) > least_flight_ * 2.0 * p.reach) continue;
+        const auto gear = static_cast<std::size_t>(p.element);
+        // While impacts accumulate flanks count as touching, but have a gap.
+        const bool touches = key.modes[c] == 0 && !(now.x[places().gears[gear].clock] > 0.0);
+        flanks.push_back({c, now.x[p.flanks] > 0.0 ? 1.0 : -1.0, train().gears[gear].restitution, apart, touches});
     }
-    // M, and M^-1 G^T as columns behind it, one for each of the flanks.
-    std::vector<ImpactRow> moves(n);
-    for (std::size_t k = 0; k < n; ++k) {
-        std::vector<double>& row = moves[k].c;
-        row.assign(n, 0.0);
-        for (int s = 0; s < shafts; ++s) {
-            const double to = share(s, free[k]);
-            if (to == 0.0) continue;
-            for (std::size_t l = 0; l < n; ++l) {
-                row[l] += to * places().shafts[s].inertia * share(s, free[l]);
-                places().each_coupled_inertia(s, [&](int t, double J) { row[l] += to * J * share(t, free[l]); });
-            }
-        }
-        for (const Flank& f : flanks) row.push_back(f.per[k]);
-    }
-    solve_impacts(moves);
-    const auto by = [&](std::size_t a, std::size_t b) {
-        double sum = 0.0;
-        for (std::size_t k = 0; k < n; ++k) sum += flanks[a].per[k] * moves[k].c[n + b];
-        return sum;
-    };
-    std::vector<double> P(flanks.size());
-    for (unsigned active = 0; active < 1u << flanks.size(); ++active) {
-        std::vector<std::size_t> of;
-        for (std::size_t f = 0; f < flanks.size(); ++f)
-            if (active >> f & 1) of.push_back(f);
-        std::vector<ImpactRow> W(of.size());
-        for (std::size_t a = 0; a < of.size(); ++a) {
-            for (const std::size_t b : of) W[a].c.push_back(by(of[a], b));
-            W[a].c.push_back(flanks[of[a]].before - flanks[of[a]].target);
-        }
-        bool holds = solve_impacts(W);
-        std::fill(P.begin(), P.end(), 0.0);
-        for (std::size_t a = 0; a < of.size(); ++a) {
-            P[of[a]] = W[a].c.back();
-            holds = holds && P[of[a]] >= 0.0;
-        }
-        for (std::size_t f = 0; f < flanks.size() && holds; ++f) {
-            if (active >> f & 1) continue;
-            double after = flanks[f].before, size = std::fabs(after);
-            for (const std::size_t a : of) {
-                after -= by(f, a) * P[a];
-                size += std::fabs(by(f, a) * P[a]);
-            }
-            holds = after <= flanks[f].target + few_roundings * size;
-        }
-        if (holds) break;
-    }
-    MovedShafts moved{};
-    for (std::size_t f = 0; f < flanks.size(); ++f) {
-        if (P[f] == 0.0) continue;
-        const ContactPlace& p = places().contacts[flanks[f].contact];
-        now.memory[places().gears[static_cast<std::size_t>(p.element)].impact_loss] +=
-            0.5 * (flanks[f].before + flanks[f].target) * P[f];
-        for (int s = 0; s < shafts; ++s)
-            for (std::size_t k = 0; k < n; ++k) {
-                const double change = share(s, free[k]) * moves[k].c[n + f] * P[f];
-                now.x[places().shafts[s].speed] -= change;
-                moved[static_cast<std::size_t>(s)] = moved[static_cast<std::size_t>(s)] || change != 0.0;
-            }
-    }
-    return moved;
+    return Impulses(places(), std::move(flanks), speeds);
 }
 
-// The regime after a strike. past: what was before it.
+// The regime after impulses. past: what was before them.
 template <class Sizes>
 template <class Cache, class Now>
-Found SwitchedTrain<Sizes>::find_after(Cache& cache, Now& now, const MovedShafts& struck, Event event, const Now& past,
-                                       Key& key) const {
-    constexpr double few_roundings = 8.0 * std::numeric_limits<double>::epsilon();
+Found SwitchedTrain<Sizes>::land(Cache& cache, Now& now, const Impulses& after, Event event, const Now& past,
+                                 Key& key) const {
     const Rest before = event.at_rest;
+    MovedShafts moved{};
+    const auto changes = after.changes();
+    for (std::size_t s = 0; s < train().shafts.size(); ++s) {
+        now.x[places().shafts[s].speed] += changes[s];
+        moved[s] = changes[s] != 0.0;
+    }
+    for (const Flank& f : after.flanks) {
+        const ContactPlace& p = places().contacts[f.contact];
+        const GearPlace& gear = places().gears[static_cast<std::size_t>(p.element)];
+        if (f.struck) now.x[p.flanks] = f.side * p.reach;
+        event.at_rest[f.contact] = f.touches || (f.speed == 0.0 && p.may_rest(now.x));
+        if (f.struck || !event.at_rest[f.contact]) now.x[gear.clock] = f.accumulates ? 1.0 : 0.0;
+        now.memory[gear.impact_loss] += f.loss;
+        if (!event.at_rest[f.contact] || !before[f.contact]) key.modes[f.contact] = -1;
+    }
+    return find_after(cache, now, moved, event, before, past, key);
+}
+
+// The regime after some speeds have jumped. Of flanks the event says whether they rest. before: the contacts at rest
+// before it.
+template <class Sizes>
+template <class Cache, class Now>
+Found SwitchedTrain<Sizes>::find_after(Cache& cache, Now& now, const MovedShafts& moved, Event event,
+                                       const Rest& before, const Now& past, Key& key) const {
+    constexpr double few_roundings = 8.0 * std::numeric_limits<double>::epsilon();
     for (int c = 0; c < contacts(); ++c) {
         const ContactPlace& p = places().contacts[c];
-        if (p.bilateral) continue;
-        bool moved = false;
+        if (p.bilateral || p.flanks != nowhere) continue;
+        bool moves = false;
         double speed = 0.0, size = 0.0;
         p.each_shaft([&](int shaft, double per) {
-            moved = moved || struck[static_cast<std::size_t>(shaft)];
+            moves = moves || moved[static_cast<std::size_t>(shaft)];
             speed += per * now.x[places().shafts[shaft].speed];
             size += std::fabs(per * now.x[places().shafts[shaft].speed]) +
                     std::fabs(per * past.x[places().shafts[shaft].speed]);
         });
-        if (!moved && p.flanks == nowhere) continue;
+        if (!moves) continue;
         const bool same = std::fabs(speed) <= few_roundings * size;
-        event.at_rest[c] = same && p.may_rest(now.x);
-        const int mode = p.flanks != nowhere || speed < 0.0 ? -1 : +1;
+        event.at_rest[c] = same;
+        const int mode = speed < 0.0 ? -1 : +1;
         const GearPlace* gear =
             p.kind == ContactPlace::gear ? &places().gears[static_cast<std::size_t>(p.element)] : nullptr;
         if (gear != nullptr && gear->hysteresis != nowhere && !before[c] && (same || mode != key.modes[c]))
             now.memory[gear->hysteresis] =
                 assembly_.stiffness_factor(p.element, key) *
                 train().gears[static_cast<std::size_t>(p.element)].law.hysteresis_capacity(now.x[gear->twist]);
-        if (!event.at_rest[c] || !before[c]) key.modes[c] = static_cast<std::int8_t>(mode);
+        if (!same || !before[c]) key.modes[c] = static_cast<std::int8_t>(mode);
     }
     stop(now.x, event.at_rest);
     for (int c = 0; c < contacts(); ++c) event.stopped[c] = event.at_rest[c] && !before[c];
@@ -175,11 +105,12 @@ Found SwitchedTrain<Sizes>::find_after(Cache& cache, Now& now, const MovedShafts
     return find(cache, now, on_the_way, event, key);
 }
 
-// How long flanks that have just parted go on to strike; -1 if they do not, or their flights are to be seen.
+// How long flanks of one gear that have just parted go on to strike; -1 if they do not, or their flights are to be
+// seen.
 template <class Sizes>
 template <class E, class Now>
 double SwitchedTrain<Sizes>::time_to_rest(const E& e, const Now& now, int contact) const {
-    constexpr double smallest_height = 1e-6, epsilon = std::numeric_limits<double>::epsilon();
+    constexpr double epsilon = std::numeric_limits<double>::epsilon();
     const ContactPlace& p = places().contacts[contact];
     const double restitution = train().gears[static_cast<std::size_t>(p.element)].restitution;
     const double side = now.x[p.flanks] > 0.0 ? 1.0 : -1.0;
@@ -191,9 +122,9 @@ double SwitchedTrain<Sizes>::time_to_rest(const E& e, const Now& now, int contac
     const double a0 = along.rate(approach, 1), a1 = along.rate(approach, 2), a2 = along.rate(approach, 3);
     if (!(a0 > rounding * along.rate_magnitude(approach, 1))) return -1.0;
     const double first = 2.0 * v / a0, all = first / (1.0 - restitution);
-    const bool small = 0.5 * v * v <= smallest_height * 2.0 * p.reach * a0;
+    const bool small = 0.5 * v * v <= least_flight_ * 2.0 * p.reach * a0;
     const bool even = std::fabs(a1) * all <= 1e-4 * a0 && std::fabs(a2) * all * all <= 1e-8 * a0;
-    if (!(small && even) && first > 1e4 * epsilon * std::fabs(now.time)) return -1.0;
+    if (!(small && even) && first > unresolved * std::fabs(now.time)) return -1.0;
     // Flights under an acceleration that changes little, until it is constant to rounding.
     double t = 0.0;
     for (int flight = 0; flight < 100000; ++flight) {
@@ -208,41 +139,193 @@ double SwitchedTrain<Sizes>::time_to_rest(const E& e, const Now& now, int contac
     return t;
 }
 
+// The same of all flanks that strike in turn, and are pressed in this regime, in which they touch. energy: K. before:
+// where their gaps were.
+template <class Sizes>
+template <class E, class Now>
+double SwitchedTrain<Sizes>::time_to_rest(const E& e, const Now& now, const Now& before, const Impulses& joined,
+                                          double energy) const {
+    auto along = flow(e, now);
+    struct Pressed {
+        double torque, rate, most, flight;  // most: the gap that counts as none; flight: its duration, by sqrt(energy)
+    };
+    std::vector<Pressed> all;
+    for (std::size_t f = 0; f < joined.flanks.size(); ++f) {
+        const Flank& flank = joined.flanks[f];
+        if (!flank.accumulates && !(flank.struck && flank.touches)) continue;
+        const ContactPlace& p = places().contacts[flank.contact];
+        const auto& form = regime_of(e).output_torque[static_cast<std::size_t>(p.element)];
+        const double torque = flank.side * evaluate(n_, form, now);
+        if (!(torque > rounding * magnitude(n_, form, now)) || !(flank.restitution < 1.0)) return -1.0;
+        energy += torque * (p.reach - std::fabs(before.x[p.flanks]));
+        all.push_back({torque, along.rate(form, 1), least_flight_ * 2.0 * p.reach,
+                       2.0 * std::sqrt(2.0 * joined.inertia(f)) / (torque * (1.0 - flank.restitution))});
+    }
+    double time = 0.0;
+    for (const Pressed& p : all) time = std::fmax(time, p.flight * std::sqrt(energy));
+    const bool small = std::all_of(all.begin(), all.end(), [&](const Pressed& p) {
+        return energy <= p.most * p.torque && std::fabs(p.rate) * time <= 1e-4 * p.torque;
+    });
+    return small || time <= unresolved * std::fabs(now.time) ? time : -1.0;
+}
+
 template <class Sizes>
 template <class Cache, class Now, class G>
 Found SwitchedTrain<Sizes>::strikes(Cache& cache, Now& now, const G& fired, Key& key) const {
     const int contact = fired.contact;
     const ContactPlace& p = places().contacts[contact];
-    const auto gear = static_cast<std::size_t>(p.element);
-    double& clock = now.x[places().gears[gear].clock];
-    clock = 0.0;
+    now.x[places().gears[static_cast<std::size_t>(p.element)].clock] = 0.0;
     if (fired.branch != nowhere) {
         cross(fired, key);
         return Found::yes;
     }
-    const auto& old = cache.regime(key);
-    Event event;
-    for (std::size_t g = 0; g < train().gears.size(); ++g) event.gear[g] = evaluate(n_, old.output_torque[g], now);
-    each_coupling_contact([&](int c) { event.coupling[c] = evaluate(n_, old.contact_torque[c], now); });
-    std::copy_n(old.at_rest.begin(), contacts(), event.at_rest.begin());
     now.x[p.flanks] = std::copysign(p.reach, now.x[p.flanks]);
-    const Now past = now;
-    const Key from = key;
-    Found found = find_after(cache, now, strike(now, key, contact, train().gears[gear].restitution), event, past, key);
-    if (found != Found::yes || key.modes[contact] == 0) return found;
-    const double left = time_to_rest(look_up(cache, key), now, contact);
-    if (left < 0.0) return found;
+    double first = 0.0;
+    for (int round = 0;; ++round) {
+        const auto& old = cache.regime(key);
+        Event event;
+        for (std::size_t g = 0; g < train().gears.size(); ++g) event.gear[g] = evaluate(n_, old.output_torque[g], now);
+        each_coupling_contact([&](int c) { event.coupling[c] = evaluate(n_, old.contact_torque[c], now); });
+        std::copy_n(old.at_rest.begin(), contacts(), event.at_rest.begin());
+        const Now past = now;
+        const Key from = key;
+        Impulses struck = impulses(now, key);
+        const double approach = struck.approach();
+        if (round == 0) first = approach;
+        // Speeds that have come to nothing end with all flanks together, so far as these press.
+        const bool last = round >= most_rounds || approach <= negligible * first;
+        struck.strike(last);
+        const Found found = land(cache, now, struck, event, past, key);
+        if (found != Found::yes || last || close(cache, now, struck, contact, event, past, from, key)) return found;
+        if (struck.approach() == 0.0) return found;
+    }
+}
+
+// Lets flanks touch whose flights are negligible: of all gears where they fly that low, or else those of one. False if
+// there are none.
+template <class Sizes>
+template <class Cache, class Now>
+bool SwitchedTrain<Sizes>::close(Cache& cache, Now& now, const Impulses& struck, int contact, const Event& event,
+                                 const Now& past, const Key& from, Key& key) const {
     const Now apart = now;
     const Key key_apart = key;
-    now = past;
-    key = from;
-    const MovedShafts all = strike(now, key, contact, 0.0);
-    clock = left;
-    found = find_after(cache, now, all, event, past, key);
-    if (found == Found::yes && key.modes[contact] == 0) return found;
-    now = apart;
-    key = key_apart;
-    return Found::yes;
+    for (const bool alone : {false, true}) {
+        Impulses joined = struck;
+        std::vector<bool> some;
+        int several = 0;
+        for (Flank& f : joined.flanks) {
+            const bool flies = key_apart.modes[f.contact] != 0;
+            f.accumulates = flies && (!alone || f.contact == contact);
+            several += f.accumulates;
+            some.push_back(f.accumulates || !flies);
+        }
+        const bool own = key_apart.modes[contact] != 0;  // of all that fly, or the only one
+        if (alone ? !own || struck.approach() > 0.0 : several == 0 || (several == 1 && own)) continue;
+        double left = alone ? time_to_rest(look_up(cache, key), now, contact) : 0.0;
+        if (left < 0.0) return false;
+        const double energy = joined.join(some);
+        now = past;
+        key = from;
+        bool rest = land(cache, now, joined, event, past, key) == Found::yes;
+        for (std::size_t f = 0; f < some.size() && rest; ++f)
+            rest = !some[f] || key.modes[joined.flanks[f].contact] == 0;
+        if (rest && !alone) left = time_to_rest(look_up(cache, key), now, apart, joined, energy);
+        if (rest && left >= 0.0) {
+            for (const Flank& f : joined.flanks)
+                if (f.accumulates)
+                    now.x[places().gears[static_cast<std::size_t>(places().contacts[f.contact].element)].clock] = left;
+            return true;
+        }
+        now = apart;
+        key = key_apart;
+    }
+    return false;
+}
+
+// Friction that grows with the load may lock a rigid gear in motion (theory.md): where no accelerations are consistent,
+// the torque in ever stiffer meshes grows without limit in no time, and stops its input shaft with all that rigid gears
+// tie to it. Contacts of limited torque take no part in that.
+template <class Sizes>
+template <class Cache, class Now>
+Found SwitchedTrain<Sizes>::locks(Cache& cache, Now& now, const Event& event, const Now& past, Key& key) const {
+    const Now moving = now;
+    const Key from = key;
+    Now stopped = now;
+    Key stopped_key = key;
+    bool some = false;
+    for (std::size_t g = 0; g < train().gears.size(); ++g) {
+        if (!train().gears[g].may_lock() || !locks_in_motion(cache, moving, event, from, g)) continue;
+        now = moving;
+        key = from;
+        MovedShafts moved{};
+        double& lost = now.memory[places().gears[g].impact_loss];
+        if (!stop_with(now, g, moved, lost)) continue;
+        const Found found = find_after(cache, now, moved, event, event.at_rest, past, key);
+        if (found != Found::yes) continue;
+        // Of two that may lock, it is only known where both stop the same.
+        if (some && !(key == stopped_key && now.x == stopped.x)) {
+            some = false;
+            break;
+        }
+        if (!some) stopped = now, stopped_key = key;
+        some = true;
+    }
+    now = some ? stopped : moving;
+    key = some ? stopped_key : from;
+    return some ? Found::yes : Found::inconsistent;
+}
+
+// Is the effective inertia of all that the input of a gear moves negative under a torque by which its output drives it,
+// and positive under the opposite one, while all contacts of limited torque slip?
+template <class Sizes>
+template <class Cache, class Now>
+bool SwitchedTrain<Sizes>::locks_in_motion(Cache& cache, const Now& now, const Event& event, const Key& from,
+                                           std::size_t gear) const {
+    const Gear& g = train().gears[gear];
+    const int contact = places().shafts[g.input].contact, way = from.modes[contact];
+    if (way == 0 || event.at_rest[contact]) return false;
+    const auto moves = [&](double driven) {
+        Key trial;
+        for (int c = 0; c < contacts(); ++c) {
+            const bool slips = !places().contacts[c].bilateral && from.modes[c] == 0;
+            trial.modes[c] = slips ? std::int8_t{-1} : from.modes[c];
+        }
+        locate(now, trial);
+        Torques T_2 = event.gear;
+        T_2[gear] = driven * way * g.sense() * g.rated_torque();
+        locate_losses(now, T_2, trial);
+        return cache.regime(trial).solvable;
+    };
+    return moves(+1.0) && !moves(-1.0);
+}
+
+// Stops the input of a gear and all that rigid gears tie to it. False if that leaves a part of it in motion, or would
+// move others.
+template <class Sizes>
+template <class Now>
+bool SwitchedTrain<Sizes>::stop_with(Now& now, std::size_t gear, MovedShafts& moved, double& lost) const {
+    const int contact = places().shafts[train().gears[gear].input].contact;
+    Key together;
+    for (int c = 0; c < contacts(); ++c)
+        together.modes[c] = places().contacts[c].bilateral || c == contact ? std::int8_t{0} : std::int8_t{1};
+    const Ties ties = places().ties(together.modes.data());
+    const std::array<int, max_shafts> part = parts(places(), together);
+    const std::size_t shafts = train().shafts.size();
+    for (std::size_t s = 0; s < shafts; ++s) {
+        if (part[s] != part[train().gears[gear].input]) continue;
+        if (!ties.at_rest[s]) return false;
+        const ShaftPlace& p = places().shafts[s];
+        moved[s] = true;
+        lost += 0.5 * p.inertia * now.x[p.speed] * now.x[p.speed];
+        places().each_coupled_inertia(static_cast<int>(s), [&](int t, double J) {
+            lost += 0.5 * J * now.x[p.speed] * now.x[places().shafts[t].speed];
+        });
+    }
+    for (std::size_t s = 0; s < shafts; ++s)
+        if (moved[s]) now.x[places().shafts[s].speed] = 0.0;
+    return std::none_of(places().contacts.begin(), places().contacts.end(), [&](const ContactPlace& p) {
+        return p.one_way && speed_of(static_cast<int>(&p - places().contacts.data()), now) > 0.0;
+    });
 }
 
 }  // namespace lostmotion::model

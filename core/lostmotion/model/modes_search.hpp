@@ -109,9 +109,14 @@ Found SwitchedTrain<Sizes>::start(Cache& cache, Now& now, Key& key) const {
         snap = snap || (same && !p.bilateral && speed != 0.0);
     }
     if (snap) stop(now.x, event.at_rest);
-    Now before = now;  // as if nothing had acted on the train
+    Now before = now;  // as if nothing had acted on the train, with brakes and clutches as they are commanded
     before.x = {};
     before.input = {};
+    const auto keep = [&](const auto& e) {
+        if (e->command != nowhere) before.input[0][e->command] = now.input[0][e->command];
+    };
+    std::for_each(places().acting.begin(), places().acting.end(), keep);
+    std::for_each(places().couplings.begin(), places().couplings.end(), keep);
     const Key meshes = assembly_.meshes_at(now.x);
     for (std::size_t g = 0; g < train().gears.size(); ++g) {
         const Gear& gear = train().gears[g];
@@ -180,7 +185,8 @@ Found SwitchedTrain<Sizes>::next(Cache& cache, Now& now, const G* fired, Key& ke
     }
     if (event.with_guard && event.kind == Guard::capacity && breaks_away(cache, now, event, margin_size, near, key))
         return Found::yes;
-    return find(cache, now, past, event, key);
+    const Found found = find(cache, now, past, event, key);
+    return found == Found::inconsistent ? locks(cache, now, event, past, key) : found;
 }
 
 // A contact whose capacity has been overcome begins to slip that way, from rest: there is nothing to decide as long as
@@ -237,13 +243,24 @@ Found SwitchedTrain<Sizes>::find(Cache& cache, Now& now, const Now& before, Even
     const auto search = [&] {
         return tries_all ? enumerate(cache, now, event, from, key) : pivot(cache, now, event, path, from, key);
     };
-    const Found found = search();
-    if (found == Found::yes) return found;
-    event.from_each_load =
-        std::any_of(train().gears.begin(), train().gears.end(), [](const Gear& g) { return g.has_dry_losses(); });
-    if (event.from_each_load && search() == Found::yes) return Found::yes;
-    event.closest = true;
-    return search() == Found::yes ? Found::yes : found;
+    // Flanks without a gap that approach each other strike next: until then their ends are not to be seen.
+    std::vector<std::pair<int, double>> hidden;
+    for (int c = 0; c < contacts() && has_flanks_; ++c) {
+        const ContactPlace& p = places().contacts[c];
+        if (p.flanks == nowhere || event.at_rest[c] || has_gap(c, now) || !approach(c, now)) continue;
+        hidden.emplace_back(p.flanks, std::exchange(now.x[p.flanks], 0.0));
+    }
+    const Found found = [&] {
+        const Found first = search();
+        if (first == Found::yes) return first;
+        event.from_each_load =
+            std::any_of(train().gears.begin(), train().gears.end(), [](const Gear& g) { return g.has_dry_losses(); });
+        if (event.from_each_load && search() == Found::yes) return Found::yes;
+        event.closest = true;
+        return search() == Found::yes ? Found::yes : first;
+    }();
+    for (const auto& [twist, value] : hidden) now.x[twist] = value;
+    return found;
 }
 
 template <class Sizes>

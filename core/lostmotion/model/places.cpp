@@ -177,7 +177,7 @@ void Places::place_memory_and_branches(const Train& train) {
     for (std::size_t k = 0; k < gears.size(); ++k)
         if (train.gears[k].law.has_hysteresis())
             gears[k].hysteresis = layout.memory++;
-        else if (train.gears[k].strikes())
+        else if (train.gears[k].strikes() || train.gears[k].may_lock())
             gears[k].impact_loss = layout.memory++;
     // What is redundant while some contacts are stuck is so while all are.
     const std::vector<std::int8_t> all_stuck(contacts.size(), 0);

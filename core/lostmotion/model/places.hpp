@@ -38,7 +38,7 @@ struct GearPlace {
     int piece = nowhere, cell = nowhere, cell_back = nowhere, flanks = nowhere;  // branches
     int side = nowhere;   // branch of rigid flanks: +1, -1 where they touch, +2, -2 while impacts accumulate, 0 apart
     int clock = nowhere;  // state: the time left until impacts have accumulated [s]
-    int impact_loss = nowhere;      // memory: the energy that impacts have taken [J]
+    int impact_loss = nowhere;      // memory: the energy that impulses have taken [J]
     int parametric_work = nowhere;  // memory: the energy that steps of the stiffness have given [J]
     OverAngle error, mesh;
 

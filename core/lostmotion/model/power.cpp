@@ -67,7 +67,8 @@ void each_flow(const Assembly& a, Use&& use) {
                 [&](const Regime& r) -> Flow { return {{a.housing_friction(g, r), relative()}}; });
         if (gear.mesh_stiffness.present())
             use(PowerFlow::source, gear.name, "parametric work", [](const Regime&) -> Flow { return {}; });
-        if (gear.strikes()) use(PowerFlow::loss, gear.name, "impacts", [](const Regime&) -> Flow { return {}; });
+        if (gear.strikes() || gear.may_lock())
+            use(PowerFlow::loss, gear.name, "impacts", [](const Regime&) -> Flow { return {}; });
         if ((gear.rigid() || gear.strikes()) && !train.short_form) continue;
         use(PowerFlow::loss, gear.name, "hysteresis and damping", [&](const Regime& r) -> Flow {
             if (a.twist_rests(g, r)) return {};

@@ -25,8 +25,10 @@
 #include "../solver/status.hpp"
 #include "assembly.hpp"
 #include "held_torque.hpp"
+#include "impulses.hpp"
 #include "motion.hpp"
 #include "scales.hpp"
+#include "statics.hpp"
 
 namespace lostmotion::model {
 
@@ -60,6 +62,10 @@ class SwitchedTrain {
     explicit SwitchedTrain(const Assembly& assembly) : SwitchedTrain(assembly, assembly.layout()) {}
     SwitchedTrain(const Assembly& assembly, const Sizes& sizes) : assembly_(assembly), n_(sizes) {
         set_near_event();
+        const auto strike =
+            std::count_if(train().gears.begin(), train().gears.end(), [](const Gear& g) { return g.strikes(); });
+        has_flanks_ = strike > 0;
+        least_flight_ = strike > 1 ? flight_among_others : one_flight;
         for (int c = 0; c < contacts(); ++c) {
             some_redundant_ = some_redundant_ || places().contacts[c].locked != nowhere;
             holds_more_[c] = !places().contacts[c].bilateral && holds_more(places().contacts[c]);
@@ -245,10 +251,23 @@ class SwitchedTrain {
         }
         return slips;
     }
-    // Impacts of rigid flanks: modes_impact.hpp.
+    // Impulses: modes_impact.hpp.
     using MovedShafts = std::array<bool, max_shafts>;
     template <class Now>
-    MovedShafts strike(Now& now, const Key& key, int contact, double restitution) const;
+    bool has_gap(int contact, const Now& now) const;
+    // Do flanks close their gap, by more than rounding?
+    template <class Now>
+    bool approach(int contact, const Now& now) const {
+        double speed = 0.0, size = 0.0;
+        places().contacts[contact].each_shaft([&](int s, double per) {
+            speed += per * now.x[places().shafts[s].speed];
+            size += std::fabs(per * now.x[places().shafts[s].speed]);
+        });
+        const double side = now.x[places().contacts[contact].flanks] > 0.0 ? 1.0 : -1.0;
+        return side * speed > 8.0 * std::numeric_limits<double>::epsilon() * size;
+    }
+    template <class Now>
+    Impulses impulses(const Now& now, const Key& key) const;
     template <class Now>
     double speed_of(int contact, const Now& now) const {
         double speed = 0.0;
@@ -259,9 +278,23 @@ class SwitchedTrain {
     template <class Cache, class Now, class G>
     Found strikes(Cache& cache, Now& now, const G& fired, Key& key) const;
     template <class Cache, class Now>
-    Found find_after(Cache& cache, Now& now, const MovedShafts& struck, Event event, const Now& past, Key& key) const;
+    Found land(Cache& cache, Now& now, const Impulses& after, Event event, const Now& past, Key& key) const;
+    template <class Cache, class Now>
+    Found find_after(Cache& cache, Now& now, const MovedShafts& moved, Event event, const Rest& before, const Now& past,
+                     Key& key) const;
     template <class E, class Now>
     double time_to_rest(const E& e, const Now& now, int contact) const;
+    template <class E, class Now>
+    double time_to_rest(const E& e, const Now& now, const Now& before, const Impulses& joined, double energy) const;
+    template <class Cache, class Now>
+    bool close(Cache& cache, Now& now, const Impulses& struck, int contact, const Event& event, const Now& past,
+               const Key& from, Key& key) const;
+    template <class Cache, class Now>
+    Found locks(Cache& cache, Now& now, const Event& event, const Now& past, Key& key) const;
+    template <class Cache, class Now>
+    bool locks_in_motion(Cache& cache, const Now& now, const Event& event, const Key& from, std::size_t gear) const;
+    template <class Now>
+    bool stop_with(Now& now, std::size_t gear, MovedShafts& moved, double& lost) const;
 
     template <class Cache, class Now>
     Found enumerate(Cache& cache, Now& now, const Event& event, const Key& from, Key& key) const;
@@ -434,6 +467,12 @@ class SwitchedTrain {
 
     static constexpr double max_violation = 1e-6;                                      // that rounding may make
     static constexpr double on_corner = 8.0 * std::numeric_limits<double>::epsilon();  // of an angle and its period
+    // Flights of this height, by the backlash, are not followed: those of one gear alone make no difference to others.
+    static constexpr double one_flight = 1e-6, flight_among_others = rounding;
+    // The last round at an instant is that in which the energy of approach is this share of the first.
+    static constexpr double negligible = 0x1p-80;
+    static constexpr int most_rounds = 4096;
+    static constexpr double unresolved = 1e4 * std::numeric_limits<double>::epsilon();  // of the time
     static constexpr int most_changes = 4;  // of the mode of each contact along the way of the torques
     static constexpr std::size_t from_one_start = 300, longest_pivoting = 600;
 
@@ -441,7 +480,9 @@ class SwitchedTrain {
     Sizes n_;
     std::array<double, max_states> near_state_{};
     std::array<double, max_inputs> near_input_{};
-    Rest holds_more_{};            // contacts that hold more than they take while they slip
+    Rest holds_more_{};  // contacts that hold more than they take while they slip
+    bool has_flanks_ = false;
+    double least_flight_ = one_flight;
     bool some_redundant_ = false;  // while all contacts are at rest; else no one keeps another at rest
     // What has been found of sets of contacts and of modes, by their last bits.
     mutable std::array<std::unique_ptr<Stopped>, 16> stopped_;

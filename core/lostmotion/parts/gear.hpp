@@ -67,6 +67,14 @@ struct Gear {
     bool strikes() const { return flank_backlash > 0.0; }
     bool rigid() const { return law.compliance == Gearbox::rigid && !strikes(); }
     bool has_dry_losses() const { return efficiencies || law.losses == Gearbox::loss_map; }
+    // May its friction stop it in motion, as the torque in its mesh grows without limit?
+    bool may_lock() const {
+        if (!rigid() || !has_dry_losses()) return false;
+        if (efficiencies) return efficiencies->overrunning() < 0.0;
+        for (int j = 0; j < load_intervals(); ++j)
+            if (std::fabs(loss_at_standstill(j).per_load) > 1.0) return true;
+        return false;
+    }
     bool has_backlash() const { return law.compliance != Gearbox::rigid && law.curve.slope(0) == 0.0; }
     bool parts_flanks() const { return mesh_damping > 0.0 && has_backlash(); }
     enum Flanks { touching, parted, limited };
