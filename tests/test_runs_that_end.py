@@ -78,6 +78,51 @@ def test_a_torque_that_turns_back_within_the_rounding_of_the_state_ends_its_regi
         assert exact[name].values == pytest.approx(expected, rel=1e-6, abs=1e-7 * float(abs(expected).max() + 1e-9))
 
 
+def test_a_turn_is_not_looked_for_beyond_the_end_of_a_motion_that_grows() -> None:
+    """Friction that falls makes a tiny inertia faster until a guard ends that; 1 ms on, its speed would be beyond all numbers.
+
+    Beside it a clutch holds a shaft whose friction is at its limit, so that the instant is wanted at which the torque turns.
+    """
+    falling = {"speeds": [0.0, 2.0, 70.0, 110.0], "torques": [0.17, 0.007, 0.23, 0.002]}
+    scenario = lm.Scenario(
+        shafts={
+            "s0": {"inertia": 2e-7, "friction_curve": falling, "torque": {"mean": -0.23}},
+            "s1": {"inertia": 7e-5, "friction_torque": 0.8},
+            "s2": {"friction_torque": 0.002},
+            "s4": {"friction_torque": 0.018, "viscous_friction": 0.06, "torque": {"mean": -2.8}},
+        },
+        motors={
+            "m": {
+                "shaft": "s4",
+                "kind": "dc",
+                "rotor_inertia": 0.007,
+                "rated_torque": 0.72,
+                "rated_speed": 60.0,
+                "armature_voltage_constant": 12.6,
+                "electrical_time_constant": 1.2e-4,
+            }
+        },
+        command={"m": {"mean": -0.18}},
+        gears={
+            "x1": {
+                "input": "s0",
+                "output": "s1",
+                "ratio": 20.0,
+                "stiffness": {"kind": "curve", "backlash": 2.4e-4, "slopes": [200.0]},
+            }
+        },
+        clutches={"x2": {"input": "s1", "output": "s2", "torque": 6.0, "kind": "safety"}},
+        mass_matrices={"j": {"shafts": ["s2", "s4"], "matrix": [[500.0, 0.002], [0.002, 1.3e-8]]}},
+        simulation={"duration": 2e-3, "sample_interval": 1e-4},
+    )
+    with interrupted_after(10.0, signal.ITIMER_PROF):
+        exact = lm.simulate(scenario)
+    adaptive = lm.simulate(scenario, solver="dormand-prince", relative_tolerance=1e-10)
+    for name in ("s0_speed", "s4_speed", "x1_twist"):
+        expected = adaptive[name].values
+        assert exact[name].values == pytest.approx(expected, rel=1e-6, abs=1e-7 * float(abs(expected).max() + 1e-9))
+
+
 def test_energies_of_a_motion_through_a_wall_of_losses_are_integrated_in_long_panels() -> None:
     """The losses fall by 1e7 of their rated value over the load: terms of powers cancel to 1e-9 of themselves."""
     scenario = lm.load(NAMED["step-to-standstill"], {"gearbox.losses.values.0.1": 1e6})

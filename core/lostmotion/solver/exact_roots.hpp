@@ -22,6 +22,8 @@ double ExactSolver<System>::first_turn(Entry& e, double limit) {
         for (int i = 0; i < D::inputs; ++i) forced = forced + input_bound_[i] * absolute(load(e.rates.input_column[i]));
         Cursor at = *begin_;
         while (at.time() < limit && !interruption()) {
+            // A motion that grows without bound is followed to no end: a guard ends the regime before.
+            if (!moderate(at.rate())) return at.time();
             level = e.propagator.bounded_level(level);
             const double h = e.propagator.length(level);
             const InstantOf<D> now{at.time(), at.x(), now_.memory, at.input().jet(), at.input().magnitudes()};
