@@ -2,6 +2,8 @@
 // soak [cases of each kind] [seed]. Prints what it found; ends with 1 if anything is wrong.
 #include <cstdio>
 #include <cstdlib>
+#include <ctime>
+#include <functional>
 #include <string>
 
 #include "properties.hpp"
@@ -122,6 +124,42 @@ Tally round_numbers(long count, unsigned seed) {
     return t;
 }
 
+// What a run takes: processor time [s], event checks and events in a second of motion.
+struct Effort {
+    double seconds = 0.0, checks = 0.0, events = 0.0;
+    long number = 0;
+};
+
+// Trains of all elements run to their end, in finite numbers. The hundred that take longest are described.
+Tally endings(long count, unsigned seed) {
+    Tally t{"random trains of all elements to their end"};
+    constexpr double duration = 1.0;
+    std::vector<Effort> all;
+    for (long n = 0; n < count; ++n) {
+        const auto is = [n](int bit) { return (n >> bit & 1) != 0; };
+        model::RandomTrains random(seed + static_cast<unsigned>(n), is(0), is(1), is(2));
+        const model::RandomRun r(random, 6, duration);
+        const std::clock_t begin = std::clock();
+        const model::Recorded run(r.train, r.inputs, duration, duration / 50.0);
+        const double seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+        ++t.cases;
+        all.push_back({seconds, static_cast<double>(run.report.steps) / duration,
+                       static_cast<double>(run.report.switching_count) / duration, n});
+        if (run.done() && std::ranges::all_of(run.out, [](double v) { return std::isfinite(v); })) continue;
+        ++t.wrong;
+        std::printf("  %s: seed %u train %ld: %s\n", t.what, seed, n,
+                    run.done() ? "a value is not finite" : error_text(run.report, run.run.assembly()).c_str());
+    }
+    std::ranges::sort(all, std::ranges::greater(), &Effort::seconds);
+    for (const std::size_t k :
+         {std::size_t{0}, std::size_t{1}, std::size_t{2}, std::size_t{9}, std::size_t{99}, all.size() / 2})
+        if (k < all.size())
+            std::printf(
+                "  number %zu by time: %.2g ms, %.0f checks and %.0f events in a second of motion (train %ld)\n", k + 1,
+                1e3 * all[k].seconds, all[k].checks, all[k].events, all[k].number);
+    return t;
+}
+
 // Trains: exact against adaptive solver, the laws of every run, time stepping.
 template <class Sum, class Check>
 Tally trains(const char* what, long count, unsigned seed, Check check) {
@@ -158,6 +196,7 @@ int main(int argc, char** argv) {
     done(self_locking(count, seed, true));
     done(solvers(count / 10, seed));
     done(round_numbers(count / 100, seed));
+    done(endings(count / 10, seed));
     done(trains<model::SolverTally>(
         "exact and adaptive solver on random trains", count / 20, seed,
         [](auto& random, auto& sum, const char* which) { model::compare_solvers(random, 6, 1.0, sum, which); }));
