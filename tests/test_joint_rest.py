@@ -141,3 +141,17 @@ def test_rest_at_a_start_beyond_what_one_shaft_holds_changes_the_torques_least(t
     result = joint_rest(tmp_path, "mean = 5.5", "mean = -0.55")
     assert not np.asarray(result["a_speed"]).any()
     assert np.asarray(result["g_output_torque"]) == pytest.approx(-0.5, abs=1e-12)
+
+
+def test_speeds_that_differ_by_the_rounding_of_what_they_were_are_the_same_at_the_start() -> None:
+    """A run that begins where another has ended, as two shafts in a closed clutch pass through zero, begins stuck."""
+    scenario = lm.Scenario(
+        shafts={"a": {"inertia": 1.0, "torque": {"mean": -0.3}}, "b": {"inertia": 2.0}},
+        clutches={"c": {"input": "a", "output": "b", "torque": 1.0, "kind": "safety"}},
+        initial={"speeds": {"a": 2e-16, "b": -3e-17}},
+        simulation={"duration": 1.0, "sample_interval": 0.1},
+    )
+    result = lm.simulate(scenario)
+    assert result["c_contact"].values.tolist() == [0] * 11
+    assert result.attrs["switching_count"] == 0
+    assert result["b_speed"].values.tolist() == result["a_speed"].values.tolist()
