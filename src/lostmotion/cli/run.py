@@ -9,7 +9,7 @@ import typer
 
 from .arguments import Overrides, SourceArgument, load_scenario, number
 from .targets import try_file, try_page
-from .terminal import about, busy, simulating
+from .terminal import about, busy, conclude, simulating
 
 if TYPE_CHECKING:
     from ..simulation.results import RunArrays
@@ -68,6 +68,9 @@ def run(
 ) -> None:
     """Run a scenario: print, save, draw, report, explain.
 
+    With a controller the summary has the following error, true and as it is measured. A loop does not fit if its error
+    diverges, or swings at the end by more than a tenth of the reference's range.
+
     \b
     lostmotion run drive.toml
     lostmotion run paper-2dof-nl-small --plot small.png
@@ -94,7 +97,7 @@ def run(
 
     with about(scenario), simulating("Simulating", loaded, 0.0 if solver == "exact" else tolerance or TOLERANCE):
         result = work(loaded, solver=solver, relative_tolerance=tolerance)  # type: ignore[arg-type]
-    from ..reports.run import summary
+    from ..reports.run import summary, verdict_of
 
     print(summary(result))
     if explain is not None:
@@ -121,6 +124,10 @@ def run(
         print(f"Next: lostmotion live {scenario}")
     else:
         print(f"All charts on a page: lostmotion run {scenario} --report {Path(scenario).stem}.html")
+    verdict = verdict_of(result)
+    if verdict is not None:
+        print(f"Verdict: {verdict}")
+    conclude(verdict)
 
 
 def _draw(plot: Path, result: RunArrays, figure: str | None) -> None:

@@ -87,7 +87,7 @@ def axis_figures(
     error = [{"variable": reference, "minus": measured, "label": "reference − measured"}]
     return [
         {"title": f"{quantity.capitalize()}{of}", "unit": unit, "series": followed},
-        {"title": f"Following error{of}", "unit": unit, "series": error},
+        {"title": f"Measured following error{of}", "unit": unit, "series": error},
     ]
 
 

@@ -14,8 +14,9 @@ from ..simulation.scenario import Scenario
 from ..simulation.switchings import ATTRIBUTE as SWITCHINGS
 from ..simulation.switchings import MESH_STEP, names_in, unpacked
 from ..simulation.windings import errors_of
-from ..units.practical import charted, counted, practical, printed
-from ..verdict import Verdict
+from ..units.practical import charted, counted, printed
+from ..verdict import Point, Verdict
+from .run_loops import lines_of, loop_errors, points_of
 
 if TYPE_CHECKING:
     import xarray
@@ -63,7 +64,8 @@ def summary(result: xarray.Dataset | RunArrays) -> str:
 
 
 def _last_lines(result: xarray.Dataset | RunArrays) -> Iterator[str]:
-    """Lines of any run: how far its energy balance closes, its contacts and meshes, its bounds, warning and note."""
+    """Lines of any run: its loops, how far its energy balance closes, its contacts and meshes, its bounds, warning and note."""
+    yield from (f"  {line}" for line in lines_of(loop_errors(result)))
     if "energy" in result.attrs and energy_of(result)["turned_over"] > 0.0:
         yield f"  energy balance closes to {closes_to(result)}"
     yield from (*contact_lines(result), *mesh_lines(result), *error_lines(result))
@@ -190,11 +192,12 @@ def run_report(name: str, result: xarray.Dataset) -> Report:
     more = gear_charts(result)
     flows = [Flows("Energy of the whole run", e)] if e else []
     gears = [Group("gears", "Torsion, losses and energy", "", (*more, *flows))] if more or flows else []
+    found = verdict_of(result)
     shown = (first, *_motion_lines(result), *told)[:3]
     return Report(
         title=result.attrs.get("title") or name,
         lead=f"Run of `{name}`.",
-        verdict=Verdict("fits with a reservation", shown) if "warning" in result.attrs else shown,
+        verdict=shown if found is None else Verdict(found.state, (*found.lines, *shown)[:3]),
         main=Group("run", "The run", "Drag over a chart to zoom, double-click to see all of it.", tuple(charts)),
         parts=(
             *gears,
@@ -204,28 +207,23 @@ def run_report(name: str, result: xarray.Dataset) -> Report:
     )
 
 
+def verdict_of(result: xarray.Dataset | RunArrays) -> Verdict | None:
+    """Verdict on a run whose loops do not work, or that warns; None where nothing is judged."""
+    points = points_of(loop_errors(result))
+    points += [Point("fits with a reservation", result.attrs["warning"])] if "warning" in result.attrs else []
+    return Verdict.of(points) if points else None
+
+
 def _motion_lines(result: xarray.Dataset) -> list[str]:
-    """Following error of controlled axes, and which contacts are stuck."""
-    errors: dict[str, str] = {}
+    """Errors of controlled axes, and which contacts are stuck."""
+    errors = [line for found in loop_errors(result) for line in found.lines()]
     share = weights(result["time"].values)
-    for name in sorted(n for n in map(str, result) if n.endswith(("position_reference", "speed_reference"))):
-        axis, _, quantity = name.removesuffix("_reference").rpartition("_")
-        measured = f"{axis}_measured_{quantity}".removeprefix("_")
-        if axis not in errors and measured in result:  # the position, where there is one
-            error = result[name].values - result[measured].values
-            unit = str(result[name].attrs.get("units", ""))
-            peak, rms = (
-                practical(float(v), unit, 4)
-                for v in (np.abs(error).max(), np.sqrt(np.average(error**2, weights=share)))
-            )
-            of = f"{axis.replace('_', ' ')} " if axis else ""
-            errors[axis] = f"{of}{quantity} peak {peak}, rms {rms}"
     stuck = [
         f"{name.removesuffix('_contact').replace('_', ' ')} {100.0 * float(np.average(result[name].values == 0, weights=share)):.0f} %"
         for name in map(str, result)
         if name.endswith("_contact")
     ]
-    lines = [f"Following error, reference less measured: {'; '.join(errors.values())}."] if errors else []
+    lines = [f"{'; '.join(errors)}."] if errors else []
     return lines + ([f"Share of the time in which contacts are stuck: {', '.join(stuck)}."] if stuck else [])
 
 

@@ -1,0 +1,101 @@
+"""What a run says of its loops: true and measured errors by their names, and a loop that does not work."""
+
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lostmotion as lm
+from lostmotion.reports.page import render
+from lostmotion.reports.run import run_report, summary, verdict_of
+from lostmotion.reports.servo import servo_report
+from lostmotion.servo.margins import instability
+from lostmotion.servo.regimes import axis_of, regimes
+from two_mass import two_mass
+
+MOVES = {"kind": "position", "moves": [{"to": 0.5 * math.pi}], "speed": 4.0, "acceleration": 40.0}
+
+
+SLUGGISH = {"gain": 0.05, "integral_gain": 5.0}
+"""a speed loop that is slower than the position loop around it"""
+
+
+def axis(speed: dict[str, Any]) -> lm.Scenario:
+    """A cascade on two masses."""
+    scenario = two_mass(speed | {"torque_limit": 6.0}, reference=MOVES, position={"gain": 30.0, "feedforward": 1.0})
+    return scenario.replace(**{"simulation.duration": 3.0, "simulation.sample_interval": 1e-3})
+
+
+def test_an_unstable_axis_says_that_it_swings_and_by_how_much_it_leaves_its_reference() -> None:
+    scenario = axis(SLUGGISH)
+    of = axis_of(scenario)
+    assert all(instability(of, regime) is not None for regime in regimes(of))
+    result = lm.simulate(scenario)
+    beyond = float(result["load_angle"].max()) - 0.5 * math.pi
+    assert beyond > 1.0
+    text, verdict = summary(result), verdict_of(result)
+    assert f"leaves the range of its reference by {math.degrees(beyond):.4g} deg" in text
+    assert verdict is not None
+    assert (verdict.state, verdict.exit_code) == ("does not fit", 1)
+    assert verdict.lines[0] in text
+    late = result["load_angle"].values[-1000:] - 0.5 * math.pi
+    swing = float(re.findall(r"±([\d.]+) deg", verdict.lines[0])[0])
+    assert swing == pytest.approx(math.degrees(0.5 * np.ptp(late)), rel=0.1)
+
+
+def test_a_loop_that_works_gets_no_verdict_of_a_run() -> None:
+    assert verdict_of(lm.simulate(axis({"gain": 1.1, "integral_gain": 45.0}))) is None
+
+
+def test_an_error_that_grows_while_the_reference_moves_on_is_said_to_diverge() -> None:
+    ramp = {"reference": {"kind": "position", "samples": {"times": [0.0, 10.0], "values": [0.0, 0.1]}}}
+    verdict = verdict_of(
+        lm.simulate(two_mass(SLUGGISH, position={"gain": 30.0}, **ramp), duration=2.0, sample_interval=1e-3)
+    )
+    assert verdict is not None
+    assert verdict.lines[0].startswith("unstable: the position error of m diverges, up to ")
+
+
+@pytest.fixture(scope="module")
+def shipped() -> Any:
+    return lm.simulate(lm.load("position-axis"))
+
+
+def test_true_and_measured_errors_have_their_names(shipped: Any) -> None:
+    """The true error by the load's angle, the measured one by the encoder on the motor, which does not see the twist."""
+    reference = lm.load("position-axis").controller.reference.at(shipped["time"].values)[0]
+    errors = {
+        "true (reference less load)": reference - shipped["load_angle"].values,
+        "measured (reference less encoder on motor)": shipped["position_reference"].values
+        - shipped["measured_position"].values,
+    }
+    page = render(run_report("position-axis", shipped))
+    for name, error in errors.items():
+        peak, last = (f"{x * 10800.0 / math.pi:.4g} arcmin" for x in (np.abs(error).max(), error[-1]))
+        line = f"position error, {name}: at most {peak}, at the end {last}"
+        for text in (summary(shipped), shipped.lm.summary(), page):
+            assert line in text
+
+
+def test_pages_of_run_and_servo_give_no_name_to_both_errors(shipped: Any) -> None:
+    titles = [
+        {panel.title for group in page.groups() for panel in group.charts if "rror" in panel.title}
+        for page in (
+            run_report("position-axis", shipped),
+            servo_report("position-axis", lm.commission(lm.load("position-axis"))),
+        )
+    ]
+    assert titles == [{"Measured following error"}, {"following error over the run, reference less true value"}]
+
+
+def test_the_command_ends_with_the_exit_code_of_its_verdict(tmp_path: Path) -> None:
+    from test_servo import lostmotion
+
+    stable = lostmotion("run", "position-axis", cwd=tmp_path)
+    assert (stable.returncode, "Verdict" in stable.stdout) == (0, False)
+    unstable = lostmotion("run", "position-axis", "--set", "controller.position.gain=2000 1/s", cwd=tmp_path)
+    assert unstable.stdout.splitlines()[-1].startswith("Verdict: ")
+    assert unstable.returncode == (1 if "does not fit" in unstable.stdout else 0)
