@@ -406,10 +406,7 @@ def _sources(long: Scenario, train: DriveTrain, over: str) -> Iterator[tuple[str
             encoder = getattr(controller, key, None)
             if encoder is None or not encoder.error:
                 continue
-            default = train.motors[name].shaft
-            if key == "position_encoder":
-                default = getattr(controller, "shaft", None) or list(train.shafts)[-1]
-            shaft = encoder.shaft or default
+            shaft = encoder.shaft or train.motors[name].shaft
             per_turn = encoder.error_periods or encoder.lines
             if per_turn is None:  # of a linear scale, whose coordinate is a length
                 per_turn = 2.0 * math.pi / encoder.grating_period
