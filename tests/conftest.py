@@ -134,6 +134,7 @@ SLOW = {
     "test_portable.py": "every scenario in WebAssembly, bit for bit",
     "test_response.py": "Jacobians of periodic motions against differences of runs",
     "test_servo.py": "margins and tuning against time responses of the exact loop",
+    "test_settling.py": "random axes whose settling is decided by long runs",
     "test_slurm.py": "workers as processes, by the scripts of SLURM jobs",
     "test_study.py": "interrupted and distributed studies with real processes",
     "test_study_train.py": "the same for trains",

@@ -11,7 +11,7 @@ import typer
 
 from .arguments import FiguresOption, Overrides, SourceArgument, load_scenario, print_bare
 from .targets import try_directory, try_file, writing
-from .terminal import about, busy, console, fail, progress
+from .terminal import about, busy, conclude, console, progress
 
 if TYPE_CHECKING:
     from ..servo.commission import ServoReport
@@ -40,7 +40,7 @@ def servo(
             "--window",
             metavar="ANGLE",
             help='Within which a move has settled, e.g. "1 arcmin", of a slide "5 um"; left out, four encoder steps at the reference\'s '
-            "shaft, at least a thousandth of the reference's range.",
+            "shaft, at least a thousandth of the longest move.",
         ),
     ] = None,
     rule: Annotated[
@@ -66,9 +66,9 @@ def servo(
 
     Also computes bandwidths, following error, settling and stiffness.
 
-    The report is servo.html (one page) with the data of its charts and the margins as CSV. Exit code 1 if the complete loop
-    is unstable in one of its regimes; what was asked for is written all the same. With a continuous controller it is the
-    certificate of hunting.
+    The report is servo.html (one page) with the data of its charts and the margins as CSV. The verdict is on stability, the
+    window, hunting and limits; what was asked for is written whatever it is. With a continuous controller it is the certificate of
+    hunting.
 
     \b
     lostmotion servo position-axis -o servo
@@ -117,8 +117,7 @@ def servo(
     if drive_units:
         _print_drive_units(loaded, motor)
     print("\n".join([*written, _next(scenario, files, directories, rule)]))
-    if not report.stable:
-        fail(f"unstable: {'; '.join(map(str, report.instabilities()))}")
+    conclude(report.verdict)
 
 
 def _print_tuned(tuned: Tuning) -> None:
@@ -138,7 +137,7 @@ def _certify(
 ) -> None:
     """Print whether an axis with a continuous controller hunts, with its page on request."""
     from ..errors import InputError
-    from ..reports.certificate import certificate_rows, write_certificate
+    from ..reports.certificate import certificate_rows, verdict_of, write_certificate
     from ..servo.certificate import hunting_certificate
 
     if given := [option for option, value in asked.items() if value is not None]:
@@ -154,6 +153,7 @@ def _certify(
             print(f"Report: {write_certificate(path, Path(source).stem, loaded.title, certificate, pictures)}")
     if not directories:
         print(f"The map as a chart: lostmotion servo {source} -o sheet")
+    conclude(verdict_of(certificate))
 
 
 def _tuned(scenario: Scenario, rule: str, feedforward: bool, motor: str | None) -> Tuning:

@@ -85,16 +85,21 @@ def certificate_parts(certificate: HuntingCertificate) -> list[Table | Group]:
     return [table, *([Group("hunting", "From break-away to break-away", WITHOUT_STEPS, (panel,), 1)] if panel else [])]
 
 
+def verdict_of(certificate: HuntingCertificate) -> Verdict:
+    """Verdict on an axis with a continuous controller: whether it hunts."""
+    lines = tuple(f"{what[0].upper()}{what[1:]}: {value}." for what, value in certificate_rows(certificate)[:3])
+    return Verdict(STATES[certificate.verdict], lines)
+
+
 def certificate_report(name: str, title: str, certificate: HuntingCertificate) -> Report:
     """The page of a certificate."""
     rows = certificate_rows(certificate)
     panel = map_panel(certificate)
-    lines = tuple(f"{what[0].upper()}{what[1:]}: {value}." for what, value in rows[:3])
     return Report(
         title=title or name,
         lead=f"Certificate of hunting of `{name}`"
         + (f", contact `{certificate.contact}`." if certificate.contact else "."),
-        verdict=Verdict(STATES[certificate.verdict], lines),
+        verdict=verdict_of(certificate),
         main=Group("hunting", "From break-away to break-away", CAPTION, () if panel is None else (panel,), 1),
         parts=(Table("Hunting", ("quantity", "value"), rows), Prose("What is computed", COMPUTED)),
     )

@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from ..servo.commission import LoopSheet, ServoReport, decibels
+from ..servo.commission import TRUE, LoopSheet, ServoReport, decibels
 from ..servo.motion import LimitCycle, StepResponse
 from ..units.practical import charted
-from ..verdict import State, Verdict
 from .certificate import certificate_parts
 from .looks import FAINT, look
 from .page import Prose, Report, Table
@@ -93,30 +92,6 @@ def _cycle_table(report: ServoReport, cycle: LimitCycle) -> Table:
         rows.append([what, *(map(_text, numbers) if rest.cycles else ("none", "none", ""))])
     header = ("left out", f"amplitude at the motor [{motor[0]}]", f"at the load [{load[0]}]", "frequency [Hz]")
     return Table("Causes of the limit cycle", header, rows)
-
-
-# --- verdict ---
-
-
-def _verdict(report: ServoReport) -> Verdict:
-    """Stability and margins; error and settling; stiffness and hunting."""
-    found = report.instabilities()
-    rows = dict(report.summary())
-    cycle = report.limit_cycle
-    state: State = "does not fit" if found or (cycle is not None and cycle.whole.cycles) else "fits"
-    if state == "fits" and cycle is not None and cycle.whole.verdict == "not decided":
-        state = "not decided"
-    lines = (
-        f"{_sentence(rows['verdict'])} Worst margins: {rows['worst margins']}.",
-        f"Following error over the run: {rows['following error']}."
-        + (f" Settled: {rows['settling']}." if "settling" in rows else ""),
-        (f"Stiffness: {rows['stiffness']}. " if "stiffness" in rows else "") + f"At rest: {rows['at rest']}.",
-    )
-    return Verdict(state, lines)
-
-
-def _sentence(text: str) -> str:
-    return f"{text[0].upper()}{text[1:]}."
 
 
 # --- figures ---
@@ -209,7 +184,7 @@ def _motion_panels(report: ServoReport) -> Iterable[Panel]:
     )
     yield Panel(f"{quantity} over the run", "time [s]", f"{quantity} [{shown}]", both)
     error = Curve("error", f.time, factor * f.error, look(0))
-    yield Panel("following error over the run", "time [s]", f"error [{unit}]", (error,))
+    yield Panel(f"following error over the run, {TRUE}", "time [s]", f"error [{unit}]", (error,))
 
 
 def _stiffness_group(report: ServoReport) -> list[Group]:
@@ -274,7 +249,7 @@ def servo_report(name: str, report: ServoReport) -> Report:
     return Report(
         title=report.scenario.title or name,
         lead=f"Commissioning report of the servo axis of `{report.motor}` in `{name}`.",
-        verdict=_verdict(report),
+        verdict=report.verdict,
         main=main,
         parts=(
             Table("Loops", HEADER, rows, blank, marked=wrong),

@@ -17,6 +17,7 @@ from typing import Literal
 
 import numpy as np
 
+from ..control.turning import turns
 from ..simulation.explanation import explain
 from ..simulation.scenario import Scenario
 from ..simulation.simulation_state import SimulationState
@@ -45,6 +46,7 @@ STEADY = (
 )
 CONFIRMED = 3.0  # times as long a watch confirms a swing
 NOISE = 2e-9 * math.pi  # [rad], a billionth of a turn: what a shaft at rest may move by rounding
+TURN = 1e-3  # [m/rad], for which a radian counts where a linear motor moves a slide
 NOTHING_MOVES = "the state is an equilibrium: no state of drive and controllers changes"
 
 
@@ -98,8 +100,10 @@ class Watch:
         self.tick, ticks = frame_of(scenario) if sampled else (0.0, 0)
         self.frame = self.tick * ticks
         self._running = list(running_slots(self.simulation._control))
+        self.noise = np.array([_noise(scenario, name) for name in self.names])
         self._speeds = tuple(f"{name}_speed" for name in (*scenario.shafts, *scenario.slides))
-        self._skipped = 0.0
+        self.skipped = 0.0
+        """time that was extrapolated, not run [s]"""
         self.times = np.zeros(0)
         self.rows = np.zeros((0, len(self.names)))
         self.magnitude = np.zeros(0)
@@ -130,7 +134,7 @@ class Watch:
     @property
     def elapsed(self) -> float:
         """Since the inputs have come to rest [s]."""
-        return self.simulation.time - self.settled + self._skipped
+        return self.simulation.time - self.settled + self.skipped
 
     def _advance(self, interval: float) -> None:
         """By a whole number of frames, at least one."""
@@ -246,7 +250,7 @@ class Watch:
             step = after[1].numbers - after[0].numbers
             bound = STRAIGHT * np.abs(wanted) + AHEAD * CONSTANT * self.magnitude
             if np.all(np.abs(step - wanted) <= bound):
-                self._skipped += windows * window
+                self.skipped += windows * window
                 return True
         self.simulation.state = kept
         return False
@@ -273,7 +277,7 @@ class Watch:
     def rises(self) -> np.ndarray:
         """Upward crossings in the last half, of the first variable that moves [s]."""
         times, values = self.part(0.5, 1.0)
-        moving = self.swing(0.5, 1.0) > NOISE
+        moving = self.swing(0.5, 1.0) > self.noise
         return rises_of(times, values[:, int(np.argmax(moving))]) if moving.any() else np.zeros(0)
 
     def period(self) -> float:
@@ -296,17 +300,28 @@ class Watch:
         """Whether the last half of the watch has several cycles that neither die out nor become ever slower."""
         before, last = self.swing(0.5, 0.75), self.swing(0.75, 1.0)
         periods = np.diff(self.rises())
-        if len(periods) < CYCLES or not np.any(last > NOISE):
+        moving = last > self.noise
+        if len(periods) < CYCLES or not moving.any():
             return False
         half = len(periods) // 2
         steady = STEADY * np.mean(periods[-half:]) <= np.mean(periods[:half])
-        return bool(steady and np.all(last[last > NOISE] >= STEADY * before[last > NOISE]))
+        return bool(steady and np.all(last[moving] >= STEADY * before[moving]))
 
 
 def _value(points: Sequence[tuple[float, ...]], begin: float, time: float) -> float:
     """Value of a signal at a time within its segment that begins at or before another."""
     t, value, slope = next(p for p in reversed(points) if p[0] <= begin)
     return value + slope * (time - t)
+
+
+def _noise(scenario: Scenario, name: str) -> float:
+    """Motion by rounding of the angle or position of that name [rad] or [m]: of a slide as far as its fastest shaft moves it."""
+    train = scenario.train()
+    slide = next((s for s in scenario.slides if train.angle_of(s) == name), None)
+    if slide is None:
+        return NOISE
+    per_length = [abs(turns(train, shaft, slide) or 0.0) for shaft in scenario.shafts]
+    return NOISE / (max(per_length, default=0.0) or 1.0 / TURN)
 
 
 def _zero(values: np.ndarray, rounding: float) -> float:
@@ -343,8 +358,13 @@ class Decision:
     """[s], since the inputs have come to rest"""
     frequency: float
     """[Hz]; NaN unless it hunts"""
-    swing: np.ndarray
-    """largest less least value of each variable over the last quarter of the watch"""
+    range: np.ndarray
+    """least and largest value of each variable over the last quarter of the watch (2, variable)"""
+
+    @property
+    def swing(self) -> np.ndarray:
+        """Largest less least value of each variable."""
+        return np.asarray(self.range[1] - self.range[0])
 
 
 def decide(watch: Watch, first: float, most: float) -> Decision:
@@ -362,7 +382,7 @@ def decide(watch: Watch, first: float, most: float) -> Decision:
     while seen < most and idle < IDLE:
         before = len(watch.rows)
         watch.follow(duration, min(round(SAMPLES * duration / first), FINEST))
-        idle = idle + 1 if np.ptp(watch.rows[before:], axis=0).max() <= NOISE else 0
+        idle = idle + 1 if np.all(np.ptp(watch.rows[before:], axis=0) <= watch.noise) else 0
         seen += duration
         window = watch.window(duration / 100.0)
         outlook, looks = watch.outlook(window)
@@ -390,19 +410,21 @@ def decide(watch: Watch, first: float, most: float) -> Decision:
 def _decision(watch: Watch, verdict: Verdict, reason: str) -> Decision:
     swing, watched, frequency = watch.swing(0.75, 1.0), watch.elapsed, math.nan
     if verdict == "hunts":
-        moving = int(np.argmax(swing > NOISE))
+        moving = int(np.argmax(swing > watch.noise))
         quick = watch.quick_frequency(moving, 0.5 * swing[moving])
         frequency = 1.0 / watch.period() if math.isnan(quick) else quick
-    return Decision(verdict, reason, watched, frequency, swing)
+    last = watch.part(0.75, 1.0)[1]
+    ends = np.array([last.min(axis=0), last.max(axis=0)]) if len(last) else np.full((2, len(watch.names)), math.nan)
+    return Decision(verdict, reason, watched, frequency, ends)
 
 
 def _why(watch: Watch, outlook: Outlook) -> str:
     if text := outlook.describe():
         return text
     before, last = watch.swing(0.5, 0.75), watch.swing(0.75, 1.0)
-    moving = np.flatnonzero(last > NOISE)
+    moving = np.flatnonzero(last > watch.noise)
     if not len(moving):
-        return f"nothing moves by more than {NOISE:.2g} (rad or m), but not all contacts are stuck, or the controllers still move"
+        return "nothing moves by more than a billionth of a turn, but not all contacts are stuck, or the controllers still move"
     k = moving[0]
     unit = "m" if watch.names[k].endswith("_position") else "rad"
     return f"{watch.names[k]} still moves by {last[k]:.3g} {unit}, {last[k] / max(before[k], last[k] * 1e-9):.3g} of the time before"

@@ -12,6 +12,7 @@ from .margins import Margins as Margins
 from .motion import AtRest as AtRest
 from .motion import Following as Following
 from .motion import LimitCycle as LimitCycle
-from .motion import Settling as Settling
 from .motion import StepResponse as StepResponse
+from .settling import Moves as Moves
+from .settling import Settling as Settling
 from .tuned import Tuning as Tuning

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 
@@ -16,22 +16,13 @@ from ..inputs.quantities import Angle
 from ..response.standstill import moving_input
 from ..simulation.scenario import Scenario
 from ..units.practical import practical
+from ..verdict import Point, State, Verdict
 from .certificate import HuntingCertificate, certified, certified_in_words
 from .margins import Bandwidth, Instability, Margins, bandwidth_of, frequencies, instability, margins
-from .motion import (
-    STEPPED,
-    Following,
-    LimitCycle,
-    Settling,
-    StepResponse,
-    default_window,
-    following,
-    limit_cycle,
-    settling,
-    step_response,
-)
+from .motion import STEPPED, Following, LimitCycle, StepResponse, following, limit_cycle, step_response
 from .regimes import Axis, Regime, axis_of, regimes
 from .sampled import SampledLoop
+from .settling import Moves, Settling, default_window, repeated, settling
 
 
 @dataclass(frozen=True)
@@ -101,6 +92,8 @@ class ServoReport:
     following: Following
     window: float
     """window of settling [rad]"""
+    moves: Moves | None
+    """the moves of the reference, repeated until they repeat; None without moves"""
     settling: tuple[Settling, ...]
     stiffness: tuple[Stiffness, ...]
     limit_cycle: LimitCycle | None
@@ -111,6 +104,8 @@ class ServoReport:
     """motor unit of the motor's angle; m of a linear motor"""
     load_unit: str = "rad"
     """load unit of the angle of the reference's shaft; m of a slide"""
+    window_given: bool = False
+    """whether the window was asked for, not the one by default"""
 
     @property
     def stable(self) -> bool:
@@ -121,14 +116,74 @@ class ServoReport:
         """Poles of the complete loop outside the unit circle, one for each regime that has some."""
         return list(dict.fromkeys(row.unstable for row in self.loops if row.unstable is not None))
 
+    @property
+    def verdict(self) -> Verdict:
+        """Answer to all that is asked of an axis: stability, the window, hunting, limits; and what was not judged."""
+        rows = dict(self._rows())
+        lines = [
+            f"Worst margins: {rows['worst margins']}. Following error over the run: {rows['following error']}.",
+            " ".join(
+                f"{what.capitalize()}: {rows[what]}." for what in ("settling", "stiffness", "at rest") if what in rows
+            ),
+        ]
+        return Verdict.of(self._points(), lines)
+
+    def _points(self) -> Iterator[Point]:
+        stable, f = f"stable in {self._regimes()}", self.following
+        if found := self.instabilities():
+            yield Point("does not fit", f"unstable: {'; '.join(map(str, found))}")
+        if self.window_given and self.moves is None:
+            yield Point("not decided", "the window is not judged: the reference has no moves to settle after")
+        if (worst := self.worst_move) is not None:
+            yield Point(*self._window_point(worst))
+        yield from self._rest_points()
+        for name, share in f.limits.items():
+            yield Point("fits with a reservation", f"{stable}, but the {name} acts in {100.0 * share:.3g} % of the run")
+        yield Point("fits", stable)
+
+    def _window_point(self, worst: Settling) -> tuple[State, str]:
+        """The answer to whether the axis settles within its window."""
+        stable, window = "stable" if self.stable else "unstable", _shown(self.window, self.load_unit)
+        after = f"after the move to {self._place(worst.to)}"
+        if worst.state == "settled":
+            return "fits", f"{stable} in {self._regimes()}, and {self._worst_settling()}"
+        if worst.state == "not decided":
+            return (
+                "not decided",
+                f"{stable}, but it is not decided whether it settles within {window} {after}: {worst.reason}",
+            )
+        beyond = abs(worst.remaining) - self.window
+        if beyond <= 0.0:
+            return "does not fit", f"{stable}, but not settled within {window} {after}: {self._why(worst)}"
+        text = f"{stable}, but misses the window of {window} by {_shown(beyond, self.load_unit, 2)} {after}"
+        return "does not fit", f"{text}: {self._why(worst)}" if worst.last and self._swings(worst) else text
+
+    def _rest_points(self) -> Iterator[Point]:
+        """Hunting, and what is not known of it."""
+        whole = None if self.limit_cycle is None else self.limit_cycle.whole
+        if whole is not None and whole.cycles:
+            judged = self.settling and self.settling[-1].state == "settled"
+            yield Point("fits with a reservation" if judged else "does not fit", f"stable, but {self.rest()}")
+        elif self.certificate is not None and self.certificate.verdict == "hunts":
+            yield Point(
+                "fits with a reservation", f"stable, but other starts hunt: {certified_in_words(self.certificate)}"
+            )
+        if whole is not None and whole.verdict == "not decided":
+            judged = self.settling and self.settling[-1].state == "settled"
+            state: State = "fits with a reservation" if judged else "not decided"
+            yield Point(state, f"stable, but hunting is not decided: {whole.described()}")
+
     def summary(self) -> list[tuple[str, str]]:
         """The verdict on the axis, as (what, value): stability, worst margins, error, settling, stiffness, hunting."""
+        return [("verdict", str(self.verdict)), *self._rows()]
+
+    def _rows(self) -> list[tuple[str, str]]:
         found = self.instabilities()
         f = self.following
         rows = [
-            ("verdict", f"UNSTABLE: {'; '.join(map(str, found))}" if found else f"stable in {self._regimes()}"),
+            ("stability", f"UNSTABLE: {'; '.join(map(str, found))}" if found else f"stable in {self._regimes()}"),
             ("worst margins", self.least_margins() or "none: no gain crosses 1"),
-            ("following error", f"peak {_shown(f.peak, f.unit)}, rms {_shown(f.rms, f.unit)}"),
+            ("following error", f"{TRUE}: peak {_shown(f.peak, f.unit)}, rms {_shown(f.rms, f.unit)}"),
         ]
         if self.settling:
             rows.append(("settling", self._worst_settling()))
@@ -161,23 +216,48 @@ class ServoReport:
     def _worst_settling(self) -> str:
         """The longest time of all moves; where one does not settle, why."""
         inside = f"within {_shown(self.window, self.following.unit)}"
-        never = [s for s in self.settling if math.isnan(s.time)]
-        if not never:
-            return f"{inside} in at most {1e3 * max(s.time for s in self.settling):.4g} ms"
-        worst = max(never, key=lambda s: abs(s.remaining))
-        return f"not {inside}: {self._why(worst)}"
+        worst = self.worst_move
+        assert worst is not None
+        if worst.state != "settled":
+            return f"{'not' if worst.state == 'not settled' else 'not decided whether'} {inside}: {self._why(worst)}"
+        return f"{inside} in at most {1e3 * worst.time:.4g} ms, {self._proof(self.settling[-1])}"
+
+    @property
+    def worst_move(self) -> Settling | None:
+        """The move that settles last; before that one that is not decided, and one that does not settle; None without moves."""
+        order = ("settled", "not decided", "not settled")
+        return max(
+            self.settling,
+            key=lambda s: (order.index(s.state), s.time if s.state == "settled" else abs(s.remaining)),
+            default=None,
+        )
+
+    def _proof(self, last: Settling) -> str:
+        """Why the error stays within the window."""
+        held = f"after the last move for ever ({last.reason})"
+        return held if len(self.settling) == 1 else f"until the next move begins, {held}"
+
+    @staticmethod
+    def _swings(s: Settling) -> bool:
+        return s.swing > SWINGS * abs(s.remaining)
 
     def _why(self, s: Settling) -> str:
         """Why a move does not settle, in one sentence."""
-        left, twist = abs(s.remaining), abs(s.unseen)
-        if math.isnan(left):
-            return "the run ends with the move"
-        text = f"the error is still {_shown(left, self.following.unit, 3)} before the next move or the end"
-        if left <= self.window:
-            return f"it leaves the window again; {text}"
+        if s.state == "not decided":
+            return s.reason
+        left, twist, unit = abs(s.remaining), abs(s.unseen), self.following.unit
+        when = s.reason if s.last else "before the next move"
+        swing = f"swings by ±{_shown(s.swing, unit, 3)}"
+        if self._swings(s) and s.last:
+            return f"it still {swing}, {when}"
+        text = f"the error is still {_shown(left, unit, 3)} {when}"
+        if self._swings(s):
+            return f"{text}, and {swing}"
         if twist > 0.5 * left:
             where = "the motor" if self.following.encoder == "motor" else f"the shaft {self.following.encoder}"
-            return f"{text}, as an encoder on {where} does not see {_shown(twist, self.following.unit, 3)} of static twist under load"
+            return f"{text}, as an encoder on {where} does not see {_shown(twist, unit, 3)} of twist"
+        if s.reason == "at rest":
+            return f"{text}, which the loop does not remove; add an integral gain, or a finer encoder"
         return f"{text}, which the loop measures and is still removing; raise its gains, or allow more time"
 
     def _place(self, position: float) -> str:
@@ -187,17 +267,31 @@ class ServoReport:
         """Following, settling, stiffness and rest, as (what, value)."""
         f = self.following
         rows = [
-            ("following error over the run, peak", _shown(f.peak, f.unit)),
-            ("following error over the run, rms", _shown(f.rms, f.unit)),
+            (f"following error over the run, {TRUE}: peak", _shown(f.peak, f.unit)),
+            (f"following error over the run, {TRUE}: rms", _shown(f.rms, f.unit)),
         ]
+        if self.moves is not None:
+            rows.append(("moves", self.repetition()))
         for s in self.settling:
-            inside = f"{1e3 * s.time:.4g} ms" if not math.isnan(s.time) else f"not: {self._why(s)}"
+            until = self._proof(s) if s.last else "until the next move begins"
+            inside = f"{1e3 * s.time:.4g} ms, {until}" if s.state == "settled" else f"{s.state}: {self._why(s)}"
             within = _shown(self.window, self.load_unit)
             rows.append((f"settled within {within} after the move to {self._place(s.to)}", inside))
         for k in self.stiffness:
             least, at = k.least
             rows.append((f"least stiffness against load, {k.regime}", f"{k.shown(least)} at {at:.3g} Hz"))
         return [*rows, ("at rest", self.rest())]
+
+    def repetition(self) -> str:
+        """Number of cycles of the moves, and whether they then repeat."""
+        moves = self.moves
+        assert moves is not None
+        if moves.note:
+            return moves.note
+        apart = (
+            f"the errors of the last two of {moves.cycles} cycles differ by {_shown(moves.apart, self.load_unit, 3)}"
+        )
+        return f"repeat: {apart}" if moves.repeats else f"do not repeat: {apart}"
 
     def rest(self) -> str:
         """Behaviour of the axis at rest, in one line."""
@@ -228,7 +322,8 @@ def commission(
     as they are. A loop with several sample times is a time-invariant system over that of its outermost loop. Field-oriented control
     is linear about the steady motion of the regime. A loop is cut at the measured value of its controller; the loops within it are
     closed, those around it open. Limits, quantisation and dead zones count in the runs only: steps, following, settling and rest are
-    exact simulations of the scenario.
+    exact simulations of the scenario. Moves are repeated, both ways, until they repeat. An axis has settled after a move if its error
+    stays within the window until the next move begins. After the last one it must be shown to stay there for ever.
 
     Parameters
     ----------
@@ -237,8 +332,8 @@ def commission(
     motor : str, optional
         Name of the motor whose controller is examined. Default: the only one.
     window : float, optional
-        Window of the settled position [rad]. Default: four encoder steps at the reference's shaft, at least a thousandth of the
-        reference's range.
+        Window of the settled position [rad], of a slide [m]. Default: four steps of the position's encoder at the reference's shaft,
+        at least a thousandth of the longest move.
     progress : callable
         Called `work(scenario)` times.
 
@@ -258,8 +353,8 @@ def commission(
     --------
     >>> import lostmotion as lm
     >>> report = lm.commission(lm.load("speed-axis"))
-    >>> report.summary()[0]
-    ('verdict', 'stable in all 4 regimes (first stiffness, last stiffness, twist stuck, load stuck)')
+    >>> print(report.verdict)
+    fits: stable in all 4 regimes (first stiffness, last stiffness, twist stuck, load stuck)
     """
     axis = axis_of(scenario, motor)
     if window is not None and not window > 0.0:
@@ -278,7 +373,8 @@ def commission(
         doubt_window(window, float(np.ptp(followed.reference)), followed.unit, "window")
     progress()
     stiffness = tuple(_stiffness(axis, regime) for regime in points) if axis.loops[-1] == "position" else ()
-    cycle = limit_cycle(axis)
+    moves = repeated(axis, wide)
+    cycle = limit_cycle(axis) if moves is None else limit_cycle(moves.axis, moves.longest)
     progress()
     certificate = None
     if cycle is not None and not moving_input(axis.scenario) and not scenario.continuous():
@@ -291,12 +387,14 @@ def commission(
         steps=tuple(steps),
         following=followed,
         window=wide,
-        settling=tuple(settling(axis, followed, wide)),
+        moves=moves,
+        settling=() if moves is None or cycle is None else tuple(settling(moves, cycle.whole, wide)),
         stiffness=stiffness,
         limit_cycle=cycle,
         certificate=certificate,
         motor_unit=axis.train.angle_unit(axis.motor_shaft),
         load_unit=axis.train.angle_unit(axis.shaft),
+        window_given=window is not None,
     )
 
 
@@ -339,6 +437,10 @@ def _stiffness(axis: Axis, regime: Regime) -> Stiffness:
     with np.errstate(divide="ignore"):  # a shaft that sticks is infinitely stiff
         values = 1.0 / np.abs(closed.compliance(f, axis.shaft, axis.shaft))
     return Stiffness(regime.name, axis.shaft, f, values, axis.train.is_slide(axis.shaft))
+
+
+TRUE = "reference less true value"
+SWINGS = 0.25  # of the error that is left: the least amplitude of which it is said that it swings
 
 
 def decibels(factor: float) -> float:

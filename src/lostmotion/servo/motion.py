@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..control.loops import CurrentLoop, Feedforward, FieldOriented
-from ..control.references import PositionReference
 from ..control.turning import turns
 from ..inputs.part import Part
 from ..model.torsion import TorsionCurve
@@ -35,6 +34,7 @@ REST = 10.0  # of the slowest time constants of the loops, for which an axis is 
 MOST_TICKS = 4e6  # for which it is watched at most
 PATIENCE = 4.0  # times as long as the whole axis, for which one without a possible cause is watched
 FINEST_BITS = 40  # of an encoder
+WITHIN = 1.0 - 1e-9  # of a limit, from which on it acts
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ def with_controller(axis: Axis, **fields: Any) -> Axis:
 
 def step_response(axis: Axis, loop: str) -> StepResponse:
     """Step response of one loop. The step is halved until no limit acts on it."""
-    size, limited = _first_size(axis, loop), True
+    size, limited = first_size(axis, loop), True
     for _ in range(HALVINGS):
         data = _step(axis, loop, size)
         if not (limited := _is_limited(axis, loop, data)):
@@ -113,7 +113,8 @@ def step_response(axis: Axis, loop: str) -> StepResponse:
     return StepResponse(loop, size, unit, limited, data["time"], value - value[0])
 
 
-def _first_size(axis: Axis, loop: str) -> float:
+def first_size(axis: Axis, loop: str) -> float:
+    """First size of a step of one loop."""
     if loop == "current":
         return 0.5 * axis.train.motors[axis.motor].rated_torque
     if loop == "speed":
@@ -156,24 +157,28 @@ def _step(axis: Axis, loop: str, size: float) -> RunArrays:
 
 
 def _is_limited(axis: Axis, loop: str, data: RunArrays) -> bool:
+    return any(share > 0.0 for share in limited(axis, loop, data).values())
+
+
+def limited(axis: Axis, loop: str, data: RunArrays) -> dict[str, float]:
+    """Share of a run in which each limit within a loop acts, by its name."""
     c, motor = axis.controller, axis.train.motors[axis.motor]
-    within = 1.0 - 1e-9
-    found = []
+    found: list[tuple[str, np.ndarray, float]] = []
     if c.speed is not None and c.speed.torque_limit is not None and loop != "current":
-        found.append((f"{axis.motor}_torque_reference", c.speed.torque_limit))
+        found.append(("speed.torque_limit", data[f"{axis.motor}_torque_reference"], c.speed.torque_limit))
     if c.position is not None and c.position.speed_limit is not None and loop == "position":
-        found.append((f"{axis.motor}_speed_reference", c.position.speed_limit * abs(axis.ratio)))
+        most = c.position.speed_limit * abs(axis.ratio)
+        found.append(("position.speed_limit", data[f"{axis.motor}_speed_reference"], most))
     if motor.command_limit is not None and isinstance(c.current, CurrentLoop):
-        found.append((f"{axis.motor}_command", motor.command_limit))
+        found.append(("limit of the motor's voltage", data[f"{axis.motor}_command"], motor.command_limit))
     if motor.torque_limit is not None:
-        found.append((axis.train.motor_torque_of(axis.motor), motor.torque_limit))
-    most = {name: float(np.abs(data[name]).max()) for name, _ in found}
+        found.append(("limit of the motor's torque", data[axis.train.motor_torque_of(axis.motor)], motor.torque_limit))
     if isinstance(c.current, FieldOriented) and motor.winding is not None and motor.winding.max_current is not None:
         for what, limit in (("voltage", motor.phase_voltage), ("current", math.sqrt(2.0) * motor.winding.max_current)):
             pair = (data[f"{axis.motor}_{which}_{what}"] for which in ("direct", "quadrature"))
-            found.append((what, limit))
-            most[what] = float(np.hypot(*pair).max())
-    return any(most[name] >= within * limit for name, limit in found)
+            found.append((f"limit of the motor's {what}", np.hypot(*pair), limit))
+    share = weights(data["time"])
+    return {name: float(np.average(np.abs(values) >= WITHIN * limit, weights=share)) for name, values, limit in found}
 
 
 # --- following and settling ---
@@ -194,22 +199,8 @@ class Following:
     shaft, less that of the reference's shaft [rad]"""
     encoder: str
     """shaft of that encoder"""
-
-
-@dataclass(frozen=True)
-class Settling:
-    """Settling of an axis after one move."""
-
-    end: float
-    """end of the move [s]"""
-    to: float
-    """position [rad]"""
-    time: float
-    """until the error stays within the window until the next move [s]; NaN if it does not"""
-    remaining: float = math.nan
-    """error before the next move, or at the end of the run [rad]"""
-    unseen: float = math.nan
-    """part of it that the encoder of the position does not see: the twist between its shaft and that of the reference [rad]"""
+    limits: Mapping[str, float]
+    """share of the run in which each limit acts"""
 
 
 def following(axis: Axis) -> Following:
@@ -222,47 +213,20 @@ def following(axis: Axis) -> Following:
         name, unit = f"{axis.shaft}_speed", axis.train.speed_unit(axis.shaft)
     error = wanted - data[name]
     rms = math.sqrt(float(np.average(error**2, weights=weights(time))))
-    encoder = encoder_shaft(axis)
-    unseen = np.zeros_like(error)
-    if reference.kind == "position" and encoder != axis.shaft:
-        read = data[axis.train.angle_of(encoder)]
-        unseen = read / (turns(axis.train, encoder, axis.shaft) or 1.0) - data[name]
-    return Following(unit, time, wanted, error, float(np.abs(error).max()), rms, unseen, encoder)
+    unseen = errors_of(axis, data)[1] if reference.kind == "position" else np.zeros_like(error)
+    limits = {name: share for name, share in limited(axis, axis.loops[-1], data).items() if share > 0.0}
+    return Following(
+        unit, time, wanted, error, float(np.abs(error).max()), rms, unseen, axis.position_encoder[0], limits
+    )
 
 
-def encoder_shaft(axis: Axis) -> str:
-    """Shaft at which the position is measured."""
-    c = axis.controller
-    if c.position_encoder is not None:
-        return c.position_encoder.shaft or axis.shaft
-    return (c.encoder and c.encoder.shaft) or axis.motor_shaft
-
-
-def default_window(axis: Axis) -> float:
-    """Four steps of the position encoder at the reference's shaft, and not less than a thousandth of the longest move [rad]."""
-    c = axis.controller
-    encoder = c.position_encoder or c.encoder
-    step = 0.0 if encoder is None else encoder.step
-    if c.position_encoder is None:
-        step /= abs(axis.ratio)
-    return max(4.0 * step, 1e-3 * 50.0 * _first_size(axis, "position"))
-
-
-def settling(axis: Axis, followed: Following, window: float) -> list[Settling]:
-    """After each move of the reference that ends within the run."""
-    reference = axis.controller.reference
-    if not isinstance(reference, PositionReference) or not reference.moves:
-        return []
-    spans = [span for span in reference.intervals() if span[1] < followed.time[-1]]
-    out = []
-    for k, (_, end) in enumerate(spans):
-        until = spans[k + 1][0] if k + 1 < len(spans) else math.inf
-        during = (followed.time >= end) & (followed.time <= until)
-        time = settled(followed.time[during], followed.error[during], window) if during.any() else math.nan
-        last = np.flatnonzero(during)[-1:]
-        left = [float(x[last[0]]) if len(last) else math.nan for x in (followed.error, followed.unseen)]
-        out.append(Settling(end, reference.moves[k].to, time, *left))
-    return out
+def errors_of(axis: Axis, data: RunArrays) -> tuple[np.ndarray, np.ndarray]:
+    """Error of a position over a run, and the part of it that its encoder does not see [rad]."""
+    train, encoder, name = axis.train, axis.position_encoder[0], axis.measured["position"][0]
+    error = axis.controller.reference.at(data["time"])[0] - data[name]
+    if encoder == axis.shaft:
+        return error, np.zeros_like(error)
+    return error, data[train.angle_of(encoder)] / (turns(train, encoder, axis.shaft) or 1.0) - data[name]
 
 
 # --- under a reference that stands ---
@@ -283,6 +247,12 @@ class AtRest:
     """the same of the reference's shaft [rad]"""
     frequency: float
     """[Hz]; NaN unless it hunts"""
+    begin: float = 0.0
+    """when the inputs have come to rest [s]"""
+    extrapolated: float = 0.0
+    """part of the time that was watched in which all contacts are stuck, which was not run [s]"""
+    range: tuple[float, float] = (math.nan, math.nan)
+    """least and largest angle of the reference's shaft in the last quarter [rad]"""
 
     @property
     def cycles(self) -> bool:
@@ -311,11 +281,11 @@ class LimitCycle:
         return [name for name, rest in self.without.items() if rest.motor_amplitude < low]
 
 
-def limit_cycle(axis: Axis) -> LimitCycle | None:
-    """Limit cycle of an axis with a position loop; None for others."""
+def limit_cycle(axis: Axis, most: float = math.inf) -> LimitCycle | None:
+    """Limit cycle of an axis with a position loop, watched for a time [s] at most; None for others."""
     if axis.controller.position is None:
         return None
-    whole = at_rest(axis)
+    whole = at_rest(axis, most)
     if not whole.cycles:
         return LimitCycle(whole, {})
     most = PATIENCE * whole.watched
@@ -358,14 +328,22 @@ def at_rest(axis: Axis, most: float = math.inf) -> AtRest:
     start = axis.scenario.begin().of_all("angles").get(axis.shaft, 0.0)
     at_start = reference.duration == 0.0 and float(reference.at(0.0)[0]) == start
     if at_start or reference.sine_list() or any(reference.pieces()[-1][2:]):
-        axis = with_controller(axis, reference={"kind": "position", "mean": start + _first_size(axis, "position")})
+        axis = with_controller(axis, reference={"kind": "position", "mean": start + first_size(axis, "position")})
     if name := moving_input(axis.scenario):
         return AtRest("not decided", f"{name} never comes to rest", 0.0, math.nan, math.nan, math.nan)
-    first = max(REST * slowest(c), 4.0 * step_duration(axis, "position"), axis.scenario.simulation.duration)
+    first = max(watched_at_least(axis), axis.scenario.simulation.duration)
     watch = Watch(axis.scenario, (axis.train.angle_of(axis.motor_shaft), axis.train.angle_of(axis.shaft)))
     found = decide(watch, first, min(most, max(MOST_TICKS * c.sample_time, 4.0 * first)))
     motor, load = 0.5 * found.swing
-    return AtRest(found.verdict, found.reason, found.watched, motor, load, found.frequency)
+    ends = (float(found.range[0, 1]), float(found.range[1, 1]))
+    return AtRest(
+        found.verdict, found.reason, found.watched, motor, load, found.frequency, watch.settled, watch.skipped, ends
+    )
+
+
+def watched_at_least(axis: Axis) -> float:
+    """Time for which an axis is watched at least, with its reference at rest [s]."""
+    return max(REST * slowest(axis.controller), 4.0 * step_duration(axis, "position"))
 
 
 def _changed_all(scenario: Scenario, table: str, change: Any) -> Scenario | None:

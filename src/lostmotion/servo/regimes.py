@@ -81,6 +81,14 @@ class Axis:
         shafts = list(self.train.shafts)
         return law, shafts[law.position_shaft], shafts[law.speed_shaft]
 
+    @cached_property
+    def position_encoder(self) -> tuple[str, float]:
+        """Shaft at which the position is read, and the step of its encoder at the shaft of the reference [rad], of a slide [m]."""
+        c, (_, position, speed) = self.controller, self.law
+        shaft, encoder = (speed, c.encoder) if c.position_encoder is None else (position, c.position_encoder)
+        step = 0.0 if encoder is None else encoder.step
+        return shaft, step / abs(turns(self.train, shaft, self.shaft) or 1.0)
+
     @property
     def loops(self) -> tuple[str, ...]:
         """Names of the loops that are closed, the innermost first."""

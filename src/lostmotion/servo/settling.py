@@ -1,0 +1,341 @@
+"""Settling of an axis: its moves repeated until they repeat, both ways, and what proves that the error stays in the window."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from ..control.references import MovesReference
+from ..response.closed_response import frame_of
+from ..response.standstill import moving_input, rises_of
+from .motion import AtRest, changed, errors_of, first_size, ran, settled, watched_at_least
+from .regimes import Axis
+
+SAMPLES = 20_000  # of one cycle of the moves
+MOST = 400_000  # of a run
+TICKS = 1e6  # sample times of the controller, for which it is watched at most after the last move
+CYCLES = (2, 4, 8)  # of the moves
+ALIKE = 0.1  # of the window, by which the errors of two cycles may differ
+SPREADS = (
+    3.0  # of the extremes of a swing that was watched: the least distance from the window of one that stays within it
+)
+COARSE = 20  # times the interval between samples, at most, of a long run
+SAME = 0.01  # of the window, by which the run and what was watched may differ at the end
+LATER = 0.03  # of what was watched, from which on a swing counts that becomes ever slower
+PERIODS = 20  # of an input that never rests, for which the last position is held
+SHARE = 0.001  # of the longest move: the least window by default
+STEPS = 4.0  # of the encoder of the position: the least window by default
+
+AnyMoves = MovesReference[Any, Any, Any, Any, Any]
+State = Literal["settled", "not settled", "not decided"]
+
+
+@dataclass(frozen=True)
+class Settling:
+    """Settling of an axis after one move."""
+
+    end: float
+    """end of the move [s]"""
+    to: float
+    """position [rad], of a slide [m]"""
+    state: State
+    """settled where the error is shown to stay within the window; not settled where it is shown to leave it"""
+    time: float
+    """until the error stays within the window [s]; NaN unless settled"""
+    last: bool
+    """whether the position is held after the move for ever; otherwise until the next move begins"""
+    reason: str = ""
+    """proof of it, or observation in vain"""
+    remaining: float = math.nan
+    """error before the next move, or at the end of what was run [rad]; of a swing the largest one"""
+    unseen: float = math.nan
+    """part of it that the encoder of the position does not see: the twist between its shaft and that of the reference [rad]"""
+    swing: float = 0.0
+    """half of what the error swings by at the end of what was run [rad]"""
+
+
+@dataclass(frozen=True)
+class Moves:
+    """Moves of a reference, repeated until their errors repeat."""
+
+    axis: Axis
+    """with the repeated moves as its reference"""
+    cycles: int
+    """number of cycles; 1 where an input varies by itself"""
+    period: float
+    """period of the repeated moves [s]"""
+    apart: float
+    """largest difference of the errors of the last two cycles [rad]; NaN of a single one"""
+    repeats: bool
+    interval: float
+    """between samples [s]"""
+    count: int
+    """moves of a cycle"""
+    note: str = ""
+    """reason for moves that are not repeated; empty if they are"""
+
+    @property
+    def longest(self) -> float:
+        """Time for which the axis is watched at most after the last move [s]."""
+        return TICKS * self.axis.controller.sample_time
+
+    @property
+    def reference(self) -> AnyMoves:
+        """The repeated moves."""
+        reference = self.axis.controller.reference
+        assert isinstance(reference, MovesReference)
+        return reference
+
+
+def default_window(axis: Axis) -> float:
+    """Four steps of the position encoder at the reference's shaft, and not less than a thousandth of the longest move [rad]."""
+    reference = axis.controller.reference
+    moves = reference.moves if isinstance(reference, MovesReference) else ()
+    steps = np.abs(np.diff([getattr(reference, "start", 0.0), *(move.to for move in moves)]))
+    longest = float(steps.max(initial=0.0)) or 50.0 * first_size(axis, "position")
+    return max(STEPS * axis.position_encoder[1], SHARE * longest)
+
+
+# --- repeated moves ---
+
+
+def repeated(axis: Axis, window: float) -> Moves | None:
+    """The axis with its moves repeated until their errors differ by a tenth of the window at most; None without moves.
+
+    Moves that end elsewhere than they begin are made backward too, so that each stretch is travelled both ways. Behind the moves the
+    last position of the reference is held.
+    """
+    reference = axis.controller.reference
+    if not isinstance(reference, MovesReference) or not reference.moves:
+        return None
+    tick, ticks = frame_of(axis.scenario)
+    if name := _varying(axis):
+        end = reference.intervals()[-1][1]
+        interval = max(math.ceil(end / SAMPLES / tick), 1) * tick
+        note = f"not repeated, as {name} varies over time"
+        return Moves(_following(axis, reference), 1, end, math.nan, True, interval, len(reference.moves), note)
+    there = _resolved(reference)
+    back = [] if there[-1]["to"] == reference.start else _backward(reference.start, there)
+    cycle = [*there, *back]
+    for k in {len(there) - 1, len(cycle) - 1}:
+        cycle[k] = {**cycle[k], "dwell": cycle[k]["dwell"] or watched_at_least(axis)}
+    needed = _with_moves(reference, cycle).duration - reference.begin
+    count = max(math.ceil(needed / SAMPLES / tick), 1)
+    count = count if count == 1 else math.ceil(count / ticks) * ticks
+    period = math.ceil(needed / tick / max(count, ticks) - 1e-9) * max(count, ticks) * tick
+    cycle[-1] = {**cycle[-1], "dwell": cycle[-1]["dwell"] + period - needed}
+    for cycles in CYCLES:
+        longer = _following(axis, _with_moves(reference, [*cycle * cycles, *(there if back else [])]))
+        apart = _apart(longer, cycles, period, count * tick)
+        if apart <= ALIKE * window:
+            break
+    return Moves(longer, cycles, period, apart, apart <= ALIKE * window, count * tick, len(cycle))
+
+
+def _with_moves(reference: AnyMoves, moves: Sequence[dict[str, float]]) -> AnyMoves:
+    kind = type(reference.moves[0])
+    return reference.model_copy(update={"moves": tuple(kind(**move) for move in moves)})
+
+
+def _following(axis: Axis, new: AnyMoves) -> Axis:
+    """The axis with another reference, which all controllers follow that have the same one; the duration of its run is none of its own."""
+    scenario, reference = axis.scenario, axis.controller.reference
+    table = scenario.simulation.model_copy(update={"duration": watched_at_least(axis)})
+    controllers = {
+        name: c.model_copy(update={"reference": new}) if c.reference == reference else c
+        for name, c in scenario.axes().items()
+    }
+    controllers = {**scenario.controllers, **controllers}
+    return Axis(changed(scenario, controllers=controllers, simulation=table), axis.motor)
+
+
+def _resolved(reference: AnyMoves) -> list[dict[str, float]]:
+    """The moves with all that is given beside them."""
+    keys = ("speed", "acceleration", "jerk", "dwell")
+    return [{"to": move.to} | {key: reference._of(move, key) for key in keys} for move in reference.moves]
+
+
+def _backward(start: float, there: Sequence[dict[str, float]]) -> list[dict[str, float]]:
+    """The same stretches in reverse, each within its own limits."""
+    ends = [{"to": start, "dwell": there[-1]["dwell"]}, *there[:-1]]
+    pairs = zip(reversed(there), reversed(ends), strict=True)
+    return [{**move, "to": end["to"], "dwell": end["dwell"]} for move, end in pairs]
+
+
+def _varying(axis: Axis) -> str:
+    """Name of an input beside the moves that varies over time; empty if there is none."""
+    reference = axis.controller.reference
+    if reference.sine_list():
+        return f"{axis.motor}_reference"
+    for name, c in axis.scenario.axes().items():
+        if c.reference != reference and (c.reference.duration > 0.0 or c.reference.sine_list()):
+            return f"{name}_reference"
+    driven = {f"{name}_command" for name in axis.scenario.axes()}
+    for name, signal in axis.scenario.signals().items():
+        points = signal.breakpoint_list()
+        if name not in driven and (signal.sine_list() or len(points) > 1 or any(points[-1][2:])):
+            return name
+    return ""
+
+
+def _apart(axis: Axis, cycles: int, period: float, interval: float) -> float:
+    """Largest difference of the errors of the last two cycles."""
+    reference = axis.controller.reference
+    begin = reference.intervals()[0][0]  # type: ignore[union-attr]
+    end = math.ceil(begin / interval) * interval + cycles * period
+    error = errors_of(axis, ran(axis, duration=end, sample_interval=interval))[0]
+    n = round(period / interval)
+    return float(np.abs(error[-n:] - error[-2 * n : -n]).max())
+
+
+# --- settling ---
+
+
+def settling(moves: Moves, rest: AtRest, window: float) -> list[Settling]:
+    """After each move of the last cycle, and after the last move, behind which the position is held.
+
+    Parameters
+    ----------
+    rest
+        What follows the last move.
+    """
+    seen = _seen(moves, rest)
+    held = len(moves.reference.moves) - 1
+    found = []
+    for k in range(max(held - moves.count + 1, 0), held):
+        earlier = range(k, -1, -moves.count)[: 1 if moves.repeats else 2]
+        several = [s for j in earlier if (s := _before_the_next(moves, j, seen, window)) is not None]
+        found += [max(several, key=_badness)] if several else []
+    last = _held(moves, rest, seen, window)
+    if not moves.repeats and last.state == "settled" and held >= moves.count:
+        before = _before_the_next(moves, held - moves.count, seen, window)
+        last = (
+            last
+            if before is None or math.isnan(before.time)
+            else max(last, replace(last, time=before.time), key=_badness)
+        )
+    return [*found, last]
+
+
+def _badness(s: Settling) -> tuple[bool, float]:
+    return s.state != "settled", abs(s.remaining) if s.state != "settled" else s.time
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """Run of the repeated moves and of what follows."""
+
+    time: np.ndarray
+    error: np.ndarray
+    unseen: np.ndarray
+    covers: bool
+    """whether it covers all that was watched after the last move"""
+
+    def during(self, begin: float, end: float = math.inf) -> np.ndarray:
+        """Indices of the samples between two instants."""
+        return np.flatnonzero((self.time >= begin) & (self.time <= end))
+
+
+def _seen(moves: Moves, rest: AtRest) -> _Seen:
+    moving = moving_input(moves.axis.scenario)
+    end = _patience(moves) if moving else rest.begin + rest.watched - rest.extrapolated
+    every = min(max(math.ceil(end / moves.interval / MOST), 1), COARSE)
+    covers = bool(moving) or (rest.extrapolated == 0.0 and end <= MOST * every * moves.interval)
+    data = ran(moves.axis, duration=min(end, MOST * every * moves.interval), sample_interval=every * moves.interval)
+    return _Seen(data["time"], *errors_of(moves.axis, data), covers)
+
+
+def _patience(moves: Moves) -> float:
+    """Until when the last position is held where an input never rests [s]."""
+    scenario = moves.axis.scenario
+    of_inputs = [sine for signal in scenario.signals().values() for sine in signal.sine_list()]
+    of_inputs += [sine for c in scenario.axes().values() for sine in c.reference.sine_list()]
+    slowest = min((frequency for _, frequency, _ in of_inputs if frequency > 0.0), default=math.inf)
+    return moves.reference.intervals()[-1][1] + max(watched_at_least(moves.axis), PERIODS / slowest)
+
+
+def _before_the_next(moves: Moves, k: int, seen: _Seen, window: float) -> Settling | None:
+    """Whether the error is within the window until the next move begins; None where that begins at once."""
+    spans, to = moves.reference.intervals(), moves.reference.moves[k].to
+    (_, end), (until, _) = spans[k : k + 2]
+    during = seen.during(end, until)
+    if until <= end + moves.interval or not len(during):
+        return None
+    error = seen.error[during]
+    time = settled(seen.time[during], error, window) + float(seen.time[during[0]]) - end
+    state: State = "not settled" if math.isnan(time) else "settled"
+    swing = _swing(seen.time[during], error)
+    return Settling(end, to, state, time, False, "", float(error[-1]), float(seen.unseen[during[-1]]), swing)
+
+
+def _swing(time: np.ndarray, error: np.ndarray, begin: float = 0.5) -> float:
+    """Half of what an error swings by from a share of its course on; 0 where it moves one way."""
+    first = int(begin * len(error))
+    late = error[first:]
+    turns_around = any(len(rises_of(time[first:], way * late)) for way in (1.0, -1.0))
+    return 0.5 * float(np.ptp(late)) if turns_around else 0.0
+
+
+def _held(moves: Moves, rest: AtRest, seen: _Seen, window: float) -> Settling:
+    """Whether the error stays within the window for ever."""
+    end, to = moves.reference.intervals()[-1][1], moves.reference.moves[-1].to
+    after = seen.during(end)
+    time, error = seen.time[after], seen.error[after]
+    late = error[3 * len(error) // 4 :] if seen.covers else to - np.array(rest.range)
+    worst = float(late[np.abs(late).argmax()])
+    if rest.verdict == "at rest" and seen.covers:
+        worst = float(error[-1])
+        if abs(to - rest.range[1] - worst) > SAME * window:
+            rest = replace(rest, verdict="not decided", reason="rounding decides between two motions")
+    within = settled(time, error, window) + float(time[0]) - end
+    goes_on = rest.verdict == "not decided" and seen.covers and abs(_limit(error)) > window
+    goes_on = goes_on and bool(np.abs(error[int(LATER * len(error)) :]).max() > window)  # as far as its flanks let it
+    state: State = "not settled"
+    if abs(worst) > window or goes_on or (seen.covers and math.isnan(within)):
+        watched = rest.watched or float(time[-1]) - end
+        reason = "at rest" if rest.verdict == "at rest" else f"{watched:.3g} s after the moves"
+    else:
+        state, reason = _proved(moves, rest, error, window, covers=seen.covers)
+    within = within if state == "settled" else math.nan
+    swing = 0.0
+    if rest.verdict != "at rest":
+        swing = _swing(time, error, LATER) if seen.covers else 0.5 * float(np.ptp(late))
+    return Settling(end, to, state, within, True, reason, worst, float(seen.unseen[-1]), swing)
+
+
+def _limit(error: np.ndarray) -> float:
+    """Limit of an error that moves one way, if its changes go on to grow or shrink as in the last two eighths of its course.
+
+    A load that floats through its backlash without friction is within the window for ever longer times, at an ever lower speed.
+    """
+    late = error[3 * len(error) // 4 :]
+    a, b, c = late[[0, len(late) // 2, -1]].tolist()
+    one_way = np.all(np.diff(late) >= 0.0) or np.all(np.diff(late) <= 0.0)
+    if not one_way or b in (a, c):
+        return float(c)
+    share = (c - b) / (b - a)
+    return float(c + (c - b) * share / (1.0 - share)) if share < 1.0 else math.copysign(math.inf, c - b)
+
+
+def _proved(moves: Moves, rest: AtRest, error: np.ndarray, window: float, *, covers: bool) -> tuple[State, str]:
+    """Whether an error that was seen to remain within the window stays there, and the reason."""
+    if rest.verdict == "at rest" and covers:
+        return "settled", "at rest"
+    name = moving_input(moves.axis.scenario)
+    if covers and _swings_within(error, window):
+        return "settled", f"swings steadily within the window{f' under {name}' if name else ''}"
+    if name:
+        return "not decided", f"{name} never comes to rest, and the error does not repeat"
+    why = rest.reason if rest.verdict == "not decided" else f"{rest.verdict} near the edge of the window"
+    return "not decided", f"within the window {rest.watched:.3g} s after the moves, but not proved to stay there: {why}"
+
+
+def _swings_within(error: np.ndarray, window: float) -> bool:
+    """Whether least and largest error of each part of the last half are as good as the same, and far enough from the window."""
+    parts = np.array_split(error[len(error) // 2 :], PERIODS // 2)
+    ends = np.array([(part.min(), part.max()) for part in parts if len(part)])
+    return bool(np.abs(ends).max() + SPREADS * np.ptp(ends, axis=0).max() <= window)
