@@ -57,8 +57,8 @@ def identify(
     scenario), identified.html (one page), errors.csv (of each log), parameters.csv and, with the key record, gearbox.toml (a data
     sheet). An interrupted command with -o keeps its fitted models in identify-progress.json, and continues with the next one.
 
-    Exit code 0: the model describes the logs, with or without a reservation; 1: it leaves more than half of the motion, or an
-    error; 3: the logs determine none of the parameters.
+    Exit code 0: the model describes the logs, with or without a reservation. Exit code 1: it leaves more than half of the motion, or
+    an error. Exit code 3: the logs determine none of the parameters.
 
     `new` looks at the logs in DIR and writes a first identification file: channels, units, sample times, and what is in doubt about
     them. A file that exists is never overwritten.

@@ -156,7 +156,7 @@ def channel_unit(written: str, of_file: str, unit: str, where: str) -> tuple[flo
 
 
 def alike(note: str) -> str:
-    """What a note has in common with notes of other logs: all but its numbers, and with the value of `logs.header` that it names."""
+    """Part of a note that notes of other logs share: all but its numbers, and with the value of `logs.header` that it names."""
     return note if note.startswith(DEFAULT) else NUMBER.sub("#", note)
 
 

@@ -134,7 +134,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _numbers(path: Path, values: list[Any], key: str, notes: list[str]) -> np.ndarray:
-    """Values of a channel; NaN where one is null, and where one of few is no number."""
+    """Values of a channel; NaN where a value is null, and where a few are words."""
     words = [k for k, value in enumerate(values) if value is not None and not _is_number(value)]
     if len(words) > (LOST * len(values) if len(values) >= LEAST else 0.0):
         value = values[words[0]]

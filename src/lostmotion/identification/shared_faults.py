@@ -1,8 +1,8 @@
 """Faults that several logs share: what these logs have in common, and the limit or filter of an input that would explain them.
 
 A delay, an offset or a wrong rate of the clock in one log is a fault of its record. In several logs of one kind it is rather an effect
-that the model lacks: a firmware that limits the rate of its goal shows as a delay of the logs with large steps. Such logs stay in
-the fit.
+that the model lacks. For example, a firmware that limits the rate of its goal shows as a delay of the logs with large steps. Such logs
+stay in the fit.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class SharedFault:
     --------
     >>> from lostmotion.identification.shared_faults import SharedFault
     >>> print(SharedFault(("1.csv", "4.csv"), 9, "the inputs are 30 to 60 ms late", "steps = 1 (2 of 2 such logs)", "").text)
-    2 of 9 logs (1.csv, 4.csv): the inputs are 30 to 60 ms late; in common: steps = 1 (2 of 2 such logs); a fault that logs share is ...
+    2 of 9 logs (1.csv, 4.csv): the inputs are 30 to 60 ms late; in common: steps = 1 (2 of 2 such logs); a fault that logs share is the model's, so that they stay in the fit
     """
 
     logs: tuple[str, ...]
@@ -49,7 +49,7 @@ class SharedFault:
     fault: str
     """the fault, with the range of its size"""
     common: str
-    """what tells these logs from the others; empty if nothing does"""
+    """property that tells these logs from the others; empty if nothing does"""
     candidate: str
     """limit or filter of an input that explains them; empty if none does"""
 
