@@ -159,6 +159,7 @@ class Chain:
                     F[s] -= way * self.friction[s]
                 C = np.array(rows).reshape(-1, n)
                 K = C @ (C / self.inertias).T
+                held: NDArray[Any] = np.zeros(0)
                 if len(rows) and np.linalg.matrix_rank(K, tol=1e-12 * np.abs(K).max()) < len(rows):
                     # Rest leaves torques open: any that are allowed.
                     limits = [(0.0, None)] * sum(presses)
@@ -168,9 +169,9 @@ class Chain:
                     one = linprog(np.zeros(len(rows)), A_eq=K, b_eq=C @ (F / self.inertias), bounds=limits)
                     if one.status != 0:
                         continue
-                    held = one.x
-                else:
-                    held = np.linalg.solve(K, C @ (F / self.inertias)) if len(rows) else np.zeros(0)
+                    held = np.asarray(one.x)
+                elif len(rows):
+                    held = np.linalg.solve(K, C @ (F / self.inertias))
                 a = (F - C.T @ held) / self.inertias
                 bad = 0.0
                 torques = iter(held)
@@ -197,7 +198,7 @@ class Chain:
                 a[s] = 0.0
         for k, on in presses_of.items():
             self.touches[k] = on
-        return a
+        return np.asarray(a, dtype=np.float64)
 
     def strike(self) -> None:
         """All that approach each other without a gap and all that touch, together."""

@@ -26,7 +26,7 @@ def at_end(result: Any, chain: Chain) -> Vector:
 # --- several gears ---
 
 
-IN_TURN = {
+IN_TURN: dict[str, Any] = {
     "inertias": np.array([20.0, 0.5, 0.7]),
     "torques": np.array([0.0, -1.0, -0.49]),
     "friction": np.zeros(3),
