@@ -87,7 +87,7 @@ torque = { mean = 0.0 }
 shaft = "carriage"
 kind = "torque_source"
 rated_torque = 1.0
-rotor_inertia = 95.0
+rotor_inertia = "95 kg*m^2"
 [simulation]
 duration = "1 s"
 sample_interval = "1 ms"
@@ -103,7 +103,7 @@ stiffness = { kind = "linear", stiffness = 900.0 }
 shaft = "carriage"
 kind = "torque_source"
 rated_torque = 1.0
-rotor_inertia = 95.0
+rotor_inertia = "95 kg*m^2"
 [simulation]
 duration = "1 s"
 sample_interval = "1 ms"

@@ -552,6 +552,10 @@ SCREENED: dict[str, tuple[Log, str]] = {
     ),
     "slow channel": (log_of(position=np.floor(TIME / 0.15)), "position changes only"),
     "constant": (log_of(position=np.full(200, 0.3)), "position stays at 0.3 all through"),
+    "constant with gaps": (
+        log_of(position=changed(np.full(200, 0.3), slice(50, 55), np.nan)),
+        "position stays at 0.3 all through",
+    ),
 }
 
 

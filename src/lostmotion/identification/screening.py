@@ -275,6 +275,8 @@ def _at_rest(x: np.ndarray, begin: int, end: int, others: Sequence[np.ndarray]) 
     if others:
         return not any(_moves(other, begin, end) for other in others)
     step = np.abs(np.diff(x))
+    if not np.any(step > 0.0):
+        return True  # the same all through, maybe with gaps, which has a note of its own
     jumped = begin > 0 and step[begin - 1] > 2.0 * float(
         np.nanmax(np.delete(step, [begin - 1, min(end, len(x) - 1) - 1]))
     )
