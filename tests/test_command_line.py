@@ -440,7 +440,7 @@ def test_long_work_without_a_terminal_prints_a_line_now_and_then() -> None:
     assert re.fullmatch(r"Identifying: model, iteration 3, [0-9.]+ s so far\n", done.stderr)
 
 
-LONG_RUN = ("simulation.duration=1e7", "simulation.sample_interval=1000")  # ten million periods of the command
+LONG_RUN = ("simulation.duration=1e7 s", "simulation.sample_interval=1000 s")  # ten million periods of the command
 
 
 def test_a_run_of_minutes_says_so_at_once_and_is_interrupted() -> None:

@@ -17,6 +17,8 @@ SCREEN = 40  # lines
 # Commands that take minutes with any input that is worth showing; their other tests run them on less.
 LONG = {"select": "1705 pairs", "identify": "three models of three logs", "reproduce": "all figures of the paper"}
 
+DO_NOT_FIT = {("monitor",), ("servo",)}  # the axis of the one example has worn, that of the other misses its window
+
 
 def commands(group: Any, prefix: tuple[str, ...] = ()) -> dict[tuple[str, ...], Any]:
     """Commands by their words, those within groups too."""
@@ -60,7 +62,8 @@ def test_the_help_of_a_command_has_an_example_that_runs(
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     words = [*examples[0], "--no-open"] if name == ("live",) else examples[0]
     done = CliRunner().invoke(app, words)
-    assert done.exit_code == (1 if name == ("monitor",) else 0), done.output  # the axis of the example has worn
+    assert done.exit_code == (1 if name in DO_NOT_FIT else 0), done.output
+    assert name not in DO_NOT_FIT or isinstance(done.exception, SystemExit), "an error is no verdict"
     left = {path.name for path in tmp_path.iterdir()} - {"examples"}
     assert left <= {Path(word).name for word in words} | {"drive.html", "paper-2dof-nl-small.html"}
     if name != ("schema",):  # which is for programs

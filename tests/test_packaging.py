@@ -100,7 +100,10 @@ def test_the_commands_that_make_demo_names_need_only_what_it_installs(tmp_path: 
     installed = re.findall(r'--editable "\.\[([\w,]+)\]"', MAKEFILE)[0].split(",")
     libraries = {re.match(r"[\w-]+", text)[0] for extra in installed for text in EXTRAS[extra]}  # type: ignore[index]
     done = without_extras(*shlex.split(command), cwd=tmp_path, but=libraries)
-    assert done.returncode == 0, done.stderr
+    misses = "does not fit: stable, but misses the window" in done.stdout  # the verdict on the axis, which is no error
+    assert misses == command.startswith("servo ")
+    assert done.returncode == (1 if misses else 0), done.stderr
+    assert done.stderr == ""
 
 
 def test_make_demo_names_commands() -> None:

@@ -19,6 +19,7 @@ import xarray as xr
 import lostmotion as lm
 from conftest import for_all
 from lostmotion.identification.parameters import FreeParameter
+from lostmotion.inputs.doubts import ValueWarning
 from lostmotion.inputs.part import Part
 from lostmotion.studies.select import Selection
 from public_names import PATHS, public
@@ -208,7 +209,7 @@ def refused_plainly(call: Callable[[], Any], where: str) -> None:
     """Runs a call that may work; what it raises is an `InputError` or a report of the solver, in one plain line."""
     try:
         call()
-    except (lm.InputError, lm.SolverError, RuntimeError) as error:
+    except (lm.InputError, lm.SolverError, RuntimeError, ValueWarning) as error:
         message = str(error)
     except TypeError as error:
         assert re.search(r"positional argument|required .*argument|keyword argument|multiple values", str(error)), where
@@ -301,7 +302,9 @@ def test_a_number_of_any_library_is_the_same_number_everywhere() -> None:
         assert SCENARIO.replace(**{"load.inertia": number}).load.inertia == 0.25
         assert SCENARIO.replace(command=number, **{"command.frequency": 1, "command.amplitude": 1}).command.mean == 0.25
         assert lm.load("paper-2dof-nl-small", {"load.inertia": number}).load.inertia == 0.25
-        assert lm.gearbox("paper-gearbox", added_backlash=number) == lm.gearbox("paper-gearbox", added_backlash=0.25)
+        assert lm.gearbox("paper-gearbox", added_backlash=made(2**-6)) == lm.gearbox(
+            "paper-gearbox", added_backlash=2**-6
+        )
         assert lm.motor("paper-motor", voltage_limit=number).voltage_limit == 0.25
         vary = [{"key": "load.inertia", "values": [number]}, {"key": "load.torque", "uniform": (0, number)}]
         study = lm.studies.Study(

@@ -1,3 +1,4 @@
+from ..verdict import Verdict as Verdict
 from .certificate import FixedPoint as FixedPoint
 from .certificate import HuntingCertificate as HuntingCertificate
 from .commission import LoopSheet as LoopSheet
