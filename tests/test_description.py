@@ -273,7 +273,8 @@ def test_a_parameter_keeps_to_the_range_of_scenario_files(library: c.CDLL, name:
             with pytest.raises(lm.InputError) as refused:
                 scenario.replace(**{p.key: outside})
             assert there.set(p.key, outside) == INVALID
-            assert there.error() == f"parameter {p.key}: {outside:g} must{str(refused.value).partition(' must')[2]}"
+            said = str(refused.value).partition(" must")[2].partition("; write ")[0]  # the core knows no percentages
+            assert there.error() == f"parameter {p.key}: {outside:g} must{said}"
             seen += 1
     assert seen > 15
 

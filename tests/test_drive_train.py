@@ -128,7 +128,7 @@ def test_a_file_in_the_long_form_gives_the_train_in_si(file: Path) -> None:
             'key gears.belt.gearbox: gearbox "nix" is not in the catalogue; `lostmotion catalogue` lists them',
         ),
         (
-            "gears.belt.added_backlash=1",
+            "gears.belt.added_backlash=0.01",
             "key gears.belt.added_backlash: acts on a record; give gears.belt.gearbox, or leave it out",
         ),
         (

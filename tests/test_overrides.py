@@ -48,6 +48,7 @@ OTHER = {
     "motor.winding": {"pole_pairs": 4},
     "motor.dc_voltage": "12 V",
     "motor.limits.max_winding_temperature": "90 degC",
+    "motor.limits.max_inertia_ratio": 5,
     "motor.limits.max_voltage": "10 V",
     "motor.limits.max_current": "1 A",
     "gearbox.ratio": 80,

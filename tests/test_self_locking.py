@@ -334,7 +334,8 @@ def test_the_drive_check_takes_a_train_and_says_how_it_lowers():
     assert not [f for f in belt if f.rule == "self_locking"]
     judged = {f.what: f.verdict for f in belt}
     assert judged["strain_wave: output torque, largest"] == judged["servo: motor torque, rms"] == "ok"
-    assert judged["belt: output torque, largest"] == judged["holding"] == "unknown"
+    assert judged["belt: output torque, largest"] == "unknown"
+    assert judged["holding without power"] == "ok"  # no load acts at rest
 
 
 def test_explain_says_that_a_gearbox_locks():
@@ -392,11 +393,11 @@ def test_a_drive_as_a_train_has_the_same_input_torque_at_rest():
 @pytest.mark.parametrize(
     ("speeds", "message"),
     [
-        ({"worm": 100.0}, "worm = 100 rad/s and drum = 0 rad/s do not fit the rigid gear gear; their quotient must be"),
-        ({"worm": 100.0, "drum": 2.1}, "worm = 100 rad/s and drum = 2.1 rad/s do not fit the rigid gear gear"),
+        ({"worm": 100.0, "drum": 0.0}, ".drum: 0 rad/s does not fit worm = 100 rad/s .* makes it 2 rad/s"),
+        ({"worm": 100.0, "drum": 2.1}, ".drum: 2.1 rad/s does not fit worm = 100 rad/s .* makes it 2 rad/s"),
         (
             {"handle": 1.0},
-            "handle = 1 rad/s and worm = 0 rad/s do not fit the freewheel hand, whose input cannot be faster",
+            ": handle = 1 rad/s and worm = 0 rad/s do not fit the freewheel hand, whose input cannot be faster",
         ),
     ],
 )
@@ -404,10 +405,11 @@ def test_speeds_that_contradict_each_other_are_refused(speeds: dict[str, float],
     tables = worm_tables(stiffness=None, mass=0.5)
     tables["shafts"]["handle"] = {"inertia": 1e-4}
     tables["freewheels"] = {"hand": {"input": "handle", "output": "worm"}}
-    with pytest.raises(lm.InputError, match=f"key initial.speeds: {message}"):
+    with pytest.raises(lm.InputError, match=f"key initial.speeds{message}"):
         scenario(tables, initial={"speeds": speeds})
-    free = scenario(tables, initial={"speeds": {"worm": 100.0, "drum": 2.0}})
-    assert float(lm.simulate(free)["drum_speed"][0]) == 2.0
+    for fitting in ({"worm": 100.0, "drum": 2.0}, {"worm": 100.0}):
+        free = scenario(tables, initial={"speeds": fitting})
+        assert float(lm.simulate(free)["drum_speed"][0]) == 2.0
 
 
 # --- the page ---
