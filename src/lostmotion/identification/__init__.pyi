@@ -1,5 +1,6 @@
 from .campaign import write_campaign as write_campaign
 from .changes import Change as Change
+from .changes import Present as Present
 from .design import Candidate as Candidate
 from .design import design_experiment as design_experiment
 from .errors_of_logs import LogError as LogError

@@ -14,6 +14,7 @@ from .motion import AtRest as AtRest
 from .motion import Following as Following
 from .motion import LimitCycle as LimitCycle
 from .motion import StepResponse as StepResponse
+from .regimes import Axis as Axis
 from .settling import Moves as Moves
 from .settling import Settling as Settling
 from .tuned import Tuning as Tuning

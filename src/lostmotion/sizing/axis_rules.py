@@ -17,7 +17,7 @@ from ..model.linear import RatedScrew
 from ..model.motor import Motor
 from ..units.practical import ROUNDING, RPM, excess, share_of_limit, told_apart
 from .duty_cycle import integral
-from .finding import Finding, Mark, within
+from .finding import Finding, Judgement, within
 from .formulas import (
     belt_force,
     buckling_force,
@@ -321,5 +321,5 @@ def _tightened(finding: Finding, factor: float, why: str) -> Finding:
     assert finding.use is not None
     use = finding.use * factor
     exceeded = use > 1.0 + ROUNDING
-    verdict: Mark = "warning" if exceeded else finding.verdict
+    verdict: Judgement = "warning" if exceeded else finding.verdict
     return finding.noted(f"{why}: {share_of_limit(use)} of the limit", use=use, verdict=verdict)

@@ -12,7 +12,7 @@ from ..units.practical import ROUNDING, counted, excess, told_apart
 from ..verdict import Point, Verdict
 from .duty_cycle import DutyCycle
 
-Mark = Literal["ok", "warning", "unknown"]
+Judgement = Literal["ok", "warning", "unknown"]
 
 # Each rule of the check and where it comes from.
 RULES = {
@@ -73,7 +73,7 @@ class Finding:
     """key of `SOURCES`"""
     what: str
     value: str
-    verdict: Mark
+    verdict: Judgement
     remark: str = ""
     use: float | None = None
     """share of the limit that is used; above 1 it is exceeded"""

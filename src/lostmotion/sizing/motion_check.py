@@ -13,7 +13,7 @@ from ..simulation.explanation import smallest_commands
 from ..simulation.results import RunArrays
 from ..simulation.scenario import Scenario
 from ..test_rig.rig import TestRig
-from .finding import Finding, Mark
+from .finding import Finding, Judgement
 from .holding import holding
 
 INERTIA_RATIO = 10.0  # beyond it a load is usually called hard to control
@@ -86,7 +86,7 @@ def resonance(motor: Motor, g: Gearbox, load_inertia: float, command: CommandSig
         near = [f for f in excited if f_a / NEAR_RESONANCE < f < f_r * NEAR_RESONANCE]
         value = f"{f_r:.4g} Hz, anti-resonance {f_a:.4g} Hz"
         remark = f"the command has {near[0]:g} Hz" if near else ""
-        verdict: Mark = "warning" if near else "ok"
+        verdict: Judgement = "warning" if near else "ok"
         out.append(Finding("resonance", f"resonance on the {name} segment", value, verdict, remark))
     return out
 

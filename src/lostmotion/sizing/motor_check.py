@@ -13,7 +13,7 @@ from ..control.loops import FirstOrderCurrent
 from ..model.motor import Motor
 from ..units.practical import ROUNDING, RPM, told_apart
 from .duty_cycle import DutyCycle
-from .finding import Finding, Mark, within
+from .finding import Finding, Judgement, within
 from .thermal import TwoBodies, mean_square, steady_rise
 
 
@@ -75,7 +75,7 @@ def heat(
             Finding("winding_temperature", what, f"thermal runaway, {cycle}", "warning", remark, math.inf),
         ]
     use = rise / (permissible - ambient) if permissible > ambient else math.inf
-    verdict: Mark = "ok" if use <= 1.0 + ROUNDING else "warning"
+    verdict: Judgement = "ok" if use <= 1.0 + ROUNDING else "warning"
     hottest, limit = told_apart(ambient + rise, permissible, verdict == "warning", digits=3)
     value = f"{hottest} of {limit} °C in the long run at {ambient:.3g} °C ambient, {cycle}"
     reserve = permissible - ambient - rise
