@@ -265,7 +265,7 @@ def random_axis(seed: int) -> tuple[lm.Scenario, float]:
         }
     else:
         tables["controller"] = controller
-    return lm.Scenario(**tables), log(r, 3e-4, 3e-2) * size
+    return lm.Scenario(**tables), log(r, 6e-5, 6e-3) * size
 
 
 def holds(move: Settling, time: np.ndarray, error: np.ndarray, window: float, watched: float) -> bool:
