@@ -20,7 +20,7 @@ int main(int argc, char** argv) {
     options.max_switchings = 0;
     const TrainRun train(paper.train);
     const std::vector<Signal> none(2);
-    std::unique_ptr<AnyWorkspace> workspace;
+    std::unique_ptr<Workspace> workspace;
     const auto run = [&] { return train.run_exactly(none, {}, {}, options, nullptr, workspace); };
     if (argc > 1) {
         options.control = cascade(paper.drive, 2.0 * std::numbers::pi / 8192.0, 0.2);

@@ -5,7 +5,6 @@
 #include <thread>
 
 #include "lostmotion/analysis/respond.hpp"
-#include "lostmotion/simulation/train_solving.hpp"
 #include "lostmotion/solver/adaptive_solver.hpp"
 #include "paper_run.hpp"
 
@@ -28,7 +27,7 @@ Cost cost_of(const model::Train& train, const std::vector<Signal>& signals, doub
     if (!run.error().empty()) throw std::runtime_error(run.error());
     Cost cost;
     cost.first = best_ms(repeats, [&] { TrainRun(train).run(signals, {}, {}, options, nullptr); });
-    std::unique_ptr<AnyWorkspace> workspace;
+    std::unique_ptr<Workspace> workspace;
     cost.again = best_ms(repeats, [&] {
         cost.switchings = run.run_exactly(signals, {}, {}, options, nullptr, workspace).switching_count;
     });
@@ -95,7 +94,7 @@ void response(const TrainRun& train) {
                     threads > 1 ? "s" : "", missed, time);
     }
     // Every eighth point, times eight.
-    train.in_kernel([&]<class D>(const typename TrainReader<D>::Model& model) {
+    in_least(train, [&]<class D>(const TrainModel& model) {
         using System = model::TrainSystem<D>;
         const System system(model.assembly);
         const double exact = best_ms(1, [&] {

@@ -6,7 +6,6 @@
 #include <cstdlib>
 #include <numeric>
 
-#include "lostmotion/simulation/sampler.hpp"
 #include "paper_run.hpp"
 
 using namespace lostmotion;
@@ -18,9 +17,8 @@ template <class D>
 class Repeated {
  public:
     using System = model::TrainSystem<D>;
-    using Model = typename TrainReader<D>::Model;
 
-    Repeated(const Model& model, const PaperRun& paper, std::span<const int> channels)
+    Repeated(const TrainModel& model, const PaperRun& paper, std::span<const int> channels)
         : model_(model),
           paper_(paper),
           channels_(channels),
@@ -28,13 +26,13 @@ class Repeated {
           solver_(system_, model::packed_signals<D>(paper.signals), 1e-3, system_.balanced_scale()),
           table(channels.size() * paper.samples) {}
     void run() {
-        SamplerOf<System, TrainReader<D>, Model> sampler(model_, 0.0, 1e-3, paper_.samples, table.data(), channels_);
+        SamplerOf<System, TrainReader<D>> sampler(model_, {1e-3, paper_.samples}, table.data(), channels_);
         solver_.begin(0.0, {}, {});
         solver_.advance(2.0, sampler);
     }
 
  private:
-    const Model& model_;
+    const TrainModel& model_;
     const PaperRun& paper_;
     std::span<const int> channels_;
     System system_;
@@ -50,7 +48,7 @@ void compare(const char* map, const PaperRun& paper) {
     const std::size_t channels = paper.channels.size();
     Table exact(channels * paper.samples), other(channels * paper.samples);
     train.run(paper.signals, {}, {}, options, exact.data());
-    train.in_kernel([&]<class D>(const typename TrainReader<D>::Model& model) {
+    in_least(train, [&]<class D>(const TrainModel& model) {
         std::vector<int> numbers(channels);
         std::iota(numbers.begin(), numbers.end(), 0);
         Repeated<D> repeated(model, paper, paper.compared), whole(model, paper, numbers);
@@ -84,7 +82,7 @@ int main(int argc, char** argv) {
     if (argc > 1) {
         const PaperRun paper;
         const TrainRun train(paper.train);
-        train.in_kernel([&]<class D>(const typename TrainReader<D>::Model& model) {
+        in_least(train, [&]<class D>(const TrainModel& model) {
             Repeated<D> repeated(model, paper, paper.compared);
             for (int k = std::atoi(argv[1]); k > 0; --k) repeated.run();
         });

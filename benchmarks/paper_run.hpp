@@ -7,8 +7,15 @@
 #include <vector>
 
 #include "../core/tests/drive_runs.hpp"
+#include "../core/tests/least_kernel.hpp"
 
 namespace lostmotion {
+
+// Calls use<D>(model) in the kernel of drives.
+template <class Use>
+void in_least(const TrainRun& train, Use&& use) {
+    use.template operator()<model::Least>(train.model());
+}
 
 // fine: into how many each interval of speed and of load is divided.
 inline LossMap stand_in_map(int fine = 1) {

@@ -4,10 +4,14 @@
 #include <string>
 #include <vector>
 
-#include "lostmotion/simulation/train_stepping.hpp"
+#include "../core/kernels/solving.hpp"
 #include "paper_run.hpp"
 
 namespace lostmotion {
+
+LOSTMOTION_SOLVING(extern template, model::Narrow)
+LOSTMOTION_SOLVING(extern template, model::Middle)
+LOSTMOTION_SOLVING(extern template, model::Wide)
 
 struct TimedTrain {
     std::string name;
@@ -130,11 +134,12 @@ struct TrainIn {
 template <class Use>
 void in_kernel(const TimedTrain& t, Use&& use) {
     const model::Assembly a(t.train);
-    if (model::fits<model::Least>(t.train, a.layout()))
+    const auto holds = [&]<class D>(D) { return sizes_of<D>.hold(t.train, a.layout()); };
+    if (holds(model::Least{}))
         use(TrainIn<model::Least>(t));
-    else if (model::fits<model::Narrow>(t.train, a.layout()))
+    else if (holds(model::Narrow{}))
         use(TrainIn<model::Narrow>(t));
-    else if (model::fits<model::Middle>(t.train, a.layout()))
+    else if (holds(model::Middle{}))
         use(TrainIn<model::Middle>(t));
     else
         use(TrainIn<model::Wide>(t));

@@ -31,7 +31,7 @@ inline void check(Status status, JointTrains& t) {
 
 // A copy of all trains, with where the next step begins its search.
 struct JointSnapshot {
-    std::vector<TrainSimulation::Snapshot> trains;
+    std::vector<MotionState> trains;
     std::vector<JointTrains::Guess> guesses;
 };
 
@@ -78,9 +78,9 @@ inline void bind_joint_trains(nb::module_& m) {
         .def("snapshot",
              [](const T& t) {
                  const std::size_t n = t.joints().size();
-                 JointSnapshot to{std::vector<TrainSimulation::Snapshot>(n), {}};
+                 JointSnapshot to{std::vector<MotionState>(n), {}};
                  for (std::size_t k = 0; k < n; ++k) {
-                     t.joints()[k].train->save(to.trains[k]);
+                     t.joints()[k].train->motion().save(to.trains[k]);
                      to.guesses.push_back(t.guess(k));
                  }
                  return to;

@@ -14,16 +14,6 @@ void check_size(const std::vector<T>& given, std::size_t count) {
     if (given.size() != count) throw nb::type_error("a state of another simulation");
 }
 
-template <std::size_t n>
-Numbers from_memory(const std::array<double, n>& m) {
-    return {m.begin(), m.end()};
-}
-template <std::size_t n>
-void to_memory(const Numbers& v, std::array<double, n>& m) {
-    check_size(v, n);
-    std::copy(v.begin(), v.end(), m.begin());
-}
-
 // The modes of the contacts, and which pieces of the laws hold.
 inline std::vector<int> from_key(const model::Key& k) {
     std::vector<int> v(k.modes.begin(), k.modes.end());
@@ -37,22 +27,19 @@ inline void to_key(const std::vector<int>& v, model::Key& key) {
         key.branch[b] = static_cast<std::int16_t>(v[key.modes.size() + b]);
 }
 
-// The course of a motion and whether the inputs are constant.
-template <class D>
-Numbers from_course(const CourseOf<D>& c, bool steady) {
-    Numbers v;
-    each_number(c, [&](const auto& number) { v.push_back(static_cast<double>(number)); });
-    v.push_back(steady);
-    return v;
-}
-template <class D>
-void to_course(const Numbers& v, CourseOf<D>& c, bool& steady) {
-    std::size_t count = 1;
-    each_number(c, [&](const auto&) { ++count; });
-    check_size(v, count);
-    const double* next = v.data();
-    each_number(c, [&](auto& number) { number = static_cast<std::remove_reference_t<decltype(number)>>(*next++); });
-    steady = *next != 0.0;
+// What is known of a motion beside its state: use(number) for each of its numbers.
+template <class State, class Use>
+void each_number_of_course(State& s, Use&& use) {
+    for (auto* numbers : {&s.rate, &s.rate_input})
+        for (auto& number : *numbers) use(number);
+    use(s.rate_known);
+    for (auto& t : s.twists) {
+        use(t.off_zero);
+        use(t.grazing_magnitude);
+        use(t.doubt);
+        use(t.most_doubt);
+    }
+    use(s.steady);
 }
 
 // The next tick of the controllers, and what they remember.
@@ -67,38 +54,48 @@ inline ControlCourse to_control(const Numbers& v) {
 }
 
 // State of a simulation by keys.
-template <class System>
-Record get_state(const SimulationOf<System>& s) {
-    const auto& n = s.snapshot();
+inline Record get_state(const Motion& m) {
+    MotionState s;
+    m.save(s);
+    Numbers course;
+    each_number_of_course(s, [&](const auto& number) { course.push_back(static_cast<double>(number)); });
     Record out;
-    out["time"] = n.time;
-    out["state"] = Numbers(n.x.begin(), n.x.end());
-    out["memory"] = from_memory(n.memory);
-    out["regime"] = from_key(n.key);
-    out["inputs"] = Numbers(n.input.begin(), n.input.end());
-    out["started"] = n.started;
-    out["course"] = from_course(n.course, n.steady);
-    out["control"] = from_control(n.control);
+    out["time"] = s.time;
+    out["state"] = s.x;
+    out["memory"] = s.memory;
+    out["regime"] = from_key(s.key);
+    out["inputs"] = s.input;
+    out["started"] = s.started;
+    out["course"] = course;
+    out["control"] = from_control(s.control);
     return out;
 }
 
-template <class System>
-void set_state(SimulationOf<System>& s, const Record& from) {
-    typename SimulationOf<System>::Snapshot to;
+inline void set_state(Motion& m, const Record& from) {
+    MotionState to;
+    m.save(to);  // which has as many numbers
     const auto numbers = [&](const char* key) { return nb::cast<Numbers>(from[key]); };
+    const auto take = [&](const char* key, Numbers& into) {
+        Numbers given = numbers(key);
+        check_size(given, into.size());
+        into = std::move(given);
+    };
     to.time = nb::cast<double>(from["time"]);
-    const Numbers x = numbers("state"), input = numbers("inputs");
-    check_size(x, to.x.size());
-    std::copy(x.begin(), x.end(), to.x.begin());
-    to_memory(numbers("memory"), to.memory);
+    take("state", to.x);
+    take("memory", to.memory);
+    take("inputs", to.input);
     to_key(nb::cast<std::vector<int>>(from["regime"]), to.key);
-    check_size(input, to.input.size());
-    std::copy(input.begin(), input.end(), to.input.begin());
     to.started = nb::cast<bool>(from["started"]);
-    to_course(numbers("course"), to.course, to.steady);
+    const Numbers course = numbers("course");
+    std::size_t count = 0;
+    each_number_of_course(to, [&](const auto&) { ++count; });
+    check_size(course, count);
+    const double* next = course.data();
+    each_number_of_course(
+        to, [&](auto& number) { number = static_cast<std::remove_reference_t<decltype(number)>>(*next++); });
     to.control = to_control(numbers("control"));
-    if (to.started) check_size(to.control.slots, static_cast<std::size_t>(s.control_slots()));
-    s.restore(to);
+    if (to.started) check_size(to.control.slots, m.control_slots());
+    m.restore(to);
 }
 
 }  // namespace lostmotion::binding

@@ -23,11 +23,9 @@ inline void check(Status status, TrainSimulation& s) {
     if (status == Status::done) return;
     TrainReport report;
     report.status = status;
-    report.time = s.time();
-    s.with([&](auto& in) {
-        report.contact = in.stopped_at();
-        report.too_many_guards = in.too_many_guards();
-    });
+    report.time = s.motion().time();
+    report.contact = s.motion().stopped_at();
+    report.too_many_guards = s.motion().too_many_guards();
     check_train_run(report, s.assembly());
 }
 
@@ -37,7 +35,7 @@ void advance(TrainSimulation& s, const Numbers& begin, const Numbers& end, Step&
     const auto n = static_cast<std::size_t>(s.assembly().layout().inputs);
     check_size(begin, n);
     check_size(end, n);
-    s.with([](auto& in) { in.set_interrupt(poll_signals, nullptr); });
+    s.motion().set_interrupt(poll_signals, nullptr);
     Status status;
     {
         nb::gil_scoped_release release;
@@ -47,22 +45,18 @@ void advance(TrainSimulation& s, const Numbers& begin, const Numbers& end, Step&
 }
 
 inline TrainPoint point_now(TrainSimulation& s) {
-    return s.with([&](auto& in) {
-        check(in.find_regime(), s);
-        return in.point();
-    });
+    check(s.motion().find_regime(), s);
+    return s.motion().point();
 }
 
 inline Numbers read(TrainSimulation& s) {
-    return s.with([&](auto& in) {
-        check(in.find_regime(), s);
-        return in.values();
-    });
+    check(s.motion().find_regime(), s);
+    return s.motion().values();
 }
 
 inline void bind_stepping(nb::module_& m) {
     using S = TrainSimulation;
-    nb::class_<S::Snapshot>(m, "SimulationSnapshot");
+    nb::class_<MotionState>(m, "SimulationSnapshot");
     nb::class_<S>(m, "Simulation")
         .def(
             "__init__",
@@ -76,7 +70,7 @@ inline void bind_stepping(nb::module_& m) {
         .def(
             "advance",
             [](S& s, double interval, const Numbers& begin, const Numbers& end) {
-                advance(s, begin, end, [&] { return s.advance(interval, begin, end); });
+                advance(s, begin, end, [&] { return s.motion().advance(interval, begin, end); });
             },
             "interval"_a, "begin"_a, "end"_a)
         .def(
@@ -85,7 +79,7 @@ inline void bind_stepping(nb::module_& m) {
                 const std::optional<LoadShaft> load = s.load_shaft(shaft);
                 if (!load) throw nb::type_error("a shaft without load torque, or whose angle is no state");
                 LoadAnswer out;
-                advance(s, begin, end, [&] { return s.answer(interval, begin, end, *load, out); });
+                advance(s, begin, end, [&] { return s.motion().answer(interval, begin, end, *load, out); });
                 return std::make_tuple(load->inertia, out.acceleration, out.compliance);
             },
             "interval"_a, "begin"_a, "end"_a, nb::kw_only(), "shaft"_a,
@@ -95,13 +89,13 @@ inline void bind_stepping(nb::module_& m) {
             "Whether a shaft is one of answer().")
         .def("snapshot",
              [](const S& s) {
-                 S::Snapshot to;
-                 s.save(to);
+                 MotionState to;
+                 s.motion().save(to);
                  return to;
              })
         .def(
             "restore",
-            [](S& s, const S::Snapshot& from) {
+            [](S& s, const MotionState& from) {
                 if (!s.restore(from)) throw nb::type_error("a snapshot of another simulation");
             },
             "snapshot"_a)
@@ -115,19 +109,17 @@ inline void bind_stepping(nb::module_& m) {
                 if (!error.empty()) throw nb::value_error(error.c_str());
             },
             "start"_a, "hysteresis_capacities"_a)
-        .def("get_state", [](const S& s) { return s.with([](const auto& in) { return get_state(in); }); })
+        .def("get_state", [](const S& s) { return get_state(s.motion()); })
         .def(
-            "set_state", [](S& s, const Record& state) { s.with([&](auto& in) { set_state(in, state); }); }, "state"_a)
+            "set_state", [](S& s, const Record& state) { set_state(s.motion(), state); }, "state"_a)
         .def(
             "control_signals",
             [](S& s) {
-                return s.with([](auto& in) {
-                    in.find_regime();
-                    return in.control_signals();
-                });
+                s.motion().find_regime();
+                return s.motion().control_signals();
             },
             "Of each controller what axis_signals() and winding_signals() name, one controller after the other.")
-        .def("time", [](const S& s) { return s.time(); });
+        .def("time", [](const S& s) { return s.motion().time(); });
 
     nb::class_<MotionCourse>(m, "MotionCourse")
         .def(

@@ -35,14 +35,14 @@ inline std::vector<ChannelRow> channel_rows(const std::vector<TrainChannel>& cha
 // Idle workspaces.
 class Workspaces {
  public:
-    std::unique_ptr<AnyWorkspace> take() {
+    std::unique_ptr<Workspace> take() {
         const std::lock_guard<std::mutex> hold(mutex_);
         if (idle_.empty()) return nullptr;
-        std::unique_ptr<AnyWorkspace> one = std::move(idle_.back());
+        std::unique_ptr<Workspace> one = std::move(idle_.back());
         idle_.pop_back();
         return one;
     }
-    void give_back(std::unique_ptr<AnyWorkspace> one) {
+    void give_back(std::unique_ptr<Workspace> one) {
         const std::lock_guard<std::mutex> hold(mutex_);
         if (one && idle_.size() < max_idle) idle_.push_back(std::move(one));
     }
@@ -51,7 +51,7 @@ class Workspaces {
     static constexpr std::size_t max_idle = 8;
 
     std::mutex mutex_;
-    std::vector<std::unique_ptr<AnyWorkspace>> idle_;
+    std::vector<std::unique_ptr<Workspace>> idle_;
 };
 
 // A composed train with what its runs leave for the next ones. Each run takes a workspace for itself.
@@ -61,16 +61,16 @@ class SharedRun : public TrainRun {
     SharedRun(const SharedRun&) = delete;
     SharedRun& operator=(const SharedRun&) = delete;
     ~SharedRun() {
-        for (std::unique_ptr<AnyWorkspace> w = own_.take(); w; w = own_.take()) {
+        for (std::unique_ptr<Workspace> w = own_.take(); w; w = own_.take()) {
             w->leave();
             spare_->give_back(std::move(w));
         }
     }
-    std::unique_ptr<AnyWorkspace> take() const {
-        std::unique_ptr<AnyWorkspace> w = own_.take();
+    std::unique_ptr<Workspace> take() const {
+        std::unique_ptr<Workspace> w = own_.take();
         return w ? std::move(w) : spare_->take();
     }
-    void give_back(std::unique_ptr<AnyWorkspace> w) const { own_.give_back(std::move(w)); }
+    void give_back(std::unique_ptr<Workspace> w) const { own_.give_back(std::move(w)); }
 
  private:
     // Of trains that are gone, the one of this module.
@@ -240,7 +240,7 @@ struct Case {
     TrainReport run(TrainOptions& options, double* out) const {
         options.interrupted = poll_signals;
         nb::gil_scoped_release release;
-        std::unique_ptr<AnyWorkspace> workspace = train->take();
+        std::unique_ptr<Workspace> workspace = train->take();
         TrainReport report = train->run(inputs, start, options, out, workspace);
         train->give_back(std::move(workspace));
         return report;
@@ -409,12 +409,9 @@ inline void bind_train(nb::module_& m) {
             "short_form", [](const TrainDescription& t) { return t.train.short_form; },
             [](TrainDescription& t, bool v) { t.train.short_form = v; },
             "Whether results have the names of a drive: `twist`, not `gearbox_twist`.")
-        .def("kernel", [](const TrainDescription& t) { return t.run()->kernel(); })
+        .def("kernel", [](const TrainDescription& t) { return t.run()->kernel().name(); })
         .def(
-            "guards",
-            [](const TrainDescription& t) {
-                return t.run()->in_kernel([]<class D>(const auto&) { return D::guards; });
-            },
+            "guards", [](const TrainDescription& t) { return t.run()->kernel().sizes().guards; },
             "How many guards its kernel has room for.")
         .def("massless_shafts", &TrainDescription::massless_shafts)
         .def("check_start", &TrainDescription::check_start, "speeds"_a)

@@ -32,7 +32,7 @@ def builder() -> Any:
 
 def compiled(kernel: str) -> Path:
     """The core of live pages for drives in the short form, or for trains of a kernel."""
-    path: Path = builder().page_core(kernel)
+    path: Path = builder().page_cores([kernel])[0]
     return path
 
 

@@ -139,7 +139,7 @@ PLAIN_WORDS = {
     r"\b(own|printed|missing) figures?\b|\bfigures? of (a|the|your) (data )?sheet": "datum, data, value",
     r"\bby and by\b": "by a low-pass filter",
     r"\bhonest": "state what was found",
-    r"\breferee\b": "reference solver",
+    r"(?<!/)\breferee\b": "reference solver",
     r"\bin the place of\b": "in place of",
     r"\bis no number\b": "is not a number",
     r"\bgo(es)? along with\b": "follow",

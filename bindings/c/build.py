@@ -18,7 +18,6 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from itertools import product
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
@@ -83,6 +82,7 @@ WASM_FEATURES = (
     "reference-types",
 )
 STACK = 1 << 20
+PAGE_CORES = ROOT / "build" / "page-core"
 
 
 def newest(sources: Sequence[Path]) -> float:
@@ -150,50 +150,60 @@ def called_by_page() -> list[str]:
     return sorted(set(re.findall(r'"(lm_\w+|malloc|free)"', sources)))
 
 
-def page_core(kernel: str, optimisation: str = "-O3") -> Path:
+def kernel_target(kernel: str) -> Sequence[str]:
+    """What the kernel of a live page is compiled for."""
+    return (*WASM_CODE, *(INLINED if kernel == "drive" else ()))
+
+
+def page_core(kernel: str, made: Sequence[Path]) -> Path:
     """The core of a live page with one kernel alone: a WebAssembly module with the functions that a page calls."""
-    directory = ROOT / "build" / "page-core" / kernel
-    directory.mkdir(parents=True, exist_ok=True)
-    to = directory / "core.wasm"
-    with (directory / ".lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)  # one process compiles, the others wait
-        target = (*WASM_CODE, f"-DLOSTMOTION_KERNEL={kernel}")
-        inlined = (*target, *(INLINED if kernel == "drive" else ()))
-        made = [
-            compiled([*TICKS, KERNELS[kernel]], inlined, optimisation, directory),
-            compiled(REGIMES, target, "-O2", directory),
-            compiled(PAGE_SOURCES, target, "-Oz", directory),
-        ]
-        calls = ROOT / "page" / "src" / "core.ts"
-        if not to.exists() or to.stat().st_mtime < max(p.stat().st_mtime for p in (*made, calls)):
-            module = directory / "linked.wasm"
-            linked(module, made, *(f"--export={name}" for name in called_by_page()))
-            if WASM_OPT.exists():
-                features = [f"--enable-{name}" for name in WASM_FEATURES]
-                subprocess.run([WASM_OPT, "-O3", *features, module, "-o", module], check=True)
-            module.replace(to)
+    to, calls = PAGE_CORES / kernel / "core.wasm", ROOT / "page" / "src" / "core.ts"
+    if not to.exists() or to.stat().st_mtime < max(p.stat().st_mtime for p in (*made, calls)):
+        module = to.with_name("linked.wasm")
+        linked(module, made, *(f"--export={name}" for name in called_by_page()))
+        if WASM_OPT.exists():
+            features = [f"--enable-{name}" for name in WASM_FEATURES]
+            subprocess.run([WASM_OPT, "-O3", *features, module, "-o", module], check=True)
+        module.replace(to)
     return to
+
+
+def page_cores(kernels: Sequence[str], optimisation: str = "-O3") -> list[Path]:
+    """The cores of live pages with these kernels: all but the kernel is compiled once."""
+    PAGE_CORES.mkdir(parents=True, exist_ok=True)
+    with (PAGE_CORES / ".lock").open("w") as lock, ThreadPoolExecutor(os.cpu_count()) as pool:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # one process compiles, the others wait
+        own = [
+            pool.submit(compiled, [KERNELS[k]], kernel_target(k), optimisation, PAGE_CORES / k) for k in kernels
+        ]
+        shared = ((TICKS, optimisation), (REGIMES, "-O2"), (PAGE_SOURCES, "-Oz"))
+        rest = [pool.submit(compiled, group, WASM_CODE, level, PAGE_CORES) for group, level in shared]
+        made = [part.result() for part in rest]
+        return [page_core(kernel, [of.result(), *made]) for kernel, of in zip(kernels, own, strict=True)]
 
 
 def page(to: Path, optimisation: str = "-O3", kernels: Sequence[str] = tuple(KERNELS)) -> None:
     """The cores of live pages as these carry them, KERNEL.wasm.gz."""
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        for kernel, core in zip(kernels, pool.map(lambda k: page_core(k, optimisation), kernels), strict=True):
-            (to / f"{kernel}.wasm.gz").write_bytes(gzip.compress(core.read_bytes(), 9, mtime=0))
+    for kernel, core in zip(kernels, page_cores(kernels, optimisation), strict=True):
+        (to / f"{kernel}.wasm.gz").write_bytes(gzip.compress(core.read_bytes(), 9, mtime=0))
 
 
-def fmu_library(to: Path, platform: str, kernel: str, optimisation: str = "-O2") -> None:
-    """The library of FMUs for a platform and a kernel: the kernel for speed, the rest for size."""
-    target, extension = PLATFORMS[platform]
-    library = to / platform / f"{kernel}{extension}"
-    library.parent.mkdir(parents=True, exist_ok=True)
+def fmu_libraries(to: Path, platform: str, optimisation: str = "-O2") -> None:
+    """The libraries of FMUs for a platform, KERNEL.so or alike: kernels for speed; the rest for size, once for all."""
+    target, _ = PLATFORMS[platform]
     arguments = ["-target", target, "-mcpu=baseline", *([] if "windows" in platform else ["-fPIC"])]
-    flags, directory = (*FMU_FLAGS, f"-DLOSTMOTION_KERNEL={kernel}"), ROOT / "build" / "fmu" / platform / kernel
-    made = [
-        compiled([*TICKS, KERNELS[kernel]], arguments, optimisation, directory, (*flags, *FMU_KERNEL_FLAGS)),
-        compiled(REGIMES, arguments, optimisation, directory, flags),
-        compiled(FMU_SOURCES, arguments, "-Oz", directory, flags),
-    ]
+    directory = ROOT / "build" / "fmu" / platform
+    shared = ((TICKS, optimisation, FMU_KERNEL_FLAGS), (REGIMES, optimisation, ()), (FMU_SOURCES, "-Oz", ()))
+    rest = [compiled(group, arguments, level, directory, (*FMU_FLAGS, *more)) for group, level, more in shared]
+    for kernel, source in KERNELS.items():
+        own = compiled([source], arguments, optimisation, directory, (*FMU_FLAGS, *FMU_KERNEL_FLAGS))
+        link_fmu(to, platform, kernel, arguments, [own, *rest])
+
+
+def link_fmu(to: Path, platform: str, kernel: str, arguments: Sequence[str], made: Sequence[Path]) -> None:
+    """The library of FMUs for a platform and a kernel."""
+    library = to / platform / f"{kernel}{PLATFORMS[platform][1]}"
+    library.parent.mkdir(parents=True, exist_ok=True)
     unfinished = library.with_suffix(".unfinished")
     # A missing symbol ends the linking, not the loading; nothing that is not called, and no names but those of FMI.
     link = {
@@ -211,7 +221,7 @@ def fmu_library(to: Path, platform: str, kernel: str, optimisation: str = "-O2")
 def fmu(to: Path, optimisation: str = "-O2", platforms: Sequence[str] = tuple(PLATFORMS)) -> None:
     """The libraries of FMUs, KERNEL.so or alike, each in a directory named after its platform."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        list(pool.map(lambda of: fmu_library(to, *of, optimisation), product(platforms, KERNELS)))
+        list(pool.map(lambda platform: fmu_libraries(to, platform, optimisation), platforms))
 
 
 def main() -> None:

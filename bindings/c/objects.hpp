@@ -48,7 +48,7 @@ struct lm_simulation {
 };
 
 struct lm_snapshot {
-    lostmotion::TrainSimulation::Snapshot of;
+    lostmotion::MotionState of;
 };
 
 // A signal, or what is wrong with it.

@@ -176,7 +176,7 @@ int lm_advance_motion(lm_simulation* simulation, double interval, const double* 
             if (input.ends_with(given_speed) && !is_moved(s, input, courses))
                 return simulation->failed("the motion of '" + input.substr(0, input.size() - given_speed.size()) +
                                           "' is missing");
-    s.with([&](auto& in) { in.set_interrupt(Asked::ask, &simulation->asked); });
+    s.motion().set_interrupt(Asked::ask, &simulation->asked);
     const std::span<const double> first(begin, n), last(end, n);
     return simulation->ended(courses.empty() ? s.advance(interval, first, last)
                                              : s.advance(interval, first, last, courses));
@@ -195,7 +195,7 @@ int lm_advance_answer(lm_simulation* simulation, double interval, const double* 
         wrong = "the shaft '" + name +
                 "' has no load torque of its own: there is none, none acts on it, or a mass matrix joins it to others";
     if (!wrong.empty()) return simulation->failed(std::move(wrong));
-    s.with([&](auto& in) { in.set_interrupt(Asked::ask, &simulation->asked); });
+    s.motion().set_interrupt(Asked::ask, &simulation->asked);
     const std::size_t n = s.names().inputs.size(), input = s.input_of(load->load);
     lm::LoadAnswer out;
     const int status = simulation->ended(s.answer(interval, {begin, n}, {end, n}, *load, out));
@@ -268,7 +268,7 @@ lm_snapshot* lm_snapshot_new(const lm_simulation* simulation) {
     return made;
 }
 void lm_snapshot_save(lm_snapshot* snapshot, const lm_simulation* simulation) {
-    simulation->simulation.train().save(snapshot->of);
+    simulation->simulation.motion().save(snapshot->of);
 }
 int lm_snapshot_restore(lm_simulation* simulation, const lm_snapshot* snapshot) {
     return simulation->simulation.restore(snapshot->of) ? int(LM_OK)

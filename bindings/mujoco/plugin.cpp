@@ -81,9 +81,7 @@ struct Drive {
         controlled = !scenario.control.axes.empty();
         scale = torque_source ? 1.0 / motor.rated_torque : 1.0;
     }
-    double speed() const {
-        return simulation.with([&](const auto& s) { return s.snapshot().x[shaft.speed_state]; });
-    }
+    double speed() const { return simulation.motion().state(shaft.speed_state); }
     lm::ScenarioSimulation simulation;
     lm::LoadShaft shaft;
     std::vector<double> inputs;
@@ -265,7 +263,7 @@ void compute(const mjModel* m, mjData* d, int instance, int) {
         if (!drive.simulation.set_state(state)) fail(m, group->instances[k], "plugin_state is not that of this drive");
         const double control = given(m, d, drive);
         std::ranges::fill(group->trains->inputs(k), control);
-        if (drive.controlled) drive.simulation.with([&](auto& s) { s.set_reference(0, control, 0.0); });
+        if (drive.controlled) drive.simulation.motion().set_reference(0, control, 0.0);
         group->trains->set_guess(k, {state[drive.numbers], 0.0});
         group->unit[static_cast<std::size_t>(drive.dof)] = 1.0;
         mj_solveM(m, d, group->column.data(), group->unit.data(), 1);

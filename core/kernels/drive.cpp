@@ -1,8 +1,8 @@
-#include "lostmotion/simulation/hybrid.hpp"
-#include "lostmotion/simulation/train_solving.hpp"
-#include "lostmotion/simulation/train_stepping.hpp"
+#include "solving.hpp"
 
 namespace lostmotion {
-LOSTMOTION_TRAIN_RUNS(template, model::Least)
-LOSTMOTION_TRAIN_STEPPING(template, model::Least)
+LOSTMOTION_SOLVING(template, model::Least)
+namespace {
+const KernelIn<model::Least> kernel("drive");
+}
 }  // namespace lostmotion

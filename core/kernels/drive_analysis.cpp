@@ -1,10 +1,9 @@
-#include "lostmotion/analysis/sensitive_solving.hpp"
-#include "lostmotion/analysis/train_response.hpp"
-#include "lostmotion/simulation/train_adaptive.hpp"
-#include "lostmotion/simulation/train_stepping.hpp"
+#include "analyses.hpp"
 
 namespace lostmotion {
-LOSTMOTION_ADAPTIVE_RUNS(template, model::Least)
-LOSTMOTION_RESPONSES(template, model::Least)
-LOSTMOTION_SENSITIVITIES(template, model::Least)
+LOSTMOTION_SOLVING(extern template, model::Least)
+namespace {
+const AdaptiveKernelIn<model::Least> adaptive("drive");
+const AnalysesIn<model::Least> analyses("drive");
+}  // namespace
 }  // namespace lostmotion

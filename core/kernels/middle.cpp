@@ -1,8 +1,8 @@
-#include "lostmotion/simulation/hybrid.hpp"
-#include "lostmotion/simulation/train_solving.hpp"
-#include "lostmotion/simulation/train_stepping.hpp"
+#include "solving.hpp"
 
 namespace lostmotion {
-LOSTMOTION_TRAIN_RUNS(template, model::Middle)
-LOSTMOTION_TRAIN_STEPPING(template, model::Middle)
+LOSTMOTION_SOLVING(template, model::Middle)
+namespace {
+const KernelIn<model::Middle> kernel("middle");
+}
 }  // namespace lostmotion

@@ -1,10 +1,9 @@
-#include "lostmotion/analysis/sensitive_solving.hpp"
-#include "lostmotion/analysis/train_response.hpp"
-#include "lostmotion/simulation/train_adaptive.hpp"
-#include "lostmotion/simulation/train_stepping.hpp"
+#include "analyses.hpp"
 
 namespace lostmotion {
-LOSTMOTION_ADAPTIVE_RUNS(template, model::Middle)
-LOSTMOTION_RESPONSES(template, model::Middle)
-LOSTMOTION_SENSITIVITIES(template, model::Middle)
+LOSTMOTION_SOLVING(extern template, model::Middle)
+namespace {
+const AdaptiveKernelIn<model::Middle> adaptive("middle");
+const AnalysesIn<model::Middle> analyses("middle");
+}  // namespace
 }  // namespace lostmotion

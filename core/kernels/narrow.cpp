@@ -1,8 +1,8 @@
-#include "lostmotion/simulation/hybrid.hpp"
-#include "lostmotion/simulation/train_solving.hpp"
-#include "lostmotion/simulation/train_stepping.hpp"
+#include "solving.hpp"
 
 namespace lostmotion {
-LOSTMOTION_TRAIN_RUNS(template, model::Narrow)
-LOSTMOTION_TRAIN_STEPPING(template, model::Narrow)
+LOSTMOTION_SOLVING(template, model::Narrow)
+namespace {
+const KernelIn<model::Narrow> kernel("narrow");
+}
 }  // namespace lostmotion

@@ -1,10 +1,9 @@
-#include "lostmotion/analysis/sensitive_solving.hpp"
-#include "lostmotion/analysis/train_response.hpp"
-#include "lostmotion/simulation/train_adaptive.hpp"
-#include "lostmotion/simulation/train_stepping.hpp"
+#include "analyses.hpp"
 
 namespace lostmotion {
-LOSTMOTION_ADAPTIVE_RUNS(template, model::Narrow)
-LOSTMOTION_RESPONSES(template, model::Narrow)
-LOSTMOTION_SENSITIVITIES(template, model::Narrow)
+LOSTMOTION_SOLVING(extern template, model::Narrow)
+namespace {
+const AdaptiveKernelIn<model::Narrow> adaptive("narrow");
+const AnalysesIn<model::Narrow> analyses("narrow");
+}  // namespace
 }  // namespace lostmotion

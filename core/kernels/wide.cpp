@@ -1,8 +1,8 @@
-#include "lostmotion/simulation/hybrid.hpp"
-#include "lostmotion/simulation/train_solving.hpp"
-#include "lostmotion/simulation/train_stepping.hpp"
+#include "solving.hpp"
 
 namespace lostmotion {
-LOSTMOTION_TRAIN_RUNS(template, model::Wide)
-LOSTMOTION_TRAIN_STEPPING(template, model::Wide)
+LOSTMOTION_SOLVING(template, model::Wide)
+namespace {
+const KernelIn<model::Wide> kernel("wide");
+}
 }  // namespace lostmotion

@@ -1,10 +1,9 @@
-#include "lostmotion/analysis/sensitive_solving.hpp"
-#include "lostmotion/analysis/train_response.hpp"
-#include "lostmotion/simulation/train_adaptive.hpp"
-#include "lostmotion/simulation/train_stepping.hpp"
+#include "analyses.hpp"
 
 namespace lostmotion {
-LOSTMOTION_ADAPTIVE_RUNS(template, model::Wide)
-LOSTMOTION_RESPONSES(template, model::Wide)
-LOSTMOTION_SENSITIVITIES(template, model::Wide)
+LOSTMOTION_SOLVING(extern template, model::Wide)
+namespace {
+const AdaptiveKernelIn<model::Wide> adaptive("wide");
+const AnalysesIn<model::Wide> analyses("wide");
+}  // namespace
 }  // namespace lostmotion

@@ -44,15 +44,11 @@ inline Samples run(const Drive& drive, const Signals& signals, double duration, 
 
 // To where another simulation of the same train is.
 inline void restore(TrainSimulation& to, const TrainSimulation& from) {
-    from.with([&]<class D>(const TrainSimulationIn<D>& a) {
-        to.with([&]<class E>(TrainSimulationIn<E>& b) {
-            if constexpr (std::is_same_v<D, E>) b.restore(a.snapshot());
-        });
-    });
+    MotionState state;
+    from.motion().save(state);
+    to.restore(state);
 }
-inline TrainPoint point(TrainSimulation& s) {
-    return s.with([](auto& in) { return in.point(); });
-}
+inline TrainPoint point(TrainSimulation& s) { return s.motion().point(); }
 
 // A drive step by step.
 class Simulation {
@@ -60,7 +56,8 @@ class Simulation {
     Simulation(const Drive& drive, double step) : train(train_of(drive), step) {}
 
     Status advance(double interval, double command_begin, double command_end, double load_begin, double load_end) {
-        return train.advance(interval, std::array{command_begin, load_begin}, std::array{command_end, load_end});
+        return train.motion().advance(interval, std::array{command_begin, load_begin},
+                                      std::array{command_end, load_end});
     }
     double operator()(Quantity q) { return point(train).values[channel_number(train.channels(), q)]; }
 

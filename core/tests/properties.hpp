@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "drive_runs.hpp"
+#include "least_kernel.hpp"
 
 namespace lostmotion::test {
 
@@ -153,17 +154,16 @@ inline Splitting split_run(const Drive& drive, const Signals& signals, double du
     out.status = whole.report.status;
     out.time = whole.report.time;
     if (out.status != Status::done) return out;
-    whole.run.in_kernel([&]<class D>(const typename TrainReader<D>::Model& model) {
-        const model::TrainSystem<D> system(model.assembly);
-        ExactSolver<model::TrainSystem<D>> solver(system, model::packed_signals<D>({signals.begin(), signals.end()}),
-                                                  interval, system.balanced_scale());
-        Observer<model::TrainSystem<D>> nothing;
-        out.split = solver.begin(0.0, {}, {});
-        if (out.split == Status::done) out.split = solver.advance(at, nothing);
-        if (out.split == Status::done) out.split = solver.inputs_changed();
-        if (out.split == Status::done) out.split = solver.advance(duration, nothing);
-        if (out.split == Status::done) out.gap = difference_at_end(drive, whole, solver.state());
-    });
+    using System = model::TrainSystem<model::Least>;
+    const System system(whole.run.assembly());
+    ExactSolver<System> solver(system, model::packed_signals<model::Least>({signals.begin(), signals.end()}), interval,
+                               system.balanced_scale());
+    Observer<System> nothing;
+    out.split = solver.begin(0.0, {}, {});
+    if (out.split == Status::done) out.split = solver.advance(at, nothing);
+    if (out.split == Status::done) out.split = solver.inputs_changed();
+    if (out.split == Status::done) out.split = solver.advance(duration, nothing);
+    if (out.split == Status::done) out.gap = difference_at_end(drive, whole, solver.state());
     if (out.gap > 1e-10) {
         const Samples other = run(drive, perturbed(signals), duration, interval);
         out.amplification = other.report.status == Status::done ? difference_at_end(drive, whole, other.report.x) : 1.0;

@@ -6,6 +6,7 @@
 #include <initializer_list>
 #include <limits>
 
+#include "lostmotion/model/shaft_angle.hpp"
 #include "random_trains.hpp"
 #include "recorded.hpp"
 #include "train_steps.hpp"

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "lostmotion/kernel/inputs.hpp"
+#include "lostmotion/kernel/signal.hpp"
 #include "lostmotion/parts/gearbox.hpp"
 #include "referee_polynomial.hpp"
 

@@ -43,8 +43,8 @@ TEST_SUITE("dying_out") {
         check_same(plain, sampled.report.x, sampled.report.memory);
         for (const double step : {1e-3, 0.0137}) {
             Simulation simulation(drive, step);
-            while (simulation.train.time() < 3.0 - 1e-9)
-                REQUIRE(simulation.advance(std::min(step, 3.0 - simulation.train.time()), 0.3, 0.3, 0.0, 0.0) ==
+            while (simulation.train.motion().time() < 3.0 - 1e-9)
+                REQUIRE(simulation.advance(std::min(step, 3.0 - simulation.train.motion().time()), 0.3, 0.3, 0.0, 0.0) ==
                         Status::done);
             const model::Instant end = point(simulation.train).now;
             check_same(plain, end.x, end.memory);

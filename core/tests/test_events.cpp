@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "drive_runs.hpp"
+#include "least_kernel.hpp"
 #include "lostmotion/solver/adaptive_solver.hpp"
 
 namespace lostmotion::test {
@@ -32,7 +33,7 @@ Samples swinging(double at, double duration, double interval) {
 
 // A ball that loses half its speed at each bounce: switchings accumulate at a known time.
 struct BouncingBall {
-    using Dims = model::Widest;
+    using Dims = model::Least;
     using Key = model::Key;
     using Regime = model::PackedRegime<Dims>;
     using Guard = model::PackedGuard<Dims>;
@@ -63,8 +64,8 @@ struct BouncingBall {
     }
 };
 
-StateOf<model::Widest> ones() {
-    StateOf<model::Widest> x;
+StateOf<model::Least> ones() {
+    StateOf<model::Least> x;
     x.fill(1.0);
     return x;
 }
@@ -169,14 +170,14 @@ TEST_SUITE("events") {
     }
     TEST_CASE("accumulating switchings end in a report of time and contact, not in a hang") {
         const BouncingBall ball;
-        const SignalsOf<model::Widest> none;
+        const SignalsOf<model::Least> none;
         ExactSolver<BouncingBall> solver(ball, none, 1e-3, ones());
         struct : Observer<BouncingBall> {
             int count = 0;
             bool wants_switching() const override { return true; }
             void switching(const SwitchingOf<BouncingBall>&) override { ++count; }
         } counter;
-        StateOf<model::Widest> x{};
+        StateOf<model::Least> x{};
         x[BouncingBall::height] = 1.0;
         REQUIRE(solver.begin(0.0, x, {}) == Status::done);
         CHECK(solver.advance(10.0, counter) == Status::zeno);
@@ -196,8 +197,8 @@ TEST_SUITE("events") {
     }
     TEST_CASE("the adaptive solver takes a nonlinear remainder: a pendulum under gravity") {
         // J w' = -m g l sin(phi), small friction none: period 4 K(sin(a/2)) / omega_0.
-        using System = model::TrainSystem<model::Widest>;
-        constexpr int load_angle = model::Widest::coupled;
+        using System = model::TrainSystem<model::Least>;
+        constexpr int load_angle = model::Least::coupled;
         Drive d = plain_drive(1.0, 1e-3, 1.0);
         struct Gravity {
             void operator()(double, const System::State& x, System::State& rate) const {
@@ -208,7 +209,7 @@ TEST_SUITE("events") {
         };
         const model::Assembly assembly(train_of(d));
         const System system(assembly);
-        const SignalsOf<model::Widest> none;
+        const SignalsOf<model::Least> none;
         AdaptiveSolver<System, Gravity> solver(system, none, 1e-11, ones());
         System::State x{};
         x[load_angle] = 1.0;

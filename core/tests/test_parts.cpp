@@ -4,6 +4,7 @@
 #include <random>
 
 #include "drive_runs.hpp"
+#include "least_kernel.hpp"
 #include "lostmotion/analysis/reduction.hpp"
 #include "lostmotion/solver/adaptive_solver.hpp"
 
@@ -51,22 +52,23 @@ LongMatrix<n> reference_exponential(const std::array<Form, n>& rate, Long t) {
 template <class Use>
 void with_propagator(const Drive& drive, bool slipping, const Use& use) {
     const TrainRun run(train_of(drive));
-    run.in_kernel([&]<class D>(const typename TrainReader<D>::Model& model) {
-        const model::TrainSystem<D> system(model.assembly);
-        RegimeCache<model::TrainSystem<D>> cache(system);
-        InstantOf<D> now;
-        model::Key key;
-        REQUIRE(system.start(cache, now, key) == Found::yes);
-        const auto& contacts = model.assembly.places().contacts;
-        for (std::size_t c = 0; slipping && c < contacts.size(); ++c)
-            if (key.modes[c] == 0 && !contacts[c].bilateral) key.modes[c] = 1;
-        const auto regime = system.build(key);
-        Propagator<D> p;
-        PhaseRotations turns(1e-3, input_basis(SignalsOf<D>{}));
-        const LinearRatesOf<D> rates(regime.rate);
-        p.prepare(rates, turns, system.balanced_scale());
-        use(p, rates, regime.rate, system.balanced_scale());
-    });
+    const TrainModel model = run.model();
+    using D = model::Least;
+    const model::TrainSystem<D> system(model.assembly);
+    RegimeCache<model::TrainSystem<D>> cache(system);
+    InstantOf<D> now;
+    model::Key key;
+    REQUIRE(system.start(cache, now, key) == Found::yes);
+    const auto& contacts = model.assembly.places().contacts;
+    for (std::size_t c = 0; slipping && c < contacts.size(); ++c)
+        if (key.modes[c] == 0 && !contacts[c].bilateral) key.modes[c] = 1;
+    const auto regime = system.build(key);
+    Propagator<D> p;
+    const SignalsOf<D> none;
+    PhaseRotations turns(1e-3, input_basis(none));
+    const LinearRatesOf<D> rates(regime.rate);
+    p.prepare(rates, turns, system.balanced_scale());
+    use(p, rates, regime.rate, system.balanced_scale());
 }
 
 }  // namespace

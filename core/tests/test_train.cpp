@@ -131,7 +131,7 @@ TEST_CASE("a packed regime has the same coefficients in the kernel's order, and 
     for (int n = 0; n < cases(100); ++n) {
         const Assembly a(random.train(random.pick(2, 6), true));
         const Layout& at = a.layout();
-        REQUIRE(fits<WidestTest>(a.train(), at));
+        REQUIRE(sizes_of<WidestTest>.hold(a.train(), at));
         Key key;
         for (int c = 0; c < at.contacts; ++c)
             key.modes[c] = static_cast<std::int8_t>(a.places().contacts[c].bilateral ? 0 : random.pick(-1, 1));

@@ -130,8 +130,8 @@ TEST_CASE("random trains stepped with intervals split at random follow the run i
             double at = 0.0;
             while (at < 1.0 && status == Status::done) {
                 const double to = random.coin(0.4) ? 1.0 : std::min(1.0, at + random.uniform(0.05, 0.9));
-                status = stepped.advance(h * (to - at), between(levels[k], levels[k + 1], at),
-                                         between(levels[k], levels[k + 1], to));
+                status = stepped.motion().advance(h * (to - at), between(levels[k], levels[k + 1], at),
+                                                  between(levels[k], levels[k + 1], to));
                 at = to;
             }
         }
@@ -172,9 +172,9 @@ TEST_CASE("a restored simulation of a train continues bit for bit") {
         for (std::size_t k = 0; k < 120 && status == Status::done; ++k) {
             if (k == 47) restore(b, a);
             const Values& begin = levels[k % 5 == 0 ? k + 1 : k];  // held now and then
-            status = a.advance(1e-2, begin, levels[k + 1]);
+            status = a.motion().advance(1e-2, begin, levels[k + 1]);
             if (k < 47) continue;
-            REQUIRE(b.advance(1e-2, begin, levels[k + 1]) == status);
+            REQUIRE(b.motion().advance(1e-2, begin, levels[k + 1]) == status);
             if (status != Status::done) break;
             const TrainPoint p = point(a), q = point(b);
             REQUIRE(p.now.x == q.now.x);
@@ -193,7 +193,7 @@ TEST_CASE("what a contact at rest can hold is its guard's margin and what it hol
         const Assembly& a = s.assembly();
         const auto levels = random_levels(random, 40, a.layout().inputs);
         for (const Values& level : levels) {
-            if (s.advance(1e-2, level, level) != Status::done) break;
+            if (s.motion().advance(1e-2, level, level) != Status::done) break;
             const TrainPoint p = point(s);
             const Regime r = a.build(p.key);
             const auto contacts = explain_contacts(a, p);
@@ -230,7 +230,7 @@ TEST_CASE("the command that turns the motor of a drive is that of a closed form"
         TrainSimulation s(train_of(d), 1e-3);
         for (int k = 0; k < 10; ++k) {
             const double u = random.uniform(-0.5, 0.5), M_Z = random.uniform(-1.0, 1.0) * d.gearbox.rated_output_torque;
-            if (s.advance(5e-3, Values{u, M_Z}, Values{u, M_Z}) != Status::done) break;
+            if (s.motion().advance(5e-3, Values{u, M_Z}, Values{u, M_Z}) != Status::done) break;
             const TrainPoint p = point(s);
             const double T_2 = evaluate(s.assembly().layout(), s.assembly().build(p.key).output_torque[0], p.now);
             const auto motors = explain_motors(s.assembly(), p);
@@ -258,7 +258,7 @@ TEST_CASE("the command that turns a motor: what is behind a clutch, a freewheel,
     const auto commands = [](const Train& train, const Values& u) {
         TrainSimulation s(train, 1e-3);
         REQUIRE(model::check(train).empty());
-        REQUIRE(s.advance(1e-6, u, u) == Status::done);
+        REQUIRE(s.motion().advance(1e-6, u, u) == Status::done);
         return explain_motors(s.assembly(), point(s));
     };
     Gear slow = spring(0, 1, 2.0, TorsionCurve({}, {100.0}));
@@ -304,7 +304,7 @@ TEST_CASE("the command that turns a motor: what is behind a clutch, a freewheel,
     damped.shafts[2].name = "turning";
     TrainSimulation s(damped, 1e-3);
     REQUIRE(s.reset({{{"turning_speed", 1.0}}, {}}) == "");
-    REQUIRE(s.advance(1e-9, Values{0.0, 0.0}, Values{0.0, 0.0}) == Status::done);
+    REQUIRE(s.motion().advance(1e-9, Values{0.0, 0.0}, Values{0.0, 0.0}) == Status::done);
     of = explain_motors(s.assembly(), point(s));
     CHECK(of[0].command_forward == doctest::Approx(1.25 / 1.6 + 0.5 - 0.3).epsilon(1e-8));
     CHECK(of[0].command_backward == doctest::Approx(-1.25 / 1.6 - 0.5 - 0.3).epsilon(1e-8));

@@ -45,21 +45,7 @@ struct ResponseTable {
 
 using Waiting = std::function<bool(std::size_t)>;
 
-// Compiled once for each kernel, by core/kernels.
-template <class D>
-ResponseTable respond_train_in(const typename TrainReader<D>::Model& model, const std::vector<ResponseRequest>& points,
-                               const ResponseSpec& spec, unsigned threads, const Waiting& waiting);
-
-inline ResponseTable respond_train(const TrainRun& run, const std::vector<ResponseRequest>& points,
-                                   const ResponseSpec& spec, unsigned threads, const Waiting& waiting) {
-    return run.in_kernel([&]<class D>(const typename TrainReader<D>::Model& model) {
-        return respond_train_in<D>(model, points, spec, threads, waiting);
-    });
-}
-
-#define LOSTMOTION_RESPONSES(TEMPLATE, D)                                                                         \
-    TEMPLATE ResponseTable respond_train_in<D>(const TrainReader<D>::Model&, const std::vector<ResponseRequest>&, \
-                                               const ResponseSpec&, unsigned, const Waiting&);
-LOSTMOTION_EACH_KERNEL(LOSTMOTION_RESPONSES, extern template)
+ResponseTable respond_train(const TrainRun& run, const std::vector<ResponseRequest>& points, const ResponseSpec& spec,
+                            unsigned threads, const Waiting& waiting);
 
 }  // namespace lostmotion

@@ -16,6 +16,7 @@
 
 #include "harmonics.hpp"
 #include "periodic.hpp"
+#include "power_channels.hpp"
 #include "respond.hpp"
 #include "workers.hpp"
 
@@ -34,20 +35,6 @@ struct ResponsePointOf {
     SignalsOf<D> signals;  // constant, or of this period
     double period = 1.0;   // [s] of the motion that is looked for
     StartOf<D> start;
-};
-
-// Channels whose products are powers.
-struct PowerChannels {
-    struct Pair {
-        int torque, speed;
-    };
-    struct Gear {
-        Pair in, out;
-        bool last;               // its output shaft turns no other gear
-        int housing_speed = -1;  // -1: it stands
-    };
-    std::vector<Pair> motors;
-    std::vector<Gear> gears;
 };
 
 template <class System>

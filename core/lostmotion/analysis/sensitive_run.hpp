@@ -34,6 +34,9 @@ struct SensitivityOutput {
     DerivativeFault fault;  // then there is no run
 };
 
+// Refuses what has no derivative among the controllers of a run.
+DerivativeFault check_derivatives(const Control& control, const std::vector<Variation>& variations);
+
 struct SensitiveRow {
     DerivativeFault problem;                                // of what is asked for
     std::string error;                                      // of the motion, or empty
@@ -44,19 +47,7 @@ struct SensitiveRow {
     std::string ends_by;
 };
 
-// These are compiled once for each kernel, by core/kernels.
-
 // By the exact solver. out: values, as TrainRun::run; output: derivatives of the same channels and instants.
-template <class D>
-TrainReport run_with_derivatives_in(const typename TrainReader<D>::Model& model, const SensitiveCase& c, double* out,
-                                    SensitivityOutput& output);
-// Cases of one train, each into its row. signals: also what the controllers show; then the instants must be multiples
-// of an interval.
-template <class D>
-void run_sensitive_in(const typename TrainReader<D>::Model& model, std::span<const SensitiveCase> cases,
-                      std::span<SensitiveRow> rows, const std::vector<std::string>& channels, bool signals,
-                      std::atomic<bool>& stop);
-
 TrainReport run_with_derivatives(const SensitiveCase& c, double* out, SensitivityOutput& output);
 
 // Up to this many runs of the same train come one after the other on a thread.
@@ -69,13 +60,5 @@ std::vector<std::size_t> pieces_of_work(const std::vector<SensitiveCase>& cases)
 std::vector<SensitiveRow> run_sensitive(const std::vector<SensitiveCase>& cases,
                                         const std::vector<std::string>& channels, bool signals, unsigned threads,
                                         const std::function<bool(std::size_t)>& waiting);
-
-#define LOSTMOTION_SENSITIVITIES(TEMPLATE, D)                                                                    \
-    TEMPLATE TrainReport run_with_derivatives_in<D>(const TrainReader<D>::Model&, const SensitiveCase&, double*, \
-                                                    SensitivityOutput&);                                         \
-    TEMPLATE void run_sensitive_in<D>(const TrainReader<D>::Model&, std::span<const SensitiveCase>,              \
-                                      std::span<SensitiveRow>, const std::vector<std::string>&, bool,            \
-                                      std::atomic<bool>&);
-LOSTMOTION_EACH_KERNEL(LOSTMOTION_SENSITIVITIES, extern template)
 
 }  // namespace lostmotion

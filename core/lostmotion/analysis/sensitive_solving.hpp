@@ -2,29 +2,24 @@
 #pragma once
 
 #include "../simulation/train_solving.hpp"
+#include "sensitive_run.hpp"
 #include "train_batch.hpp"
 #include "train_sensitivity.hpp"
 
 namespace lostmotion {
 
-// Ticks, delays and schedules that differ beside the value of a parameter have no derivative.
-bool acts_at_the_same_instants(const Control& a, const Control& b);
-
-// Refuses what has no derivative among the controllers of a run.
-DerivativeFault check_derivatives(const Control& control, const std::vector<Variation>& variations);
-
 // Runs of one train, each with its derivatives, by the exact solver. What their regimes are is found once for all.
 template <class D>
 class SensitiveRuns {
  public:
-    explicit SensitiveRuns(const typename TrainReader<D>::Model& model) : model_(model) {}
+    explicit SensitiveRuns(const TrainModel& model) : model_(model) {}
 
     // out: values, as TrainRun::run; output: derivatives of the same channels and instants.
     TrainReport operator()(const SensitiveCase& c, const TrainOptions& options, double* out,
                            SensitivityOutput& output) {
         const auto [x, memory] = c.run->in_layout(c.start);
         if (c.variations.empty())
-            return run_train_exactly_in<D>(model_, c.inputs, x, memory, options, out, nullptr, workspace_);
+            return run_train_exactly_in<D>(model_, {c.inputs, x, memory}, options, out, nullptr, workspace_);
         const auto trains = std::make_shared<const VariedTrain>(*c.run, c.variations);
         const auto tangents = std::make_shared<const InputTangents>(c.run->assembly().layout(), c.inputs, c.variations);
         for (const DerivativeFault& fault :
@@ -35,12 +30,12 @@ class SensitiveRuns {
         if (!regimes_ || !regimes_->serve(*trains, *tangents, output.channels))
             regimes_.emplace(trains, tangents, output.channels);
         TrainSensitivity<D> watcher(*trains, *tangents, *regimes_, c.variations, c.start, options.control, output);
-        return run_train_exactly_in<D>(model_, c.inputs, x, memory, options, out, &watcher, workspace_);
+        return run_train_exactly_in<D>(model_, {c.inputs, x, memory}, options, out, &watcher, workspace_);
     }
 
  private:
-    const typename TrainReader<D>::Model& model_;
-    std::unique_ptr<AnyWorkspace> workspace_;
+    const TrainModel& model_;
+    std::unique_ptr<Workspace> workspace_;
     std::optional<RegimeTangents> regimes_;
 };
 
@@ -76,15 +71,8 @@ SensitiveRow run_sensitive(SensitiveRuns<D>& runs, const SensitiveCase& one, con
 }
 
 template <class D>
-TrainReport run_with_derivatives_in(const typename TrainReader<D>::Model& model, const SensitiveCase& c, double* out,
-                                    SensitivityOutput& output) {
-    return SensitiveRuns<D>(model)(c, c.options, out, output);
-}
-
-template <class D>
-void run_sensitive_in(const typename TrainReader<D>::Model& model, std::span<const SensitiveCase> cases,
-                      std::span<SensitiveRow> rows, const std::vector<std::string>& channels, bool signals,
-                      std::atomic<bool>& stop) {
+void run_sensitive_cases(const TrainModel& model, std::span<const SensitiveCase> cases, std::span<SensitiveRow> rows,
+                         const std::vector<std::string>& channels, bool signals, std::atomic<bool>& stop) {
     SensitiveRuns<D> runs(model);
     for (std::size_t k = 0; k < cases.size() && !stop; ++k) {
         TrainOptions options = cases[k].options;

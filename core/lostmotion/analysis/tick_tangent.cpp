@@ -29,7 +29,7 @@ void TickTangent::measure(std::size_t a, const control::Axis& law, const FormTan
     std::array<double, n_measured> y;
     std::fill(measured_derivative_.begin(), measured_derivative_.end(), 0.0);
     for (int k = 0; k < n_measured; ++k) {
-        const model::Row& f = forms_[a][static_cast<std::size_t>(k)];
+        const model::Row& f = rows_[a].measured[static_cast<std::size_t>(k)];
         y[static_cast<std::size_t>(k)] = form.value(f, w);
         const control::Encoder& encoder =
             k == 0 && law.two_encoders ? law.position_sensor.encoder : law.speed_sensor.encoder;
@@ -38,9 +38,9 @@ void TickTangent::measure(std::size_t a, const control::Axis& law, const FormTan
         form.add_motion(f, derivative, 1.0, to);
         for (int p = 0; p < parameters_; ++p)
             for (const Beside& b : beside_[static_cast<std::size_t>(p)])
-                if (!b.forms.empty())
-                    to[p] += b.weight *
-                             (form.value(b.forms[a][static_cast<std::size_t>(k)], w) - y[static_cast<std::size_t>(k)]);
+                if (!b.rows.empty())
+                    to[p] += b.weight * (form.value(b.rows[a].measured[static_cast<std::size_t>(k)], w) -
+                                         y[static_cast<std::size_t>(k)]);
     }
     measured_ = {y[0], y[1], y[2], y[3], y[4], y[5], y[6], time};
 }

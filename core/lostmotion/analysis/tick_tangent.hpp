@@ -6,10 +6,12 @@
 // of finite resolution reads does not depend on anything but at single instants: its derivative is 0.
 #pragma once
 
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "../simulation/train_control.hpp"
 #include "reset_tangent.hpp"
 
 namespace lostmotion {
@@ -30,27 +32,25 @@ class TickTangent {
     const std::string& error() const { return error_; }
 
     // A tick that the controllers are about to run. w, derivative: as in InputTangents.
-    template <class D>
-    void step(const ClosedLoop<D>& loop, const ControlCourse& course, const FormTangent& form,
-              const VariedTrain& trains, const double* w, const double* derivative) {
-        if (beside_.empty()) place<D>(loop, trains);
-        const double time = loop.ticks.time(course.next);
+    void step(const Ticks& ticks, std::span<const control::Axis> axes, const ControlCourse& course,
+              const FormTangent& form, const VariedTrain& trains, const double* w, const double* derivative) {
+        if (beside_.empty()) place(axes, trains);
+        const double time = ticks.time(course.next);
         int first = 0;
-        for (std::size_t a = 0; a < loop.axes.size(); ++a) {
-            const control::Axis& law = loop.axes[a];
+        for (std::size_t a = 0; a < axes.size(); ++a) {
+            const control::Axis& law = axes[a];
             const double* slots = course.slots.data() + first;
             measure(a, law, form, w, derivative, time);
             if (course.next == 0)
-                vary(a, first, law.slots(), law, slots,
-                     [&](const control::Axis& l, const control::Sampled& y, double* s) {
-                         l.start(y, loop.ticks.length, s);
-                     });
+                vary(
+                    a, first, law.slots(), law, slots,
+                    [&](const control::Axis& l, const control::Sampled& y, double* s) { l.start(y, ticks.length, s); });
             vary(a, first, law.slots(), law, slots, [&](const control::Axis& l, const control::Sampled& y, double* s) {
-                l.step(course.next, loop.ticks.length, y, s);
+                l.step(course.next, ticks.length, y, s);
             });
             double* own = now_.data();
             std::copy_n(slots, law.slots(), own);
-            law.step(course.next, loop.ticks.length, measured_, own);
+            law.step(course.next, ticks.length, measured_, own);
             commands_[a].value = law.command(own);
             std::copy_n(&slots_[static_cast<std::size_t>((first + law.command_slot()) * parameters_)], parameters_,
                         commands_[a].derivative.begin());
@@ -76,56 +76,30 @@ class TickTangent {
         double value = 0.0;
         std::vector<double> derivative;
     };
-    using Forms = std::array<model::Row, n_measured>;
     // At another value of a parameter.
     struct Beside {
         double offset, weight;
         std::vector<control::Axis> laws;  // none: the same
-        std::vector<Forms> forms;         // of each axis; none: the same
+        std::vector<AxisRows> rows;       // of each axis; none: the same
     };
 
-    template <class D>
-    static model::Row unpacked(const LinearFormOf<D>& f, const model::Layout& n) {
-        model::Row out;
-        const auto copy = [&](int from, int count, int to) {
-            for (int k = 0; k < count; ++k) out.c[to + k] = f.c[static_cast<std::size_t>(from + k)];
-        };
-        copy(0, n.coupled, 0);
-        copy(D::coupled, n.angles, n.coupled);
-        copy(D::one, 1, n.one);
-        copy(D::first_memory, n.memory, n.first_memory);
-        copy(D::first_input, n.inputs, n.first_input);
-        return out;
-    }
-    template <class D>
-    static std::vector<Forms> forms_of(const ClosedLoop<D>& loop, const model::Layout& n) {
-        std::vector<Forms> out;
-        for (const AxisPlace<D>& p : loop.places) {
-            Forms& f = out.emplace_back();
-            int k = 0;
-            for (const auto* form : {&p.position_angle, &p.speed_angle, &p.speed, &p.motor_torque, &p.rotor_angle,
-                                     &p.rotor_speed, &p.shaft_angle})
-                f[static_cast<std::size_t>(k++)] = unpacked<D>(*form, n);
-        }
-        return out;
-    }
-    template <class D>
-    void place(const ClosedLoop<D>& loop, const VariedTrain& trains) {
-        const model::Layout& n = trains.base().layout();
-        forms_ = forms_of(loop, n);
+    void place(std::span<const control::Axis> axes, const VariedTrain& trains) {
+        rows_ = axis_rows(trains.base(), control_);
         for (const Variation& v : variations_) {
             std::vector<Beside>& all = beside_.emplace_back();
             for (const Neighbour& at : v.neighbours) {
                 Beside& b = all.emplace_back(Beside{at.offset, at.weight, {}, {}});
                 if (at.control) b.laws = at.control->laws();
-                if (at.train) b.forms = forms_of(closed_loop_of<D>(at.train->assembly(), control_, {}), n);
+                if (at.train) b.rows = axis_rows(at.train->assembly(), control_);
             }
         }
-        for (const AxisPlace<D>& p : loop.places)
-            commands_.push_back({p.input, 0.0, std::vector<double>(static_cast<std::size_t>(parameters_))});
-        slots_.resize(static_cast<std::size_t>(loop.slots() * parameters_));
+        for (const AxisRows& r : rows_)
+            commands_.push_back({r.command, 0.0, std::vector<double>(static_cast<std::size_t>(parameters_))});
+        int slots = 0;
+        for (const control::Axis& law : axes) slots += law.slots();
+        slots_.resize(static_cast<std::size_t>(slots * parameters_));
         measured_derivative_.resize(static_cast<std::size_t>(n_measured * parameters_));
-        for (auto* room : {&now_, &at_}) room->resize(static_cast<std::size_t>(loop.slots()));
+        for (auto* room : {&now_, &at_}) room->resize(static_cast<std::size_t>(slots));
     }
 
     // What an axis measures, and its derivatives.
@@ -223,7 +197,7 @@ class TickTangent {
     int parameters_;
     const std::vector<Variation>& variations_;
     const Control& control_;
-    std::vector<Forms> forms_;
+    std::vector<AxisRows> rows_;
     std::vector<std::vector<Beside>> beside_;
     std::vector<Command> commands_;
     std::vector<double> slots_;  // derivatives of the numbers of all axes

@@ -56,7 +56,7 @@ std::string find_channels(const TrainRun& run, const std::vector<std::string>& n
 }
 
 TrainRow run_case(const TrainCase& one, const TrainBatch& batch, TrainOptions options, double* samples, double* out,
-                  std::unique_ptr<AnyWorkspace>& workspace) {
+                  std::unique_ptr<Workspace>& workspace) {
     constexpr double nan = std::numeric_limits<double>::quiet_NaN();
     TrainRow row;
     row.energies.assign(batch.energies.size(), nan);
@@ -90,7 +90,7 @@ std::vector<TrainRow> run_trains(const TrainBatch& batch, double* out, unsigned 
         options.interrupted_context = &stop;
         std::vector<double> samples(batch.kept.empty() ? 0 : batch.channels.size() * options.samples);
         TrainCase room;
-        std::unique_ptr<AnyWorkspace> workspace;
+        std::unique_ptr<Workspace> workspace;
         for (std::size_t k = next(); k < rows.size() && !stop; k = next())
             rows[k] = run_case(batch.row(k, room), batch, options, samples.data(), out + k * batch.width(), workspace);
     });

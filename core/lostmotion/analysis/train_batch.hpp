@@ -57,7 +57,7 @@ std::string find_channels(const TrainRun& run, const std::vector<std::string>& n
 // out: the numbers of the row; NaN if the run has not ended well.
 // workspace: of another train, left for the next.
 TrainRow run_case(const TrainCase& one, const TrainBatch& batch, TrainOptions options, double* samples, double* out,
-                  std::unique_ptr<AnyWorkspace>& workspace);
+                  std::unique_ptr<Workspace>& workspace);
 
 // out: runs() x width().
 std::vector<TrainRow> run_trains(const TrainBatch& batch, double* out, unsigned threads,

@@ -40,23 +40,19 @@ std::vector<NamedComponent> train_components(const model::Assembly& a) {
     return out;
 }
 
-PowerChannels power_channels(const model::Assembly& a, const std::vector<TrainChannel>& channels);
-
 template <class D>
 class TrainPlant {
  public:
     using System = model::TrainSystem<D>;
     using Workspace = TrainWorkspace<D>;
-    using Model = typename TrainReader<D>::Model;
 
-    explicit TrainPlant(const Model& m) : model_(m), powers_(power_channels(m.assembly, m.channels)) {
+    explicit TrainPlant(const TrainModel& m) : model_(m), powers_(power_channels(m.assembly, m.channels)) {
         for (std::size_t c = 0; c < m.channels.size(); ++c) numbers_.push_back(static_cast<int>(c));
     }
 
     std::size_t channels() const { return model_.channels.size(); }
     const PowerChannels& powers() const { return powers_; }
-    SamplerOf<System, TrainReader<D>, Model> sampler(Workspace&, double interval, std::size_t count,
-                                                     double* out) const {
+    SamplerOf<System, TrainReader<D>> sampler(Workspace&, double interval, std::size_t count, double* out) const {
         return {model_, {interval, count}, out, numbers_};
     }
     bool spoiled(const Workspace& w) const { return w.system.overflowed(); }
@@ -68,13 +64,13 @@ class TrainPlant {
     void give_back(std::unique_ptr<Workspace>) {}
 
  private:
-    const Model& model_;
+    const TrainModel& model_;
     const PowerChannels powers_;
     std::vector<int> numbers_;
 };
 
 template <class D>
-ResponseTable respond_train_in(const typename TrainReader<D>::Model& model, const std::vector<ResponseRequest>& points,
+ResponseTable respond_train_in(const TrainModel& model, const std::vector<ResponseRequest>& points,
                                const ResponseSpec& spec, unsigned threads, const Waiting& waiting) {
     TrainPlant<D> plant(model);
     const auto start = [&](const Named& named) {

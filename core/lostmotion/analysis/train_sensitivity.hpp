@@ -95,7 +95,7 @@ class TrainSensitivity final : public TrainWatcher<D> {
     void tick(const ClosedLoop<D>& loop, const ControlCourse& course, const State& x, const Memory& memory) override {
         if (!begun_) set_states(x, memory);
         read_signals(loop, loop.ticks.time(course.next));
-        ticks_.template step<D>(loop, course, form_, trains_, w_.data(), derivative_.data());
+        ticks_.step(loop.ticks, loop.axes, course, form_, trains_, w_.data(), derivative_.data());
         if (!ticks_.error().empty() && output_.ends_by.empty()) {
             output_.ends_at = loop.ticks.time(course.next);
             output_.ends_by = ticks_.error();

@@ -42,6 +42,7 @@ struct DriveBatch::Worker {
     long clock = 0;
     Counts counts;
     Failure failure;
+    MotionState state;  // its memory is used again
 
     TrainSimulation& solver(const Models& models, std::size_t model, double step) {
         ++clock;
@@ -59,7 +60,7 @@ struct DriveBatch::Worker {
 std::string DriveBatch::error(const model::Train& train) {
     const TrainRun run(train);
     if (!run.error().empty()) return run.error();
-    if (!train.short_form || !model::fits<D>(train, run.assembly().layout()) ||
+    if (!train.short_form || !sizes_of<D>.hold(train, run.assembly().layout()) ||
         run.assembly().layout().branches > Label::max_branches)
         return "is more than a motor, a gearbox with torsion curve and losses, and a load with plain friction";
     return "";
@@ -196,40 +197,40 @@ bool DriveBatch::solve(std::size_t k, const Inputs& u, Worker& worker) {
     DriveState& d = drives_[k];
     const auto model = static_cast<std::size_t>(model_of_[k]);
     TrainSimulation& simulation = worker.solver(models_, model, step_);
-    return simulation.with([&]<class S>(S& s) {
-        if constexpr (std::is_same_v<S, TrainSimulationIn<D>>) {
-            typename S::Snapshot from;
-            std::ranges::copy(d.x, from.x.begin());
-            from.memory = d.memory;
-            if (d.regime != nullptr) {
-                from.started = true;
-                from.key = d.regime->label.key();
-                from.course.input = inputs_[k];
-            } else {
-                const model::Assembly& a = simulation.assembly();
-                const model::GearPlace& gear = a.places().gears[0];
-                const int locked = gear.contact == model::nowhere
-                                       ? model::nowhere
-                                       : a.places().contacts[static_cast<std::size_t>(gear.contact)].locked;
-                if (locked != model::nowhere && gear.twist != model::nowhere)
-                    from.memory[static_cast<std::size_t>(locked)] =
-                        a.train().gears[0].law.curve.torque(d.x[static_cast<std::size_t>(gear.twist)]);
-            }
-            s.restore(from);
-            const Status status = s.advance(step_, u, u);
-            if (status != Status::done) {
-                worker.failure.add({k, train_status_text(simulation.assembly(), status, s.time(), s.stopped_at(),
-                                                         s.too_many_guards())});
-                return false;
-            }
-            const auto& to = s.snapshot();
-            std::ranges::copy(to.x, d.x.begin());
-            d.memory = to.memory;
-            d.regime = table(model, Label::of(to.key), worker);
-            return true;
-        }
+    const model::Assembly& a = simulation.assembly();
+    const model::Layout& n = a.layout();
+    MotionState& s = worker.state;
+    s.clear();
+    s.x.resize(static_cast<std::size_t>(n.states));
+    model::unpack_state<D>(d.x, n, s.x.begin());
+    s.memory.assign(d.memory.begin(), d.memory.begin() + n.memory);
+    if (d.regime != nullptr) {
+        s.started = true;
+        s.key = d.regime->label.key();
+        s.rate_input.assign(inputs_[k].begin(), inputs_[k].begin() + n.inputs);
+    } else {
+        const model::GearPlace& gear = a.places().gears[0];
+        const int locked = gear.contact == model::nowhere
+                               ? model::nowhere
+                               : a.places().contacts[static_cast<std::size_t>(gear.contact)].locked;
+        if (locked != model::nowhere && gear.twist != model::nowhere)
+            s.memory[static_cast<std::size_t>(locked)] =
+                a.train().gears[0].law.curve.torque(d.x[static_cast<std::size_t>(gear.twist)]);
+    }
+    simulation.motion().restore(s);
+    const auto inputs = std::span(u).first(static_cast<std::size_t>(n.inputs));
+    const Status status = simulation.motion().advance(step_, inputs, inputs);
+    if (status != Status::done) {
+        const Motion& m = simulation.motion();
+        worker.failure.add({k, train_status_text(a, status, m.time(), m.stopped_at(), m.too_many_guards())});
         return false;
-    });
+    }
+    simulation.motion().save(s);
+    const auto to = model::packed_start<D>(n, s.x, s.memory);
+    std::ranges::copy(to.x, d.x.begin());
+    d.memory = to.memory;
+    d.regime = table(model, Label::of(s.key), worker);
+    return true;
 }
 
 void DriveBatch::reset(const bool* which, const double* start) {

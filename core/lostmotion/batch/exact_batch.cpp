@@ -62,8 +62,8 @@ std::string ExactBatch::reset(const bool* which, const double* start) {
 }
 
 auto ExactBatch::snapshot() const -> Snapshot {
-    Snapshot s{this, std::vector<TrainSimulation::Snapshot>(size()), values_};
-    for (std::size_t k = 0; k < size(); ++k) drives_[k]->train().save(s.drives[k]);
+    Snapshot s{this, std::vector<MotionState>(size()), values_};
+    for (std::size_t k = 0; k < size(); ++k) drives_[k]->motion().save(s.drives[k]);
     return s;
 }
 
@@ -74,8 +74,7 @@ void ExactBatch::restore(const Snapshot& s) {
 
 std::size_t ExactBatch::memory() const {
     std::size_t bytes = values_.size() * sizeof(double);
-    for (const auto& d : drives_)
-        bytes += sizeof(*d) + std::as_const(*d).with([]<class S>(const S&) { return sizeof(S); });
+    for (const auto& d : drives_) bytes += sizeof(*d) + d->motion().memory();
     return bytes;
 }
 

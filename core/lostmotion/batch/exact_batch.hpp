@@ -40,7 +40,7 @@ class ExactBatch {
 
     struct Snapshot {
         const ExactBatch* of;
-        std::vector<TrainSimulation::Snapshot> drives;
+        std::vector<MotionState> drives;
         std::vector<double> values;
     };
     Snapshot snapshot() const;

@@ -4,7 +4,7 @@
 #include <numbers>
 #include <vector>
 
-#include "../kernel/inputs.hpp"
+#include "../kernel/signal.hpp"
 #include "../kernel/sine.hpp"
 
 namespace lostmotion::control {

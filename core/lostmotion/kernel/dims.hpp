@@ -30,18 +30,6 @@ struct DependsOn<D> {
     void see_memory(int, double) {}
 };
 
-// The kernels that a build holds: all, one alone, as the cores of live pages do, or the smallest and the widest, as the
-// tests with sanitizers do.
-enum class Kernel { all, drive, narrow, middle, wide, drive_and_wide };
-#ifndef LOSTMOTION_KERNEL
-#define LOSTMOTION_KERNEL all
-#endif
-inline constexpr Kernel built = Kernel::LOSTMOTION_KERNEL;
-constexpr bool holds(Kernel k) {
-    return built == Kernel::all || built == k ||
-           (built == Kernel::drive_and_wide && (k == Kernel::drive || k == Kernel::wide));
-}
-
 template <int coupled_, int angles_, int inputs_, int memory_, int contacts_, int guards_>
 struct Dims {
     static constexpr int coupled = coupled_;    // states that act on one another

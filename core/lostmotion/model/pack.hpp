@@ -12,37 +12,6 @@
 
 namespace lostmotion::model {
 
-// Calls use(count, most, what) for all that a kernel of these dimensions limits of a train. Guards are counted regime
-// by regime.
-template <class D, class Use>
-void each_size(const Train& train, const Layout& n, Use&& use) {
-    use(n.coupled, D::coupled, "coupled states");
-    use(n.angles, D::angles, "parts that no gear joins");
-    use(n.inputs, D::inputs, "inputs");
-    use(n.contacts, D::contacts, "dry contacts");
-    use(n.memory, D::memory, "torques and turns of angles to remember");
-    use(static_cast<int>(train.gears.size()), D::contacts, "gears");
-}
-
-// Has it nothing but motors, gears and shafts with plain friction? Then 16 conditions end each regime at most.
-inline bool is_plain(const Train& t) {
-    bool plain = t.motors.size() <= 1 && t.gears.size() <= 1 && t.controllers.empty();
-    const auto none = [&](const char*, const char*, const auto& elements) { plain = plain && elements.empty(); };
-    Train::each_kind(t, none);
-    Train::each_coupling_kind(t, none);
-    for (const Shaft& s : t.shafts) plain = plain && s.friction.speeds.empty() && !s.has_drag();
-    for (const Gear& g : t.gears) plain = plain && !g.over_angle() && !g.parts_flanks();
-    return plain;
-}
-
-// Does a train fit into a kernel of these dimensions?
-template <class D>
-bool fits(const Train& train, const Layout& n) {
-    bool all = D::guards >= 32 || is_plain(train);
-    each_size<D>(train, n, [&](int count, int most, const char*) { all = all && count <= most; });
-    return all;
-}
-
 template <class D>
 using PackedForm = LinearFormOf<D>;
 
@@ -67,8 +36,8 @@ F pack(const Row& f, const Layout& n) {
 }
 
 // A state of the kernel, by the layout.
-template <class D, class To>
-void unpack_state(const StateOf<D>& x, const Layout& n, To to) {
+template <class D, class State, class To>
+void unpack_state(const State& x, const Layout& n, To to) {
     std::copy_n(x.begin() + D::coupled, n.angles, std::copy_n(x.begin(), n.coupled, to));
 }
 

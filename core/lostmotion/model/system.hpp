@@ -18,9 +18,6 @@ using Least = Dims<4, 1, 2, 2, 3, 16>;  // motor, gear and load, as the paper ha
 using Narrow = Dims<4, 1, 4, 6, 8, 32>;
 using Middle = Dims<8, 2, 6, 10, 12, 64>;
 using Wide = Dims<16, 4, 16, 20, 24, 64>;
-using Widest = std::conditional_t<
-    holds(Kernel::wide), Wide,
-    std::conditional_t<holds(Kernel::middle), Middle, std::conditional_t<holds(Kernel::narrow), Narrow, Least>>>;
 
 template <class D>
 struct TrainRegime : PackedRegime<D> {

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "../simulation/closed_loop.hpp"
+#include "../simulation/controllers.hpp"
 #include "part_fields.hpp"
 
 namespace lostmotion {

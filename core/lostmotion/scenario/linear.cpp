@@ -35,14 +35,12 @@ void along_direction(TrainSimulation& t, const TrainPoint& point, const std::vec
 
 Status directional_derivative(ScenarioSimulation& s, const double* states, const double* inputs, double* rates,
                               double* variables) {
-    const Status status = s.with([](auto& in) { return in.find_regime(); });
+    const Status status = s.motion().find_regime();
     if (status != Status::done) return status;
     std::vector<double> dx(s.names().states.size()), du(s.solver_inputs());
     if (states != nullptr) std::copy_n(states, dx.size(), dx.begin());
     for (std::size_t k = 0; k < s.free_inputs() && inputs != nullptr; ++k) du[s.solver_input(k)] = inputs[k];
-    s.with([&](auto& in) {
-        along_direction(s.train(), in.point(), s.names().states, dx.data(), du.data(), rates, variables);
-    });
+    along_direction(s.train(), s.motion().point(), s.names().states, dx.data(), du.data(), rates, variables);
     if (variables == nullptr) return status;
     std::fill(variables + s.variables().first_shown(), variables + s.variables().size(), 0.0);
     std::vector<double> values(s.variables().size());

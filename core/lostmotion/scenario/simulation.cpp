@@ -1,5 +1,7 @@
 #include "simulation.hpp"
 
+#include <type_traits>
+
 namespace lostmotion {
 
 ScenarioSimulation::ScenarioSimulation(const Scenario& scenario, double step)
@@ -25,9 +27,7 @@ double ScenarioSimulation::played_input(std::size_t k) const {
 }
 
 std::string ScenarioSimulation::text(Status status) const {
-    return with([&](const auto& s) {
-        return train_status_text(train_.assembly(), status, s.time(), s.stopped_at(), s.too_many_guards());
-    });
+    return train_status_text(train_.assembly(), status, time(), motion().stopped_at(), motion().too_many_guards());
 }
 
 std::string ScenarioSimulation::reset(std::span<const double> states, std::span<const double> capacities) {
@@ -37,34 +37,29 @@ std::string ScenarioSimulation::reset(std::span<const double> states, std::span<
 auto ScenarioSimulation::advance(double interval, std::span<const double> begin, std::span<const double> end)
     -> Status {
     set_references(begin, end, interval);
-    return with([&]<class S>(S& s) {
-        const auto before = s.snapshot();
-        const double from = before.time, to = from + interval;
-        for (double until = from; until != to;) {
-            const double t = s.time();
-            follow_signals(t, accumulated);
-            const double next = next_breakpoint(t);
-            until = next < to - accumulated * to ? next : to;
-            for (std::size_t k = 0; k < free_.size(); ++k) {
-                const double slope = (end[k] - begin[k]) / interval;
-                begin_[free_[k]] = t == from ? begin[k] : begin[k] + slope * (t - from);
-                end_[free_[k]] = until == to ? end[k] : begin[k] + slope * (until - from);
-            }
-            for (const Played& p : played_) {
-                begin_[free_[p.input]] = p.line(t);
-                end_[free_[p.input]] = p.line(until);
-            }
-            InputsOf<typename S::D> first{}, last{};
-            std::copy(begin_.begin(), begin_.end(), first.begin());
-            std::copy(end_.begin(), end_.end(), last.begin());
-            const Status status = s.advance(t == from && until == to ? interval : until - t, first, last);
-            if (status != Status::done) {
-                s.restore(before);
-                return status;
-            }
+    motion().save(before_);
+    const double from = time(), to = from + interval;
+    for (double until = from; until != to;) {
+        const double t = time();
+        follow_signals(t, accumulated);
+        const double next = next_breakpoint(t);
+        until = next < to - accumulated * to ? next : to;
+        for (std::size_t k = 0; k < free_.size(); ++k) {
+            const double slope = (end[k] - begin[k]) / interval;
+            begin_[free_[k]] = t == from ? begin[k] : begin[k] + slope * (t - from);
+            end_[free_[k]] = until == to ? end[k] : begin[k] + slope * (until - from);
         }
-        return Status::done;
-    });
+        for (const Played& p : played_) {
+            begin_[free_[p.input]] = p.line(t);
+            end_[free_[p.input]] = p.line(until);
+        }
+        const Status status = motion().advance(t == from && until == to ? interval : until - t, begin_, end_);
+        if (status != Status::done) {
+            motion().restore(before_);
+            return status;
+        }
+    }
+    return Status::done;
 }
 
 auto ScenarioSimulation::answer(double interval, std::span<const double> begin, std::span<const double> end,
@@ -74,7 +69,7 @@ auto ScenarioSimulation::answer(double interval, std::span<const double> begin, 
         begin_[free_[k]] = begin[k];
         end_[free_[k]] = end[k];
     }
-    return train_.answer(interval, begin_, end_, shaft, out);
+    return motion().answer(interval, begin_, end_, shaft, out);
 }
 
 std::optional<ScenarioSimulation::GivenShaft> ScenarioSimulation::given_shaft(const std::string& name) const {
@@ -110,130 +105,111 @@ auto ScenarioSimulation::advance(double interval, std::span<const double> begin,
         }
         return row;
     };
-    return with([&](auto& s) {
-        const auto before = s.snapshot();
-        for (std::size_t k = 1; k < times.size(); ++k) {
-            const Status status = advance(times[k] - times[k - 1], inputs_at(times[k - 1]), inputs_at(times[k]));
-            if (status == Status::done) continue;
-            s.restore(before);
-            return status;
-        }
-        return Status::done;
-    });
+    MotionState before;
+    motion().save(before);
+    for (std::size_t k = 1; k < times.size(); ++k) {
+        const Status status = advance(times[k] - times[k - 1], inputs_at(times[k - 1]), inputs_at(times[k]));
+        if (status == Status::done) continue;
+        motion().restore(before);
+        return status;
+    }
+    return Status::done;
 }
 
 void ScenarioSimulation::hold(std::span<const double> inputs) {
-    with([&](auto& s) {
-        if (s.snapshot().started) return;
-        auto snapshot = s.snapshot();
-        for (std::size_t k = 0; k < free_.size(); ++k) snapshot.input[free_[k]] = inputs[k];
-        for (const Played& p : played_) snapshot.input[free_[p.input]] = p.line(snapshot.time);
-        s.restore(snapshot);
-    });
+    motion().save(scratch_);
+    if (!scratch_.started) {
+        for (std::size_t k = 0; k < free_.size(); ++k) scratch_.input[free_[k]] = inputs[k];
+        for (const Played& p : played_) scratch_.input[free_[p.input]] = p.line(scratch_.time);
+        motion().restore(scratch_);
+    }
     set_references(inputs, inputs, 1.0);
 }
 
 void ScenarioSimulation::place(double time, std::span<const double> states, std::span<const double> inputs) {
     for (Played& p : played_)
         if (time < p.signal.breakpoints[p.segment].time) p.segment = p.signal.segment(time);
-    with([&]<class S>(S& s) {
-        auto x = s.snapshot().x;
-        auto u = s.snapshot().input;
-        for (std::size_t k = 0; k < states.size(); ++k) x[place_of<typename S::D>(k)] = states[first_[k]];
-        for (std::size_t k = 0; k < free_.size(); ++k) u[free_[k]] = inputs[k];
-        for (const Played& p : played_) u[free_[p.input]] = p.line(time);
-        s.place(time, x, u);
-    });
+    motion().save(scratch_);
+    for (std::size_t k = 0; k < states.size(); ++k) scratch_.x[k] = states[first_[k]];
+    for (std::size_t k = 0; k < free_.size(); ++k) scratch_.input[free_[k]] = inputs[k];
+    for (const Played& p : played_) scratch_.input[free_[p.input]] = p.line(time);
+    motion().place(time, scratch_.x, scratch_.input);
     set_references(inputs, inputs, 1.0);
 }
 
 void ScenarioSimulation::states(double* out) const {
-    with([&]<class S>(const S& s) {
-        for (std::size_t k = 0; k < names_.states.size(); ++k) out[k] = s.snapshot().x[place_of<typename S::D>(k)];
-    });
+    for (std::size_t k = 0; k < names_.states.size(); ++k) out[k] = motion().state(static_cast<int>(k));
 }
 
 auto ScenarioSimulation::rates(double* out) -> Status {
-    return with([&]<class S>(S& s) {
-        const Status status = s.find_regime();
-        if (status != Status::done) return status;
-        const auto rates = s.rates();
-        for (std::size_t k = 0; k < names_.states.size(); ++k) out[k] = rates[place_of<typename S::D>(k)];
-        return status;
-    });
+    const Status status = motion().find_regime();
+    if (status == Status::done) motion().rates(out);
+    return status;
 }
 
 auto ScenarioSimulation::guards(double* out) -> Status {
-    return with([&](auto& s) {
-        const Status status = s.find_regime();
-        if (status == Status::done) std::ranges::copy(s.guards(), out);
-        return status;
-    });
+    const Status status = motion().find_regime();
+    if (status == Status::done) motion().guards(out);
+    return status;
 }
 
 auto ScenarioSimulation::settle() -> Status {
     follow_signals(time(), stopped);
-    return with([&](auto& s) {
-        auto snapshot = s.snapshot();
-        for (const Played& p : played_) snapshot.input[free_[p.input]] = p.line(snapshot.time);
-        s.restore(snapshot);
-        return s.settle();
-    });
+    motion().save(scratch_);
+    for (const Played& p : played_) scratch_.input[free_[p.input]] = p.line(scratch_.time);
+    motion().restore(scratch_);
+    return motion().settle();
 }
 
 auto ScenarioSimulation::read(double* out) -> Status {
-    const Status status = with([](auto& s) { return s.find_regime(); });
+    const Status status = motion().find_regime();
     if (status != Status::done) return status;
-    with([&](auto& s) { std::ranges::copy(s.values(), out); });
-    if (!laws_.empty()) with([&](const auto& in) { read_controllers(in.snapshot(), out); });
+    std::ranges::copy(motion().values(), out);
+    if (!laws_.empty()) read_controllers(out);
     variables_.derive(out, 1, 0);
     return status;
 }
 
 void ScenarioSimulation::go_on_from(const ScenarioSimulation& before) {
-    with([&]<class S>(S& to) {
-        before.with([&]<class From>(const From& from) {
-            if constexpr (std::is_same_v<S, From>) {
-                auto snapshot = from.snapshot();
-                snapshot.started = false;
-                to.restore(snapshot);
-            }
-        });
-    });
+    before.motion().save(scratch_);
+    scratch_.started = false;
+    train_.restore(scratch_);
     follow_signals(time(), accumulated);
+}
+
+MotionState ScenarioSimulation::whole_state() const {
+    MotionState s;
+    motion().save(s);
+    s.control.slots.resize(motion().control_slots());
+    return s;
 }
 
 std::size_t ScenarioSimulation::state_size() const {
     std::size_t n = 1;
-    with([&](const auto& s) { each_number_of_snapshot(s.snapshot(), s.control_slots(), [&](const auto&) { ++n; }); });
+    const MotionState s = whole_state();
+    each_number(s, [&](const auto&) { ++n; });
     return n;
 }
 
 void ScenarioSimulation::get_state(double* to) const {
     double* const first = to;
-    with([&](const auto& s) {
-        each_number_of_snapshot(s.snapshot(), s.control_slots(),
-                                [&](const auto& number) { *to++ = static_cast<double>(number); });
-    });
+    const MotionState s = whole_state();
+    each_number(s, [&](const auto& number) { *to++ = static_cast<double>(number); });
     *to = sum(first, to);
 }
 
 bool ScenarioSimulation::set_state(const double* from) {
     const std::size_t n = state_size();
     if (from[n - 1] != sum(from, from + n - 1)) return false;
-    with([&](auto& s) {
-        auto snapshot = s.snapshot();
-        each_number_of_snapshot(snapshot, s.control_slots(), [&](auto& number) {
-            number = static_cast<std::remove_reference_t<decltype(number)>>(*from++);
-        });
-        if (!snapshot.started && snapshot.control.next == 0) snapshot.control.slots.clear();
-        s.restore(snapshot);
-    });
+    MotionState s = whole_state();
+    each_number(s, [&](auto& number) { number = static_cast<std::remove_reference_t<decltype(number)>>(*from++); });
+    if (!s.started && s.control.next == 0) s.control.slots.clear();
+    motion().restore(s);
     follow_signals(time(), accumulated);
     return true;
 }
 
-bool ScenarioSimulation::restore(const TrainSimulation::Snapshot& from) {
+bool ScenarioSimulation::restore(const MotionState& from) {
     const bool well = train_.restore(from);
     if (well) follow_signals(time(), accumulated);
     return well;
@@ -329,7 +305,7 @@ void ScenarioSimulation::set_references(std::span<const double> begin, std::span
     for (std::size_t a = 0; a < names_.references.size(); ++a) {
         if (own_reference_[a]) continue;
         const std::size_t k = free_.size() + a;
-        with([&](auto& s) { s.set_reference(a, begin[k], (end[k] - begin[k]) / interval); });
+        motion().set_reference(a, begin[k], (end[k] - begin[k]) / interval);
     }
 }
 

@@ -4,45 +4,19 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 #include <limits>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
-#include <type_traits>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include "../simulation/given_motion.hpp"
-#include "../simulation/hybrid.hpp"
 #include "../simulation/train_stepping.hpp"
 #include "variables.hpp"
 
 namespace lostmotion {
-
-// What a snapshot consists of, number by number: use(number) may read or write. slots: how many the controllers have.
-template <class Snapshot, class Use>
-void each_number_of_snapshot(Snapshot& s, int slots, Use&& use) {
-    use(s.time);
-    for (auto& x : s.x) use(x);
-    for (auto& m : s.memory) use(m);
-    for (auto& m : s.key.modes) use(m);
-    for (auto& b : s.key.branch) use(b);
-    for (auto& u : s.input) use(u);
-    use(s.started);
-    use(s.steady);
-    each_number(s.course, use);
-    use(s.control.next);
-    if constexpr (!std::is_const_v<Snapshot>) s.control.slots.resize(static_cast<std::size_t>(slots));
-    for (std::size_t k = 0; k < static_cast<std::size_t>(slots); ++k) {
-        if constexpr (std::is_const_v<Snapshot>)
-            use(k < s.control.slots.size() ? s.control.slots[k] : 0.0);
-        else
-            use(s.control.slots[k]);
-    }
-}
 
 class ScenarioSimulation {
  public:
@@ -69,21 +43,13 @@ class ScenarioSimulation {
     // The present value of an input that follows its signal in the scenario; NaN of one that is given.
     double played_input(std::size_t k) const;
 
-    // use(simulation) with that of its kernel.
-    template <class Use>
-    decltype(auto) with(Use&& use) {
-        return train_.with(use);
-    }
-    template <class Use>
-    decltype(auto) with(Use&& use) const {
-        return train_.with(use);
-    }
     TrainSimulation& train() { return train_; }
     const TrainSimulation& train() const { return train_; }
 
-    double time() const {
-        return with([](const auto& s) { return s.time(); });
-    }
+    Motion& motion() { return train_.motion(); }
+    const Motion& motion() const { return train_.motion(); }
+
+    double time() const { return motion().time(); }
     // Why a status is what it is, in words; empty if all is well.
     std::string text(Status status) const;
 
@@ -130,24 +96,18 @@ class ScenarioSimulation {
     void states(double* out) const;
     // Of the states.
     Status rates(double* out);
-    std::size_t guard_count() const {
-        return with([]<class S>(const S&) { return static_cast<std::size_t>(S::n_guards); });
-    }
+    std::size_t guard_count() const { return motion().guard_count(); }
     Status guards(double* out);
     Status settle();
     // The next tick of sampled controllers, or breakpoint of a signal that is followed [s].
-    double next_event() const {
-        return std::fmin(next_breakpoint(time()), with([](const auto& s) { return s.next_tick(); }));
-    }
-    bool accept() {
-        return with([](auto& s) { return s.find_regime() == Status::done && s.accept(); });
-    }
+    double next_event() const { return std::fmin(next_breakpoint(time()), motion().next_tick()); }
+    bool accept() { return motion().find_regime() == Status::done && motion().accept(); }
 
     // All variables at the present instant, with the inputs at their last values.
     Status read(double* out);
 
-    // False: the snapshot is not one of such a simulation.
-    bool restore(const TrainSimulation::Snapshot& from);
+    // False: the state is not one of such a simulation.
+    bool restore(const MotionState& from);
 
     // Another scenario of the same elements, at the present state: the contacts are found anew.
     void go_on_from(const ScenarioSimulation& before);
@@ -187,22 +147,14 @@ class ScenarioSimulation {
     void name_reference(const Scenario& scenario, const ControlledAxis& axis);
     // The last inputs, each in a straight line from its first to its second value.
     void set_references(std::span<const double> begin, std::span<const double> end, double interval);
-    // Of a state, by its number among the names, that in the kernel.
-    template <class D>
-    std::size_t place_of(std::size_t k) const {
-        const auto coupled = static_cast<std::size_t>(train_.assembly().layout().coupled);
-        return k < coupled ? k : k - coupled + static_cast<std::size_t>(D::coupled);
-    }
-
     static void mix(std::uint64_t& hash, const void* bytes, std::size_t n);
     // What the controllers show. A motor with a winding has the torque of its currents, in the place of the straight
     // line that drives the mechanics.
-    template <class Snapshot>
-    void read_controllers(const Snapshot& now, double* out) const {
-        std::vector<const double*> slots{now.control.slots.data()};
+    void read_controllers(double* out) const {
+        std::vector<const double*> slots{motion().control().slots.data()};
         std::vector<std::array<double, control::n_winding_signals>> windings;
         for (const control::Axis& law : laws_) {
-            windings.push_back(winding_signals_of(law, now.time, slots.back()));
+            windings.push_back(winding_signals_of(law, time(), slots.back()));
             slots.push_back(slots.back() + law.slots());
         }
         double* to = out + variables_.first_shown();
@@ -213,9 +165,11 @@ class ScenarioSimulation {
                         : windings[a][static_cast<std::size_t>(shown.signal - control::n_axis_signals)];
         }
         for (std::size_t a = 0; a < laws_.size(); ++a)
-            if (laws_[a].field_orientation) out[torques_[a]] = laws_[a].winding_torque(now.time, slots[a]);
+            if (laws_[a].field_orientation) out[torques_[a]] = laws_[a].winding_torque(time(), slots[a]);
     }
 
+    // With room for all that the controllers remember, also before they begin.
+    MotionState whole_state() const;
     // Of the bits of numbers, as a number without a fraction.
     double sum(const double* first, const double* end) const;
 
@@ -230,6 +184,7 @@ class ScenarioSimulation {
     std::vector<Played> played_;
     std::vector<bool> own_reference_;  // of each reference, whether it is that of the scenario
     std::vector<double> begin_, end_;
+    MotionState before_, scratch_;  // their memory is used again
     std::uint64_t identity_ = 0;
 };
 

@@ -2,49 +2,17 @@
 // it.
 #pragma once
 
-#include <cstdint>
 #include <limits>
 #include <span>
 #include <vector>
 
+#include "../model/pack.hpp"
 #include "../solver/components.hpp"
 #include "../solver/exact_solver.hpp"
-#include "sample_times.hpp"
+#include "train_control.hpp"
 #include "winding_coupling.hpp"
 
 namespace lostmotion {
-
-// The controller of a motor, by the numbers of the motor, of the shafts that its encoders are on, and of that of its
-// reference.
-struct ControlledAxis {
-    control::Axis law;
-    int motor = 0;
-    int position_shaft = 0, speed_shaft = 0, reference_shaft = 0;
-};
-
-struct Control {
-    double tick = 1e-3;  // [s]
-    std::vector<ControlledAxis> axes;
-
-    bool present() const { return !axes.empty(); }
-    // How many of them each axis shows: those of a winding too if there is one.
-    int signals() const;
-    // The controllers, ready to run.
-    std::vector<control::Axis> laws() const;
-};
-
-// When the controllers run. An instant that only rounding parts from a tick is that of the tick.
-struct Ticks {
-    double length = 1e-3;          // [s]
-    double sample_interval = 0.0;  // [s] of a run's record, whose instants are ticks where both fall together; 0: none
-
-    double time(std::int64_t tick) const;
-    // Of two times: whether the first lies before the second by more than rounding.
-    bool before(double first, double second) const { return first < second - rounding(); }
-
- private:
-    double rounding() const { return 1e-9 * length; }
-};
 
 // The controllers of a run, all at the same base tick. Parameters only.
 template <class D>
@@ -58,48 +26,6 @@ struct ClosedLoop {
         for (const control::Axis& a : axes) n += a.slots();
         return n;
     }
-};
-
-// What the controllers remember, and when they run next.
-struct ControlCourse {
-    std::int64_t next = 0;      // tick
-    std::vector<double> slots;  // of all axes, one after the other
-};
-
-// Of an axis, 0 without a winding.
-inline std::array<double, control::n_winding_signals> winding_signals_of(const control::Axis& a, double time,
-                                                                         const double* slot) {
-    return a.field_orientation ? a.winding_signals(time, slot) : std::array<double, control::n_winding_signals>{};
-}
-
-// The signals of the axes at the instants of a record: out[(axis * signals + signal) * count + k] at k * interval.
-class ControlRecord {
- public:
-    ControlRecord(const SampleTimes& times, int signals, double* out) : times_(times), signals_(signals), out_(out) {}
-
-    // What holds before time `end`.
-    template <class D>
-    void hold_until(double end, const ClosedLoop<D>& loop, const ControlCourse& course) {
-        for (; next_ < times_.count && times_[next_] < end; ++next_) {
-            const double* slot = course.slots.data();
-            double* to = out_ + next_;
-            for (const control::Axis& a : loop.axes) {
-                for (int s = 0; s < control::n_axis_signals; ++s, to += times_.count) *to = a.signal(s, slot);
-                if (signals_ > control::n_axis_signals)
-                    for (const double v : winding_signals_of(a, times_[next_], slot)) {
-                        *to = v;
-                        to += times_.count;
-                    }
-                slot += a.slots();
-            }
-        }
-    }
-
- private:
-    SampleTimes times_;
-    int signals_;
-    double* out_;
-    std::size_t next_ = 0;
 };
 
 // Signals of which those that windings turn will be set to ramps. input(motor): its number among them.
@@ -213,7 +139,7 @@ class ClosedLoopRun {
     };
 
     void hold_until(double end, ControlRecord* record) const {
-        if (record != nullptr) record->hold_until(end, loop_, course_);
+        if (record != nullptr) record->hold_until(end, loop_.axes, course_);
     }
     // With windings, by the parts of a tick.
     Status advance_windings(double tick, double t_end, bool last_tick, Observer& observer, ControlRecord* record) {
@@ -279,24 +205,6 @@ class ClosedLoopRun {
     bool changed_ = false;
 };
 
-// What every run is asked for.
-struct RunRequest {
-    double duration = 1.0;          // [s]
-    double sample_interval = 1e-3;  // [s]
-    std::size_t samples = 0;        // instants to record: k * sample_interval, from k = 0, and no later than the end
-    bool energy = true;
-    std::size_t max_switchings = 100000;  // kept; all are counted
-    bool (*interrupted)(void*) = nullptr;
-    void* interrupted_context = nullptr;
-    Control control;                // nothing: the inputs alone act
-    double* control_out = nullptr;  // (axes x signals) x samples, as ControlRecord
-    // Of a run under controllers, the sample at which the observer may end it; 0: none. Up to there the run is the one
-    // that ends there, and it goes on as if there was no pause.
-    std::size_t pause = 0;
-
-    SampleTimes times() const { return {sample_interval, samples, duration}; }
-};
-
 // From a start to the end of the run, open loop or under the controllers of the request. make_loop(laws): these in the
 // system.
 template <class Solver, class MakeLoop>
@@ -323,7 +231,7 @@ Status run_recorded(Solver& solver, const StartOf<typename Solver::D>& start, co
     if (const Status s = run.advance(request.duration, observer, &record); s != Status::done) return s;
     const Status ended = run.show_end(observer);
     observer.finish(loop);
-    if (ended == Status::done) record.hold_until(std::numeric_limits<double>::infinity(), loop, run.course());
+    if (ended == Status::done) record.hold_until(std::numeric_limits<double>::infinity(), loop.axes, run.course());
     return ended;
 }
 
@@ -334,6 +242,21 @@ auto inputs_at_end(Solver& solver, const Signals& signals, const Control& contro
     InputState<typename Solver::D> input(signals, solver.basis());
     input.anchor(solver.time());
     return input.values();
+}
+
+// The controllers in a train. The laws are those of `laws`, which must stay.
+template <class D>
+ClosedLoop<D> closed_loop_of(const model::Assembly& a, const Control& control, const std::vector<control::Axis>& laws) {
+    ClosedLoop<D> loop{{control.tick}, laws, {}};
+    for (const AxisRows& rows : axis_rows(a, control)) {
+        AxisPlace<D>& p = loop.places.emplace_back();
+        p.input = rows.command;
+        auto row = rows.measured.begin();
+        for (auto* form : {&p.position_angle, &p.speed_angle, &p.speed, &p.motor_torque, &p.rotor_angle, &p.rotor_speed,
+                           &p.shaft_angle})
+            *form = model::pack<D>(*row++, a.layout());
+    }
+    return loop;
 }
 
 }  // namespace lostmotion

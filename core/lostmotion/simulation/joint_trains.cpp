@@ -24,7 +24,7 @@ void JointTrains::set_commands(std::span<const double> values) {
     for (std::size_t k = 0; k < joints_.size(); ++k) {
         Joint& j = joints_[k];
         if (j.command < 0)
-            j.train->with([&](auto& s) { s.set_reference(0, values[k], 0.0); });
+            j.train->motion().set_reference(0, values[k], 0.0);
         else
             j.inputs[static_cast<std::size_t>(j.command)] = values[k] * j.command_scale;
     }
@@ -42,11 +42,10 @@ void JointTrains::set_guess(std::size_t joint, const Guess& g) {
 }
 
 void JointTrains::read() {
-    for (Joint& j : joints_)
-        j.train->with([&](const auto& s) {
-            j.speed = s.snapshot().x[j.shaft.speed_state];
-            j.angle = s.snapshot().x[j.shaft.angle_state];
-        });
+    for (Joint& j : joints_) {
+        j.speed = j.train->motion().state(j.shaft.speed_state);
+        j.angle = j.train->motion().state(j.shaft.angle_state);
+    }
 }
 
 Status JointTrains::respond(std::size_t joint, double interval, double slope) {
@@ -55,7 +54,7 @@ Status JointTrains::respond(std::size_t joint, double interval, double slope) {
     begin_inputs_ = end_inputs_ = j.inputs;
     begin_inputs_[static_cast<std::size_t>(j.shaft.load)] -= 0.5 * interval * slope;
     end_inputs_[static_cast<std::size_t>(j.shaft.load)] += 0.5 * interval * slope;
-    const Status status = j.train->answer(interval, begin_inputs_, end_inputs_, j.shaft, answer_[joint]);
+    const Status status = j.train->motion().answer(interval, begin_inputs_, end_inputs_, j.shaft, answer_[joint]);
     if (status != Status::done) failed_ = joint;
     return status;
 }
@@ -93,12 +92,12 @@ bool JointTrains::solve() {
 
 Status JointTrains::substep(double interval) {
     const std::size_t n = joints_.size();
-    for (Joint& j : joints_) j.train->with([](auto& s) { s.keep_here(); });
+    for (Joint& j : joints_) j.train->motion().save(j.substep_begin);
     double best = 0.0;
     double share = 1.0;  // of the last change that is taken
     for (int iteration = 0;; ++iteration) {
         for (std::size_t k = 0; k < n; ++k) {
-            if (iteration > 0) joints_[k].train->with([](auto& s) { s.go_back(); });
+            if (iteration > 0) joints_[k].train->motion().restore(joints_[k].substep_begin);
             if (const Status status = respond(k, interval, slope_[k]); status != Status::done) return status;
         }
         double worst = 0.0;  // over what rounding leaves
@@ -148,7 +147,7 @@ Status JointTrains::substep(double interval) {
 Status JointTrains::step(double interval, int substeps, const Mechanics& m) {
     const std::size_t n = joints_.size();
     for (std::size_t k = 0; k < joints_.size(); ++k) {
-        joints_[k].train->with([](auto& s) { s.keep_begin(); });
+        joints_[k].train->motion().save(joints_[k].step_begin);
         begin_speed_[k] = joints_[k].speed;
         joints_[k].torque = 0.0;
     }
@@ -174,7 +173,7 @@ Status JointTrains::step(double interval, int substeps, const Mechanics& m) {
 }
 
 void JointTrains::go_back() {
-    for (Joint& j : joints_) j.train->with([](auto& s) { s.go_back_to_begin(); });
+    for (Joint& j : joints_) j.train->motion().restore(j.step_begin);
     read();
 }
 

@@ -32,6 +32,7 @@ class JointTrains {
         double speed = 0.0, angle = 0.0;  // of the joint, now [rad/s, rad]
         double acceleration = 0.0;        // mean over the last step [rad/s^2]
         double compliance = 0.0;          // c_i of the last substep [1/(kg m2)]
+        MotionState step_begin = {}, substep_begin = {};
     };
 
     // The trains must stay.

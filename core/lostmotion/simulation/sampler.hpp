@@ -12,18 +12,19 @@
 #include "../kernel/stride.hpp"
 #include "../solver/exact_solver.hpp"
 #include "sample_times.hpp"
+#include "train_channels.hpp"
 
 namespace lostmotion {
 
 // Writes samples at some instants, channel by channel: out[c * count + k] is that of channels[c].
 // Reader(model, regime, memory) reads them.
-template <class System, class Reader, class Model>
+template <class System, class Reader>
 class SamplerOf : public Observer<System> {
  public:
     using D = typename System::Dims;
     using Instants = InstantsOf<D>;
 
-    SamplerOf(const Model& model, const SampleTimes& times, double* out, std::span<const int> channels)
+    SamplerOf(const TrainModel& model, const SampleTimes& times, double* out, std::span<const int> channels)
         : model_(model), times_(times), out_(out), channels_(channels) {}
 
     Interruption interruption;
@@ -182,7 +183,7 @@ class SamplerOf : public Observer<System> {
         }
     }
 
-    const Model& model_;
+    const TrainModel& model_;
     SampleTimes times_;
     double per_interval_ = 1.0 / times_.interval;  // rounded
     std::size_t next_ = 0;

@@ -26,14 +26,21 @@ class AdaptiveTrainObserver final : public Observer<model::TrainSystem<D>> {
 };
 
 template <class D>
-TrainReport run_train_adaptively_in(const typename TrainReader<D>::Model& model, const std::vector<Signal>& inputs,
-                                    std::span<const double> start, std::span<const double> memory,
-                                    const TrainOptions& options, double* out) {
+class AdaptiveKernelIn final : public AdaptiveKernel {
+ public:
+    explicit AdaptiveKernelIn(const char* name) : AdaptiveKernel(name, sizes_of<D>) {}
+    TrainReport run(const TrainModel& model, const RunStart& start, const TrainOptions& options,
+                    double* out) const override;
+};
+
+template <class D>
+TrainReport AdaptiveKernelIn<D>::run(const TrainModel& model, const RunStart& start, const TrainOptions& options,
+                                     double* out) const {
     using System = model::TrainSystem<D>;
     TrainReport report;
-    report.message = check_run(model.assembly, start, options.control);
+    report.message = check_run(model.assembly, start.start, options.control);
     if (!report.message.empty()) return report;
-    const PackedRun<D> c(model.assembly, inputs, start, memory, options);
+    const PackedRun<D> c(model.assembly, start, options);
     TrainRecorder<D> recorder(model, options, out, report, nullptr);
     const System system(model.assembly);
     AdaptiveSolver<System> solver(system, c.signals, options.tolerance, system.rated_scale());

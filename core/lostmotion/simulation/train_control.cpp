@@ -1,5 +1,8 @@
 #include "train_control.hpp"
 
+#include "../model/names.hpp"
+#include "../model/shaft_angle.hpp"
+
 namespace lostmotion {
 
 std::string check_control(const model::Assembly& a, const Control& control) {
@@ -28,6 +31,24 @@ std::string check_control(const model::Assembly& a, const Control& control) {
             return error;
     }
     return "";
+}
+
+std::vector<AxisRows> axis_rows(const model::Assembly& a, const Control& control) {
+    std::vector<AxisRows> out;
+    for (const ControlledAxis& axis : control.axes) {
+        const auto speed_of = [&](int shaft) { return a.places().shafts[static_cast<std::size_t>(shaft)].speed; };
+        const model::MotorPlace& place = a.places().motors[static_cast<std::size_t>(axis.motor)];
+        const model::ShaftMotor& motor = a.train().motors[static_cast<std::size_t>(axis.motor)];
+        const int rotor = speed_of(motor.shaft);
+        out.push_back({place.command,
+                       {*model::shaft_angle(a, axis.position_shaft), *model::shaft_angle(a, axis.speed_shaft),
+                        model::Row::unit(speed_of(axis.speed_shaft)),
+                        motor.law.torque<model::Row>(
+                            {place.torque, rotor, a.layout().first_input + place.command, a.layout().one}),
+                        model::shaft_angle(a, motor.shaft).value_or(model::Row{}), model::Row::unit(rotor),
+                        axis.law.camera.present ? *model::shaft_angle(a, axis.reference_shaft) : model::Row{}}});
+    }
+    return out;
 }
 
 }  // namespace lostmotion

@@ -1,45 +1,15 @@
-// What can be read of a train at an instant: the channels of a record.
+// The channels of a train, as a kernel reads them.
 #pragma once
 
 #include <algorithm>
 #include <array>
-#include <string>
 #include <vector>
 
 #include "../kernel/stride.hpp"
-#include "../model/names.hpp"
 #include "../model/system.hpp"
+#include "train_point.hpp"
 
 namespace lostmotion {
-
-// At a jump a channel has its right limit.
-struct TrainChannel {
-    enum Kind {
-        input,
-        state,
-        motor_torque,
-        output_torque,
-        input_torque,
-        contact_torque,
-        drive_torque,
-        massless_speed,
-        loss_coefficient,
-        contact_mode,
-        shaft_sign,  // of the speed: what shows how a contact slips that the train does not have
-        twist_sign,
-        output,
-        error
-    } kind;
-    int index;  // of the input, state, motor, gear, contact, given motion, shaft without inertia, shaft or controller
-    std::string name, unit, meaning, symbol = {};
-};
-
-// The inputs from this one on are those of the controllers.
-std::size_t first_reference(const model::Assembly& a);
-
-void add_controller_channels(const model::Assembly& a, int controller, std::vector<TrainChannel>& out);
-
-std::vector<TrainChannel> train_channels(const model::Assembly& a);
 
 // Reads the channels in one regime, as many instants at once as the instruction set holds numbers.
 template <class D>
@@ -47,13 +17,8 @@ class TrainReader {
  public:
     using Memory = typename D::Memory;
     using Instants = InstantsOf<D>;
-    // What a reader is made for.
-    struct Model {
-        const model::Assembly& assembly;
-        const std::vector<TrainChannel>& channels;
-    };
 
-    TrainReader(const Model& m, const model::TrainRegime<D>& r, const Memory& memory)
+    TrainReader(const TrainModel& m, const model::TrainRegime<D>& r, const Memory& memory)
         : model_(m), regime_(r), memory_(memory) {}
 
     // A channel at the first n instants, rounded up to whole vectors.
@@ -197,9 +162,23 @@ class TrainReader {
         return constant + own + forced;
     }
 
-    const Model& model_;
+    const TrainModel& model_;
     const model::TrainRegime<D>& regime_;
     const Memory& memory_;
 };
+
+template <class D>
+TrainPoint point_of(const TrainModel& model, const model::TrainRegime<D>& r, double time, const StateOf<D>& x,
+                    const typename D::Memory& memory, const InputsOf<D>& u) {
+    const model::Layout& n = model.assembly.layout();
+    TrainPoint p;
+    p.now.time = time;
+    model::unpack_state<D>(x, n, p.now.x.begin());
+    std::copy_n(memory.begin(), n.memory, p.now.memory.begin());
+    std::copy_n(u.begin(), n.inputs, p.now.input[0].begin());
+    p.key = r.key;
+    p.values = TrainReader<D>(model, r, memory)(x, u);
+    return p;
+}
 
 }  // namespace lostmotion

@@ -101,9 +101,8 @@ template <class D>
 class TrainRecorder final : public Observer<model::TrainSystem<D>> {
  public:
     using System = model::TrainSystem<D>;
-    using Model = typename TrainReader<D>::Model;
 
-    TrainRecorder(const Model& m, const TrainOptions& options, double* out, TrainReport& report,
+    TrainRecorder(const TrainModel& m, const TrainOptions& options, double* out, TrainReport& report,
                   TrainWatcher<D>* watcher)
         : watcher_(watcher),
           model_(m),
@@ -160,7 +159,7 @@ class TrainRecorder final : public Observer<model::TrainSystem<D>> {
     }
 
  private:
-    static std::vector<int> all(const Model& m) {
+    static std::vector<int> all(const TrainModel& m) {
         std::vector<int> numbers(m.channels.size());
         std::iota(numbers.begin(), numbers.end(), 0);
         return numbers;
@@ -169,12 +168,12 @@ class TrainRecorder final : public Observer<model::TrainSystem<D>> {
     bool keeps_switching() const { return report_.switchings.size() < options_.max_switchings; }
 
     TrainWatcher<D>* watcher_;
-    const Model& model_;
+    const TrainModel& model_;
     const TrainOptions& options_;
     double* out_;
     TrainReport& report_;
     std::vector<int> channels_;
-    SamplerOf<System, TrainReader<D>, Model> sampler_;
+    SamplerOf<System, TrainReader<D>> sampler_;
     TrainMeter<D> meter_;
     DenseSamples dense_samples_;
 };

@@ -88,31 +88,6 @@ struct TrainReport {
     // Energy [J] that no power is the rate of.
     void add(const std::string& name, model::PowerFlow::Kind kind, double more);
 
-    template <class System, class Solver>
-    void ended(const System& system, Solver& solver) {
-        const model::Assembly& a = system.assembly();
-        const model::Layout& n = a.layout();
-        time = solver.time();
-        contact = solver.stopped_at();
-        switching_count = solver.switchings();
-        searches = system.searches();
-        too_many_guards = system.overflowed();
-        x.resize(static_cast<std::size_t>(n.states));
-        const auto& r = solver.regime();
-        const auto state = solver.state();
-        model::unpack_state<typename System::Dims>(state, n, x.begin());
-        memory.assign(solver.memory().begin(), solver.memory().begin() + n.memory);
-        const auto input = solver.input_before(time, state);
-        // What rest leaves open may have gone along with the limit of a contact since its regime began.
-        for (std::size_t c = 0; c < a.places().contacts.size(); ++c) {
-            const model::ContactPlace& place = a.places().contacts[c];
-            if (place.locked == model::nowhere) continue;
-            const auto& torque =
-                place.kind == model::ContactPlace::gear ? r.output_torque[place.element] : r.contact_torque[c];
-            memory[static_cast<std::size_t>(place.locked)] =
-                evaluate<typename System::Dims>(torque, state, solver.memory(), input);
-        }
-    }
     // What the balance fails by [J].
     double residual() const;
 };

@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "stepping.hpp"
+#include "train_motion.hpp"
 #include "train_recorder.hpp"
 #include "train_run.hpp"
 
@@ -14,9 +14,9 @@ inline constexpr char kernel_of = 0;  // its address tells kernels apart
 
 // A train with the regimes that its runs have met.
 template <class D>
-struct TrainWorkspace final : AnyWorkspace {
+struct TrainWorkspace final : Workspace {
     explicit TrainWorkspace(const model::Assembly& assembly)
-        : AnyWorkspace(&kernel_of<D>), system(assembly), cache(system) {
+        : Workspace(&kernel_of<D>), system(assembly), cache(system) {
         of = &assembly;
     }
     StateOf<D> balanced_scale() const { return system.balanced_scale(); }
@@ -36,16 +36,42 @@ struct TrainWorkspace final : AnyWorkspace {
     RegimeCache<model::TrainSystem<D>> cache;
 };
 
+// What a run has ended with.
+template <class System, class Solver>
+void end_report(TrainReport& report, const System& system, Solver& solver) {
+    const model::Assembly& a = system.assembly();
+    const model::Layout& n = a.layout();
+    report.time = solver.time();
+    report.contact = solver.stopped_at();
+    report.switching_count = solver.switchings();
+    report.searches = system.searches();
+    report.too_many_guards = system.overflowed();
+    report.x.resize(static_cast<std::size_t>(n.states));
+    const auto& r = solver.regime();
+    const auto state = solver.state();
+    model::unpack_state<typename System::Dims>(state, n, report.x.begin());
+    report.memory.assign(solver.memory().begin(), solver.memory().begin() + n.memory);
+    const auto input = solver.input_before(report.time, state);
+    // What rest leaves open may have gone along with the limit of a contact since its regime began.
+    for (std::size_t c = 0; c < a.places().contacts.size(); ++c) {
+        const model::ContactPlace& place = a.places().contacts[c];
+        if (place.locked == model::nowhere) continue;
+        const auto& torque =
+            place.kind == model::ContactPlace::gear ? r.output_torque[place.element] : r.contact_torque[c];
+        report.memory[static_cast<std::size_t>(place.locked)] =
+            evaluate<typename System::Dims>(torque, state, solver.memory(), input);
+    }
+}
+
 // What a run begins with, by the layout of a kernel: signals, state, and the controllers in the train.
 template <class D>
 struct PackedRun {
-    PackedRun(const model::Assembly& a, const std::vector<Signal>& inputs, std::span<const double> x,
-              std::span<const double> m, const TrainOptions& options)
+    PackedRun(const model::Assembly& a, const RunStart& s, const TrainOptions& options)
         : assembly(a),
           options(options),
-          signals(with_ramps(model::packed_signals<D>(inputs), options.control,
+          signals(with_ramps(model::packed_signals<D>(s.inputs), options.control,
                              [&](int motor) { return a.places().motors[static_cast<std::size_t>(motor)].command; })),
-          start(model::packed_start<D>(a.layout(), x, m)) {}
+          start(model::packed_start<D>(a.layout(), s.start, s.memory)) {}
 
     auto in_train() const {
         return [this](const auto& laws) { return closed_loop_of<D>(assembly, options.control, laws); };
@@ -53,7 +79,7 @@ struct PackedRun {
     // Into the report of a recorded run, what it has ended with.
     template <class System, class Solver>
     void end(TrainReport& report, const System& system, Solver& solver) const {
-        report.ended(system, solver);
+        end_report(report, system, solver);
         report.stored_change =
             model::stored_change(assembly, start.x, solver.state(), assembly.meshes_at(start.x), solver.regime().key);
         const auto remembered = [&](int place) {
@@ -75,15 +101,14 @@ struct PackedRun {
     StartOf<D> start;
 };
 
+// As Kernel::run. watcher: sees the run, or nullptr.
 template <class D>
-TrainReport run_train_exactly_in(const typename TrainReader<D>::Model& model, const std::vector<Signal>& inputs,
-                                 std::span<const double> start, std::span<const double> memory,
-                                 const TrainOptions& options, double* out, TrainWatcher<D>* watcher,
-                                 std::unique_ptr<AnyWorkspace>& workspace) {
+TrainReport run_train_exactly_in(const TrainModel& model, const RunStart& start, const TrainOptions& options,
+                                 double* out, TrainWatcher<D>* watcher, std::unique_ptr<Workspace>& workspace) {
     TrainReport report;
-    report.message = check_run(model.assembly, start, options.control);
+    report.message = check_run(model.assembly, start.start, options.control);
     if (!report.message.empty()) return report;
-    const PackedRun<D> c(model.assembly, inputs, start, memory, options);
+    const PackedRun<D> c(model.assembly, start, options);
     TrainRecorder<D> recorder(model, options, out, report, watcher);
     if (!workspace || workspace->kernel != &kernel_of<D>)
         workspace = std::make_unique<TrainWorkspace<D>>(model.assembly);
@@ -102,18 +127,33 @@ TrainReport run_train_exactly_in(const typename TrainReader<D>::Model& model, co
 }
 
 template <class D>
-TrainReport reach_train_in(const typename TrainReader<D>::Model& model, const std::vector<Signal>& inputs,
-                           std::span<const double> start, std::span<const double> memory, const TrainOptions& options,
-                           TrainPoint& point) {
+class KernelIn final : public Kernel {
+ public:
+    explicit KernelIn(const char* name) : Kernel(name, sizes_of<D>) {}
+    std::unique_ptr<Motion> motion(const TrainModel& model, double step, const Control& control,
+                                   const InputSines& sines) const override {
+        return std::make_unique<TrainMotion<D>>(model, step, control, sines);
+    }
+    TrainReport run(const TrainModel& model, const RunStart& start, const TrainOptions& options, double* out,
+                    std::unique_ptr<Workspace>& workspace) const override {
+        return run_train_exactly_in<D>(model, start, options, out, nullptr, workspace);
+    }
+    TrainReport reach(const TrainModel& model, const RunStart& start, const TrainOptions& options,
+                      TrainPoint& point) const override;
+};
+
+template <class D>
+TrainReport KernelIn<D>::reach(const TrainModel& model, const RunStart& start, const TrainOptions& options,
+                               TrainPoint& point) const {
     TrainReport report;
-    report.message = check_run(model.assembly, start, options.control);
+    report.message = check_run(model.assembly, start.start, options.control);
     if (!report.message.empty()) return report;
-    const PackedRun<D> c(model.assembly, inputs, start, memory, options);
+    const PackedRun<D> c(model.assembly, start, options);
     const model::TrainSystem<D> system(model.assembly);
     ExactSolver<model::TrainSystem<D>> solver(system, c.signals, options.sample_interval, system.balanced_scale());
     Observer<model::TrainSystem<D>> nothing;
     report.status = run_recorded(solver, c.start, options, nothing, c.in_train());
-    report.ended(system, solver);
+    end_report(report, system, solver);
     if (report.status != Status::done) return report;
     point = point_of<D>(model, solver.regime(), solver.time(), solver.state(), solver.memory(),
                         inputs_at_end(solver, c.signals, options.control));

@@ -60,7 +60,7 @@ def source_files(
     listed = directory / "names.txt"
     if not listed.is_file():
         raise InputError(f"{directory}: has no sources of an FMU; run `make fmu-library` in a checkout")
-    yield "configuration.hpp", _configuration(fmi, kernel, identifier, listed.read_text(encoding="utf-8").split())
+    yield "configuration.hpp", _configuration(fmi, identifier, listed.read_text(encoding="utf-8").split())
     for name, source in (("solving", f"solving_{kernel}"), ("model", "model"), ("fmi", f"fmi{fmi}")):
         yield f"{name}.cpp", (directory / f"{source}.cpp").read_text(encoding="utf-8")
     yield "lostmotion.hpp", (directory / "lostmotion.hpp").read_text(encoding="utf-8")
@@ -75,14 +75,13 @@ def _override(fmi: int) -> str:
     return f"FMI{fmi}_OVERRIDE_FUNCTION_PREFIX"
 
 
-def _configuration(fmi: int, kernel: str, identifier: str, names: list[str]) -> str:
+def _configuration(fmi: int, identifier: str, names: list[str]) -> str:
     """The header that makes the sources those of one FMU."""
     functions = [name for name in names if name.startswith(f"fmi{fmi}")]
     others = [name for name in names if not name.startswith("fmi")]
     lines = [
-        "// The kernel that this scenario needs, and names that no other FMU in the same program has.",
+        "// Names that no other FMU in the same program has.",
         "#pragma once",
-        f"#define LOSTMOTION_KERNEL {kernel}",
         "#define LOSTMOTION_EMBEDDED",
         "#define LM_API",
         "#ifdef _MSC_VER",

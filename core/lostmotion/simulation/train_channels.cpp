@@ -1,4 +1,4 @@
-#include "train_reader.hpp"
+#include "train_channels.hpp"
 
 namespace lostmotion {
 

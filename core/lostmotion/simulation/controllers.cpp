@@ -1,4 +1,6 @@
-#include "closed_loop.hpp"
+#include "controllers.hpp"
+
+#include <cmath>
 
 namespace lostmotion {
 

@@ -1,4 +1,4 @@
-#include "train_response.hpp"
+#include "power_channels.hpp"
 
 namespace lostmotion {
 

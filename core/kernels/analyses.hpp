@@ -1,0 +1,30 @@
+// What analyses runs in a kernel, compiled for the dimensions D.
+#pragma once
+
+#include "lostmotion/analysis/analyses.hpp"
+#include "lostmotion/analysis/sensitive_solving.hpp"
+#include "lostmotion/analysis/train_response.hpp"
+#include "lostmotion/simulation/train_adaptive.hpp"
+#include "solving.hpp"
+
+namespace lostmotion {
+
+template <class D>
+class AnalysesIn final : public Analyses {
+ public:
+    explicit AnalysesIn(const char* name) : Analyses(name, sizes_of<D>) {}
+    ResponseTable respond(const TrainModel& model, const std::vector<ResponseRequest>& points, const ResponseSpec& spec,
+                          unsigned threads, const Waiting& waiting) const override {
+        return respond_train_in<D>(model, points, spec, threads, waiting);
+    }
+    TrainReport run_with_derivatives(const TrainModel& model, const SensitiveCase& c, double* out,
+                                     SensitivityOutput& output) const override {
+        return SensitiveRuns<D>(model)(c, c.options, out, output);
+    }
+    void run_sensitive(const TrainModel& model, std::span<const SensitiveCase> cases, std::span<SensitiveRow> rows,
+                       const std::vector<std::string>& channels, bool signals, std::atomic<bool>& stop) const override {
+        run_sensitive_cases<D>(model, cases, rows, channels, signals, stop);
+    }
+};
+
+}  // namespace lostmotion
