@@ -44,8 +44,8 @@ TEST_SUITE("dying_out") {
         for (const double step : {1e-3, 0.0137}) {
             Simulation simulation(drive, step);
             while (simulation.train.motion().time() < 3.0 - 1e-9)
-                REQUIRE(simulation.advance(std::min(step, 3.0 - simulation.train.motion().time()), 0.3, 0.3, 0.0, 0.0) ==
-                        Status::done);
+                REQUIRE(simulation.advance(std::min(step, 3.0 - simulation.train.motion().time()), 0.3, 0.3, 0.0,
+                                           0.0) == Status::done);
             const model::Instant end = point(simulation.train).now;
             check_same(plain, end.x, end.memory);
         }

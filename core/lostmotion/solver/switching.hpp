@@ -6,8 +6,8 @@
 #include "../kernel/flow.hpp"
 #include "../kernel/inputs.hpp"
 #include "../kernel/rates.hpp"
-#include "status.hpp"
 #include "observer.hpp"
+#include "status.hpp"
 
 namespace lostmotion {
 
