@@ -436,7 +436,11 @@ def test_the_command_says_what_is_unstable_and_fails(tmp_path: Any) -> None:
     scenario = str(ROOT / "scenarios" / "position-axis.toml")
     done = lostmotion("servo", scenario, "--set", "controller.position.gain=2000 1/s", cwd=tmp_path)
     assert done.returncode == 1
-    assert done.stdout.splitlines()[1].split(maxsplit=1)[1].startswith("does not fit: unstable: position (first stiffness)")
+    assert (
+        done.stdout.splitlines()[1]
+        .split(maxsplit=1)[1]
+        .startswith("does not fit: unstable: position (first stiffness)")
+    )
     assert list(tmp_path.iterdir()) == []  # no directory was asked for
     done = lostmotion("servo", scenario, "--tune", "identical_radius", cwd=tmp_path)
     assert (done.returncode, len(done.stderr.splitlines())) == (1, 1)

@@ -173,9 +173,7 @@ def page_cores(kernels: Sequence[str], optimisation: str = "-O3") -> list[Path]:
     PAGE_CORES.mkdir(parents=True, exist_ok=True)
     with (PAGE_CORES / ".lock").open("w") as lock, ThreadPoolExecutor(os.cpu_count()) as pool:
         fcntl.flock(lock, fcntl.LOCK_EX)  # one process compiles, the others wait
-        own = [
-            pool.submit(compiled, [KERNELS[k]], kernel_target(k), optimisation, PAGE_CORES / k) for k in kernels
-        ]
+        own = [pool.submit(compiled, [KERNELS[k]], kernel_target(k), optimisation, PAGE_CORES / k) for k in kernels]
         shared = ((TICKS, optimisation), (REGIMES, "-O2"), (PAGE_SOURCES, "-Oz"))
         rest = [pool.submit(compiled, group, WASM_CODE, level, PAGE_CORES) for group, level in shared]
         made = [part.result() for part in rest]

@@ -30,7 +30,7 @@ class LockedTorques {
     // Each torque is as it was or at a bound in a regime, which is that at rest or, where contacts have come to their
     // limits and turn back at once, that at the limits, which gives the other torques.
     struct Hold {
-        std::shared_ptr<const Regime> at_limit;                // empty: the regime at rest itself
+        std::unique_ptr<const Regime> at_limit;                // empty: the regime at rest itself
         std::array<model::Bound, model::max_contacts> bounds;  // in the order of that regime's locked torques
     };
     // torques: those before. Nothing if the torques are elsewhere.
@@ -53,7 +53,7 @@ class LockedTorques {
                 for (std::size_t k = 0; k < used_up.size(); ++k)
                     if (some >> k & 1)
                         modes.modes[used_up[k]->contact] = static_cast<std::int8_t>(used_up[k]->neighbour);
-                auto at_limit = std::make_shared<const Regime>(system_.build_at(rest, modes, now));
+                auto at_limit = std::make_unique<const Regime>(system_.build_at(rest, modes, now));
                 if (!at_limit->solvable || !holds(*at_limit, rest, torques, x, memory, u, hold.bounds)) continue;
                 hold.at_limit = std::move(at_limit);
                 return hold;

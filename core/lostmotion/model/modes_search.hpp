@@ -137,6 +137,17 @@ Found SwitchedTrain<Sizes>::start(Cache& cache, Now& now, Key& key) const {
     });
     for (const auto& e : places().acting)
         if (e->turn != nowhere) now.memory[e->turn] = e->turn_at(now.x[places().shafts[e->shaft].angle]);
+    // A run that goes on from the end of another keeps the torques that rest has left open there, if it can.
+    const auto has_torque = [&](const ContactPlace& p) { return p.locked != nowhere && now.memory[p.locked] != 0.0; };
+    if (std::any_of(places().contacts.begin(), places().contacts.end(), has_torque)) {
+        Now going_on = now;
+        Key kept = key;
+        if (find(cache, going_on, now, event, kept) == Found::yes) {
+            now = going_on;
+            key = kept;
+            return Found::yes;
+        }
+    }
     return find(cache, now, before, event, key);
 }
 
