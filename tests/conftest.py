@@ -1,15 +1,20 @@
 """Shared by the tests."""
 
+import contextlib
+import gc
+import io
 import os
 import signal
 import subprocess
 import sys
+import warnings
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor
 from importlib.util import find_spec
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -17,6 +22,7 @@ import pytest
 
 import lostmotion as lm
 from lostmotion import _instruction_set
+from lostmotion.cli import main
 
 ROOT = Path(__file__).parent.parent
 ALL_SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))
@@ -98,6 +104,30 @@ def run_in_build(build: str, *arguments: str) -> subprocess.CompletedProcess[str
     )
 
 
+def lostmotion(*arguments: object, cwd: Path) -> subprocess.CompletedProcess[str]:
+    """The command, called in a directory: what it prints and its exit code. In this process, as it takes longer to start than to run."""
+    words = ["lostmotion", *map(str, arguments)]
+    out, err, thresholds, code = io.StringIO(), io.StringIO(), gc.get_threshold(), None
+    with (
+        contextlib.chdir(cwd),
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+        warnings.catch_warnings(),
+        mock.patch.object(sys, "argv", words),
+        mock.patch.dict(os.environ),
+    ):
+        warnings.resetwarnings()
+        for kind in (DeprecationWarning, PendingDeprecationWarning, ImportWarning, ResourceWarning):
+            warnings.simplefilter("ignore", kind)
+        try:
+            main()
+        except SystemExit as end:
+            code = end.code
+        finally:
+            gc.set_threshold(*thresholds)
+    return subprocess.CompletedProcess(words, int(code or 0), out.getvalue(), err.getvalue())
+
+
 def rows_by_any_threads_and_executor(study: lm.studies.Study, directory: Path) -> pa.Table:
     """The table of a study, having found that one thread, three and processes give the same; in folder `1` of the directory."""
     one = pq.ParquetDataset(lm.study(study, directory / "1", threads=1)).read()
@@ -112,7 +142,7 @@ def rows_by_any_threads_and_executor(study: lm.studies.Study, directory: Path) -
 # Files whose tests take long, and why they are worth it. `make check` leaves them out; `make test` runs them and prints their time.
 SLOW = {
     "test_closed_loop_response.py": "periodic motions under sampled control against long runs: no closed form covers them",
-    "test_command_line.py": "each command in a process of its own, as a user calls it",
+    "test_command_line.py": "what commands import, in processes of their own",
     "test_docs.py": "every code block, number and link of the documentation is executed or followed",
     "test_field_oriented.py": "500 random axes against the full equations of the winding, the only second method for it",
     "test_fmu.py": "FMUs of every scenario by another importer",

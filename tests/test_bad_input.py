@@ -3,8 +3,6 @@
 import math
 import pickle
 import re
-import subprocess
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import lostmotion as lm
-from conftest import ROOT
+from conftest import ROOT, lostmotion
 from lostmotion.inputs.validation import listed, nearest
 from lostmotion.simulation.scenario import Scenario
 from lostmotion.studies.expressions import Expression
@@ -536,12 +534,6 @@ def test_a_jamming_gear_is_refused_with_the_advice_to_give_it_a_compliance(tmp_p
 # --- the command line --------------------------------------------------------------------------------------
 
 
-def lostmotion(*arguments: str | Path, cwd: Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "lostmotion", *map(str, arguments)], cwd=cwd, capture_output=True, text=True, check=False
-    )
-
-
 CALLS = [
     ("a file that is not there", ["run", "nothing.toml"], ["nothing.toml", "no such file"]),
     ("a file with a near name", ["run", "goood.toml"], ["did you mean good.toml"]),
@@ -610,10 +602,8 @@ def test_titles_and_names_of_files_do_not_command_the_terminal(tmp_path: Path) -
     calls += [["drive", "check", "e\x1b[31m\x07.toml"], ["run", "e\x1b[31m\x07.toml", "--set", "load.inertia=\x1b\x07"]]
     calls += [["study", "show", "\x1b\x07"], ["run", "--no\x1b\x07"]]
     for arguments in calls:
-        done = subprocess.run(
-            [sys.executable, "-m", "lostmotion", *arguments], cwd=tmp_path, capture_output=True, check=False
-        )
-        shown = (done.stdout + done.stderr).decode()
+        done = lostmotion(*arguments, cwd=tmp_path)
+        shown = done.stdout + done.stderr
         assert r"\x1b" in shown, arguments
         assert not re.search("[^\n\x20-\x7e\xa0-\U0010ffff]", shown), arguments
     assert lm.simulate(lm.load(tmp_path / "e\x1b[31m\x07.toml")).lm.summary().startswith(r"t\x1b]0;x\x07\x9b\r")

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 import lostmotion as lm
-from conftest import ALL_SCENARIOS, ROOT
+from conftest import ALL_SCENARIOS, ROOT, lostmotion
 from lostmotion.cli import app as lm_app
 from lostmotion.simulation.train_tables import TrainTables
 
@@ -25,8 +25,9 @@ def test_the_tutorial_can_be_followed(tmp_path: Path) -> None:
     assert len(commands) == 7
 
     def run(command: str) -> str:
-        words = [sys.executable, "-m", "lostmotion", *shlex.split(command)]
-        return subprocess.run(words, cwd=tmp_path, check=True, capture_output=True, text=True).stdout
+        done = lostmotion(*shlex.split(command), cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
 
     run(commands[0])
     template = (tmp_path / "my-gearbox.toml").read_text()
@@ -43,13 +44,7 @@ def test_the_tutorial_can_be_followed(tmp_path: Path) -> None:
     result = lm.simulate(lm.load(tmp_path / "my-drive.toml"))
     assert float(abs(result["load_speed"]).max()) > 0.1
     (tmp_path / "my-drive.toml").write_text(drive.replace("friction_torque =", "friction_torqe ="))
-    done = subprocess.run(
-        [sys.executable, "-m", "lostmotion", "run", "my-drive.toml"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = lostmotion("run", "my-drive.toml", cwd=tmp_path)
     shown = re.search(r"^lostmotion: my-drive.toml.*$", page, re.M)
     assert shown is not None
     assert done.stderr.strip() == shown.group(0)
@@ -92,8 +87,7 @@ def test_the_first_commands_run(tmp_path: Path) -> None:
     assert commands_in(pages[1]) == commands[:3]
     printed = []
     for command in commands:
-        words = [sys.executable, "-m", "lostmotion", *shlex.split(command)]
-        done = subprocess.run(words, check=False, cwd=tmp_path, capture_output=True, text=True)
+        done = lostmotion(*shlex.split(command), cwd=tmp_path)
         misses = (
             "does not fit: stable, but misses the window" in done.stdout
         )  # the verdict on the axis, which is no error
@@ -111,8 +105,8 @@ def test_the_first_commands_run(tmp_path: Path) -> None:
 
 def test_the_command_of_the_page_on_the_drive_check_runs(tmp_path: Path) -> None:
     for command in commands_in("docs/drive-check.md"):
-        words = [sys.executable, "-m", "lostmotion", *shlex.split(command)]
-        subprocess.run(words, cwd=tmp_path, check=True, capture_output=True, text=True)
+        done = lostmotion(*shlex.split(command), cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
 
 
 def test_every_extra_is_explained_on_the_home_page() -> None:

@@ -2,8 +2,6 @@
 
 import math
 import re
-import subprocess
-import sys
 import warnings
 from pathlib import Path
 from typing import Any
@@ -12,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 import lostmotion as lm
-from conftest import ROOT
+from conftest import ROOT, lostmotion
 from lostmotion.cli import app
 from lostmotion.inputs.doubts import LARGEST, ValueWarning
 
@@ -94,9 +92,9 @@ def test_options_print_bare_numbers_back_with_their_unit() -> None:
     assert "bare number" not in quiet
 
 
-def test_a_command_prints_a_warning_as_one_line_without_the_place_in_the_code() -> None:
-    call = [sys.executable, "-m", "lostmotion", "run", JOINT, "--set", "gearbox.added_backlash=3"]
-    done = subprocess.run(call, capture_output=True, text=True, check=True)
+def test_a_command_prints_a_warning_as_one_line_without_the_place_in_the_code(tmp_path: Path) -> None:
+    done = lostmotion("run", JOINT, "--set", "gearbox.added_backlash=3", cwd=tmp_path)
+    assert done.returncode == 0
     lines = [line for line in done.stdout.splitlines() if line.startswith("warning: ")]
     assert len(lines) == 1
     assert "3 rad (172 deg)" in lines[0]

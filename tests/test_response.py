@@ -3,8 +3,6 @@
 import json
 import math
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 import lostmotion as lm
-from conftest import ROOT
+from conftest import ROOT, lostmotion
 from html_pages import charts
 from lostmotion.cli import app
 from lostmotion.cli.grids import parse_grid
@@ -534,8 +532,7 @@ def test_lists_of_values_are_read_alike() -> None:
     ],
 )
 def test_the_command_refuses_bad_options_in_one_line(tmp_path: Path, words: list[str], match: str):
-    command = [sys.executable, "-m", "lostmotion", "response", str(ROOT / "scenarios" / "paper-1dof-l-large.toml")]
-    done = subprocess.run([*command, *words, "-o", str(tmp_path / "o")], capture_output=True, text=True, check=False)
+    done = lostmotion("response", "paper-1dof-l-large", *words, "-o", "o", cwd=tmp_path)
     assert done.returncode == 1
     assert match in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
-from conftest import ROOT
+from conftest import ROOT, lostmotion
 from lostmotion.control.tuning import TwoInertias, suited
 from lostmotion.simulation.drive_tables import LoadTable
 from lostmotion.simulation.run import run
@@ -449,13 +449,12 @@ def test_the_command_writes_table_and_front(tmp_path: Path):
     vary = '[[vary]]\nkey = "gearbox"\nvalues = ["bonfiglioli-tr060-2-100", "bonfiglioli-tr060-2-36"]\n'
     vary += '[[vary]]\nkey = "motor"\nvalues = ["maxon-ec-40-393023"]\n'
     (tmp_path / "task.toml").write_text(head + vary + tail[tail.index("[select]") :])
-    command = [sys.executable, "-m", "lostmotion", "select", "task.toml", "-o", "rows"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    done = lostmotion("select", "task.toml", "-o", "rows", cwd=tmp_path)
+    assert done.returncode == 0
     assert "of 2 fit" in done.stdout
-    shown = [*command[:3], "study", "show", "rows", "-o", "page"]
-    subprocess.run(shown, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert lostmotion("study", "show", "rows", "-o", "page", cwd=tmp_path).returncode == 0
     assert {p.name for p in (tmp_path / "page").iterdir()} >= {"study.html", "selection.csv", "limits.csv"}
     assert {p.name for p in tmp_path.iterdir()} == {"task.toml", "rows", "page"}
-    missing = subprocess.run([*command[:4], "none.toml"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    missing = lostmotion("select", "none.toml", cwd=tmp_path)
     assert missing.returncode == 1
     assert missing.stderr.startswith("lostmotion: none.toml: there is no such file")

@@ -2,8 +2,6 @@
 
 import math
 import re
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +10,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
-from conftest import ROOT
+from conftest import ROOT, lostmotion
 from html_pages import charts
 from lostmotion.control.tuning import (
     TwoInertias,
@@ -400,12 +398,6 @@ def test_an_axis_is_named_where_there_are_several() -> None:
 
 
 # --- the command ---
-
-
-def lostmotion(*words: str, cwd: Any) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "lostmotion", *words], cwd=cwd, capture_output=True, text=True, check=False
-    )
 
 
 def test_the_command_writes_one_page_that_needs_nothing_else(tmp_path: Any) -> None:

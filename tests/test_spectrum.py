@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +11,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
+from conftest import lostmotion
 
 ARCMIN = math.radians(1.0 / 60.0)
 
@@ -130,13 +129,7 @@ def test_what_has_no_spectrum_is_refused() -> None:
 
 def test_the_command_prints_the_spectrum_and_draws_one_subject(tmp_path: Path) -> None:
     def call(*words: str) -> Any:
-        return subprocess.run(
-            [sys.executable, "-m", "lostmotion", "run", *words],
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        return lostmotion("run", *words, cwd=tmp_path)
 
     lm.save(lm.simulate(turning({"pair": gear("motor", "load", 1.0, sine(3, ARCMIN))}, 20.0)), tmp_path / "run.csv")
     done = call("run.csv", "--spectrum", "--plot", "motion.svg", "--figure", "motion")

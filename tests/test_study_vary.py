@@ -1,15 +1,13 @@
 """What a study can vary: records by name, conditions of their use, entries of lists; and what it cannot."""
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import lostmotion as lm
-from conftest import ROOT
+from conftest import ROOT, lostmotion
 from lostmotion.data_sheets.gearbox_sheet import GearboxSheet
 from lostmotion.reports.study import read_table
 from lostmotion.studies.chunk import scenario_of_run
@@ -137,10 +135,7 @@ def test_a_constant_load_torque_varies_in_its_own_unit(tmp_path: Path):
 
 def test_runs_that_fail_are_counted_on_the_command_line(tmp_path: Path):
     path = write(tmp_path, '[[vary]]\nkey = "gearbox.temperature"\nvalues = ["20 degC", "40 degC"]')
-    done = subprocess.run(
-        [sys.executable, "-m", "lostmotion", "study", str(path), "-o", path.stem],
-        cwd=tmp_path, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    done = lostmotion("study", path, "-o", path.stem, cwd=tmp_path)
     assert done.returncode == 1
     assert len(done.stderr.strip().splitlines()) == 1
     assert "1 of 2 runs failed, such as: gearbox schaeffler-rt1-h-20-100: has data for 20 °C only" in done.stderr
