@@ -15,6 +15,7 @@ from lostmotion.model.duty import Amplifier
 from lostmotion.reports.listing import record_text
 from lostmotion.servo.tuning import drive_units
 from lostmotion.sizing.supply import amperes, amplifier_rules
+from lostmotion.studies.task_file import task_of
 
 GAIN = 0.48  # N·m/(rad/s), of scenarios/field-weakening.toml
 RMS = 0.88  # N·m to one ampere rms, printed for its motor: 1FT7044-.AK7, (3/sqrt 2) p psi
@@ -71,6 +72,35 @@ def test_the_amplifier_of_a_synchronous_motor_is_compared_in_amperes_rms() -> No
     time, current = np.linspace(0.0, 1.0, 11), np.full(11, 4.0)
     found = amplifier_rules(time, current, 1.0, amplifier, None, unit=amperes(motor))
     assert [f.value for f in found] == ["4 of 5 A rms", "4 of 10 A rms"]
+
+
+def test_currents_and_voltages_of_a_selection_are_effective_values_beside_amplitudes() -> None:
+    """1FT7044, 0.61 ohm a phase, holds 0.8 N·m nearly at rest: 0.8/0.88 A rms, across the resistance of a phase alone.
+
+    0.01 rad/s and 0.1 rad/s^2 behind a ratio of 10 are 0.03 V of 0.8 V, and 1.5 mN·m. The rms over the cycle of 2 s hardly has them.
+    """
+    torque, ratio = 8.0, 10.0
+    moves = {"kind": "position", "speed": 0.01, "acceleration": 0.1, "moves": [{"to": 1e-3, "dwell": 0.5}, {"to": 0.0}]}
+    tables = {
+        "task": {"cycle": "2 s", "max_inertia_ratio": 1e4},
+        "load": {"inertia": 0.05, "torque": torque},
+        "controller": {"encoder": {"ideal": True}, "reference": moves},
+        "motor": {"from": "siemens-1ft7044-ak7"},
+        "gearbox": {
+            "ratio": ratio,
+            "inertia": 1e-6,
+            "rated_input_speed": 300.0,
+            "rated_output_torque": 50.0,
+            "stiffness": {"kind": "rigid"},
+            "losses": {"kind": "constant_efficiency", "efficiency": 1.0},
+        },
+    }
+    row = lm.select(task_of(tables)).isel(pair=0)
+    effective = torque / ratio / RMS
+    assert float(row["current_rms"]) == pytest.approx(effective, rel=1e-4)
+    assert float(row["voltage_rms"]) == pytest.approx(0.61 * effective, rel=1e-3)
+    assert float(row["current_peak"]) == pytest.approx(math.sqrt(2.0) * float(row["motor_torque_peak"]) / RMS, rel=1e-9)
+    assert float(row["voltage_peak"]) == pytest.approx(math.sqrt(2.0) * 0.61 * effective, rel=0.06)
 
 
 @pytest.mark.parametrize("record", [r for r in catalogue() if isinstance(r, AmplifierSheet)], ids=lambda r: r.name)

@@ -46,6 +46,16 @@ def test_an_unstable_axis_says_that_it_swings_and_by_how_much_it_leaves_its_refe
     assert swing == pytest.approx(math.degrees(0.5 * np.ptp(late)), rel=0.1)
 
 
+def test_a_limit_cycle_of_a_stable_loop_is_a_reservation_however_large() -> None:
+    """Static friction under integral action swings on between break-aways. No requirement is missed by a run that shows it."""
+    scenario = lm.load("hunting-with-static-friction")
+    assert lm.servo.limit_cycle(scenario, causes=False).verdict == "hunts"
+    verdict = verdict_of(lm.simulate(scenario))
+    assert verdict is not None
+    assert (verdict.state, verdict.exit_code) == ("fits with a reservation", 0)
+    assert "does not die out" in verdict.lines[0]
+
+
 def test_a_loop_that_works_gets_no_verdict_of_a_run() -> None:
     assert verdict_of(lm.simulate(axis({"gain": 1.1, "integral_gain": 45.0}))) is None
 

@@ -68,8 +68,8 @@ def run(
 ) -> None:
     """Run a scenario: print, save, draw, report, explain.
 
-    With a controller the summary has the following error, true and as it is measured. A loop does not fit if its error
-    diverges, or swings at the end by more than a tenth of the reference's range.
+    With a controller the summary has the following error, true and as it is measured. A loop does not fit if it is
+    unstable: its error grows, or swings at the end with a pole outside the unit circle. Other swings are a reservation.
 
     \b
     lostmotion run drive.toml

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import InputError, MissingLibraryError
 from ..response.standstill import rises_of
 from ..simulation.results import RunArrays
 from ..simulation.scenario import Scenario
@@ -23,7 +24,6 @@ SWINGS = 2  # periods at least in the last half of that time
 GROWS = 1.2  # from one part to the next, at least, of a swing that grows
 LASTS = 0.75  # the same of one that does not die out
 SEEN = 0.001  # of the range of the reference: the least swing that is reported
-LARGE = 0.1  # of the range of the reference: the least swing that lasts of a loop that does not work
 DEGREES = 0.1  # [rad], from which on an angle is in degrees
 REST = 0.1  # of the run: the least time at rest that is looked at
 DIVERGES = 2.0  # from one part of a run to the next, at least, of an error that diverges
@@ -54,6 +54,8 @@ class LoopErrors:
     """[Hz]"""
     grows: bool
     """whether that swing grows, or the error diverges"""
+    pole: str
+    """pole outside the unit circle of the sampled loops of an axis that swings; empty if there is none, or none is known"""
 
     def lines(self) -> Iterator[str]:
         """Lines of a summary."""
@@ -68,17 +70,17 @@ class LoopErrors:
             yield f"{of} leaves the range of its reference by {beyond}"
 
     def points(self) -> Iterator[Point]:
-        """Answer to whether the loop works: only what does not."""
+        """Answer to whether the loop is stable, if it is not, or if it swings. A swing that lasts by itself misses no requirement."""
         of = f"the {self.quantity} error{f' of {self.name}' if self.name else ''}"
         if self.grows and self.swing == 0.0:
             yield Point("does not fit", f"unstable: {of} diverges, up to {_shown(_peak(self.true), self.unit, 3)}")
         elif self.swing > 0.0:
             swing = f"±{_shown(self.swing, self.unit, 3)} at {self.frequency:.3g} Hz"
-            large = self.grows or self.swing > LARGE * self.range
-            how = "grows" if self.grows else "does not die out"
+            unstable, how = self.grows or bool(self.pole), "grows" if self.grows else "does not die out"
             yield Point(
-                "does not fit" if large else "fits with a reservation",
-                f"{'unstable: ' if self.grows else ''}{of} swings by {swing} at the end, which {how}",
+                "does not fit" if unstable else "fits with a reservation",
+                f"{'unstable: ' if unstable else ''}{of} swings by {swing} at the end, which {how}"
+                f"{f'; {self.pole}' if self.pole else ''}",
             )
 
 
@@ -138,7 +140,24 @@ def _of_axis(result: Any, scenario: Scenario, motor: str) -> LoopErrors | None:
         swing,
         frequency,
         grows,
+        _pole(scenario, motor) if sampled and swing > 0.0 else "",
     )
+
+
+def _pole(scenario: Scenario, motor: str) -> str:
+    """Pole outside the unit circle of an axis in one of its regimes; empty where none is found."""
+    from ..servo.margins import instability
+    from ..servo.regimes import axis_of, regimes
+
+    try:
+        axis = axis_of(scenario, motor)
+        found = [instability(axis, regime) for regime in regimes(axis)]
+    except (
+        InputError,
+        MissingLibraryError,
+    ):  # loops without a linear regime, or no library for them: the growth alone decides
+        return ""
+    return next((str(pole) for pole in found if pole is not None), "")
 
 
 def _last_change(time: np.ndarray, reference: np.ndarray) -> float:

@@ -145,8 +145,12 @@ class ServoReport:
         """The answer to whether the axis settles within its window."""
         stable, window = "stable" if self.stable else "unstable", _shown(self.window, self.load_unit)
         after = f"after the move to {self._place(worst.to)}"
-        if worst.state == "settled":
-            return "fits", f"{stable} in {self._regimes()}, and {self._worst_settling()}"
+        if worst.within:
+            assert self.moves is not None
+            proved = self.settling[-1].state == "settled" and self.moves.repeats
+            text = f"{stable} in {self._regimes()}, and {self._worst_settling()}"
+            text += "" if self.moves.repeats else f"; the moves {self.repetition()}"
+            return "fits" if proved else "fits with a reservation", text
         if worst.state == "not decided":
             return (
                 "not decided",
@@ -162,14 +166,14 @@ class ServoReport:
         """Hunting, and what is not known of it."""
         whole = None if self.limit_cycle is None else self.limit_cycle.whole
         if whole is not None and whole.cycles:
-            judged = self.settling and self.settling[-1].state == "settled"
+            judged = self.settling and self.settling[-1].within
             yield Point("fits with a reservation" if judged else "does not fit", f"stable, but {self.rest()}")
         elif self.certificate is not None and self.certificate.verdict == "hunts":
             yield Point(
                 "fits with a reservation", f"stable, but other starts hunt: {certified_in_words(self.certificate)}"
             )
         if whole is not None and whole.verdict == "not decided":
-            judged = self.settling and self.settling[-1].state == "settled"
+            judged = self.settling and self.settling[-1].within
             state: State = "fits with a reservation" if judged else "not decided"
             yield Point(state, f"stable, but hunting is not decided: {whole.described()}")
 
@@ -218,23 +222,24 @@ class ServoReport:
         inside = f"within {_shown(self.window, self.following.unit)}"
         worst = self.worst_move
         assert worst is not None
-        if worst.state != "settled":
+        if not worst.within:
             return f"{'not' if worst.state == 'not settled' else 'not decided whether'} {inside}: {self._why(worst)}"
         return f"{inside} in at most {1e3 * worst.time:.4g} ms, {self._proof(self.settling[-1])}"
 
     @property
     def worst_move(self) -> Settling | None:
         """The move that settles last; before that one that is not decided, and one that does not settle; None without moves."""
-        order = ("settled", "not decided", "not settled")
+        order = ("not decided", "not settled")
         return max(
             self.settling,
-            key=lambda s: (order.index(s.state), s.time if s.state == "settled" else abs(s.remaining)),
+            key=lambda s: (-1, s.time) if s.within else (order.index(s.state), abs(s.remaining)),
             default=None,
         )
 
     def _proof(self, last: Settling) -> str:
-        """Why the error stays within the window."""
-        held = f"after the last move for ever ({last.reason})"
+        """Proof that the error stays within the window, or how long it was watched."""
+        proved = "for ever" if last.state == "settled" else "without a proof that it stays so"
+        held = f"after the last move {proved} ({last.reason})"
         return held if len(self.settling) == 1 else f"until the next move begins, {held}"
 
     @staticmethod
@@ -274,7 +279,7 @@ class ServoReport:
             rows.append(("moves", self.repetition()))
         for s in self.settling:
             until = self._proof(s) if s.last else "until the next move begins"
-            inside = f"{1e3 * s.time:.4g} ms, {until}" if s.state == "settled" else f"{s.state}: {self._why(s)}"
+            inside = f"{1e3 * s.time:.4g} ms, {until}" if s.within else f"{s.state}: {self._why(s)}"
             within = _shown(self.window, self.load_unit)
             rows.append((f"settled within {within} after the move to {self._place(s.to)}", inside))
         for k in self.stiffness:
@@ -323,7 +328,8 @@ def commission(
     is linear about the steady motion of the regime. A loop is cut at the measured value of its controller; the loops within it are
     closed, those around it open. Limits, quantisation and dead zones count in the runs only: steps, following, settling and rest are
     exact simulations of the scenario. Moves are repeated, both ways, until they repeat. An axis has settled after a move if its error
-    stays within the window until the next move begins. After the last one it must be shown to stay there for ever.
+    stays within the window until the next move begins. After the last one only rest proves that it stays there for ever; a steady
+    swing within the window is reported as settled, not proved.
 
     Parameters
     ----------

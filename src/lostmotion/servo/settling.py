@@ -1,4 +1,4 @@
-"""Settling of an axis: its moves repeated until they repeat, both ways, and what proves that the error stays in the window."""
+"""Settling of an axis: moves repeated until their errors repeat, both ways; proof or observation that the error stays in the window."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ SHARE = 0.001  # of the longest move: the least window by default
 STEPS = 4.0  # of the encoder of the position: the least window by default
 
 AnyMoves = MovesReference[Any, Any, Any, Any, Any]
-State = Literal["settled", "not settled", "not decided"]
+State = Literal["settled", "settled, not proved", "not settled", "not decided"]
 
 
 @dataclass(frozen=True)
@@ -43,9 +43,10 @@ class Settling:
     to: float
     """position [rad], of a slide [m]"""
     state: State
-    """settled where the error is shown to stay within the window; not settled where it is shown to leave it"""
+    """settled where the error is proved to stay within the window; settled, not proved where it was only watched to do so in steady
+    swings; not settled where it is outside at the end of what was run"""
     time: float
-    """until the error stays within the window [s]; NaN unless settled"""
+    """until the error stays within the window [s]; NaN unless settled, proved or not"""
     last: bool
     """whether the position is held after the move for ever; otherwise until the next move begins"""
     reason: str = ""
@@ -56,6 +57,11 @@ class Settling:
     """part of it that the encoder of the position does not see: the twist between its shaft and that of the reference [rad]"""
     swing: float = 0.0
     """half of what the error swings by at the end of what was run [rad]"""
+
+    @property
+    def within(self) -> bool:
+        """Whether the error is within the window from `time` on, by a proof or as far as it was watched."""
+        return self.state.startswith("settled")
 
 
 @dataclass(frozen=True)
@@ -211,7 +217,7 @@ def settling(moves: Moves, rest: AtRest, window: float) -> list[Settling]:
         several = [s for j in earlier if (s := _before_the_next(moves, j, seen, window)) is not None]
         found += [max(several, key=_badness)] if several else []
     last = _held(moves, rest, seen, window)
-    if not moves.repeats and last.state == "settled" and held >= moves.count:
+    if not moves.repeats and last.within and held >= moves.count:
         before = _before_the_next(moves, held - moves.count, seen, window)
         last = (
             last
@@ -222,7 +228,7 @@ def settling(moves: Moves, rest: AtRest, window: float) -> list[Settling]:
 
 
 def _badness(s: Settling) -> tuple[bool, float]:
-    return s.state != "settled", abs(s.remaining) if s.state != "settled" else s.time
+    return not s.within, s.time if s.within else abs(s.remaining)
 
 
 @dataclass(frozen=True)
@@ -299,8 +305,8 @@ def _held(moves: Moves, rest: AtRest, seen: _Seen, window: float) -> Settling:
         watched = rest.watched or float(time[-1]) - end
         reason = "at rest" if rest.verdict == "at rest" else f"{watched:.3g} s after the moves"
     else:
-        state, reason = _proved(moves, rest, error, window, covers=seen.covers)
-    within = within if state == "settled" else math.nan
+        state, reason = _within(moves, rest, time - end, error, window, covers=seen.covers)
+    within = within if state.startswith("settled") else math.nan
     swing = 0.0
     if rest.verdict != "at rest":
         swing = _swing(time, error, LATER) if seen.covers else 0.5 * float(np.ptp(late))
@@ -321,13 +327,19 @@ def _limit(error: np.ndarray) -> float:
     return float(c + (c - b) * share / (1.0 - share)) if share < 1.0 else math.copysign(math.inf, c - b)
 
 
-def _proved(moves: Moves, rest: AtRest, error: np.ndarray, window: float, *, covers: bool) -> tuple[State, str]:
-    """Whether an error that was seen to remain within the window stays there, and the reason."""
+def _within(
+    moves: Moves, rest: AtRest, after: np.ndarray, error: np.ndarray, window: float, *, covers: bool
+) -> tuple[State, str]:
+    """Whether an error that was seen to remain within the window stays there, and the reason.
+
+    Rest is a proof. A steady swing is none: a quantised loop may be chaotic, and its state never repeats.
+    """
     if rest.verdict == "at rest" and covers:
         return "settled", "at rest"
-    name = moving_input(moves.axis.scenario)
+    name, watched = moving_input(moves.axis.scenario), float(after[-1])
     if covers and _swings_within(error, window):
-        return "settled", f"swings steadily within the window{f' under {name}' if name else ''}"
+        under = f" under {name}" if name else ""
+        return "settled, not proved", f"watched for {watched:.3g} s, in which it swings steadily{under}"
     if name:
         return "not decided", f"{name} never comes to rest, and the error does not repeat"
     why = rest.reason if rest.verdict == "not decided" else f"{rest.verdict} near the edge of the window"
