@@ -115,3 +115,21 @@ def test_the_rig_says_of_a_record_what_is_true_of_the_gearbox_that_it_measures()
 )  # fmt: skip
 def test_sentences_about_a_changed_value_go(note: str, changed: list[str], left: str) -> None:
     assert still_true(note, changed) == left
+
+
+# --- titles ---
+
+
+def test_a_title_names_the_values_that_were_changed_below_it(tmp_path: Path) -> None:
+    """The joint of the title swings at 1 Hz, the changed one at 2 Hz."""
+    plain = lm.load("catalogue-robot-joint").title
+    changes = {"command.frequency": "2 Hz", "simulation.duration": 1.0}
+    assert lm.load("catalogue-robot-joint", changes).title == f"{plain}; changed: command.frequency"
+    assert lm.load("catalogue-robot-joint", {"simulation.duration": 1.0}).title == plain
+    assert lm.load("catalogue-robot-joint", {"title": "Mine", "command.frequency": 2.0}).title == "Mine"
+    file = tmp_path / "run.csv"
+    lm.save(lm.simulate(lm.load("catalogue-robot-joint", changes)), file)
+    again = lm.load(file, {"load.inertia": 2.0, "command.frequency": 3.0})
+    assert again.title == f"{plain}; changed: command.frequency, load.inertia"
+    many = {f"load.{key}": 1.0 for key in ("inertia", "friction_torque", "viscous_friction")}
+    assert lm.load("catalogue-robot-joint", {**changes, **many}).title.endswith(", load.friction_torque, ...")

@@ -28,6 +28,7 @@ from .series_files import read_series
 from .shipped import shipped_scenarios
 
 MAX_BASES = 100  # files that are each the base of the one before
+CHANGED, MORE, MOST_KEYS = "; changed: ", ", ...", 3  # keys in a title
 
 
 def find_scenario(name: str | Path, directory: Path = Path()) -> Path:
@@ -129,8 +130,28 @@ def override(data: dict[str, Any], overrides: Mapping[str, Any] | Iterable[str],
         items: Iterable[tuple[str, Any]] = overrides.items()
     else:
         items = [parse_override(text) for text in overrides]
+    items = list(items)
     with prefixed(path):
         set_values(data, items)
+    keys = [key.removesuffix(".mean") for key, _ in items]
+    if isinstance(data.get("title"), str) and "title" not in keys:
+        data["title"] = title_with(data["title"], [key for key in keys if not key.startswith("simulation.")])
+
+
+def title_with(title: str, keys: Iterable[str]) -> str:
+    """The title of a scenario of which some values were changed, so that it claims no more than holds.
+
+    Examples
+    --------
+    >>> title_with("A robot joint, 1 Hz", ["command.frequency"])
+    'A robot joint, 1 Hz; changed: command.frequency'
+    """
+    plain, _, before = title.partition(CHANGED)
+    every = list(dict.fromkeys([*filter(None, before.removesuffix(MORE).split(", ")), *keys]))
+    if not every or not plain:
+        return title
+    more = MORE if len(every) > MOST_KEYS or before.endswith(MORE) else ""
+    return f"{plain}{CHANGED}{', '.join(every[:MOST_KEYS])}{more}"
 
 
 def _read(path: Path, including: tuple[Path, ...]) -> dict[str, Any]:

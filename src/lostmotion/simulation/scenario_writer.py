@@ -18,7 +18,7 @@ from ..inputs.toml_files import RESULTS, is_in_file
 from .axis_form import is_axis
 from .keys import list_index
 from .scenario import Scenario
-from .scenario_files import find_base, find_scenario, scenario_text
+from .scenario_files import CHANGED, find_base, find_scenario, scenario_text
 from .scenario_files import load as load_file
 from .shipped import shipped_scenarios
 
@@ -49,6 +49,7 @@ def write_changed(
         The file cannot be written; nothing is left behind.
     """
     texts = []
+    changes = {**changes, **({"title": scenario.title} if CHANGED in scenario.title else {})}
     for inline in (False, True) if Path(source).suffix not in RESULTS else ():
         # A file may have a shape in which these values cannot be changed.
         with suppress(TOMLKitError, KeyError, TypeError, ValueError, AttributeError):

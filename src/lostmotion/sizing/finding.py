@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any, Literal, Self
+from typing import Any, Literal, Self, get_args
 
 from ..errors import InputError
 from ..inputs.validation import shown
@@ -12,7 +12,8 @@ from ..units.practical import ROUNDING, counted, excess, told_apart
 from ..verdict import Point, Verdict
 from .duty_cycle import DutyCycle
 
-Judgement = Literal["ok", "warning", "unknown"]
+Judgement = Literal["ok", "caution", "warning", "unknown"]
+"""Within the limit, beyond a rule of thumb, beyond a stated limit, or not judged."""
 
 # Each rule of the check and where it comes from.
 RULES = {
@@ -91,7 +92,7 @@ class Finding:
     @property
     def in_short(self) -> str:
         """Verdict, value and remark in one line, without the source of the rule."""
-        mark = {"ok": "ok     ", "warning": "WARNING", "unknown": "?      "}[self.verdict]
+        mark = {"ok": "ok", "caution": "caution", "warning": "WARNING", "unknown": "?"}[self.verdict].ljust(7)
         return f"{mark}  {self.sentence}"
 
     def noted(self, remark: str, **changes: Any) -> Finding:
@@ -111,7 +112,7 @@ class Findings(tuple[Finding, ...]):
     --------
     >>> import lostmotion as lm
     >>> findings = lm.check_drive(lm.load("catalogue-robot-joint"))
-    >>> {finding.verdict for finding in findings} <= {"ok", "warning", "unknown"}
+    >>> {finding.verdict for finding in findings} <= {"ok", "caution", "warning", "unknown"}
     True
     >>> findings.verdict.state
     'fits with a reservation'
@@ -128,12 +129,13 @@ class Findings(tuple[Finding, ...]):
 
     @property
     def verdict(self) -> Verdict:
-        """Verdict of all: an exceeded limit decides, then losses whose range does not decide, then what is not judged."""
-        by = {mark: [f for f in self if f.verdict == mark] for mark in ("ok", "warning", "unknown")}
+        """Verdict of all: an exceeded limit decides, then estimated losses, then a rule of thumb, then what is not judged."""
+        by = {mark: [f for f in self if f.verdict == mark] for mark in get_args(Judgement)}
         points = [Point("does not fit", f.sentence) for f in by["warning"]]
         points += [Point("not decided", f.sentence) for f in by["unknown"] if f.rule == "estimated_losses"]
-        unknown, judged = by["unknown"], len(by["ok"]) + len(by["warning"])
-        if judged == 0:
+        points += [Point("fits with a reservation", f.sentence) for f in by["caution"]]
+        unknown = by["unknown"]
+        if len(unknown) == len(self):
             why = f", such as: {unknown[0].sentence}" if unknown else ""
             points.append(Point("not decided", f"none of {counted(len(self), 'point')} is judged{why}"))
         elif unknown:
@@ -146,8 +148,9 @@ class Findings(tuple[Finding, ...]):
                 )
             )
         points.append(Point("fits", f"all {counted(len(self), 'point')} within the limits"))
+        thumb = f"{counted(len(by['caution']), 'rule')} of thumb exceeded, " if by["caution"] else ""
         lines = [
-            f"{counted(len(by['warning']), 'limit')} exceeded, {len(by['ok'])} kept, {len(by['unknown'])} not judged"
+            f"{counted(len(by['warning']), 'limit')} exceeded, {thumb}{len(by['ok'])} kept, {len(unknown)} not judged"
         ]
         if used := [f for f in self if f.use is not None]:
             most = max(used, key=lambda f: f.use or 0.0)

@@ -115,5 +115,5 @@ def lost_motion(g: Gearbox, limit: float | None, *, slides: bool = False) -> Fin
 def loss_map(result: RunArrays) -> Finding:
     """Whether the run left the data of a loss map."""
     if "warning" in result.attrs:
-        return Finding("loss_map", "loss map", "used outside its data", "warning", result.attrs["warning"])
+        return Finding("loss_map", "loss map", "used outside its data", "caution", result.attrs["warning"])
     return Finding("loss_map", "loss map", "used within its data", "ok")

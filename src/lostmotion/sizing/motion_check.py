@@ -41,23 +41,30 @@ def ratio_of_inertias(motor: Motor, gearbox: Gearbox, load_inertia: float) -> fl
 
 
 def inertia_ratio(motor: Motor, gearbox: Gearbox, load_inertia: float, wanted: float | None = None) -> Finding:
-    """The same, of parts, with the largest permissible ratio: the one that is wanted and that of the manufacturer, or else 10."""
+    """The same, of parts, with the largest permissible ratio: the one that is wanted, and that of the manufacturer.
+
+    Without either, 10 is the rule of thumb, and beyond it is a reservation.
+    """
     ratio = ratio_of_inertias(motor, gearbox, load_inertia)
     printed = None if motor.limits is None else motor.limits.max_inertia_ratio
-    largest = min((limit for limit in (wanted, printed) if limit is not None), default=INERTIA_RATIO)
+    stated = [limit for limit in (wanted, printed) if limit is not None]
+    largest = min(stated, default=INERTIA_RATIO)
     far = ratio > largest
-    whose = (
-        ", the limit of the motor's manufacturer"
-        if largest == printed
-        else " the load is hard to control from the motor"
-    )
-    remark = f"above {largest:g}{whose}" if far else ""
+    beyond: Judgement = "warning" if stated else "caution"
+    if largest == printed:
+        remark = f"above {largest:g}, the limit of the motor's manufacturer"
+    elif stated:
+        remark = f"above {largest:g} the load is hard to control from the motor"
+    else:
+        remark = (
+            f"above {largest:g} a load is usually hard to control; motor.limits.max_inertia_ratio states the motor's own limit"
+        )
     return Finding(
         "inertia_ratio",
         "inertia of load and gearbox / of the rotor",
         f"{ratio:.3g}",
-        "warning" if far else "ok",
-        remark,
+        beyond if far else "ok",
+        remark if far else "",
         ratio / largest,
     )
 
@@ -86,7 +93,7 @@ def resonance(motor: Motor, g: Gearbox, load_inertia: float, command: CommandSig
         near = [f for f in excited if f_a / NEAR_RESONANCE < f < f_r * NEAR_RESONANCE]
         value = f"{f_r:.4g} Hz, anti-resonance {f_a:.4g} Hz"
         remark = f"the command has {near[0]:g} Hz" if near else ""
-        verdict: Judgement = "warning" if near else "ok"
+        verdict: Judgement = "caution" if near else "ok"
         out.append(Finding("resonance", f"resonance on the {name} segment", value, verdict, remark))
     return out
 
@@ -105,7 +112,7 @@ def dead_zone(scenario: Scenario, result: RunArrays) -> Finding:
         return Finding("dead_zone", "dead zone", value, "warning", remark)
     small = peak < 3.0 * max(forward, -backward)
     remark = f"a large part of the command, which reaches {peak:.4g}" if small else ""
-    return Finding("dead_zone", "dead zone", value, "warning" if small else "ok", remark)
+    return Finding("dead_zone", "dead zone", value, "caution" if small else "ok", remark)
 
 
 def holdings(scenario: Scenario, result: RunArrays) -> list[Finding]:

@@ -18,7 +18,7 @@ from ..simulation.drive_tables import LoadTable
 from .duty_cycle import DutyCycle
 from .finding import Finding
 from .gearbox_check import input_speeds, loads
-from .motion_check import inertia_ratio
+from .motion_check import INERTIA_RATIO, inertia_ratio
 from .motor_check import current, heat, largest_speed, needed_command, peak_torque, rms_rise, voltage
 
 POINTS = 1000  # of a cycle at least
@@ -188,7 +188,9 @@ def check_motor(
     slides: bool = False,
 ) -> list[Finding]:
     """The rules for a motor at this gearbox, or with `slides` for a linear motor, whose ratio of inertias is not judged. `largest` is
-    the largest wanted ratio of the inertias."""
+    the largest wanted ratio of the inertias: left out, the limit of the motor's record, or else 10."""
+    if largest is None and (motor.limits is None or motor.limits.max_inertia_ratio is None):
+        largest = INERTIA_RATIO
     torque = demand.motor_torque(motor)
     cycle = demand.cycle(torque)
     rise = rms_rise(motor, cycle.rms_motor_torque, ambient)
