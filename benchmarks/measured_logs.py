@@ -27,6 +27,7 @@ from report import Report
 import lostmotion as lm
 import test_identification_odd_logs as odd
 import test_monitor as wear
+from dry_friction import RIG
 from identification_logs import NOISE, SERVO, TRUTH, servo_plans, servo_task
 from lostmotion.errors import InputError
 from lostmotion.identification.identify import identify_logs, identify_task
@@ -110,19 +111,6 @@ def spoiled(rigs: int = 20) -> list[Row]:
 
 # --- intervals ---
 
-AXIS = """
-[shafts.c]
-viscous_friction = 0.02
-friction_torque = 0.1
-[motors.m]
-shaft = "c"
-kind = "torque_source"
-rated_torque = 1.0
-rotor_inertia = 5e-3
-[simulation]
-duration = "1 s"
-sample_interval = "2 ms"
-"""
 AXIS_TASK = {
     "scenario": "axis.toml",
     "logs": {"files": ["*.csv"]},
@@ -161,7 +149,7 @@ def coverage(axes: int = 200) -> list[Row]:
     draw = np.random.default_rng(0)
     count = covered = either = 0
     with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / "axis.toml").write_text(AXIS)
+        (Path(folder) / "axis.toml").write_text(RIG)
         scenario = lm.load(Path(folder) / "axis.toml")
         for axis in range(axes):
             measured = {"channel": "a", "variable": "c_angle", **({"deviation": 1e-3} if axis % 2 else {})}

@@ -52,7 +52,7 @@ class Actuated:
     ----------
     model, data
         The `mujoco.MjModel` and its `mujoco.MjData`. After `step` position, speed, time and `qacc` (mean over the step) are those
-        at the end; poses of bodies and contacts are those of the middle of the last substep, and sensors are not evaluated. Call
+        at the end; poses of bodies and contacts are from the middle of the last substep, and sensors are not evaluated. Call
         ``mujoco.mj_forward(model, data)`` where they are wanted at the end.
     joints
         Names of the joints with a drive, in the order of all arrays.
@@ -273,7 +273,7 @@ class Actuated:
                 )
 
     def _compute_forces(self) -> None:
-        """Forces [N·m] beside those of drives and contacts."""
+        """Forces [N·m] other than the torques of drives and the forces of contacts."""
         self._mj.mj_fwdVelocity(self.model, self.data)
         self._mj.mj_fwdActuation(self.model, self.data)
         self._mj.mj_fwdAcceleration(self.model, self.data)
@@ -378,7 +378,7 @@ class Actuated:
         Raises
         ------
         InputError
-            The snapshot is that of another one.
+            The snapshot is from another robot.
         """
         if not isinstance(snapshot, ActuatedSnapshot) or snapshot.of is not self:
             raise InputError(f"snapshot: {shown(snapshot)} is none of this robot; between robots, use state")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
@@ -26,7 +25,7 @@ from ..simulation.scenario import Scenario
 from ..simulation.shipped import shipped_scenarios
 from ..simulation.sources import load
 from .actuated import MAX_SUBSTEPS, Actuated
-from .joints import acts, joint_id
+from .joints import acts, compiled, joint_id
 from .mjcf import JointActuator
 from .overlaps import clear, without_weight
 
@@ -98,7 +97,7 @@ def attach(
     drives
         By the name of a hinge: a `Drive` or a `DriveTrain`, whose load's inertia the robot takes the place of; a scenario or its
         name, whose controller then turns the motor; what `from_mjcf` has returned; the name of an actuator of the catalogue; or
-        that of a gearbox, which an ideal torque source without inertia then turns.
+        the name of a gearbox, which an ideal torque source without inertia then turns.
     controllers
         By the name of a hinge: a controller for its drive, which acts at its own sample instants within the steps.
     replace
@@ -144,7 +143,7 @@ def attach(
             model = mujoco.MjSpec.from_file(str(model))
         except ValueError as error:
             raise InputError(f"{model}: {' '.join(str(error).split())}") from None
-    compiled = model.copy().compile() if isinstance(model, mujoco.MjSpec) else copy.copy(model)
+    robot = compiled(model)
     if not drives:
         raise InputError("drives: is empty; name at least one joint")
     for name in controllers or {}:
@@ -155,23 +154,23 @@ def attach(
                 f"controllers: joint {shown(name)} has a JointActuator, which is turned by its control; leave it out"
             )
     for what, count in (
-        ("actuators with states of their own (activations)", compiled.na),
-        ("actuators with a delay", (compiled.actuator_delay > 0.0).any()),
-        ("springs that yield", compiled.nplastic),
-        ("plugins with states of their own", compiled.npluginstate),
+        ("actuators with states of their own (activations)", robot.na),
+        ("actuators with a delay", (robot.actuator_delay > 0.0).any()),
+        ("springs that yield", robot.nplastic),
+        ("plugins with states of their own", robot.npluginstate),
     ):
         if count:
             raise InputError(f"model: has {what}, which are not supported; use such without")
     if substeps is not None and not 1 <= substeps <= MAX_SUBSTEPS:
         raise InputError(f"substeps: {shown(substeps)} must lie between 1 and {MAX_SUBSTEPS}")
-    heavy = (compiled.body_mass > 0.0) & (compiled.body_gravcomp != 1.0)
-    weighs = bool(compiled.opt.gravity.any() and heavy.any()) and acts(compiled, "GRAVITY")
+    heavy = (robot.body_mass > 0.0) & (robot.body_gravcomp != 1.0)
+    weighs = bool(robot.opt.gravity.any() and heavy.any()) and acts(robot, "GRAVITY")
     made: dict[str, JointActuator] = {}
     for name, given in drives.items():
-        joint_id(compiled, name)
+        joint_id(robot, name)
         actuator = given if isinstance(given, JointActuator) else JointActuator(given)
         drive = drive_of_joint(name, actuator.drive, (controllers or {}).get(name))
         drive = without_weight(name, drive, replace=replace, weighs=weighs)
-        clear(compiled, name, drive, replace=replace)
+        clear(robot, name, drive, replace=replace)
         made[name] = dataclasses.replace(actuator, drive=drive)
-    return Actuated(compiled, made, substeps)
+    return Actuated(robot, made, substeps)

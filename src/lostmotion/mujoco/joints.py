@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import TYPE_CHECKING
 
 from ..errors import InputError
@@ -9,6 +10,24 @@ from ..inputs.validation import did_you_mean, listed, shown
 
 if TYPE_CHECKING:
     import mujoco
+
+
+def compiled(model: mujoco.MjSpec | mujoco.MjModel) -> mujoco.MjModel:
+    """An own copy of a model, compiled.
+
+    Raises
+    ------
+    InputError
+        MuJoCo refuses the specification.
+    """
+    import mujoco
+
+    if not isinstance(model, mujoco.MjSpec):
+        return copy.copy(model)
+    try:
+        return model.copy().compile()
+    except ValueError as error:
+        raise InputError(f"model: {' '.join(str(error).split())}") from None
 
 
 def joint_id(model: mujoco.MjModel, name: str) -> int:

@@ -22,7 +22,7 @@ from ..model.springs import Spring
 from ..model.torsion import LinearStiffness, Rigid
 from ..simulation.joint_trains import Driven
 from ..simulation.scenario import Scenario
-from .joints import acts, actuators_of, joint_id
+from .joints import acts, actuators_of, compiled, joint_id
 
 if TYPE_CHECKING:
     import mujoco
@@ -43,7 +43,7 @@ UNLIMITED = (-math.inf, math.inf)
 
 @dataclass(frozen=True)
 class JointActuator:
-    """A drive as the actuator of a joint, whose control is that of an actuator in MuJoCo. `from_mjcf` returns it, `attach` takes it."""
+    """A drive as the actuator of a joint, with the control of an actuator in MuJoCo. `from_mjcf` returns it, `attach` takes it."""
 
     drive: Driven
     """drive of the joint, with its controller if the actuator is a servo"""
@@ -114,10 +114,8 @@ def from_mjcf(
     30.0
     """
     need("mujoco", "lostmotion.mujoco", "mujoco")
-    import mujoco
 
-    if isinstance(model, mujoco.MjSpec):
-        model = model.copy().compile()
+    model = compiled(model)
     number = joint_id(model, joint)
     dof = model.jnt_dofadr[number]
     actuators = actuators_of(model, number)
@@ -133,7 +131,9 @@ def from_mjcf(
     if ratio == 0.0 or law.gear == 0.0:
         raise InputError(f"joint {joint!r}: has the ratio 0; give speed of the motor / speed of the joint")
     if servo and ratio < 0.0:
-        raise InputError(f"{ratio:g} must be above 0 for a servo, whose reference is that of the joint", "ratio")
+        raise InputError(
+            f"{ratio:g} must be above 0 for a servo, whose reference is the position or speed of the joint", "ratio"
+        )
     _refuse_of_joint(model, joint, number)
     armature, damping = float(model.dof_armature[dof]), float(model.dof_damping[dof])
     for k in actuators:

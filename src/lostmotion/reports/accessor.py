@@ -41,7 +41,7 @@ class ResultAccessor:
         Parameters
         ----------
         output
-            The variable of a frequency response; left out, the load's speed, of a train that of its last shaft.
+            The variable of a frequency response; left out, the load's speed, of a train the speed of its last shaft.
 
         Raises
         ------

@@ -216,7 +216,7 @@ BUDGET = (
     "change one thing: the place of the encoders, the losses that the controller assumes, the temperature, the wear."
 )
 CONTRIBUTED = (
-    "The causes are removed one after another, in this order. The mean square error falls by these contributions, which add up to that of all causes. "
+    "The causes are removed one after another, in this order. The mean square error falls by these contributions, which add up to the error by all causes. "
     "A negative contribution belongs to a cause that hides another one. Another order gives other contributions."
 )
 

@@ -215,7 +215,7 @@ def _in_terms_of(train: DriveTrain, name: str, last: str, ratio: float) -> str:
 
 
 def ratios_to(train: DriveTrain, last: str) -> dict[str, float]:
-    """For each shaft its speed over that of the last one, by the gears between them; 1 where there are none."""
+    """For each shaft its speed over the speed of the last one, by the gears between them; 1 where there are none."""
     ratios = {last: 1.0}
     waiting = [last]
     while waiting:

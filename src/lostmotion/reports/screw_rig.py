@@ -20,7 +20,7 @@ from .rig import agreement, compared_rows, rig_parts
 
 MEASURED = (
     "Deflection: the input is locked and the force on the slide goes through slow ramps. Efficiency: a flywheel keeps the screw at its speed against the force; it "
-    "is that of the thread, without the drag. Drag: the deceleration of a coasting flywheel without a force. Break-away: a slow ramp of torque on the input, or of "
+    "is the efficiency of the thread, without the drag. Drag: the deceleration of a coasting flywheel without a force. Break-away: a slow ramp of torque on the input, or of "
     "force on the slide with the input free. Pitch error: a slow turn without a force.",
     "Every run is exact, so the rig adds no error of its own: a difference between the two columns comes from the data.",
 )

@@ -126,7 +126,7 @@ def _open_panels(report: ServoReport, loop: str) -> tuple[Panel, Panel]:
         m = row.margins
         if math.isfinite(m.crossover):
             at_gain.append(Mark(m.crossover, 0.0, f"{m.crossover:.3g} Hz", look(k)))
-            # At the crossover the loop is -exp(j margin) or its conjugate; the side is that of its neighbours.
+            # At the crossover the loop is -exp(j margin) or its conjugate; its side follows from its neighbours.
             side = np.interp(m.crossover, row.frequency, np.imag(-row.open_loop))
             margin = math.copysign(DEGREES * m.phase_margin, side)
             at_phase.append(Mark(m.crossover, margin - 180.0, f"{abs(margin):.3g}°", look(k), to=-180.0))

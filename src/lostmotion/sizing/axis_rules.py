@@ -170,7 +170,7 @@ def holding_brake(demand: InputDemand, brake: HoldingBrake | None, slide: Requir
 
 
 def held_by(limit: float | None, what: str, need: float, unit: str, word: str) -> Finding:
-    """A holding torque or force against that of a brake."""
+    """A holding torque or force against the torque or force of a brake."""
     told = what if limit is not None else f"{what}: {need:.4g} {unit}"
     return against("holding_brake", told, need, limit, unit, f"{word} of the brake", f"task.brake.{word}")
 
@@ -273,7 +273,7 @@ def screw_rules(load: AxialLoad, screw: RatedScrew, wanted_life: float | None, *
     speed = screw.max_input_speed
     if speed is None and screw.ball_circle_diameter is not None:
         speed = dn_speed(screw.ball_circle_diameter)
-    what, name = "speed of the screw against that of its balls", "largest speed of the screw"
+    what, name = "speed of the screw against the speed of its balls", "largest speed of the screw"
     lacks, most = f"{key}.max_input_speed or {key}.ball_circle_diameter", None if speed is None else RPM * speed
     return [*found, against("screw_speed", what, RPM * fastest, most, "rpm", name, lacks)]
 
@@ -308,7 +308,7 @@ def derated(findings: list[Finding], share: float) -> list[Finding]:
 
 
 def with_safety(findings: list[Finding], factors: Mapping[str, float]) -> list[Finding]:
-    """Findings under the safety factors of a task: the share of a limit that is used is multiplied by that of its rule."""
+    """Findings under the safety factors of a task: the share of a limit that is used is multiplied by the factor of its rule."""
     return [
         _tightened(f, factors[f.rule], f"with the safety factor {factors[f.rule]:g}")
         if f.rule in factors and f.use is not None

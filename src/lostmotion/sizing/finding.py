@@ -29,7 +29,7 @@ RULES = {
     "inertia_ratio": "the motor's data sheet, or the rule of thumb of servo manufacturers: at most 10",
     "resonance": "two-mass oscillator; a command within a factor of 1.5",
     "dead_zone": "the run, and the commands that move the load from rest",
-    "lost_motion": "virtual test rig; the limit is that of the task",
+    "lost_motion": "virtual test rig; the limit is task.max_lost_motion",
     "holding": "runs with command 0, from rest and from motion",
     "self_locking": "linear regime of the steady motion under the load: docs/self-locking.md",
     "motor_peak_torque": "the motor's data sheet",

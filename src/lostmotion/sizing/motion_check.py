@@ -27,12 +27,12 @@ def load_torques(result: RunArrays) -> list[float]:
 
 
 def inertia(scenario: Scenario) -> Finding:
-    """Inertia of the load relative to that of the rotor."""
+    """Inertia of the load relative to the inertia of the rotor."""
     return inertia_ratio(scenario.motor, scenario.gearbox, scenario.load.inertia)
 
 
 def ratio_of_inertias(motor: Motor, gearbox: Gearbox, load_inertia: float) -> float:
-    """Inertia of all that the rotor moves, at the motor, over that of the rotor with its brake.
+    """Inertia of all that the rotor moves, at the motor, over the inertia of the rotor with its brake.
 
     The limits of manufacturers are for this ratio: screw, coupling, pulleys and gearbox belong to the load.
     Source: Yaskawa, selection examples of servo motors, J_L = J_table + J_screw + J_coupling + J_gear.
@@ -41,7 +41,7 @@ def ratio_of_inertias(motor: Motor, gearbox: Gearbox, load_inertia: float) -> fl
 
 
 def inertia_ratio(motor: Motor, gearbox: Gearbox, load_inertia: float, wanted: float | None = None) -> Finding:
-    """The same, of parts, with the largest permissible ratio: the one that is wanted, and that of the manufacturer.
+    """The same, of parts, with the largest permissible ratio: the one that is wanted, and the limit of the manufacturer.
 
     Without either, 10 is the rule of thumb, and beyond it is a reservation.
     """
@@ -56,9 +56,7 @@ def inertia_ratio(motor: Motor, gearbox: Gearbox, load_inertia: float, wanted: f
     elif stated:
         remark = f"above {largest:g} the load is hard to control from the motor"
     else:
-        remark = (
-            f"above {largest:g} a load is usually hard to control; motor.limits.max_inertia_ratio states the motor's own limit"
-        )
+        remark = f"above {largest:g} a load is usually hard to control; motor.limits.max_inertia_ratio states the motor's own limit"
     return Finding(
         "inertia_ratio",
         "inertia of load and gearbox / of the rotor",

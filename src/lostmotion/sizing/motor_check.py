@@ -35,7 +35,7 @@ def largest_speed(m: Motor, speed: float, where: str = "motor", *, slides: bool 
 
 
 def peak_torque(m: Motor, torque: np.ndarray, where: str = "motor", *, slides: bool = False) -> list[Finding]:
-    """The largest of the run [N·m], of a motor that moves a slide [N]; nothing where no limit is known, as that of the current then judges."""
+    """The largest of the run [N·m], of a motor that moves a slide [N]; nothing where no limit is known, as the limit of the current then judges."""
     limit = m.limits.peak_torque if m.limits else None
     if limit is None:
         return []
@@ -124,7 +124,7 @@ def command_of_run(
     torque: np.ndarray,
     speed: np.ndarray,
 ) -> np.ndarray:
-    """E_C over a run [-]: its command. If the command is that of a current loop whose voltage the run does not
+    """E_C over a run [-]: its command. If the command comes from a current loop whose voltage the run does not
     contain, E_C is computed from torque [N·m] and speed [rad/s]. The inductance counts under a current loop of first
     order only."""
     law = None if controller is None else driven(controller)

@@ -40,7 +40,7 @@ def motor_current(result: xarray.Dataset, motor: str | None = None) -> xarray.Da
         Over ``time`` [s]. A motor with a winding has `current` [A], i_q, the amplitude of a phase with the sign of the torque;
         `current_rms` [A]; and `voltage` [V], the amplitude of a phase with the decoupling, which may exceed `voltage_limit` since
         only u_q is limited. Under a current loop of kind ideal or first_order it is the voltage that torque and speed require.
-        With first_order it includes that of the inductance, which has no bound in an ideal loop. Under field-oriented control the
+        With first_order it includes the voltage of the inductance, which has no bound in an ideal loop. Under field-oriented control the
         amplitudes are those of both axes together, as in the run. Any other motor has `current` alone, torque / torque constant.
 
     Raises
@@ -126,14 +126,14 @@ def temperatures(
     repeated : bool
         Whether the run is a cycle that has been repeated until the temperatures repeat too, in closed form.
     constant_resistance : bool
-        Whether the resistance stays that of its reference temperature. Otherwise it rises by 0.393 % per kelvin, as copper does.
+        Whether the resistance stays at its value for the reference temperature. Otherwise it rises by 0.393 % per kelvin, as copper does.
 
     Returns
     -------
     xarray.Dataset
         Over ``time`` [s]: `winding_temperature` and `case_temperature` [°C] and `copper_loss` [W]; `rms_torque` [N·m], and `headroom`
-        [K] if the limits have a largest temperature. The heat of each interval between samples is that of the exact run, from a
-        second run. The attribute `error_bound` [K] bounds the error that results from its course within an interval. It is infinite
+        [K] if the limits have a largest temperature. The heat of each interval between samples is exact, from a second
+        run. The attribute `error_bound` [K] bounds the error that results from its course within an interval. It is infinite
         for a run with a law of its own, which cannot be repeated: the torque is then taken as straight between the samples.
 
     Raises

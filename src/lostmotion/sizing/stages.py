@@ -93,7 +93,7 @@ def without_record(kind: str, table: Mapping[str, Any]) -> bool:
 
 
 def at_input(motion: RequiredMotion, stage: LinearDrive) -> RequiredMotion:
-    """The motion of a slide as that of the shaft that drives its stage: torques [N·m] with losses, drag and inertia of the stage."""
+    """The motion of a slide, as a motion of the shaft that drives its stage: torques [N·m] with losses, drag and inertia of the stage."""
     ratio = stage.ratio()
     speed, acceleration, s = ratio * motion.speed, ratio * motion.acceleration, np.sign(motion.speed)
     forward, back = stage.efficiencies() or (1.0, 1.0)

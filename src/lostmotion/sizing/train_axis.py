@@ -57,7 +57,7 @@ class OneAxis:
 
 
 def _gearbox(gear: Any) -> Gearbox:
-    """A gear of a train as a gearbox without losses; one without a rated torque has that of `DIRECT`."""
+    """A gear of a train as a gearbox without losses; one without a rated torque has the rated torque of `DIRECT`."""
     known = {key: value for key in Gearbox.model_fields if (value := getattr(gear, key, None)) is not None}
     own = DIRECT.model_dump(include={"rated_input_speed", "rated_output_torque"})
     lossless = {"losses": ConstantEfficiency(efficiency=1.0), "loss_range": None}
@@ -80,7 +80,7 @@ def axis_rules(scenario: Scenario, result: RunArrays) -> list[Finding]:
             *resonance(motor, found.whole, found.mass, command),
             replace(lost_motion(found.whole, None, slides=True), remark="the task of a train has no limit for it"),
         ]
-    controlled = "the command is that of a controller" if scenario.axes() else "it is judged in the short form alone"
+    controlled = "the command comes from a controller" if scenario.axes() else "it is judged in the short form alone"
     return [*findings, _not_judged("dead_zone", controlled), *_held(scenario, result)]
 
 
@@ -98,7 +98,7 @@ def _held(scenario: Scenario, result: RunArrays) -> list[Finding]:
         why = "the share of each motor in the loads follows from the motion; judge each axis apart"
         return [_not_judged(rule, why) for rule in asked]
     if scenario.gravity or scenario.springs or scenario.angle_torques:
-        return [_not_judged(rule, "a load that depends on the angle acts beside that of the run") for rule in asked]
+        return [_not_judged(rule, "a load that depends on the angle acts beside the load of the run") for rule in asked]
     (motor,) = train.motors.values()
     need = _largest([(shares[shaft] or 0.0) * torque for shaft, torque in loads.items()])
     nothing = Finding("holding", HOLDING, "no load acts", "ok")

@@ -153,8 +153,8 @@ def warm_up(
     Parameters
     ----------
     scenario : Scenario
-        A scenario with commands or continuous controllers. Its values hold at the reference temperatures: of the motor at that of its
-        resistance, of gears at `lubricant_temperature`.
+        A scenario with commands or continuous controllers. Its values hold at the reference temperatures: for the motor at the
+        temperature of its resistance, for gears at `lubricant_temperature`.
     update : float
         Interval between two updates of the temperatures [s], an even multiple of simulation.sample_interval.
     motor : str, optional

@@ -29,7 +29,7 @@ BESIDE: dict[str, tuple[str, ...]] = {
 
 
 class LinearWinding(Winding):
-    """Winding of a linear motor: as that of a rotary one, to 1 m of travel in place of 1 rad.
+    """Winding of a linear motor, as for a rotary one, to 1 m of travel in place of 1 rad.
 
     With the pole pitch tau the electrical angle is pi x/tau, so that pi/tau stands for the pole pairs.
     """
