@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import os
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -114,9 +115,9 @@ def test_the_order_of_the_shafts_in_the_file_changes_nothing() -> None:
         assert np.all(np.abs(one - other[::-1]) < tolerance * size[:n]), case
 
 
-def compare(number: int, seed: int, *, friction: bool) -> None:
+def compare(cases: Sequence[int], seed: int, *, friction: bool) -> None:
     compared = impacts = 0
-    for case in range(number):
+    for case in cases:
         parts, duration = random_chain(np.random.default_rng([seed, case]), friction=friction)
         result = lm.simulate(Chain(**parts).scenario(duration))
         energy = lm.energy_of(result)
@@ -131,17 +132,22 @@ def compare(number: int, seed: int, *, friction: bool) -> None:
         assert taken == pytest.approx(chain.lost, rel=1e-6, abs=tolerance * turned), case
         compared += 1
         impacts += chain.impacts
-    assert compared > 0.8 * number
-    assert impacts > 20 * number
+    assert compared > 0.8 * len(cases)
+    assert impacts > 20 * len(cases)
 
 
 def test_random_chains_are_those_of_momentum_and_restitution() -> None:
     """3 to 6 shafts, inertias over 2.5 decades, 0 to 0.9 of restitution: none jams, and all are as from impact to impact."""
-    compare(int(2000 * SHARE), 59, friction=False)
+    compare(range(int(2000 * SHARE)), 59, friction=False)
 
 
 def test_random_chains_with_friction_are_those_of_momentum_and_restitution() -> None:
-    compare(int(max(30, 300 * SHARE)), 60, friction=True)
+    compare(range(int(max(30, 300 * SHARE))), 60, friction=True)
+
+
+def test_flanks_accumulate_beside_others_that_part_for_long() -> None:
+    """All are without a gap at that instant: those that part at a speed take no part."""
+    compare([312, 458, 722, 1247, 1521, 1660, 1695, 1876], 61, friction=True)
 
 
 # --- gears that lock in motion ---

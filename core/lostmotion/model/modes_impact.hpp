@@ -2,7 +2,8 @@
 //
 // With an approach acceleration a > 0, flanks of one gear that part at the speed v meet again after 2 v/a, at the speed
 // v, and the sum of all further flights is 2 v/(a (1 - e)). Flights that are less high than a share of the backlash are
-// replaced by contact with the same mean torque: a clock runs for the sum of their durations, and then they touch.
+// replaced by contact with the same mean torque: a clock runs for the sum of their durations, and then they touch. It
+// does not run down where nothing is lost (e = 1).
 //
 // Flanks of several gears strike in turn. Let K be the kinetic energy of their approach speeds u, delta their gaps,
 // lambda the torques that would press them if all touched. K + sum lambda delta is constant in flight and falls with
@@ -29,6 +30,7 @@ template <class Now>
 Impulses SwitchedTrain<Sizes>::impulses(const Now& now, const Key& key) const {
     std::array<double, max_shafts> speeds{};
     for (std::size_t s = 0; s < train().shafts.size(); ++s) speeds[s] = now.x[places().shafts[s].speed];
+    const Ties ties = places().ties(key.modes.data());
     std::vector<Flank> flanks;
     for (int c = 0; c < contacts(); ++c) {
         const ContactPlace& p = places().contacts[c];
@@ -36,8 +38,10 @@ Impulses SwitchedTrain<Sizes>::impulses(const Now& now, const Key& key) const {
         const bool apart = has_gap(c, now);
         if (apart && p.reach - std::fabs(now.x[p.flanks]) > least_flight_ * 2.0 * p.reach) continue;
         const auto gear = static_cast<std::size_t>(p.element);
-        // While impacts accumulate flanks count as touching, but have a gap.
-        const bool touches = key.modes[c] == 0 && !(now.x[places().gears[gear].clock] > 0.0);
+        // While impacts accumulate flanks count as touching, but have a gap. Where others keep them at rest, it is open
+        // whether they press.
+        const bool touches =
+            !(now.x[places().gears[gear].clock] > 0.0) && (key.modes[c] == 0 || (!apart && kept_at_rest(p, ties)));
         flanks.push_back({c, now.x[p.flanks] > 0.0 ? 1.0 : -1.0, train().gears[gear].restitution, apart, touches});
     }
     return Impulses(places(), std::move(flanks), speeds);
@@ -115,16 +119,18 @@ double SwitchedTrain<Sizes>::time_to_rest(const E& e, const Now& now, int contac
     const double restitution = train().gears[static_cast<std::size_t>(p.element)].restitution;
     const double side = now.x[p.flanks] > 0.0 ? 1.0 : -1.0;
     double v = -side * speed_of(contact, now);
-    if (!(v > 0.0) || !(restitution < 1.0)) return -1.0;
+    if (!(v > 0.0)) return -1.0;
     std::decay_t<decltype(regime_of(e).guards[0].form)> approach;
     p.each_shaft([&](int s, double per) { approach.c[places().shafts[s].speed] += side * per; });
     auto along = flow(e, now);
     const double a0 = along.rate(approach, 1), a1 = along.rate(approach, 2), a2 = along.rate(approach, 3);
     if (!(a0 > rounding * along.rate_magnitude(approach, 1))) return -1.0;
-    const double first = 2.0 * v / a0, all = first / (1.0 - restitution);
+    const bool elastic = !(restitution < 1.0);
+    const double first = 2.0 * v / a0, all = elastic ? first : first / (1.0 - restitution);
     const bool small = 0.5 * v * v <= least_flight_ * 2.0 * p.reach * a0;
     const bool even = std::fabs(a1) * all <= 1e-4 * a0 && std::fabs(a2) * all * all <= 1e-8 * a0;
     if (!(small && even) && first > unresolved * std::fabs(now.time)) return -1.0;
+    if (elastic) return for_ever;
     // Flights under an acceleration that changes little, until it is constant to rounding.
     double t = 0.0;
     for (int flight = 0; flight < 100000; ++flight) {
@@ -147,7 +153,8 @@ double SwitchedTrain<Sizes>::time_to_rest(const E& e, const Now& now, const Now&
                                           double energy) const {
     auto along = flow(e, now);
     struct Pressed {
-        double torque, rate, most, flight;  // most: the gap that counts as none; flight: its duration, by sqrt(energy)
+        // most: the gap that counts as none; flight: its duration, by sqrt(energy); flights: of all, or without end
+        double torque, rate, most, flight, flights;
     };
     std::vector<Pressed> all;
     for (std::size_t f = 0; f < joined.flanks.size(); ++f) {
@@ -156,17 +163,23 @@ double SwitchedTrain<Sizes>::time_to_rest(const E& e, const Now& now, const Now&
         const ContactPlace& p = places().contacts[flank.contact];
         const auto& form = regime_of(e).output_torque[static_cast<std::size_t>(p.element)];
         const double torque = flank.side * evaluate(n_, form, now);
-        if (!(torque > rounding * magnitude(n_, form, now)) || !(flank.restitution < 1.0)) return -1.0;
+        if (!(torque > rounding * magnitude(n_, form, now))) return -1.0;
         energy += torque * (p.reach - std::fabs(before.x[p.flanks]));
         all.push_back({torque, along.rate(form, 1), least_flight_ * 2.0 * p.reach,
-                       2.0 * std::sqrt(2.0 * joined.inertia(f)) / (torque * (1.0 - flank.restitution))});
+                       2.0 * std::sqrt(2.0 * joined.inertia(f)) / torque, 1.0 / (1.0 - flank.restitution)});
     }
     double time = 0.0;
-    for (const Pressed& p : all) time = std::fmax(time, p.flight * std::sqrt(energy));
+    bool elastic = false;
+    for (const Pressed& p : all) {
+        const bool ends = std::isfinite(p.flights);
+        time = std::fmax(time, p.flight * std::sqrt(energy) * (ends ? p.flights : 1.0));
+        elastic = elastic || !ends;
+    }
     const bool small = std::all_of(all.begin(), all.end(), [&](const Pressed& p) {
         return energy <= p.most * p.torque && std::fabs(p.rate) * time <= 1e-4 * p.torque;
     });
-    return small || time <= unresolved * std::fabs(now.time) ? time : -1.0;
+    if (!small && !(time <= unresolved * std::fabs(now.time))) return -1.0;
+    return elastic ? for_ever : time;
 }
 
 template <class Sizes>
@@ -201,44 +214,72 @@ Found SwitchedTrain<Sizes>::strikes(Cache& cache, Now& now, const G& fired, Key&
     }
 }
 
-// Lets flanks touch whose flights are negligible: of all gears where they fly that low, or else those of one. False if
-// there are none.
+// Lets flanks touch whose flights are negligible: all that fly that low, or else ever fewer, or the struck ones alone.
+// False if there are none.
 template <class Sizes>
 template <class Cache, class Now>
 bool SwitchedTrain<Sizes>::close(Cache& cache, Now& now, const Impulses& struck, int contact, const Event& event,
                                  const Now& past, const Key& from, Key& key) const {
     const Now apart = now;
     const Key key_apart = key;
-    for (const bool alone : {false, true}) {
-        Impulses joined = struck;
-        std::vector<bool> some;
-        int several = 0;
-        for (Flank& f : joined.flanks) {
-            const bool flies = key_apart.modes[f.contact] != 0;
-            f.accumulates = flies && (!alone || f.contact == contact);
-            several += f.accumulates;
-            some.push_back(f.accumulates || !flies);
-        }
-        const bool own = key_apart.modes[contact] != 0;  // of all that fly, or the only one
-        if (alone ? !own || struck.approach() > 0.0 : several == 0 || (several == 1 && own)) continue;
-        double left = alone ? time_to_rest(look_up(cache, key), now, contact) : 0.0;
-        if (left < 0.0) return false;
+    const std::size_t m = struck.flanks.size();
+    const auto flies = [&](std::size_t f) { return key_apart.modes[struck.flanks[f].contact] != 0; };
+    Impulses joined = struck;
+    // Do those that are to accumulate rest together with those that touch, while no others strike? left: finds for how
+    // long they go on to strike.
+    const auto rest = [&](auto&& left) {
+        std::vector<bool> some(m);
+        for (std::size_t f = 0; f < m; ++f) some[f] = joined.flanks[f].accumulates || !flies(f);
         const double energy = joined.join(some);
         now = past;
         key = from;
-        bool rest = land(cache, now, joined, event, past, key) == Found::yes;
-        for (std::size_t f = 0; f < some.size() && rest; ++f)
-            rest = !some[f] || key.modes[joined.flanks[f].contact] == 0;
-        if (rest && !alone) left = time_to_rest(look_up(cache, key), now, apart, joined, energy);
-        if (rest && left >= 0.0) {
-            for (const Flank& f : joined.flanks)
-                if (f.accumulates)
-                    now.x[places().gears[static_cast<std::size_t>(places().contacts[f.contact].element)].clock] = left;
-            return true;
+        bool rests = land(cache, now, joined, event, past, key) == Found::yes && !(joined.approach() > 0.0);
+        for (std::size_t f = 0; f < m; ++f) rests = rests && (!some[f] || key.modes[joined.flanks[f].contact] == 0);
+        const double time = rests ? left(energy) : -1.0;
+        if (!(time >= 0.0)) return false;
+        for (const Flank& f : joined.flanks)
+            if (f.accumulates)
+                now.x[places().gears[static_cast<std::size_t>(places().contacts[f.contact].element)].clock] = time;
+        return true;
+    };
+    std::vector<bool> set(m);
+    for (std::size_t f = 0; f < m; ++f) set[f] = flies(f);
+    while (true) {
+        const auto several = std::count(set.begin(), set.end(), true);
+        joined = struck;
+        bool own = false;
+        for (std::size_t f = 0; f < m; ++f) {
+            joined.flanks[f].accumulates = set[f];
+            own = own || (set[f] && joined.flanks[f].contact == contact);
         }
-        now = apart;
-        key = key_apart;
+        if (several == 0 || (several == 1 && own)) break;
+        if (rest([&](double energy) { return time_to_rest(look_up(cache, key), now, apart, joined, energy); }))
+            return true;
+        // Those that would part do not belong to them, or that which strikes or parts with the most energy.
+        bool part = false;
+        std::size_t most = m;
+        for (std::size_t f = 0; f < m; ++f) {
+            if (!set[f]) continue;
+            const auto size = [&](std::size_t k) {
+                return std::fabs(struck.flanks[k].speed) * std::sqrt(struck.inertia(k));
+            };
+            if (most == m || size(f) > size(most)) most = f;
+            if (key.modes[struck.flanks[f].contact] == 0) continue;
+            set[f] = false;
+            part = true;
+        }
+        if (!part) set[most] = false;
     }
+    now = apart;
+    key = key_apart;
+    if (key.modes[contact] == 0 || struck.approach() > 0.0) return false;
+    const double left = time_to_rest(look_up(cache, key), now, contact);
+    if (left < 0.0) return false;
+    joined = struck;
+    for (Flank& f : joined.flanks) f.accumulates = f.contact == contact;
+    if (rest([&](double) { return left; })) return true;
+    now = apart;
+    key = key_apart;
     return false;
 }
 

@@ -473,6 +473,7 @@ class SwitchedTrain {
     static constexpr double negligible = 0x1p-80;
     static constexpr int most_rounds = 4096;
     static constexpr double unresolved = 1e4 * std::numeric_limits<double>::epsilon();  // of the time
+    static constexpr double for_ever = 1e9;                                             // [s]
     static constexpr int most_changes = 4;  // of the mode of each contact along the way of the torques
     static constexpr std::size_t from_one_start = 300, longest_pivoting = 600;
 
