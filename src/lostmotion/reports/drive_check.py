@@ -16,11 +16,11 @@ MARKS = {"ok": "ok", "caution": "caution", "warning": "WARNING", "unknown": "not
 
 def check_report(name: str, findings: Findings, title: str = "") -> Report:
     """The page of a check."""
-    used = {f.what: (100.0 * f.use,) for f in findings if f.use is not None}
+    used = {f.what: (100.0 * f.use,) for f in findings if f.use is not None and f.verdict != "caution"}
     reach = min(WIDEST, max([110.0, *(1.05 * value for (value,) in used.values())]))
     bars = Bars("Use of the limits", "share of the limit [%]", used, x_range=(0.0, reach), limit=100.0)
     rows = [[f.what, f.value, MARKS[f.verdict], f.remark, f.source] for f in findings]
-    marked = frozenset(k for k, f in enumerate(findings) if f.verdict in ("caution", "warning"))
+    marked = frozenset(k for k, f in enumerate(findings) if f.verdict == "warning")
     header = ("point", "value", "verdict", "remark", "rule and its source")
     return Report(
         title=title or name,

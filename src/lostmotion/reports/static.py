@@ -233,7 +233,7 @@ def _bars(bars: Bars) -> str:
     """The longest bar first."""
     order = sorted(bars.values, key=lambda name: -max(map(abs, bars.values[name])))
     limits = bars.x_range or extent([*bars.values.values(), [0.0]], False, 0.0)
-    left = min(220.0, 14.0 + 6.6 * max(map(len, order), default=0))
+    left = min(0.55 * WIDTH, 14.0 + 6.6 * max(map(len, order), default=0))
     to_x = _scale(limits, left, WIDTH - RIGHT, False)
     row = 24.0
     height = TOP + row * len(order) + BOTTOM
@@ -254,7 +254,7 @@ def _bars(bars: Bars) -> str:
             parts.append(f'<rect {box} fill="var(--{colour})"><title>{escape(name)}: {_shown(value)}</title></rect>')
             if cut:
                 end = f'x="{b - 6:.1f}" y="{top + 15:.1f}"'
-                parts.append(f'<text class="tick end" {end} style="fill: var(--surface)">{_shown(value)} →</text>')
+                parts.append(f'<text class="tick end" {end} style="fill: var(--surface)">{value:.4g} →</text>')
     if bars.limit is not None:
         end = f"{float(to_x(bars.limit)):.1f}"
         parts.append(f'<path d="M{end} {TOP}V{height - BOTTOM}" stroke="var(--text)" stroke-dasharray="4 3"/>')

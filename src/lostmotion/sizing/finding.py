@@ -152,7 +152,7 @@ class Findings(tuple[Finding, ...]):
         lines = [
             f"{counted(len(by['warning']), 'limit')} exceeded, {thumb}{len(by['ok'])} kept, {len(unknown)} not judged"
         ]
-        if used := [f for f in self if f.use is not None]:
+        if used := [f for f in self if f.use is not None and f.verdict != "caution"]:
             most = max(used, key=lambda f: f.use or 0.0)
             lines.append(f"the most used limit is {most.what}: {100.0 * (most.use or 0.0):.3g} %")
         return Verdict.of(points, lines)
