@@ -345,7 +345,7 @@ def test_a_limit_that_is_missed_by_far_leaves_the_other_bars_to_be_seen(tmp_path
     first, *others = sorted(uses, key=lambda name: -uses[name])
     for name in others:
         assert widths[name] / widths[first] == pytest.approx(uses[name] / 200.0, abs=0.01)
-    assert f"{uses[first]:.6g} →" in render(check_report("joint", findings))
+    assert f"{uses[first]:.4g} →" in render(check_report("joint", findings))
 
 
 def test_no_mean_is_judged_ok_by_waiting_while_the_load_sinks():
@@ -443,6 +443,14 @@ def test_an_inertia_ratio_is_a_reservation_by_the_rule_of_thumb_and_a_failure_by
         assert ratio.use == pytest.approx(31.7 / (limit or 10.0), rel=2e-3)
         states[limit] = (ratio.verdict, findings.verdict.exit_code, "inertia" in findings.verdict.lines[0])
     assert states == {None: ("caution", 0, True), 20.0: ("warning", 1, True), 40.0: ("ok", 0, False)}
+
+
+def test_a_limit_that_is_given_takes_no_other_judgement_away() -> None:
+    before, after = (
+        {f.what: f.verdict for f in lm.check_drive(lm.load("position-axis", changes))}
+        for changes in ({}, {"motor.limits.max_speed": "4000 rpm"})
+    )
+    assert {what for what in before if after[what] != before[what]} == {"input speed, largest, for the motor"}
 
 
 def test_a_load_that_drives_is_no_dead_zone():

@@ -54,9 +54,9 @@ def heat(
     limits = m.limits
     word, unit = ("force", "N") if slides else ("torque", "N·m")
     torque = cycle.rms_motor_torque
-    continuous = (
-        limits.continuous_torque if limits is not None else None if m.kind == "torque_source" else m.rated_torque
-    )
+    continuous = None if limits is None else limits.continuous_torque
+    if continuous is None and m.kind != "torque_source":  # other limits do not say that there is none
+        continuous = m.rated_torque
     name = f"continuous {word} of the motor"
     key = f"{where}.limits.continuous_torque"
     findings = [within("motor_torque", f"motor {word}, rms", torque, continuous, unit, name, key=key, cycle=cycle)]
