@@ -180,7 +180,7 @@ def re_number(text: str, pattern: str) -> float:
 
 # --- random axes against long runs ---
 
-AXES = 200 if os.environ.get("LOSTMOTION_CASES") == "1" else 40
+AXES = 200 if os.environ.get("LOSTMOTION_CASES") == "1" else 20
 LONGER = (5.0, 20.0)  # times as long as what was watched
 LONGEST = 6e6  # samples of a controller, of a long run
 

@@ -110,7 +110,7 @@ def test_verdicts_of_random_axes_are_those_of_long_runs(seed: int) -> None:
     counts, checked = {"hunts": 0, "at rest": 0, "not decided": 0}, 0
     for k in range(AXES):
         scenario = random_axis(rng)
-        found = at_rest(axis_of(scenario))
+        found = at_rest(axis_of(scenario), LONGEST / 1.5)
         counts[found.verdict] += 1
         told = f"seed {seed}, axis {k}: {found}"
         duration = 1.5 * found.watched + LONG + (6.0 / found.frequency if found.frequency > 0.0 else 0.0)
