@@ -19,6 +19,7 @@ from lostmotion.portable.fmu_sources import SOURCES
 fmpy: Any = pytest.importorskip("fmpy", reason="FMPy is missing: .venv/bin/pip install --group dev")
 COMPILER = shutil.which("g++") or shutil.which("c++")
 CMAKE = shutil.which("cmake") or shutil.which("cmake", path=str(Path(sys.executable).parent))
+FAST_TO_BUILD = ("-DCMAKE_CXX_FLAGS=-Wall -Wextra -Werror", "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -DNDEBUG")
 STRICT = ("-std=c++20", "-O1", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fvisibility=hidden", "-fPIC")
 
 
@@ -30,18 +31,26 @@ def exported(name: str, to: Path, fmi: int = 2) -> Path:
     return to / "axis"
 
 
-def compiled(sources: Path, to: Path, definitions: Sequence[str]) -> list[Path]:
+def compiled(sources: Path, to: Path, definitions: Sequence[str], files: Sequence[str] = SOURCES) -> list[Path]:
     """Objects of the sources, without the extensions of GCC; its warnings are errors."""
-    made = {Path(name).with_suffix(".o").name: sources / name for name in SOURCES}
+    made = {to / Path(name).with_suffix(".o").name: sources / name for name in files}
+    to.mkdir(exist_ok=True)
     flags = [*STRICT, *(f"-D{d}" for d in definitions)]
 
-    def compile_one(item: tuple[str, Path]) -> str:
-        command = [str(COMPILER), *flags, "-c", str(item[1]), "-o", str(to / item[0])]
+    def compile_one(item: tuple[Path, Path]) -> str:
+        command = [str(COMPILER), *flags, "-c", str(item[1]), "-o", str(item[0])]
         return subprocess.run(command, check=False, stderr=subprocess.PIPE, text=True).stderr
 
     with ThreadPoolExecutor(2) as pool:
         assert "".join(pool.map(compile_one, made.items())) == ""
-    return [to / name for name in made]
+    return list(made)
+
+
+def shared_names(objects: Sequence[Path]) -> list[str]:
+    """Names that objects define for all others; the linker takes one of several inline functions."""
+    listed = subprocess.run(["nm", "-g", "--defined-only", *objects], check=True, capture_output=True, text=True).stdout
+    words = [line.split() for line in listed.splitlines() if len(line.split()) > 2]
+    return [name for _, kind, name in words if kind not in "VWu"]
 
 
 def results(fmu: Path) -> Any:
@@ -49,12 +58,20 @@ def results(fmu: Path) -> Any:
     return fmpy.simulate_fmu(str(fmu), stop_time=0.5, output_interval=1e-3, fmi_type="CoSimulation")
 
 
-@pytest.mark.skipif(COMPILER is None, reason="there is no C++ compiler")
-def test_plain_sources_give_the_bits_of_the_library(tmp_path: Path) -> None:
+@pytest.mark.skipif(COMPILER is None or shutil.which("nm") is None, reason="there is no C++ compiler, or no nm")
+@pytest.mark.slow("the sources of an FMU are compiled")
+def test_plain_sources_give_the_bits_of_the_library_and_share_no_names_with_another_fmu(tmp_path: Path) -> None:
+    """A program that links FMUs statically needs other names for the functions of each; a library has those of the standard."""
     directory = exported("position-axis", tmp_path)
     wanted = results(tmp_path / "axis.fmu")
+    objects = compiled(directory / "sources", tmp_path / "static", ["LOSTMOTION_PLAIN_VECTORS"])
+    names = shared_names(objects)
+    assert {"axis_fmi2DoStep", "axis_lm_advance"} <= set(names)
+    assert [name for name in names if "axis_" not in name] == []
+
     definitions = ["LOSTMOTION_PLAIN_VECTORS", "FMI2_OVERRIDE_FUNCTION_PREFIX"]
-    objects = compiled(directory / "sources", tmp_path, definitions)
+    objects = [o for o in objects if o.name != "fmi.o"]  # the others have no functions of the standard
+    objects += compiled(directory / "sources", tmp_path / "library", definitions, ["fmi.cpp"])
     library = next((directory / "binaries").rglob("axis.*"))
     before = library.read_bytes()
     subprocess.run([str(COMPILER), "-shared", *map(str, objects), "-o", str(library)], check=True)
@@ -69,12 +86,12 @@ def test_plain_sources_give_the_bits_of_the_library(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(CMAKE is None or COMPILER is None, reason="there is no CMake, or no C++ compiler")
-@pytest.mark.slow
+@pytest.mark.slow("the sources of an FMU are compiled")
 def test_cmake_builds_the_sources_of_a_train_in_fmi_3(tmp_path: Path) -> None:
     directory = exported("ball-screw-axis", tmp_path, fmi=3)
     wanted = results(tmp_path / "axis.fmu")
     for command in (
-        [str(CMAKE), "-S", directory / "sources", "-B", tmp_path / "build", "-DCMAKE_CXX_FLAGS=-Wall -Wextra -Werror"],
+        [str(CMAKE), "-S", directory / "sources", "-B", tmp_path / "build", *FAST_TO_BUILD],
         [str(CMAKE), "--build", tmp_path / "build"],
     ):
         subprocess.run(list(map(str, command)), check=True, capture_output=True)
@@ -83,20 +100,6 @@ def test_cmake_builds_the_sources_of_a_train_in_fmi_3(tmp_path: Path) -> None:
     found = results(directory)
     for name in found.dtype.names:
         assert found[name].tobytes() == wanted[name].tobytes(), name
-
-
-@pytest.mark.skipif(COMPILER is None or shutil.which("nm") is None, reason="there is no C++ compiler, or no nm")
-@pytest.mark.slow
-def test_two_fmus_in_one_program_share_no_names(tmp_path: Path) -> None:
-    """A program that links FMUs statically needs other names for the functions of each."""
-    directory = exported("paper-2dof-nl-small", tmp_path)
-    names = []
-    for made in compiled(directory / "sources", tmp_path, []):
-        listed = subprocess.run(["nm", "-g", "--defined-only", made], check=True, capture_output=True, text=True)
-        names += [line.split()[-1] for line in listed.stdout.splitlines() if line.split()[-2] not in "VWu"]
-    assert "axis_fmi2DoStep" in names
-    assert "axis_lm_advance" in names
-    assert [name for name in names if "axis_" not in name] == []
 
 
 def test_the_description_lists_the_sources(tmp_path: Path) -> None:
