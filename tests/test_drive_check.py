@@ -445,6 +445,22 @@ def test_an_inertia_ratio_is_a_reservation_by_the_rule_of_thumb_and_a_failure_by
     assert states == {None: ("caution", 0, True), 20.0: ("warning", 1, True), 40.0: ("ok", 0, False)}
 
 
+@pytest.mark.parametrize("name", ["position-axis", "catalogue-robot-joint", "paper-1dof-l-small", "lossy-rigid-gear"])
+def test_a_drive_in_the_long_form_gets_the_judgements_of_the_short_one(name: str) -> None:
+    scenario = lm.load(name)
+    assert scenario.is_drive
+    short, long = (
+        [
+            (f.rule, f.value, f.verdict)
+            for f in lm.check_drive(s)
+            if f.rule in ("inertia_ratio", "resonance", "lost_motion")
+        ]
+        for s in (scenario, scenario.long())
+    )
+    assert len(short) >= 2
+    assert long == short
+
+
 def test_a_limit_that_is_given_takes_no_other_judgement_away() -> None:
     before, after = (
         {f.what: f.verdict for f in lm.check_drive(lm.load("position-axis", changes))}

@@ -79,7 +79,7 @@ def resonances(motor: Motor, g: Gearbox, load_inertia: float) -> list[tuple[str,
             math.sqrt(k / load_inertia) / (2.0 * math.pi),
         )
         for name, k in pieces.items()
-        if k > 0.0 and not (name == "stiffest" and len(slopes) == 1)
+        if k > 0.0 and not (name == "stiffest" and k == pieces["softest"])
     ]
 
 

@@ -1,4 +1,4 @@
-"""Rules for a train that is one axis: a motor, at most one gearbox, and a screw, a rack or a belt that moves one slide."""
+"""Rules for a train that is one axis: a motor and a gear with a load; or a screw, a rack or a belt that moves one slide."""
 
 from __future__ import annotations
 
@@ -25,19 +25,24 @@ HOLDING = "holding without power"
 
 @dataclass(frozen=True)
 class OneAxis:
-    """A train that is one axis, as a motor and a gearbox with a slide behind it, in units of translation."""
+    """A train that is one axis, as a motor and a gearbox with a load behind it; a slide in units of translation."""
 
     motor: str
     whole: Gearbox
     """gearbox, shafts and stage as one gear"""
-    mass: float
-    """mass of the slide [kg]"""
+    load: float
+    """inertia of the load [kg·m²], or mass of the slide [kg]"""
+    slides: bool
+    rated: bool
+    """whether a torque at the load is known, to which its lost motion is a share"""
 
     @classmethod
     def of(cls, scenario: Scenario) -> OneAxis | str:
         """The axis of a train, or why it is none."""
         train, stages = scenario.train(), scenario.linear_drives()
         between = [name for name in train.gears if name not in stages]
+        if not stages and not scenario.slides:
+            return cls._turning(scenario)
         if len(train.motors) != 1 or len(stages) != 1 or len(between) > 1 or len(scenario.slides) != 1:
             return "it needs one motor, at most one gear, and one screw, rack or belt that moves one slide"
         ((name, motor),), ((stage_name, stage),) = train.motors.items(), stages.items()
@@ -53,7 +58,19 @@ class OneAxis:
         if gear is not None:
             inertia += train.shafts[gear.output].inertia / gear.ratio**2
         whole = together(g.model_copy(update={"inertia": inertia}), stage)
-        return cls(name, whole, next(iter(scenario.slides.values())).mass)
+        return cls(name, whole, next(iter(scenario.slides.values())).mass, True, True)
+
+    @classmethod
+    def _turning(cls, scenario: Scenario) -> OneAxis | str:
+        train = scenario.train()
+        if len(train.motors) != 1 or len(train.gears) != 1 or len(train.shafts) != 2 or scenario.mass_matrices:
+            return "it needs one motor and one gear between two shafts, or a screw, rack or belt that moves one slide"
+        ((name, motor),), (gear,) = train.motors.items(), train.gears.values()
+        if motor.shaft != gear.input or gear.housing is not None or not train.shafts[gear.output].inertia > 0.0:
+            return "the motor must turn a load with an inertia through the gear"
+        g = _gearbox(gear)
+        whole = g.model_copy(update={"inertia": g.inertia + train.shafts[gear.input].inertia})
+        return cls(name, whole, train.shafts[gear.output].inertia, False, gear.rated_output_torque is not None)
 
 
 def _gearbox(gear: Any) -> Gearbox:
@@ -76,9 +93,13 @@ def axis_rules(scenario: Scenario, result: RunArrays) -> list[Finding]:
         motor = scenario.train().motors[found.motor]
         command = scenario.command.get(found.motor)
         findings = [
-            inertia_ratio(motor, found.whole, found.mass),
-            *resonance(motor, found.whole, found.mass, command),
-            replace(lost_motion(found.whole, None, slides=True), remark="the task of a train has no limit for it"),
+            inertia_ratio(motor, found.whole, found.load),
+            *resonance(motor, found.whole, found.load, command),
+            replace(
+                lost_motion(found.whole, None, slides=found.slides), remark="the task of a train has no limit for it"
+            )
+            if found.rated
+            else _not_judged("lost_motion", "the gear has no rated_output_torque"),
         ]
     controlled = "the command comes from a controller" if scenario.axes() else "it is judged in the short form alone"
     return [*findings, _not_judged("dead_zone", controlled), *_held(scenario, result)]
