@@ -10,7 +10,8 @@ import pytest
 import lostmotion as lm
 from dry_friction import RIG, TASK, angles, write_log
 from lostmotion.identification.logs import Channel, Log
-from lostmotion.identification.screening import frozen_stretches, screened
+from lostmotion.identification.screening import constant_stretches, frozen_stretches, screened
+from lostmotion.identification.shared_faults import _kinds_of
 
 TIME = np.arange(800) / 200
 
@@ -30,6 +31,29 @@ def test_a_load_that_rests_below_its_friction_is_not_frozen(rounded: int) -> Non
     assert frozen_stretches(speed) == []
     log = Log("a.csv", TIME, {"angle": Channel(angle, "rad")})
     assert not any("frozen" in note for note in screened(log, ["angle"], []).notes)
+
+
+def test_readings_between_those_of_a_coarse_encoder_are_no_noise_of_a_frozen_sensor() -> None:
+    """A register of 12 bit, read 70 times a second and interpolated to 200 Hz, as servos on a bus give it."""
+    step = 2.0 * np.pi / 4096.0
+    read = np.arange(0.0, TIME[-1], 1.0 / 70.0)
+    angle = np.interp(TIME, read, step * np.round(np.interp(read, TIME, stuck()) / step))
+    assert len(constant_stretches(angle)) >= 4
+    assert frozen_stretches(angle) == []
+    moving = int(np.argmax(np.abs(np.diff(angle))))
+    angle[moving : moving + 30] = angle[moving]
+    (begin, end), *others = frozen_stretches(angle)
+    assert (begin <= moving, end, others) == (True, moving + 30, [])
+
+
+def test_logs_of_a_few_kinds_are_said_to_be_of_these_if_that_is_no_chance() -> None:
+    """9 of 60 logs, all of two trajectories of five, as 4 and 5 of 12: by chance once in 4,000 times."""
+    words = ("brutal", "lift", "sine", "square", "up")
+    facts = {f"{word}{k}": {"trajectory": word, "mass": 0.1 * (k % 4)} for word in words for k in range(12)}
+    odd = {f"brutal{k}" for k in range(4)} | {f"lift{k}" for k in range(5)}
+    assert _kinds_of(facts, odd) == "trajectory = brutal or lift (9 of 24 such logs)"
+    assert _kinds_of(facts, {"brutal0", "lift0"}) == ""
+    assert _kinds_of(facts, {f"{word}0" for word in words}) == "mass = 0 (5 of 15 such logs)"
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-3])

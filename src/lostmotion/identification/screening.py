@@ -282,6 +282,10 @@ def _at_rest(x: np.ndarray, begin: int, end: int, others: Sequence[np.ndarray]) 
     )
     if abs(x[begin]) <= 1e-9 * float(np.nanmax(np.abs(x))) and not jumped:
         return True  # a speed of zero, or an angle that has not left its zero
+    # A sensor that was frozen jumps by what the motion has gone on meanwhile; one that follows a load at rest goes on slowly.
+    ends = [step[k] for k in (begin - 1, end - 1) if 0 <= k < len(step)]
+    if end < len(x) and max(ends) <= np.nanmedian(step[step > 0.0]):
+        return True
     second, third = (float(np.nanmedian(np.abs(np.diff(x[np.isfinite(x)], order)))) for order in (2, 3))
     # Third differences of white noise are 1.8 times the second ones; those of a smooth motion are far smaller.
     resolution = float(np.min(step[step > 0.0]))

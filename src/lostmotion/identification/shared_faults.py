@@ -24,6 +24,9 @@ from .rig import Rig
 FEW = 2  # logs that share a fault
 ALONE = 3  # logs, from which on a fault is shared even if nothing else tells these logs from the others
 KIND = 0.75  # F-score of a property, from which on it tells logs from the others
+CHANCE = (
+    0.01  # probability that logs which are drawn at random are all of a few kinds, below which these tell something
+)
 MANY = 12  # values of a key of the header, up to which each is a kind of log
 TRIED = 12  # logs with which candidates are tried
 GRID = 10  # values of a candidate
@@ -113,7 +116,8 @@ def shared_faults(
         own = [log for log in logs if log.name in names]
         rest = [log for log in logs if log.name not in names]
         candidate = _candidate(rig, engine, own, rest, point, rung)
-        found.append(SharedFault(names, len(logs), _ranged(members), common if score >= KIND else "", candidate))
+        common = common if score >= KIND else _kinds_of(facts, set(names))
+        found.append(SharedFault(names, len(logs), _ranged(members), common, candidate))
     return found
 
 
@@ -176,6 +180,22 @@ def _common(facts: dict[str, dict[str, Any]], names: set[str]) -> tuple[str, flo
         return "", 0.0
     such = [name for name, f in facts.items() if best[1](f)]
     return f"{best[0]} ({len(names & set(such))} of {len(such)} such logs)", best[2]
+
+
+def _kinds_of(facts: dict[str, dict[str, Any]], names: set[str]) -> str:
+    """Values of a key that all of some logs have, and at most half of all logs; empty if there are none, or by chance.
+
+    Such logs are of few kinds, though not all logs of these kinds have the fault.
+    """
+    found = []
+    for key in dict.fromkeys(k for f in facts.values() for k in f):
+        own = [facts[n].get(key) for n in names]
+        several = len({repr(f.get(key)) for f in facts.values()}) <= MANY and not key.startswith("largest ")
+        such = [n for n, f in facts.items() if f.get(key) in own]
+        if several and None not in own and (len(such) / len(facts)) ** len(names) < CHANCE:
+            values = " or ".join(sorted({_shown(value) for value in own}))
+            found.append((len(such), f"{key} = {values} ({len(names)} of {len(such)} such logs)"))
+    return min(found, default=(0, ""))[1]
 
 
 Test = Callable[[dict[str, Any]], bool]

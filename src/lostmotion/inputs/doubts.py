@@ -60,7 +60,7 @@ def doubt(key: str, value: Any, where: object = "") -> None:
 def doubt_window(window: float, travel: float, unit: str, where: str) -> None:
     """Warn of a window of settling in which all of the motion lies."""
     if window >= travel > 0.0:
-        text = f"{where}: {read_as(window, unit)} is no less than the whole motion, {read_as(travel, unit)}; write it with its unit, "
+        text = f"{where}: {read_as(window, unit)} is no less than the whole motion, {read_as(travel, unit)}; give a part of it, "
         warnings.warn(f'{text}such as "1 {"arcmin" if unit == "rad" else "um"}"', ValueWarning, stacklevel=3)
 
 

@@ -202,7 +202,8 @@ class ServoReport:
 
     def _regimes(self) -> str:
         names = ", ".join(self.regimes)
-        return f"its one regime ({names})" if len(self.regimes) == 1 else f"all {len(self.regimes)} regimes ({names})"
+        count = {1: "its one regime", 2: "both regimes"}.get(len(self.regimes), f"all {len(self.regimes)} regimes")
+        return f"{count} ({names})"
 
     def least_margins(self) -> str:
         """The least margins of all loops and regimes; empty where no loop has one."""
