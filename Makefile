@@ -19,8 +19,10 @@ NODE := command -v npm >/dev/null
 # Not every ninja understands the job server of every make.
 unexport MAKEFLAGS
 
-demo: $(VENV)/built report-where-node
-	@if $(NODE); then $(MAKE) --no-print-directory page-drive && mkdir -p out && $(BIN)/lostmotion live paper-2dof-nl-small -o out/live.html; \
+# The core of the live page compiles beside the extension.
+demo: $(VENV)/tools
+	@$(MAKE) --no-print-directory --jobs=2 $(VENV)/built demo-page
+	@if $(NODE); then mkdir -p out && $(BIN)/lostmotion live paper-2dof-nl-small -o out/live.html; \
 	else echo 'Without node the live page was not built; with it, make demo leaves it at out/live.html.'; fi
 	$(BIN)/lostmotion reproduce -o out
 	@echo
@@ -30,9 +32,13 @@ demo: $(VENV)/built report-where-node
 	@echo '      $(BIN)/lostmotion rig schaeffler-rt1-h-20-100'
 	@echo '      $(BIN)/lostmotion servo position-axis'
 
-# After a change: what finds most faults. make test runs all.
+.PHONY: demo-page
+demo-page: $(VENV)/tools
+	@! $(NODE) || $(MAKE) --no-print-directory page-drive page-report
+
+# After a change: what finds most faults. make test runs all; of two jobs one has the longest, the other all else beside it.
 check: lint test-core check-python
-test: lint test-core test-sanitized test-page test-python
+test: test-python test-core lint test-sanitized test-page
 
 .PHONY: test-python check-python
 test-python: c-library fmu-library page-where-node $(VENV)/examples
@@ -121,7 +127,9 @@ KERNELS := drive narrow middle wide
 NEED_NODE := $(NODE) || (echo 'npm is missing: without node the live page is not built'; false)
 WASM_SOURCES := $(SOURCES) $(wildcard bindings/c/*) page/src/core.ts
 .PHONY: page page-report $(KERNELS:%=page-%)
-page: $(KERNELS:%=page-%) page-report
+# In one go, of which each part compiles on a processor of its own where something has changed.
+page: $(LIVE)/page.html page-report | $(VENV)/zig
+	$(BIN)/python bindings/c/build.py page $(LIVE)
 $(KERNELS:%=page-%): page-%: $(LIVE)/page.html $(LIVE)/%.wasm.gz
 # The script of reports, which those who have none call by page-report.
 SCRIPT := $(PACKAGE)/reports/report.js

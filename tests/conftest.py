@@ -176,6 +176,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if why := SLOW.get(item.path.name):
             item.add_marker(pytest.mark.slow(why))
+    # The last tests are short, so that all processes end together.
+    items.sort(key=lambda item: item.path.name not in SLOW)
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
