@@ -123,7 +123,7 @@ aarch64-python:
 # The live page, src/lostmotion/live_page/page.html, and its cores, one for each kernel, which the wheel carries.
 # `lostmotion live` calls page-KERNEL when it first needs a core.
 LIVE := $(PACKAGE)/live_page
-KERNELS := drive narrow middle wide
+KERNELS := drive middle any
 NEED_NODE := $(NODE) || (echo 'npm is missing: without node the live page is not built'; false)
 WASM_SOURCES := $(SOURCES) $(wildcard bindings/c/*) page/src/core.ts
 .PHONY: page page-report $(KERNELS:%=page-%)

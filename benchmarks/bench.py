@@ -43,13 +43,16 @@ def outputs(build: Path) -> dict[str, list[list[str]]]:
         f"bench_control_{builds[0]}",
         "peer_cvode",
     ]
+    wanted += [f"{p} size" for p in wanted if p.startswith(("bench_trains", "peer_cvode"))]
     return {
         p: [
             line.split("|")
-            for line in subprocess.run([build / p], check=True, capture_output=True, text=True).stdout.splitlines()
+            for line in subprocess.run(
+                [build / p.split()[0], *p.split()[1:]], check=True, capture_output=True, text=True
+            ).stdout.splitlines()
         ]
         for p in wanted
-        if (build / p).exists()
+        if (build / p.split()[0]).exists()
     }
 
 
@@ -70,6 +73,7 @@ def main() -> None:
     baseline.section(report, build, _instruction_set.builds())
     build_times.section(report)
     trains.section(report, programs)
+    trains.sizes(report, programs)
     closed_loops.section(report, programs)
     gradients.section(report)
     robots.section(report)

@@ -1,6 +1,7 @@
-// What runs of trains cost, without samples, in the narrowest kernel that holds each; first the paper's drive,
+// What runs of trains cost, without samples, in the smallest kernel that holds each; first the paper's drive,
 // which the others are compared with. Prints one line a case: name, states, switchings, event checks, time of the same
-// train again and of a new one [ms]. With the number of a train and that of runs: makes them and prints nothing.
+// train again and of a new one [ms]. With an argument: of chains, `bench_trains size`. With the number of a train and
+// that of runs: makes them and prints nothing.
 #include <cstdio>
 #include <cstdlib>
 
@@ -34,13 +35,13 @@ struct Run {
 };
 
 template <class System>
-void time_run(const char* name, int states, Run<System> run) {
-    const double first = best_ms(100, [&] {
+void time_run(const char* name, int states, Run<System> run, int repeats = 100) {
+    const double first = best_ms(repeats, [&] {
         RegimeCache<System> cache(run.system);
         run(cache);
     });
     RegimeCache<System> cache(run.system);
-    const double again = best_ms(400, [&] { run(cache); });
+    const double again = best_ms(4 * repeats, [&] { run(cache); });
     std::printf("%s|%d|%zu|%ld|%.6f|%.6f\n", name, states, run.switchings, run.event_checks, again, first);
 }
 
@@ -52,6 +53,15 @@ Run<model::TrainSystem<D>> run_of(const TrainIn<D>& in, const TimedTrain& t) {
 }  // namespace
 
 int main(int argc, char** argv) {
+    if (argc == 2) {  // sizes: chains of masses
+        for (const TimedTrain& t : chains())
+            in_kernel(t, [&](const auto& in) {
+                const int repeats = t.train.shafts.size() > 16 ? 5 : 40;
+                time_run(t.name.c_str(), in.assembly.layout().coupled, run_of(in, t), repeats);
+                std::fflush(stdout);
+            });
+        return 0;
+    }
     const std::vector<TimedTrain> trains = timed_trains();
     if (argc > 2) {
         const TimedTrain& t = trains.at(static_cast<std::size_t>(std::atoi(argv[1])));

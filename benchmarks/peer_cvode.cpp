@@ -29,7 +29,7 @@ struct Context {
     ColumnOf<D> constant{};
     std::vector<int> states;  // those that CVODE integrates, one after the other
     // Guards that have been off zero since the regime began. CVODE refuses to go on from a root, or from near one.
-    std::vector<bool> left_zero = std::vector<bool>(D::guards);
+    std::vector<bool> left_zero;
 
     StateOf<D> state_of(N_Vector y) const {
         StateOf<D> x{};
@@ -50,13 +50,31 @@ int rates(realtype t, N_Vector y, N_Vector rate, void* user) {
 }
 
 template <class System>
+int jacobian(realtype, N_Vector, N_Vector, SUNMatrix J, void* user, N_Vector, N_Vector, N_Vector) {
+    const auto& c = *static_cast<Context<System>*>(user);
+    SUNMatZero(J);
+    for (std::size_t r = 0; r < c.states.size(); ++r) {
+        const int row = c.states[r];
+        if (row < System::Dims::coupled)
+            c.linear->each_in_row(row, [&](int k, double factor) {
+                if (k < static_cast<int>(c.states.size()))
+                    SM_ELEMENT_D(J, static_cast<sunindextype>(r), static_cast<sunindextype>(k)) = factor;
+            });
+        else if (const int angle = row - System::Dims::coupled; true)
+            SM_ELEMENT_D(J, static_cast<sunindextype>(r), static_cast<sunindextype>(c.linear->angle_speed[angle])) =
+                c.linear->angle_coefficient[angle];
+    }
+    return 0;
+}
+
+template <class System>
 int roots(realtype t, N_Vector y, realtype* g, void* user) {
     using D = typename System::Dims;
     auto& c = *static_cast<Context<System>*>(user);
     c.input->follow(t);
     const StateOf<D> x = c.state_of(y);
     const auto u = c.input->values();
-    for (int k = 0; k < D::guards; ++k) {
+    for (int k = 0; k < static_cast<int>(c.left_zero.size()); ++k) {
         g[k] = 1.0;
         if (k >= c.regime->n_guards) continue;
         const LinearFormOf<D>& form = c.regime->guards[k].form;
@@ -94,6 +112,7 @@ class Cvode {
         const auto n = static_cast<sunindextype>(task.states.size());
         user_.states = task.states;
         user_.input = &input_;
+        user_.left_zero.resize(static_cast<std::size_t>(task.system.most_guards()));
         SUNContext_Create(nullptr, &context_);
         y_ = N_VNew_Serial(n, context_);
         N_Vector absolute = N_VNew_Serial(n, context_);
@@ -107,8 +126,9 @@ class Cvode {
         CVodeSVtolerances(memory_, tolerance, absolute);
         CVodeSetUserData(memory_, &user_);
         CVodeSetLinearSolver(memory_, solver_, matrix_);
+        CVodeSetJacFn(memory_, jacobian<System>);
         CVodeSetMaxNumSteps(memory_, 1000000);
-        CVodeRootInit(memory_, D::guards, roots<System>);
+        CVodeRootInit(memory_, task.system.most_guards(), roots<System>);
         CVodeSetNoInactiveRootWarn(memory_);
         N_VDestroy(absolute);
     }
@@ -138,7 +158,7 @@ class Cvode {
         return Status::done;
     }
     Status advance(double t_end, Observer&) {
-        std::array<int, D::guards> found{};
+        std::vector<int> found(user_.left_zero.size());
         while (time_ < t_end) {
             CVodeSetStopTime(memory_, controlled_ ? std::fmin(limit_, t_end) : limit_);
             const int status = CVode(memory_, t_end, y_, &time_, CV_NORMAL);
@@ -335,7 +355,29 @@ void compare_cascade(const TrainIn<D>& in, const test::Drive& drive) {
 
 }  // namespace
 
-int main() {
+// Chains of masses, each once, without samples: by BDF, 1e-6, and by Adams, 1e-9.
+void compare_sizes() {
+    for (const TimedTrain& t : chains())
+        in_kernel(t, [&]<class D>(const TrainIn<D>& in) {
+            RegimeCache<model::TrainSystem<D>> cache(in.system);
+            const auto task = task_of(in, in.signals, cache);
+            for (const auto& [method, name, tolerance] :
+                 {std::tuple{CV_BDF, "CVODE BDF, 1e-6", 1e-6}, {CV_ADAMS, "CVODE Adams, 1e-9", 1e-9}}) {
+                bool done = true;
+                const double time = best_ms(t.train.shafts.size() > 16 ? 1 : 3, [&] {
+                    done = Cvode(task, method, tolerance).run(t.duration, 2, [](const auto&) {}) && done;
+                });
+                std::printf("%s|%s|%.6f\n", t.name.c_str(), name, done ? time : std::nan(""));
+                std::fflush(stdout);
+            }
+        });
+}
+
+int main(int argc, char**) {
+    if (argc > 1) {
+        compare_sizes();
+        return 0;
+    }
     std::vector<TimedTrain> trains = timed_trains();
     trains.resize(3);
     const test::Drive drive = PaperRun().drive;

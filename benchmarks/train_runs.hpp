@@ -9,9 +9,8 @@
 
 namespace lostmotion {
 
-LOSTMOTION_SOLVING(extern template, model::Narrow)
 LOSTMOTION_SOLVING(extern template, model::Middle)
-LOSTMOTION_SOLVING(extern template, model::Wide)
+LOSTMOTION_SOLVING(extern template, Any)
 
 struct TimedTrain {
     std::string name;
@@ -98,6 +97,45 @@ inline TimedTrain six_shafts() {
     }
     return t;
 }
+// Masses joined by gears of ratio 1: every third with backlash, the others with damping; dry friction on every shaft of
+// this many, driven by a sine. Of another size nothing else changes.
+struct ChainOf {
+    int masses, friction_every, backlash_every = 3;
+    double friction = 0.05, amplitude = 3.0, frequency = 2.0, mesh_damping = 0.05;  // [N m, N m, Hz, N m s/rad]
+};
+inline TimedTrain chain_of(const ChainOf& c) {
+    using namespace model;
+    constexpr double inertia = 1e-3, stiffness = 500.0, half_backlash = 1e-3;
+    TimedTrain t{"chain of " + std::to_string(c.masses), {}, {sine(c.amplitude, c.frequency)}, 1.0, 0};
+    for (int k = 0; k < c.masses; ++k) {
+        t.train.shafts.push_back(shaft(k == 0 ? 0.0 : inertia));
+        t.train.shafts[k].viscous_friction = 2e-3;
+        if (k % c.friction_every == 0) t.train.shafts[k].friction.torque = c.friction;
+    }
+    t.train.motors = {torque_motor(0)};
+    t.train.motors[0].law.rotor_inertia = inertia;
+    t.train.motors[0].law.friction_torque = 0.0;
+    for (int k = 0; k + 1 < c.masses; ++k) {
+        const bool gap = k % c.backlash_every == 1;
+        t.train.gears.push_back(spring(
+            k, k + 1, 1.0, gap ? TorsionCurve({half_backlash}, {0.0, stiffness}) : TorsionCurve({}, {stiffness})));
+        if (!gap) t.train.gears[k].mesh_damping = c.mesh_damping;
+    }
+    return t;
+}
+// With two frictions and two gaps, and with friction on every mass and a gap at every third.
+inline std::vector<TimedTrain> chains() {
+    std::vector<TimedTrain> all;
+    for (const int masses : {8, 16, 32, 64, 128}) {
+        all.push_back(chain_of({masses, masses / 2, masses / 2}));
+        all.back().name = "few contacts, " + std::to_string(masses);
+    }
+    for (const int masses : {8, 16, 32}) {
+        all.push_back(chain_of({masses, 1, 3}));
+        all.back().name = "friction on all, " + std::to_string(masses);
+    }
+    return all;
+}
 inline std::vector<TimedTrain> timed_trains() {
     const PaperRun paper;
     return {{"the paper's drive", paper.train, paper.signals},
@@ -113,6 +151,7 @@ struct TrainIn {
     using System = model::TrainSystem<D>;
 
     explicit TrainIn(const TimedTrain& t) : assembly(t.train), system(assembly) {
+        make_room(signals, system.counts().inputs);
         for (std::size_t k = 0; k < t.inputs.size(); ++k) signals[k] = t.inputs[k];
         for (const auto& [gear, d] : t.twists) start[assembly.places().gears[gear].twist] = d;
     }
@@ -130,19 +169,17 @@ struct TrainIn {
     StateOf<D> start{};
 };
 
-// Calls use(a TrainIn) in the narrowest kernel that holds a train.
+// Calls use(a TrainIn) in the smallest kernel that holds a train.
 template <class Use>
 void in_kernel(const TimedTrain& t, Use&& use) {
     const model::Assembly a(t.train);
     const auto holds = [&]<class D>(D) { return sizes_of<D>.hold(t.train, a.layout()); };
     if (holds(model::Least{}))
         use(TrainIn<model::Least>(t));
-    else if (holds(model::Narrow{}))
-        use(TrainIn<model::Narrow>(t));
     else if (holds(model::Middle{}))
         use(TrainIn<model::Middle>(t));
     else
-        use(TrainIn<model::Wide>(t));
+        use(TrainIn<Any>(t));
 }
 
 }  // namespace lostmotion

@@ -31,7 +31,7 @@ SHORT = {"simulation.duration": "0.1 s"}
 def built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Stands in for `make page`: its source, and bytes as the core."""
     (tmp_path / "page.html").write_text(SOURCE)
-    for kernel in ("drive", "narrow", "middle", "wide"):
+    for kernel in ("drive", "middle", "any"):
         (tmp_path / f"{kernel}.wasm.gz").write_bytes(b"\x1f\x8b" + kernel.encode())
     monkeypatch.setattr(live_page, "TEMPLATE", tmp_path / "page.html")
     monkeypatch.setattr(live_page, "CORES", tmp_path)
@@ -57,13 +57,13 @@ def test_the_page_holds_the_core_and_the_scenario() -> None:
     assert lm.Scenario(**described["scenario"]) == scenario
 
 
-def test_a_page_holds_the_narrowest_kernel_of_its_train() -> None:
+def test_a_page_holds_the_smallest_kernel_of_its_train() -> None:
     names = ("paper-2dof-nl-small", "position-axis", "worm-lowering", "direction-finder")
     assert [live_page.core_of(lm.load(name)).name for name in names] == [
         "drive.wasm.gz",
         "drive.wasm.gz",
         "middle.wasm.gz",
-        "wide.wasm.gz",
+        "any.wasm.gz",
     ]
 
 

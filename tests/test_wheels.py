@@ -47,8 +47,8 @@ def test_a_wheel_holds_all_that_a_user_needs(tag: str) -> None:
     assert modules == BUILDS[processor(tag)]
     assert any(re.fullmatch(rf"lostmotion/_instruction_set(?:{suffix})", n) for n in names)
     libraries = {(p.parent.name, p.stem) for p in map(Path, names) if p.parts[1] == "fmu_libraries"}
-    assert libraries == set(product(FMU_PLATFORMS, ("drive", "narrow", "middle", "wide")))
-    assert {"lostmotion/live_page/page.html", "lostmotion/live_page/wide.wasm.gz"} <= set(names)
+    assert libraries == set(product(FMU_PLATFORMS, ("drive", "middle", "any")))
+    assert {"lostmotion/live_page/page.html", "lostmotion/live_page/any.wasm.gz"} <= set(names)
     assert {f"lostmotion/reports/{name}" for name in ("report.js", "style.css", "report.css")} <= set(names)
     assert {f"lostmotion/scenarios/{name}.toml" for name in lm.shipped_scenarios()} <= set(names)
 

@@ -23,7 +23,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 # The longest to compile first.
-KERNELS = {name: ROOT / "core" / "kernels" / f"{name}.cpp" for name in ("wide", "middle", "narrow", "drive")}
+KERNELS = {name: ROOT / "core" / "kernels" / f"{name}.cpp" for name in ("any", "middle", "drive")}
 # Sources that are compiled as one, in less time and to less code.
 Group = Sequence[Path]
 CORE = ROOT / "core" / "lostmotion"

@@ -41,6 +41,7 @@ struct BouncingBall {
     enum { height, speed };  // its states
     static constexpr int ground = 2;
 
+    static CountsOf<Dims> counts() { return {}; }
     static int n_twists() { return 0; }
     static int twist_state(int) { return height; }
     static const Form& torque_at_load(const Regime& r) { return r.output_torque[0]; }

@@ -66,7 +66,7 @@ void with_propagator(const Drive& drive, bool slipping, const Use& use) {
     Propagator<D> p;
     const SignalsOf<D> none;
     PhaseRotations turns(1e-3, input_basis(none));
-    const LinearRatesOf<D> rates(regime.rate);
+    const LinearRatesOf<D> rates(system.counts(), regime.rate);
     p.prepare(rates, turns, system.balanced_scale());
     use(p, rates, regime.rate, system.balanced_scale());
 }

@@ -203,8 +203,8 @@ TEST_CASE("a jump that starts a chain with all its contacts at rest is found in 
         for (int i = 0; i < a.layout().inputs; ++i) now.input[0][i] = random.uniform(-3.0, 3.0);
         system.searches = {};
         CAPTURE(n);
-        REQUIRE(system.next(cache, now, static_cast<const Guard*>(nullptr), key, std::array<double, max_inputs>{}) ==
-                Found::yes);
+        REQUIRE(system.next(cache, now, static_cast<const Guard*>(nullptr), key,
+                            std::decay_t<decltype(now.input[0])>{}) == Found::yes);
         worst = std::max(worst, system.searches.trials);
         contacts = a.layout().contacts;
         const std::vector<double> expected = least_constraint(a, now, 20000);
@@ -242,11 +242,14 @@ TEST_CASE("the search works on packed regimes and the kernel's own instant as on
         WideCache wide_cache{a, {}};
         Instant now = random.instant(a, 0.2);
         WideInstant wide;
+        const auto copy = [](const auto& from, auto& to) {
+            for (std::size_t k = 0; k < to.size(); ++k) to[k] = from[k];
+        };
         std::copy_n(now.x.begin(), a.layout().coupled, wide.x.begin());
-        std::copy_n(now.memory.begin(), 16, wide.memory.begin());
-        std::copy_n(now.input_magnitudes.begin(), 14, wide.input_magnitudes.begin());
+        copy(now.memory, wide.memory);
+        copy(now.input_magnitudes, wide.input_magnitudes);
         const auto inputs = [&] {
-            for (int k = 0; k < n_derivatives; ++k) std::copy_n(now.input[k].begin(), 14, wide.input[k].begin());
+            for (int k = 0; k < n_derivatives; ++k) copy(now.input[k], wide.input[k]);
         };
         inputs();
         Key key, wide_key;
@@ -262,7 +265,7 @@ TEST_CASE("the search works on packed regimes and the kernel's own instant as on
                   packed.next(wide_cache, wide, static_cast<const PackedGuard<WidestTest>*>(nullptr), wide_key,
                               wide_before));
             CHECK(key == wide_key);
-            CHECK(std::equal(wide.memory.begin(), wide.memory.end(), now.memory.begin()));
+            for (std::size_t k = 0; k < wide.memory.size(); ++k) CHECK(wide.memory[k] == std::as_const(now.memory)[k]);
         }
     }
 }

@@ -12,7 +12,7 @@ using namespace lostmotion::model;
 
 namespace {
 
-using D = Wide;
+using D = Any;
 using System = TrainSystem<D>;
 
 // A run of a train from a state, with what is asked of it.
@@ -40,7 +40,7 @@ struct Case {
 
     StateOf<D> place(const model::Instant& now) const {
         StateOf<D> x{};
-        std::copy_n(now.x.begin(), assembly.layout().coupled, x.begin());
+        for (int k = 0; k < assembly.layout().coupled; ++k) x[k] = now.x[k];
         return x;
     }
     // Continues from a regime that is known.
@@ -80,11 +80,11 @@ TEST_SUITE("train_periodic") {
             Case c(train);
             const double duration = 1.0;
             const std::vector<Signal> inputs = random.signals(c.assembly, duration);
-            std::copy(inputs.begin(), inputs.end(), c.signals.begin());
+            c.signals = model::packed_signals<D>(inputs);
             const model::Instant now = random.instant(c.assembly, 0.7);
             ExactSolver<System> first(c.system, c.signals, 1e-2, c.system.balanced_scale(), &c.cache);
             D::Memory memory{};
-            std::copy_n(now.memory.begin(), c.assembly.layout().memory, memory.begin());
+            for (int k = 0; k < c.assembly.layout().memory; ++k) memory[k] = std::as_const(now.memory)[k];
             if (first.begin(0.0, c.place(now), memory) != Status::done) continue;
             Path lead_in;
             if (first.advance(0.1, lead_in) != Status::done) continue;
@@ -92,7 +92,7 @@ TEST_SUITE("train_periodic") {
             memory = first.memory();
             const model::Key key = first.key();
 
-            SensitivityOf<System> sensitivity(c.laws, c.cache);
+            SensitivityOf<System> sensitivity(c.system.counts(), c.laws, c.cache);
             Path plain, seen;
             if (!c.run(x, memory, key, 0.1, duration, plain, plain)) continue;
             REQUIRE(c.run(x, memory, key, 0.1, duration, sensitivity, seen));
@@ -122,14 +122,15 @@ TEST_SUITE("train_periodic") {
                     for (int side : {0, 1}) {
                         StateOf<D> disturbed = x;
                         D::Memory m = memory;
-                        for (int k = 0; k < component_count<D>; ++k)
-                            (k < D::states ? disturbed[k] : m[static_cast<std::size_t>(k - D::states)]) +=
-                                (side == 0 ? -h : h) * direction[k];
+                        each_component<D>(c.system.counts(), [&](int k) {
+                            (k < D::states ? disturbed[k] : m[k - D::states]) += (side == 0 ? -h : h) * direction[k];
+                        });
                         if (!c.run(disturbed, m, key, 0.1, duration, ends[side], ends[side])) return false;
                         if (!same_events(ends[side], plain)) return false;
                     }
-                    for (int k = 0; k < component_count<D>; ++k)
+                    each_component<D>(c.system.counts(), [&](int k) {
                         out[k] = (component(ends[1], k) - component(ends[0], k)) / (2.0 * h);
+                    });
                     return true;
                 };
                 ComponentsOf<D> coarse{}, fine{};
@@ -141,8 +142,8 @@ TEST_SUITE("train_periodic") {
                 for (const NamedComponent& of : train_components<D>(c.assembly)) {
                     if (!c.laws.matters(plain.key, of.place)) continue;
                     double found = 0.0;
-                    for (int k = 0; k < component_count<D>; ++k)
-                        found += sensitivity.jacobian.row[of.place][k] * direction[k];
+                    each_component<D>(c.system.counts(),
+                                      [&](int k) { found += sensitivity.jacobian.row[of.place][k] * direction[k]; });
                     const double expected = (4.0 * fine[of.place] - coarse[of.place]) / 3.0;
                     const double bend = std::fabs(fine[of.place] - coarse[of.place]);
                     const double allowed = 1e-7 * (1.0 + std::fabs(expected)) + 0.5 * bend;

@@ -85,7 +85,7 @@ class TrainRun {
 
  private:
     static constexpr int order = 14, points = 16;
-    using Derivatives = std::array<std::array<double, max_states>, order + 1>;
+    using Derivatives = std::array<std::array<double, 64>, order + 1>;
 
     const TestInput& piece(std::size_t input, double t) const {
         const auto& all = inputs[input];

@@ -73,7 +73,7 @@ class ShootingOf {
         HybridState here{solver_.state(), solver_.memory(), solver_.key()};
         for (int follow = first_follow; motion.periods < options_.max_periods; follow *= 2) {
             for (int k = 0; k < follow; ++k, ++motion.periods) {
-                Image image(laws_, cache_);
+                Image image(system_.counts(), laws_, cache_);
                 if (!advance(here, image, motion)) return motion;
                 motion.residual = residual(here, image);
                 // A motion that repeats to the last bit needs no more.
@@ -102,13 +102,14 @@ class ShootingOf {
 
     // A station after one period, and how it depends on the one before.
     struct Image {
-        Image(const ComponentLaws<System>& laws, RegimeCache<System>& cache) : sensitivity(laws, cache) {}
+        Image(const CountsOf<D>& n, const ComponentLaws<System>& laws, RegimeCache<System>& cache)
+            : sensitivity(n, laws, cache) {}
         HybridState end;
         SensitivityOf<System> sensitivity;
     };
 
     static InputsOf<D> constants(const SignalsOf<D>& signals) {
-        InputsOf<D> u;
+        InputsOf<D> u{};
         for (std::size_t i = 0; i < signals.size(); ++i) u[i] = signals[i].breakpoints[0].value;
         return u;
     }
@@ -135,11 +136,11 @@ class ShootingOf {
 
     double residual(const HybridState& a, const Image& image) const {
         double worst = 0.0;
-        for (int k = 0; k < component_count<D>; ++k) {
-            if (laws_.neutral(k) || !laws_.matters(image.end.key, k)) continue;
+        each_component<D>(system_.counts(), [&](int k) {
+            if (laws_.neutral(k) || !laws_.matters(image.end.key, k)) return;
             const double scale = k < D::states ? image.sensitivity.magnitude[k] : laws_.magnitude(k);
             if (scale > 0.0) worst = std::fmax(worst, std::fabs(change(a, image.end, k)) / scale);
-        }
+        });
         return worst;
     }
 
@@ -150,7 +151,7 @@ class ShootingOf {
         motion.newton_steps = steps;
         motion.start = start;
         motion.jacobian = image.sensitivity.jacobian;
-        for (int k = 0; k < D::states; ++k) motion.advance[k] = image.end.x[k] - start.x[k];
+        each_state<D>(system_.counts(), [&](int k) { motion.advance[k] = image.end.x[k] - start.x[k]; });
         return motion;
     }
 
@@ -158,7 +159,7 @@ class ShootingOf {
     bool newton(HybridState y, Motion& motion) {
         double best = std::numeric_limits<double>::infinity();
         for (int step = 0; step <= max_newton; ++step) {
-            Image image(laws_, cache_);
+            Image image(system_.counts(), laws_, cache_);
             if (!advance(y, image, motion)) return false;
             const double now = residual(y, image), before = best;
             if (now < best) {
@@ -175,8 +176,9 @@ class ShootingOf {
     // y + (1 - J)^-1 (image - y), leaving out the directions in which the motion is neutral.
     bool step_from(HybridState& y, const Image& image) {
         std::vector<int> active;
-        for (int k = 0; k < component_count<D>; ++k)
+        each_component<D>(system_.counts(), [&](int k) {
             if (!laws_.neutral(k)) active.push_back(k);
+        });
         const std::size_t n = active.size();
         std::vector<std::vector<double>> M(n, std::vector<double>(n));
         std::vector<double> rhs(n), scale(n);

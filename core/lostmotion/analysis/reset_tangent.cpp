@@ -34,11 +34,12 @@ void ResetTangent::tied_speeds(const std::int8_t* modes, const double* x, double
         if (!b.other_ratios) continue;
         const model::Ties other = tie(b.assembly(), modes);
         for (std::size_t s = 0; s < a.train().shafts.size(); ++s) {
-            if (!ties.follows(static_cast<int>(s)) || ties.free[s] != other.free[s]) continue;
+            if (!ties.follows(static_cast<int>(s)) ||
+                !std::ranges::equal(ties.of[s], other.of[s], {}, &model::Share::shaft, &model::Share::shaft))
+                continue;
             double& sum = to[a.places().shafts[s].speed * parameters_ + b.parameter];
             ties.each_share(static_cast<int>(s), [&](int k, double share) {
-                sum += b.weight * (other.share[s][static_cast<std::size_t>(k)] - share) *
-                       x[a.places().shafts[static_cast<std::size_t>(k)].speed];
+                sum += b.weight * (other.of[s].of(k) - share) * x[a.places().shafts[static_cast<std::size_t>(k)].speed];
             });
         }
     }

@@ -14,6 +14,7 @@
 #include <memory>
 #include <string>
 
+#include "../model/pack.hpp"
 #include "harmonics.hpp"
 #include "periodic.hpp"
 #include "power_channels.hpp"
@@ -136,7 +137,7 @@ ResponseTable respond_by_name(Plant& plant, const std::vector<ResponseRequest>& 
     std::vector<ResponsePointOf<System>> points;
     for (const ResponseRequest& r : asked) {
         points.emplace_back();
-        std::copy(r.inputs.begin(), r.inputs.end(), points.back().signals.begin());
+        points.back().signals = model::packed_signals<D>(r.inputs);
         points.back().period = r.period;
         points.back().start = start(r.start);
     }

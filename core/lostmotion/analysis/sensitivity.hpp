@@ -22,33 +22,37 @@ class SensitivityOf final : public Observer<System> {
     using Components = ComponentsOf<D>;
     using Jacobian = JacobianOf<D>;
 
-    SensitivityOf(const ComponentLaws<System>& laws, RegimeCache<System>& cache) : laws_(laws), cache_(cache) {}
+    SensitivityOf(const CountsOf<D>& n, const ComponentLaws<System>& laws, RegimeCache<System>& cache)
+        : jacobian(Jacobian::identity(n)), n_(n), laws_(laws), cache_(cache) {}
 
-    Jacobian jacobian = Jacobian::identity();
+    Jacobian jacobian;
     State magnitude{};   // largest magnitude of each state at the ends of the segments
     bool smooth = true;  // false: a switching by grazing, or with a rate that is lost in rounding
 
     bool segment(const Segment<System>& s) override {
         if (!input_) input_.emplace(s.at.input());
-        for (int k = 0; k < D::states; ++k)
+        each_state<D>(n_, [&](int k) {
             magnitude[k] = std::fmax(magnitude[k], std::fmax(std::fabs(s.at.x()[k]), std::fabs(s.x_end[k])));
+        });
         const Regime& r = s.entry.regime;
         regime_ = &r;
         x_ = s.x_end;
         memory_ = s.memory;
         if (!(s.end > s.begin)) return true;
-        const auto G = s.entry.propagator.integral(s.end - s.begin);
-        std::array<Components, static_cast<std::size_t>(D::states)> rates;
-        for (int row = 0; row < D::states; ++row) rates[row] = gradient<D>(r.rate[row]);
+        const auto G = s.entry.propagator.changes(s.end - s.begin);
+        ByState<D, Components> rates;
+        rates.make_room(n_);
+        each_state<D>(n_, [&](int row) { rates[row] = gradient<D>(r.rate[row]); });
         // x(s) = x + G x', column by column.
-        for (int c = 0; c < component_count<D>; ++c) {
+        each_component<D>(n_, [&](int c) {
             State rate{};
-            for (int row = 0; row < D::states; ++row)
-                for (int k = 0; k < component_count<D>; ++k) rate[row] += rates[row][k] * jacobian.row[k][c];
+            each_state<D>(n_, [&](int row) {
+                each_component<D>(n_, [&](int k) { rate[row] += rates[row][k] * jacobian.row[k][c]; });
+            });
             State change;
-            (G * load<D>(rate)).store(change.data());
-            for (int row = 0; row < D::states; ++row) jacobian.row[row][c] += change[row];
-        }
+            (G * load<D>(rate)).store(change);
+            each_state<D>(n_, [&](int row) { jacobian.row[row][c] += change[row]; });
+        });
         return true;
     }
 
@@ -62,41 +66,42 @@ class SensitivityOf final : public Observer<System> {
             input_->anchor(w.time);
             u_after = input_->template jet<2>();
         }
-        Jacobian jump = Jacobian::identity();
+        Jacobian jump = Jacobian::identity(n_);
         const auto reset = laws_.reset({w, old, next, x_, memory_, u, u_after}, jump);
         smooth = smooth && reset.exact;
         if (w.guard >= 0) {
             const auto& form = old.guards[w.guard].form;
             const Components f = flow(old, x_, memory_, u[0]), after = flow(next, w.x, w.memory, u[0]);
             State rate{};
-            std::copy_n(f.begin(), D::states, rate.begin());
+            each_state<D>(n_, [&](int k) { rate[k] = f[k]; });
             const double fall = evaluate_rate<D>(form, rate, u[1]);
             double noise = 0.0;
-            for (int k = 0; k < D::states; ++k) noise += std::fabs(form.c[k] * rate[k]);
-            for (int i = 0; i < D::inputs; ++i) noise += std::fabs(form.c[D::first_input + i] * u[1][i]);
+            each_state_of<D>(form, [&](int k, double c) { noise += std::fabs(c * rate[k]); });
+            each_input_of<D>(form, [&](int i, double c) { noise += std::fabs(c * u[1][i]); });
             if (!(fall < -rounding * noise)) {
                 smooth = false;
             } else {
                 const Components g = gradient<D>(form);
                 Components gap = after;
-                for (int r = 0; r < component_count<D>; ++r) {
+                each_component<D>(n_, [&](int r) {
                     gap[r] -= reset.by_time[r];
-                    for (int k = 0; k < component_count<D>; ++k) gap[r] -= jump.row[r][k] * f[k];
-                }
-                for (int r = 0; r < component_count<D>; ++r)
-                    for (int c = 0; c < component_count<D>; ++c) jump.row[r][c] += gap[r] * g[c] / fall;
+                    each_component<D>(n_, [&](int k) { gap[r] -= jump.row[r][k] * f[k]; });
+                });
+                each_component<D>(
+                    n_, [&](int r) { each_component<D>(n_, [&](int c) { jump.row[r][c] += gap[r] * g[c] / fall; }); });
             }
         }
         jacobian = jump * jacobian;
     }
 
  private:
-    static Components flow(const Regime& r, const State& x, const typename D::Memory& m, const InputsOf<D>& u) {
+    Components flow(const Regime& r, const State& x, const typename D::Memory& m, const InputsOf<D>& u) const {
         Components f{};
-        for (int k = 0; k < D::states; ++k) f[k] = evaluate<D>(r.rate[k], x, m, u);
+        each_state<D>(n_, [&](int k) { f[k] = evaluate<D>(r.rate[k], x, m, u); });
         return f;
     }
 
+    const CountsOf<D> n_;
     const ComponentLaws<System>& laws_;
     RegimeCache<System>& cache_;
     std::optional<InputState<D>> input_;

@@ -84,7 +84,7 @@ class TrainSensitivity final : public TrainWatcher<D> {
         const std::array<InputsOf<D>, 2> after = inputs();
         const auto& next = solver_->regime(w.after);
         const ResetOf<System> r{w, old, next, x, memory, before, after};
-        auto jump = JacobianOf<D>::identity();
+        auto jump = JacobianOf<D>::identity(system_.counts());
         const ResetRatesOf<D> rates = laws_.reset(r, jump);
         if (!rates.exact) end(w, torque_at_rest);
         set_anew_.assign(derivative_.size(), 0.0);
@@ -148,12 +148,11 @@ class TrainSensitivity final : public TrainWatcher<D> {
     void set_states(const State& x, const Memory& memory) {
         memory_ = memory;
         model::unpack_state<D>(x, n_, w_.begin());
-        std::copy_n(memory.begin(), n_.memory, w_.begin() + n_.first_memory);
+        for (int k = 0; k < n_.memory; ++k) w_[static_cast<std::size_t>(n_.first_memory + k)] = memory[k];
     }
     State state() const {
         State x{};
-        std::copy_n(w_.begin(), n_.coupled, x.begin());
-        std::copy_n(w_.begin() + n_.coupled, n_.angles, x.begin() + D::coupled);
+        for (int k = 0; k < n_.states; ++k) x[model::state_place<D>(n_, k)] = w_[static_cast<std::size_t>(k)];
         return x;
     }
     void see_inputs(double t, bool left) {
@@ -202,8 +201,9 @@ class TrainSensitivity final : public TrainWatcher<D> {
         const model::Assembly& a = trains_.base();
         const model::Regime& r = tangent_->regime;
         if (r.locked.empty()) return;
-        std::array<double, model::max_contacts> torques{};
-        std::vector<double> derivatives(model::max_contacts * static_cast<std::size_t>(parameters_));
+        typename LockedTorques<D>::Torques torques;
+        torques.reach(trains_.base().places().contacts.size());
+        std::vector<double> derivatives(a.places().contacts.size() * static_cast<std::size_t>(parameters_));
         for (std::size_t c = 0; c < a.places().contacts.size(); ++c) {
             const model::ContactPlace& contact = a.places().contacts[c];
             double* to = derivatives.data() + c * static_cast<std::size_t>(parameters_);
@@ -265,7 +265,7 @@ class TrainSensitivity final : public TrainWatcher<D> {
                double* to) {
         const SwitchingOf<System>& w = r.switching;
         const model::Assembly& a = trains_.base();
-        std::array<std::int8_t, model::max_contacts> modes{};
+        std::vector<std::int8_t> modes(static_cast<std::size_t>(n_.contacts));
         for (int c = 0; c < n_.contacts; ++c) modes[static_cast<std::size_t>(c)] = r.before.at_rest[c] ? 0 : 1;
         if (w.guard >= 0 && w.kind == model::Guard::speed) modes[static_cast<std::size_t>(w.contact)] = 0;
         resets_.tied_speeds(modes.data(), left_w, to);
@@ -288,7 +288,8 @@ class TrainSensitivity final : public TrainWatcher<D> {
         const auto hold = locked_.find(r);
         if (!hold) return;
         const auto& contacts = trains_.base().places().contacts;
-        std::array<double, model::max_contacts> torques{};
+        typename LockedTorques<D>::Torques torques;
+        torques.reach(trains_.base().places().contacts.size());
         std::vector<double> derivatives(contacts.size() * static_cast<std::size_t>(parameters_));
         for (std::size_t c = 0; c < contacts.size(); ++c) {
             if (contacts[c].kind == model::ContactPlace::shaft) continue;
@@ -311,25 +312,26 @@ class TrainSensitivity final : public TrainWatcher<D> {
     void apply(const JacobianOf<D>& jump, const ResetRatesOf<D>& rates, const ResetOf<System>& r, const double* left,
                const double* shift, const double* set_anew) {
         ComponentsRow before{}, after{};
-        for (int c = 0; c < D::states; ++c)
-            if (const int k = place(c); k >= 0) {
-                before[c] = evaluate<D>(r.before.rate[c], r.x, r.memory, r.input[0]);
-                after[c] = evaluate<D>(r.after.rate[c], r.switching.x, r.switching.memory, r.input_after[0]);
-            }
-        for (int c = 0; c < component_count<D>; ++c) {
+        const CountsOf<D>& counts = system_.counts();
+        each_state<D>(counts, [&](int c) {
+            if (place(c) < 0) return;
+            before[c] = evaluate<D>(r.before.rate[c], r.x, r.memory, r.input[0]);
+            after[c] = evaluate<D>(r.after.rate[c], r.switching.x, r.switching.memory, r.input_after[0]);
+        });
+        each_component<D>(counts, [&](int c) {
             const int k = place(c);
-            if (k < 0) continue;
+            if (k < 0) return;
             double* to = row(k);
             std::copy_n(set_anew + k * parameters_, parameters_, to);
             double gap = rates.by_time[c] - after[c];
-            for (int j = 0; j < component_count<D>; ++j) {
+            each_component<D>(counts, [&](int j) {
                 const double share = jump.row[c][j];
-                if (share == 0.0 || place(j) < 0) continue;
+                if (share == 0.0 || place(j) < 0) return;
                 add_scaled(to, share, left + place(j) * parameters_, parameters_);
                 gap += share * before[j];
-            }
+            });
             if (gap != 0.0) add_scaled(to, gap, shift, parameters_);
-        }
+        });
     }
 
     // What the controllers have shown until a time.

@@ -90,7 +90,7 @@ void set_stops(const model::Assembly& a, const model::PackedRegime<D>& r, Regime
     const auto& contacts = a.places().contacts;
     for (std::size_t c = 0; c < contacts.size(); ++c) {
         if (r.at_rest[c]) continue;
-        std::array<std::int8_t, model::max_contacts> modes{};
+        std::vector<std::int8_t> modes(contacts.size());
         for (std::size_t k = 0; k < contacts.size(); ++k) modes[k] = r.at_rest[k] || k == c ? 0 : 1;
         const model::Ties ties = a.places().ties(modes.data(), nullptr, true);
         out.stops_alone[c] = true;
@@ -145,7 +145,7 @@ Tabulated tabulate(const model::Assembly& assembly, const Label& label, double h
     details.cell_back = static_cast<std::int8_t>(place.cell_back);
     if (gear.law.has_hysteresis()) details.hysteresis = 0.5 * (1.0 - gear.law.hysteresis_efficiency);
     if (!is_plain(r)) return out;
-    const LinearRatesOf<D> rates(r.rate);
+    const LinearRatesOf<D> rates({}, r.rate);
     State scale;
     scale.fill(1.0);
     model::balanced_scale(assembly, scale, D::coupled);

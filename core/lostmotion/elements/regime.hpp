@@ -1,12 +1,9 @@
 // One regime of a train: its key, the rates of the states and the guards that end it.
 #pragma once
 
-#include <array>
-#include <bit>
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
-#include <type_traits>
 #include <vector>
 
 #include "row.hpp"
@@ -17,13 +14,12 @@ inline constexpr long max_pieces = 30000;  // of a law: they are counted in 16 b
 
 // Which regime: the mode of each contact (slips forward +1, backward -1, stuck 0) and the branch of each piecewise law.
 struct Key {
-    std::array<std::int8_t, max_contacts> modes{};
-    std::array<std::int16_t, max_branches> branch{};
+    Few<std::int8_t, 32> modes;
+    Few<std::int16_t, 64> branch;
 
-    friend bool operator==(const Key& a, const Key& b) { return std::memcmp(&a, &b, sizeof(Key)) == 0; }
+    friend bool operator==(const Key&, const Key&) = default;
     std::size_t hash() const;
 };
-static_assert(std::has_unique_object_representations_v<Key>);
 struct KeyHash {
     std::size_t operator()(const Key& k) const { return k.hash(); }
 };
@@ -60,22 +56,57 @@ struct Guard {
     static int acceleration_order(Kind kind) { return kind == impact ? 2 : kind == speed ? 1 : 0; }
 };
 
-// Speeds that the contacts at rest tie together: each a sum over those that stay free, w_s = sum_k share[s][k] w_k.
+using Flags = Few<bool, 32>;  // of contacts or shafts
+std::size_t hash_of(const Flags& flags);
+std::size_t hash_of(const decltype(Key::modes)& modes);
+
+// A share of the speed of a shaft in another.
+struct Share {
+    int shaft;
+    double share;
+};
+// Shares of shafts, in their order.
+class Shares {
+ public:
+    const Share* begin() const { return at_.begin(); }
+    const Share* end() const { return at_.begin() + count_; }
+    std::size_t size() const { return count_; }
+    bool empty() const { return count_ == 0; }
+    // Of a shaft, or 0.
+    double of(int shaft) const {
+        const Share* found = find(shaft);
+        return found != end() && found->shaft == shaft ? found->share : 0.0;
+    }
+    bool has(int shaft) const {
+        const Share* found = find(shaft);
+        return found != end() && found->shaft == shaft;
+    }
+    // In the place of what there is of the shaft.
+    void set(int shaft, double share);
+    void erase(int shaft);
+
+ private:
+    const Share* find(int shaft) const {
+        return std::find_if(begin(), end(), [shaft](const Share& s) { return s.shaft >= shaft; });
+    }
+
+    Few<Share, 4> at_;
+    std::size_t count_ = 0;
+};
+
+// Speeds that the contacts at rest tie together: each a sum over those that stay free.
 struct Ties {
-    std::array<std::uint16_t, max_shafts> free{};                  // bits of the k in the sum; 0: at rest
-    std::array<std::array<double, max_shafts>, max_shafts> share;  // where the bit is set
-    std::array<bool, max_shafts> at_rest{};
-    bool follows(int s) const { return free[s] != 0 && (free[s] >> s & 1) == 0; }
+    std::vector<Shares> of;  // of each shaft; none: at rest
+    Flags at_rest;
+    bool is_free(int s) const { return of[static_cast<std::size_t>(s)].has(s); }
+    bool follows(int s) const { return !of[static_cast<std::size_t>(s)].empty() && !is_free(s); }
     // Calls use(k, share) for each free shaft that the speed of a shaft depends on.
     template <class Use>
     void each_share(int s, Use&& use) const {
-        for (unsigned left = free[s]; left != 0; left &= left - 1) {
-            const int k = std::countr_zero(left);
-            use(k, share[s][k]);
-        }
+        for (const Share& share : of[static_cast<std::size_t>(s)]) use(share.shaft, share.share);
     }
     // Stuck, but its speed is kept at zero by those before it, or given and zero.
-    std::array<bool, max_contacts> redundant{};
+    Flags redundant;
 };
 
 // What takes a torque that rest leaves open along with the limit of a contact: where the inputs have a part in it, it
@@ -99,7 +130,7 @@ struct LockedTorque {
     Form low{}, high{}, needs{}, friction{};
     // What the shaft needs beside `needs`: shares of T_2 of gears and of the torques of couplings that are stuck as
     // well, by contact.
-    std::array<double, max_contacts> needs_torque{};
+    Few<double, 4> needs_torque;
 
     // The bound that is a sum of forms: calls use(form, factor) for each, and says whether other torques count as well.
     template <class Use>
@@ -132,7 +163,7 @@ struct Regime {
     std::vector<Row> motion;           // of each shaft: the net torque, then its acceleration
     std::vector<Row> loss;             // of each gear: what acts on the contact of its input shaft [N m]
     std::vector<MasslessSpeed> massless;
-    std::array<bool, max_contacts> at_rest{};  // contacts whose speeds this regime keeps at zero
+    Flags at_rest;  // contacts whose speeds this regime keeps at zero
     Ties ties;
     std::vector<Driver<Row>> drivers;
     std::vector<LockedTorque<Row>> locked;  // in the order in which they are held: from the load to the motors

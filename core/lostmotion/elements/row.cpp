@@ -20,22 +20,13 @@ auto Row::unit(int term, double factor) -> Row {
     return f;
 }
 
-void Coefficients::grow(std::size_t size) {
-    const std::size_t before = this->size(), whole = (size + 3) / 4 * 4;
-    if (many_ == nullptr) {
-        many_ = room_for_all();
-        copy(few_.data(), before, many_->data());
-    }
-    std::fill(many_->data() + before, many_->data() + whole, 0.0);
-    size_ = whole;
-}
-
 // Calls use(k) for each four of the coefficients.
 template <class Use>
 static void each_four(std::size_t size, Use&& use) {
-    if (size == Coefficients::few)
+    constexpr std::size_t few = 20;
+    if (size == few)
 #pragma GCC unroll 5
-        for (std::size_t k = 0; k < Coefficients::few; k += 4) use(k);
+        for (std::size_t k = 0; k < few; k += 4) use(k);
     else
         for (std::size_t k = 0; k < size; k += 4) use(k);
 }

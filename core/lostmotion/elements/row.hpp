@@ -1,18 +1,13 @@
-// Linear forms of a train while it is composed, by its layout. Those of a small train allocate nothing.
+// Linear forms of a train while it is composed, by its layout.
 #pragma once
 
-#include <algorithm>
-#include <array>
 #include <cstddef>
-#include <cstring>
-#include <memory>
 #include <type_traits>
 #include <utility>
 
-namespace lostmotion::model {
+#include "../kernel/few.hpp"
 
-inline constexpr int max_shafts = 16, max_contacts = 32, max_terms = 72, max_columns = max_terms + max_contacts;
-inline constexpr int max_branches = 64, max_guards = 256, max_memory = 32, max_inputs = 24, max_states = 40;
+namespace lostmotion::model {
 
 // The order of the terms of a form: [coupled states][angles][1][memory][inputs], then [reactions of stuck contacts].
 // The names are those of the kernel's dimensions.
@@ -23,66 +18,7 @@ struct Layout {
     void arrange();
 };
 
-// Coefficients of a form. The first few are there always; the others, as many as have been asked for: what lies beyond
-// is zero.
-class Coefficients {
- public:
-    static constexpr std::size_t few = 20;
-
-    Coefficients() = default;
-    Coefficients(const Coefficients& o) { *this = o; }
-    Coefficients(Coefficients&& o) noexcept { *this = std::move(o); }
-    Coefficients& operator=(const Coefficients& o) {
-        if (many_ == nullptr && o.many_ == nullptr)
-            few_ = o.few_;
-        else
-            copy(o.begin(), o.size(), as_many_as(o));
-        return *this;
-    }
-    Coefficients& operator=(Coefficients&& o) noexcept {
-        if (o.many_ == nullptr) return *this = std::as_const(o);
-        std::swap(size_, o.size_);
-        std::swap(many_, o.many_);
-        return *this;
-    }
-
-    std::size_t size() const { return many_ == nullptr ? few : size_; }
-    // As many as others, whose values are to follow.
-    double* as_many_as(const Coefficients& o) {
-        if (o.many_ != nullptr && many_ == nullptr) many_ = room_for_all();
-        size_ = o.size();
-        return data();
-    }
-    // Makes room for as many and, so that loops need no remainder, up to three more.
-    void reach(std::size_t size) {
-        if (size > this->size()) grow(size);
-    }
-    template <class Index>
-    double operator[](Index k) const {
-        return static_cast<std::size_t>(k) < size() ? begin()[k] : 0.0;
-    }
-    template <class Index>
-    double& operator[](Index k) {
-        reach(static_cast<std::size_t>(k) + 1);
-        return data()[k];
-    }
-    const double* begin() const { return many_ == nullptr ? few_.data() : many_->data(); }
-    const double* end() const { return begin() + size(); }
-    double* data() { return many_ == nullptr ? few_.data() : many_->data(); }
-
- private:
-    static_assert(few % 4 == 0 && max_columns % 4 == 0);
-    static void copy(const double* from, std::size_t size, double* to) {  // in fours
-        for (std::size_t k = 0; k < size; k += 4) std::memcpy(to + k, from + k, 4 * sizeof(double));
-    }
-    using Many = std::array<double, max_columns>;
-    static std::unique_ptr<Many> room_for_all() { return std::make_unique_for_overwrite<Many>(); }
-    void grow(std::size_t size);
-
-    std::array<double, few> few_{};  // where there are not many
-    std::unique_ptr<Many> many_;     // as far as size_
-    std::size_t size_ = 0;
-};
+using Coefficients = Few<double, 20>;
 
 // sum_k c[k] * term[k]
 struct Row {

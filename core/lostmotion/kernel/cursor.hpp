@@ -42,7 +42,7 @@ class Cursor {
     void settle() {
         Lanes rate{};
         rate.angle = propagator_->rates().angle_rate(coupled(x_));
-        rate.store(rate_.data());
+        rate.store(rate_);
         rate_known_ = carries_rate_ = true;
     }
     InputState<D>& inputs() { return input_; }
@@ -54,7 +54,7 @@ class Cursor {
     const State& x() const { return x_; }
     const InputState<D>& input() const { return input_; }
     [[gnu::always_inline]] const State& rate() const {
-        if (!rate_known_) propagator_->rates()(coupled(x_), *constant_, input_).store(rate_.data());
+        if (!rate_known_) propagator_->rates()(coupled(x_), *constant_, input_).store(rate_);
         rate_known_ = true;
         return rate_;
     }
@@ -81,6 +81,8 @@ class Cursor {
         constant_ = from.constant_;
         carries_rate_ = from.carries_rate_;
         const double length = propagator_->length(level);
+        if constexpr (std::same_as<D, Any>)
+            if (propagator_->by_series()) return series_step(from, length);
         if (carries_rate_) {
             Lanes x = load(from.x_), rate = load(from.rate());
             propagator_->step(level, x, rate, from.input_.weights());
@@ -99,6 +101,13 @@ class Cursor {
         Propagator<D>& p = *(propagator_ = from.propagator_);
         constant_ = from.constant_;
         carries_rate_ = from.carries_rate_;
+        if constexpr (std::same_as<D, Any>)
+            if (p.by_series()) {
+                const double parts = std::fmax(1.0, std::ceil(h / p.length(p.longest_level())));
+                series_step(from, h / parts);
+                for (double k = 1.0; k < parts; ++k) series_step(*this, h / parts);
+                return 0.0;
+            }
         input_ = from.input_;
         // By way of a signed number, which processors make of a floating-point one at once.
         const auto n = static_cast<std::uint64_t>(static_cast<std::int64_t>(h * p.per_first() + 0.5));
@@ -145,23 +154,48 @@ class Cursor {
     // By one base interval at most, forward or backward; the inputs turn on from where they are.
     void taylor_step(double s) {
         if (s == 0.0) return;
+        if constexpr (std::same_as<D, Any>)
+            if (propagator_->by_series()) return series_step(*this, s);
         Expansion<D> here;
         expand(here);
         taylor_step(here, s);
     }
-    void expand(Expansion<D>& out) const { propagator_->taylor().expand(load(rate()), input_, out); }
+    void expand(Expansion<D>& out) const {
+        if constexpr (std::same_as<D, Any>)
+            if (propagator_->by_series())
+                return Taylor<D>::expand_by_rates(propagator_->rates(), load(rate()), input_, out);
+        propagator_->taylor().expand(load(rate()), input_, out);
+    }
     void taylor_step(const Expansion<D>& here, double s) {
         const Lanes x = load(x_) + here.change(s);
         input_.rotate(s);
         if (carries_rate_) {
             arrive(x, {coupled(rate_) + here.rate_change(s), propagator_->rates().angle_rate(x.coupled)});
         } else {
-            x.store(x_.data());
+            x.store(x_);
             rate_known_ = false;
         }
     }
 
  private:
+    // To h beyond where another is on the same stretch, forward or backward.
+    void series_step(const Cursor& from, double h)
+        requires(std::same_as<D, Any>)
+    {
+        Propagator<D>& p = *propagator_;
+        p.series().expand(p.rates(), load(from.rate()), from.input_, h, p.theta(h));
+        const Lanes x = load(from.x_) + p.series().change();
+        Lanes rate{};
+        if (carries_rate_) rate.coupled = coupled(from.rate_) + p.series().rate_change();
+        if (this != &from) input_ = from.input_;
+        input_.rotate(h);
+        if (carries_rate_) {
+            rate.angle = p.rates().angle_rate(x.coupled);
+            arrive(x, rate);
+        } else {
+            arrive(x);
+        }
+    }
     // Given speeds are those of their signals, at an instant that the inputs were anchored to.
     void set_given() {
         if (const auto* given = propagator_->rates().given; given != nullptr) [[unlikely]]
@@ -174,19 +208,19 @@ class Cursor {
     }
     // At a state that the inputs belong to.
     [[gnu::always_inline]] void arrive(const Lanes& x) {
-        x.store(x_.data());
-        propagator_->rates()(x.coupled, *constant_, input_).store(rate_.data());
+        x.store(x_);
+        propagator_->rates()(x.coupled, *constant_, input_).store(rate_);
         rate_known_ = true;
     }
     [[gnu::always_inline]] void arrive(const Lanes& x, const Lanes& rate) {
-        x.store(x_.data());
-        rate.store(rate_.data());
+        x.store(x_);
+        rate.store(rate_);
         rate_known_ = true;
     }
     // Whether anything but the state itself acts on the coupled states.
     bool driven() const {
         const Coupled drive = load(*constant_) + propagator_->rates().forced(input_);
-        for (int k = 0; k < D::coupled; ++k)
+        for (int k = 0; k < propagator_->rates().n.coupled; ++k)
             if (drive[k] != 0.0) return true;
         return false;
     }

@@ -43,8 +43,8 @@ class Flow {
         const State& terms = magnitude(k);
         const auto& u = now_.input[k];
         double sum = 0.0;
-        for (int i = 0; i < D::inputs; ++i) sum += std::fabs(f.c[D::first_input + i] * u[i]);
-        for (int j = 0; j < D::states; ++j) sum += std::fabs(f.c[j]) * terms[j];
+        each_input_of<D>(f, [&](int i, double c) ALWAYS_INLINE { sum += std::fabs(c * u[i]); });
+        each_state_of<D>(f, [&](int j, double c) ALWAYS_INLINE { sum += std::fabs(c) * terms[j]; });
         return sum;
     }
 

@@ -5,9 +5,10 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <concepts>
+#include <type_traits>
 
-#include "dims.hpp"
-#include "vec.hpp"
+#include "numbers.hpp"
 
 namespace lostmotion {
 
@@ -41,59 +42,137 @@ struct Form {
 };
 
 template <class D>
-using LinearFormOf = Form<D::terms>;
-
+struct FormIn {
+    using Type = Form<D::terms>;
+};
+template <>
+struct FormIn<Any> {
+    using Type = AnyForm;
+};
 template <class D>
-using CoupledOf = Pack<D::coupled>;
+using LinearFormOf = typename FormIn<D>::Type;
+
+// The coupled states, in registers; then a state, and its coupled part alone, in memory.
+template <class D>
+struct CoupledIn {
+    using Type = Pack<D::coupled>;
+};
+template <>
+struct CoupledIn<Any> {
+    using Type = Numbers;
+};
+template <class D>
+using CoupledOf = typename CoupledIn<D>::Type;
 template <class D>
 struct alignas(sizeof(typename CoupledOf<D>::Part)) StateOf : std::array<double, D::states> {};
-// The coupled states alone.
+template <>
+struct StateOf<Any> {
+    Numbers coupled;
+    Few<double, 4> angle;
+
+    double operator[](int k) const { return k < Any::coupled ? coupled[k] : angle[k - Any::coupled]; }
+    double& operator[](int k) { return k < Any::coupled ? coupled[k] : angle[k - Any::coupled]; }
+    friend bool operator==(const StateOf&, const StateOf&) = default;
+};
 template <class D>
 struct alignas(sizeof(typename CoupledOf<D>::Part)) ColumnOf : std::array<double, D::coupled> {};
+template <>
+struct ColumnOf<Any> : Numbers {
+    ColumnOf() = default;
+    ColumnOf(Numbers numbers) : Numbers(std::move(numbers)) {}
+};
 template <class D>
-using InputsOf = std::array<double, D::inputs>;
+using InputsOf = std::conditional_t<std::same_as<D, Any>, Few<double, 8>, std::array<double, D::inputs>>;
+template <class D>
+using AnglesOf = std::conditional_t<std::same_as<D, Any>, Few<double, 4>, std::array<double, D::angles>>;
 
 // A state in registers.
 template <class D>
 struct LanesOf {
     CoupledOf<D> coupled{};
-    std::array<double, D::angles> angle{};
+    AnglesOf<D> angle{};
 
-    [[gnu::always_inline]] static LanesOf load(const double* from) {
-        LanesOf x{CoupledOf<D>::load(from), {}};
-        for (int j = 0; j < D::angles; ++j) x.angle[j] = from[D::coupled + j];
-        return x;
+    [[gnu::always_inline]] static LanesOf load(const StateOf<D>& from) {
+        if constexpr (std::same_as<D, Any>) {
+            return {from.coupled, from.angle};
+        } else {
+            LanesOf x{CoupledOf<D>::load(from.data()), {}};
+            for (int j = 0; j < D::angles; ++j) x.angle[j] = from[D::coupled + j];
+            return x;
+        }
     }
-    [[gnu::always_inline]] void store(double* to) const {
-        coupled.store(to);
-        for (int j = 0; j < D::angles; ++j) to[D::coupled + j] = angle[j];
+    [[gnu::always_inline]] void store(StateOf<D>& to) const {
+        if constexpr (std::same_as<D, Any>) {
+            to.coupled = coupled;
+            to.angle = angle;
+        } else {
+            coupled.store(to.data());
+            for (int j = 0; j < D::angles; ++j) to[D::coupled + j] = angle[j];
+        }
     }
     [[gnu::always_inline]] friend LanesOf operator+(LanesOf a, const LanesOf& b) {
         a.coupled = a.coupled + b.coupled;
-        for (int j = 0; j < D::angles; ++j) a.angle[j] += b.angle[j];
+        for (std::size_t j = 0; j < b.angle.size(); ++j) a.angle[j] += b.angle[j];
         return a;
     }
     [[gnu::always_inline]] friend LanesOf operator*(double a, LanesOf b) {
         b.coupled = a * b.coupled;
-        for (int j = 0; j < D::angles; ++j) b.angle[j] *= a;
+        for (double& angle : b.angle) angle *= a;
         return b;
     }
 };
 template <class D>
 [[gnu::always_inline]] inline LanesOf<D> load(const StateOf<D>& x) {
-    return LanesOf<D>::load(x.data());
+    return LanesOf<D>::load(x);
 }
 template <class D>
 [[gnu::always_inline]] inline CoupledOf<D> load(const ColumnOf<D>& x) {
     return CoupledOf<D>::load(x.data());
 }
+inline const Numbers& load(const ColumnOf<Any>& x) { return x; }
 template <class D>
 [[gnu::always_inline]] inline CoupledOf<D> coupled(const StateOf<D>& x) {
     return CoupledOf<D>::load(x.data());
 }
+inline const Numbers& coupled(const StateOf<Any>& x) { return x.coupled; }
+// The coupled states into memory.
+template <class D>
+[[gnu::always_inline]] inline void store(const CoupledOf<D>& x, ColumnOf<D>& to) {
+    if constexpr (std::same_as<D, Any>)
+        static_cast<Numbers&>(to) = x;
+    else
+        x.store(to.data());
+}
+template <class D>
+[[gnu::always_inline]] inline void store(const CoupledOf<D>& x, StateOf<D>& to) {
+    if constexpr (std::same_as<D, Any>)
+        to.coupled = x;
+    else
+        x.store(to.data());
+}
+// Those of a form.
+template <class D>
+[[gnu::always_inline]] inline CoupledOf<D> coupled(const LinearFormOf<D>& f) {
+    if constexpr (std::same_as<D, Any>) {
+        Numbers out;
+        f.each_term([&](int place, double factor) {
+            if (place < Any::coupled) out[place] = factor;
+        });
+        return out;
+    } else {
+        return CoupledOf<D>::load(f.c.data());
+    }
+}
 template <class D>
 void add_scaled(StateOf<D>& y, double a, const StateOf<D>& x) {
-    (load(y) + a * load(x)).store(y.data());
+    (load(y) + a * load(x)).store(y);
+}
+// The same number for all states.
+template <class D>
+StateOf<D> filled(const CountsOf<D>& n, double value) {
+    StateOf<D> out{};
+    each_state<D>(n, [&](int k) { out[k] = value; });
+    return out;
 }
 
 template <std::size_t n>
@@ -107,7 +186,7 @@ template <class D>
     magnitude.coupled = absolute(magnitude.coupled);
     for (double& angle : magnitude.angle) angle = std::fabs(angle);
     StateOf<D> out;
-    magnitude.store(out.data());
+    magnitude.store(out);
     return out;
 }
 
@@ -126,25 +205,85 @@ struct InstantOf {
     InputsOf<D> input_magnitudes{};  // sums of the magnitudes of the inputs' parts
 };
 
+// Calls use(place, factor) for each term of a form that may be other than zero.
+template <int N, class Use>
+[[gnu::always_inline]] inline void each_term(const Form<N>& f, Use&& use) {
+    for (int k = 0; k < N; ++k) use(k, f.c[k]);
+}
+template <class Use>
+void each_term(const AnyForm& f, Use&& use) {
+    f.each_term(use);
+}
+// Of those that belong to states, or to inputs by their number.
+template <class D, class Use>
+[[gnu::always_inline]] inline void each_state_of(const LinearFormOf<D>& f, Use&& use) {
+    if constexpr (std::same_as<D, Any>) {
+        const auto [begin, end] = f.between(0, D::states);
+        for (auto* t = begin; t != end; ++t) use(t->place, t->factor);
+    } else {
+        for (int k = 0; k < D::states; ++k) use(k, f.c[k]);
+    }
+}
+template <class D, class Use>
+[[gnu::always_inline]] inline void each_input_of(const LinearFormOf<D>& f, Use&& use) {
+    if constexpr (std::same_as<D, Any>) {
+        const auto [begin, end] = f.between(D::first_input, D::terms);
+        for (auto* t = begin; t != end; ++t) use(t->place - D::first_input, t->factor);
+    } else {
+        for (int i = 0; i < D::inputs; ++i) use(i, f.c[D::first_input + i]);
+    }
+}
+template <class D, class Use>
+[[gnu::always_inline]] inline void each_memory_of(const LinearFormOf<D>& f, Use&& use) {
+    if constexpr (std::same_as<D, Any>) {
+        const auto [begin, end] = f.between(D::first_memory, D::first_input);
+        for (auto* t = begin; t != end; ++t) use(t->place - D::first_memory, t->factor);
+    } else {
+        for (int k = 0; k < D::memory; ++k) use(k, f.c[D::first_memory + k]);
+    }
+}
+
 // The part of a form that depends on neither state nor inputs: constant within a regime.
 template <class D>
 double constant_part(const LinearFormOf<D>& f, const typename D::Memory& m) {
     double sum = f.c[D::one];
-    for (int k = 0; k < D::memory; ++k) sum += f.c[D::first_memory + k] * m[k];
+    each_memory_of<D>(f, [&](int k, double factor) ALWAYS_INLINE { sum += factor * m[k]; });
     return sum;
 }
 
 template <class D>
 double input_part(const LinearFormOf<D>& f, const InputsOf<D>& u) {
-    double sum = f.c[D::first_input] * u[0];
-    for (int i = 1; i < D::inputs; ++i) sum += f.c[D::first_input + i] * u[i];
-    return sum;
+    if constexpr (std::same_as<D, Any>) {
+        double sum = 0.0;
+        each_input_of<D>(f, [&](int i, double factor) { sum += factor * u[i]; });
+        return sum;
+    } else {
+        double sum = f.c[D::first_input] * u[0];
+        for (int i = 1; i < D::inputs; ++i) sum += f.c[D::first_input + i] * u[i];
+        return sum;
+    }
+}
+
+// The part of the coupled states.
+template <class D>
+double coupled_part(const LinearFormOf<D>& f, const StateOf<D>& x) {
+    if constexpr (std::same_as<D, Any>) {
+        const auto [begin, end] = f.between(0, D::coupled);
+        return AnyForm::sum_of_coupled(begin, end, [&](const auto& t) { return t.factor * x.coupled[t.place]; });
+    } else {
+        return (CoupledOf<D>::load(f.c.data()) * coupled(x)).sum();
+    }
 }
 
 template <class D>
 double evaluate(const LinearFormOf<D>& f, const StateOf<D>& x, const typename D::Memory& m, const InputsOf<D>& u) {
-    double own = (CoupledOf<D>::load(f.c.data()) * coupled(x)).sum();
-    for (int j = D::coupled; j < D::states; ++j) own += f.c[j] * x[j];
+    double own = coupled_part<D>(f, x);
+    if constexpr (std::same_as<D, Any>) {
+        const auto [begin, end] = f.between(D::coupled, D::states);
+        for (auto* t = begin; t != end; ++t) own += t->factor * x[t->place];
+    } else {
+        for (int j = D::coupled; j < D::states; ++j) own += f.c[j] * x[j];
+    }
     return (constant_part<D>(f, m) + input_part<D>(f, u)) + own;
 }
 
@@ -152,9 +291,9 @@ double evaluate(const LinearFormOf<D>& f, const StateOf<D>& x, const typename D:
 template <class D>
 double magnitude(const LinearFormOf<D>& f, const StateOf<D>& x, const typename D::Memory& m, const InputsOf<D>& u) {
     double sum = std::fabs(f.c[D::one]);
-    for (int k = 0; k < D::memory; ++k) sum += std::fabs(f.c[D::first_memory + k] * m[k]);
-    for (int i = 0; i < D::inputs; ++i) sum += std::fabs(f.c[D::first_input + i] * u[i]);
-    for (int k = 0; k < D::states; ++k) sum += std::fabs(f.c[k] * x[k]);
+    each_memory_of<D>(f, [&](int k, double factor) ALWAYS_INLINE { sum += std::fabs(factor * m[k]); });
+    each_input_of<D>(f, [&](int i, double factor) ALWAYS_INLINE { sum += std::fabs(factor * u[i]); });
+    each_state_of<D>(f, [&](int k, double factor) ALWAYS_INLINE { sum += std::fabs(factor * x[k]); });
     return sum;
 }
 
@@ -162,7 +301,7 @@ double magnitude(const LinearFormOf<D>& f, const StateOf<D>& x, const typename D
 template <class D>
 double evaluate_rate(const LinearFormOf<D>& f, const StateOf<D>& rate, const InputsOf<D>& input_rate) {
     double sum = input_part<D>(f, input_rate);
-    for (int k = 0; k < D::states; ++k) sum += f.c[k] * rate[k];
+    each_state_of<D>(f, [&](int k, double factor) ALWAYS_INLINE { sum += factor * rate[k]; });
     return sum;
 }
 
@@ -280,6 +419,143 @@ class FormTable {
     int rows_;
     bool driven_;
     [[no_unique_address]] DependsOn<D> depends_on_;
+};
+
+// For trains of any size: the coefficients that are not zero, form by form.
+template <int N>
+class FormTable<Any, N> {
+ public:
+    using D = Any;
+    using Values = Few<double, 32>;
+    using LinearForm = AnyForm;
+    using State = StateOf<D>;
+    using Inputs = InputsOf<D>;
+    using Memory = D::Memory;
+
+    void clear() {
+        forms_.clear();
+        block_.clear();
+        states_ = 0;
+        depends_on_ = {};
+        driven_ = false;
+    }
+    // Of few states the coefficients are kept whole, side by side as the other kernels keep them.
+    void set_states(int coupled) { states_ = coupled <= few_states ? coupled : 0; }
+    void set(int row, const LinearForm& f) {
+        if (static_cast<std::size_t>(row) >= forms_.size()) forms_.resize(static_cast<std::size_t>(row) + 1, one());
+        forms_[static_cast<std::size_t>(row)] = f;
+        block_.resize(static_cast<std::size_t>(rows() * states_));
+        each_state_of<D>(f, [&](int k, double factor) {
+            if (k < states_)
+                block_[static_cast<std::size_t>((row / vec_width * states_ + k) * vec_width + row % vec_width)] =
+                    factor;
+        });
+        each_input_of<D>(f, [&](int i, double factor) {
+            driven_ = driven_ || factor != 0.0;
+            depends_on_.see_input(i, factor);
+        });
+    }
+    int rows() const { return (static_cast<int>(forms_.size()) + vec_width - 1) / vec_width * vec_width; }
+    double coefficient(int row, int term) const { return form(row).c[term]; }
+    const LinearForm& form(int row) const { return forms_[static_cast<std::size_t>(row)]; }
+
+    void constants(const Memory& m, Values& out) const {
+        fill(out, [&](const LinearForm& f) { return constant_part<D>(f, m); }, 1.0);
+    }
+    void evaluate(const Values& constant, const State& x, const Inputs& u, Values& out) const {
+        terms(x, u, out);
+        double* to = out.data();
+        for (int g = 0; g < rows(); ++g) to[g] = constant.data()[g] + to[g];
+    }
+    template <class Input>
+    void evaluate(const Values& constant, const State& x, const State& rate, const Input& input, Values& value,
+                  Values& slope) const {
+        Inputs u{}, u_rate{};
+        if (driven_) {
+            input.values(depends_on_.inputs, u);
+            input.rates(depends_on_.inputs, u_rate);
+        }
+        evaluate(constant, x, u, value);
+        rates(rate, u_rate, slope);
+    }
+    void magnitudes(const Memory& m, const State& x, const Inputs& u, Values& out) const {
+        fill(out, [&](const LinearForm& f) { return magnitude(f, m, x, u); });
+    }
+    template <class Input>
+    double magnitude_of(int row, const Memory& m, const State& x, const Input& input) const {
+        return magnitude(form(row), m, x, driven_ ? input.magnitudes() : Inputs{});
+    }
+    void rate_magnitudes(const State& rate, const Inputs& input_rate, Values& out) const {
+        terms<true>(rate, input_rate, out);
+    }
+    void rates(const State& rate, const Inputs& input_rate, Values& out) const { terms(rate, input_rate, out); }
+
+ private:
+    static const LinearForm& one() {
+        static const LinearForm form = [] {
+            LinearForm f;
+            f.c[D::one] = 1.0;
+            return f;
+        }();
+        return form;
+    }
+    // Of each form, and of those that are missing to whole vectors.
+    template <class Value>
+    void fill(Values& out, Value&& value, double missing = 0.0) const {
+        out.reach(static_cast<std::size_t>(rows()));
+        double* to = out.data();
+        for (const LinearForm& f : forms_) *to++ = value(f);
+        while (to < out.data() + rows()) *to++ = missing;
+    }
+    // Of all forms.
+    template <bool magnitudes = false>
+    void terms(const State& x, const Inputs& u, Values& out) const {
+        if (states_ == 0) {
+            fill(out, [&](const LinearForm& f) { return terms<magnitudes>(f, x, u); });
+            return;
+        }
+        out.reach(static_cast<std::size_t>(rows()));
+        for (int g = 0; g < rows(); g += vec_width) {
+            const double* c = block_.data() + g * states_;
+            Vec sum{};
+            for (int k = 0; k < states_; k += 4) {
+                const auto part = [&](int j) ALWAYS_INLINE {
+                    const Vec factor = load(c + (k + j) * vec_width);
+                    return (magnitudes ? absolute(factor) : factor) * x.coupled.data()[k + j];
+                };
+                sum += (part(0) + part(1)) + (part(2) + part(3));
+            }
+            store(sum, out.data() + g);
+        }
+        if (!driven_) return;
+        double* to = out.data();
+        for (const LinearForm& f : forms_) {
+            double forced = 0.0;
+            each_input_of<D>(f, [&](int i, double c) { forced += (magnitudes ? std::fabs(c) : c) * u[i]; });
+            *to++ += forced;
+        }
+    }
+    template <bool magnitudes = false>
+    static double terms(const LinearForm& f, const State& x, const Inputs& u) {
+        const auto c = [](double factor) { return magnitudes ? std::fabs(factor) : factor; };
+        const auto [begin, end] = f.between(0, D::coupled);
+        const double own = AnyForm::sum_of_coupled(
+            begin, end, [&](const AnyForm::Term& t) { return c(t.factor) * x.coupled[t.place]; });
+        double forced = 0.0;
+        each_input_of<D>(f, [&](int i, double factor) { forced += c(factor) * u[i]; });
+        return own + forced;
+    }
+    static double magnitude(const LinearForm& f, const Memory& m, const State& x, const Inputs& u) {
+        double kept = 0.0;
+        each_memory_of<D>(f, [&](int k, double factor) { kept += m[k] * std::fabs(factor); });
+        return std::fabs(f.c[D::one]) + kept + terms<true>(f, x, u);
+    }
+
+    std::vector<LinearForm> forms_;
+    std::vector<double> block_;
+    int states_ = 0;
+    bool driven_ = false;
+    DependsOn<D> depends_on_;
 };
 
 }  // namespace lostmotion

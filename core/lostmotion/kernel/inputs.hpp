@@ -17,18 +17,18 @@
 namespace lostmotion {
 
 template <class D>
-using SignalsOf = std::array<Signal, D::inputs>;
+using SignalsOf = ArrayOf<D, Signal, D::inputs>;
 
 // The same without what is always zero: a sine of no amplitude does not make an input vary.
-template <std::size_t n>
-std::array<Signal, n> without_idle_sines(std::array<Signal, n> signals) {
+template <class Signals>
+Signals without_idle_sines(Signals signals) {
     for (Signal& s : signals) std::erase_if(s.sines, [](const Sine& sine) { return sine.amplitude == 0.0; });
     return signals;
 }
 
 // The first breakpoint of any input after t.
-template <std::size_t n>
-double next_breakpoint(const std::array<Signal, n>& signals, double t) {
+template <class Signals>
+double next_breakpoint(const Signals& signals, double t) {
     double next = std::numeric_limits<double>::infinity();
     for (const Signal& s : signals) next = std::min(next, s.next_breakpoint(t));
     return next;
@@ -38,6 +38,7 @@ double next_breakpoint(const std::array<Signal, n>& signals, double t) {
 template <class D>
 SignalsOf<D> ramped_inputs(int count = D::inputs, const InputSines& sines = {}) {
     SignalsOf<D> signals;
+    make_room(signals, std::max(count, 1));
     for (int i = 0; i < count; ++i) signals[i].breakpoints[0].slope = 1.0;
     for (const auto& [input, sine] : sines) signals[static_cast<std::size_t>(input)].sines.push_back(sine);
     return signals;
@@ -65,9 +66,9 @@ struct InputBasis {
 
 // In pairs: cosine and sine of each sine of the signals, those of the first input first, then the ramps. At least one
 // pair, and if need be with nothing in the last places.
-template <std::size_t n>
-std::vector<InputBasis> input_basis(const std::array<Signal, n>& signals) {
-    constexpr int n_inputs = n;
+template <class Signals>
+std::vector<InputBasis> input_basis(const Signals& signals) {
+    const int n_inputs = static_cast<int>(signals.size());
     std::vector<InputBasis> basis;
     for (int i = 0; i < n_inputs; ++i)
         for (const Sine& s : signals[i].sines) {
@@ -133,7 +134,6 @@ class PhaseRotations {
 template <class D>
 class InputState {
  public:
-    static constexpr int n_inputs = D::inputs;
     using Inputs = InputsOf<D>;
     using Signals = SignalsOf<D>;
 
@@ -141,7 +141,7 @@ class InputState {
         : signals_(&signals), basis_(basis.data()), size_(static_cast<int>(basis.size())) {
         make_room();
         int end = 0;
-        for (int i = 0; i < n_inputs; ++i) sines_end_[i] = end += 2 * static_cast<int>(signals[i].sines.size());
+        for (int i = 0; i < n_inputs(); ++i) sines_end_[i] = end += 2 * static_cast<int>(signals[i].sines.size());
         anchor(0.0);
     }
     InputState(const InputState& o) : signals_(o.signals_), basis_(o.basis_), size_(o.size_), sines_end_(o.sines_end_) {
@@ -161,12 +161,12 @@ class InputState {
     // Sets all from absolute time, so that no phase error accumulates however long the run. At a breakpoint: the right
     // limit.
     void anchor(double t) {
-        for (int i = 0; i < n_inputs; ++i) breakpoint_[i] = &(*signals_)[i].breakpoints[(*signals_)[i].segment(t)];
+        for (int i = 0; i < n_inputs(); ++i) breakpoint_[i] = &(*signals_)[i].breakpoints[(*signals_)[i].segment(t)];
         follow(t);
     }
     // The same, the left limit.
     void anchor_left(double t) {
-        for (int i = 0; i < n_inputs; ++i) {
+        for (int i = 0; i < n_inputs(); ++i) {
             const Signal& s = (*signals_)[i];
             std::size_t k = s.segment(t);
             while (k > 0 && s.breakpoints[k].time >= t) --k;
@@ -177,13 +177,13 @@ class InputState {
     // The same, on the stretches between breakpoints that were last anchored to, also at their far end.
     void follow(double t) {
         time_ = t;
-        for (int i = 0; i < n_inputs; ++i) {
+        for (int i = 0; i < n_inputs(); ++i) {
             const Breakpoint& k = *breakpoint_[i];
             linear_[i] = k.value + k.slope * (t - k.time);
             slope_[i] = k.slope;
         }
         int q = 0;
-        for (int i = 0; i < n_inputs; ++i)
+        for (int i = 0; i < n_inputs(); ++i)
             for (const Sine& s : (*signals_)[i].sines) {
                 const auto [sine, cosine] = sine_cosine(s.angle(t));
                 weights_[q++] = s.amplitude * sine;
@@ -195,7 +195,7 @@ class InputState {
     double time() const { return time_; }
     int size() const { return size_; }
     // How many sines there are, those of the first input first, and the frequency [Hz] of one.
-    int sines() const { return sines_end_[n_inputs - 1] / 2; }
+    int sines() const { return sines_end_[n_inputs() - 1] / 2; }
     double frequency(int k) const {
         const int i = basis_[2 * k].input, before = i == 0 ? 0 : sines_end_[i - 1] / 2;
         return (*signals_)[i].sines[static_cast<std::size_t>(k - before)].frequency;
@@ -205,7 +205,7 @@ class InputState {
 
     Inputs values() const {
         Inputs out{};
-        values(n_inputs, out);
+        values(n_inputs(), out);
         return out;
     }
     // Of the first n alone.
@@ -225,6 +225,21 @@ class InputState {
             third += odd * turned_twice;
         }
         return {first, second, third};
+    }
+
+    // The derivatives of one up to the order n, from the first on.
+    void derivatives(int i, int n, double* out) const {
+        for (int k = 1; k <= n; ++k) out[k] = k == 1 ? slope_[i] : 0.0;
+        for (int q = i == 0 ? 0 : sines_end_[i - 1]; q < sines_end_[i]; q += 2) {
+            const double omega = basis_[q].omega, turned_twice = -omega * omega;
+            double even = weights_[q] * turned_twice, odd = omega * weights_[q + 1];
+            for (int k = 1; k <= n; k += 2) {
+                out[k] += odd;
+                odd *= turned_twice;
+                if (k + 1 <= n) out[k + 1] += even;
+                even *= turned_twice;
+            }
+        }
     }
 
     // A given speed at an instant of the present stretch, from absolute time, so that no error accumulates. Between
@@ -247,7 +262,7 @@ class InputState {
     Inputs magnitudes() const {
         Inputs out{};
         sum(
-            n_inputs, lostmotion::magnitudes(linear_),
+            n_inputs(), lostmotion::magnitudes(linear_),
             [this](int q) { return std::fabs(weights_[q]) + std::fabs(weights_[q + 1]); }, out);
         return out;
     }
@@ -267,7 +282,7 @@ class InputState {
         u[0] = linear_;
         if constexpr (N > 1) u[1] = slope_;
         for (int k = 2; k < N; ++k) u[k] = {};
-        for (int q = 0; q < sines_end_[n_inputs - 1]; q += 2) {
+        for (int q = 0; q < sines_end_[n_inputs() - 1]; q += 2) {
             const int i = basis_[q].input;
             const double omega = basis_[q].omega, turned_twice = -omega * omega;
             double even = weights_[q], odd = omega * weights_[q + 1];
@@ -284,7 +299,7 @@ class InputState {
     bool varies(int i) const { return slope_[i] != 0.0 || sines_end_[i] > (i == 0 ? 0 : sines_end_[i - 1]); }
 
     bool constant() const {
-        for (int i = 0; i < n_inputs; ++i)
+        for (int i = 0; i < n_inputs(); ++i)
             if (varies(i)) return false;
         return true;
     }
@@ -292,7 +307,7 @@ class InputState {
     // Bound on the fourth derivative of each input for all time.
     Inputs fourth_derivative_bound() const {
         Inputs bound{};
-        for (int i = 0; i < n_inputs; ++i)
+        for (int i = 0; i < n_inputs(); ++i)
             for (const Sine& s : (*signals_)[i].sines) {
                 const double omega = 2.0 * std::numbers::pi * s.frequency;
                 bound[i] += std::fabs(s.amplitude) * omega * omega * omega * omega;
@@ -329,7 +344,7 @@ class InputState {
     void rotate(double h) {
         time_ += h;
         add_slopes(*this, h);
-        for (int q = 0; q < sines_end_[n_inputs - 1]; q += 2) {
+        for (int q = 0; q < sines_end_[n_inputs() - 1]; q += 2) {
             const double a = basis_[q].omega * h, a2 = a * a;
             const auto [sine, cosine] =
                 a2 < 1e-6 ? SineCosine{a * (1.0 - a2 / 6.0 * (1.0 - a2 / 20.0)), 1.0 - a2 / 2.0 * (1.0 - a2 / 12.0)}
@@ -357,19 +372,23 @@ class InputState {
     // The linear parts h after `from`, in the vectors in which they are copied: a processor waits long for a vector of
     // what has just been written number by number.
     [[gnu::always_inline]] void add_slopes(const InputState& from, double h) {
-        constexpr int width = vec_width < n_inputs ? vec_width : n_inputs, whole = n_inputs / width * width;
-        const auto add = [&]<int n>(std::integral_constant<int, n>, int i) ALWAYS_INLINE {
-            (Pack<n>::load(&from.linear_[i]) + h * Pack<n>::load(&slope_[i])).store(&linear_[i]);
-        };
-        for (int i = 0; i < whole; i += width) add(std::integral_constant<int, width>{}, i);
-        if constexpr (whole < n_inputs) add(std::integral_constant<int, n_inputs - whole>{}, whole);
+        if constexpr (std::same_as<D, Any>) {
+            for (int i = 0; i < n_inputs(); ++i) linear_[i] = from.linear_[i] + h * slope_[i];
+        } else {
+            constexpr int n = D::inputs, width = vec_width < n ? vec_width : n, whole = n / width * width;
+            const auto add = [&]<int count>(std::integral_constant<int, count>, int i) ALWAYS_INLINE {
+                (Pack<count>::load(&from.linear_[i]) + h * Pack<count>::load(&slope_[i])).store(&linear_[i]);
+            };
+            for (int i = 0; i < whole; i += width) add(std::integral_constant<int, width>{}, i);
+            if constexpr (whole < n) add(std::integral_constant<int, n - whole>{}, whole);
+        }
     }
     static Pack<2> pair_of(const InputState& s, int q) { return Pack<2>::load(s.weights_ + q); }
     // For each of the first n inputs, what it begins with and the terms of its sines. Number by number, and nothing is
     // copied: see add_slopes().
     template <class Term>
     [[gnu::always_inline]] void sum([[maybe_unused]] int n, const Inputs& begin, Term&& term, Inputs& out) const {
-        if constexpr (n_inputs > 2) {  // of many inputs few have a sine
+        if constexpr (D::inputs > 2) {  // of many inputs few have a sine
             for (int i = 0; i < n; ++i) out[i] = begin[i];
             for (int q = 0; q < sines_end_[n - 1]; q += 2) out[basis_[q].input] += term(q);
         } else {
@@ -380,16 +399,23 @@ class InputState {
                 out[i] = sum;
             };
             [&]<std::size_t... i>(std::index_sequence<i...>)
-                ALWAYS_INLINE { (add(i), ...); }(std::make_index_sequence<n_inputs>{});
+                ALWAYS_INLINE { (add(i), ...); }(std::make_index_sequence<D::inputs>{});
         }
+    }
+
+    int n_inputs() const {
+        if constexpr (std::same_as<D, Any>)
+            return static_cast<int>(signals_->size());
+        else
+            return D::inputs;
     }
 
     const Signals* signals_;
     const InputBasis* basis_;
     int size_;
-    std::array<int, n_inputs> sines_end_{};  // of each input
+    ListOf<D, int, D::inputs> sines_end_{};  // of each input
     double time_ = 0.0;
-    std::array<const Breakpoint*, n_inputs> breakpoint_{};
+    ListOf<D, const Breakpoint*, D::inputs> breakpoint_{};
     Inputs linear_{}, slope_{};
     double* weights_;  // of cosine: a sin(psi); sine: a cos(psi); ramp: slope
     std::array<double, 4> few_{};

@@ -27,10 +27,6 @@ class LongStep {
     using Propagator = lostmotion::Propagator<D>;
     using InputState = lostmotion::InputState<D>;
 
-    static constexpr std::size_t n_states = D::states, n_coupled = D::coupled, n_inputs = D::inputs;
-    // The places in z.
-    static constexpr std::size_t unit = n_states, line = unit + 1, slope = line + n_inputs, sine = slope + n_inputs;
-
     // Whether a stretch is so long that it pays to take it at once.
     static bool pays(const Propagator& p, double stretch) { return stretch > p.long_stretch(); }
 
@@ -41,7 +37,12 @@ class LongStep {
     }
     // The same before its doublings.
     LongStep(const Propagator& p, const Column& constant, const InputState& inputs, double length, int doublings)
-        : rates_(p.rates()), constant_(constant), h_(std::ldexp(length, -doublings)) {
+        : rates_(p.rates()),
+          n_coupled(static_cast<std::size_t>(rates_.n.coupled)),
+          n_angles(static_cast<std::size_t>(rates_.n.angles)),
+          n_inputs(static_cast<std::size_t>(rates_.n.inputs)),
+          constant_(constant),
+          h_(std::ldexp(length, -doublings)) {
         for (int q = 0; q < inputs.sines(); ++q)
             sines_.push_back(
                 {static_cast<std::size_t>(inputs.basis(2 * q).input), two_pi * inputs.frequency(q), 0.0, 0.0});
@@ -61,12 +62,12 @@ class LongStep {
         gather(x, inputs, z_);
         advance(z_.data());
         State out;
-        std::copy_n(z_.begin(), n_states, out.begin());
+        for (std::size_t k = 0; k < n_states; ++k) out[place(k)] = z_[k];
         return out;
     }
     void gather(const State& x, const InputState& inputs, std::vector<double>& z) const {
         z.resize(size());
-        std::copy_n(x.begin(), n_states, z.begin());
+        for (std::size_t k = 0; k < n_states; ++k) z[k] = x[place(k)];
         z[unit] = 1.0;
         for (std::size_t i = 0; i < n_inputs; ++i) {
             z[line + i] = inputs.linear()[i];
@@ -77,7 +78,9 @@ class LongStep {
     void advance(double* z) const {
         Lanes change{};
         for (std::size_t j = 0; j < size(); ++j) change = change + z[j] * load(rounded_[j]);
-        (Lanes::load(z) + change).store(z);
+        State changed;
+        change.store(changed);
+        for (std::size_t k = 0; k < n_states; ++k) z[k] += changed[place(k)];
         for (std::size_t i = 0; i < n_inputs; ++i) z[line + i] += h_ * z[slope + i];
         for (std::size_t q = 0; q < sines_.size(); ++q) {
             const auto now = Pack<2>::load(z + sine + 2 * q);
@@ -116,8 +119,7 @@ class LongStep {
     template <class Number>
     std::vector<Number> next_term(const std::vector<Number>& z, int k) const {
         const auto scaled = [&](const Number& rate) { return rate * h_ / (k + 1.0); };
-        std::vector<Number> out(size());
-        std::array<Number, n_inputs> u;
+        std::vector<Number> out(size()), u(n_inputs);
         for (std::size_t i = 0; i < n_inputs; ++i) {
             u[i] = z[line + i];
             out[line + i] = scaled(z[slope + i]);
@@ -135,10 +137,11 @@ class LongStep {
             }
             Number rate = constant_[r] * z[unit];
             for (std::size_t i = 0; i < n_inputs; ++i) rate += rates_.input_column[i][r] * u[i];
-            for (std::size_t c = 0; c < n_coupled; ++c) rate += rates_.rate.column[c][r] * z[c];
+            rates_.each_in_row(static_cast<int>(r),
+                               [&](int c, double factor) { rate += factor * z[static_cast<std::size_t>(c)]; });
             out[r] = scaled(rate);
         }
-        for (std::size_t j = 0; j < D::angles; ++j)
+        for (std::size_t j = 0; j < n_angles; ++j)
             out[n_coupled + j] = scaled(rates_.angle_coefficient[j] * z[rates_.angle_speed[static_cast<int>(j)]]);
         return out;
     }
@@ -173,8 +176,9 @@ class LongStep {
 
     void tie() {
         const auto row = [this](std::size_t r) {
-            std::array<double, n_coupled + n_inputs + 1> c;
-            for (std::size_t k = 0; k < n_coupled; ++k) c[k] = rates_.rate.column[k][r];
+            std::vector<double> c(n_coupled + n_inputs + 1);
+            rates_.each_in_row(static_cast<int>(r),
+                               [&](int k, double factor) { c[static_cast<std::size_t>(k)] = factor; });
             for (std::size_t i = 0; i < n_inputs; ++i) c[n_coupled + i] = rates_.input_column[i][r];
             c.back() = constant_[r];
             return c;
@@ -194,11 +198,13 @@ class LongStep {
     }
     void round() {
         for (std::size_t j = 0; j < size(); ++j)
-            for (std::size_t r = 0; r < n_states; ++r) rounded_[j][r] = change_[j][r].high;
+            for (std::size_t r = 0; r < n_states; ++r) rounded_[j][place(r)] = change_[j][r].high;
     }
     void begin() {
+        make_room(ties_, rates_.n.coupled);
         tie();
         change_.resize(size());
+        for (auto& c : change_) make_room(c, static_cast<int>(n_states));
         rounded_.resize(size());
         std::vector<DoubleDouble> z;
         for (std::size_t j = 0; j < size(); ++j) {
@@ -217,12 +223,25 @@ class LongStep {
         round();
     }
 
+    // Of what in z is a state, its place.
+    int place(std::size_t k) const {
+        return static_cast<int>(k < n_coupled ? k : static_cast<std::size_t>(D::coupled) + k - n_coupled);
+    }
+
     LinearRatesOf<D> rates_;
+    const std::size_t n_coupled, n_angles, n_inputs;
+
+ public:
+    // The places in z.
+    const std::size_t n_states = n_coupled + n_angles, unit = n_states, line = unit + 1, slope = line + n_inputs,
+                      sine = slope + n_inputs;
+
+ private:
     Column constant_;
-    std::array<Tie, n_coupled> ties_{};
+    ArrayOf<D, Tie, D::coupled> ties_{};
     double h_;
     std::vector<RotatingSine> sines_;
-    std::vector<std::array<DoubleDouble, n_states>> change_, doubled_;  // D(h), column by column
+    std::vector<ArrayOf<D, DoubleDouble, D::states>> change_, doubled_;  // D(h), column by column
     std::vector<State> rounded_;
     std::vector<double> z_;
 };

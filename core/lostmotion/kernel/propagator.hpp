@@ -14,8 +14,13 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <limits>
+#include <optional>
+#include <type_traits>
+#include <variant>
 #include <vector>
 
+#include "series.hpp"
 #include "taylor.hpp"
 
 namespace lostmotion {
@@ -35,12 +40,12 @@ struct ResponseOf {
     using Column = ColumnOf<D>;
 
     std::array<Column, 2> change;  // of x
-    std::array<std::array<double, D::angles>, 2> angle;
+    std::array<AnglesOf<D>, 2> angle;
     std::array<Column, 2> rate;  // of x'
 
     Lanes of(int c) const { return {load(change[c]), angle[c]}; }
     void set(int c, const Lanes& x) {
-        x.coupled.store(change[c].data());
+        store<D>(x.coupled, change[c]);
         angle[c] = x.angle;
     }
     // From the weights of the pair.
@@ -81,13 +86,14 @@ class Propagator {
         const double fastest = rotations.fastest();
         double norm = fastest;  // of A in scaled units, or the highest input frequency [1/s]
         resolved_ = true;
-        for (int r = 0; r < D::coupled; ++r) {
+        for (int r = 0; r < rates.n.coupled; ++r) {
             double sum = 0.0;
-            for (int c = 0; c < D::coupled; ++c) sum += std::fabs(rates.rate(r, c)) * scale[c] / scale[r];
+            rates.each_in_row(r,
+                              [&](int c, double rate) ALWAYS_INLINE { sum += std::fabs(rate) * scale[c] / scale[r]; });
             norm = std::fmax(norm, sum);
             resolved_ = resolved_ && sum < max_norm;  // nor is it if that is no number
         }
-        for (int j = 0; j < D::angles; ++j)
+        for (int j = 0; j < rates.n.angles; ++j)
             norm = std::fmax(
                 norm, std::fabs(rates.angle_coefficient[j]) * scale[rates.angle_speed[j]] / scale[D::coupled + j]);
         if (!resolved_) norm = fastest;
@@ -99,18 +105,60 @@ class Propagator {
         while (longest_ + 1 < max_levels && fastest * length(longest_ + 1) <= 1.0) ++longest_;
         long_stretch_ = 16384.0 * length(longest_);
         levels_ = 0;
-        taylor_.prepare(rates);
-        add_base();
+        norm_ = norm;
+        rates_ = &rates;
+        if constexpr (std::same_as<D, Any>) {
+            // By the data of the regime alone, so that no result depends on what has been met before.
+            const double swing = std::fmax(rates.fastest_swing(), fastest);
+            by_series_ =
+                rates.n.coupled > few_states && resolved_ && rates.fastest_decay() <= swing && norm <= 8.0 * swing;
+            if (by_series_) {
+                while (longest_ > 0 && theta(length(longest_)) > Series::longest) --longest_;
+                long_stretch_ = std::numeric_limits<double>::infinity();
+            }
+        }
+        if (!by_series()) begin_levels();
+        ready_ = true;
     }
 
-    bool ready() const { return levels_ > 0; }
-    void reset() { levels_ = 0; }
+    bool ready() const { return ready_; }
+    void reset() {
+        levels_ = 0;
+        ready_ = false;
+    }
+    // Whether motions are followed by their series alone: those of large trains that are not stiff. Its levels are only
+    // lengths then, and matrices are made for those who ask for them.
+    bool by_series() const {
+        if constexpr (std::same_as<D, Any>)
+            return by_series_;
+        else
+            return false;
+    }
+    double theta(double h) const { return norm_ * std::fabs(h); }
+    // Of the last step that was taken with it.
+    auto& series() { return series_; }
+    // What its levels take [bytes], of trains of any size; then without them, until it is prepared again.
+    std::size_t bytes() const {
+        const auto n = static_cast<std::size_t>(steps_.empty() ? 0 : steps_[0].change.size());
+        return steps_.size() * 3 * n * n * sizeof(double);
+    }
+    void release() {
+        reset();
+        steps_ = {};
+        responses_ = {};
+        taylor_ = {};
+    }
 
-    const LinearRates& rates() const { return taylor_.rates(); }
+    const LinearRates& rates() const { return *rates_; }
     const Taylor<D>& taylor() const { return taylor_; }
 
     const Step& level(int k) {
-        while (levels_ <= k) add_doubled();
+        while (levels_ <= k) {
+            if (levels_ > 0)
+                add_doubled();
+            else
+                begin_levels();
+        }
         return steps_[k];
     }
     // The level or, if the motion grows beyond all bounds before it ends, the highest whose `exponential_bound` is a
@@ -174,14 +222,44 @@ class Propagator {
         rate.angle = rates().angle_rate(x.coupled);
     }
 
+    // What multiplies rates by G(h).
+    struct Changes {
+        Propagator& propagator;
+        double h;
+        std::optional<Integral> integral;
+
+        Lanes operator*(Lanes rate) const {
+            if constexpr (std::same_as<D, Any>)
+                if (!integral) {
+                    Lanes sum;
+                    const double parts = std::fmax(1.0, std::ceil(h / propagator.length(propagator.longest_level())));
+                    Series& series = propagator.series_;
+                    for (double k = 0.0; k < parts; ++k) {
+                        series.expand(propagator.rates(), rate, h / parts, propagator.theta(h / parts));
+                        const Lanes change = series.change();
+                        sum = sum + change;
+                        rate.coupled = rate.coupled + series.rate_change();
+                        const auto turned = propagator.rates().angle_rate(change.coupled);
+                        for (std::size_t j = 0; j < turned.size(); ++j) rate.angle[j] += turned[j];
+                    }
+                    return sum;
+                }
+            return *integral * rate;
+        }
+    };
+    Changes changes(double h) {
+        return {*this, h, by_series() ? std::nullopt : std::optional<Integral>(this->integral(h))};
+    }
     // G(h) for any length: whole levels from the longest down, then the Taylor series.
     Integral integral(double h) {
-        Integral sum;
+        level(0);
+        Integral sum{Matrix::like(rates().matrix()), {}, 0.0, rates().n};
+        lostmotion::make_room(sum.angle, rates().n.angles);
         const auto append = [this, &sum](const Matrix& change, const Integral& next) {
             // G(s + h) = G(h) + exp(A h) G(s)
-            for (int j = 0; j < D::angles; ++j)
-                (load(sum.angle[j]) + (sum.coupled.after(angle_change(next, j)) + load(next.angle[j])))
-                    .store(sum.angle[j].data());
+            for (int j = 0; j < rates().n.angles; ++j)
+                store<D>(load(sum.angle[j]) + (sum.coupled.after(angle_change(next, j)) + load(next.angle[j])),
+                         sum.angle[j]);
             sum.coupled.add(1.0, change * sum.coupled);
             sum.coupled.add(1.0, next.coupled);
             sum.length += next.length;
@@ -190,7 +268,7 @@ class Propagator {
             for (; h >= length(k); h -= length(k)) append(level(k).change, level(k).integral);
         if (h > 0.0) {
             const Integral rest = taylor_.integral(h);
-            append(rates().rate * rest.coupled, rest);
+            append(rates().matrix() * rest.coupled, rest);
         }
         return sum;
     }
@@ -220,16 +298,20 @@ class Propagator {
         if (responses_.size() < levels * pairs) responses_.resize(levels * pairs);
     }
 
+    void begin_levels() {
+        taylor_.prepare(rates());
+        add_base();
+    }
     void add_base() {
         make_room();
         Step& s = steps_[0];
         bounded_ = max_levels;
         const double h = base_;
         s.integral = taylor_.integral(h);
-        s.change = rates().rate * s.integral.coupled;
+        s.change = rates().matrix() * s.integral.coupled;
         // |exp(A s)| from the powers of a matrix without negative entries beside its diagonal.
-        Matrix positive = rates().rate.magnitudes();
-        for (int k = 0; k < D::coupled; ++k) positive.column[k][k] = std::fmax(rates().rate.column[k][k], 0.0);
+        Matrix positive = rates().matrix().magnitudes();
+        for (int k = 0; k < positive.size(); ++k) positive(k, k) = std::fmax(rates().matrix()(k, k), 0.0);
         positive.scale(h);
         const Matrix twice = positive * positive;
         s.exponential_bound = Taylor<D>::template power_series<0>(positive, twice, positive * twice);
@@ -253,22 +335,27 @@ class Propagator {
         const int k = levels_ - 1;
         const Step& a = steps_[static_cast<std::size_t>(k)];
         Step& b = steps_[static_cast<std::size_t>(k + 1)];
-        for (int c = 0; c < D::coupled; ++c) {
-            const Column &change = a.change.column[c], &integral = a.integral.coupled.column[c];
-            (2.0 * load(change) + a.change * change).store(b.change.column[c].data());
-            (2.0 * load(integral) + a.change * integral).store(b.integral.coupled.column[c].data());
+        const int size = a.change.size(), angles = rates().n.angles;
+        for (Matrix* m : {&b.change, &b.integral.coupled, &b.exponential_bound}) m->make_room_like(a.change);
+        for (int c = 0; c < size; ++c) {
+            const Coupled change = a.change.at(c), integral = a.integral.coupled.at(c);
+            b.change.set_column(c, 2.0 * change + a.change * change);
+            b.integral.coupled.set_column(c, 2.0 * integral + a.change * integral);
             // |exp(A (h + s))| <= |exp(A s)| |exp(A h)|, of which the second is known.
-            const Coupled magnitude = absolute(Matrix::identity().at(c) + load(change));
-            at_most(max_of(a.exponential_bound.at(c), a.exponential_bound * magnitude), unbounded)
-                .store(b.exponential_bound.column[c].data());
+            const Coupled magnitude = absolute(a.change.unit(c) + change);
+            b.exponential_bound.set_column(
+                c, at_most(max_of(a.exponential_bound.at(c), a.exponential_bound * magnitude), unbounded));
         }
-        for (int c = 0; c < D::coupled; ++c)
-            for (const double bound : b.exponential_bound.column[c])
-                if (!(bound < unbounded)) bounded_ = std::min(bounded_, k);
-        std::array<Coupled, D::angles> angle;
-        for (int j = 0; j < D::angles; ++j) {
+        for (int c = 0; c < size; ++c)
+            for (int r = 0; r < size; ++r)
+                if (!(b.exponential_bound(r, c) < unbounded)) bounded_ = std::min(bounded_, k);
+        ArrayOf<D, Coupled, D::angles> angle;
+        lostmotion::make_room(angle, angles);
+        lostmotion::make_room(b.integral.angle, angles);
+        b.integral.n = rates().n;
+        for (int j = 0; j < angles; ++j) {
             angle[j] = angle_change(a.integral, j);
-            (2.0 * load(a.integral.angle[j]) + a.integral.coupled.after(angle[j])).store(b.integral.angle[j].data());
+            store<D>(2.0 * load(a.integral.angle[j]) + a.integral.coupled.after(angle[j]), b.integral.angle[j]);
         }
         b.integral.length = 2.0 * a.integral.length;
         for (int p = 0; p < n_pairs_; ++p) {
@@ -280,7 +367,7 @@ class Propagator {
                 const Lanes own = from.of(c);
                 Lanes out = own;
                 out.coupled = own.coupled + a.change * from.change[c];
-                for (int j = 0; j < D::angles; ++j) out.angle[j] = own.angle[j] + (angle[j] * own.coupled).sum();
+                for (int j = 0; j < angles; ++j) out.angle[j] = own.angle[j] + (angle[j] * own.coupled).sum();
                 return out;
             };
             if (basis->kind == InputBasis::cosine) {
@@ -310,13 +397,17 @@ class Propagator {
                                      : basis[c].kind == InputBasis::ramp   ? length(k)
                                      : basis[c].kind == InputBasis::cosine ? cosine_change(k, p)
                                                                            : turn[p].sin;
-                (rates().rate * r.change[c] + input * load(rates().input_column[basis[c].input]))
-                    .store(r.rate[c].data());
+                store<D>(rates().matrix() * r.change[c] + input * load(rates().input_column[basis[c].input]),
+                         r.rate[c]);
             }
         }
     }
 
     Taylor<D> taylor_;
+    const LinearRates* rates_ = nullptr;
+    double norm_ = 0.0;
+    bool ready_ = false, by_series_ = false;
+    [[no_unique_address]] std::conditional_t<std::same_as<D, Any>, Series, std::monostate> series_;
     double base_ = 0.0;  // length of level 0 [s]
     double per_first_ = 0.0;
     double long_stretch_ = 0.0;  // [s]

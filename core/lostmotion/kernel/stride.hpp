@@ -19,20 +19,28 @@ struct InstantsOf {
     static_assert(max_count % vec_width == 0);
     using Column = std::array<double, max_count>;
 
-    alignas(64) std::array<Column, D::states> x{};
-    alignas(64) std::array<Column, D::inputs> u{};
+    alignas(64) ByState<D, Column> x{};
+    alignas(64) ArrayOf<D, Column, D::inputs> u{};
 
     [[gnu::always_inline]] void set(int k, const LanesOf<D>& state, const InputsOf<D>& input) {
-        for (int j = 0; j < D::coupled; ++j) x[j][k] = state.coupled[j];
-        for (int j = 0; j < D::angles; ++j) x[D::coupled + j][k] = state.angle[j];
-        for (int i = 0; i < D::inputs; ++i) u[i][k] = input[i];
+        if constexpr (std::same_as<D, Any>) {
+            x.coupled.resize(std::max(x.coupled.size(), state.coupled.size()));
+            x.angle.resize(std::max(x.angle.size(), state.angle.size()));
+            u.resize(std::max(u.size(), input.size()));
+            for (std::size_t j = 0; j < x.coupled.size(); ++j) x.coupled[j][k] = state.coupled[j];
+            for (std::size_t j = 0; j < x.angle.size(); ++j) x.angle[j][k] = state.angle[j];
+            for (std::size_t i = 0; i < u.size(); ++i) u[i][k] = input[i];
+        } else {
+            for (int j = 0; j < D::coupled; ++j) x[j][k] = state.coupled[j];
+            for (int j = 0; j < D::angles; ++j) x[D::coupled + j][k] = state.angle[j];
+            for (int i = 0; i < D::inputs; ++i) u[i][k] = input[i];
+        }
     }
 };
 
 template <class D>
 class Stride {
  public:
-    static constexpr int n_inputs = D::inputs;
     using Coupled = CoupledOf<D>;
     using State = StateOf<D>;
     using Lanes = LanesOf<D>;
@@ -45,12 +53,14 @@ class Stride {
         const LinearRatesOf<D>& rates = propagator.rates();
         const ResponseOf<D>* responses = propagator.responses(level);
         const PhaseRotation* rotations = propagator.rotations(level);
-        for (int j = 0; j < D::angles; ++j)
+        n_ = rates.n;
+        make_room(angle_row_, n_.angles);
+        for (int j = 0; j < n_.angles; ++j)
             angle_row_[j] = rates.angle_coefficient[j] * step_->integral.coupled.row(rates.angle_speed[j]);
         x_ = from.x();
         linear_ = input.linear();
         Coupled driving = load(constant), ramp{};
-        for (int i = 0; i < n_inputs; ++i) {
+        for (int i = 0; i < n_.inputs; ++i) {
             increase_[i] = input.slope()[i] * length;
             driving = driving + linear_[i] * load(rates.input_column[i]);
             ramp = ramp + increase_[i] * load(rates.input_column[i]);
@@ -84,11 +94,11 @@ class Stride {
         for (int k = 0;; ++k) {
             InputsOf<D> u = linear_;
             std::size_t q = 0;
-            for (int i = 0; i < n_inputs; ++i)
+            for (int i = 0; i < n_.inputs; ++i)
                 for (; q < sines_end_[i]; ++q) u[i] += sines_[q].sine_cosine[0];
             to.set(k, x, u);
             if (k + 1 == n) {
-                x.store(x_.data());
+                x.store(x_);
                 return;
             }
             Lanes driven = forced;
@@ -97,10 +107,10 @@ class Stride {
                 t.sine_cosine = t.rotation * t.sine_cosine;
             }
             Lanes own{step_->change * x.coupled, {}};
-            for (int j = 0; j < D::angles; ++j) own.angle[j] = (angle_row_[j] * x.coupled).sum();
+            for (int j = 0; j < n_.angles; ++j) own.angle[j] = (angle_row_[j] * x.coupled).sum();
             x = own + (x + driven);  // so that one sum less waits for the step before
             forced = forced + growth_;
-            for (int i = 0; i < n_inputs; ++i) linear_[i] += increase_[i];
+            for (int i = 0; i < n_.inputs; ++i) linear_[i] += increase_[i];
         }
     }
     // At the last of them.
@@ -114,12 +124,13 @@ class Stride {
     };
 
     const StepOf<D>* step_ = nullptr;
-    std::array<Coupled, D::angles> angle_row_;  // the rows of the angles in exp(A h) - 1
+    [[no_unique_address]] CountsOf<D> n_;
+    ArrayOf<D, Coupled, D::angles> angle_row_;  // the rows of the angles in exp(A h) - 1
     State x_{};
     Lanes forced_, growth_;
     InputsOf<D> linear_{}, increase_{};
     std::vector<RotatingSine> sines_;  // input by input
-    std::array<std::size_t, D::inputs> sines_end_{};
+    ListOf<D, std::size_t, D::inputs> sines_end_{};
 };
 
 }  // namespace lostmotion

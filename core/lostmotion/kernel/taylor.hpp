@@ -32,10 +32,11 @@ class Expansion {
     static constexpr int terms = Polynomial::degree;  // good for a base interval: 0.25^13/13! < 1e-17
     using Coupled = CoupledOf<D>;
 
-    std::array<InputsOf<D>, terms + 1> input;         // [k]: their k-th derivative
-    std::array<double, D::angles> angle_rate;         // of the angles
-    std::array<double, D::angles> angle_coefficient;  // their rates over their speeds
+    std::array<InputsOf<D>, terms + 1> input;  // [k]: their k-th derivative
+    AnglesOf<D> angle_rate;                    // of the angles
+    AnglesOf<D> angle_coefficient;             // their rates over their speeds
     [[no_unique_address]] AngleSpeeds<D> angle_speed;
+    [[no_unique_address]] CountsOf<D> n;
     std::array<Coupled, terms> coupled;  // derivatives of the other states, from the first on
 
     // By how much the state changes over s.
@@ -49,12 +50,12 @@ class Expansion {
             const Coupled* v = &coupled[static_cast<std::size_t>(4 * part)];
             sum.coupled = sum.coupled + ((by<0>(c, v[0]) + by<1>(c, v[1])) + (by<2>(c, v[2]) + by<3>(c, v[3])));
             const Pack<4> next = c * four_over_next(part);
-            for (int j = 0; j < D::angles; ++j) {
+            for (int j = 0; j < n.angles; ++j) {
                 const int speed = angle_speed[j];
                 sum.angle[j] += (next * Pack<4>::of({v[0][speed], v[1][speed], v[2][speed], v[3][speed]})).sum();
             }
         }
-        for (int j = 0; j < D::angles; ++j) sum.angle[j] = s * (angle_rate[j] + angle_coefficient[j] * sum.angle[j]);
+        for (int j = 0; j < n.angles; ++j) sum.angle[j] = s * (angle_rate[j] + angle_coefficient[j] * sum.angle[j]);
         return sum;
     }
 
@@ -67,11 +68,10 @@ class Expansion {
 
     // A form of the motion that does not depend on an angle, as a polynomial in the time [s] from the instant.
     [[gnu::always_inline]] Polynomial polynomial(const LinearFormOf<D>& form, double value) const {
-        for (int j = D::coupled; j < D::states; ++j) assert(form.c[j] == 0.0);
         Polynomial p(value);
-        const Coupled c = Coupled::load(form.c.data());
+        const Coupled c = lostmotion::coupled<D>(form);
         bool driven = false;
-        for (int i = 0; i < D::inputs; ++i) driven = driven || form.c[D::first_input + i] != 0.0;
+        each_input_of<D>(form, [&](int, double factor) ALWAYS_INLINE { driven = driven || factor != 0.0; });
         for (int part = 0; part < Polynomial::parts; ++part) {
             const Coupled* v = &coupled[static_cast<std::size_t>(4 * part)];
             p.part[part] = sums(c * v[0], c * v[1], c * v[2], c * v[3]);
@@ -114,13 +114,14 @@ struct IntegralOf {
     using Lanes = LanesOf<D>;
 
     MatrixOf<D> coupled;
-    std::array<ColumnOf<D>, D::angles> angle{};  // the rows of the angles, but for their own rates
+    ArrayOf<D, ColumnOf<D>, D::angles> angle{};  // the rows of the angles, but for their own rates
     double length = 0.0;
+    [[no_unique_address]] CountsOf<D> n;
 
     // By how much the state changes that had this rate.
     [[gnu::always_inline]] Lanes operator*(const Lanes& rate) const {
         Lanes out{coupled * rate.coupled, angle_changes(rate.coupled)};
-        for (int j = 0; j < D::angles; ++j) out.angle[j] += length * rate.angle[j];
+        for (int j = 0; j < n.angles; ++j) out.angle[j] += length * rate.angle[j];
         return out;
     }
     [[gnu::always_inline]] Lanes operator*(const ColumnOf<D>& rate) const {
@@ -128,9 +129,11 @@ struct IntegralOf {
     }
 
  private:
-    [[gnu::always_inline]] std::array<double, D::angles> angle_changes(const CoupledOf<D>& rate) const {
-        std::array<double, D::angles> out;
-        if constexpr (D::angles == 1) {
+    [[gnu::always_inline]] AnglesOf<D> angle_changes(const CoupledOf<D>& rate) const {
+        AnglesOf<D> out;
+        if constexpr (std::same_as<D, Any>) {
+            for (int j = 0; j < n.angles; ++j) out[j] = product(load(angle[static_cast<std::size_t>(j)]), rate);
+        } else if constexpr (D::angles == 1) {
             out[0] = (load(angle[0]) * rate).sum();
         } else {  // at once
             constexpr int last = D::angles - 1;
@@ -156,21 +159,37 @@ class Taylor {
 
     void prepare(const LinearRates& rates) {
         rates_ = &rates;
-        squared_ = rates.rate * rates.rate;
-        cubed_ = rates.rate * squared_;
-        for (int i = 0; i < D::inputs; ++i) {
+        const Matrix& A = rates.matrix();
+        squared_ = A * A;
+        cubed_ = A * squared_;
+        lostmotion::make_room(input_, rates.n.inputs);
+        for (int i = 0; i < rates.n.inputs; ++i) {
             const Coupled B = load(rates.input_column[i]);
-            input_[i] = {B, rates.rate * B, squared_ * B};
+            input_[i] = {B, A * B, squared_ * B};
         }
     }
 
     const LinearRates& rates() const { return *rates_; }
 
     // At an instant with this rate and these inputs.
+    // Without the powers of the matrix.
+    static void expand_by_rates(const LinearRates& rates, const Lanes& rate, const InputState<D>& input,
+                                Expansion<D>& out)
+        requires(std::same_as<D, Any>)
+    {
+        input.template jet<terms + 1>(out.input.data());
+        out.angle_rate = rate.angle;
+        out.angle_coefficient = rates.angle_coefficient;
+        out.angle_speed = rates.angle_speed;
+        out.n = rates.n;
+        out.coupled[0] = rate.coupled;
+        for (std::size_t k = 1; k < terms; ++k)
+            out.coupled[k] = rates * out.coupled[k - 1] + rates.forced(out.input[k]);
+    }
     [[gnu::always_inline]] void expand(const Lanes& rate, const InputState<D>& input, Expansion<D>& out) const {
         input.template jet<terms + 1>(out.input.data());
         Varies varies;
-        for (int i = 0; i < D::inputs; ++i) varies[i] = input.varies(i);
+        for (int i = 0; i < rates_->n.inputs; ++i) varies[i] = input.varies(i);
         expand(rate, varies, out);
     }
     // The answer from rest to a function of the inputs after h.
@@ -196,21 +215,22 @@ class Taylor {
 
     // G over at most one base interval.
     Integral integral(double h) const {
-        Matrix one = rates_->rate, two = squared_, three = cubed_;
+        Matrix one = rates_->matrix(), two = squared_, three = cubed_;
         one.scale(h);
         two.scale(h * h);
         three.scale(h * h * h);
-        Integral sum{power_series<1>(one, two, three), {}, h};
+        Integral sum{power_series<1>(one, two, three), {}, h, rates_->n};
         sum.coupled.scale(h);
+        lostmotion::make_room(sum.angle, rates_->n.angles);
         // An angle is turned by the integral of its speed's row.
-        for (int j = 0; j < D::angles; ++j) {
+        for (int j = 0; j < rates_->n.angles; ++j) {
             const int speed = rates_->angle_speed[j];
-            const Coupled first = Matrix::identity().row(speed), second = one.row(speed), third = two.row(speed);
+            const Coupled first = one.unit(speed), second = one.row(speed), third = two.row(speed);
             Coupled row{};
             for (int k = terms - 3; k >= 0; k -= 3)
                 row = three.after(row) + (over_factorial[k + 2] * first +
                                           (over_factorial[k + 3] * second + over_factorial[k + 4] * third));
-            (rates_->angle_coefficient[j] * h * h * row).store(sum.angle[j].data());
+            store<D>(rates_->angle_coefficient[j] * h * h * row, sum.angle[j]);
         }
         return sum;
     }
@@ -219,10 +239,10 @@ class Taylor {
     template <int shift>
     static Matrix power_series(const Matrix& one, const Matrix& two, const Matrix& three) {
         static_assert(terms == 12);
-        Matrix sum;
+        Matrix sum = Matrix::like(one);
         for (int k = 9; k >= 0; k -= 3) {
             if (k < 9) sum = three * sum;
-            sum.add(over_factorial[k + shift], Matrix::identity());
+            sum.add_identity(over_factorial[k + shift]);
             sum.add(over_factorial[k + 1 + shift], one);
             sum.add(over_factorial[k + 2 + shift], two);
         }
@@ -240,16 +260,17 @@ class Taylor {
         }
     };
 
-    using Varies = std::array<bool, D::inputs>;
+    using Varies = ListOf<D, bool, D::inputs>;
 
     [[gnu::always_inline]] void expand(const Lanes& rate, const Varies& varies, Expansion<D>& out) const {
         out.angle_rate = rate.angle;
         out.angle_coefficient = rates_->angle_coefficient;
         out.angle_speed = rates_->angle_speed;
+        out.n = rates_->n;
         const auto recur = [&](auto forced) ALWAYS_INLINE {
             auto& v = out.coupled;
             v[0] = rate.coupled;
-            v[1] = forced(rates_->rate * v[0], -2);
+            v[1] = forced(rates_->matrix() * v[0], -2);
             v[2] = forced(squared_ * v[0], -1);
             for (int k = 0; k + 3 < terms; ++k) v[k + 3] = forced(cubed_ * v[k], k);
         };
@@ -268,7 +289,7 @@ class Taylor {
             else
                 recur(free);
         } else {
-            std::array<int, D::inputs> varying;
+            ListOf<D, int, D::inputs> varying;
             int n = 0;
             for (int i = 0; i < rates_->depends_on.inputs; ++i)
                 if (varies[i]) varying[n++] = i;
@@ -286,7 +307,7 @@ class Taylor {
 
     const LinearRates* rates_ = nullptr;
     Matrix squared_, cubed_;  // A^2, A^3
-    std::array<Forcing, D::inputs> input_;
+    ArrayOf<D, Forcing, D::inputs> input_;
 };
 
 }  // namespace lostmotion

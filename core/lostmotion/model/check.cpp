@@ -9,19 +9,15 @@ namespace lostmotion::model {
 std::string Fault::sentence() const { return kind.empty() ? reason : element() + ' ' + reason; }
 
 Fault TrainCheck::operator()() const {
-    for (const auto check : {&TrainCheck::shafts_exist, &TrainCheck::mass_matrices, &TrainCheck::controllers,
-                             &TrainCheck::elements, &TrainCheck::inertias, &TrainCheck::rigid_loops,
-                             &TrainCheck::turned, &TrainCheck::sizes, &TrainCheck::massless})
+    for (const auto check :
+         {&TrainCheck::shafts_exist, &TrainCheck::mass_matrices, &TrainCheck::controllers, &TrainCheck::elements,
+          &TrainCheck::inertias, &TrainCheck::rigid_loops, &TrainCheck::turned, &TrainCheck::massless})
         if (Fault error = (this->*check)(); !error.empty()) return error;
     return {};
 }
 
 Fault TrainCheck::shafts_exist() const {
     if (train_.shafts.empty()) return Fault{} + "the train has no shaft";
-    if (Fault error = too_many("shafts", train_.shafts.size(), max_shafts); !error.empty()) return error;
-    std::size_t contacts = train_.shafts.size() + train_.gears.size();
-    for (const auto& c : coupling_elements(train_)) contacts += c->is_dry();
-    if (Fault error = too_many("shafts, gears and couplings", contacts, max_contacts); !error.empty()) return error;
     const auto missing = [](const Fault& what, int s) {
         return what + "names shaft number " + std::to_string(s) + ", which the train does not have";
     };
@@ -258,10 +254,9 @@ Fault TrainCheck::massless() const {
         if (places.contacts[c].bilateral) rigid[c] = 0;
     const Ties tied = places.ties(rigid.data());
     for (std::size_t c = 0; c < places.contacts.size(); ++c) {
-        std::array<double, max_shafts> per;
-        const unsigned moves = rigid[c] == 0 ? 0 : tied_speed(places.contacts[c], tied, per);
+        const Shares moves = rigid[c] == 0 ? Shares{} : tied_speed(places.contacts[c], tied);
         for (const int s : places.massless)
-            if (moves >> s & 1)
+            if (moves.has(s))
                 return shaft(s) + "has no " + inertia(s) + ", and " + contact_name(a, static_cast<int>(c)) +
                        " is a dry contact at it" + remedy(s) + ", or leave the contact out";
     }
@@ -327,11 +322,11 @@ Fault TrainCheck::rigid_loops() const {
 }
 
 Fault TrainCheck::given_motions(const std::vector<ContactPlace>& rigid) const {
-    GivenShafts given;
+    std::vector<int> given;
     for (std::size_t s = 0; s < train_.shafts.size(); ++s)
-        if (train_.shafts[s].given_motion) given.shafts |= 1u << s;
+        if (train_.shafts[s].given_motion) given.push_back(static_cast<int>(s));
     const std::vector<std::int8_t> stuck(rigid.size(), 0);
-    const Ties ties = tie(rigid, static_cast<int>(train_.shafts.size()), stuck.data(), nullptr, given);
+    const Ties ties = tie(rigid, static_cast<int>(train_.shafts.size()), stuck.data(), nullptr, {given});
     for (std::size_t k = 0; k < rigid.size(); ++k)
         if (const auto gear = static_cast<std::size_t>(rigid[k].element); ties.redundant[k])
             return named("gears", "gear", train_.gears[gear].name, gear) +
@@ -369,29 +364,10 @@ Fault TrainCheck::turned() const {
     return {};
 }
 
-Fault TrainCheck::sizes() const {
-    const Layout n = Places(train_).layout;
-    const std::pair<const char*, std::pair<int, int>> counts[] = {{"states", {n.states, max_states}},
-                                                                  {"inputs", {n.inputs, max_inputs}},
-                                                                  {"memories", {n.memory, max_memory}},
-                                                                  {"terms", {n.terms, max_terms}},
-                                                                  {"piecewise laws", {n.branches, max_branches}}};
-    for (const auto& [what, count] : counts)
-        if (Fault error = too_many(what, static_cast<std::size_t>(count.first), count.second); !error.empty())
-            return error;
-    return {};
-}
-
 Fault TrainCheck::too_fine(const Fault& element, int pieces) {
     if (pieces <= max_pieces) return {};
     return element + "would take " + std::to_string(pieces) + " straight lines; at most " + std::to_string(max_pieces) +
            " are possible: allow a larger error";
-}
-
-Fault TrainCheck::too_many(const char* what, std::size_t n, int most) {
-    if (n <= static_cast<std::size_t>(most)) return {};
-    return Fault{} + "the train has " + std::to_string(n) + ' ' + what + "; at most " + std::to_string(most) +
-           " are possible";
 }
 
 std::string check_start(const Train& train, const std::vector<double>& speed) {

@@ -78,9 +78,7 @@ class TrainCheck {
     // freely.
     Fault turned() const;
 
-    Fault sizes() const;
     static Fault too_fine(const Fault& element, int pieces);
-    static Fault too_many(const char* what, std::size_t n, int most);
 
     const Train& train_;
 };

@@ -47,19 +47,20 @@ std::vector<PeriodicAngle> periodic_angles(const Assembly& a) {
 
 std::vector<Row> geometric_constraints(const Assembly& a, const Key& key) {
     struct Equation {
-        std::array<double, max_shafts> angle{};  // of the shafts
-        Row state;                               // equal to it, but for a constant
+        std::vector<double> angle;  // of the shafts
+        Row state;                  // equal to it, but for a constant
     };
     std::vector<Equation> equations;
     const Terms terms(a.layout());
+    const std::vector<double> none(a.train().shafts.size());
     for (std::size_t s = 0; s < a.train().shafts.size(); ++s)
         if (const int k = a.places().shafts[s].angle; k != nowhere) {
-            equations.push_back({{}, terms.state(k)});
+            equations.push_back({none, terms.state(k)});
             equations.back().angle[s] = 1.0;
         }
     for (std::size_t g = 0; g < a.train().gears.size(); ++g) {
         const Gear& gear = a.train().gears[g];
-        Equation e;
+        Equation e{none, {}};
         e.angle[static_cast<std::size_t>(gear.input)] = a.per_input(static_cast<int>(g), key);
         e.angle[static_cast<std::size_t>(gear.output)] = -1.0;
         if (gear.housing != nowhere)

@@ -58,10 +58,12 @@ class ComponentLaws<model::TrainSystem<D>> {
     using Locked = model::LockedTorque<LinearFormOf<D>>;
 
     explicit ComponentLaws(const System& system)
-        : assembly_(system.assembly()), angles_(model::periodic_angles(assembly_)), locked_(system) {
-        neutral_.fill(true);
-        const model::Layout& n = assembly_.layout();
-        std::fill_n(neutral_.begin(), n.coupled, false);
+        : assembly_(system.assembly()),
+          counts_(system.counts()),
+          angles_(model::periodic_angles(assembly_)),
+          locked_(system) {
+        each_component<D>(system.counts(), [&](int k) { neutral_[k] = true; });
+        for (int k = 0; k < assembly_.layout().coupled; ++k) neutral_[k] = false;
         for (std::size_t g = 0; g < gears().size(); ++g)
             if (const int h = gears()[g].hysteresis; h != model::nowhere)
                 set_torque(h, assembly_.train().gears[g].law.rated_output_torque);
@@ -70,7 +72,7 @@ class ComponentLaws<model::TrainSystem<D>> {
     }
 
     // The turns of angles follow from these.
-    bool neutral(int k) const { return neutral_[k]; }
+    bool neutral(int k) const { return neutral_[k] != 0; }
     bool matters(const model::Key& key, int k) const {
         for (std::size_t c = 0; c < contacts().size(); ++c)
             if (contacts()[c].locked != model::nowhere && D::states + contacts()[c].locked == k)
@@ -94,7 +96,7 @@ class ComponentLaws<model::TrainSystem<D>> {
             if (D::states + g.hysteresis == k && g.hysteresis != model::nowhere) torque = std::fmax(0.0, torque);
     }
     void rewind(State& x, Memory& memory) const {
-        for (int j = D::coupled; j < D::states; ++j) x[j] = 0.0;
+        for (int j = 0; j < assembly_.layout().angles; ++j) x[D::coupled + j] = 0.0;
         for (const model::PeriodicAngle& a : angles_) a.rewind(x, memory);
     }
     void direct(const State& x, model::Key& key) const {
@@ -116,7 +118,7 @@ class ComponentLaws<model::TrainSystem<D>> {
     // Speeds that stop or follow another, hysteresis at turning points, locked torques. A period that an angle begins
     // anew moves its turn by a constant.
     ResetRatesOf<D> reset(const ResetOf<System>& r, JacobianOf<D>& jump) const {
-        std::array<std::int8_t, model::max_contacts> modes{};
+        std::vector<std::int8_t> modes(contacts().size());
         for (std::size_t c = 0; c < contacts().size(); ++c) modes[c] = r.before.at_rest[c] ? 0 : 1;
         if (r.switching.guard >= 0 && r.switching.kind == model::Guard::speed) modes[r.switching.contact] = 0;
         const model::Ties t = ties(modes), rest = ties(r.after.key.modes);
@@ -172,17 +174,17 @@ class ComponentLaws<model::TrainSystem<D>> {
         const auto add_before = [&](int contact, double share) {
             const LinearFormOf<D>& was = locked_.torque(r.before, contact);
             const Components g = gradient<D>(was);
-            for (int i = 0; i < component_count<D>; ++i) row[i] += share * g[i];
+            each_component<D>(counts_, [&](int i) { row[i] += share * g[i]; });
             by_time += share * input_part<D>(was, r.input[1]);
         };
         const auto add_now = [&](const LinearFormOf<D>& form, double factor) {
             const Components g = gradient<D>(form);
             by_time += factor * input_part<D>(form, r.input_after[1]);
-            for (int j = 0; j < component_count<D>; ++j) {
-                if (g[j] == 0.0) continue;
-                for (int i = 0; i < component_count<D>; ++i) row[i] += factor * g[j] * jump.row[j][i];
+            each_component<D>(counts_, [&](int j) {
+                if (g[j] == 0.0) return;
+                each_component<D>(counts_, [&](int i) { row[i] += factor * g[j] * jump.row[j][i]; });
                 by_time += factor * g[j] * rates.by_time[j];
-            }
+            });
         };
         const auto set = [&](const Locked& l, auto&& add) {
             row = {};
@@ -210,9 +212,10 @@ class ComponentLaws<model::TrainSystem<D>> {
     }
 
     const model::Assembly& assembly_;
+    const CountsOf<D> counts_;
     const std::vector<model::PeriodicAngle> angles_;
     const LockedTorques<D> locked_;
-    std::array<bool, static_cast<std::size_t>(component_count<D>)> neutral_;
+    ByComponent<D, char> neutral_{};
     Memory magnitude_{};
 };
 

@@ -106,11 +106,8 @@ auto ElementForms::held_friction(int shaft, const Key& key) const -> Row {
 
 auto ElementForms::between(const CouplingElement& c, const Ties& ties) const -> Between {
     Between shafts{terms_, {}};
-    std::array<double, max_shafts> slip;
-    for (unsigned left = tied_speed(coupling_place(c, nowhere), ties, slip); left != 0; left &= left - 1) {
-        const int k = std::countr_zero(left);
-        shafts.slip.c[places_.shafts[k].speed] = slip[k];
-    }
+    for (const Share& k : tied_speed(coupling_place(c, nowhere), ties))
+        shafts.slip.c[places_.shafts[k.shaft].speed] = k.share;
     return shafts;
 }
 

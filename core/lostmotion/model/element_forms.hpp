@@ -1,8 +1,6 @@
 // Speeds and torques of the elements of a train in a regime, as linear forms: each law is stated here once.
 #pragma once
 
-#include <array>
-#include <bit>
 #include <utility>
 
 #include "places.hpp"

@@ -22,17 +22,17 @@ struct Equation {
 
 }  // namespace
 
-Impulses::Impulses(const Places& places, std::vector<Flank> all, const std::array<double, max_shafts>& speeds)
+Impulses::Impulses(const Places& places, std::vector<Flank> all, const std::vector<double>& speeds)
     : flanks(std::move(all)), shafts_(places.shafts.size()) {
-    std::array<std::int8_t, max_contacts> modes{};
+    std::vector<std::int8_t> modes(places.contacts.size());
     for (std::size_t c = 0; c < places.contacts.size(); ++c) modes[c] = places.contacts[c].bilateral ? 0 : 1;
     const Ties ties = places.ties(modes.data());
     std::vector<int> free;
     for (std::size_t s = 0; s < shafts_; ++s)
-        if ((ties.free[s] >> s & 1) != 0 && !places.moves_no_inertia(static_cast<int>(s), ties))
+        if (ties.is_free(static_cast<int>(s)) && !places.moves_no_inertia(static_cast<int>(s), ties))
             free.push_back(static_cast<int>(s));
     const std::size_t n = free.size(), m = flanks.size();
-    const auto share = [&](std::size_t s, int k) { return (ties.free[s] >> k & 1) != 0 ? ties.share[s][k] : 0.0; };
+    const auto share = [&](std::size_t s, int k) { return ties.of[s].of(k); };
 
     std::vector<Values> G(m, Values(n));
     size_.assign(m, 0.0);
@@ -113,8 +113,8 @@ double Impulses::join(const std::vector<bool>& some) {
     return energy;
 }
 
-std::array<double, max_shafts> Impulses::changes() const {
-    std::array<double, max_shafts> sum{};
+auto Impulses::changes() const -> Values {
+    Values sum(shafts_);
     for (std::size_t s = 0; s < shafts_; ++s)
         for (std::size_t f = 0; f < flanks.size(); ++f)
             if (total_[f] != 0.0) sum[s] -= per_impulse_[s][f] * total_[f];

@@ -31,10 +31,12 @@ struct Flank {
 
 class Impulses {
  public:
+    using Values = std::vector<double>;
+
     std::vector<Flank> flanks;
 
     // speeds: of the shafts. Those of the flanks are found here, if they do not touch.
-    Impulses(const Places& places, std::vector<Flank> flanks, const std::array<double, max_shafts>& speeds);
+    Impulses(const Places& places, std::vector<Flank> flanks, const std::vector<double>& speeds);
 
     // The largest energy of an approach speed alone that is left.
     double approach() const;
@@ -46,11 +48,9 @@ class Impulses {
     // 1/W of flanks alone: what inertia a change of their speed moves.
     double inertia(std::size_t flank) const { return 1.0 / W_[flank][flank]; }
     // Changes of the speeds of the shafts up to here.
-    std::array<double, max_shafts> changes() const;
+    Values changes() const;
 
  private:
-    using Values = std::vector<double>;
-
     Values least(const Values& excess, const std::vector<bool>& some) const;
     Values solve(const std::vector<std::size_t>& of, const Values& excess) const;
     void apply(const Values& P, const std::vector<bool>& some, const Values& target);

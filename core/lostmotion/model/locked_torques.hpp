@@ -23,15 +23,15 @@ class LockedTorques {
     using Memory = typename D::Memory;
     using Form = LinearFormOf<D>;
     using Locked = model::LockedTorque<Form>;
-    using Torques = std::array<double, model::max_contacts>;  // by contact
+    using Torques = Few<double, 12>;  // by contact
 
     explicit LockedTorques(const System& system) : system_(system) {}
 
     // Each torque is as it was or at a bound in a regime, which is that at rest or, where contacts have come to their
     // limits and turn back at once, that at the limits, which gives the other torques.
     struct Hold {
-        std::unique_ptr<const Regime> at_limit;                // empty: the regime at rest itself
-        std::array<model::Bound, model::max_contacts> bounds;  // in the order of that regime's locked torques
+        std::unique_ptr<const Regime> at_limit;  // empty: the regime at rest itself
+        std::vector<model::Bound> bounds;        // in the order of that regime's locked torques
     };
     // torques: those before. Nothing if the torques are elsewhere.
     std::optional<Hold> find(const Regime& rest, const Torques& torques, const State& x, const Memory& memory,
@@ -92,7 +92,8 @@ class LockedTorques {
     }
     // Are the torques that rest leaves open those that this regime gives?
     bool holds(const Regime& r, const Regime& rest, const Torques& torques, const State& x, const Memory& memory,
-               const InputsOf<D>& u, std::array<model::Bound, model::max_contacts>& bounds) const {
+               const InputsOf<D>& u, std::vector<model::Bound>& bounds) const {
+        bounds.resize(r.locked.size());
         Memory m = memory;
         for (const Locked& l : r.locked) m[l.memory] = torques[l.contact];
         for (std::size_t k = 0; k < r.locked.size(); ++k) {

@@ -28,7 +28,7 @@ bool SwitchedTrain<Sizes>::has_gap(int contact, const Now& now) const {
 template <class Sizes>
 template <class Now>
 Impulses SwitchedTrain<Sizes>::impulses(const Now& now, const Key& key) const {
-    std::array<double, max_shafts> speeds{};
+    std::vector<double> speeds(train().shafts.size());
     for (std::size_t s = 0; s < train().shafts.size(); ++s) speeds[s] = now.x[places().shafts[s].speed];
     const Ties ties = places().ties(key.modes.data());
     std::vector<Flank> flanks;
@@ -199,7 +199,7 @@ Found SwitchedTrain<Sizes>::strikes(Cache& cache, Now& now, const G& fired, Key&
         Event event;
         for (std::size_t g = 0; g < train().gears.size(); ++g) event.gear[g] = evaluate(n_, old.output_torque[g], now);
         each_coupling_contact([&](int c) { event.coupling[c] = evaluate(n_, old.contact_torque[c], now); });
-        std::copy_n(old.at_rest.begin(), contacts(), event.at_rest.begin());
+        for (int c = 0; c < contacts(); ++c) event.at_rest[c] = old.at_rest[c];
         const Now past = now;
         const Key from = key;
         Impulses struck = impulses(now, key);
@@ -350,7 +350,7 @@ bool SwitchedTrain<Sizes>::stop_with(Now& now, std::size_t gear, MovedShafts& mo
     for (int c = 0; c < contacts(); ++c)
         together.modes[c] = places().contacts[c].bilateral || c == contact ? std::int8_t{0} : std::int8_t{1};
     const Ties ties = places().ties(together.modes.data());
-    const std::array<int, max_shafts> part = parts(places(), together);
+    const std::vector<int> part = parts(places(), together);
     const std::size_t shafts = train().shafts.size();
     for (std::size_t s = 0; s < shafts; ++s) {
         if (part[s] != part[train().gears[gear].input]) continue;

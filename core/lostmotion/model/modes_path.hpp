@@ -20,7 +20,8 @@ bool SwitchedTrain<Sizes>::conditions(Cache& cache, Now now, const Key& modes, c
     trial = branches_at(cache.regime(trial), trial, now);
     const auto& e = look_up(cache, trial);
     const auto& r = regime_of(e);
-    for (auto& c : out) c.fill(std::numeric_limits<double>::infinity());
+    constexpr double none = std::numeric_limits<double>::infinity();
+    out.assign(static_cast<std::size_t>(contacts()), {none, none, none});
     auto along = flow(e, now);
     const auto clear = [](double value, double size) { return std::fabs(value) > rounding * size ? value : 0.0; };
     for (std::size_t g = 0; g < guard_count(r) && r.solvable; ++g) {
@@ -63,7 +64,8 @@ Key SwitchedTrain<Sizes>::follow(Cache& cache, const Now& now, const Now& before
     }
     double way = 0.0;
     Conditions before_change;
-    for (auto& c : before_change) c.fill(std::numeric_limits<double>::infinity());
+    constexpr double none = std::numeric_limits<double>::infinity();
+    before_change.assign(static_cast<std::size_t>(contacts()), {none, none, none});
     for (int changes = 0; changes < most_changes * contacts(); ++changes) {
         Conditions first, last;
         if (!conditions(cache, before, begin, event, first) || !conditions(cache, now, end, event, last)) break;

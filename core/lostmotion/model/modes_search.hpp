@@ -7,10 +7,12 @@ namespace lostmotion::model {
 
 template <class Sizes>
 void SwitchedTrain<Sizes>::set_near_event() {
+    const Layout& n = assembly_.layout();
+    near_state_.resize(static_cast<std::size_t>(n.states));
+    near_input_.assign(static_cast<std::size_t>(n.inputs), far_from_event);
     rated_scale(assembly_, near_state_);
     for (double& x : near_state_) x *= far_from_event;
-    for (int a = 0; a < assembly_.layout().angles; ++a) near_state_[n_.coupled + a] = far_from_event;
-    near_input_.fill(far_from_event);
+    for (int a = 0; a < n.angles; ++a) near_state_[n.coupled + a] = far_from_event;
     for (std::size_t s = 0; s < train().shafts.size(); ++s)
         if (const int load = places().shafts[s].load; load != nowhere)
             near_input_[load] = far_from_event * rated_torque(train(), static_cast<int>(s));
@@ -19,31 +21,29 @@ void SwitchedTrain<Sizes>::set_near_event() {
 template <class Sizes>
 template <class X, class AtRest>
 void SwitchedTrain<Sizes>::stop(X& x, AtRest& at_rest) const {
-    const auto bits = [&] {
-        std::uint32_t all = 0;
-        for (int c = 0; c < contacts(); ++c) all |= std::uint32_t{at_rest[c]} << c;
-        return all;
-    };
-    const Stopped& all = stopped(bits());
-    for (int c = 0; c < contacts(); ++c) at_rest[c] = (all.kept >> c & 1) != 0 && places().contacts[c].may_rest(x);
+    Rest now;
+    for (int c = 0; c < contacts(); ++c)
+        if (at_rest[c]) now[c] = true;
+    const Stopped& all = stopped(now);
+    for (int c = 0; c < contacts(); ++c) at_rest[c] = all.kept[c] && places().contacts[c].may_rest(x);
     if (places().driven.empty()) {
         set_tied_speeds(x, all.ties);
     } else {  // whose speeds stay what they are, to the last bit
-        std::array<std::int8_t, max_contacts> modes{};
-        for (int c = 0; c < contacts(); ++c) modes[c] = at_rest[c] ? 0 : 1;
+        std::vector<std::int8_t> modes;
+        for (int c = 0; c < contacts(); ++c) modes.push_back(at_rest[c] ? 0 : 1);
         set_tied_speeds(x, places().ties(modes.data()));
     }
 }
 
 template <class Sizes>
-auto SwitchedTrain<Sizes>::stopped(std::uint32_t at_rest) const -> const Stopped& {
-    std::unique_ptr<Stopped>& known = stopped_[at_rest % stopped_.size()];
+auto SwitchedTrain<Sizes>::stopped(const Rest& at_rest) const -> const Stopped& {
+    std::unique_ptr<Stopped>& known = stopped_[hash_of(at_rest) % stopped_.size()];
     if (known != nullptr && known->at_rest == at_rest) return *known;
-    std::array<std::int8_t, max_contacts> modes{};
-    for (int c = 0; c < contacts(); ++c) modes[c] = (at_rest >> c & 1) != 0 ? 0 : 1;
-    known = std::make_unique<Stopped>(Stopped{at_rest, 0, places().ties(modes.data(), nullptr, true)});
+    std::vector<std::int8_t> modes;
+    for (int c = 0; c < contacts(); ++c) modes.push_back(at_rest[c] ? 0 : 1);
+    known = std::make_unique<Stopped>(Stopped{at_rest, {}, places().ties(modes.data(), nullptr, true)});
     for (int c = 0; c < contacts(); ++c)
-        known->kept |= std::uint32_t{kept_at_rest(places().contacts[c], known->ties)} << c;
+        if (kept_at_rest(places().contacts[c], known->ties)) known->kept[c] = true;
     return *known;
 }
 
@@ -62,21 +62,16 @@ template <class Sizes>
 template <class Now>
 bool SwitchedTrain<Sizes>::follow_given(Now& now, const Key& key, Rest& rests) const {
     if (places().driven.empty()) return false;
-    unsigned given = 0;
-    for (const int s : places().driven) {
-        given |= 1u << s;
-        now.x[places().shafts[s].speed] = now.input[0][places().shafts[s].given_speed];
-    }
+    for (const int s : places().driven) now.x[places().shafts[s].speed] = now.input[0][places().shafts[s].given_speed];
     const Ties ties = places().ties(key.modes.data());
     bool some = false;
     for (int c = 0; c < contacts(); ++c) {
         if (key.modes[c] == 0) continue;
-        std::array<double, max_shafts> per;
-        const unsigned moves = tied_speed(places().contacts[c], ties, per);
-        if (moves == 0 || (moves & ~given) != 0) continue;
+        const Shares moves = tied_speed(places().contacts[c], ties);
+        const auto is_given = [&](int s) { return std::ranges::binary_search(places().driven, s); };
+        if (moves.empty() || !std::ranges::all_of(moves, is_given, &Share::shaft)) continue;
         double speed = 0.0;
-        for (const int s : places().driven)
-            if (moves >> s & 1) speed += per[s] * now.x[places().shafts[s].speed];
+        for (const Share& s : moves) speed += s.share * now.x[places().shafts[s.shaft].speed];
         rests[c] = speed == 0.0;
         some = some || rests[c];
     }
@@ -178,7 +173,7 @@ Found SwitchedTrain<Sizes>::next(Cache& cache, Now& now, const G* fired, Key& ke
         event.shift = fired->shift;
     }
     Rest before{};
-    std::copy_n(old.at_rest.begin(), contacts(), before.begin());
+    for (int c = 0; c < contacts(); ++c) before[c] = old.at_rest[c];
     for (int c = 0; c < contacts(); ++c) event.at_rest[c] = before[c] || given_rest[c];
     if (fired != nullptr && fired->kind == Guard::speed) event.at_rest[fired->contact] = true;
     stop(now.x, event.at_rest);
@@ -277,10 +272,8 @@ Found SwitchedTrain<Sizes>::find(Cache& cache, Now& now, const Now& before, Even
 template <class Sizes>
 bool SwitchedTrain<Sizes>::at_its_limit(const Key& key) const {
     if (!some_redundant_) return false;
-    std::uint64_t modes = 0;
-    for (int c = 0; c < contacts(); ++c) modes |= std::uint64_t{static_cast<unsigned>(key.modes[c]) & 3u} << 2 * c;
-    Limit& known = limits_[modes * 0x9e3779b97f4a7c15u >> 58];
-    if (known.modes != modes) known = {modes, pushes_against_rest(key)};
+    Limit& known = limits_[hash_of(key.modes) % limits_.size()];
+    if (!known.known || !(known.modes == key.modes)) known = {key.modes, true, pushes_against_rest(key)};
     return known.reached;
 }
 
@@ -291,16 +284,16 @@ template <class Sizes>
 bool SwitchedTrain<Sizes>::pushes_against_rest(const Key& key) const {
     const std::vector<ContactPlace>& all = places().contacts;
     const Ties ties = places().ties(key.modes.data());
-    std::array<int, max_shafts> direction{};  // of each free shaft
-    std::array<double, max_shafts> speed;
+    std::vector<int> direction(train().shafts.size());  // of each free shaft
     for (std::size_t k = 0; k < all.size(); ++k) {
         if (key.modes[k] == 0 || all[k].flanks != nowhere) continue;
         const ContactPlace& c = all[k];
-        const unsigned free = tied_speed(c, ties, speed);
-        if (free == 0) return true;
-        if (!std::has_single_bit(free)) continue;
-        const int shaft = std::countr_zero(free), way = key.modes[k] * (speed[shaft] > 0.0 ? 1 : -1);
-        int& of_free = direction[shaft];
+        const Shares free = tied_speed(c, ties);
+        if (free.empty()) return true;
+        if (free.size() > 1) continue;
+        const Share& only = *free.begin();
+        const int way = key.modes[k] * (only.share > 0.0 ? 1 : -1);
+        int& of_free = direction[static_cast<std::size_t>(only.shaft)];
         if (of_free * way < 0) return true;
         of_free = way;
     }
@@ -390,8 +383,15 @@ Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, Ke
         constexpr std::uint64_t stride = 2654435761u;  // Knuth's prime near the golden section of 2^32
         path.clear();
         begun = tried.size();
-        for (const auto all = static_cast<std::uint64_t>(combinations(event)); drawn <= all;) {
-            combination(drawn++ * stride % all, event, from, modes);
+        constexpr double countable = 0x1p62;
+        const double count = combinations(event);
+        for (const auto all = static_cast<std::uint64_t>(std::fmin(count, countable)); drawn <= all;) {
+            std::uint64_t number = drawn++ * stride;
+            if (count < countable)
+                combination(number % all, event, from, modes);
+            else
+                combination([&](std::uint64_t n) { return ((number = number * 6364136223846793005u + 1) >> 33) % n; },
+                            event, from, modes);
             if (is_new()) return true;
         }
         return false;
@@ -458,7 +458,7 @@ double SwitchedTrain<Sizes>::violation(const E& e, const Now& now, const Event& 
     double worst = 0.0;
     for (std::size_t g = 0; g < guard_count(r); ++g) {
         const auto& guard = r.guards[g];
-        if (ignored[g] || !guard.is_of_contact()) continue;
+        if (ignored[static_cast<int>(g)] || !guard.is_of_contact()) continue;
         const double value = evaluate(n_, guard.form, now), size = magnitude(n_, guard.form, now);
         const double rate = along.rate(guard.form, 1);
         const bool zero = std::fabs(value) <= along.noise(size, rate);

@@ -252,12 +252,12 @@ auto SwitchedTrain<Sizes>::walk(Cache& cache, Now& now, const Event& event, Key 
         const auto g = static_cast<std::size_t>(left - &r.guards[0]);
         cross(*left, next);
         if (step > 0 && next == previous) {
-            along.set(g);
+            along.set(static_cast<int>(g));
             continue;
         }
         shift(*left, now);
         previous = std::exchange(trial, next);
-        along.reset();
+        along = {};
     }
     return result;
 }

@@ -12,10 +12,10 @@ namespace lostmotion::model {
 // All that a regime's equations depend on at one instant. The kernel's is the same with its own dimensions.
 struct Instant {
     double time = 0.0;  // [s]
-    std::array<double, max_states> x{};
-    std::array<double, max_memory> memory{};
-    std::array<std::array<double, max_inputs>, n_derivatives> input{};  // [k]: k-th derivatives
-    std::array<double, max_inputs> input_magnitudes{};
+    Few<double, 20> x;
+    Few<double, 12> memory;
+    std::array<Few<double, 8>, n_derivatives> input;  // [k]: k-th derivatives
+    Few<double, 8> input_magnitudes;
 };
 
 // Added up as the kernel does: the constants, the inputs, the coupled states in fours, the angles.
@@ -41,6 +41,46 @@ double magnitude(const Sizes& n, const F& f, const Now& now) {
         sum += std::fabs(f.c[n.first_input + k]) * std::fmax(std::fabs(now.input[0][k]), now.input_magnitudes[k]);
     for (int k = 0; k < n.states; ++k) sum += std::fabs(f.c[k] * now.x[k]);
     return sum;
+}
+
+// The same in the places of the kernel for trains of any size.
+template <class Now>
+double evaluate(const Any&, const AnyForm& f, const Now& now) {
+    return lostmotion::evaluate<Any>(f, now.x, now.memory, now.input[0]);
+}
+template <class Now>
+double magnitude(const Any&, const AnyForm& f, const Now& now) {
+    double sum = 0.0;
+    f.each_term([&](int place, double factor) {
+        if (place < Any::states)
+            sum += std::fabs(factor * now.x[place]);
+        else if (place == Any::one)
+            sum += std::fabs(factor);
+        else if (place < Any::first_input)
+            sum += std::fabs(factor * now.memory[place - Any::first_memory]);
+        else
+            sum += std::fabs(factor) * std::fmax(std::fabs(now.input[0][place - Any::first_input]),
+                                                 now.input_magnitudes[place - Any::first_input]);
+    });
+    return sum;
+}
+
+// Calls use(place, factor) for each state of a form, use(number, factor) for each of its inputs.
+template <class Sizes, class F, class Use>
+void each_state_of(const Sizes& n, const F& f, Use&& use) {
+    for (int k = 0; k < n.states; ++k) use(k, f.c[k]);
+}
+template <class Sizes, class F, class Use>
+void each_input_of(const Sizes& n, const F& f, Use&& use) {
+    for (int k = 0; k < n.inputs; ++k) use(k, f.c[n.first_input + k]);
+}
+template <class Use>
+void each_state_of(const Any&, const AnyForm& f, Use&& use) {
+    lostmotion::each_state_of<Any>(f, use);
+}
+template <class Use>
+void each_input_of(const Any&, const AnyForm& f, Use&& use) {
+    lostmotion::each_input_of<Any>(f, use);
 }
 
 // Time derivatives along the flow of one regime, computed as far as they are asked for: the kernel's Flow for forms of
@@ -97,7 +137,7 @@ class RowFlow {
     const Regime& regime_;
     const Now& now_;
     int order_ = 0;
-    std::array<std::array<double, max_states>, n_derivatives + 1> x_, size_;  // as far as they are known
+    std::array<Few<double, 20>, n_derivatives + 1> x_, size_;  // as far as they are known
 };
 
 }  // namespace lostmotion::model

@@ -15,30 +15,50 @@ namespace lostmotion::model {
 template <class D>
 using PackedForm = LinearFormOf<D>;
 
-template <class D, class F = PackedForm<D>>
-F pack(const Row& f, const Layout& n) {
-    F out;
-    const int known = static_cast<int>(f.c.size());
-    // Most often as many as there is room for.
-    const auto copy = [&]<int room>(std::integral_constant<int, room>, int from, int count, int to) ALWAYS_INLINE {
-        const double* c = f.c.begin() + from;
-        if (count == room && from + room <= known)
-            std::copy_n(c, room, out.c.begin() + to);
-        else
-            for (int k = 0; k < std::min(count, known - from); ++k) out.c[to + k] = c[k];
-    };
-    copy(std::integral_constant<int, D::coupled>{}, 0, n.coupled, 0);
-    copy(std::integral_constant<int, D::angles>{}, n.coupled, n.angles, D::coupled);
-    copy(std::integral_constant<int, 1>{}, n.one, 1, D::one);
-    copy(std::integral_constant<int, D::memory>{}, n.first_memory, n.memory, D::first_memory);
-    copy(std::integral_constant<int, D::inputs>{}, n.first_input, n.inputs, D::first_input);
+// Places of what a layout has, in the kernel.
+template <class D>
+int state_place(const Layout& n, int k) {
+    return k < n.coupled ? k : D::coupled + k - n.coupled;
+}
+
+inline Counts counts_of(const Layout& n) { return {n.coupled, n.angles, n.inputs, n.memory}; }
+
+template <class D>
+PackedForm<D> pack(const Row& f, const Layout& n) {
+    PackedForm<D> out;
+    if constexpr (std::same_as<D, Any>) {
+        auto& terms = out.c.terms();
+        const double* c = f.c.begin();
+        for (int k = 0, end = std::min(static_cast<int>(f.c.size()), n.terms); k < end; ++k)
+            if (c[k] != 0.0)
+                terms.push_back({k < n.states         ? state_place<D>(n, k)
+                                 : k < n.first_memory ? D::one
+                                 : k < n.first_input  ? D::first_memory + k - n.first_memory
+                                                      : D::first_input + k - n.first_input,
+                                 c[k]});
+    } else {
+        const int known = static_cast<int>(f.c.size());
+        // Most often as many as there is room for.
+        const auto copy = [&]<int room>(std::integral_constant<int, room>, int from, int count, int to) ALWAYS_INLINE {
+            const double* c = f.c.begin() + from;
+            if (count == room && from + room <= known)
+                std::copy_n(c, room, out.c.begin() + to);
+            else
+                for (int k = 0; k < std::min(count, known - from); ++k) out.c[to + k] = c[k];
+        };
+        copy(std::integral_constant<int, D::coupled>{}, 0, n.coupled, 0);
+        copy(std::integral_constant<int, D::angles>{}, n.coupled, n.angles, D::coupled);
+        copy(std::integral_constant<int, 1>{}, n.one, 1, D::one);
+        copy(std::integral_constant<int, D::memory>{}, n.first_memory, n.memory, D::first_memory);
+        copy(std::integral_constant<int, D::inputs>{}, n.first_input, n.inputs, D::first_input);
+    }
     return out;
 }
 
 // A state of the kernel, by the layout.
 template <class D, class State, class To>
 void unpack_state(const State& x, const Layout& n, To to) {
-    std::copy_n(x.begin() + D::coupled, n.angles, std::copy_n(x.begin(), n.coupled, to));
+    for (int k = 0; k < n.states; ++k) *to++ = x[state_place<D>(n, k)];
 }
 
 template <class D>
@@ -67,18 +87,18 @@ struct PackedGuard {
 template <class D>
 struct PackedRegime {
     Key key;
-    std::array<PackedForm<D>, D::states> rate{};
-    std::array<PackedForm<D>, D::contacts> output_torque{};  // of each gear [N m]
-    std::array<PackedForm<D>, D::contacts> input_torque{};   // of each gear, with dry losses while it turns [N m]
-    std::array<PackedForm<D>, D::contacts>
-        mesh_loss{};  // of each gear, what it takes at its output, |i| T_1 - T_2 as turned by the input [N m]
-    std::array<PackedForm<D>, D::contacts> contact_torque{};  // of each contact [N m]
-    std::vector<PackedForm<D>> motor_torque, drive_torque;    // of each motor and of each given motion [N m]
-    std::vector<PackedForm<D>> massless_speed;                // of each shaft without inertia
-    std::array<PackedGuard<D>, D::guards> guards{};
+    using Forms = ArrayOf<D, PackedForm<D>, D::contacts>;
+    ByState<D, PackedForm<D>> rate{};
+    Forms output_torque{};   // of each gear [N m]
+    Forms input_torque{};    // of each gear, with dry losses while it turns [N m]
+    Forms mesh_loss{};       // of each gear, what it takes at its output, |i| T_1 - T_2 as turned by the input [N m]
+    Forms contact_torque{};  // of each contact [N m]
+    std::vector<PackedForm<D>> motor_torque, drive_torque;  // of each motor and of each given motion [N m]
+    std::vector<PackedForm<D>> massless_speed;              // of each shaft without inertia
+    ArrayOf<D, PackedGuard<D>, D::guards> guards{};
     int n_guards = 0;
-    std::array<bool, D::contacts> at_rest{}, redundant{};
-    std::array<bool, D::coupled> resting{}, following{};  // speeds kept at zero, and those that follow others
+    ListOf<D, bool, D::contacts> at_rest{}, redundant{};
+    ListOf<D, bool, D::coupled> resting{}, following{};  // speeds kept at zero, and those that follow others
     bool solvable = true, in_data = true;
     std::vector<Driver<PackedForm<D>>> drivers;
     std::vector<LockedTorque<PackedForm<D>>> locked;
@@ -92,11 +112,11 @@ struct PackedRegime {
 inline std::vector<GivenState> given_states(const Regime& r, const Places& places) {
     std::vector<GivenState> out;
     if (places.driven.empty()) return out;
-    unsigned driven = 0;
-    for (const int s : places.driven) driven |= 1u << s;
+    const auto is_driven = [&](int s) { return std::ranges::binary_search(places.driven, s); };
     for (int s = 0; s < static_cast<int>(places.shafts.size()); ++s) {
-        const bool follows = r.ties.follows(s) && (r.ties.free[s] & ~driven) == 0;
-        if (r.ties.at_rest[s] || !(follows || (driven >> s & 1) != 0)) continue;
+        const bool follows =
+            r.ties.follows(s) && std::ranges::all_of(r.ties.of[static_cast<std::size_t>(s)], is_driven, &Share::shaft);
+        if (r.ties.at_rest[s] || !(follows || is_driven(s))) continue;
         GivenState& given = out.emplace_back(GivenState{places.shafts[s].speed, {}});
         const auto add = [&](int k, double share) {
             given.shares.push_back({places.shafts[k].given_speed, places.shafts[k].given_acceleration, share});
@@ -114,7 +134,12 @@ template <class D>
 void pack(const Regime& r, const Assembly& a, PackedRegime<D>& out) {
     const Layout& n = a.layout();
     out.key = r.key;
-    for (int k = 0; k < n.states; ++k) out.rate[k < n.coupled ? k : D::coupled + k - n.coupled] = pack<D>(r.rate[k], n);
+    out.rate.make_room(CountsOf<D>(counts_of(n)));
+    for (auto* forms : {&out.output_torque, &out.input_torque, &out.mesh_loss})
+        make_room(*forms, std::max(1, static_cast<int>(r.output_torque.size())));
+    make_room(out.contact_torque, n.contacts);
+    make_room(out.guards, static_cast<int>(r.guards.size()));
+    for (int k = 0; k < n.states; ++k) out.rate[state_place<D>(n, k)] = pack<D>(r.rate[k], n);
     for (std::size_t g = 0; g < r.output_torque.size(); ++g) {
         out.output_torque[g] = pack<D>(r.output_torque[g], n);
         out.input_torque[g] = pack<D>(r.input_torque[g], n);
@@ -131,8 +156,10 @@ void pack(const Regime& r, const Assembly& a, PackedRegime<D>& out) {
     for (const Row& f : r.motor_torque) out.motor_torque.push_back(pack<D>(f, n));
     for (const Row& f : r.drive_torque) out.drive_torque.push_back(pack<D>(f, n));
     for (const MasslessSpeed& m : r.massless) out.massless_speed.push_back(pack<D>(m.form, n));
-    std::copy_n(r.at_rest.begin(), n.contacts, out.at_rest.begin());
-    std::copy_n(r.ties.redundant.begin(), n.contacts, out.redundant.begin());
+    for (int c = 0; c < n.contacts; ++c) {
+        out.at_rest[c] = r.at_rest[c];
+        out.redundant[c] = r.ties.redundant[c];
+    }
     const auto& shafts = a.places().shafts;
     for (int s = 0; s < static_cast<int>(shafts.size()); ++s) {
         out.resting[shafts[s].speed] = r.ties.at_rest[s];
@@ -159,6 +186,7 @@ PackedRegime<D> pack(const Regime& r, const Assembly& a) {
 template <class D>
 SignalsOf<D> packed_signals(const std::vector<Signal>& inputs) {
     SignalsOf<D> signals;
+    make_room(signals, std::max(1, static_cast<int>(inputs.size())));
     std::copy(inputs.begin(), inputs.end(), signals.begin());
     return signals;
 }
@@ -166,10 +194,8 @@ SignalsOf<D> packed_signals(const std::vector<Signal>& inputs) {
 template <class D>
 StartOf<D> packed_start(const Layout& n, std::span<const double> x, std::span<const double> memory) {
     StartOf<D> start;
-    const auto coupled = static_cast<std::size_t>(n.coupled);
-    for (std::size_t k = 0; k < x.size(); ++k)
-        start.x[k < coupled ? k : static_cast<std::size_t>(D::coupled) + k - coupled] = x[k];
-    std::copy(memory.begin(), memory.end(), start.memory.begin());
+    for (std::size_t k = 0; k < x.size(); ++k) start.x[state_place<D>(n, static_cast<int>(k))] = x[k];
+    for (std::size_t k = 0; k < memory.size(); ++k) start.memory[k] = memory[k];
     return start;
 }
 

@@ -66,7 +66,7 @@ void Places::place_states(const Train& train) {
     }
     const bool all = motors.size() + shafts.size() + gears.size() + of_controllers +
                          static_cast<std::size_t>(std::count(by_angle.begin(), by_angle.end(), true)) <=
-                     narrowest;
+                     smallest;
     int next = 0;
     for (std::size_t m = 0; m < motors.size(); ++m)
         if (all || train.motors[m].law.has_torque_state()) motors[m].torque = next++;
@@ -132,7 +132,7 @@ void Places::place_contacts(const Train& train) {
 bool Places::moves_no_inertia(int shaft, const Ties& t) const {
     for (std::size_t s = 0; s < shafts.size(); ++s) {
         const bool given = std::find(driven.begin(), driven.end(), static_cast<int>(s)) != driven.end();
-        if ((t.free[s] >> shaft & 1) != 0 && (given || shafts[s].inertia > 0.0)) return false;
+        if (t.of[s].has(shaft) && (given || shafts[s].inertia > 0.0)) return false;
     }
     return true;
 }

@@ -81,11 +81,14 @@ struct Places {
     explicit Places(const Train& train, bool with_remainders = false);
 
     Ties ties(const std::int8_t* modes, const double* inertia = nullptr, bool given_speeds_follow = false) const {
-        unsigned given = 0;
-        for (const int s : driven) given |= 1u << s;
-        unsigned first = 0;
-        for (const int s : massless) first |= 1u << s;
-        return tie(contacts, static_cast<int>(shafts.size()), modes, inertia, {given, given_speeds_follow, first});
+        return tie(contacts, static_cast<int>(shafts.size()), modes, inertia, {driven, given_speeds_follow, massless});
+    }
+    // How many conditions may end a regime: both ends of each piecewise law and each cell, what the contacts hold to
+    // both sides with the cells of their losses, limits of commands, and what rest leaves open.
+    int most_guards() const {
+        const std::size_t elements =
+            gears.size() + acting.size() + couplings.size() + motors.size() + controllers.size();
+        return 4 * (layout.contacts + layout.branches + static_cast<int>(elements));
     }
     // Does nothing that moves with a free shaft have an inertia?
     bool moves_no_inertia(int shaft, const Ties& t) const;
@@ -112,9 +115,9 @@ struct Places {
     }
 
  private:
-    // The narrowest kernel. A train that fits into it has a place for the torque of each motor and the twist of each
+    // The smallest kernel. A train that fits into it has a place for the torque of each motor and the twist of each
     // gear, whether they move or not: one motor, two shafts and a gear are always in the same order.
-    static constexpr int narrowest = 4;
+    static constexpr int smallest = 4;
 
     void place_states(const Train& train);
     void place_contacts(const Train& train);

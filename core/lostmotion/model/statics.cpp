@@ -39,7 +39,7 @@ int sign_of_determinant(Matrix K) {
 
 // The balance of a shaft: terms and reactions, then the accelerations that stay free.
 struct Balance {
-    std::array<double, max_columns + max_shafts> c{};
+    Coefficients c;
     friend Balance operator/(Balance b, double a) {
         for (double& v : b.c) v /= a;
         return b;
@@ -48,8 +48,8 @@ struct Balance {
 
 }  // namespace
 
-std::array<int, max_shafts> parts(const Places& places, const Key& key) {
-    std::array<int, max_shafts> part;
+std::vector<int> parts(const Places& places, const Key& key) {
+    std::vector<int> part(places.shafts.size());
     std::iota(part.begin(), part.end(), 0);
     const auto join = [&part](int a, int b) {
         const int first = std::min(part[a], part[b]), other = std::max(part[a], part[b]);
@@ -65,7 +65,8 @@ std::array<int, max_shafts> parts(const Places& places, const Key& key) {
 
 Statics::Statics(const Places& places, const Key& key, const Ties& ties, std::vector<Row>& motion)
     : places_(places), contacts_(places.contacts), layout_(places.layout), key_(key), ties_(ties), motion_(motion) {
-    for (std::size_t s = 0; s < shafts(); ++s) pivot_[s] = inertia_[s] = places.shafts[s].inertia;
+    for (const ShaftPlace& s : places.shafts) inertia_.push_back(s.inertia);
+    pivot_ = inertia_;
     if (!places.coupled_inertias.empty()) factorise();
 }
 
@@ -115,7 +116,7 @@ std::vector<int> Statics::stuck() const {
 
 // Do the inertias of shafts that hang together, as one of them feels them, differ that much?
 bool Statics::has_light_shafts() const {
-    std::array<double, max_shafts> speed{};  // magnitudes, of each shaft for that of the first of its part
+    std::vector<double> speed(shafts());  // magnitudes, of each shaft for that of the first of its part
     for (std::size_t first = 0; first < shafts(); ++first) {
         if (speed[first] != 0.0) continue;
         speed[first] = 1.0;
@@ -171,7 +172,7 @@ bool Statics::solve_reactions(const std::vector<int>& of, Forms forms) {
 }
 
 bool Statics::moves_freely(const std::vector<int>& of, const std::vector<Row>& rows) const {
-    const std::array<int, max_shafts> part = parts(places_, key_);
+    const std::vector<int> part = parts(places_, key_);
     for (std::size_t p = 0; p < shafts(); ++p) {
         std::vector<std::size_t> in;
         for (std::size_t k = 0; k < of.size(); ++k)
@@ -187,7 +188,7 @@ bool Statics::moves_freely(const std::vector<int>& of, const std::vector<Row>& r
 void Statics::follow(Row& f, const Ties& heavy) const {
     for (const int s : places_.massless) {
         const int speed = places_.shafts[s].speed;
-        if ((heavy.free[s] >> s & 1) != 0 || f.c[speed] == 0.0) continue;
+        if (heavy.is_free(s) || std::as_const(f.c)[speed] == 0.0) continue;
         const double share = std::exchange(f.c[speed], 0.0);
         heavy.each_share(s, [&](int k, double of) { f.c[places_.shafts[k].speed] += share * of; });
     }
@@ -196,30 +197,34 @@ void Statics::follow(Row& f, const Ties& heavy) const {
 bool Statics::solve_balances(const std::vector<int>& of, Forms forms) {
     const int all = static_cast<int>(shafts());
     const Ties heavy = places_.ties(key_.modes.data(), inertia_.data());
-    const auto is_free = [&](int s) { return (heavy.free[s] >> s & 1) != 0; };
+    const int columns = layout_.terms + layout_.contacts;  // accelerations come behind them
     // Accelerations first, each from the balance of a heavy shaft: what reactions are then is the share of the light
     // shafts, and no difference of two torques on the heavy one.
     std::vector<int> unknowns;
     for (int s = 0; s < all; ++s)
-        if (is_free(s) && !places_.moves_no_inertia(s, heavy)) unknowns.push_back(max_columns + s);
+        if (heavy.is_free(s) && !places_.moves_no_inertia(s, heavy)) unknowns.push_back(columns + s);
     const std::size_t accelerations = unknowns.size();
     for (const int c : of) unknowns.push_back(unknown(c));
     for (const int s : places_.massless)
-        if (is_free(s) && places_.moves_no_inertia(s, heavy)) unknowns.push_back(places_.shafts[s].speed);
+        if (heavy.is_free(s) && places_.moves_no_inertia(s, heavy)) unknowns.push_back(places_.shafts[s].speed);
     if (unknowns.size() != shafts()) return false;
     for (Row& f : motion_) follow(f, heavy);
     std::vector<Balance> rows(shafts());
     for (int s = 0; s < all; ++s) {
         if (is_given(static_cast<std::size_t>(s))) motion_[s] = acceleration_of(static_cast<std::size_t>(s));
+        rows[s].c.reach(static_cast<std::size_t>(columns + all));
         std::transform(motion_[s].c.begin(), motion_[s].c.end(), rows[s].c.begin(), std::negate<>());
         each_inertia(static_cast<std::size_t>(s), [&](int t, double J) {
-            heavy.each_share(t, [&](int k, double share) { rows[s].c[max_columns + k] += J * share; });
+            heavy.each_share(t, [&](int k, double share) { rows[s].c[columns + k] += J * share; });
         });
     }
     const bool free = balances_move_freely(of, heavy);
-    const auto take = []<class F>(F& f, double factor, const Balance& row) {
-        const std::size_t columns = std::is_same_v<F, Row> ? static_cast<std::size_t>(max_columns) : row.c.size();
-        for (std::size_t k = 0; k < columns; ++k) f.c[k] -= factor * row.c[k];
+    const auto take = [&]<class F>(F& f, double factor, const Balance& row) {
+        const auto all_columns = static_cast<std::size_t>(std::is_same_v<F, Row> ? columns : columns + all);
+        f.c.reach(all_columns);
+        double* to = f.c.data();
+        const double* from = row.c.data();
+        for (std::size_t k = 0; k < all_columns; ++k) to[k] -= factor * from[k];
     };
     if (!eliminate(rows, unknowns, rows.size(), take)) return false;
     const auto put = [&](Row& f) {
@@ -236,16 +241,16 @@ bool Statics::solve_balances(const std::vector<int>& of, Forms forms) {
     for (int s = 0; s < all; ++s) {
         motion_[s] = Row{};
         heavy.each_share(s, [&](int k, double share) {
-            const auto at = std::find(unknowns.begin(), unknowns.end(), max_columns + k) - unknowns.begin();
+            const auto at = std::find(unknowns.begin(), unknowns.end(), columns + k) - unknowns.begin();
             if (at == static_cast<std::ptrdiff_t>(unknowns.size())) return;  // it moves no inertia
-            for (int j = 0; j < layout_.terms; ++j) motion_[s].c[j] -= share * rows[at].c[j];
+            for (int j = 0; j < layout_.terms; ++j) motion_[s].c[j] -= share * std::as_const(rows[at].c)[j];
         });
     }
     return free;
 }
 
 bool Statics::balances_move_freely(const std::vector<int>& of, const Ties& heavy) const {
-    const std::array<int, max_shafts> part = parts(places_, key_);
+    const std::vector<int> part = parts(places_, key_);
     for (std::size_t p = 0; p < shafts(); ++p) {
         std::vector<int> in;
         for (std::size_t s = 0; s < shafts(); ++s)
@@ -255,15 +260,14 @@ bool Statics::balances_move_freely(const std::vector<int>& of, const Ties& heavy
             const int s = in[row];
             const bool given = is_given(static_cast<std::size_t>(s));
             for (const int k : in) {
-                if ((heavy.free[k] >> k & 1) == 0) continue;
+                if (!heavy.is_free(k)) continue;
                 if (places_.moves_no_inertia(k, heavy)) {
                     with[row].push_back(-motion_[s].c[places_.shafts[k].speed]);
                     continue;
                 }
                 double sum = 0.0;
-                each_inertia(static_cast<std::size_t>(s), [&](int t, double J) {
-                    if ((heavy.free[t] >> k & 1) != 0) sum += J * heavy.share[t][k];
-                });
+                each_inertia(static_cast<std::size_t>(s),
+                             [&](int t, double J) { sum += J * heavy.of[static_cast<std::size_t>(t)].of(k); });
                 with[row].push_back(sum);
             }
             without[row] = with[row];

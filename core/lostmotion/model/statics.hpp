@@ -12,7 +12,7 @@
 namespace lostmotion::model {
 
 // For each shaft: the first shaft of those that contacts at rest and the mass matrix join to it.
-std::array<int, max_shafts> parts(const Places& places, const Key& key);
+std::vector<int> parts(const Places& places, const Key& key);
 
 // What the reactions of stuck contacts are solved from, J being the mass matrix, most often diagonal. Where the shafts
 // of each rigidly tied part have inertias of like size, reactions come first: C J^-1 (F + B lambda) = 0, C being the
@@ -70,8 +70,8 @@ class Statics {
     const Key& key_;
     const Ties& ties_;
     std::vector<Row>& motion_;
-    std::array<double, max_shafts> inertia_, pivot_;  // of each shaft: the diagonals of J and of D
-    std::vector<std::vector<double>> factor_;         // L, where J is not diagonal
+    std::vector<double> inertia_, pivot_;      // of each shaft: the diagonals of J and of D
+    std::vector<std::vector<double>> factor_;  // L, where J is not diagonal
     std::vector<MasslessSpeed> massless_;
 };
 

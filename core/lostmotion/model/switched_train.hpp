@@ -13,8 +13,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
-#include <bitset>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -22,6 +20,7 @@
 #include <utility>
 #include <vector>
 
+#include "../kernel/bit_set.hpp"
 #include "../solver/status.hpp"
 #include "assembly.hpp"
 #include "held_torque.hpp"
@@ -41,15 +40,14 @@ std::size_t guard_count(const R& r) {
         return r.guards.size();
 }
 
-// For how many contacts, and gears, and for how many guards there is room.
+// For how many guards there is room.
+inline constexpr int max_guards = Any::guards;
 template <class Sizes>
-struct Room {
-    static constexpr int contacts = max_contacts, guards = max_guards;
-};
-template <int coupled, int angles, int inputs, int memory, int contacts_, int guards_>
-struct Room<Dims<coupled, angles, inputs, memory, contacts_, guards_>> {
-    static constexpr int contacts = contacts_, guards = guards_;
-};
+inline constexpr int guard_room = max_guards;
+template <int coupled, int angles, int inputs, int memory, int contacts, int guards>
+inline constexpr int guard_room<Dims<coupled, angles, inputs, memory, contacts, guards>> = guards;
+template <>
+inline constexpr int guard_room<Any> = Any::guards;
 
 using lostmotion::Found;
 using lostmotion::SearchCounts;
@@ -93,12 +91,13 @@ class SwitchedTrain {
     void near_event(const Table& guards, Values& out) const {
         StateOf<Sizes> state{};
         InputsOf<Sizes> input{};
-        std::copy_n(near_state_.begin(), n_.states, state.begin());
-        std::copy_n(near_input_.begin(), n_.inputs, input.begin());
+        const Layout& n = assembly_.layout();
+        for (int k = 0; k < n.states; ++k) state[k < n.coupled ? k : n_.coupled + k - n.coupled] = near_state_[k];
+        for (int i = 0; i < n.inputs; ++i) input[i] = near_input_[i];
         guards.rate_magnitudes(state, input, out);
     }
 
-    using Rest = std::array<bool, max_contacts>;
+    using Rest = Flags;
     // Sets the speeds of contacts at rest to what they are, to the last bit, and marks those that this implies.
     template <class X, class AtRest>
     void stop(X& x, AtRest& at_rest) const;
@@ -121,7 +120,7 @@ class SwitchedTrain {
     mutable SearchCounts searches;
 
  private:
-    using Torques = std::array<double, static_cast<std::size_t>(Room<Sizes>::contacts)>;
+    using Torques = Few<double, 12>;
     struct Event {
         Rest at_rest{};
         Rest stopped{};                     // those that have come to rest at this event
@@ -145,10 +144,10 @@ class SwitchedTrain {
         // The solver has seen this regime to its end.
         bool has_ended(const Key& key) const { return with_guard && kind != Guard::speed && key == before; }
     };
-    using Guards = std::bitset<static_cast<std::size_t>(Room<Sizes>::guards)>;
+    using Guards = BitSet<guard_room<Sizes>>;
     // For each contact at rest and each mode, -1, 0 and +1: negative where the contact has to change to that mode.
     // Margins of what is stuck, accelerations of what slips; infinite where there is no condition.
-    using Conditions = std::array<std::array<double, 3>, max_contacts>;
+    using Conditions = std::vector<std::array<double, 3>>;
     // A guard of a contact that is violated.
     struct Violation {
         int contact = nowhere, mode = 0;  // the mode that it suggests
@@ -191,8 +190,14 @@ class SwitchedTrain {
     template <class F>
     double near_event(const F& f) const {
         double sum = 0.0;
-        for (int k = 0; k < n_.states; ++k) sum += std::fabs(f.c[k]) * near_state_[k];
-        for (int k = 0; k < n_.inputs; ++k) sum += std::fabs(f.c[n_.first_input + k]) * near_input_[k];
+        const Layout& n = assembly_.layout();
+        each_state_of(n_, f, [&](int k, double c) {
+            const int at = k < n_.coupled ? k : n.coupled + k - n_.coupled;
+            if (c != 0.0) sum += std::fabs(c) * near_state_[at];
+        });
+        each_input_of(n_, f, [&](int i, double c) {
+            if (c != 0.0) sum += std::fabs(c) * near_input_[i];
+        });
         return sum;
     }
 
@@ -206,12 +211,12 @@ class SwitchedTrain {
         if (guard.branch != nowhere && guard.memory != nowhere) now.memory[guard.memory] += guard.shift;
     }
 
-    // What contacts at rest, as bits, make of the speeds: found once for each set.
+    // What contacts at rest make of the speeds: found once for each set.
     struct Stopped {
-        std::uint32_t at_rest, kept;
+        Rest at_rest, kept;
         Ties ties;
     };
-    const Stopped& stopped(std::uint32_t at_rest) const;
+    const Stopped& stopped(const Rest& at_rest) const;
     bool at_its_limit(const Key& key) const;
     bool pushes_against_rest(const Key& key) const;
     bool holds_more(const ContactPlace& c) const;
@@ -237,22 +242,33 @@ class SwitchedTrain {
     // One of them, by its number: the last contact changes first, from stuck to forward to backward. Returns how many
     // contacts slip.
     int combination(std::uint64_t number, const Event& event, const Key& from, Key& out) const {
+        return combination(
+            [&](std::uint64_t n) {
+                const std::uint64_t mode = number % n;
+                number /= n;
+                return mode;
+            },
+            event, from, out);
+    }
+    // next(n): the mode of the next contact, below n.
+    template <class Next>
+        requires std::is_invocable_v<Next, std::uint64_t>
+    int combination(Next&& next, const Event& event, const Key& from, Key& out) const {
         int slips = 0;
         for (int c = contacts(); c-- > 0;) {
             const ContactPlace& p = places().contacts[c];
             if (p.bilateral) continue;
             out.modes[c] = from.modes[c];
             if (event.at_rest[c]) {
-                const std::uint64_t n = p.one_way ? 2 : 3, mode = number % n;
+                const std::uint64_t mode = next(p.one_way ? 2 : 3);
                 out.modes[c] = mode == 0 ? 0 : mode == 1 && !p.one_way ? +1 : -1;
-                number /= n;
             }
             slips += out.modes[c] != 0;
         }
         return slips;
     }
     // Impulses: modes_impact.hpp.
-    using MovedShafts = std::array<bool, max_shafts>;
+    using MovedShafts = Flags;
     template <class Now>
     bool has_gap(int contact, const Now& now) const;
     // Do flanks close their gap, by more than rounding?
@@ -365,13 +381,11 @@ class SwitchedTrain {
     Guards moving(const E& e, const AtRest& at_rest) const {
         Guards out;
         if constexpr (requires { e.regime; }) {
-            std::uint64_t all = 0;
-            for (int c = 0; c < contacts(); ++c)
-                if (!at_rest[c]) all |= e.speeds[c];
-            out = all;
+            for (int k = 0; k < e.n_speeds; ++k)
+                if (!at_rest[e.regime.guards[e.speeds[k]].contact]) out.set(e.speeds[k]);
         } else {
             for (std::size_t g = 0; g < guard_count(e); ++g)
-                out[g] = e.guards[g].kind == Guard::speed && !at_rest[e.guards[g].contact];
+                if (e.guards[g].kind == Guard::speed && !at_rest[e.guards[g].contact]) out.set(static_cast<int>(g));
         }
         return out;
     }
@@ -384,20 +398,16 @@ class SwitchedTrain {
             e.guards.constants(now.memory, constant);
             e.guards.evaluate(constant, now.x, now.input[0], value);
             e.guards.magnitudes(magnitudes(now.memory), magnitudes(now.x), now.input_magnitudes, size);
-            std::uint64_t near = 0;
+            Guards near;
             for (int g = 0; g < e.guards.rows(); g += vec_width) {
-                const Vec clear = clear_of_zero * load(&size[g]) + load(&e.near_event[g]);
-                near |= std::uint64_t{all_bits & ~above(load(&value[g]), clear)} << g;
+                const Vec clear = clear_of_zero * load(size.data() + g) + load(e.near_event.data() + g);
+                near.set(g, all_bits & ~above(load(value.data() + g), clear));
             }
-            near &= ~(ignored.to_ullong() | e.behind);
-            for (; near != 0; near &= near - 1) {
-                const int g = std::countr_zero(near);
-                if (!use(r.guards[g], value[g], size[g])) return;
-            }
+            (near - ignored - e.behind).each([&](int g) { return use(r.guards[g], value[g], size[g]); });
         } else {
             for (std::size_t g = 0; g < guard_count(r); ++g) {
                 const auto& guard = r.guards[g];
-                if (ignored[g] || guard.behind) continue;
+                if (ignored[static_cast<int>(g)] || guard.behind) continue;
                 const double value = evaluate(n_, guard.form, now), size = magnitude(n_, guard.form, now);
                 if (value > clear_of_zero * size + near_event(guard.form)) continue;
                 if (!use(guard, value, size)) return;
@@ -442,11 +452,10 @@ class SwitchedTrain {
     template <class Driver, class Input>
     bool falls(const Driver& driver, const Input& before, const Input& after) const {
         double change = 0.0, size = 0.0;
-        for (int i = 0; i < n_.inputs; ++i) {
-            const double share = driver.torque.c[n_.first_input + i];
+        each_input_of(n_, driver.torque, [&](int i, double share) {
             change += share * (after[i] - before[i]);
             size += std::fabs(share) * std::fmax(std::fabs(before[i]), std::fabs(after[i]));
-        }
+        });
         return change < -rounding * size;
     }
     template <class E, class Now>
@@ -479,17 +488,16 @@ class SwitchedTrain {
 
     const Assembly& assembly_;
     Sizes n_;
-    std::array<double, max_states> near_state_{};
-    std::array<double, max_inputs> near_input_{};
+    std::vector<double> near_state_, near_input_;
     Rest holds_more_{};  // contacts that hold more than they take while they slip
     bool has_flanks_ = false;
     double least_flight_ = one_flight;
     bool some_redundant_ = false;  // while all contacts are at rest; else no one keeps another at rest
-    // What has been found of sets of contacts and of modes, by their last bits.
+    // What has been found of sets of contacts and of modes, by their hash.
     mutable std::array<std::unique_ptr<Stopped>, 16> stopped_;
     struct Limit {
-        std::uint64_t modes = ~std::uint64_t{0};
-        bool reached = false;
+        decltype(Key::modes) modes;
+        bool known = false, reached = false;
     };
     mutable std::array<Limit, 64> limits_;
     // Of each combination, how many contacts slip. Its memory is used again.

@@ -11,13 +11,10 @@
 
 namespace lostmotion::model {
 
-// Dimensions of the kernel for trains, which takes the narrowest that holds one. Guards are 64 at most: the solver
-// keeps them as bits of a word. Every input that there is room for costs time at every event check, so there is room
-// for few.
+// Dimensions of the kernels whose sizes are known when they are compiled; a train takes the smallest that holds it, or
+// else that for any size. Every input that there is room for costs time at every event check, so there is room for few.
 using Least = Dims<4, 1, 2, 2, 3, 16>;  // motor, gear and load, as the paper has them
-using Narrow = Dims<4, 1, 4, 6, 8, 32>;
 using Middle = Dims<8, 2, 6, 10, 12, 64>;
-using Wide = Dims<16, 4, 16, 20, 24, 64>;
 
 template <class D>
 struct TrainRegime : PackedRegime<D> {
@@ -38,7 +35,8 @@ class TrainSystem {
     using Regime = TrainRegime<D>;
     using State = StateOf<D>;
 
-    explicit TrainSystem(const Assembly& assembly) : assembly_(assembly), search_(assembly, D{}) {
+    explicit TrainSystem(const Assembly& assembly)
+        : assembly_(assembly), counts_(counts_of(assembly.layout())), search_(assembly, D{}) {
         for (const GearPlace& g : assembly.places().gears) {
             if (g.twist != nowhere) twists_[n_twists_++] = g.twist;
             has_parametric_work_ = has_parametric_work_ || g.parametric_work != nowhere;
@@ -46,6 +44,14 @@ class TrainSystem {
     }
 
     const Assembly& assembly() const { return assembly_; }
+    const CountsOf<D>& counts() const { return counts_; }
+    // Conditions that end a regime, at most.
+    int most_guards() const {
+        if constexpr (std::same_as<D, Any>)
+            return assembly_.places().most_guards();
+        else
+            return D::guards;
+    }
     // Whether a regime has had more guards than there is room for: then nothing that follows is certain.
     bool overflowed() const { return overflowed_; }
     SearchCounts& searches() const { return search_.searches; }
@@ -124,14 +130,12 @@ class TrainSystem {
     }
 
     State balanced_scale() const {
-        State s;
-        s.fill(1.0);
+        State s = filled<D>(counts_, 1.0);
         model::balanced_scale(assembly_, s, D::coupled);
         return s;
     }
     State rated_scale() const {
-        State s;
-        s.fill(1.0);
+        State s = filled<D>(counts_, 1.0);
         model::rated_scale(assembly_, s);
         return s;
     }
@@ -151,8 +155,9 @@ class TrainSystem {
     }
 
     const Assembly& assembly_;
+    const CountsOf<D> counts_;
     SwitchedTrain<D> search_;
-    std::array<int, D::coupled> twists_{};
+    ListOf<D, int, D::coupled> twists_{};
     int n_twists_ = 0;
     bool has_parametric_work_ = false;
     mutable bool overflowed_ = false;

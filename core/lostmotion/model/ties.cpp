@@ -1,63 +1,72 @@
 #include "ties.hpp"
 
+#include <algorithm>
+#include <iterator>
+
 namespace lostmotion::model {
 
-unsigned tied_speed(const ContactPlace& c, const Ties& t, std::array<double, max_shafts>& speed) {
-    unsigned all = 0;
-    c.each_shaft([&](int s, double) { all |= t.free[s]; });
-    unsigned moves = 0;
-    for (unsigned left = all; left != 0; left &= left - 1) {
-        const int k = std::countr_zero(left);
+Shares tied_speed(const ContactPlace& c, const Ties& t) {
+    Shares all;
+    c.each_shaft([&](int s, double) { t.each_share(s, [&](int k, double) { all.set(k, 0.0); }); });
+    Shares speed;
+    for (const Share& free : all) {
         double sum = 0.0, size = 0.0;
         c.each_shaft([&](int s, double per) {
-            const double part = t.free[s] >> k & 1 ? per * t.share[s][k] : 0.0;
+            const double part = per * t.of[static_cast<std::size_t>(s)].of(free.shaft);
             sum += part;
             size += std::fabs(part);
         });
-        speed[k] = sum;
-        if (std::fabs(sum) > loop_rounding * size) moves |= 1u << k;
+        if (std::fabs(sum) > loop_rounding * size) speed.set(free.shaft, sum);
     }
-    return moves;
+    return speed;
 }
 
-// The free shaft whose inertia, with that of all that follow it, is least as the contact feels it.
-static int lightest(unsigned moves, const std::array<double, max_shafts>& speed, int shafts, const Ties& t,
-                    const double* inertia) {
-    int found = nowhere;
+// The share whose shaft has the least inertia, with that of all that follow it, as the contact feels it.
+static const Share& lightest(const std::vector<Share>& speed, const Ties& t, const double* inertia) {
+    const Share* found = nullptr;
     double least = 0.0;
-    for (unsigned left = moves; left != 0; left &= left - 1) {
-        const int k = std::countr_zero(left);
+    for (const Share& k : speed) {
         double J = 0.0;
-        for (int s = 0; s < shafts; ++s)
-            if (t.free[s] >> k & 1) J += inertia[s] * t.share[s][k] * t.share[s][k];
-        J /= speed[k] * speed[k];
-        if (found != nowhere && !(J < least)) continue;
-        found = k;
+        for (std::size_t s = 0; s < t.of.size(); ++s) {
+            const double share = t.of[s].of(k.shaft);
+            J += inertia[s] * share * share;
+        }
+        J /= k.share * k.share;
+        if (found != nullptr && !(J < least)) continue;
+        found = &k;
         least = J;
     }
-    return found;
+    return *found;
 }
 
-bool stop_contact(const ContactPlace& c, int shafts, Ties& t, const double* inertia, GivenShafts given) {
-    std::array<double, max_shafts> speed;
-    const unsigned moves = tied_speed(c, t, speed);
-    unsigned may_follow = moves & ~given.shafts;
-    if (may_follow == 0 && given.follow) may_follow = moves;
-    if (may_follow == 0) return false;
-    if ((may_follow & given.massless) != 0) may_follow &= given.massless;
-    const int last =
-        inertia != nullptr ? lightest(may_follow, speed, shafts, t, inertia) : std::bit_width(may_follow) - 1;
-    for (int s = 0; s < shafts; ++s) {
-        if ((t.free[s] >> last & 1) == 0) continue;
-        t.free[s] ^= static_cast<std::uint16_t>(1u << last);
-        for (unsigned left = moves ^ 1u << last; left != 0; left &= left - 1) {
-            const int k = std::countr_zero(left);
-            const auto bit = static_cast<std::uint16_t>(1u << k);
-            const double change = t.share[s][last] * (-speed[k] / speed[last]),
-                         sum = (t.free[s] & bit) != 0 ? t.share[s][k] + change : change;
-            t.share[s][k] = sum;
-            t.free[s] |= bit;
-            if (!(std::fabs(sum) > loop_rounding * std::fabs(change))) t.free[s] ^= bit;
+bool stop_contact(const ContactPlace& c, Ties& t, const double* inertia, const GivenShafts& given) {
+    const Shares speed = tied_speed(c, t);
+    const auto some = [&](auto&& fits) {
+        std::vector<Share> out;
+        std::copy_if(speed.begin(), speed.end(), std::back_inserter(out), fits);
+        return out;
+    };
+    const auto is_one_of = [](std::span<const int> shafts, const Share& s) {
+        return std::binary_search(shafts.begin(), shafts.end(), s.shaft);
+    };
+    std::vector<Share> may_follow = some([&](const Share& s) { return !is_one_of(given.shafts, s); });
+    if (may_follow.empty() && given.follow) may_follow.assign(speed.begin(), speed.end());
+    if (may_follow.empty()) return false;
+    const auto massless = some([&](const Share& s) {
+        return is_one_of(given.massless, s) &&
+               std::any_of(may_follow.begin(), may_follow.end(), [&](const Share& o) { return o.shaft == s.shaft; });
+    });
+    if (!massless.empty()) may_follow = massless;
+    const Share last = inertia != nullptr ? lightest(may_follow, t, inertia) : may_follow.back();
+    for (Shares& of : t.of) {
+        const double share = of.of(last.shaft);
+        if (share == 0.0) continue;
+        of.erase(last.shaft);
+        for (const Share& k : speed) {
+            if (k.shaft == last.shaft) continue;
+            const double change = share * (-k.share / last.share), sum = of.of(k.shaft) + change;
+            of.set(k.shaft, sum);
+            if (!(std::fabs(sum) > loop_rounding * std::fabs(change))) of.erase(k.shaft);
         }
     }
     return true;
@@ -66,25 +75,21 @@ bool stop_contact(const ContactPlace& c, int shafts, Ties& t, const double* iner
 Ties tie(const std::vector<ContactPlace>& contacts, int shafts, const std::int8_t* modes, const double* inertia,
          GivenShafts given) {
     Ties t;
-    for (int s = 0; s < shafts; ++s) {
-        t.free[s] = static_cast<std::uint16_t>(1u << s);
-        t.share[s][s] = 1.0;
-    }
+    t.of.resize(static_cast<std::size_t>(shafts));
+    for (int s = 0; s < shafts; ++s) t.of[static_cast<std::size_t>(s)].set(s, 1.0);
     enum { rigid, frame, other };
     const auto turn = [&](const ContactPlace& c) {
-        return c.bilateral && given.shafts != 0 ? rigid : c.b == nowhere ? frame : other;
+        return c.bilateral && !given.shafts.empty() ? rigid : c.b == nowhere ? frame : other;
     };
     for (const auto now : {rigid, frame, other})
         for (std::size_t k = 0; k < contacts.size(); ++k)
             if (modes[k] == 0 && turn(contacts[k]) == now)
-                t.redundant[k] = !stop_contact(contacts[k], shafts, t, inertia, given);
-    for (int s = 0; s < shafts; ++s) t.at_rest[s] = t.free[s] == 0;
+                t.redundant[k] = !stop_contact(contacts[k], t, inertia, given);
+    for (std::size_t s = 0; s < t.of.size(); ++s)
+        if (t.of[s].empty()) t.at_rest[s] = true;
     return t;
 }
 
-bool kept_at_rest(const ContactPlace& c, const Ties& t) {
-    std::array<double, max_shafts> speed;
-    return tied_speed(c, t, speed) == 0;
-}
+bool kept_at_rest(const ContactPlace& c, const Ties& t) { return tied_speed(c, t).empty(); }
 
 }  // namespace lostmotion::model

@@ -5,8 +5,8 @@
 // follow is redundant: its reaction is not determined by the motion.
 #pragma once
 
-#include <bit>
 #include <cmath>
+#include <span>
 #include <vector>
 
 #include "../elements/contact_place.hpp"
@@ -17,21 +17,21 @@ namespace lostmotion::model {
 // Ratios in a loop agree within this share.
 inline constexpr double loop_rounding = 1e-12;
 
-// Shafts whose motion is given, as bits. Their speeds follow no other one, unless contacts at rest at one instant are
-// to have no speed to the last bit: then they do where nothing else is left.
+// Shafts whose motion is given, in their order. Their speeds follow no other one, unless contacts at rest at one
+// instant are to have no speed to the last bit: then they do where nothing else is left.
 struct GivenShafts {
-    unsigned shafts = 0;
+    std::span<const int> shafts = {};
     bool follow = false;
-    unsigned massless = 0;  // shafts without inertia, as bits: they follow others first
+    std::span<const int> massless = {};  // shafts without inertia: they follow others first
 };
 
-// The speed of a contact in terms of those that are free, as bits of them; what cancels to within rounding is none.
-unsigned tied_speed(const ContactPlace& c, const Ties& t, std::array<double, max_shafts>& speed);
+// The speed of a contact in terms of those that are free; what cancels to within rounding is none.
+Shares tied_speed(const ContactPlace& c, const Ties& t);
 
 // Makes the last of the free shafts that the speed of a contact depends on follow the others; with the inertias of the
 // shafts, the one that carries least, so that the heavy ones stay free. False if it follows from those before that its
 // speed is zero, or if its speed is given.
-bool stop_contact(const ContactPlace& c, int shafts, Ties& t, const double* inertia = nullptr, GivenShafts given = {});
+bool stop_contact(const ContactPlace& c, Ties& t, const double* inertia = nullptr, const GivenShafts& given = {});
 
 // stuck: a contact is at rest where this is 0. Frame contacts come first, so that it is a gear or coupling whose
 // torque is redundant where a shaft is held twice. With given motions, rigid gears come before them.

@@ -29,8 +29,8 @@ struct ClosedLoop {
 };
 
 // Signals of which those that windings turn will be set to ramps. input(motor): its number among them.
-template <std::size_t n, class Input>
-std::array<Signal, n> with_ramps(std::array<Signal, n> signals, const Control& control, Input&& input) {
+template <class Signals, class Input>
+Signals with_ramps(Signals signals, const Control& control, Input&& input) {
     for (const ControlledAxis& axis : control.axes)
         if (axis.law.field_orientation) signals[static_cast<std::size_t>(input(axis.motor))] = {{{0.0, 0.0, 1.0}}, {}};
     return signals;

@@ -29,17 +29,17 @@ StateOf<typename System::Dims> SimulationOf<System>::rates() {
     const Regime& r = regime();
     const Inputs input = inputs();
     StateOf<D> out{};
-    for (int k = 0; k < D::states; ++k) out[k] = evaluate<D>(r.rate[k], now_.x, now_.memory, input);
+    each_state<D>(system_.counts(), [&](int k) { out[k] = evaluate<D>(r.rate[k], now_.x, now_.memory, input); });
     return out;
 }
 
 template <class System>
-auto SimulationOf<System>::guards() -> std::array<double, n_guards> {
+auto SimulationOf<System>::guards() -> GuardValues {
     const Regime& r = regime();
     const auto& entry = solver_.cache().entry(now_.key);
     const Inputs input = inputs();
-    std::array<double, n_guards> out;
-    out.fill(1.0);
+    GuardValues out;
+    for (std::size_t g = 0; g < guard_count(); ++g) out[g] = 1.0;
     for (int g = 0; g < r.n_guards; ++g) {
         if (r.guards[g].behind) continue;
         const double natural = entry.near_event[g] / far_from_event;
@@ -52,7 +52,7 @@ auto SimulationOf<System>::guards() -> std::array<double, n_guards> {
 template <class System>
 auto SimulationOf<System>::lowest_guard() -> const typename System::Guard* {
     const auto values = guards();
-    const auto lowest = std::min_element(values.begin(), values.end());
+    const auto lowest = std::min_element(values.begin(), values.begin() + guard_count());
     // The integrator may have stopped just before the zero.
     return *lowest < 0.5 * fallen ? &regime().guards[static_cast<std::size_t>(lowest - values.begin())] : nullptr;
 }
@@ -61,7 +61,7 @@ auto SimulationOf<System>::lowest_guard() -> const typename System::Guard* {
 template <class System>
 Status SimulationOf<System>::follow(const typename System::Guard* fired) {
     if (fired != nullptr && fired->kind == System::Guard::outside) return Status::outside;
-    InstantOf<D> now;
+    InstantOf<D> now{};
     now.time = now_.time;
     now.x = now_.x;
     now.memory = now_.memory;

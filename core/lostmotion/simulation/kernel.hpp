@@ -1,5 +1,5 @@
 // The door to the solver. A kernel solves trains up to its dimensions, which are known when it is compiled; a program
-// has the kernels that it is linked with (core/kernels), and takes the narrowest that holds a train.
+// has the kernels that it is linked with (core/kernels), and takes the smallest that holds a train.
 #pragma once
 
 #include <algorithm>
@@ -59,9 +59,9 @@ class Linked {
     const char* name() const { return name_; }
     const KernelSizes& sizes() const { return sizes_; }
 
-    // The narrowest first.
+    // The smallest first.
     static const std::vector<const Own*>& all() { return list(); }
-    // The narrowest that holds a train, or the widest. There must be one.
+    // The smallest that holds a train, or the largest. There must be one.
     static const Own& of(const model::Assembly& assembly) {
         for (const Own* o : list())
             if (o->sizes().hold(assembly.train(), assembly.layout())) return *o;

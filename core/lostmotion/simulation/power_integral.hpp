@@ -26,7 +26,7 @@ class PowerIntegral {
  public:
     using State = StateOf<D>;
     using LinearForm = LinearFormOf<D>;
-    using Flows = std::array<double, N>;
+    using Flows = std::conditional_t<std::same_as<D, Any>, Few<double, 32>, std::array<double, N>>;
 
     Flows flow{};              // [J] so far
     double turned_over = 0.0;  // [J] sum of the magnitudes of all flows, panel by panel (or of apparent energies)
@@ -37,7 +37,8 @@ class PowerIntegral {
     using Powers = std::array<Flows, orders>;
     // Of as many flows as a vector holds, from the f-th on.
     static std::array<Vec, orders> at(const Powers& p, int f) {
-        return {load(&p[0][f]), load(&p[1][f]), load(&p[2][f]), load(&p[3][f]), load(&p[4][f])};
+        const auto of = [&](int order) { return load(p[order].data() + f); };
+        return {of(0), of(1), of(2), of(3), of(4)};
     }
 
  public:
@@ -69,13 +70,15 @@ class PowerIntegral {
                 if (k + 1 == orders) break;
                 rate = p.rates().higher(rate, u[k]);
             }
+            for (Flows& order : out) make_room(order, count());
             for (int f = 0; f < count(); f += vec_width) {
                 const auto l = at(a, f), r = at(b, f);
-                store(l[0] * r[0], &out[0][f]);
-                store(l[1] * r[0] + l[0] * r[1], &out[1][f]);
-                store(l[2] * r[0] + 2.0 * l[1] * r[1] + l[0] * r[2], &out[2][f]);
-                store(l[3] * r[0] + 3.0 * (l[2] * r[1] + l[1] * r[2]) + l[0] * r[3], &out[3][f]);
-                store(l[4] * r[0] + 4.0 * (l[3] * r[1] + l[1] * r[3]) + 6.0 * l[2] * r[2] + l[0] * r[4], &out[4][f]);
+                store(l[0] * r[0], out[0].data() + f);
+                store(l[1] * r[0] + l[0] * r[1], out[1].data() + f);
+                store(l[2] * r[0] + 2.0 * l[1] * r[1] + l[0] * r[2], out[2].data() + f);
+                store(l[3] * r[0] + 3.0 * (l[2] * r[1] + l[1] * r[2]) + l[0] * r[3], out[3].data() + f);
+                store(l[4] * r[0] + 4.0 * (l[3] * r[1] + l[1] * r[3]) + 6.0 * l[2] * r[2] + l[0] * r[4],
+                      out[4].data() + f);
             }
         }
 
@@ -165,6 +168,8 @@ class PowerIntegral {
     // added.
     double add_panel(int n, const Powers& a, const Powers& b, double h, bool shortest) {
         Flows sums, apart;
+        make_room(sums, n);
+        make_room(apart, n);
         double difference = 0.0;
         for (int f = 0; f < n; f += vec_width) {
             const auto p = at(a, f), q = at(b, f);
@@ -172,8 +177,8 @@ class PowerIntegral {
                       s3 = h * h * h * (p[3] - q[3]), s4 = h * h * h * h * (p[4] + q[4]);
             const Vec sum = h * (s0 / 2.0 + s1 / 9.0 + s2 / 72.0 + s3 / 1008.0 + s4 / 30240.0);
             const Vec lower = h * (s0 / 2.0 + 3.0 * s1 / 28.0 + s2 / 84.0 + s3 / 1680.0);
-            store(sum, &sums[f]);
-            store(absolute(sum - lower), &apart[f]);
+            store(sum, sums.data() + f);
+            store(absolute(sum - lower), apart.data() + f);
         }
         for (int f = 0; f < n; ++f) difference += apart[f];
         return add(n, sums, difference, panel_tolerance, h, shortest);

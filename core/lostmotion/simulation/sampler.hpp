@@ -82,7 +82,7 @@ class SamplerOf : public Observer<System> {
 
     [[gnu::noinline]] bool write(Piece& p) {
         auto& propagator = p.entry->propagator;
-        const int level = times_.listed.empty() ? propagator.level_of(times_.interval) : -1;
+        const int level = times_.listed.empty() && !propagator.by_series() ? propagator.level_of(times_.interval) : -1;
         if (level < 0 && p.at_once) return write_at_once(p);
         const Reader reader(model_, p.entry->regime, p.memory);
         for (std::size_t next = p.first;;) {

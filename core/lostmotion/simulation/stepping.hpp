@@ -81,8 +81,9 @@ class SimulationOf {
     void place(double time, const StateOf<D>& x, const Inputs& input);
     StateOf<D> rates();
     // The guards, each over its natural magnitude; 1 beyond the last. One that falls below zero ends the regime.
-    static constexpr int n_guards = D::guards;
-    std::array<double, n_guards> guards();
+    using GuardValues = typename RegimeCache<System>::GuardTable::Values;
+    std::size_t guard_count() const { return static_cast<std::size_t>(system_.most_guards()); }
+    GuardValues guards();
     // The ticks that are due, and the regime that follows where guards have fallen or inputs have changed.
     Status settle();
     double next_tick() const;  // [s], infinity without controllers

@@ -26,7 +26,7 @@ class TorqueResponse final : public Observer<System> {
     using State = StateOf<D>;
     using Components = ComponentsOf<D>;
 
-    explicit TorqueResponse(const System& system) : laws_(system) {}
+    explicit TorqueResponse(const System& system) : n_(system.counts()), laws_(system) {}
 
     // input: the number of the torque among the inputs.
     void begin(RegimeCache<System>& cache, int input) {
@@ -55,15 +55,10 @@ class TorqueResponse final : public Observer<System> {
             return true;
         }
         State rate{};
-        for (int row = 0; row < D::states; ++row) {
-            const auto& c = r.rate[row].c;
-            rate[row] = c[D::first_input + input_];
-            for (int k = 0; k < D::states; ++k) rate[row] += c[k] * derivative_[k];
-            for (int k = 0; k < D::memory; ++k) rate[row] += c[D::first_memory + k] * derivative_[D::states + k];
-        }
+        each_state<D>(n_, [&](int row) { rate[row] = by_torque(r.rate[row]); });
         State change;
-        (s.entry.propagator.integral(length) * load<D>(rate)).store(change.data());
-        for (int row = 0; row < D::states; ++row) derivative_[row] += change[row];
+        (s.entry.propagator.changes(length) * load<D>(rate)).store(change);
+        each_state<D>(n_, [&](int row) { derivative_[row] += change[row]; });
         if (first) {
             last_entry_ = &s.entry;
             last_key_ = r.key;
@@ -85,28 +80,25 @@ class TorqueResponse final : public Observer<System> {
             inputs_->anchor(w.time);
             u_after = inputs_->template jet<2>();
         }
-        auto jump = JacobianOf<D>::identity();
+        auto jump = JacobianOf<D>::identity(n_);
         const auto reset = laws_.reset({w, old, next, x_, memory_, u, u_after}, jump);
         Components out{};
-        for (int r = 0; r < component_count<D>; ++r)
-            for (int k = 0; k < component_count<D>; ++k) out[r] += jump.row[r][k] * derivative_[k];
+        each_component<D>(
+            n_, [&](int r) { each_component<D>(n_, [&](int k) { out[r] += jump.row[r][k] * derivative_[k]; }); });
         if (w.guard >= 0) {
             const Components before = flow(old, x_, memory_, u[0]), after = flow(next, w.x, w.memory, u_after[0]);
-            const auto& g = old.guards[w.guard].form.c;
-            double fall = 0.0, change = g[D::first_input + input_];
-            for (int i = 0; i < D::inputs; ++i) fall += g[D::first_input + i] * u[1][i];
-            for (int k = 0; k < D::states; ++k) {
-                fall += g[k] * before[k];
-                change += g[k] * derivative_[k];
-            }
-            for (int k = 0; k < D::memory; ++k) change += g[D::first_memory + k] * derivative_[D::states + k];
+            const auto& g = old.guards[w.guard].form;
+            const double change = by_torque(g);
+            double fall = 0.0;
+            each_input_of<D>(g, [&](int i, double c) { fall += c * u[1][i]; });
+            each_state_of<D>(g, [&](int k, double c) { fall += c * before[k]; });
             if (fall < 0.0) {
                 const double shift = -change / fall;
-                for (int r = 0; r < component_count<D>; ++r) {
+                each_component<D>(n_, [&](int r) {
                     double gap = reset.by_time[r] - after[r];
-                    for (int k = 0; k < component_count<D>; ++k) gap += jump.row[r][k] * before[k];
+                    each_component<D>(n_, [&](int k) { gap += jump.row[r][k] * before[k]; });
                     out[r] += gap * shift;
-                }
+                });
             }
         }
         derivative_ = out;
@@ -118,12 +110,20 @@ class TorqueResponse final : public Observer<System> {
         constexpr std::uint64_t least = std::uint64_t{1} << 23;
         return std::bit_cast<double>((std::bit_cast<std::uint64_t>(length) + least / 2) & ~(least - 1));
     }
-    static Components flow(const Regime& r, const State& x, const typename D::Memory& m, const InputsOf<D>& u) {
+    // How a form depends on the torque.
+    double by_torque(const LinearFormOf<D>& f) const {
+        double sum = f.c[D::first_input + input_];
+        each_state_of<D>(f, [&](int k, double c) { sum += c * derivative_[k]; });
+        each_memory_of<D>(f, [&](int k, double c) { sum += c * derivative_[D::states + k]; });
+        return sum;
+    }
+    Components flow(const Regime& r, const State& x, const typename D::Memory& m, const InputsOf<D>& u) const {
         Components f{};
-        for (int k = 0; k < D::states; ++k) f[k] = evaluate<D>(r.rate[k], x, m, u);
+        each_state<D>(n_, [&](int k) { f[k] = evaluate<D>(r.rate[k], x, m, u); });
         return f;
     }
 
+    const CountsOf<D> n_;
     const ComponentLaws<System> laws_;
     RegimeCache<System>* cache_ = nullptr;
     int input_ = 0;

@@ -29,7 +29,7 @@ class TrainMotion final : public Motion {
     }
 
     double time() const override { return simulation_.time(); }
-    double state(int k) const override { return now().x[in_kernel(k)]; }
+    double state(int k) const override { return now().x[model::state_place<D>(layout(), k)]; }
     void save(MotionState& to) const override;
     void restore(const MotionState& from) override;
 
@@ -63,8 +63,11 @@ class TrainMotion final : public Motion {
         simulation_.place(time, model::packed_start<D>(layout(), x, {}).x, inputs(input));
     }
     void rates(double* out) override { model::unpack_state<D>(simulation_.rates(), layout(), out); }
-    std::size_t guard_count() const override { return Simulation::n_guards; }
-    void guards(double* out) override { std::ranges::copy(simulation_.guards(), out); }
+    std::size_t guard_count() const override { return simulation_.guard_count(); }
+    void guards(double* out) override {
+        const auto values = simulation_.guards();
+        std::copy_n(values.begin(), guard_count(), out);
+    }
     Status settle() override { return simulation_.settle(); }
     double next_tick() const override { return simulation_.next_tick(); }
     bool accept() override { return simulation_.accept(); }
@@ -72,13 +75,9 @@ class TrainMotion final : public Motion {
  private:
     const model::Layout& layout() const { return model_.assembly.layout(); }
     const typename Simulation::Snapshot& now() const { return simulation_.snapshot(); }
-    // Of a state, its place in the kernel.
-    std::size_t in_kernel(int k) const {
-        return static_cast<std::size_t>(k < layout().coupled ? k : D::coupled + k - layout().coupled);
-    }
     static InputsOf<D> inputs(std::span<const double> given) {
         InputsOf<D> out{};
-        std::ranges::copy(given, out.begin());
+        for (std::size_t i = 0; i < given.size(); ++i) out[i] = given[i];
         return out;
     }
 
@@ -93,7 +92,8 @@ void TrainMotion<D>::save(MotionState& to) const {
     const typename Simulation::Snapshot& s = now();
     const model::Layout& n = layout();
     const auto first = [](const auto& from, int count, std::vector<double>& numbers) {
-        numbers.assign(from.begin(), from.begin() + count);
+        numbers.clear();
+        for (int k = 0; k < count; ++k) numbers.push_back(from[k]);
     };
     const auto state = [&](const StateOf<D>& from, std::vector<double>& numbers) {
         numbers.resize(static_cast<std::size_t>(n.states));
@@ -104,12 +104,15 @@ void TrainMotion<D>::save(MotionState& to) const {
     first(s.memory, n.memory, to.memory);
     first(s.input, n.inputs, to.input);
     to.key = s.key;
+    to.key.modes.reach(static_cast<std::size_t>(n.contacts));
+    to.key.branch.reach(static_cast<std::size_t>(n.branches));
     to.started = s.started;
     to.steady = s.steady;
     state(s.course.rate, to.rate);
     to.rate_known = s.course.rate_known;
     first(s.course.input, n.inputs, to.rate_input);
-    to.twists.assign(s.course.twist.begin(), s.course.twist.begin() + system_.n_twists());
+    to.twists.clear();
+    for (int t = 0; t < system_.n_twists(); ++t) to.twists.push_back(s.course.twist[t]);
     to.control = s.control;
 }
 
@@ -127,7 +130,7 @@ void TrainMotion<D>::restore(const MotionState& from) {
     s.course.rate = model::packed_start<D>(layout(), from.rate, {}).x;
     s.course.rate_known = from.rate_known;
     s.course.input = inputs(from.rate_input);
-    std::ranges::copy(from.twists, s.course.twist.begin());
+    for (std::size_t t = 0; t < from.twists.size(); ++t) s.course.twist[t] = from.twists[t];
     s.control = from.control;
     simulation_.restore(s);
 }
@@ -142,7 +145,7 @@ Status TrainMotion<D>::answer(double interval, std::span<const double> begin, st
     const double after = state(shaft.speed_state);
     out.acceleration = (after - before) / interval;
     out.rounding = 0x1p-52 * std::fmax(std::fabs(before), std::fabs(after)) / interval;
-    out.compliance = std::fmax(0.0, -response_.derivative()[in_kernel(shaft.speed_state)] / interval);
+    out.compliance = std::fmax(0.0, -response_.derivative()[shaft.speed_state] / interval);
     return status;
 }
 

@@ -36,11 +36,7 @@ class TrainReader {
         };
         switch (c.kind) {
             case TrainChannel::input: column(at.u[index]); return;
-            case TrainChannel::state: {
-                const int layout = model_.assembly.layout().coupled;
-                column(at.x[c.index < layout ? index : D::coupled + index - static_cast<std::size_t>(layout)]);
-                return;
-            }
+            case TrainChannel::state: column(at.x[model::state_place<D>(model_.assembly.layout(), c.index)]); return;
             case TrainChannel::motor_torque: form(regime_.motor_torque[index]); return;
             case TrainChannel::output_torque: form(regime_.output_torque[index]); return;
             case TrainChannel::input_torque:
@@ -89,7 +85,7 @@ class TrainReader {
     Vec speed(int shaft, const Instants& at, int k) const {
         if (const int massless = place(shaft).massless; massless != model::nowhere)
             return evaluate(regime_.massless_speed[static_cast<std::size_t>(massless)], at, k);
-        return load(&at.x[static_cast<std::size_t>(place(shaft).speed)][k]);
+        return load(&at.x[place(shaft).speed][k]);
     }
     template <class Instants>
     Vec twist_rate(std::size_t k, const Instants& at, int n) const {
@@ -156,10 +152,26 @@ class TrainReader {
     // None of the forms depends on an angle that follows.
     template <class Instants>
     static Vec evaluate(const LinearFormOf<D>& f, double constant, const Instants& at, int k) {
-        const Vec own = sum_in_fours<D::coupled>([&](auto j) { return f.c[j] * load(&at.x[j][k]); });
-        Vec forced = f.c[D::first_input] * load(&at.u[0][k]);
-        for (int i = 1; i < D::inputs; ++i) forced += f.c[D::first_input + i] * load(&at.u[i][k]);
-        return constant + own + forced;
+        if constexpr (std::same_as<D, Any>) {
+            Vec own{}, forced{};
+            const auto [begin, end] = f.between(0, D::coupled);
+            for (auto* t = begin; t != end;) {
+                const int four = t->place / 4;
+                Vec part[4] = {};
+                for (; t != end && t->place / 4 == four; ++t)
+                    part[t->place % 4] = t->factor * load(&at.x[t->place][static_cast<std::size_t>(k)]);
+                own += (part[0] + part[1]) + (part[2] + part[3]);
+            }
+            each_input_of<D>(f, [&](int i, double c) {
+                forced += c * load(&at.u[static_cast<std::size_t>(i)][static_cast<std::size_t>(k)]);
+            });
+            return constant + own + forced;
+        } else {
+            const Vec own = sum_in_fours<D::coupled>([&](auto j) { return f.c[j] * load(&at.x[j][k]); });
+            Vec forced = f.c[D::first_input] * load(&at.u[0][k]);
+            for (int i = 1; i < D::inputs; ++i) forced += f.c[D::first_input + i] * load(&at.u[i][k]);
+            return constant + own + forced;
+        }
     }
 
     const TrainModel& model_;
@@ -173,9 +185,10 @@ TrainPoint point_of(const TrainModel& model, const model::TrainRegime<D>& r, dou
     const model::Layout& n = model.assembly.layout();
     TrainPoint p;
     p.now.time = time;
+    p.now.x.reach(static_cast<std::size_t>(n.states));
     model::unpack_state<D>(x, n, p.now.x.begin());
-    std::copy_n(memory.begin(), n.memory, p.now.memory.begin());
-    std::copy_n(u.begin(), n.inputs, p.now.input[0].begin());
+    for (int k = 0; k < n.memory; ++k) p.now.memory[k] = memory[k];
+    for (int i = 0; i < n.inputs; ++i) p.now.input[0][i] = u[i];
     p.key = r.key;
     p.values = TrainReader<D>(model, r, memory)(x, u);
     return p;

@@ -20,7 +20,7 @@ template <class D>
 class TrainMeter {
  public:
     explicit TrainMeter(const model::Assembly& a) : assembly_(a) {
-        place_.fill(-1);
+        place_.assign(model::all_flows(a).size(), -1);
         if (a.train().short_form)
             for (const int number : in_words_of_paper) place(number);
     }
@@ -54,7 +54,7 @@ class TrainMeter {
     }
 
  private:
-    static constexpr int max_flows = D::guards <= 16 ? 8 : 96;
+    static constexpr int max_flows = std::same_as<D, Any> ? Any::coupled : D::guards <= 16 ? 8 : 96;
     using Integral = PowerIntegral<D, max_flows>;
     // Motor, viscous and dry friction of its shaft, mesh, hysteresis, the same friction of the load, load torque.
     static constexpr int in_words_of_paper[] = {0, 1, 2, 6, 7, 3, 5, 4};
@@ -77,7 +77,7 @@ class TrainMeter {
 
     const model::Assembly& assembly_;
     Integral integral_;
-    std::array<int, 96> place_;
+    std::vector<int> place_;
     std::vector<int> order_;
 };
 

@@ -47,7 +47,7 @@ struct TrainSwitching {
     bool input_jump = false;
     model::Guard::Kind kind = model::Guard::speed;
     int contact = -1, branch = -1;  // that it was about, if any
-    using Modes = std::array<std::int8_t, model::max_contacts>;
+    using Modes = decltype(model::Key::modes);
     Modes before{}, after{};                         // of the contacts
     double torque_before = 0.0, torque_after = 0.0;  // T_2 [N m] of the last gear, left and right limit
 };

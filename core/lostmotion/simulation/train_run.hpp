@@ -1,4 +1,4 @@
-// A whole run of a train, by the exact or the adaptive solver, in the narrowest kernel that holds it.
+// A whole run of a train, by the exact or the adaptive solver, in the smallest kernel that holds it.
 #pragma once
 
 #include <memory>

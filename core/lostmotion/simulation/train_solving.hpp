@@ -50,7 +50,8 @@ void end_report(TrainReport& report, const System& system, Solver& solver) {
     const auto& r = solver.regime();
     const auto state = solver.state();
     model::unpack_state<typename System::Dims>(state, n, report.x.begin());
-    report.memory.assign(solver.memory().begin(), solver.memory().begin() + n.memory);
+    report.memory.clear();
+    for (int k = 0; k < n.memory; ++k) report.memory.push_back(solver.memory()[k]);
     const auto input = solver.input_before(report.time, state);
     // What rest leaves open may have gone along with the limit of a contact since its regime began.
     for (std::size_t c = 0; c < a.places().contacts.size(); ++c) {

@@ -1,4 +1,4 @@
-// A train step by step, in the narrowest kernel that holds it.
+// A train step by step, in the smallest kernel that holds it.
 #pragma once
 
 #include <memory>

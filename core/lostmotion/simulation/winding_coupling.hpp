@@ -107,7 +107,9 @@ class WindingCoupling {
     double inverse_inertia(const Motor& m) const {
         const auto& column = solver_.linear_rates().input_column[m.place->input];
         double sum = 0.0;
-        for (int k = 0; k < D::coupled; ++k) sum += m.place->rotor_speed.c[k] * column[k];
+        each_state_of<D>(m.place->rotor_speed, [&](int k, double c) {
+            if (k < D::coupled) sum += c * column[k];
+        });
         return sum / m.axis->rated_torque;
     }
     // Currents, voltages and speed of this instant.

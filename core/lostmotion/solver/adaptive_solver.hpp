@@ -145,7 +145,7 @@ class AdaptiveSolver {
         now_ = o.now_;
         key_ = o.key_;
         step_ = o.step_;
-        for (int i = 0; i < D::inputs; ++i)
+        for (std::size_t i = 0; i < signals_.size(); ++i)
             if (signals_[i].breakpoints.size() == 1) signals_[i].breakpoints[0] = o.signals_[i].breakpoints[0];
         left_.reset();
     }
@@ -218,7 +218,7 @@ class AdaptiveSolver {
 
     // Guards at one end of a step.
     struct Ends {
-        std::array<double, D::guards> value, slope;
+        typename GuardTable::Values value, slope;
     };
     // What a step is taken with: the regime and its parts that are constant in it.
     struct Motion {
@@ -235,7 +235,7 @@ class AdaptiveSolver {
         DenseStep dense;
         Ends here, there;
         double h = step_ > 0.0 ? step_ : 1e-6;
-        off_zero_ = 0;
+        off_zero_ = {};
         dense.k[0] = rates(entry.rates, motion.fixed, time_, now_.x);
         evaluate_guards(motion, time_, now_.x, dense.k[0], here);
         while (time_ < limit) {
@@ -296,13 +296,14 @@ class AdaptiveSolver {
             dense.k[stage] = rates(motion.entry.rates, motion.fixed, std::min(time_ + DP::c[stage] * h, latest), x);
         }
         double error = 0.0;
-        for (int n = 0; n < D::states; ++n) {
+        const CountsOf<D>& counts = system_.counts();
+        each_state<D>(counts, [&](int n) {
             double e = 0.0;
             for (int j = 0; j < DP::stages; ++j) e += DP::error[j] * dense.k[j][n];
             const double allowed = tolerance_ * (scale_[n] + std::max(std::fabs(now_.x[n]), std::fabs(x[n])));
             error += (h * e / allowed) * (h * e / allowed);
-        }
-        return std::sqrt(error / D::states);
+        });
+        return std::sqrt(error / (counts.coupled + counts.angles));
     }
 
     // The guard that ends the regime within the step, and when; nullptr if none does.
@@ -311,7 +312,7 @@ class AdaptiveSolver {
         const double end = t_event;
         const Guard* crossed = nullptr;
         for (int g = 0; g < entry.regime.n_guards; ++g) {
-            if ((entry.behind >> g & 1) != 0) continue;
+            if (entry.behind[g]) continue;
             const Guard& guard = entry.regime.guards[g];
             const Cubic c(here.value[g], here.slope[g], there.value[g], there.slope[g], dense.length);
             if (c.min() <= 0.0) refine_crossing(guard, dense, end, t_event, crossed);
@@ -333,10 +334,10 @@ class AdaptiveSolver {
                     double sum = evaluate<D>(driver.rate, x, now_.memory, u),
                            size =
                                solution_error(driver.rate, x) + rounding * magnitude<D>(driver.rate, x, now_.memory, u);
-                    for (int i = 0; i < D::inputs; ++i) {
-                        sum += driver.torque.c[D::first_input + i] * u_rate[i];
-                        size += rounding * std::fabs(driver.torque.c[D::first_input + i] * u_rate[i]);
-                    }
+                    each_input_of<D>(driver.torque, [&](int i, double c) {
+                        sum += c * u_rate[i];
+                        size += rounding * std::fabs(c * u_rate[i]);
+                    });
                     return sum + 2.0 * size;
                 };
                 turned = first_fall(rate, 0.0, dense, end, false, t_event) || turned;
@@ -353,7 +354,7 @@ class AdaptiveSolver {
         };
         // A solution of finite accuracy may tremble about a guard that the exact one only approaches.
         double noise = rounding * magnitude<D>(guard.form, dense.x, now_.memory, input_at(dense.begin, dense.x));
-        for (int k = 0; k < D::states; ++k) noise += noise_factor * std::fabs(guard.form.c[k]) * scale_[k];
+        each_state_of<D>(guard.form, [&](int k, double c) { noise += noise_factor * std::fabs(c) * scale_[k]; });
         // The speed of the twist is a small difference, and each of its zeros sets the hysteresis anew: one that the
         // error of the solution may make is none.
         if (guard.by_grazing) noise += solution_error(guard.form, dense.x);
@@ -391,8 +392,8 @@ class AdaptiveSolver {
                       const Guard*& crossed) {
         const double t = dense.begin + dense.length * c.lowest_at();
         const double near = grazing_factor * solution_error(guard.form, dense.x);
-        if (c.c0 > near) off_zero_ |= std::uint64_t{1} << number;
-        if ((off_zero_ >> number & 1) == 0 || c.c3 <= near || t >= t_event ||
+        if (c.c0 > near) off_zero_.set(number);
+        if (!off_zero_[number] || c.c3 <= near || t >= t_event ||
             std::fabs(evaluate<D>(guard.form, dense(t), now_.memory, input_at(t, dense(t)))) > near)
             return;
         t_event = t;
@@ -402,7 +403,8 @@ class AdaptiveSolver {
     // What the tolerance allows for in a form.
     double solution_error(const LinearForm& form, const State& x) const {
         double error = 0.0;
-        for (int k = 0; k < D::states; ++k) error += tolerance_ * std::fabs(form.c[k]) * (scale_[k] + std::fabs(x[k]));
+        each_state_of<D>(form,
+                         [&](int k, double c) { error += tolerance_ * std::fabs(c) * (scale_[k] + std::fabs(x[k])); });
         return error;
     }
 
@@ -426,7 +428,7 @@ class AdaptiveSolver {
     long steps_ = 0;
     std::size_t switchings_ = 0;
     Accumulation accumulation_;
-    std::uint64_t off_zero_ = 0;  // bit g: guard g, which may touch zero, has been off it in this regime
+    typename Cache::Guards off_zero_;  // guards that may touch zero and have been off it in this regime
     Contact stopped_at_{};
 };
 

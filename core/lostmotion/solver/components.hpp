@@ -2,15 +2,49 @@
 #pragma once
 
 #include <array>
+#include <utility>
+#include <vector>
 
 #include "switching.hpp"
 
 namespace lostmotion {
 
+// Things by the place of a component: those of the states, then D::states and what is remembered.
+template <class D, class T>
+struct ByComponent : std::array<T, static_cast<std::size_t>(D::states + D::memory)> {};
+template <class T>
+struct ByComponent<Any, T> {
+    std::vector<T> coupled, angle, memory;
+
+    T& operator[](int k) {
+        return k < Any::coupled  ? at(coupled, k)
+               : k < Any::states ? at(angle, k - Any::coupled)
+                                 : at(memory, k - Any::states);
+    }
+    const T& operator[](int k) const {
+        static const T nothing{};
+        const auto& part = k < Any::coupled ? coupled : k < Any::states ? angle : memory;
+        const auto at = static_cast<std::size_t>(k < Any::coupled  ? k
+                                                 : k < Any::states ? k - Any::coupled
+                                                                   : k - Any::states);
+        return at < part.size() ? part[at] : nothing;
+    }
+
+ private:
+    static T& at(std::vector<T>& part, int k) {
+        if (static_cast<std::size_t>(k) >= part.size()) part.resize(static_cast<std::size_t>(k) + 1);
+        return part[static_cast<std::size_t>(k)];
+    }
+};
 template <class D>
-inline constexpr int component_count = D::states + D::memory;
-template <class D>
-using ComponentsOf = std::array<double, static_cast<std::size_t>(component_count<D>)>;
+using ComponentsOf = ByComponent<D, double>;
+
+// Calls use(k) for the place of each component.
+template <class D, class Use>
+void each_component(const CountsOf<D>& n, Use&& use) {
+    each_state<D>(n, use);
+    for (int k = 0; k < n.memory; ++k) use(D::states + k);
+}
 
 // Where a motion begins.
 template <class D>
@@ -23,28 +57,30 @@ struct StartOf {
 template <class D>
 ComponentsOf<D> gradient(const LinearFormOf<D>& f) {
     ComponentsOf<D> g{};
-    for (int k = 0; k < D::states; ++k) g[k] = f.c[k];
-    for (int k = 0; k < D::memory; ++k) g[D::states + k] = f.c[D::first_memory + k];
+    each_state_of<D>(f, [&](int k, double c) { g[k] = c; });
+    each_memory_of<D>(f, [&](int k, double c) { g[D::states + k] = c; });
     return g;
 }
 
 // Of the components after a while, by those before.
 template <class D>
 struct JacobianOf {
-    static constexpr int n = component_count<D>;
-    std::array<ComponentsOf<D>, static_cast<std::size_t>(n)> row{};
+    [[no_unique_address]] CountsOf<D> n;
+    ByComponent<D, ComponentsOf<D>> row{};
 
-    static JacobianOf identity() {
-        JacobianOf j;
-        for (int k = 0; k < n; ++k) j.row[k][k] = 1.0;
+    static JacobianOf identity(const CountsOf<D>& n) {
+        JacobianOf j{n};
+        each_component<D>(n, [&](int k) { j.row[k][k] = 1.0; });
         return j;
     }
     friend JacobianOf operator*(const JacobianOf& a, const JacobianOf& b) {
-        JacobianOf out;
-        for (int r = 0; r < n; ++r)
-            for (int k = 0; k < n; ++k)
-                if (a.row[r][k] != 0.0)
-                    for (int c = 0; c < n; ++c) out.row[r][c] += a.row[r][k] * b.row[k][c];
+        JacobianOf out{a.n};
+        each_component<D>(a.n, [&](int r) {
+            each_component<D>(a.n, [&](int k) {
+                if (std::as_const(a.row)[r][k] == 0.0) return;
+                each_component<D>(a.n, [&](int c) { out.row[r][c] += a.row[r][k] * b.row[k][c]; });
+            });
+        });
         return out;
     }
 };

@@ -15,7 +15,7 @@ struct CourseOf {
     StateOf<D> rate{};  // x', if it is known better than from x: under constant inputs
     bool rate_known = false;
     InputsOf<D> input{};  // up to here; those that the rate belongs to
-    std::array<TwistCourse, D::twists> twist{};
+    ListOf<D, TwistCourse, D::twists> twist{};
 
     // Has the regime begun?
     bool has_magnitudes() const {

@@ -1,7 +1,6 @@
 // What goes on with a regime beside its state: the rate under constant inputs, with its rounding, and rest.
 #pragma once
 
-#include <bit>
 #include <utility>
 
 #include "exact_run.hpp"
@@ -10,7 +9,7 @@ namespace lostmotion {
 
 template <class System>
 auto ExactSolver<System>::has_settled(const Regime& regime, const State& rate) const -> bool {
-    for (int k = 0; k < D::coupled; ++k) {
+    for (int k = 0, n = system_.counts().coupled; k < n; ++k) {
         if (regime.following[k]) continue;
         if (!(std::fabs(rate[k]) <= settled * scale_[k])) return false;
     }
@@ -20,18 +19,17 @@ auto ExactSolver<System>::has_settled(const Regime& regime, const State& rate) c
 // Under inputs that vary, the states that they do not reach decay for ever: once they are below what squares allow,
 // they are zero. Returns whether one has become so.
 template <class System>
-inline auto ExactSolver<System>::rest_unforced(const Entry& e, const State& rate) -> bool {
-    typename Cache::States forced = 0;
-    for (int i = 0; i < D::inputs; ++i)
-        if (begin_->input().varies(i)) forced |= e.reached[i];
+inline auto ExactSolver<System>::rest_unforced(Entry& e, const State& rate) -> bool {
+    typename Cache::States forced;
+    for (int i = 0, n = system_.counts().inputs; i < n; ++i)
+        if (begin_->input().varies(i)) forced |= e.reached(i);
     bool changed = false;
-    for (typename Cache::States left = ~forced & Cache::all_states; left != 0; left &= left - 1) {
-        const int k = std::countr_zero(left);
+    (Cache::States::below(system_.counts().coupled) - forced).each([&](int k) {
         const double limit = settled * scale_[k];
-        if (now_.x[k] == 0.0 || !(std::fabs(now_.x[k]) <= limit && std::fabs(rate[k]) <= limit)) continue;
+        if (now_.x[k] == 0.0 || !(std::fabs(now_.x[k]) <= limit && std::fabs(rate[k]) <= limit)) return;
         now_.x[k] = 0.0;
         changed = true;
-    }
+    });
     return changed;
 }
 
@@ -45,7 +43,7 @@ inline auto ExactSolver<System>::follow_inputs(const Key& before) -> void {
     }
     Entry& e = cache_.entry(key_);
     Lanes rate = load(course_.rate);
-    for (int i = 0; i < D::inputs; ++i)
+    for (int i = 0, n = system_.counts().inputs; i < n; ++i)
         rate.coupled = rate.coupled + (now_.input[0][i] - left[i]) * load(e.rates.input_column[i]);
     const Coupled before_jump = bound_ahead(e, coupled(course_.rate)), after_jump = bound_ahead(e, rate.coupled);
     for (int t = 0; t < e.n_twists; ++t) {
@@ -55,14 +53,20 @@ inline auto ExactSolver<System>::follow_inputs(const Key& before) -> void {
         twist.off_zero = false;
         twist.grazing_magnitude = 0.0;
     }
-    rate.store(course_.rate.data());
+    rate.store(course_.rate);
 }
 
 // Bound on the coupled states over the first event check, from what they are.
 template <class System>
 inline auto ExactSolver<System>::bound_ahead(Entry& e, const Coupled& x) const -> Coupled {
-    if (!e.propagator.ready()) e.prepare(rotations_, scale_);
-    return e.propagator.level(first_level).exponential_bound * absolute(x);
+    if (!e.propagator.ready()) cache_.prepare(e, rotations_, scale_);
+    Propagator& p = e.propagator;
+    if constexpr (std::same_as<D, Any>)
+        if (p.by_series()) {
+            const double h = p.length(p.longest_level());
+            return Series::exponential_bound(e.rates, absolute(x), h, p.theta(h));
+        }
+    return p.level(first_level).exponential_bound * absolute(x);
 }
 
 // Rounding of the rate where a regime begins, as far as it acts on the twists. A number that the search for the modes
@@ -101,11 +105,12 @@ template <class System>
 inline auto ExactSolver<System>::rest(const Segment<System>& segment, const Cursor& at, double limit) -> void {
     now_.x = at.x();
     if (time_ == segment.begin) {
-        for (int j = D::coupled; j < D::states; ++j) now_.x[j] += at.rate()[j] * (limit - time_);
+        for (int j = D::coupled; j < D::coupled + system_.counts().angles; ++j)
+            now_.x[j] += at.rate()[j] * (limit - time_);
         time_ = limit;
     }
     keep_course(segment.entry, at);
-    for (int k = 0; k < D::coupled; ++k) course_.rate[k] = 0.0;
+    for (int k = 0, n = system_.counts().coupled; k < n; ++k) course_.rate[k] = 0.0;
     course_.rate_known = true;
 }
 
@@ -113,8 +118,8 @@ inline auto ExactSolver<System>::rest(const Segment<System>& segment, const Curs
 template <class System>
 inline auto ExactSolver<System>::keep_course(const Entry& e, const Cursor& at) -> void {
     // Carried on for long, the speeds that a stuck twist ties together drift apart by rounding.
-    if constexpr (requires(std::array<bool, D::contacts> at_rest) { system_.stop(now_.x, at_rest); }) {
-        std::array<bool, D::contacts> at_rest = e.regime.at_rest;
+    if constexpr (requires(decltype(e.regime.at_rest) at_rest) { system_.stop(now_.x, at_rest); }) {
+        auto at_rest = e.regime.at_rest;
         if (at.carries_rate() && e.followed) system_.stop(now_.x, at_rest);
     }
     course_.rate = at.rate();

@@ -48,9 +48,9 @@ inline auto ExactSolver<System>::run_regime(const Segment<System>& segment, doub
             return Status::done;
         }
         if (!moderate(rate)) return Status::outside;
-        const Coupled fourth = absolute(cursor->fourth_derivative());
+        const Coupled fourth = p.by_series() ? Coupled{} : absolute(cursor->fourth_derivative());
         const double left = limit - time_;
-        level = p.bounded_level(level);
+        if (!p.by_series()) level = p.bounded_level(level);
         if (p.length(level) < 0.5 * shortest) [[unlikely]]
             return Status::outside;
         double h = std::min(p.length(level), left);
@@ -61,7 +61,7 @@ inline auto ExactSolver<System>::run_regime(const Segment<System>& segment, doub
                 end->advance_from(*cursor, h);
             }
             evaluate(e, constant, *end, *there);
-            bound_fourth(e.guards, p.level(level).exponential_bound, fourth + h * forced);
+            bound_fourth(e.guards, p, level, fourth + h * forced);
             const Verdict verdict = judge(e, segment.memory, *cursor, *here, *there, h, h < shortest);
             if (verdict == Verdict::uncertain) {  // below the lowest doubling level, by plain halves
                 h = level > lowest ? std::min(p.length(level = std::max(lowest, level - halvings_)), left) : 0.5 * h;
@@ -118,10 +118,17 @@ inline auto ExactSolver<System>::evaluate(const Entry& e, const typename GuardTa
 
 // |g''''| over the event check, from a bound on the fourth derivative of the state that the flow carries on.
 template <class System>
-inline auto ExactSolver<System>::bound_fourth(const GuardTable& guards, const Matrix& exponential_bound,
+inline auto ExactSolver<System>::bound_fourth(const GuardTable& guards, Propagator& p, int level,
                                               const Coupled& magnitude) -> void {
     State bound;
-    (exponential_bound * magnitude).store(bound.data());
+    if constexpr (std::same_as<D, Any>) {
+        if (p.by_series())
+            bound.coupled = p.series().fourth_bound();
+        else
+            bound.coupled = p.level(level).exponential_bound * magnitude;
+    } else {
+        store<D>(p.level(level).exponential_bound * magnitude, bound);
+    }
     guards.rate_magnitudes(bound, input_bound_, bounds_.fourth);
 }
 
@@ -130,20 +137,22 @@ inline auto ExactSolver<System>::bound_fourth(const GuardTable& guards, const Ma
 template <class System>
 inline auto ExactSolver<System>::enclose(int rows, const Ends& here, const Ends& there, double h) -> Guards {
     const double third = h / 3.0, share = h * h * h * h / 384.0;
-    Guards doubtful = 0;
+    make_room(bounds_.lower, rows);
+    make_room(bounds_.error, rows);
+    Guards doubtful;
     unsigned tight = 0;
     for (int g = 0; g < rows; g += vec_width) {
-        const Vec begin = load(&here.value[g]), end = load(&there.value[g]);
-        const Vec c1 = begin + third * load(&here.slope[g]), c2 = end - third * load(&there.slope[g]);
-        const Vec low = min_of(min_of(begin, end), min_of(c1, c2)), error = share * load(&bounds_.fourth[g]);
-        store(low, &bounds_.lower[g]);
-        store(error, &bounds_.error[g]);
+        const Vec begin = load(here.value.data() + g), end = load(there.value.data() + g);
+        const Vec c1 = begin + third * load(here.slope.data() + g), c2 = end - third * load(there.slope.data() + g);
+        const Vec low = min_of(min_of(begin, end), min_of(c1, c2)), error = share * load(bounds_.fourth.data() + g);
+        store(low, bounds_.lower.data() + g);
+        store(error, bounds_.error.data() + g);
         const unsigned clear = above(low, error);
         if (clear != all_bits) {
             // One that starts on zero or above and rises all through is certain, too.
             const Vec rise = min_of(c1 - begin, min_of(c2 - c1, end - c2));
             const unsigned rises = above(rise, slope_share * error) & ~above(Vec{}, begin);
-            doubtful |= Guards{all_bits & ~(clear | rises)} << g;
+            doubtful.set(g, all_bits & ~(clear | rises));
         }
         tight |= clear & ~above(low, 64.0 * error);
     }
@@ -157,7 +166,7 @@ inline auto ExactSolver<System>::judge(Entry& e, const Memory& memory, const Cur
     Guards doubtful = enclose(e.guards.rows(), here, there, h);
     n_crossing_ = 0;
     // What counts as zero when the speed of a twist grazes it.
-    std::array<double, D::twists> grazing{};
+    ListOf<D, double, D::twists> grazing{};
     for (int t = 0; t < e.n_twists; ++t) {
         const int g = e.twists[t].grazing_guard;
         if (g < 0) continue;
@@ -165,20 +174,20 @@ inline auto ExactSolver<System>::judge(Entry& e, const Memory& memory, const Cur
         twist.grazing_magnitude = std::max(twist.grazing_magnitude, e.grazing_magnitude(e.twists[t], cursor.x()));
         grazing[t] = cursor.carries_rate() ? twist_speed_rounding(e, t, cursor) : rounding * twist.grazing_magnitude;
         twist.off_zero |= here.value[g] > grazing[t];
-        if (bounds_.lower[g] <= grazing[t]) doubtful |= Guards{1} << g;
+        if (bounds_.lower[g] <= grazing[t]) doubtful.set(g);
     }
-    doubtful &= ~e.behind;
-    if (doubtful == 0) return Verdict::clear;
+    doubtful -= e.behind;
+    if (doubtful.empty()) return Verdict::clear;
     const Memory memory_magnitudes = magnitudes(memory);
     const State state_magnitudes = magnitudes(cursor.x());
-    for (; doubtful != 0; doubtful &= doubtful - 1) {
-        const int g = std::countr_zero(doubtful);
+    bool certain = true;
+    doubtful.each([&](int g) {
         const double low = bounds_.lower[g], error = bounds_.error[g];
         const Cubic c(here.value[g], here.slope[g], there.value[g], there.slope[g], h);
         const int t = e.grazing_twist(g);
         const double near = t >= 0 ? grazing[t] : 0.0;
         const bool grazes = t >= 0 && course_.twist[t].off_zero && low - error <= near && c.c3 > near;
-        if (low > error && !grazes) continue;
+        if (low > error && !grazes) return true;
         const double magnitude = e.guards.magnitude_of(g, memory_magnitudes, state_magnitudes, cursor.input());
         const auto of_rate = rate_multiple(e, cursor, g);
         const double resolution = of_rate.factor != 0.0
@@ -186,18 +195,18 @@ inline auto ExactSolver<System>::judge(Entry& e, const Memory& memory, const Cur
                                       : rounding * magnitude;
         const double tolerance = resolution + time_rounding * std::fabs(time_) *
                                                   std::max(std::fabs(here.slope[g]), std::fabs(there.slope[g]));
-        if (low - error >= -tolerance && !grazes) continue;
+        if (low - error >= -tolerance && !grazes) return true;
         const double d0 = c.c1 - c.c0, d1 = c.c2 - c.c1, d2 = c.c3 - c.c2;
         const bool rises = std::min(d0, std::min(d1, d2)) > slope_share * error;
         const bool falls = std::max(d0, std::max(d1, d2)) < -slope_share * error;
-        if (rises && c.c0 >= -tolerance && !(grazes && c.c0 <= near)) continue;
-        if (falls && c.c3 >= -tolerance) continue;
+        if (rises && c.c0 >= -tolerance && !(grazes && c.c0 <= near)) return true;
+        if (falls && c.c3 >= -tolerance) return true;
         const bool starts_on_zero = c.c0 <= rounding * magnitude;
         if (falls) {
             crossing_[n_crossing_++] = {g, false, starts_on_zero};
-            continue;
+            return true;
         }
-        if (c.c0 <= tolerance && !grazes && departs(e, memory, cursor, g, h)) continue;
+        if (c.c0 <= tolerance && !grazes && departs(e, memory, cursor, g, h)) return true;
         const double resolved = grazes ? near : tolerance;
         if (error > resolved && !shortest) {
             // Half the length has a sixteenth of the error, which ought to be small beside what the guard does.
@@ -205,7 +214,7 @@ inline auto ExactSolver<System>::judge(Entry& e, const Memory& memory, const Cur
                                            h * std::max(std::fabs(here.slope[g]), std::fabs(there.slope[g])));
             halvings_ = 1;
             for (double left = error / 16.0; left > 0.25 * course && halvings_ < 10; left /= 16.0) ++halvings_;
-            return Verdict::uncertain;
+            return certain = false;
         }
         // The cubic is the guard to rounding, or as near as the shortest event check comes; does it dip below zero?
         const double lowest = c(c.lowest_at());
@@ -213,7 +222,9 @@ inline auto ExactSolver<System>::judge(Entry& e, const Memory& memory, const Cur
             crossing_[n_crossing_++] = {g, false, starts_on_zero};
         else if (grazes && lowest <= resolved)
             crossing_[n_crossing_++] = {g, true, starts_on_zero};
-    }
+        return true;
+    });
+    if (!certain) return Verdict::uncertain;
     return n_crossing_ > 0 ? Verdict::crossing : Verdict::clear;
 }
 

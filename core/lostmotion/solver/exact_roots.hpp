@@ -19,18 +19,27 @@ double ExactSolver<System>::first_turn(Entry& e, double limit) {
         int level = first_level;
         double ticks = 1.0;
         Coupled forced{};
-        for (int i = 0; i < D::inputs; ++i) forced = forced + input_bound_[i] * absolute(load(e.rates.input_column[i]));
+        for (int i = 0; i < e.rates.n.inputs; ++i)
+            forced = forced + input_bound_[i] * absolute(load(e.rates.input_column[i]));
         Cursor at = *begin_;
         while (at.time() < limit && !interruption()) {
             // A motion that grows without bound is followed to no end: a guard ends the regime before.
             if (!moderate(at.rate())) return at.time();
-            level = e.propagator.bounded_level(level);
+            level = e.propagator.by_series() ? std::min(level, e.propagator.longest_level())
+                                             : e.propagator.bounded_level(level);
             const double h = e.propagator.length(level);
             const InstantOf<D> now{at.time(), at.x(), now_.memory, at.input().jet(), at.input().magnitudes()};
             Flow<D> along(e.rates, now);
             State fourth{};
-            (e.propagator.level(level).exponential_bound * (absolute(at.fourth_derivative()) + h * forced))
-                .store(fourth.data());
+            if constexpr (std::same_as<D, Any>) {
+                if (e.propagator.by_series()) {
+                    e.propagator.series().expand(e.rates, load(at.rate()), at.input(), h, e.propagator.theta(h));
+                    fourth.coupled = e.propagator.series().fourth_bound();
+                }
+            }
+            if (!e.propagator.by_series())
+                store<D>(e.propagator.level(level).exponential_bound * (absolute(at.fourth_derivative()) + h * forced),
+                         fourth);
             double step = std::min(h, limit - at.time()), longest = step;
             for (const auto& driver : e.regime.drivers) {
                 const LinearForm& torque = driver.torque;
@@ -39,8 +48,8 @@ double ExactSolver<System>::first_turn(Entry& e, double limit) {
                 const double v = along.rate(torque, 1) + 2.0 * noise;
                 if (v < 0.0) return at.time();
                 double bound = 0.0;
-                for (int k = 0; k < D::states; ++k) bound += std::fabs(torque.c[k]) * fourth[k];
-                for (int i = 0; i < D::inputs; ++i) bound += std::fabs(torque.c[D::first_input + i]) * input_bound_[i];
+                each_state_of<D>(torque, [&](int k, double c) { bound += std::fabs(c) * fourth[k]; });
+                each_input_of<D>(torque, [&](int i, double c) { bound += std::fabs(c) * input_bound_[i]; });
                 const double K = std::fmax(0.0, -b) + bound * h / 3.0;
                 if (v == 0.0 && a == 0.0 && K > 0.0) {
                     // b s^2/2 - bound s^3/6 at least; without b as well, a torque that changes within rounding so soon.
@@ -79,7 +88,7 @@ inline auto ExactSolver<System>::first_crossing(Entry& e, const Memory& memory, 
                                                 const Ends& there, double h, const Guard*& fired) -> void {
     double best = std::numeric_limits<double>::infinity();
     const auto cubic = [&](int g) { return Cubic(here.value[g], here.slope[g], there.value[g], there.slope[g], h); };
-    std::array<double, D::guards> estimate;
+    ListOf<D, double, D::guards> estimate;
     for (int k = 0; k < n_crossing_; ++k) {
         const auto& [g, grazing, starts_on_zero] = crossing_[k];
         const Cubic c = cubic(g);

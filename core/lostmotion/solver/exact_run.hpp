@@ -149,10 +149,13 @@ class ExactSolver {
 
     // What is known beside the state: exact_course.hpp.
     static bool moderate(const State& rate) {
-        return sum_in_fours<D::coupled>([&](auto k) { return std::fabs(rate[k]); }) < 1e100;
+        if constexpr (std::same_as<D, Any>)
+            return absolute(rate.coupled).sum() < 1e100;
+        else
+            return sum_in_fours<D::coupled>([&](auto k) { return std::fabs(rate[k]); }) < 1e100;
     }
     [[gnu::noinline]] bool has_settled(const Regime& regime, const State& rate) const;
-    bool rest_unforced(const Entry& e, const State& rate);
+    bool rest_unforced(Entry& e, const State& rate);
     [[gnu::cold]] void follow_inputs(const Key& before);
     Coupled bound_ahead(Entry& e, const Coupled& x) const;
     void begin_in_doubt(Entry& e, const Cursor& at, const Memory& memory);
@@ -175,7 +178,7 @@ class ExactSolver {
     [[gnu::noinline]] bool leap(const Entry& e, double limit);
     [[gnu::always_inline]] static void evaluate(const Entry& e, const typename GuardTable::Values& constant, Cursor& at,
                                                 Ends& out);
-    [[gnu::always_inline]] void bound_fourth(const GuardTable& guards, const Matrix& exponential_bound,
+    [[gnu::always_inline]] void bound_fourth(const GuardTable& guards, Propagator& p, int level,
                                              const Coupled& magnitude);
     Guards enclose(int rows, const Ends& here, const Ends& there, double h);
     Verdict judge(Entry& e, const Memory& memory, const Cursor& cursor, const Ends& here, const Ends& there, double h,
@@ -221,7 +224,7 @@ class ExactSolver {
         int guard;
         bool grazing, starts_on_zero;
     };
-    std::array<Crossing, D::guards> crossing_{};
+    ListOf<D, Crossing, D::guards> crossing_{};
     int n_crossing_ = 0;
     Course course_;
     Accumulation accumulation_;
@@ -262,7 +265,7 @@ std::unique_ptr<ExactSolver<System>> ExactSolver<System>::twin() const {
 template <class System>
 void ExactSolver<System>::follow(const ExactSolver& o) {
     resume(o.time_, o.now_.x, o.now_.memory, o.key_, o.course_);
-    for (int i = 0; i < D::inputs; ++i)
+    for (std::size_t i = 0; i < signals_.size(); ++i)
         if (signals_[i].breakpoints.size() == 1) signals_[i].breakpoints[0] = o.signals_[i].breakpoints[0];
 }
 
@@ -297,7 +300,7 @@ Status ExactSolver<System>::advance(double t_end, Observer& observer) {
     while (true) {
         if (interruption(steps_of_a_search)) return Status::interrupted;
         Entry& entry = cache_.entry(key_);
-        if (!entry.propagator.ready()) entry.prepare(rotations_, scale_);
+        if (!entry.propagator.ready()) cache_.prepare(entry, rotations_, scale_);
         Segment<System> segment{
             system_, entry, *begin_, time_, t_end, true, now_.memory, entry.rates.constant(now_.memory), now_.x};
         begin_->place(entry.propagator, segment.constant, now_.x, course_.rate_known ? &course_.rate : nullptr);

@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <memory>
 #include <new>
-#include <type_traits>
 #include <vector>
 
+#include "../kernel/bit_set.hpp"
 #include "../kernel/propagator.hpp"
 
 namespace lostmotion {
@@ -23,13 +23,8 @@ class RegimeCache {
     using LinearForm = LinearFormOf<D>;
     using GuardTable = FormTable<D, D::guards>;
     using State = StateOf<D>;
-    // A set of guards, as bits.
-    using Guards = std::conditional_t<(D::guards <= 32), std::uint32_t, std::uint64_t>;
-    static_assert(D::guards <= 64);
-    // A set of coupled states, as bits.
-    using States = std::uint32_t;
-    static_assert(D::coupled < 32);
-    static constexpr States all_states = (States{1} << D::coupled) - 1;
+    using Guards = BitSet<D::guards>;
+    using States = BitSet<D::coupled>;  // a set of coupled states
 
     struct Entry {
         Entry() = default;
@@ -39,14 +34,15 @@ class RegimeCache {
         Regime regime;
         LinearRatesOf<D> rates;
         GuardTable guards;
-        std::array<Guards, D::contacts> speeds;  // the guards of each contact's speed
-        Guards contacts;                         // those that say whether a contact goes on in its mode
-        Guards behind;                           // edges that a twist slips away from, so that it does not reach them
+        ListOf<D, int, D::contacts> speeds;  // the guards of speeds of contacts
+        int n_speeds;
+        Guards contacts;  // those that say whether a contact goes on in its mode
+        Guards behind;    // edges that a twist slips away from, so that it does not reach them
         // The twists that move: the state, and the guard of its rate that also ends the regime by touching zero.
         struct Twist {
             int state, grazing_guard;
         };
-        std::array<Twist, D::twists> twists;
+        ListOf<D, Twist, D::twists> twists;
         int n_twists;
         bool may_graze;  // has one of them such a guard?
         // The guards that are multiples of the rate of a twist: its own speed, and that of one end while the other
@@ -55,37 +51,37 @@ class RegimeCache {
             int guard, twist;
             double factor;
         };
-        std::array<TwistSpeed, D::contacts> twist_speeds;
+        ListOf<D, TwistSpeed, D::contacts> twist_speeds;
         int n_twist_speeds;
-        std::array<States, D::inputs> reached;   // the states that each input acts on, by way of others, too
         bool followed;                           // does the speed of a state follow another?
         typename GuardTable::Values near_event;  // what each guard exceeds where it is far from an event
         Propagator<D> propagator;
-        std::array<Entry*, D::guards> neighbour;  // what lies beyond each guard, as far as it is known
+        ListOf<D, Entry*, D::guards> neighbour;  // what lies beyond each guard, as far as it is known
 
         void set(const System& system, const Key& key) {
             system.build(key, regime);
             const Regime& r = regime;
-            new (&rates) LinearRatesOf<D>(r.rate);
+            std::destroy_at(&rates);
+            std::construct_at(&rates, system.counts(), r.rate);
             if constexpr (requires { r.given; }) rates.given = r.given.empty() ? nullptr : &r.given;
             guards.clear();
+            if constexpr (std::same_as<D, Any>) guards.set_states(rates.n.coupled);
             neighbour = {};
-            speeds = {};
-            contacts = behind = 0;
+            n_speeds = 0;
+            contacts = behind = {};
+            reach_known_ = {};
             for (int g = 0; g < r.n_guards; ++g) {
                 const Guard& guard = r.guards[g];
                 guards.set(g, guard.form);
-                if (guard.kind == Guard::speed) speeds[guard.contact] |= Guards{1} << g;
-                if (guard.is_of_contact()) contacts |= Guards{1} << g;
-                if (guard.behind) behind |= Guards{1} << g;
+                if (guard.kind == Guard::speed) speeds[n_speeds++] = g;
+                if (guard.is_of_contact()) contacts.set(g);
+                if (guard.behind) behind.set(g);
             }
             followed = std::ranges::find(r.following, true) != r.following.end();
-            find_reach();
             find_twists(system);
             if constexpr (requires { system.near_event(guards, near_event); }) system.near_event(guards, near_event);
             propagator.reset();
         }
-        void prepare(PhaseRotations& rotations, const State& scale) { propagator.prepare(rates, rotations, scale); }
 
         // How many times the rate of a twist a guard is; factor 0 if of none.
         TwistSpeed twist_speed(int guard) const {
@@ -101,28 +97,35 @@ class RegimeCache {
         }
         // Sum of the magnitudes of the terms of a guard that ends by touching, a speed.
         double grazing_magnitude(const Twist& twist, const State& x) const {
-            return sum_in_fours<D::coupled>(
-                [&](auto k) { return std::fabs(guards.coefficient(twist.grazing_guard, k) * x[k]); });
+            if constexpr (std::same_as<D, Any>) {
+                const auto [begin, end] = guards.form(twist.grazing_guard).between(0, D::coupled);
+                return AnyForm::sum_of_coupled(begin, end,
+                                               [&](const auto& t) { return std::fabs(t.factor * x[t.place]); });
+            } else {
+                return sum_in_fours<D::coupled>(
+                    [&](auto k) { return std::fabs(guards.coefficient(twist.grazing_guard, k) * x[k]); });
+            }
+        }
+        // The states that an input acts on, by way of others, too.
+        const States& reached(int input) {
+            if (reach_.empty()) reach_.resize(static_cast<std::size_t>(rates.n.inputs));
+            States& all = reach_[static_cast<std::size_t>(input)];
+            if (reach_known_[input]) return all;
+            reach_known_[input] = true;
+            all = {};
+            for (int r = 0; r < rates.n.coupled; ++r)
+                if (rates.input_column[static_cast<std::size_t>(input)][r] != 0.0) all.set(r);
+            for (States before; before != all;) {
+                before = all;
+                for (int r = 0; r < rates.n.coupled; ++r)
+                    rates.each_in_row(r, [&](int c, double rate) {
+                        if (rate != 0.0 && all[c]) all.set(r);
+                    });
+            }
+            return all;
         }
 
      private:
-        void find_reach() {
-            const auto of = [](const ColumnOf<D>& column) {
-                States out = 0;
-                for (int r = 0; r < D::coupled; ++r) out |= States{column[r] != 0.0} << r;
-                return out;
-            };
-            std::array<States, D::coupled> next;
-            for (int k = 0; k < D::coupled; ++k) next[k] = of(rates.rate.column[k]);
-            for (int i = 0; i < D::inputs; ++i) {
-                States& all = reached[i] = of(rates.input_column[i]);
-                for (States before = 0; before != all;) {
-                    before = all;
-                    for (int k = 0; k < D::coupled; ++k)
-                        if (before >> k & 1) all |= next[k];
-                }
-            }
-        }
         void find_twists(const System& system) {
             n_twists = n_twist_speeds = 0;
             may_graze = false;
@@ -143,15 +146,34 @@ class RegimeCache {
         }
         // How many times the rate of a twist a speed is, or 0; the speeds at rest are left out.
         double times_rate(const LinearForm& speed, const LinearForm& rate) const {
-            const auto moving = [this](const LinearForm& f, int k) { return regime.resting[k] ? 0.0 : f.c[k]; };
-            int first = 0;
-            while (first < D::coupled && moving(rate, first) == 0.0) ++first;
-            if (first == D::coupled) return 0.0;
-            const double a = moving(speed, first), b = moving(rate, first);
-            for (int k = 0; k < D::coupled; ++k)
-                if (a * moving(rate, k) != b * moving(speed, k)) return 0.0;
-            return a / b;
+            if constexpr (std::same_as<D, Any>) {
+                const auto next = [this](const AnyForm::Term*& t, const AnyForm::Term* end) {
+                    while (t != end && (t->factor == 0.0 || regime.resting[t->place])) ++t;
+                };
+                auto [a, end_a] = speed.between(0, D::coupled);
+                auto [b, end_b] = rate.between(0, D::coupled);
+                double first_a = 0.0, first_b = 0.0;
+                for (next(a, end_a), next(b, end_b); a != end_a || b != end_b; next(a, end_a), next(b, end_b)) {
+                    if (a == end_a || b == end_b || a->place != b->place) return 0.0;
+                    if (first_b == 0.0) first_a = a->factor, first_b = b->factor;
+                    if (first_a * b->factor != first_b * a->factor) return 0.0;
+                    ++a, ++b;
+                }
+                return first_b == 0.0 ? 0.0 : first_a / first_b;
+            } else {
+                const auto moving = [this](const LinearForm& f, int k) { return regime.resting[k] ? 0.0 : f.c[k]; };
+                int first = 0;
+                while (first < D::coupled && moving(rate, first) == 0.0) ++first;
+                if (first == D::coupled) return 0.0;
+                const double a = moving(speed, first), b = moving(rate, first);
+                for (int k = 0; k < D::coupled; ++k)
+                    if (a * moving(rate, k) != b * moving(speed, k)) return 0.0;
+                return a / b;
+            }
         }
+
+        std::vector<States> reach_;  // by input, so far as it has been asked for
+        ListOf<D, bool, D::inputs> reach_known_;
     };
 
     explicit RegimeCache(const System& system) : system_(system) {}
@@ -169,6 +191,23 @@ class RegimeCache {
         return *(last_ = neighbour);
     }
 
+    // An entry to be followed. Where matrices are large, those of regimes that have not been met for long are given up.
+    void prepare(Entry& e, PhaseRotations& rotations, const State& scale) {
+        if constexpr (std::same_as<D, Any>) {
+            std::erase(followed_, &e);
+            followed_.push_back(&e);
+            std::size_t bytes = 0;
+            for (std::size_t k = followed_.size(); k-- > 0;) {
+                bytes += followed_[k]->propagator.bytes();
+                if (bytes <= most_bytes || followed_.size() - k <= in_use) continue;
+                for (std::size_t old = 0; old <= k; ++old) followed_[old]->propagator.release();
+                followed_.erase(followed_.begin(), followed_.begin() + static_cast<std::ptrdiff_t>(k) + 1);
+                break;
+            }
+        }
+        e.propagator.prepare(e.rates, rotations, scale);
+    }
+
     // Forgets all regimes, since the system has changed. The memory of so many is kept for others.
     void forget(std::size_t kept = max_kept) {
         left_ = std::max(left_, used_);
@@ -179,6 +218,7 @@ class RegimeCache {
         std::ranges::fill(slots_, nullptr);
         used_ = 0;
         last_ = nullptr;
+        followed_.clear();
     }
 
     // Makes ready for runs with this unit of length and these inputs; propagators for others are forgotten.
@@ -193,6 +233,8 @@ class RegimeCache {
 
  private:
     static constexpr std::size_t max_kept = 4000;  // from run to run; each of a drive takes about 12 kilobytes
+    // Matrices of trains of any size, and how many regimes observers may still read.
+    static constexpr std::size_t most_bytes = std::size_t{256} << 20, in_use = 8;
 
     [[gnu::noinline]] Entry& find(const Key& key) {
         std::size_t k = slot(key);
@@ -227,7 +269,8 @@ class RegimeCache {
 
     const System& system_;
     std::unique_ptr<PhaseRotations> rotations_;
-    Entry* last_ = nullptr;  // the one asked for last
+    std::vector<Entry*> followed_;  // with matrices, in the order of their last preparation; only of trains of any size
+    Entry* last_ = nullptr;         // the one asked for last
     std::vector<std::unique_ptr<Entry[]>> blocks_;
     std::size_t used_ = 0, left_ = 0;  // those in use come first, then those that `forget` has left
     std::vector<Entry*> slots_ = std::vector<Entry*>(256, nullptr);  // a power of two, by hash, at most half full

@@ -16,7 +16,7 @@ from .parameters import Parameter, parameters_of
 
 
 def kernel_of(scenario: Scenario) -> str:
-    """The kernel of the core that a scenario takes: ``"drive"``, or the narrowest that holds its train."""
+    """The kernel of the core that a scenario takes: ``"drive"``, or the smallest that holds its train."""
     return scenario.core().kernel()
 
 

@@ -1,8 +1,8 @@
 #include "solving.hpp"
 
 namespace lostmotion {
-LOSTMOTION_SOLVING(template, model::Wide)
+LOSTMOTION_SOLVING(template, Any)
 namespace {
-const KernelIn<model::Wide> kernel("wide");
+const KernelIn<Any> kernel("any");
 }
 }  // namespace lostmotion

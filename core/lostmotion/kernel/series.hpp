@@ -1,0 +1,158 @@
+// The motion of a large train over one step by its Taylor series, without a matrix: docs/theory.md, "Large trains".
+//
+// With the rate x' at an instant, c_1 = x' h, and
+//     c_{k+1} = h/(k + 1) (A c_k + B u^(k) h^k/k!),     x(h) = x + sum_k c_k.
+// A is sparse, so that a term costs as much as the train has elements. In scaled units |c_{k+1}| <= theta/(k + 1) times
+// the larger of |c_k| and what the inputs bring, theta = |A| h, and what is left out after K terms is at most
+// |c_1| theta^K/(K + 1)! 1/(1 - theta/(K + 2)).
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "inputs.hpp"
+#include "rates.hpp"
+
+namespace lostmotion {
+
+class Series {
+ public:
+    using Lanes = LanesOf<Any>;
+    // The longest step: beyond it, terms that cancel grow above the motion.
+    static constexpr double longest = 4.0;  // theta
+    static constexpr int most_terms = 34;
+
+    // So many that what is left out is below 2^-60 |c_1|.
+    static int terms(double theta) {
+        double term = 0.5 * theta;
+        int k = 1;
+        for (; k < most_terms && term * (k + 2) > 0x1p-60 * (k + 2 - theta); ++k) term *= theta / (k + 2);
+        return k;
+    }
+
+    // From an instant with this rate and these inputs, over h. theta: at least |A| h, in scaled units.
+    void expand(const LinearRatesOf<Any>& rates, const Lanes& rate, const InputState<Any>& input, double h,
+                double theta) {
+        begin(rates, rate, h, theta);
+        see_inputs(input);
+        add_terms();
+    }
+    // The same under constant inputs.
+    void expand(const LinearRatesOf<Any>& rates, const Lanes& rate, double h, double theta) {
+        begin(rates, rate, h, theta);
+        varying_.clear();
+        add_terms();
+    }
+
+    // By how much the state changes over the step; the small terms first.
+    Lanes change() const {
+        Lanes out;
+        out.coupled = sum([](int) { return 1.0; });
+        for (int j = 0; j < rates_->n.angles; ++j) {
+            const int speed = rates_->angle_speed[j];
+            double turned = 0.0;
+            for (int k = count_; k >= 1; --k) turned += term(k)[speed] / (k + 1);
+            out.angle[j] = h_ * (angle_rate_[j] + rates_->angle_coefficient[j] * turned);
+        }
+        return out;
+    }
+    // By how much the rate of the coupled states does.
+    Numbers rate_change() const {
+        return sum([this](int k) { return k > 1 ? k / h_ : 0.0; });
+    }
+    // Bound on |exp(A s)| times these magnitudes for 0 <= s <= h, |A| h <= theta.
+    static Numbers exponential_bound(const LinearRatesOf<Any>& rates, const Numbers& magnitudes, double h,
+                                     double theta) {
+        const SparseRates positive = rates.sparse().magnitudes();
+        Numbers sum = magnitudes, last = magnitudes, next;
+        sum.reach(static_cast<std::size_t>(rates.n.coupled));
+        last.reach(sum.size());
+        next.reach(sum.size());
+        for (int k = 1; k <= terms(theta); ++k) {
+            positive.multiply(last.data(), next.data());
+            last = h / k * next;
+            sum = sum + last;
+        }
+        return sum;
+    }
+    // Bound on their fourth derivatives all through the step.
+    Numbers fourth_bound() const {
+        Numbers out;
+        out.reach(n_);
+        const double h4 = h_ * h_ * h_ * h_;
+        for (int k = count_; k >= 4; --k) {
+            const double* c = term(k);
+            const double factor = k * (k - 1.0) * (k - 2.0) * (k - 3.0) / h4;
+            for (std::size_t j = 0; j < n_; ++j) out[j] += factor * std::fabs(c[j]);
+        }
+        return out;
+    }
+
+ private:
+    struct Varying {
+        int input;
+        std::array<double, most_terms + 1> derivative;  // [k]: the k-th, times h^k/k!
+    };
+
+    void begin(const LinearRatesOf<Any>& rates, const Lanes& rate, double h, double theta) {
+        n_ = static_cast<std::size_t>(rates.n.coupled);
+        h_ = h;
+        count_ = terms(theta);
+        rates_ = &rates;
+        angle_rate_ = rate.angle;
+        c_.resize(n_ * static_cast<std::size_t>(count_));
+        for (std::size_t j = 0; j < n_; ++j) c_[j] = h * rate.coupled[static_cast<int>(j)];
+    }
+    void add_terms() {
+        for (int k = 1; k < count_; ++k) {
+            const double* from = term(k);
+            double* to = term(k + 1);
+            const double factor = h_ / (k + 1);
+            rates_->sparse().multiply(from, to);
+            for (const Varying& v : varying_) {
+                const double u = v.derivative[static_cast<std::size_t>(k)];
+                for (const auto& [row, share] : rates_->sparse().of_input[static_cast<std::size_t>(v.input)])
+                    to[row] += share * u;
+            }
+            for (std::size_t j = 0; j < n_; ++j) to[j] *= factor;
+        }
+    }
+
+    double* term(int k) { return c_.data() + static_cast<std::size_t>(k - 1) * n_; }
+    const double* term(int k) const { return c_.data() + static_cast<std::size_t>(k - 1) * n_; }
+    template <class Factor>
+    Numbers sum(Factor&& factor) const {
+        Numbers out;
+        out.reach(n_);
+        double* to = out.data();
+        for (int k = count_; k >= 1; --k) {
+            const double* c = term(k);
+            const double f = factor(k);
+            for (std::size_t j = 0; j < n_; ++j) to[j] += f * c[j];
+        }
+        return out;
+    }
+    void see_inputs(const InputState<Any>& input) {
+        std::size_t used = 0;
+        for (int i = 0; i < rates_->depends_on.inputs; ++i) {
+            if (!input.varies(i)) continue;
+            if (used == varying_.size()) varying_.emplace_back();
+            Varying& v = varying_[used++];
+            v.input = i;
+            input.derivatives(i, count_, v.derivative.data());
+            double factor = 1.0;
+            for (int k = 1; k <= count_; ++k) v.derivative[static_cast<std::size_t>(k)] *= factor *= h_ / k;
+        }
+        varying_.resize(used);
+    }
+
+    std::size_t n_ = 0;
+    double h_ = 0.0;
+    int count_ = 0;
+    const LinearRatesOf<Any>* rates_ = nullptr;
+    Few<double, 4> angle_rate_;
+    std::vector<double> c_;  // term by term
+    std::vector<Varying> varying_;
+};
+
+}  // namespace lostmotion
