@@ -30,7 +30,7 @@ def signal(random: Random, size: float) -> dict[str, Any]:
 
 def train(random: Random) -> dict[str, Any]:
     """Tables of a scenario in the long form."""
-    count = random.randint(1, 5)
+    count = random.randint(1, 5) if random.random() < 0.9 else random.randint(6, 40)
     wide = random.random() < 0.3  # values of many orders
     low, high = (1e-8, 1e3) if wide else (1e-3, 1.0)
     names = [f"s{k}" for k in range(count)]
