@@ -4,9 +4,20 @@ numbers as docs/control.md says it. Nothing of the package is used."""
 
 import math
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from scipy.integrate import DOP853
+
+
+def steps(rates: Any, t: float, x: np.ndarray, end: float, longest: float) -> list[np.ndarray]:
+    """The states after the steps of a solution."""
+    solver, states = DOP853(rates, t, x, end, rtol=1e-13, atol=1e-15, max_step=longest), []
+    while solver.status == "running":
+        solver.step()
+        states.append(solver.y)
+    assert solver.status == "finished"
+    return states
 
 
 @dataclass
@@ -71,14 +82,18 @@ class Axis:
             until = min([end, *nexts])
             if until <= t or begin >= end:
                 continue
+            rates = self.rates(u, angle, M_Z)
+            states = steps(rates, t, x, until, math.inf)
             # At the edges of the play the error that a step of order 8 sees is not the one that it makes.
-            longest = self.tick / 64 if self.gap else math.inf
-            solver = DOP853(self.rates(u, angle, M_Z), t, x, until, rtol=1e-13, atol=1e-15, max_step=longest)
-            while solver.status == "running":
-                solver.step()
-            assert solver.status == "finished"
-            t, x = until, solver.y
+            if self.gap and len({self.flank(state) for state in (x, *states)}) > 1:
+                states = steps(rates, t, x, until, self.tick / 64)
+            t, x = until, states[-1]
         return x
+
+    def flank(self, x: np.ndarray) -> int:
+        """The flank of the play that touches: 1, -1 or none."""
+        d = x[0] / self.ratio - x[2]
+        return int(d > 0.5 * self.gap) - int(d < -0.5 * self.gap)
 
     def run(self, ticks: int) -> tuple[np.ndarray, np.ndarray]:
         """States at the ticks, and the voltages that act from there on, in coordinates of the rotor."""
