@@ -69,6 +69,16 @@ def test_an_error_that_grows_while_the_reference_moves_on_is_said_to_diverge() -
     assert verdict.lines[0].startswith("unstable: the position error of m diverges, up to ")
 
 
+def test_an_axis_whose_motion_leaves_the_range_of_numbers_is_said_to_be_unstable_with_the_loop_that_causes_it(
+    tmp_path: Path,
+) -> None:
+    """A speed loop of 40 times the gain of the stable one has a pole outside the unit circle; no limit holds its motion."""
+    scenario = axis({"gain": 44.0, "integral_gain": 45.0}).replace(**{"controllers.m.speed.torque_limit": None})
+    assert all(instability(axis_of(scenario), regime) is not None for regime in regimes(axis_of(scenario)))
+    with pytest.raises(lm.SolverError, match=r"^unstable: .* a pole of magnitude .*caused by the speed loop"):
+        lm.commission(scenario)
+
+
 @pytest.fixture(scope="module")
 def shipped() -> Any:
     return lm.simulate(lm.load("position-axis"))

@@ -92,11 +92,18 @@ def run(
     if explain is not None:
         need_open_loop(loaded, f"--explain {explain:g}")
     _check_solver(solver, tolerance)
+    from .._core import SolverError
     from ..simulation.run import TOLERANCE
     from ..simulation.run import run as work
 
-    with about(scenario), simulating("Simulating", loaded, 0.0 if solver == "exact" else tolerance or TOLERANCE):
-        result = work(loaded, solver=solver, relative_tolerance=tolerance)  # type: ignore[arg-type]
+    with about(scenario):
+        try:
+            with simulating("Simulating", loaded, 0.0 if solver == "exact" else tolerance or TOLERANCE):
+                result = work(loaded, solver=solver, relative_tolerance=tolerance)  # type: ignore[arg-type]
+        except SolverError as error:
+            from ..reports.run_loops import unstable_loops
+
+            raise InputError(unstable_loops(loaded, error)) from None
     from ..reports.run import summary, verdict_of
 
     print(summary(result))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError, MissingLibraryError
+from ..errors import InputError
 from ..response.standstill import rises_of
 from ..simulation.results import RunArrays
 from ..simulation.scenario import Scenario
@@ -26,6 +26,7 @@ LASTS = 0.75  # the same of one that does not die out
 SEEN = 0.001  # of the range of the reference: the least swing that is reported
 DEGREES = 0.1  # [rad], from which on an angle is in degrees
 REST = 0.1  # of the run: the least time at rest that is looked at
+BEYOND = "left the range"  # of numbers, in the error of a run
 DIVERGES = 2.0  # from one part of a run to the next, at least, of an error that diverges
 
 
@@ -146,18 +147,19 @@ def _of_axis(result: Any, scenario: Scenario, motor: str) -> LoopErrors | None:
 
 def _pole(scenario: Scenario, motor: str) -> str:
     """Pole outside the unit circle of an axis in one of its regimes; empty where none is found."""
-    from ..servo.margins import instability
-    from ..servo.regimes import axis_of, regimes
+    from ..servo.margins import unstable_pole
+    from ..servo.regimes import axis_of
 
     try:
-        axis = axis_of(scenario, motor)
-        found = [instability(axis, regime) for regime in regimes(axis)]
-    except (
-        InputError,
-        MissingLibraryError,
-    ):  # loops without a linear regime, or no library for them: the growth alone decides
+        return unstable_pole(axis_of(scenario, motor))
+    except InputError:  # loops that are no axis of servo: the growth alone decides
         return ""
-    return next((str(pole) for pole in found if pole is not None), "")
+
+
+def unstable_loops(scenario: Scenario, error: Exception) -> str:
+    """Why a run with sampled controllers left the range of numbers, by poles outside the unit circle; otherwise the error itself."""
+    poles = "; ".join(filter(None, (_pole(scenario, motor) for motor in scenario.axes())))
+    return f"unstable: {poles}" if poles and BEYOND in str(error) else str(error)
 
 
 def _last_change(time: np.ndarray, reference: np.ndarray) -> float:

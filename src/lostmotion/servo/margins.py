@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from .regimes import Axis, Regime
+from ..errors import InputError, MissingLibraryError
+from .regimes import Axis, Regime, regimes
 from .sampled import SampledLoop
 
 Response = Callable[[Any], np.ndarray]
@@ -93,6 +94,15 @@ def instability(axis: Axis, regime: Regime) -> Instability | None:
         outer = found or Instability(loop, regime.name, abs(pole), frequency, growth)
         found = replace(outer, loop=loop)
     return found
+
+
+def unstable_pole(axis: Axis) -> str:
+    """First pole outside the unit circle of an axis with all loops closed; empty if none is found, or no regime is linear."""
+    try:
+        found = [instability(axis, regime) for regime in regimes(axis)]
+    except (InputError, MissingLibraryError):
+        return ""
+    return next((str(pole) for pole in found if pole is not None), "")
 
 
 def frequencies(*loops: SampledLoop) -> np.ndarray:

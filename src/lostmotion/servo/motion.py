@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .. import _core
 from ..control.loops import CurrentLoop, Feedforward, FieldOriented
 from ..control.turning import turns
 from ..inputs.part import Part
@@ -20,6 +21,7 @@ from ..simulation.run import run
 from ..simulation.sampling import weights
 from ..simulation.scenario import Scenario
 from .data import inertias
+from .margins import unstable_pole
 from .regimes import Axis, speed_of
 
 if TYPE_CHECKING:
@@ -82,7 +84,11 @@ def ran(axis: Axis, **simulation: float) -> RunArrays:
     scenario = axis.scenario
     if simulation:
         scenario = changed(scenario, simulation=scenario.simulation.model_copy(update=simulation))
-    return run(scenario, energy=False)
+    try:
+        return run(scenario, energy=False)
+    except _core.SolverError as error:
+        pole = unstable_pole(axis) if "left the range" in str(error) else ""
+        raise _core.SolverError(f"unstable: {pole}" if pole else str(error)) from None
 
 
 def changed(scenario: Scenario, **fields: Any) -> Scenario:
