@@ -150,7 +150,7 @@ def export_fmu(
     icon = (files("lostmotion") / "portable" / "icon.png").read_bytes()
 
     def write(to: Path) -> None:
-        with zipfile.ZipFile(to, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
+        with zipfile.ZipFile(to, "w", zipfile.ZIP_DEFLATED) as archive:
             archive.writestr("modelDescription.xml", (fmi2 if fmi == 2 else fmi3).model_description(model))
             archive.writestr("resources/scenario.bin", resource)
             archive.writestr("resources/names.txt", model.names())
