@@ -154,6 +154,15 @@ def test_a_load_that_varies_over_time_is_no_cycle() -> None:
     assert move.to == 0.5
 
 
+def test_a_window_may_be_given_in_the_unit_of_the_shaft_that_it_is_of() -> None:
+    slide = slide_axis(SCREW)
+    assert lm.commission(slide, window="5 um").window == pytest.approx(5e-6, rel=1e-12)
+    assert lm.commission(slide, window=5e-6).window == 5e-6
+    for wrong in ("1 deg", "five", -1.0, math.nan):
+        with pytest.raises(lm.InputError, match="window"):
+            lm.commission(slide, window=wrong)
+
+
 def test_a_window_without_moves_is_not_judged() -> None:
     scenario = two_mass({"gain": 1.1}, reference={"kind": "position", "mean": 0.1}, position={"gain": 30.0})
     report = lm.commission(scenario, window=ARCMIN)

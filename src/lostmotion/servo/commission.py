@@ -12,9 +12,10 @@ import numpy as np
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.doubts import doubt_window
-from ..inputs.quantities import Angle
+from ..inputs.validation import shown
 from ..response.standstill import moving_input
 from ..simulation.scenario import Scenario
+from ..units.conversion import si_value
 from ..units.practical import practical
 from ..verdict import Point, State, Verdict
 from .certificate import HuntingCertificate, certified, certified_in_words
@@ -318,7 +319,7 @@ def commission(
     scenario: Scenario,
     *,
     motor: str | None = None,
-    window: Angle | None = None,
+    window: str | float | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> ServoReport:
     """Compute margins, steps, following error, settling, stiffness and limit cycles of an axis.
@@ -339,7 +340,7 @@ def commission(
     motor : str, optional
         Name of the motor whose controller is examined. Default: the only one.
     window : float, optional
-        Window of the settled position [rad], of a slide [m]. Default: four steps of the position's encoder at the reference's shaft,
+        Window of the settled position [rad], of a slide [m], or text such as "1 arcmin", "5 um". Default: four steps of the position's encoder at the reference's shaft,
         at least a thousandth of the longest move.
     progress : callable
         Called `work(scenario)` times.
@@ -364,8 +365,7 @@ def commission(
     fits: stable in all 4 regimes (first stiffness, last stiffness, twist stuck, load stuck)
     """
     axis = axis_of(scenario, motor)
-    if window is not None and not window > 0.0:
-        raise InputError(f"window: {window:g} {axis.measured['position'][1]} must be above 0")
+    asked = None if window is None else _window_of(axis, window)
     points = regimes(axis)
     loops, steps = [], []
     for name in axis.loops:
@@ -375,9 +375,9 @@ def commission(
             steps.append(step_response(axis, name))
         progress()
     followed = following(axis)
-    wide = default_window(axis) if window is None else window
-    if window is not None:
-        doubt_window(window, float(np.ptp(followed.reference)), followed.unit, "window")
+    wide = default_window(axis) if asked is None else asked
+    if asked is not None:
+        doubt_window(asked, float(np.ptp(followed.reference)), followed.unit, "window")
     progress()
     stiffness = tuple(_stiffness(axis, regime) for regime in points) if axis.loops[-1] == "position" else ()
     moves = repeated(axis, wide)
@@ -403,6 +403,18 @@ def commission(
         load_unit=axis.train.angle_unit(axis.shaft),
         window_given=window is not None,
     )
+
+
+def _window_of(axis: Axis, window: str | float) -> float:
+    """Window in SI, of text in a unit of the reference's shaft."""
+    unit = axis.train.angle_unit(axis.shaft)
+    try:
+        value = si_value(window, unit) if isinstance(window, str) else window
+    except ValueError as error:
+        raise InputError(f"window: {shown(window)} {error}") from None
+    if not value > 0.0:
+        raise InputError(f"window: {value:g} {unit} must be above 0")
+    return value
 
 
 def work(scenario: Scenario, motor: str | None = None) -> int:

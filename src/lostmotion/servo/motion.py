@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -84,8 +85,15 @@ def ran(axis: Axis, **simulation: float) -> RunArrays:
     scenario = axis.scenario
     if simulation:
         scenario = changed(scenario, simulation=scenario.simulation.model_copy(update=simulation))
-    try:
+    with pole_named(axis):
         return run(scenario, energy=False)
+
+
+@contextmanager
+def pole_named(axis: Axis) -> Iterator[None]:
+    """Name the pole of an unstable axis whose motion leaves the range of numbers."""
+    try:
+        yield
     except _core.SolverError as error:
         pole = unstable_pole(axis) if "left the range" in str(error) else ""
         raise _core.SolverError(f"unstable: {pole}" if pole else str(error)) from None
@@ -338,8 +346,9 @@ def at_rest(axis: Axis, most: float = math.inf) -> AtRest:
     if name := moving_input(axis.scenario):
         return AtRest("not decided", f"{name} never comes to rest", 0.0, math.nan, math.nan, math.nan)
     first = max(watched_at_least(axis), axis.scenario.simulation.duration)
-    watch = Watch(axis.scenario, (axis.train.angle_of(axis.motor_shaft), axis.train.angle_of(axis.shaft)))
-    found = decide(watch, first, min(most, max(MOST_TICKS * c.sample_time, 4.0 * first)))
+    with pole_named(axis):
+        watch = Watch(axis.scenario, (axis.train.angle_of(axis.motor_shaft), axis.train.angle_of(axis.shaft)))
+        found = decide(watch, first, min(most, max(MOST_TICKS * c.sample_time, 4.0 * first)))
     motor, load = 0.5 * found.swing
     ends = (float(found.range[0, 1]), float(found.range[1, 1]))
     return AtRest(
