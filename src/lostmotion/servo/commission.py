@@ -239,10 +239,13 @@ class ServoReport:
         )
 
     def _proof(self, last: Settling) -> str:
-        """Proof that the error stays within the window, or how long it was watched."""
+        """Proof that the error stays within the window between moves and behind the last one, or how long it was watched."""
+        return self._held(last) if len(self.settling) == 1 else f"until the next move begins, {self._held(last)}"
+
+    @staticmethod
+    def _held(last: Settling) -> str:
         proved = "for ever" if last.state == "settled" else "without a proof that it stays so"
-        held = f"after the last move {proved} ({last.reason})"
-        return held if len(self.settling) == 1 else f"until the next move begins, {held}"
+        return f"after the last move {proved} ({last.reason})"
 
     @staticmethod
     def _swings(s: Settling) -> bool:
@@ -280,7 +283,7 @@ class ServoReport:
         if self.moves is not None:
             rows.append(("moves", self.repetition()))
         for s in self.settling:
-            until = self._proof(s) if s.last else "until the next move begins"
+            until = self._held(s) if s.last else "until the next move begins"
             inside = f"{1e3 * s.time:.4g} ms, {until}" if s.within else f"{s.state}: {self._why(s)}"
             within = _shown(self.window, self.load_unit)
             rows.append((f"settled within {within} after the move to {self._place(s.to)}", inside))
