@@ -36,10 +36,11 @@ void each_motor(Use&& use) {
         f.number(above_zero("peak_torque", "N*m", "for seconds, as in acceleration"));
         f.number(above_zero("max_speed", "rad/s", "largest speed"));
         f.number(above_zero("resistance", "ohm", "resistance of the winding, at 25 °C"));
-        f.number(above_zero("torque_constant", "N*m/A", "torque to the current in the winding"));
+        f.number(above_zero("torque_constant", "N*m/A", "torque to one ampere of the armature, or to one ampere rms"));
         f.number(above_zero("max_voltage", "V",
                             "voltage limit of the amplifier of a torque source; a DC motor has `voltage_limit`"));
-        f.number(above_zero("max_current", "A", "the smaller of those of motor and amplifier"));
+        f.number(
+            above_zero("max_current", "A", "smaller limit of motor and amplifier, in the amperes of torque_constant"));
     });
     use("MotorData", [](auto& f) {
         f.number(above_zero("rated_voltage", "V",
@@ -86,7 +87,8 @@ void each_motor(Use&& use) {
                             "to one ampere of the supply with block commutation, (3 sqrt(3)/pi) p psi"));
         f.number(above_zero("continuous_current_rms", "A", "current that the motor withstands permanently, at rest"));
         f.number(above_zero("continuous_current_peak", "A", "the same as amplitude"));
-        f.number(above_zero("max_current_rms", "A", "the smaller of those of motor and amplifier"));
+        f.number(
+            above_zero("max_current_rms", "A", "smaller limit of motor and amplifier, effective value of a phase"));
         f.number(above_zero("max_current_peak", "A", "the same as amplitude"));
     });
 }

@@ -36,8 +36,9 @@ void each_duty(Use&& use) {
                false);
     });
     use("Amplifier", [](auto& f) {
-        f.number({"continuous_current", "", "A", positive, needed, "rms over the cycle"});
-        f.number(above_zero("peak_current", "A", "largest current"));
+        f.number(
+            {"continuous_current", "", "A", positive, needed, "rms over the cycle, of a synchronous motor in a phase"});
+        f.number(above_zero("peak_current", "A", "largest current, of a synchronous motor as effective value"));
         f.number(above_zero("peak_time", "s", "longest time above the continuous current"));
         f.number(above_zero("max_dc_voltage", "V", "largest voltage of the DC bus"));
     });
