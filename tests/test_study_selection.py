@@ -44,12 +44,13 @@ def test_what_fits_is_what_a_check_of_each_drive_by_itself_finds(selection: tupl
             assert c.why == str(error)
             continue
         result = lm.simulate(scenario)
-        wrong = {f.rule for f in check_drive(scenario) if f.verdict == "warning"}
+        findings = check_drive(scenario)
+        wrong = {f.rule for f in findings if f.verdict == "warning"}
         if float(result["load_angle"].max() - result["load_angle"].min()) < math.radians(45.0):
             wrong.add("travel")
         assert set(c.violated) == wrong, c.name
         assert c.values["energy"] == lm.energy_of(result)["source"]
-        most = max((f for f in check_drive(scenario) if f.use is not None), key=lambda f: f.use)
+        most = max((f for f in findings if f.use is not None), key=lambda f: f.use)
         assert c.tightest == f"{most.rule} {100.0 * most.use:.0f} %"
     fitting = [c for c in ranked if c.fits]
     assert 1 < len(fitting) < len(ranked) - sum(NOT_RUN in c.violated for c in ranked)
