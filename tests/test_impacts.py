@@ -94,6 +94,20 @@ def test_elastic_flanks_keep_the_energy() -> None:
     assert len(times) == 250
 
 
+def test_elastic_flanks_that_torques_press_are_closed_but_for_flights_that_cannot_be_seen() -> None:
+    """They bounce for ever, by 1e-9 of 0.02 rad: speeds are those of one body but for sqrt(2 a h)."""
+    J_a, J_b, T, h = 0.5, 2.0, 3.0, 1e-9
+    result = lm.simulate(pair(1.0, torques=(-T, 0.0), duration=1.0, twists={"mesh": 0.01 - h}))
+    assert len(lm.switchings_of(result)["instant"]) < 5
+    t = result["time"].values
+    for name in ("a_speed", "b_speed"):
+        np.testing.assert_allclose(result[name].values, T * t / (J_a + J_b), atol=math.sqrt(2.0 * T / J_a * h))
+    np.testing.assert_allclose(result["mesh_output_torque"].values[2:], J_b * T / (J_a + J_b), rtol=1e-9)
+    energy = lm.energy_of(result)
+    assert 0.0 <= energy["mesh: impacts"] <= 1.01 * J_b * T / (J_a + J_b) * h
+    assert abs(energy["residual"]) < 1e-13 * energy["turned_over"]
+
+
 class Reference:
     """Two inertias under constant torques between steps, from impact to impact by parabolas."""
 

@@ -218,6 +218,63 @@ def test_a_gear_that_has_locked_breaks_away_as_stiffer_meshes_do() -> None:
     assert abs(speeds[1] - rigid) < 0.2 * abs(speeds[0] - rigid)
 
 
+def test_the_speed_after_a_lock_does_not_depend_on_what_it_was_before() -> None:
+    """The motor turns on again at 0.2 s: J a = M + 20 N m/(i eta_f), J = J_1 + J_2/(i^2 eta_f), so dw/dJ_2 = -w/(J i^2 eta_f)."""
+    again = {"motor": {"mean": 0.5, "steps": [{"time": 0.1, "height": -0.5}, {"time": 0.2, "height": 0.5}]}}
+    scenario = worm(None).replace(command=again)
+    key = "shafts.drum.inertia"
+    result = lm.simulate(scenario, sensitivities=[key])
+    t, w = result["time"].values, result["worm_speed"].values
+    derivative = result["worm_speed_sensitivity"].sel(parameter=key).values
+    late = t > 0.21
+    np.testing.assert_allclose(derivative[late], -w[late] / (1e-4 + 2.0 / 1000.0) / 1000.0, rtol=1e-9)
+    assert np.all(derivative[(t > 0.1) & (t < 0.2)] == 0.0)
+
+
+def test_a_gear_that_locks_as_its_inputs_jump_goes_on_from_rest_until_it_locks_again() -> None:
+    """Its drag lets the load overrun the input above some speed; at rest there is none, and the motor drives on."""
+    J, b, eta, step = (4e-4, 3e-3), (0.02, 0.008), 0.45, 0.1
+    M, load = (2.0, 0.5), (-0.1, -0.5)
+    scenario = lm.Scenario(
+        shafts={
+            "worm": {"inertia": J[0], "viscous_friction": b[0]},
+            "drum": {
+                "inertia": J[1],
+                "viscous_friction": b[1],
+                "torque": {"mean": load[0], "steps": [{"time": step, "height": load[1] - load[0]}]},
+            },
+        },
+        motors={"motor": {"shaft": "worm", "kind": "torque_source", "rotor_inertia": 0.0}},
+        gears={
+            "gear": {
+                "input": "worm",
+                "output": "drum",
+                "ratio": 1.0,
+                "stiffness": {"kind": "rigid"},
+                "losses": {"kind": "mesh_efficiency", "drive_efficiency": eta, "backdrive_efficiency": -0.3},
+            }
+        },
+        command={"motor": {"mean": M[0], "steps": [{"time": step, "height": M[1] - M[0]}]}},
+        simulation={"duration": 0.5, "sample_interval": 0.0033},
+    )
+    result = lm.simulate(scenario)
+    t, w = result["time"].values, result["worm_speed"].values
+    drag = b[0] + b[1] / eta
+    rate = drag / (J[0] + J[1] / eta)
+    first, then = ((m - T / eta) / drag for m, T in zip(M, load, strict=True))
+    # The torque of the mesh, J_2 a + b_2 w + M_Z, is zero at this speed.
+    locks = (J[1] * rate * then + load[1]) / (J[1] * rate - b[1])
+    period = -math.log1p(-locks / then) / rate
+    expected = np.where(t < step, -first * np.expm1(-rate * t), -then * np.expm1(-rate * ((t - step) % period)))
+    np.testing.assert_allclose(w, expected, rtol=1e-10, atol=1e-12)
+    energy = lm.energy_of(result)
+    stops = math.floor((t[-1] - step) / period)
+    assert stops == 2
+    lost = 0.5 * sum(J) * ((first * math.expm1(-rate * step)) ** 2 + stops * locks**2)
+    assert energy["gear: impacts"] == pytest.approx(lost, rel=1e-11)
+    assert abs(energy["residual"]) < 1e-12 * energy["turned_over"]
+
+
 def test_a_gear_that_does_not_lock_goes_on() -> None:
     """|eta_b| J_2 < J_1 i^2: it slows down by (J_1 + eta_b J_2/i^2) a = -eta_b M/i with the load of -20 N m."""
     result = lm.simulate(worm(None, mass=0.5))

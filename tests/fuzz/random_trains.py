@@ -138,10 +138,7 @@ def gear(random: Random) -> dict[str, Any]:
                 fewer = {"contact_ratio": random.uniform(1.1, 1.9), "fewer_pairs": random.uniform(0.5, 0.95)}
                 made["mesh_stiffness"] = {"teeth": random.choice((1, 9, 30)), **fewer}
         case 3 if random.random() < 0.3:
-            backlash, restitution = (
-                spread(random, 1e-4, 1e-2),
-                random.choice((0.0, 0.4, 0.8)),
-            )  # with 1 they may strike without end
+            backlash, restitution = spread(random, 1e-4, 1e-2), random.choice((0.0, 0.4, 0.8, 1.0))
             return made | {"stiffness": {"kind": "rigid", "backlash": backlash, "restitution": restitution}}
     if "stiffness" in made and "hysteresis" not in made and random.random() < 0.4:
         made["mesh_damping"] = spread(random, 1e-2, 1e2)

@@ -448,7 +448,9 @@ bool SwitchedTrain<Sizes>::holds_more(const ContactPlace& c) const {
 }
 
 // By how much the contacts' guards of a regime are violated, each in units of the sum of its terms' magnitudes: by the
-// value or, of one that is zero to rounding, by the rate.
+// value or, of one that is zero to rounding, by the rate. A value is zero, too, if it is so beside what the terms are
+// at rated load and speed: an elimination leaves that where all else is zero. Higher derivatives, of which rounding may
+// leave less, choose among combinations that all else allows.
 template <class Sizes>
 template <class E, class Now>
 double SwitchedTrain<Sizes>::violation(const E& e, const Now& now, const Event& event) const {
@@ -459,10 +461,15 @@ double SwitchedTrain<Sizes>::violation(const E& e, const Now& now, const Event& 
     for (std::size_t g = 0; g < guard_count(r); ++g) {
         const auto& guard = r.guards[g];
         if (ignored[static_cast<int>(g)] || !guard.is_of_contact()) continue;
-        const double value = evaluate(n_, guard.form, now), size = magnitude(n_, guard.form, now);
+        double value = evaluate(n_, guard.form, now);
+        const double size = magnitude(n_, guard.form, now);
+        if (std::fabs(value) <= rounding * near_event(guard.form) / far_from_event) value = 0.0;
         const double rate = along.rate(guard.form, 1);
         const bool zero = std::fabs(value) <= along.noise(size, rate);
-        if (zero && rate < 0.0 && !event.by_value_alone(guard))
+        const bool nothing = value == 0.0 && rate == 0.0 && !event.by_value_alone(guard);
+        if (nothing && sign_after(along, guard.form, value, size).sign < 0)
+            worst = std::fmax(worst, 0.5 * max_violation);
+        else if (zero && rate < 0.0 && !event.by_value_alone(guard))
             worst = std::fmax(worst, -rate / along.rate_magnitude(guard.form, 1));
         else if (!zero && value < 0.0)
             worst = std::fmax(worst, -value / size);

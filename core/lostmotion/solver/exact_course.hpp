@@ -33,11 +33,12 @@ inline auto ExactSolver<System>::rest_unforced(Entry& e, const State& rate) -> b
     return changed;
 }
 
-// After a change of the inputs: if the regime goes on, the rate jumps by no more than what they bring.
+// After a change of the inputs: if the regime goes on from the same state, without an impulse, the rate jumps by no
+// more than what they bring.
 template <class System>
-inline auto ExactSolver<System>::follow_inputs(const Key& before) -> void {
+inline auto ExactSolver<System>::follow_inputs(const Key& before, const State& x_before) -> void {
     const InputsOf<D> left = std::exchange(course_.input, now_.input[0]);
-    if (!course_.rate_known || !(key_ == before)) {
+    if (!course_.rate_known || !(key_ == before) || now_.x != x_before) {
         course_.forget();
         return;
     }

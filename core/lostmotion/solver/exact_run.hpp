@@ -156,7 +156,7 @@ class ExactSolver {
     }
     [[gnu::noinline]] bool has_settled(const Regime& regime, const State& rate) const;
     bool rest_unforced(Entry& e, const State& rate);
-    [[gnu::cold]] void follow_inputs(const Key& before);
+    [[gnu::cold]] void follow_inputs(const Key& before, const State& x_before);
     Coupled bound_ahead(Entry& e, const Coupled& x) const;
     void begin_in_doubt(Entry& e, const Cursor& at, const Memory& memory);
     [[gnu::cold]] void rest(const Segment<System>& segment, const Cursor& at, double limit);
@@ -279,12 +279,13 @@ InputsOf<typename System::Dims> ExactSolver<System>::input_before(double t, cons
 template <class System>
 Status ExactSolver<System>::inputs_changed(Observer& observer) {
     const Key before = key_;
+    const State x_before = now_.x;
     anchor_inputs();
     bool changed = false;
     const Status status =
         follow_change<System, Cache, D>(system_, cache_, course_.input, now_, key_, observer, changed);
     switchings_ += changed;
-    follow_inputs(before);
+    follow_inputs(before, x_before);
     return status;
 }
 
@@ -346,11 +347,12 @@ Status ExactSolver<System>::change_regime(const Guard* fired, Observer& observer
                 now_.x[static_cast<std::size_t>(g.state)] = begin_->input().given_at(g, time_);
     }
     const Key before = key_;
+    const State x_before = now_.x;
     const Status status = switch_regime(system_, cache_, begin_->inputs(), time_, fired, now_, key_, observer);
     if (fired != nullptr) stopped_at_ = fired->subject();
     if (status != Status::done) return status;
     if (fired == nullptr)
-        follow_inputs(before);
+        follow_inputs(before, x_before);
     else
         course_.forget();
     ++switchings_;
