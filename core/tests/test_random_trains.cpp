@@ -23,6 +23,15 @@ TEST_CASE("exact and adaptive solver agree on random trains of all elements") {
     CHECK(tally.jammed == 0);
 }
 
+TEST_CASE("a freewheel begins to carry where all its torques are zero") {
+    RandomTrains random(4615, false, true, true);
+    const RandomRun r(random, 6, 1.0);
+    const Recorded exact(r.train, r.inputs, 1.0, 0.02), fine(r.train, r.inputs, 1.0, 0.02, 1e-10);
+    REQUIRE(exact.done());
+    REQUIRE(fine.done());
+    CHECK(difference(exact, fine) < 1e-6);
+}
+
 TEST_CASE("both solvers agree on trains with hysteresis beside contacts at rest, of values in wide ranges") {
     SolverTally tally;
     for (const unsigned seed : {35u, 41u, 42u}) {
