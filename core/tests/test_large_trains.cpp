@@ -127,7 +127,7 @@ TEST_CASE("a stiff chain is doubled, and takes no more event checks than one tha
 TEST_CASE("exact and adaptive solver agree on random trains of 9 to 40 shafts with all elements") {
     RandomTrains random(91);
     SolverTally tally;
-    for (int n = 0; n < cases(300); ++n) {
+    for (int n = 0; n < cases(30); ++n) {  // of which some take a minute by the adaptive solver
         CAPTURE(n);
         compare_solvers(RandomRun(random, 40, 0.05, 9), {}, 0.05, tally, ("large 91 " + std::to_string(n)).c_str());
     }
@@ -135,7 +135,7 @@ TEST_CASE("exact and adaptive solver agree on random trains of 9 to 40 shafts wi
                            << " that the adaptive solver does not settle, " << tally.forked << " with two motions, "
                            << tally.outlasted << " that the adaptive solver follows for a time, " << tally.jammed
                            << " that jam");
-    CHECK(tally.compared > share(250));
+    CHECK(tally.compared > share(25));
     CHECK(tally.wrong == 0);
 }
 

@@ -78,7 +78,7 @@ class TrainSteps {
     }
 
  private:
-    static constexpr int max_unknowns = 32;
+    static constexpr int max_unknowns = 160;
     static constexpr double slack = 1e-8;  // of a speed or, relative to 1 N m, a torque
     // sum_k c[k] z[k] + one, z: [speeds at the end of the step][torques of the contacts]
     struct Linear {
