@@ -25,6 +25,9 @@ void operator delete(void* p, std::align_val_t) noexcept {
     if (p != nullptr) std::free(static_cast<void**>(p)[-1]);
 }
 void operator delete(void* p, std::size_t, std::align_val_t a) noexcept { operator delete(p, a); }
+void* operator new[](std::size_t n) { return operator new(n); }
+void operator delete[](void* p) noexcept { operator delete(p); }
+void operator delete[](void* p, std::size_t) noexcept { operator delete(p); }
 void* operator new[](std::size_t n, std::align_val_t alignment) { return operator new(n, alignment); }
 void operator delete[](void* p, std::align_val_t a) noexcept { operator delete(p, a); }
 void operator delete[](void* p, std::size_t, std::align_val_t a) noexcept { operator delete(p, a); }

@@ -132,6 +132,7 @@ class ClosedLoopRun {
         }
         bool wants_switching() const override { return to_.wants_switching(); }
         void switching(const SwitchingOf<System>& s) override { to_.switching(s); }
+        bool flush() override { return to_.flush(); }
 
      private:
         Observer& to_;

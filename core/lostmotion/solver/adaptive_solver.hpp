@@ -167,6 +167,7 @@ class AdaptiveSolver {
     Status advance(double t_end, Observer& observer) {
         t_end_ = t_end;
         while (time_ < t_end) {
+            if (cache_.is_full()) cache_.forget();
             double limit = std::fmin(t_end, next_breakpoint(signals_, time_));
             if (const Regime& r = cache_.regime(key_); r.driving_input >= 0) {
                 input_.anchor(time_);

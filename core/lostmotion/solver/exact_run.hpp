@@ -300,6 +300,10 @@ Status ExactSolver<System>::advance(double t_end, Observer& observer) {
     }
     while (true) {
         if (interruption(steps_of_a_search)) return Status::interrupted;
+        if (cache_.is_full()) [[unlikely]] {
+            if (!observer.flush()) return Status::interrupted;  // what has been seen refers to regimes
+            cache_.forget();
+        }
         Entry& entry = cache_.entry(key_);
         if (!entry.propagator.ready()) cache_.prepare(entry, rotations_, scale_);
         Segment<System> segment{

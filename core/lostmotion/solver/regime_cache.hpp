@@ -83,6 +83,18 @@ class RegimeCache {
             propagator.reset();
         }
 
+        // About what it takes without matrices, of a train of any size.
+        std::size_t bytes() const {
+            std::size_t terms = 0;
+            const auto count = [&](const auto& forms) {
+                for (const auto& f : forms) terms += f.c.terms().size();
+            };
+            for (const auto* forms : {&regime.output_torque, &regime.input_torque, &regime.mesh_loss,
+                                      &regime.contact_torque, &regime.rate.coupled})
+                count(*forms);
+            for (const Guard& g : regime.guards) terms += 2 * g.form.c.terms().size();  // also in the table
+            return sizeof *this + 2 * sizeof(AnyForm::Term) * terms + sizeof(Guard) * regime.guards.size();
+        }
         // How many times the rate of a twist a guard is; factor 0 if of none.
         TwistSpeed twist_speed(int guard) const {
             for (int k = 0; k < n_twist_speeds; ++k)
@@ -208,6 +220,10 @@ class RegimeCache {
         e.propagator.prepare(e.rates, rotations, scale);
     }
 
+    // Whether the regimes of a train of any size take more memory than is to be kept: then they are to be forgotten
+    // once nobody refers to them.
+    bool is_full() const { return std::same_as<D, Any> && bytes_ > most_bytes; }
+
     // Forgets all regimes, since the system has changed. The memory of so many is kept for others.
     void forget(std::size_t kept = max_kept) {
         left_ = std::max(left_, used_);
@@ -217,6 +233,7 @@ class RegimeCache {
         }
         std::ranges::fill(slots_, nullptr);
         used_ = 0;
+        bytes_ = 0;
         last_ = nullptr;
         followed_.clear();
     }
@@ -245,6 +262,7 @@ class RegimeCache {
             if (used_ < left_) entry(used_).regime = {};
             slots_[k] = &entry(used_++);
             slots_[k]->set(system_, key);
+            if constexpr (std::same_as<D, Any>) bytes_ += slots_[k]->bytes();
         }
         return *(last_ = slots_[k]);
     }
@@ -272,6 +290,7 @@ class RegimeCache {
     std::vector<Entry*> followed_;  // with matrices, in the order of their last preparation; only of trains of any size
     Entry* last_ = nullptr;         // the one asked for last
     std::vector<std::unique_ptr<Entry[]>> blocks_;
+    std::size_t bytes_ = 0;            // of the regimes in use, without matrices; only of trains of any size
     std::size_t used_ = 0, left_ = 0;  // those in use come first, then those that `forget` has left
     std::vector<Entry*> slots_ = std::vector<Entry*>(256, nullptr);  // a power of two, by hash, at most half full
 };
