@@ -92,18 +92,8 @@ def run(
     if explain is not None:
         need_open_loop(loaded, f"--explain {explain:g}")
     _check_solver(solver, tolerance)
-    from .._core import SolverError
-    from ..simulation.run import TOLERANCE
-    from ..simulation.run import run as work
-
     with about(scenario):
-        try:
-            with simulating("Simulating", loaded, 0.0 if solver == "exact" else tolerance or TOLERANCE):
-                result = work(loaded, solver=solver, relative_tolerance=tolerance)  # type: ignore[arg-type]
-        except SolverError as error:
-            from ..reports.run_loops import unstable_loops
-
-            raise InputError(unstable_loops(loaded, error)) from None
+        result = _simulated(loaded, solver, tolerance)
     from ..reports.run import summary, verdict_of
 
     print(summary(result))
@@ -135,6 +125,22 @@ def run(
     if verdict is not None:
         print(f"Verdict: {verdict}")
     conclude(verdict)
+
+
+def _simulated(loaded: Scenario, solver: str, tolerance: float | None) -> RunArrays:
+    """The run; where it leaves the range of numbers, an error that names the loop that is unstable."""
+    from .._core import SolverError
+    from ..errors import InputError
+    from ..simulation.run import TOLERANCE
+    from ..simulation.run import run as work
+
+    try:
+        with simulating("Simulating", loaded, 0.0 if solver == "exact" else tolerance or TOLERANCE):
+            return work(loaded, solver=solver, relative_tolerance=tolerance)  # type: ignore[arg-type]
+    except SolverError as error:
+        from ..reports.run_loops import unstable_loops
+
+        raise InputError(unstable_loops(loaded, error)) from None
 
 
 def _draw(plot: Path, result: RunArrays, figure: str | None) -> None:

@@ -104,7 +104,9 @@ def _verdict(
     It is a reservation if a rule or the losses of the best one are open. If none fits and some cannot be judged, it is not decided.
     """
     fitting = [c for c in ranked if c.fits]
-    count = f"{len(fitting)} of {counted(len(ranked), 'candidate')} {'fits' if 1 in (len(fitting), len(ranked)) else 'fit'}"
+    count = (
+        f"{len(fitting)} of {counted(len(ranked), 'candidate')} {'fits' if 1 in (len(fitting), len(ranked)) else 'fit'}"
+    )
     open_ones = sum(bool({NO_DATA, NOT_RUN} & set(c.violated)) for c in ranked)
     count += f", {open_ones} cannot be judged" if open_ones else ""
     lines, points = list[str](), list[Point]()
