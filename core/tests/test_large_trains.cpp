@@ -139,18 +139,6 @@ TEST_CASE("exact and adaptive solver agree on random trains of 9 to 40 shafts wi
     CHECK(tally.wrong == 0);
 }
 
-TEST_CASE("the exact solver follows what time stepping converges to, on random trains of 9 to 40 shafts") {
-    RandomTrains random(92);
-    SteppingTally tally;
-    for (int n = 0; n < cases(300); ++n) {
-        compare_with_steps(RandomRun(random, 40, 0.05, 9), 0.05, 200, tally, ("large 92 " + std::to_string(n)).c_str());
-    }
-    MESSAGE(tally.compared << " trains compared, " << tally.undecided << " undecided, " << tally.open
-                           << " whose break-away rigid bodies leave open; largest difference " << tally.worst);
-    CHECK(tally.compared > share(200));
-    CHECK(tally.wrong == 0);
-}
-
 }  // namespace lostmotion::model
 
 TEST_SUITE_END();
