@@ -302,10 +302,10 @@ TOPICS = {
         "worm-",
     ),
     "Servo axes": ("position-axis", "speed-axis", "joint-", "field-weakening", "hobby-servo"),
-    "Linear axes": ("ball-screw-", "rack-", "vertical-"),
+    "Linear axes": ("ball-screw-", "gantry-", "rack-", "vertical-"),
     "Limit cycles": ("hunting-",),
     "Tracking and pointing": ("tracking-", "direction-finder"),
-    "Drive trains": ("belt-", "bevel-", "two-motors-", "two-link-", "given-motion"),
+    "Drive trains": ("belt-", "bevel-", "conveyor-", "thruster-", "two-motors-", "two-link-", "given-motion"),
 }
 
 

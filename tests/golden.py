@@ -40,6 +40,7 @@ HEADER = """\
 TOLERANCE = 1e-7
 
 BLOCKS = 64
+MANY = 100  # variables of a run: the series of a larger train are held as one
 
 STEADY = ("load_speed", "twist", "output_torque")
 STEPPED = ("paper-2dof-nl-small", "step-to-standstill")
@@ -86,6 +87,10 @@ def of_run(scenario: lm.Scenario) -> Groups:
     for gear in gears:
         if isinstance(gear.losses, lm.model.LossMap):  # not of the core; where it differs, all else does
             groups["input"] = {"loss_map": np.ravel(gear.losses.values)}
+    if len(groups["samples"]) > MANY:
+        return {
+            what: {"all": np.concatenate([np.ravel(v) for v in values.values()])} for what, values in groups.items()
+        }
     return groups
 
 

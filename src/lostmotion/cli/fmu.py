@@ -9,7 +9,7 @@ import typer
 
 from .arguments import Overrides, SourceArgument, load_scenario
 from .targets import try_file
-from .terminal import about, busy
+from .terminal import about, announce_parameters, busy
 
 
 def fmu(
@@ -69,6 +69,8 @@ def fmu(
         raise InputError(f"{output}: must end in .fmu")
     try_file(output)
     loaded = load_scenario(scenario, overrides)
+    with about(scenario):
+        announce_parameters(loaded)
     with about(scenario), busy("Finding out what its parameters change"):
         replaced = export_fmu(
             loaded,

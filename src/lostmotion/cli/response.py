@@ -10,7 +10,7 @@ import typer
 
 from .arguments import FiguresOption, Overrides, ReportOption, SourceArgument, load_scenario, number
 from .targets import pictures_of, writing
-from .terminal import about, busy, progress
+from .terminal import about, announce_response, busy, progress
 
 if TYPE_CHECKING:
     from ..simulation.scenario import Scenario
@@ -83,6 +83,8 @@ def response(
     wanted = parse_grid(amplitudes, "amplitudes", unit)
     grid = parse_grid(frequencies, "frequencies", "Hz")
     responses = {}
+    for s in loaded.values():
+        announce_response(s.long().train(), len(wanted) * len(grid))
     with progress(len(loaded) * len(wanted) * len(grid), "Response") as step:
         for title, s in loaded.items():
             with about(files[title]):

@@ -149,6 +149,8 @@ def _now_and_then(what: str) -> Callable[[str], None]:
 MAX_LINE = 300  # characters of an error
 SILENCE = 0.5  # [s] after which something must be seen
 LONG = 60.0  # [s] from which on work is said to take long
+MANY_CONTACTS = 24  # with which a response takes seconds a point
+SLOW = 10.0  # [s] from which on work whose length is known is announced
 EVERY = 30.0  # [s] between lines where there is no terminal
 REFRESH = 0.2  # [s]
 
@@ -228,6 +230,27 @@ def simulating(what: str, scenario: Any, tolerance: float = 0.0) -> Iterator[Cal
 
         with _beside(watch, done):
             yield tell
+
+
+def announce_response(train: Any, points: int) -> None:
+    """Say on stderr before it starts that the response of a large train with dry contacts takes long."""
+    sticking = sum(shaft.friction_torque > 0.0 or shaft.friction_curve is not None for shaft in train.shafts.values())
+    if sticking > MANY_CONTACTS:
+        print(
+            f"Response: {sticking} shafts have dry friction; each of the {points} points takes up to a minute",
+            file=sys.stderr,
+        )
+
+
+def announce_parameters(scenario: Any) -> None:
+    """Say on stderr before it starts that the search for what each value of a large train changes takes long."""
+    from ..portable.descriptions import numbers_of
+    from ..portable.parameters import seconds_for
+
+    if (seconds := seconds_for(scenario, numbers_of)) > SLOW:
+        print(
+            f"Finding out what its parameters change: takes {_span(seconds)} by estimate", file=sys.stderr, flush=True
+        )
 
 
 def _progress(passed: float, expected: float) -> str:

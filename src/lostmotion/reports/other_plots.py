@@ -14,6 +14,8 @@ from .panels import Bars, Chart, Contacts, Flows, Histogram, Matrix
 
 FIRST, SECOND = PALETTE["first"], PALETTE["second"]
 
+MAX_CONTACTS = 20  # that have room for a name; of more, every second, third, ...
+
 
 def draw(axes: Any, chart: Chart) -> None:
     """One chart on its axes."""
@@ -79,7 +81,8 @@ def _contacts(axes: Any, chart: Contacts) -> None:
             axes.broken_barh(spans, (low - k, high), facecolor=COLOURS["slips" if mode else "stuck"])
     for name, text in {"stuck": "stuck", "slips": "slips (up forward, down reverse)"}.items():
         axes.broken_barh([], (0.0, 0.0), facecolor=COLOURS[name], label=text)
-    axes.set_yticks([-k for k in range(len(chart.modes))], list(chart.modes))
+    named = slice(None, None, -(-len(chart.modes) // MAX_CONTACTS) or 1)
+    axes.set_yticks([-k for k in range(len(chart.modes))][named], list(chart.modes)[named])
     axes.set(xlabel="time [s]")
 
 

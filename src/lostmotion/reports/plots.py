@@ -26,6 +26,7 @@ HALO = (withStroke(linewidth=2.0, foreground=COLOURS["surface"]),)  # so that te
 KEY_LINE = 0.18  # height of a line of a key [inch]
 MAX_NAMES = 24  # along an axis; of more, every second, third, ...
 LEGEND_ROWS = 2  # of a legend above a panel; a longer one is in the panel
+MOST_LABELS = 12  # in a legend; of more, every second, third, ...
 DEGREES = 60.0  # from which on an axis in degrees has ticks at parts of a right angle
 
 # Decorates what makes or draws figures; the looks of the user's figures stay as they are.
@@ -71,7 +72,7 @@ def draw(charts: Iterable[Chart], columns: int, size: tuple[float, float], note:
 
 def _legends(figure: Figure, every: list[Any]) -> None:
     """One legend above the figure where the curves of all panels are among those of one; else one in each panel."""
-    entries = [dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True)) for axes in every]
+    entries = [_some(dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))) for axes in every]
     longest = max(entries, key=len)
     if len(every) > 1 and len(longest) > 1 and all(labels.keys() <= longest.keys() for labels in entries):
         columns = len(longest) if len(longest) <= 4 else 3
@@ -81,6 +82,11 @@ def _legends(figure: Figure, every: list[Any]) -> None:
     for axes in every:  # titles beside each other are at one height
         beside = (n for other, n in zip(every, rows, strict=True) if _row(other) == _row(axes))
         axes.set_title(axes.get_title(), pad=6.0 + 14.0 * max(beside))
+
+
+def _some(labels: dict[str, Any]) -> dict[str, Any]:
+    """The labels that a legend has room for, at equal distances: a train of 40 shafts has a curve for each."""
+    return dict(list(labels.items())[:: -(-len(labels) // MOST_LABELS) or 1])
 
 
 def _row(axes: Any) -> int:
@@ -99,7 +105,7 @@ def _legend_above(axes: Any, labels: Mapping[str, Any]) -> int:
         if sum(0.55 + 0.068 * n for n in longest) <= room:
             break
     else:
-        axes.legend(loc="best")
+        axes.legend(list(labels.values()), list(labels), loc="best", ncols=1 + len(labels) // 8)
         return 0
     place = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "borderaxespad": 0.2, "borderpad": 0.1}
     legend = axes.legend(list(labels.values()), list(labels), ncols=columns, columnspacing=1.2, **place)

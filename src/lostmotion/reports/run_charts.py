@@ -215,20 +215,27 @@ def _in_terms_of(train: DriveTrain, name: str, last: str, ratio: float) -> str:
 
 
 def ratios_to(train: DriveTrain, last: str) -> dict[str, float]:
-    """For each shaft its speed over the speed of the last one, by the gears between them; 1 where there are none."""
-    ratios = {last: 1.0}
-    waiting = [last]
-    while waiting:
-        shaft = waiting.pop()
-        for gear in train.fixed_gears().values():
-            for near, far, ratio in (
-                (gear.output, gear.input, gear.ratio),
-                (gear.input, gear.output, 1.0 / gear.ratio),
-            ):
-                if near == shaft and far not in ratios:
-                    ratios[far] = ratio * ratios[near]
-                    waiting.append(far)
-    return {name: ratios.get(name, 1.0) for name in train.shafts}
+    """For each shaft its speed over the speed of the last one, by the gears between them.
+
+    Shafts that no gear joins to the last one are in terms of the last of their own, such as the slides of a mass matrix.
+    """
+    ratios: dict[str, float] = {}
+    for start in (last, *reversed(train.shafts)):
+        if start in ratios:
+            continue
+        ratios[start] = 1.0
+        waiting = [start]
+        while waiting:
+            shaft = waiting.pop()
+            for gear in train.fixed_gears().values():
+                for near, far, ratio in (
+                    (gear.output, gear.input, gear.ratio),
+                    (gear.input, gear.output, 1.0 / gear.ratio),
+                ):
+                    if near == shaft and far not in ratios:
+                        ratios[far] = ratio * ratios[near]
+                        waiting.append(far)
+    return {name: ratios[name] for name in train.shafts}
 
 
 # --- over each other ---
