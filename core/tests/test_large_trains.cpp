@@ -62,6 +62,115 @@ struct ExactSeries {
     std::vector<double> sizes;
 };
 
+// The equations of a tree of masses by themselves, segment by segment from the state that the exact solver has there:
+// Runge-Kutta steps of at most 2 us, and whether friction stays within its limit and against the speed.
+struct Tree {
+    struct Joint {
+        int a, b;
+        double ratio, stiffness, half_gap, damping;
+    };
+    std::vector<double> inertia, viscous, friction;
+    std::vector<Joint> joints;
+    double amplitude, frequency;
+
+    Tree(RandomTrains& random, int masses) : amplitude(random.spread(1.0, 10.0)), frequency(random.spread(2.0, 40.0)) {
+        for (int s = 0; s < masses; ++s) {
+            inertia.push_back(random.spread(1e-3, 1e-1));
+            viscous.push_back(random.coin() ? random.spread(1e-3, 1e-1) : 0.0);
+            friction.push_back(random.coin(0.6) ? random.spread(0.01, 1.0) : 0.0);
+            if (s == 0) continue;
+            const bool gap = random.coin(0.4);
+            joints.push_back({random.pick(std::max(0, s - 3), s - 1), s, random.spread(0.5, 2.0),
+                              random.spread(1e2, 1e4), gap ? random.spread(1e-4, 1e-2) : 0.0,
+                              gap || random.coin() ? 0.0 : random.spread(0.01, 1.0)});
+        }
+    }
+    TimedTrain timed() const {
+        TimedTrain t{"tree", {}, {sine(amplitude, frequency)}, 0.1, 0};
+        for (std::size_t s = 0; s < inertia.size(); ++s) {
+            t.train.shafts.push_back(shaft(s == 0 ? 0.0 : inertia[s]));
+            t.train.shafts[s].viscous_friction = viscous[s];
+            t.train.shafts[s].friction.torque = friction[s];
+        }
+        t.train.motors = {torque_motor(0)};
+        t.train.motors[0].law.rotor_inertia = inertia[0];
+        t.train.motors[0].law.friction_torque = 0.0;
+        for (const Joint& j : joints) {
+            t.train.gears.push_back(spring(
+                j.a, j.b, j.ratio,
+                j.half_gap > 0.0 ? TorsionCurve({j.half_gap}, {0.0, j.stiffness}) : TorsionCurve({}, {j.stiffness})));
+            t.train.gears.back().mesh_damping = j.damping;
+        }
+        return t;
+    }
+    // y: speeds, then twists. free: the net torque without friction.
+    void rates(double t, const std::vector<double>& y, const std::vector<int>& modes, std::vector<double>& out,
+               std::vector<double>& free) const {
+        const std::size_t n = inertia.size();
+        std::fill(free.begin(), free.end(), 0.0);
+        free[0] = amplitude * std::sin(2.0 * std::numbers::pi * frequency * t);
+        for (std::size_t g = 0; g < joints.size(); ++g) {
+            const Joint& j = joints[g];
+            const auto a = static_cast<std::size_t>(j.a), b = static_cast<std::size_t>(j.b);
+            const double d = y[n + g], rate = y[a] / j.ratio - y[b];
+            const double T = j.stiffness * (d - std::clamp(d, -j.half_gap, j.half_gap)) + j.damping * rate;
+            free[a] -= T / j.ratio;
+            free[b] += T;
+            out[n + g] = rate;
+        }
+        for (std::size_t s = 0; s < n; ++s) {
+            free[s] -= viscous[s] * y[s];
+            out[s] = friction[s] > 0.0 && modes[s] == 0 ? 0.0 : (free[s] - modes[s] * friction[s]) / inertia[s];
+        }
+    }
+};
+
+struct Checked final : Observer<System> {
+    Checked(const Tree& tree, const TrainIn<Any>& in) : tree(tree), places(in.assembly.places()) {}
+
+    bool segment(const Segment<System>& s) override {
+        const std::size_t n = tree.inertia.size(), size = n + tree.joints.size();
+        std::vector<double> y(size), z(size), k[4], free(n);
+        for (auto& rate : k) rate.resize(size);
+        std::vector<int> modes(n);
+        for (std::size_t i = 0; i < n; ++i) {
+            y[i] = s.at.x()[places.shafts[i].speed];
+            if (tree.friction[i] > 0.0) modes[i] = s.entry.regime.key.modes[places.shafts[i].contact];
+        }
+        for (std::size_t g = 0; g < tree.joints.size(); ++g) y[n + g] = s.at.x()[places.gears[g].twist];
+        const double length = s.end - s.begin;
+        const auto steps = static_cast<long>(std::ceil(length / 2e-6));
+        const double h = steps > 0 ? length / static_cast<double>(steps) : 0.0;
+        for (long j = 0; j < steps; ++j) {
+            const double t = s.begin + h * static_cast<double>(j);
+            for (int stage = 0; stage < 4; ++stage) {
+                const double part = stage == 0 ? 0.0 : stage == 3 ? h : 0.5 * h;
+                for (std::size_t i = 0; i < size; ++i) z[i] = y[i] + (stage == 0 ? 0.0 : part * k[stage - 1][i]);
+                tree.rates(t + part, z, modes, k[stage], free);
+                for (std::size_t i = 0; stage == 0 && i < n; ++i) {
+                    if (tree.friction[i] == 0.0) continue;
+                    if (modes[i] == 0) beyond = std::fmax(beyond, std::fabs(free[i]) / tree.friction[i] - 1.0);
+                    if (modes[i] * y[i] < 0.0) against = std::fmax(against, std::fabs(y[i]));
+                }
+            }
+            for (std::size_t i = 0; i < size; ++i)
+                y[i] += h / 6.0 * (k[0][i] + 2.0 * k[1][i] + 2.0 * k[2][i] + k[3][i]);
+        }
+        for (std::size_t i = 0; i < n; ++i) gap = std::fmax(gap, std::fabs(y[i] - s.x_end[places.shafts[i].speed]));
+        for (std::size_t g = 0; g < tree.joints.size(); ++g)
+            gap = std::fmax(gap, 1e3 * std::fabs(y[n + g] - s.x_end[places.gears[g].twist]));
+        ++segments;
+        return true;
+    }
+
+    const Tree& tree;
+    const Places& places;
+    long segments = 0;
+    double gap = 0.0;      // of speeds [rad/s] and of twists [mrad] at the ends of segments
+    double beyond = 0.0;   // of a torque at rest over what friction holds
+    double against = 0.0;  // speed against the direction of slip [rad/s]
+};
+
 }  // namespace
 
 // By a solver of its own, with sparse rows and series (shared with nobody), and by Runge-Kutta steps of 2 us.
@@ -122,6 +231,33 @@ TEST_CASE("a stiff chain is doubled, and takes no more event checks than one tha
         CHECK(cache.entry(solver.key()).propagator.by_series() == (chain.mesh_damping < 1.0));
         CHECK(solver.event_checks() < 2000);
     }
+}
+
+TEST_CASE(
+    "each segment of random trees of 9 to 40 masses is that of Runge-Kutta steps, with friction within its limits") {
+    RandomTrains random(92);
+    long segments = 0;
+    double gap = 0.0, beyond = 0.0, against = 0.0;
+    for (int n = 0; n < cases(300); ++n) {
+        CAPTURE(n);
+        const Tree tree(random, random.pick(9, 40));
+        const TimedTrain t = tree.timed();
+        const TrainIn<Any> in(t);
+        ExactSolver<System> solver(in.system, in.signals, 1e-3, in.system.balanced_scale());
+        Checked checked(tree, in);
+        REQUIRE(solver.begin(0.0, in.start, {}) == Status::done);
+        REQUIRE(solver.advance(t.duration, checked) == Status::done);
+        segments += checked.segments;
+        gap = std::fmax(gap, checked.gap);
+        beyond = std::fmax(beyond, checked.beyond);
+        against = std::fmax(against, checked.against);
+    }
+    MESSAGE(segments << " segments, largest difference " << gap << ", torque at rest beyond friction " << beyond
+                     << ", speed against slip " << against);
+    CHECK(gap < 1e-9);
+    CHECK(beyond < 1e-9);
+    CHECK(against < 1e-9);
+    CHECK(segments > 10 * share(300));
 }
 
 TEST_CASE("exact and adaptive solver agree on random trains of 9 to 40 shafts with all elements") {
