@@ -3,6 +3,7 @@
 import json
 import math
 import re
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -154,8 +155,8 @@ def integrated(
         events = guards(modes)
         for guard in events:
             guard.terminal = True  # attributes of functions, as SciPy asks for
-        law = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-14}
-        run = solve_ivp(lambda t, y, m=modes: forces(t, y, m), (t, end), state, events=events, **law)
+        law: dict[str, Any] = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-14}
+        run: Any = solve_ivp(partial(forces, mode=modes), (t, end), state, events=events, **law)
         t, state = float(run.t[-1]), run.y[:, -1]
         if run.status == 1:
             which = next(k for k, at in enumerate(run.t_events) if len(at))
@@ -168,10 +169,10 @@ def test_a_chain_with_a_gap_moves_as_integrated_from_flank_to_flank() -> None:
     n, gap = 24, 11
     masses = inertias(LOOSE.train()).diagonal()
 
-    def forces(t: float, y: np.ndarray, flank: int) -> np.ndarray:
+    def forces(t: float, y: np.ndarray, mode: int) -> np.ndarray:
         speeds, twists = y[:n], y[n:]
         torque = 800.0 * twists + 0.02 * (speeds[:-1] - speeds[1:])
-        torque[gap] = 800.0 * (twists[gap] - 1e-3 * flank) if flank else 0.0
+        torque[gap] = 800.0 * (twists[gap] - 1e-3 * mode) if mode else 0.0
         drive = np.zeros(n)
         drive[0] = 0.1 + 3.0 * math.sin(40.0 * math.pi * t)
         rate = (drive - 1e-3 * speeds - np.append(torque, 0.0) + np.insert(torque, 0, 0.0)) / masses
@@ -204,13 +205,13 @@ def test_masses_break_away_one_after_the_other_as_integrated() -> None:
     scenario = chain(n, friction=0.05, ramps=[{"rise": slope, "duration": 1.0}])
     masses = inertias(scenario.train()).diagonal()
 
-    def forces(t: float, y: np.ndarray, moving: int) -> np.ndarray:
+    def forces(t: float, y: np.ndarray, mode: int) -> np.ndarray:
         speeds, twists = y[:n], y[n:]
         torque = 800.0 * twists + 0.02 * (speeds[:-1] - speeds[1:])
         drive = np.zeros(n)
         drive[0] = slope * t
         rate = (drive - 0.05 - 1e-3 * speeds - np.append(torque, 0.0) + np.insert(torque, 0, 0.0)) / masses
-        rate[moving:] = 0.0
+        rate[mode:] = 0.0
         return np.concatenate([rate, speeds[:-1] - speeds[1:]])
 
     def guards(moving: int) -> list[Any]:
@@ -240,8 +241,8 @@ def test_all_that_takes_a_train_takes_a_large_one(scenario: lm.Scenario) -> None
     assert len(lm.linearize(scenario, time=0.05).resonances()) > 0
     if scenario is LOOSE:  # of 40 masses it takes a quarter of a minute
         assert describe(scenario, "chain")["name"] == "chain"
-    with pytest.raises(lm.errors.InputError):
-        lm.SimulationBatch(scenario.train(), 1e-3, 2)  # type: ignore[arg-type]
+    with pytest.raises(lm.errors.InputError, match="must be a Drive"):
+        lm.SimulationBatch(scenario.train(), step=1e-3, count=2)  # type: ignore[arg-type]
 
     simulation = lm.Simulation(scenario)
     simulation.advance(0.02, drive_command=2.0)
