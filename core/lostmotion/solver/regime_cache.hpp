@@ -69,6 +69,7 @@ class RegimeCache {
             neighbour = {};
             n_speeds = 0;
             contacts = behind = {};
+            reach_.clear();  // it may have been of another train
             reach_known_ = {};
             for (int g = 0; g < r.n_guards; ++g) {
                 const Guard& guard = r.guards[g];
