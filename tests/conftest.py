@@ -26,7 +26,7 @@ from lostmotion.cli import main
 
 ROOT = Path(__file__).parent.parent
 ALL_SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))
-TRAINS = [p for p in ALL_SCENARIOS if any(table in p.read_text() for table in ("[shafts.", "[controllers.", "[axis."))]
+TRAINS = [p for p in ALL_SCENARIOS if any(table in p.read_text() for table in ("[shafts", "[controllers.", "[axis."))]
 """in the long form"""
 SCENARIOS = [path for path in ALL_SCENARIOS if path not in TRAINS]
 """in the short form"""

@@ -64,7 +64,8 @@ def with_diagonals(s: lm.Scenario) -> lm.Scenario:
     return lm.Scenario(**data)
 
 
-LONG = [path for path in SCENARIOS if not lm.load(path).is_drive and "two-link" not in path.stem]
+LONG = [path for path in SCENARIOS if not lm.load(path).is_drive and not lm.load(path).mass_matrices]
+"""without a mass matrix of their own"""
 
 
 @pytest.mark.parametrize("path", LONG, ids=lambda path: path.stem)

@@ -147,7 +147,7 @@ def title_with(title: str, keys: Iterable[str]) -> str:
     'A robot joint, 1 Hz; changed: command.frequency'
     """
     plain, _, before = title.partition(CHANGED)
-    every = list(dict.fromkeys([*filter(None, before.removesuffix(MORE).split(", ")), *keys]))
+    every = sorted({*filter(None, before.removesuffix(MORE).split(", ")), *keys})
     if not every or not plain:
         return title
     more = MORE if len(every) > MOST_KEYS or before.endswith(MORE) else ""
