@@ -132,4 +132,4 @@ def test_a_title_names_the_values_that_were_changed_below_it(tmp_path: Path) -> 
     again = lm.load(file, {"load.inertia": 2.0, "command.frequency": 3.0})
     assert again.title == f"{plain}; changed: command.frequency, load.inertia"
     many = {f"load.{key}": 1.0 for key in ("inertia", "friction_torque", "viscous_friction")}
-    assert lm.load("catalogue-robot-joint", {**changes, **many}).title.endswith(", load.friction_torque, ...")
+    assert lm.load("catalogue-robot-joint", {**changes, **many}).title.endswith(", load.inertia, ...")
