@@ -30,7 +30,7 @@ def test_wrong_json_of_a_train_is_refused_by_its_own_key() -> None:
 def test_names_of_variables_are_those_of_the_core(path: Path) -> None:
     """In both forms: what the train calls its variables is what the solver samples."""
     scenario = lm.load(path)
-    train, core = scenario.named_train(), scenario.core()
+    train, core = scenario.train(), scenario.core()
     named = {name for name, *_ in core.channels()}
     assert {train.speed_of(shaft) for shaft in train.shafts} <= named
     assert {train.motor_torque_of(motor) for motor in train.motors} <= named

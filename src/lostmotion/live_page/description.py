@@ -134,7 +134,7 @@ def _sliders(scenario: Scenario, values: list[tuple[str, float]], closed: str | 
 
 
 def _signal_sliders(scenario: Scenario) -> Iterator[sliders.Slider]:
-    keys, train = scenario.input_keys(), scenario.named_train()
+    keys, train = scenario.input_keys(), scenario.train()
     turned = {keys[train.command_of(motor)] for motor in (*scenario.axes(), *scenario.continuous())}
     shafts = {keys[train.load_torque_of(shaft)]: shaft for shaft in train.shafts}
     duration = scenario.simulation.duration

@@ -17,7 +17,7 @@ def drawn(scenario: Scenario) -> dict[str, Any]:
     def known(name: str) -> str | None:
         return name if name in names else None
 
-    train = scenario.named_train()
+    train = scenario.train()
     with_motor = {m.shaft for m in train.motors.values()}
     shafts = [
         {

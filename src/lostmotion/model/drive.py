@@ -1,7 +1,7 @@
 """A drive: a motor, a gearbox and a load, as frozen objects in SI units; a scenario file spells them word for word."""
 
 from functools import lru_cache
-from typing import Self
+from typing import ClassVar, Self
 
 from pydantic import model_validator
 
@@ -19,8 +19,10 @@ from .torsion import Rigid
 from .train import DriveTrain
 
 
-class NamedDrive(DriveTrain):
-    """The train of a drive, with the names that variables of a drive have."""
+class DriveOfOneGear(DriveTrain):
+    """The train of a drive, with the names that its variables have."""
+
+    drive_names: ClassVar[bool] = True
 
     def contact_of(self, shaft: str) -> str:
         return "input_contact" if shaft == "motor" else f"{shaft}_contact"
@@ -83,9 +85,9 @@ class Drive(Part):
         )
 
     @kept
-    def named_train(self) -> NamedDrive:
+    def named_train(self) -> DriveOfOneGear:
         """The same train, with the names that variables of a drive have."""
-        return NamedDrive.like(self.train())
+        return DriveOfOneGear.like(self.train())
 
     def core(self, law: MotorLaw | None = None) -> _core.Train:
         """The solver's train, its motor as a current loop may make it; the last ones are kept for equal parts."""
@@ -113,6 +115,4 @@ def _gear(gearbox: Gearbox) -> Gear:
 
 @lru_cache(maxsize=16)  # each keeps the regimes of its runs, a few megabytes
 def _core_drive(drive: Drive, law: MotorLaw | None) -> _core.Train:
-    core = drive.train().core(("load",), {"motor": law})
-    core.short_form = True
-    return core
+    return drive.named_train().core(("load",), {"motor": law})

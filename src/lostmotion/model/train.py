@@ -1,7 +1,7 @@
 """A drive train: shafts joined by gears, clutches and dampers, turned by motors, held by brakes, as frozen objects in SI units."""
 
 from collections.abc import Collection, Iterator, Mapping
-from typing import Any, Self, get_args
+from typing import Any, ClassVar, Self, get_args
 
 from pydantic import Field, model_validator
 
@@ -102,6 +102,8 @@ class DriveTrain(TrainElements):
     ['coupling', 'worm_gear']
     """
 
+    drive_names: ClassVar[bool] = False
+    """whether its variables have the names of those of a drive"""
     shafts: Elements[Shaft] = Field(min_length=1)
 
     def is_slide(self, shaft: str) -> bool:
@@ -237,6 +239,7 @@ class DriveTrain(TrainElements):
         Controllers keep to the torque_limit of the motors that such loops drive.
         """
         train = _core.Train()
+        train.short_form = self.drive_names and not given
         for name, s in self.shafts.items():
             inputs = {"loaded": name in loaded, "given_motion": name in given}
             train.add_shaft({"name": name, **s.core_fields(), **inputs})

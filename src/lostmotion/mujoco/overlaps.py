@@ -67,7 +67,7 @@ def loads_of(drive: Driven) -> list[str]:
     """Keys of the load torques of a scenario."""
     if not isinstance(drive, Scenario):
         return []
-    train = drive.named_train()
+    train = drive.train()
     return [
         drive.written.input_key(train.load_torque_of(shaft))
         for shaft, signal in drive.tables.loads().items()

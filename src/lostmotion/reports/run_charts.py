@@ -244,7 +244,7 @@ def ratios_to(train: DriveTrain, last: str) -> dict[str, float]:
 def gear_charts(result: xarray.Dataset) -> list[Panel]:
     """Torque over twist of each gear, and the operating point over its loss map."""
     scenario = scenario_of(result)
-    train = scenario.named_train()
+    train = scenario.train()
     found = []
     for name, gear in train.gears.items():
         twist, torque, speed = train.twist_of(name), train.output_torque_of(name), train.speed_of(gear.input)

@@ -108,7 +108,7 @@ def loop_errors(result: xarray.Dataset | RunArrays) -> list[LoopErrors]:
 
 
 def _of_axis(result: Any, scenario: Scenario, motor: str) -> LoopErrors | None:
-    train, time = scenario.named_train(), np.asarray(result["time"])
+    train, time = scenario.train(), np.asarray(result["time"])
     sampled = scenario.axes().get(motor)
     c: Any = sampled or scenario.continuous()[motor]
     shaft, kind = c.shaft or list(train.shafts)[-1], c.reference.kind

@@ -149,7 +149,7 @@ def _powers(plant: Plant, samples: np.ndarray) -> dict[str, float]:
     values = dict(zip(plant.channels, samples, strict=False))
     scenario = plant.closed
     assert scenario is not None
-    motors, gears = _of_train(scenario.named_train())
+    motors, gears = _of_train(scenario.train())
 
     def power(torque: str, speed: str) -> float:
         return float(np.mean(values[torque] * values[speed]))

@@ -161,7 +161,7 @@ def _scenario_of(what: Drive | Scenario) -> Scenario:
 
 def _plant_of(scenario: Scenario) -> Plant:
     need_free_motion(scenario, "response")
-    train = scenario.named_train()
+    train = scenario.train()
     core = scenario.core(sampled=False)
     signals = scenario.signals()
     last = list(train.shafts)[-1]

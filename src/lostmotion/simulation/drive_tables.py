@@ -87,9 +87,6 @@ class DriveTables(ScenarioTables):
         return Drive.of_parts(motor=self.motor, gearbox=self.gearbox, load=Load.like(self.load))
 
     def train(self) -> DriveTrain:
-        return self.drive().train()
-
-    def named_train(self) -> DriveTrain:
         return self.drive().named_train()
 
     @kept

@@ -66,8 +66,7 @@ class ExactBatch:
                 kinds[key] = len(kinds)
                 law = None if pair is None else driven(pair[1])
                 shafts: tuple[tuple[str, ...], tuple[str, ...]] = ((), ("load",)) if given else (("load",), ())
-                core = drive.train().core(shafts[0], {"motor": law}, shafts[1])
-                core.short_form = not given
+                core = drive.named_train().core(shafts[0], {"motor": law}, shafts[1])
                 trains.append(core)
                 if pair is not None and key[1:] not in bound:
                     bound[key[1:]] = controlled(*pair).control()

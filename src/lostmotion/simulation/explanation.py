@@ -212,7 +212,7 @@ def explain(what: Scenario | Simulation, time: Time | None = None) -> Explanatio
     if not 0.0 <= time <= what.simulation.duration:
         raise InputError(f"time {time} s must lie between 0 and the duration, {what.simulation.duration} s")
     need_open_loop(what, "explain")
-    return _explanation(what.named_train(), what.core(), time, **_core.explain_at(core_case(what), time))
+    return _explanation(what.train(), what.core(), time, **_core.explain_at(core_case(what), time))
 
 
 def smallest_commands(drive: Drive, load_torque: float = 0.0) -> tuple[float, float]:

@@ -29,7 +29,7 @@ def pointing_errors(scenario: Scenario, result: RunArrays) -> dict[str, np.ndarr
 
 
 def _angle(scenario: Scenario, result: RunArrays, shaft: str | None) -> np.ndarray:
-    train = scenario.named_train()
+    train = scenario.train()
     name = train.angle_of(shaft or list(train.shafts)[-1])
     if name in result:
         return result[name]

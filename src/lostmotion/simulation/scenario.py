@@ -295,12 +295,8 @@ class Scenario:
         return self.of(self.tables, checked=False) if self.is_drive else self
 
     def train(self) -> DriveTrain:
-        """The drive train without its surroundings."""
+        """The drive train without its surroundings, with the names that variables have in results of this scenario."""
         return self.written.train()
-
-    def named_train(self) -> DriveTrain:
-        """The same, with the names that variables have in results of this scenario."""
-        return self.written.named_train()
 
     def commanded(self) -> list[str]:
         """Names of what has a command: motors, brakes and friction clutches."""
@@ -364,7 +360,6 @@ class Scenario:
         continuous = self.continuous()
         return core_train(
             self.train(),
-            self.is_drive,
             tuple(self.tables.loaded() if loaded is None else loaded),
             tuple(self.tables.given() if given is None else given),
             tuple(motor_laws(self.tables.controllers if sampled else continuous).items()),
@@ -384,7 +379,7 @@ class Scenario:
 
     def signals(self) -> dict[str, Signal[Any]]:
         """All that acts on the train, after delays of brakes and clutches, by the name of its result variable."""
-        train, controllers = self.named_train(), self.continuous()
+        train, controllers = self.train(), self.continuous()
         commands = {
             train.command_of(name): self.tables.acting(name) for name in self.commanded() if name not in controllers
         }
@@ -428,7 +423,7 @@ class Scenario:
         initial
             State in place of the initial state of the scenario.
         """
-        train = self.named_train()
+        train = self.train()
         state = self.begin() if initial is None else initial.of_train()
         driven = self.tables.given()
         values = start_values(train, state, self.core(), driven)

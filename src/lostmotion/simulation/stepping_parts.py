@@ -39,7 +39,8 @@ def parts(
     if given is not None:
         raise InputError("given: is for trains; give drive.train() for a drive whose motor or load has a given motion")
     start = what.begin() if isinstance(what, Scenario) else TrainInitial()
-    return drive_of(what), what.named_train(), what.core(), (), (), start
+    drive = drive_of(what)
+    return drive, drive.named_train(), what.core(), (), (), start
 
 
 def masses_given(masses: Mapping[str, MassMatrix], given: Any) -> dict[str, MassMatrix]:

@@ -110,11 +110,7 @@ class ScenarioTables(Part):
         return "the scenario"
 
     def train(self) -> DriveTrain:
-        """The drive train without its surroundings."""
-        raise NotImplementedError
-
-    def named_train(self) -> DriveTrain:
-        """The same, with the names that variables have in results of these tables."""
+        """The drive train without its surroundings; its variables have the names that results of these tables have."""
         raise NotImplementedError
 
     def long(self) -> Any:

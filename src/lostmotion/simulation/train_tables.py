@@ -99,9 +99,6 @@ class TrainTables(ScenarioTables, LinearElements):
     def train(self) -> DriveTrain:
         return DriveTrain.of_tables(shafts=Named(self.plain_shafts()), **self.elements())
 
-    def named_train(self) -> DriveTrain:
-        return self.train()
-
     def long(self) -> TrainTables:
         return self
 
@@ -253,7 +250,6 @@ class TrainTables(ScenarioTables, LinearElements):
 @lru_cache(maxsize=16)  # each keeps the regimes of its runs, a few megabytes
 def core_train(
     train: DriveTrain,
-    short: bool,
     loaded: tuple[str, ...],
     given: tuple[str, ...],
     laws: tuple[tuple[str, MotorLaw | None], ...],
@@ -261,7 +257,6 @@ def core_train(
 ) -> _core.Train:
     """The solver's train, its motors as current loops make them, with continuous controllers."""
     core = train.core(loaded, dict(laws), given)
-    core.short_form = short
     for name, controller in continuous:
         with inside(f"controllers.{name}"):
             controller.add_to(core, train, name)

@@ -195,7 +195,7 @@ def _heating(
     scenario, time = scenario_of(result), result["time"].values
     if any(controller.law for controller in scenario.axes().values()):
         return torque, mean_square(torque), math.inf, rms(time, torque)
-    name = next(name for name in scenario.named_train().motors if scenario.motor_key(name) == where)
+    name = next(name for name in scenario.train().motors if scenario.motor_key(name) == where)
     if m.winding is None or (oriented := oriented_amplitudes(result, where)) is None:
         found = squares_of(scenario, name, time)
         return torque, found.square, found.lead, found.rms
@@ -226,7 +226,7 @@ def _dataset(
 def _motor_of(result: xarray.Dataset, name: str | None) -> tuple[Motor, str, list[np.ndarray]]:
     """The motor, its table, and its command, torque [N·m] and speed [rad/s] over the run."""
     scenario = scenario_of(result)
-    train = scenario.named_train()
+    train = scenario.train()
     motors = {motor: m for motor, m in train.motors.items() if not train.is_slide(m.shaft)}
     if name is None and len(motors) == 1:
         name = next(iter(motors))

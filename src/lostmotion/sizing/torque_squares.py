@@ -75,12 +75,12 @@ def squares_of(scenario: Scenario, motor: str, time: np.ndarray) -> Squares:
         As `simulate`.
     """
     parts = parts_of(scenario)
-    part = next(p for p in parts if motor in p.named_train().motors)
+    part = next(p for p in parts if motor in p.train().motors)
     control = scenario.control() if len(parts) == 1 else control_of_part(scenario.control(), scenario.long(), part)
     signals = part.signals().values()
     breaks = [t for signal in signals for t, *_ in signal.breakpoint_list()]
     fastest = max((f for signal in signals for _, f, _ in signal.sine_list()), default=0.0)
-    channel = part.named_train().motor_torque_of(motor)
+    channel = part.train().motor_torque_of(motor)
     return squares(core_case(part), channel, time, control=control, breaks=breaks, fastest=fastest)
 
 

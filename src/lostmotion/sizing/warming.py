@@ -282,7 +282,7 @@ def _course(law: _Law, each: int, start: tuple[float, float]) -> _Course:
     state, capacities = scenario.start(), scenario.capacities()
     last = table.samples - 1
     fastest = max((f for name in names for _, f, _ in signals[name].sine_list()), default=0.0)
-    torque = scenario.named_train().motor_torque_of(law.name)
+    torque = scenario.train().motor_torque_of(law.name)
     now, results, temperatures = start, [], [np.array([start])]
     heat = dict.fromkeys(("winding", "housing", "stored", "ambient"), 0.0)
     for first in range(0, last, each):

@@ -66,7 +66,6 @@ def _run(scenario: Scenario, shorter: Cycles, longer: Cycles) -> RunArrays:
         return stopped
 
     train = scenario.train().core(("load",), {"motor": driven(scenario.axes()["motor"])})
-    train.short_form = True
     signals, numbers = scenario.signals(), {name: k for k, (name, *_) in enumerate(train.channels())}
     inputs = [signals[name].core() for name in train.input_names()]
     state = {"start": scenario.start(), "hysteresis_capacities": scenario.capacities()}
