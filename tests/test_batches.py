@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
-from lostmotion.simulation.exact_batches import controlled
 from lostmotion.simulation.variables import STATES
 
 STEP = 1e-3
@@ -334,7 +333,7 @@ def test_controllers_act_at_their_instants_as_on_a_drive_alone() -> None:
         batch.step(targets)
     for k, drive in enumerate(drives):
         hold = controller.model_copy(update={"reference": lm.PositionReference(mean=float(targets[k]))})
-        alone = lm.Simulation(controlled(drive, hold), step=STEP)
+        alone = lm.Simulation(lm.Scenario.of_any(drive).with_axes({"motor": hold}), step=STEP)
         for _ in range(1000):
             alone.advance(STEP)
         assert batch["load_angle"][k] == pytest.approx(alone["load_angle"], abs=1e-6)

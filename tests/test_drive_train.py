@@ -353,7 +353,7 @@ def test_shipped_trains_load_and_survive_json(path: Path) -> None:
 
 def test_what_takes_a_drive_alone_says_so() -> None:
     with pytest.raises(
-        lm.InputError, match=r"drive: .* is a drive train, and this is defined for one motor, one gearbox"
+        lm.InputError, match=r"drive: is for one motor that turns one load through one gearbox, and here brakes\.hold"
     ):
         lm.response.rigid_constants(train())
     with pytest.raises(

@@ -167,7 +167,7 @@ def test_a_train_alone_may_be_loaded_everywhere() -> None:
 
 REFUSED = [
     (lambda s: s.advance(1e-3), "motor_command: missing; all commands and references are to be given"),
-    (lambda s: s.advance(1e-3, 0.1), "a train takes its inputs by name: motor_command, drum_load_torque"),
+    (lambda _: lm.Simulation(lm.load("two-motors-one-ring")).advance(1e-3, 0.1), "command: there are several; give them by name"),
     (lambda s: s.advance(1e-3, motor_comand=0.1), "motor_comand: is no input of this train; did you mean motor_command?"),
     (lambda s: s.advance(1e-3, motor_command=0.0, worm_load_torque=1.0), 'with loaded=["worm"]'),
     (lambda s: s.advance(1e-3, motor_command="0,1"), 'motor_command: "0,1" has a decimal comma; write "0.1"'),
@@ -175,22 +175,18 @@ REFUSED = [
     (lambda s: s.advance(0.0, motor_command=0.0), "interval 0.0 s must lie between"),
     (lambda s: s.advance("x", motor_command=0.0), 'interval: "x" is not one number with one unit'),
     (lambda s: s["rotor_sped"], '"rotor_sped" is no variable; did you mean rotor_speed?'),
-    (lambda s: s.reset(lm.Initial()), "initial: is the state of a drive; that of a train is a TrainInitial"),
+    (lambda s: s.reset(lm.Initial(load_speed=1.0)), "key initial.speeds.load: is no shaft of this train"),
     (lambda s: s.reset(lm.TrainInitial(speeds={"x": 1.0})), "key initial.speeds.x: is no shaft of this train"),
     (lambda s: setattr(s, "state", lm.Simulation(BELT).state), "is the state of another drive"),
     (lambda s: setattr(s, "state", lm.Simulation(WORM.replace(**{"shafts.drum.inertia": 3.0})).state), "of another drive"),
     (lambda _: lm.Simulation(WORM, loaded=["dum"]), 'loaded: "dum" is no shaft of this train; did you mean drum?'),
-    (lambda _: lm.Simulation(lm.load("paper-2dof-nl-small"), loaded=["load"]), "loaded: is for trains"),
-    (lambda _: lm.Simulation(lm.load("paper-2dof-nl-small"), initial=lm.TrainInitial()), "that of a drive is an Initial"),
     (lambda _: lm.linearize(WORM), "depends on the operating point (dry contacts: rotor_contact, worm_contact)"),
-    (lambda _: lm.linearize(WORM, lm.Initial()), "state: is that of a drive; give a TrainInitial"),
-    (lambda _: lm.linearize(WORM, lm.TrainInitial(), command=0.1), "command: a train takes its inputs by name"),
+    (lambda _: lm.linearize(lm.load("two-motors-one-ring"), lm.TrainInitial(), command=0.1), "command: there are several; give one in inputs"),
     (lambda _: lm.linearize(WORM, lm.TrainInitial(), inputs={"motor_comand": 1.0}), '"motor_comand" is no input of this train; did you'),
     (lambda _: lm.linearize(WORM, lm.TrainInitial(), time=0.1), "state: at a time of a run, state and inputs are its own"),
     (lambda _: lm.linearize(WORM.train(), time=0.1), "time: a drive alone has no run"),
     (lambda _: lm.linearize(WORM, time=9.0), "time 9.0 s must lie between 0 and the duration, 1.5 s"),
     (lambda s: lm.linearize(s, time=0.1), "time: a simulation is linearised as it stands"),
-    (lambda _: lm.linearize(lm.load("paper-2dof-nl-small"), inputs={}), "inputs: a drive has command and load_torque"),
     (lambda _: lm.explain(WORM), "time is missing"),
 ]  # fmt: skip
 

@@ -226,10 +226,11 @@ def test_what_a_response_of_a_train_refuses(call: Any, message: str) -> None:
         call(lm.Scenario(**{**tables, "motors": motors}))
 
 
-def test_a_start_of_the_other_kind_is_refused() -> None:
+def test_rest_is_the_same_start_in_both_words() -> None:
     scenario = lm.Scenario(**TWO_STAGES)
-    with pytest.raises(lm.InputError, match="must be of the kind TrainInitial"):
-        lm.periodic_motion(scenario, start=lm.Initial())
+    assert lm.periodic_motion(scenario, start=lm.Initial()).equals(
+        lm.periodic_motion(scenario, start=lm.TrainInitial())
+    )
 
 
 def test_different_starts_lead_to_one_motion_of_a_train_once() -> None:

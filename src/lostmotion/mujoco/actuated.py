@@ -11,7 +11,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..inputs.validation import did_you_mean, listed, shown
-from ..simulation.joint_trains import Driven, JointDrive, JointTrains, joint_drive
+from ..simulation.joint_trains import JointDrive, JointTrains, joint_drive
+from ..simulation.scenario import Scenario
 from .joints import acts, joint_id
 from .mjcf import JointActuator
 
@@ -134,7 +135,7 @@ class Actuated:
         return f"Actuated({listed(self.joints)}; {self.substeps} substeps, at {self.data.time:.6g} s)"
 
     @property
-    def drives(self) -> dict[str, Driven]:
+    def drives(self) -> dict[str, Scenario]:
         """By joint: the drive, with the inertia of the robot in place of its load's own."""
         return {name: d.drive for name, d in self._drives.items()}
 

@@ -17,10 +17,7 @@ from ..inputs.validation import did_you_mean, shown
 from ..model.drive import Drive
 from ..model.load import Load
 from ..model.motor import Motor
-from ..model.signals import CommandSignal
 from ..model.train import DriveTrain
-from ..simulation.exact_batches import controlled
-from ..simulation.joint_trains import Driven
 from ..simulation.scenario import Scenario
 from ..simulation.shipped import shipped_scenarios
 from ..simulation.sources import load
@@ -33,8 +30,8 @@ if TYPE_CHECKING:
     import mujoco
 
 
-def drive_of_joint(joint: str, given: Any, controller: Controller | None) -> Driven:
-    """Return the argument of `attach` for a joint as a drive, a scenario with a controller, or a train.
+def drive_of_joint(joint: str, given: Any, controller: Controller | None) -> Scenario:
+    """Return the argument of `attach` for a joint as a scenario, with the controller if there is one.
 
     Raises
     ------
@@ -46,15 +43,14 @@ def drive_of_joint(joint: str, given: Any, controller: Controller | None) -> Dri
         raise InputError(
             f"joint {joint!r}: {shown(given)} is no drive; give a Drive, a DriveTrain, a scenario, or the name of a gearbox or an actuator of the catalogue"
         )
+    scenario = Scenario.of_any(given)
     if controller is None:
-        return given
-    if isinstance(given, Scenario) and given.is_drive and given.controller is None:
-        return given.model_copy(update={"command": CommandSignal(), "controller": controller})
-    if not isinstance(given, Drive):
-        raise InputError(
-            f"joint {joint!r}: controllers are for drives; give a Drive, or a scenario with its controller"
-        )
-    return controlled(given, controller)
+        return scenario
+    if own := list(scenario.tables.controllers):
+        raise InputError(f"joint {joint!r}: a controller of its own turns the motor {own[0]}; leave one of them out")
+    if len(motors := scenario.train().motors) != 1:
+        raise InputError(f"joint {joint!r}: its train has {len(motors)} motors; a joint is turned by one")
+    return scenario.with_axes(dict.fromkeys(motors, controller))
 
 
 def _named(joint: str, name: str) -> Drive | Scenario:

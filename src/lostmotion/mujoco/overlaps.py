@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import InputError
 from ..inputs.named import Named
 from ..model.angle_torques import PeriodicTorque
-from ..model.drive import Drive
-from ..model.train import DriveTrain
-from ..simulation.joint_trains import Driven, output_of
+from ..simulation.joint_trains import output_of
 from ..simulation.scenario import Scenario
 from .joints import actuators_of, joint_id
 
@@ -24,7 +22,7 @@ SHARE_OF_WEIGHT = 1e-3
 """Part of first order in a torque over the angle, over its largest value, above which it may be a weight."""
 
 
-def without_weight(name: str, drive: Driven, *, replace: bool, weighs: bool) -> Driven:
+def without_weight(name: str, drive: Scenario, *, replace: bool, weighs: bool) -> Scenario:
     """The drive of a joint without the loads and weights on it, which the robot has.
 
     Parameters
@@ -49,24 +47,17 @@ def without_weight(name: str, drive: Driven, *, replace: bool, weighs: bool) -> 
             *keys,
             where=f"joint {name!r}",
         )
-    if isinstance(drive, Scenario) and drive.is_drive and drive.controller is None:
-        own: Drive = drive.drive()
-        return own
     if not weights:
         return drive  # load torques of scenarios are not used
     changed = {
         table: Named({key: part for key, part in getattr(drive, table).items() if (table, key) not in weights})
         for table in ("gravity", "angle_torques")
     }
-    assert not isinstance(drive, Drive)
-    lighter: Driven = drive.model_copy(update=changed)
-    return lighter
+    return drive.model_copy(update=changed)
 
 
-def loads_of(drive: Driven) -> list[str]:
+def loads_of(drive: Scenario) -> list[str]:
     """Keys of the load torques of a scenario."""
-    if not isinstance(drive, Scenario):
-        return []
     train = drive.train()
     return [
         drive.written.input_key(train.load_torque_of(shaft))
@@ -75,9 +66,9 @@ def loads_of(drive: Driven) -> list[str]:
     ]
 
 
-def _weights(name: str, drive: Driven) -> list[tuple[str, str]]:
+def _weights(name: str, drive: Scenario) -> list[tuple[str, str]]:
     """Table and name of what may be a weight on the shaft of the joint."""
-    train = drive if isinstance(drive, DriveTrain) else drive.train()
+    train = drive.train()
     shaft = output_of(name, train)
     found = [("gravity", key) for key, part in train.gravity.items() if part.shaft == shaft]
     torques = train.angle_torques.items()
@@ -100,7 +91,7 @@ def _turns_once(torque: PeriodicTorque) -> bool:
     return bool(2.0 * abs(first) / count > SHARE_OF_WEIGHT * max(map(abs, values)))
 
 
-def clear(model: mujoco.MjModel, name: str, drive: Driven, *, replace: bool) -> None:
+def clear(model: mujoco.MjModel, name: str, drive: Scenario, *, replace: bool) -> None:
     """Remove MuJoCo's own description of the drive of a joint.
 
     Raises
@@ -152,7 +143,7 @@ def clear(model: mujoco.MjModel, name: str, drive: Driven, *, replace: bool) -> 
             array[k] = 0.0
 
 
-def _has_spring(name: str, drive: Driven) -> bool:
-    train = drive if isinstance(drive, DriveTrain) else drive.train()
+def _has_spring(name: str, drive: Scenario) -> bool:
+    train = drive.train()
     shaft = output_of(name, train)
     return any(spring.shaft == shaft for spring in train.springs.values())

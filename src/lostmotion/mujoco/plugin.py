@@ -8,13 +8,10 @@ from typing import Any
 from ..control.controller import Controller
 from ..errors import InputError, need
 from ..inputs.arguments import checked
-from ..inputs.validation import shown
-from ..model.train import DriveTrain
 from ..portable.checkout import made_here
 from ..portable.descriptions import description
-from ..simulation.exact_batches import controlled
 from ..simulation.joint_trains import joint_drive
-from ..simulation.scenario import Scenario
+from ..simulation.one_gear import as_drive
 from .attaching import drive_of_joint
 from .overlaps import without_weight
 
@@ -61,7 +58,8 @@ def write_drive(drive: Any, path: str | Path, *, controller: Controller | None =
     Parameters
     ----------
     drive
-        As of `attach`: a drive, a scenario or its name, or a gearbox of the catalogue. Trains are for `attach`.
+        As of `attach`: a drive, a scenario or its name, or a gearbox of the catalogue. What is more than a motor, a gearbox and a
+        load is for `attach`.
     path
         Of the file.
     controller
@@ -75,7 +73,7 @@ def write_drive(drive: Any, path: str | Path, *, controller: Controller | None =
     Raises
     ------
     InputError
-        The drive is a train, or has a controller with a law of your own.
+        It is more than a motor, a gearbox and a load, or has a controller with a law of your own.
 
     Examples
     --------
@@ -87,11 +85,9 @@ def write_drive(drive: Any, path: str | Path, *, controller: Controller | None =
     <plugin joint="JOINT" plugin="lostmotion.drive"><config key="scenario" value=".../elbow.drive"/></plugin>
     """
     given = drive_of_joint(str(path), drive, controller)
-    if isinstance(given, DriveTrain) or (isinstance(given, Scenario) and not given.is_drive):
-        raise InputError(f"drive: {shown(drive)} is a train; use lostmotion.mujoco.attach")
     without_weight(str(path), given, replace=False, weighs=True)
-    scenario = given if isinstance(given, Scenario) else controlled(given, None)
-    armature = joint_drive(str(path), given, scenario.load.inertia, 1e-3).reflected_inertia
+    scenario = as_drive(given, "drive")
+    armature = joint_drive(str(path), scenario, scenario.load.inertia, 1e-3).reflected_inertia
     numbers = description(scenario, parameters=False)
     try:
         numbers.astype("<f8").tofile(path)

@@ -14,7 +14,8 @@ from ..inputs.validation import shown
 from ..model.drive import Drive
 from ..model.motor import Motor
 from ..simulation.joint_trains import joint_drive
-from ..simulation.scenario import Scenario, drive_of
+from ..simulation.one_gear import drive_of
+from ..simulation.scenario import Scenario
 from ..simulation.stepping import Simulation
 from .overlaps import loads_of
 
@@ -107,7 +108,7 @@ def reduce(
     for name, value in (("amplitude", amplitude), ("frequency", frequency)):
         if not value > 0.0:
             raise InputError(f"{name}: {shown(value)} must be positive")
-    if load_torque == 0.0 and (loads := loads_of(drive)):
+    if load_torque == 0.0 and (loads := loads_of(Scenario.of_any(drive))):
         raise InputError("is not taken over; give load_torque, or leave the key out", *loads)
     drive = drive_of(drive)
     columns, target = _along_sines(drive, amplitude, frequency, load_torque)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from ..errors import InputError
 from ..response.rigid import RigidConstants, rigid_constants
 from ..simulation.scenario import Scenario
-from ..simulation.sources import load_drive
+from ..simulation.sources import load
 
 MODELS = ("1-DOF-L", "2-DOF-L", "2-DOF-NL")
 AMPLITUDES = {"large": 1.0275, "small": 0.025}
@@ -37,7 +37,7 @@ def paper_scenario(model: str, amplitude: str) -> Scenario:
     """
     if model not in MODELS or amplitude not in AMPLITUDES:
         raise InputError(f"there is no run {model!r}, {amplitude!r}; models: {MODELS}, amplitudes: {tuple(AMPLITUDES)}")
-    return load_drive(f"paper-{model.lower().replace('-', '', 1)}-{amplitude}")
+    return load(f"paper-{model.lower().replace('-', '', 1)}-{amplitude}")
 
 
 @dataclass(frozen=True)

@@ -142,7 +142,7 @@ def _drive(result: xarray.Dataset) -> Iterator[Chart]:
 def _ratio(result: xarray.Dataset) -> float:
     if "gear_ratio" in result.attrs:
         return float(result.attrs["gear_ratio"])
-    return float(scenario_of(result).short_form("figure").gearbox.ratio)
+    return float(scenario_of(result).gearbox.ratio)
 
 
 def _contacts(result: xarray.Dataset, names: Mapping[str, str]) -> Contacts:

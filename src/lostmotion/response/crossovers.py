@@ -12,7 +12,7 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Frequency, Number, Torque
 from ..model.drive import Drive
 from ..simulation.explanation import smallest_commands
-from ..simulation.scenario import Scenario, drive_of
+from ..simulation.scenario import Scenario
 from .harmonic import of_output
 from .plant import plant_of
 from .shooting import MAX_PERIODS, reason_of, respond
@@ -63,8 +63,9 @@ def characteristics(response: xarray.Dataset, drive: Drive | Scenario, output: s
     bandwidth = [three_decibels_down(frequencies, np.abs(curve)) for curve in values]
     crossover = [_falls_through(frequencies, np.degrees(np.unwrap(np.angle(curve))), -180.0) for curve in values]
     dead_zone = {}
-    if isinstance(drive, Drive) or (isinstance(drive, Scenario) and drive.is_drive and drive.controller is None):
-        forward, backward = smallest_commands(drive_of(drive))
+    scenario = Scenario.of_any(drive)
+    if not scenario.controllers and not scenario.given() and len(scenario.motors) == 1:
+        forward, backward = smallest_commands(scenario)
         dead_zone = {"dead_zone_forward": forward, "dead_zone_backward": backward}
     return xr.Dataset(
         {

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,12 +19,10 @@ from ..model.torsion import Rigid
 from ..model.train import DriveTrain
 from ..simulation.core_runs import core_case
 from ..simulation.drive_tables import Initial
-from ..simulation.needs import need_free_motion, need_no_impacts, need_open_loop
-from ..simulation.scenario import Scenario, drive_of
+from ..simulation.needs import need_free_motion, need_open_loop
+from ..simulation.scenario import Scenario
 from ..simulation.stepping import Simulation
 from ..simulation.train_parts import NO_CONTACT
-from ..simulation.train_ports import loaded_train
-from ..simulation.train_state import start_values
 from ..simulation.train_tables import TrainInitial
 from ..simulation.train_variables import angle_through, angles_through_gears, train_variables
 from ..simulation.variables import CONTACTS, STATES, VARIABLES
@@ -182,11 +179,11 @@ def linearize(
     time : float, optional
         Instant [s] in place of a state: the scenario is run until then with its own inputs.
     command, load_torque : float
-        Inputs of a drive [-], [N·m] at this instant.
+        Inputs [-], [N·m] at this instant, where there is one of the kind.
     command_rate, load_torque_rate : float
         Their rates [1/s], [N·m/s].
     inputs, input_rates : mapping of str to float, optional
-        The same for a train, by name, such as ``{"servo_command": 0.2, "table_load_torque": 5.0}``. Others are 0.
+        The same by name, such as ``{"servo_command": 0.2, "table_load_torque": 5.0}``. Others are 0.
 
     Returns
     -------
@@ -220,18 +217,36 @@ def linearize(
     if time is not None:
         _refuse(given, "at a time of a run, state and inputs are its own")
         return _model_of_run(drive, time)
-    if not isinstance(drive, Drive) and not (isinstance(drive, Scenario) and drive.is_drive):
-        names = ("command", "load_torque", *rates)
-        _refuse({name: given[name] for name in names}, "a train takes its inputs by name, in inputs and input_rates")
-        return _model_of_train(drive, state, inputs or {}, input_rates or {})
-    _refuse({name: given[name] for name in ("inputs", "input_rates")}, "a drive has command and load_torque")
-    drive = drive_of(drive)
-    if not isinstance(state, Initial | None):
-        raise InputError("state: is that of a train; give an Initial")
-    ramps = [_ramp(command, rates["command_rate"]), _ramp(load_torque, rates["load_torque_rate"])]
-    such_as = "Initial(motor_speed=100, load_speed=1, twist=2e-3) [SI], or Initial()"
-    train, at = drive.named_train(), None if state is None else state.of_train()
-    return _model_at(train, drive.core(), ramps, at, partial(start_values, train), such_as)
+    scenario, core = _subject(drive)
+    names = core.input_names()
+    of_inputs, of_rates = dict(inputs or {}), dict(input_rates or {})
+    for name, values, value in (
+        ("command", of_inputs, command),
+        ("load_torque", of_inputs, load_torque),
+        ("command_rate", of_rates, rates["command_rate"]),
+        ("load_torque_rate", of_rates, rates["load_torque_rate"]),
+    ):
+        if given[name]:
+            values[_the_only(name, scenario, names)] = value
+    return _model_at(scenario, core, None if state is None else state.of_train(), of_inputs, of_rates)
+
+
+def _subject(what: Drive | DriveTrain | Scenario) -> tuple[Scenario, _core.Train]:
+    """The scenario, and the solver's train; on a train alone a load torque may act everywhere."""
+    scenario = Scenario.of_any(what)
+    need_free_motion(scenario, "linearize")
+    return scenario, scenario.core(sampled=False, loaded=list(what.shafts) if isinstance(what, DriveTrain) else None)
+
+
+def _the_only(name: str, scenario: Scenario, names: Sequence[str]) -> str:
+    """The input that is called so where there is one of its kind."""
+    train = scenario.train()
+    loads = {train.load_torque_of(shaft) for shaft in train.shafts}
+    found = [n for n in names if (n in loads) == name.startswith("load_torque")]
+    if len(found) == 1:
+        return found[0]
+    several = f"there are several; give one in inputs, by name: {', '.join(found)}" if found else "there is none"
+    raise InputError(f"{name}: {several}")
 
 
 def _refuse(given: dict[str, bool], why: str) -> None:
@@ -244,10 +259,7 @@ def _ramp(value: float, rate: float) -> _core.Signal:
 
 
 def _model_now(simulation: Simulation) -> LinearModel:
-    if simulation._scenario is not None:
-        need_free_motion(simulation._scenario, "linearize")
-    else:
-        need_no_impacts(simulation._train, "linearize")
+    need_free_motion(simulation._scenario, "linearize")
     with simulation._turn:
         regime = simulation._idle().linearize()
     return _model(simulation._train, simulation._core_train, regime)
@@ -263,28 +275,21 @@ def _model_of_run(what: Any, time: float) -> LinearModel:
     return _model(what.train(), what.core(), _core.linearize_at(core_case(what), time))
 
 
-def _model_of_train(
-    what: Any,  # a train, or a scenario in the long form
-    state: Initial | TrainInitial | None,
+def _model_at(
+    scenario: Scenario,
+    core: _core.Train,
+    state: TrainInitial | None,
     inputs: Mapping[str, float],
     rates: Mapping[str, float],
 ) -> LinearModel:
-    train, loaded = loaded_train(what)
-    if isinstance(what, DriveTrain):
-        need_no_impacts(what, "linearize")
-        core = train.core(loaded)
-    else:
-        need_free_motion(what, "linearize")
-        core = what.core(sampled=False)
-    if not isinstance(state, TrainInitial | None):
-        raise InputError("state: is that of a drive; give a TrainInitial")
-    names = core.input_names()
+    """The linear model at a state; without one it must be the same at all states."""
+    train, names = scenario.train(), core.input_names()
     for which, values in (("inputs", inputs), ("input_rates", rates)):
         for name in values:
             if name not in names:
                 meant = did_you_mean(name, names, f"the inputs are {', '.join(names)}")
                 raise InputError(f"{which}: {shown(name)} is no input of this train; {meant}")
-    unit = {v.name: v.unit.replace("1", "") for v in train_variables(train, core)}
+    unit = {v.name: v.unit.replace("1", "") for v in scenario.written.variables(core)}
     ramps = [
         _ramp(
             argument(f"inputs.{name}", inputs.get(name, 0.0), unit[name]),
@@ -292,27 +297,13 @@ def _model_of_train(
         )
         for name in names
     ]
-    start = partial(start_values, train) if what is train else what.start
-    return _model_at(train, core, ramps, state, start, "TrainInitial()")
-
-
-def _model_at(
-    train: DriveTrain,
-    core: _core.Train,
-    ramps: list[_core.Signal],
-    state: TrainInitial | None,
-    start: Callable[[TrainInitial], dict[str, float]],
-    such_as: str,
-) -> LinearModel:
-    """The linear model at a state; without one it must be the same at all states."""
     if state is None and (regimes := _why_several_regimes(train, core)):
         raise InputError(
             f"linearize: the linear model of this drive depends on the operating point ({regimes}); give one, such as "
-            f"{such_as} for the drive at rest"
+            "TrainInitial() for the drive at rest"
         )
     state = state or TrainInitial()
-    capacities = dict(state.hysteresis_capacities)
-    case = _core.Case(core, inputs=ramps, start=start(state), hysteresis_capacities=capacities)
+    case = _core.Case(core, inputs=ramps, start=scenario.start(state), hysteresis_capacities=scenario.capacities(state))
     return _model(train, core, _core.linearize_at(case, 0.0))
 
 

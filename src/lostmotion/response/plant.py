@@ -116,14 +116,14 @@ class Plant:
 
 def plant_of(what: Drive | Scenario) -> Plant:
     """The plant of a drive without inputs, or of a scenario with its own commands."""
-    scenario = _scenario_of(what)
+    scenario = Scenario.of_any(what)
     need_open_loop(scenario, "response")
     return _plant_of(scenario)
 
 
 def plant_or_loop(drive: Drive | Scenario) -> Plant:
     """The same, or of a scenario with controllers what these and the plant are together."""
-    what = _scenario_of(drive)
+    what = Scenario.of_any(drive)
     plant = _plant_of(what)
     if not what.axes():
         return plant
@@ -152,11 +152,6 @@ def plant_or_loop(drive: Drive | Scenario) -> Plant:
         output=what.train().motor_torque_of(first) if measured == "torque" else what.prefix(first) + measured,
         closed=what,
     )
-
-
-def _scenario_of(what: Drive | Scenario) -> Scenario:
-    """A scenario, or that of a drive without inputs, whose times are not used."""
-    return what if isinstance(what, Scenario) else Scenario.of_drive(what, duration=1.0, sample_interval=1.0)
 
 
 def _plant_of(scenario: Scenario) -> Plant:

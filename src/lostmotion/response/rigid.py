@@ -12,7 +12,8 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Time
 from ..model.drive import Drive
 from ..model.losses import ConstantEfficiency
-from ..simulation.scenario import Scenario, drive_of
+from ..simulation.one_gear import drive_of
+from ..simulation.scenario import Scenario
 
 
 @dataclass(frozen=True)

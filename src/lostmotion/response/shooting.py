@@ -155,7 +155,7 @@ def periodic_motion(
     plant = plant_of(drive)
     signals = _replaced(plant.signals, {"command": command, "load_torque": load_torque})
     period = multiple * _period(signals.values())
-    point = ([s.core() for s in signals.values()], period, plant.start if start is None else _start(plant, start))
+    point = ([s.core() for s in signals.values()], period, plant.start if start is None else plant.start_of(start))
     r = respond(plant, [point], harmonics=1, keep_table=True, max_periods=max_periods, threads=1, progress=None)
     if reason := reason_of(r, 0):
         raise RuntimeError(f"no periodic motion was found: {reason}")
@@ -175,13 +175,6 @@ def _replaced(signals: Mapping[str, Signal[Any]], given: Mapping[str, Any]) -> d
             )
         out[name] = type(signals[name])(mean=value) if isinstance(value, int | float) else value
     return out
-
-
-def _start(plant: Plant, start: Initial | TrainInitial) -> Mapping[str, float]:
-    wanted = Initial if plant.core.short_form else TrainInitial
-    if not isinstance(start, wanted):
-        raise InputError(f"start: {type(start).__name__} does not fit; it must be of the kind {wanted.__name__}")
-    return plant.start_of(start)
 
 
 def motion_of(r: dict[str, Any], plant: Plant, period: float) -> xarray.Dataset:

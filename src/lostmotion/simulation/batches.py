@@ -18,8 +18,12 @@ from ..inputs.quantities import Count, Time
 from ..inputs.validation import did_you_mean, listed, shown
 from ..model.drive import Drive
 from ..model.torsion import Rigid, TorsionCurve
+from ..model.train import DriveTrain
 from .exact_batches import ExactBatch
 from .given_motion import check_motion
+from .keys import renamed
+from .one_gear import as_drive, drive_keys, drive_of
+from .scenario import Scenario
 from .stepping_parts import MAX_INTERVAL, MIN_INTERVAL
 from .variables import STATES
 
@@ -55,7 +59,9 @@ class SimulationBatch:
     Parameters
     ----------
     drives
-        A drive for all, or one drive for each. Trains, and drives with mesh damping in a gear with backlash, are for `Simulation`.
+        A drive, or a scenario or a train of a motor, a gearbox and a load, for all; or one for each. A scenario also gives the
+        controller and the state at t = 0; its commands and load torques are not used. Drives with mesh damping in a gear with
+        backlash are for `Simulation`.
     step
         Step [s]; commands and load torques are constant over it.
     count
@@ -103,7 +109,7 @@ class SimulationBatch:
     @checked
     def __init__(
         self,
-        drives: Drive | Sequence[Drive],
+        drives: Drive | Scenario | DriveTrain | Sequence[Drive | Scenario | DriveTrain],
         step: Time,
         *,
         count: Count | None = None,
@@ -119,12 +125,16 @@ class SimulationBatch:
             raise InputError(f"seed: {seed} must be 0 or above")
         self._step = step
         self._threads = threads or os.cpu_count() or 1
-        if isinstance(drives, Drive):
-            one, several = drives, None
+        if isinstance(drives, Drive | Scenario | DriveTrain):
+            one, several = drive_of(drives, "SimulationBatch"), None
+            vary = {renamed(key, drive_keys(drives)): values for key, values in (vary or {}).items()}
         elif not drives:
             raise InputError("drives: there is none; give a Drive, or a list of them")
         else:
-            one, several = drives[0], list(drives)
+            several = [drive_of(drive, "SimulationBatch") for drive in drives]
+            one = several[0]
+        scenarios = [s for s in ([drives] if several is None else drives) if isinstance(s, Scenario)]
+        controllers, initial = _of_scenarios(scenarios, controllers, 1 if several is None else len(several))
         if several is not None and (count is not None or vary):
             raise InputError("count and vary: are for one drive; in a list each drive has its own parameters")
         if several is None:
@@ -146,6 +156,8 @@ class SimulationBatch:
             self._states = dict(zip(STATES, self._core.states, strict=True))
         self._rigid = any(isinstance(drive.gearbox.stiffness, Rigid) for drive in bases)
         self._time = np.zeros(self._count)
+        if initial:
+            self.reset(initial=initial)
 
     def _tabulate(self, drives: list[Drive], vary: Mapping[str, Any], generator: np.random.Generator) -> list[Drive]:
         """Make the core that steps by tables; the drives that differ."""
@@ -320,6 +332,32 @@ class SimulationBatch:
         except TypeError:
             raise InputError("state: is the snapshot of another batch; give one of this batch") from None
         self._time[:] = state.time
+
+
+def _of_scenarios(
+    scenarios: Sequence[Scenario], controllers: Controller | Sequence[Controller] | None, count: int
+) -> tuple[Controller | Sequence[Controller] | None, dict[str, Any]]:
+    """Controllers, and the state at t = 0 by name.
+
+    Raises
+    ------
+    InputError
+        Only some have one, or a state has what a batch begins without.
+    """
+    drives = [as_drive(scenario, "SimulationBatch") for scenario in scenarios]
+    own = [drive.controller for drive in drives if drive.controller is not None]
+    if own and controllers is not None:
+        raise InputError("controllers: a controller of the scenario turns the motor; leave one of them out")
+    if own and len(own) != count:
+        raise InputError("drives: some have controllers; give all of them one")
+    starts = [drive.start() for drive in drives]
+    if any(drive.capacities() for drive in drives):
+        raise InputError("a batch begins without hysteresis; leave it out", "initial.hysteresis_capacity")
+    initial = {name: [start.get(name, 0.0) for start in starts] for name in STATES}
+    moved = {name: values[0] if count == 1 else np.array(values) for name, values in initial.items() if any(values)}
+    if moved and len(drives) != count:
+        raise InputError("drives: some have a state at t = 0; give it by reset")
+    return own[0] if len(own) == 1 and count == 1 else own or controllers, moved
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,6 @@ def long_form(tables: Mapping[str, Any]) -> dict[str, Any]:
         drive |= {"command": {}, "controllers": {MOTOR: tables["controller"]}}
     if given:
         drive["shafts"] = {**drive["shafts"], LOAD: {**dict(drive["shafts"][LOAD]), **given}}
-        drive["initial"] = _without_load(drive["initial"], "motion" in given)
     if strikes:
         drive["gears"] = {GEARBOX: {**dict(drive["gears"][GEARBOX]), "stiffness": _table(tables, GEARBOX)["stiffness"]}}
     return drive
@@ -82,13 +81,3 @@ def _check_continuous(tables: Mapping[str, Any]) -> None:
                 else "a continuous controller is simulated, not judged for a task"
             )
             raise InputError(f"{why}; leave one of them out", key, "controller")
-
-
-def _without_load(initial: Any, angle: bool) -> Any:
-    """The start without the zeros of the load, whose motion begins as it is given."""
-    left_out = ("speeds", "angles") if angle else ("speeds",)
-    kept = {
-        key: {name: value for name, value in getattr(initial, key).items() if name != LOAD or value != 0.0}
-        for key in left_out
-    }
-    return initial.model_copy(update=kept)

@@ -47,17 +47,17 @@ class Initial(described.InitialFields):
     @kept
     def of_train(self) -> TrainInitial:
         """The same state of the drive as a train; what follows from a reference, or is 0, is left out."""
-        motion: dict[str, Any] = {
-            "speeds": {name: speed for name, speed in ((MOTOR, self.motor_speed), (LOAD, self.load_speed)) if speed},
+        of_shafts = {
+            "speeds": {MOTOR: self.motor_speed, LOAD: self.load_speed},
             "angles": {LOAD: self.load_angle},
         }
-        others = {
-            "twists": (GEARBOX, self.twist),
-            "motor_torques": (MOTOR, self.motor_torque),
-            "hysteresis_capacities": (GEARBOX, self.hysteresis_capacity),
+        values = ({} if self.on_reference else of_shafts) | {
+            "twists": {GEARBOX: self.twist},
+            "motor_torques": {MOTOR: self.motor_torque},
+            "hysteresis_capacities": {GEARBOX: self.hysteresis_capacity},
         }
-        found = {key: {name: value} for key, (name, value) in others.items() if value}
-        return TrainInitial(**({} if self.on_reference else motion), **found, on_reference=self.on_reference)
+        found = {key: {name: x for name, x in named.items() if x} for key, named in values.items()}
+        return TrainInitial(**found, on_reference=self.on_reference)
 
     def at_rest(self) -> Initial:
         """The same without motion and twist."""
@@ -140,8 +140,14 @@ class DriveTables(ScenarioTables):
     def derive(self, data: dict[str, Any], time: Any) -> None:  # noqa: ARG002
         add_efficiency(data, self.gearbox.ratio)
 
+    def alone(self) -> Drive:
+        return self.drive()
+
+    def of_inertia(self, shaft: str, inertia: float) -> dict[str, Any]:
+        return {shaft: getattr(self, shaft).model_copy(update={"inertia": inertia})}
+
     def of_axes(self, axes: Mapping[str, Controller]) -> dict[str, Any]:
-        return {"controller": axes[MOTOR]}
+        return {"controller": axes[MOTOR], "command": CommandSignal()}
 
     def of_gears(self, gears: Mapping[str, Transmission]) -> dict[str, Any]:
         return dict(gears)

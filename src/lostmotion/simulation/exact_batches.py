@@ -13,9 +13,7 @@ from ..control.controller import Controller
 from ..errors import InputError
 from ..inputs.validation import shown
 from ..model.drive import Drive
-from .drive_tables import LoadTable
 from .scenario import Scenario
-from .tables import SimulationTable
 
 IN_THE_LONG_FORM = {
     "twist": "gearbox_twist",
@@ -25,17 +23,6 @@ IN_THE_LONG_FORM = {
     "twist_contact": "gearbox_twist_contact",
 }
 """names of variables of a drive whose load has a given motion"""
-
-
-def controlled(drive: Drive, controller: Controller | None) -> Scenario:
-    """Return a drive as a scenario, with the controller if there is one; its duration is of no use."""
-    return Scenario(
-        motor=drive.motor,
-        gearbox=drive.gearbox,
-        load=LoadTable(**drive.load.model_dump()),
-        controller=controller,
-        simulation=SimulationTable(duration=1.0, sample_interval=1e-3),
-    )
 
 
 class ExactBatch:
@@ -69,7 +56,7 @@ class ExactBatch:
                 core = drive.named_train().core(shafts[0], {"motor": law}, shafts[1])
                 trains.append(core)
                 if pair is not None and key[1:] not in bound:
-                    bound[key[1:]] = controlled(*pair).control()
+                    bound[key[1:]] = Scenario.of_any(pair[0]).with_axes({"motor": pair[1]}).control()
                 controls.append(OPEN_LOOP if pair is None else bound[key[1:]])
             kind_of.append(kinds[key])
         self._core = _core.ExactBatch(trains, controls=controls, kind_of=kind_of, step=step)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,7 +11,6 @@ from .. import _core
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Time
-from ..model.drive import Drive
 from ..model.self_locking import SelfLocking, self_locking
 from ..model.signals import core_signal
 from ..model.torsion import Rigid
@@ -215,10 +214,14 @@ def explain(what: Scenario | Simulation, time: Time | None = None) -> Explanatio
     return _explanation(what.train(), what.core(), time, **_core.explain_at(core_case(what), time))
 
 
-def smallest_commands(drive: Drive, load_torque: float = 0.0) -> tuple[float, float]:
-    """Constant commands beyond which the load moves from rest, forward and backward, against a load torque [N·m]."""
-    inputs = [core_signal([(0.0, value, 0.0)]) for value in (0.0, load_torque)]
-    (motor,) = _core.explain_at(_core.Case(drive.core(), inputs=inputs), 0.0)["motors"]
+def smallest_commands(scenario: Scenario, loads: Mapping[str, float] = {}) -> tuple[float, float]:
+    """Constant commands of the one motor beyond which it turns its load from rest, forward and backward.
+
+    Controllers are taken away. `loads` are load torques by the names of their variables [N·m, of slides N].
+    """
+    core = scenario.core(sampled=False)
+    inputs = [core_signal([(0.0, loads.get(name, 0.0), 0.0)]) for name in core.input_names()]
+    (motor,) = _core.explain_at(_core.Case(core, inputs=inputs), 0.0)["motors"]
     return motor["command_forward"], motor["command_backward"]
 
 
@@ -251,16 +254,15 @@ def _explanation(
         command, torque = named[train.command_of(name)], named[train.motor_torque_of(name)]
         own: dict[str, Any] = {"command_limit": limit, "slides": train.is_slide(motor.shaft)}
         turned.append(MotorState(**commands, **own, command=command, torque=torque))
-    locking = tuple(_verdicts(train, named, short=core.short_form))
+    locking = tuple(_verdicts(train, named))
     return Explanation(time, named, tuple(states), tuple(turned), tuple(train.shafts), locking, slides)
 
 
-def _verdicts(train: DriveTrain, named: dict[str, float], *, short: bool) -> Iterator[SelfLocking]:
+def _verdicts(train: DriveTrain, named: dict[str, float]) -> Iterator[SelfLocking]:
     if train.fixed_gears() != train.gears:
         return
     for name, gear in train.gears.items():
-        torque = (
-            named["load_torque"] if short else abs(named[train.output_torque_of(name)])
-        ) or gear.rated_output_torque
+        load = named.get(train.load_torque_of(gear.output), 0.0)
+        torque = load or abs(named[train.output_torque_of(name)]) or gear.rated_output_torque
         if torque and (verdict := self_locking(train, name, torque)).notable:
             yield verdict

@@ -13,10 +13,8 @@ from .. import _core
 from ..control.turning import turns
 from ..errors import InputError
 from ..model.drive import Drive
-from ..model.load import Load
 from ..model.torsion import Elastic
 from ..model.train import DriveTrain
-from .drive_tables import Initial
 from .scenario import Scenario
 from .simulation_state import SimulationState
 from .stepping import Simulation
@@ -33,7 +31,7 @@ class JointDrive:
 
     name: str
     """name of the joint"""
-    drive: Driven
+    drive: Scenario
     """with the inertia of the load that the multibody engine has given it"""
     simulation: Simulation = field(repr=False)
     train: DriveTrain = field(repr=False)
@@ -133,47 +131,36 @@ def joint_drive(name: str, drive: Driven, inertia: float, step: float) -> JointD
         It is not clear which shaft the joint is, or it is a slide; another inertia than that of the robot moves with it; an element needs
         a command that `step` does not give.
     """
-    train = drive if isinstance(drive, DriveTrain) else drive.train()
+    scenario = Scenario.of_any(drive)
+    train = scenario.train()
     shaft = output_of(name, train)
-    _check_commands(name, drive, train)
+    _check_commands(name, scenario)
     if mass := next((key for key, mass in train.mass_matrices.items() if shaft in mass.shafts), None):
         raise InputError(
             f"joint {name!r}: mass_matrices.{mass} has the inertia of {shaft!r}, which comes from the robot; leave it out"
         )
-    if isinstance(drive, Drive):
-        load = drive.load
-        changed: Driven = Drive(
-            motor=drive.motor,
-            gearbox=drive.gearbox,
-            load=Load(inertia=inertia, viscous_friction=load.viscous_friction, friction_torque=load.friction_torque),
-        )
-    elif isinstance(drive, Scenario):
-        key = "load" if drive.is_drive else f"shafts.{shaft}"
-        changed = drive.replace(**{f"{key}.inertia": inertia})
-    else:
-        shafts = {n: s.model_copy(update={"inertia": inertia}) if n == shaft else s for n, s in drive.shafts.items()}
-        changed = drive.model_copy(update={"shafts": shafts})
-    short = isinstance(changed, Drive) or (isinstance(changed, Scenario) and changed.is_drive)
-    simulation = Simulation(changed, step=step, loaded=None if short else [shaft])
-    train = changed if isinstance(changed, DriveTrain) else changed.train()
-    command, scale = _command(changed, train, simulation._core_train.input_names())
-    return JointDrive(name, changed, simulation, train, shaft, command, scale)
+    changed = scenario.model_copy(update=scenario.of_inertia(shaft, inertia))
+    simulation = Simulation(changed, step=step, loaded=None if changed.loaded() == [shaft] else [shaft])
+    command, scale = _command(changed, simulation._core_train.input_names())
+    return JointDrive(name, changed, simulation, changed.train(), shaft, command, scale)
 
 
-def _command(drive: Driven, train: DriveTrain, inputs: Sequence[str]) -> tuple[int | None, float]:
+def _command(scenario: Scenario, inputs: Sequence[str]) -> tuple[int | None, float]:
     """Place of the command of the only motor among the inputs of the solver, None for a sampled controller, and from what `step` is
     given to it."""
+    train = scenario.train()
     ((name, motor),) = train.motors.items()
-    if isinstance(drive, Scenario) and drive.axes():
+    if scenario.axes():
         return None, 1.0
-    if isinstance(drive, Scenario) and drive.continuous():
+    if scenario.continuous():
         return inputs.index(f"{name}_reference"), 1.0
-    command = "command" if "command" in inputs else f"{name}_command"
+    command = train.command_of(name)
     return inputs.index(command), 1.0 / motor.rated_torque if motor.kind == "torque_source" else 1.0
 
 
-def _check_commands(name: str, drive: Driven, train: DriveTrain) -> None:
+def _check_commands(name: str, scenario: Scenario) -> None:
     """Refuse what `step` cannot command: all but one motor, or the reference of its controller."""
+    train = scenario.train()
     if len(train.motors) != 1:
         raise InputError(f"joint {name!r}: its train has {len(train.motors)} motors; a joint is turned by one")
     others = [key for key in train.commanded() if key not in train.motors]
@@ -182,11 +169,9 @@ def _check_commands(name: str, drive: Driven, train: DriveTrain) -> None:
         raise InputError(
             f"joint {name!r}: {table}.{others[0]} needs a command, and step gives one to the motor alone; leave it out"
         )
-    if not isinstance(drive, Scenario):
-        return
-    if given := drive.tables.given():
-        raise InputError(f"joint {name!r}: {drive.tables.given_key(given[0])} gives a motion, which the robot has")
-    for motor, controller in drive.continuous().items():
+    if given := scenario.given():
+        raise InputError(f"joint {name!r}: {scenario.given_key(given[0])} gives a motion, which the robot has")
+    for motor, controller in scenario.continuous().items():
         if "reference_rate" in controller.system().signals:
             raise InputError(
                 f"joint {name!r}: controllers.{motor} takes the rate of its reference, which step holds; give derivative_weight = 0"
@@ -321,20 +306,12 @@ class JointTrains:
         for k, drive in enumerate(self.drives):
             carried = held[k] - drive.own_torque(angles[k]) if k in held else 0.0
             twists, capacities = drive.twists_under(carried)
-            if drive.simulation._short:
-                initial: Initial | TrainInitial = Initial(
-                    motor_speed=drive.train.gears["gearbox"].ratio * speeds[k],
-                    load_speed=speeds[k],
-                    load_angle=angles[k],
-                    twist=twists.get("gearbox", 0.0),
-                    hysteresis_capacity=capacities.get("gearbox", 0.0),
-                )
-            else:
-                initial = TrainInitial(
+            drive.simulation.reset(
+                TrainInitial(
                     speeds={n: speeds[k] * r for n, r in drive.ratios().items()},
                     angles={drive.shaft: angles[k]},
                     twists=twists,
                     hysteresis_capacities=capacities,
                 )
-            drive.simulation.reset(initial)
+            )
         self.read()

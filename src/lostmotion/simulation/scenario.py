@@ -34,7 +34,7 @@ from .keys import renamed, set_values
 from .tables import ScenarioTables, SimulationTable
 from .train_checks import check_train
 from .train_state import angles_at_start, given_speeds, start_values
-from .train_tables import LINEAR_INITIAL, TrainInitial, TrainTables, core_train
+from .train_tables import LINEAR_INITIAL, ShaftTable, TrainInitial, TrainTables, core_train
 from .variables import Variable
 
 LONG_TABLES = ("shafts", "slides", *LinearElements.model_fields)  # of which one makes a scenario one in the long form
@@ -157,6 +157,17 @@ class Scenario:
         return cls.of(DriveTables(**tables | changes))
 
     @classmethod
+    def of_any(cls, what: Drive | DriveTrain | Scenario) -> Scenario:
+        """A scenario as it is, or that of a drive or a train alone, whose times are of no use."""
+        if isinstance(what, Scenario):
+            return what
+        if isinstance(what, Drive):
+            return cls.of_drive(what, duration=1.0, sample_interval=1e-3)
+        shafts = Named({name: ShaftTable.like(shaft) for name, shaft in what.shafts.items()})
+        times = SimulationTable(duration=1.0, sample_interval=1e-3)
+        return cls.of(TrainTables.like(what, shafts=shafts, simulation=times), checked=False)
+
+    @classmethod
     def model_validate(cls, obj: Any) -> Self:
         """Make the scenario from its tables, as the constructor does."""
         if isinstance(obj, cls):
@@ -259,7 +270,7 @@ class Scenario:
         return self.model_copy(update=self.written.of_gears(gears))
 
     def with_axes(self, axes: Mapping[str, Controller]) -> Self:
-        """The same scenario with other sampled controllers, by the names of their motors; the others stay."""
+        """The same scenario with other sampled controllers, by the names of their motors, which have no command then; the others stay."""
         return self.model_copy(update=self.written.of_axes(axes))
 
     def without_controllers(self) -> Self:
@@ -274,20 +285,6 @@ class Scenario:
     def is_drive(self) -> bool:
         """Whether it is one motor, one gearbox and one load in the short form."""
         return isinstance(self.written, DriveTables)
-
-    def short_form(self, function: str) -> Self:
-        """The scenario itself, for what is defined for one motor, one gearbox and one load.
-
-        Raises
-        ------
-        InputError
-            It is another drive train.
-        """
-        if self.is_drive:
-            return self
-        raise InputError(
-            f"{function}: is a drive train ([shafts]), which can be run; this takes a drive of [motor], [gearbox] and [load]"
-        )
 
     @kept
     def long(self) -> Scenario:
@@ -415,17 +412,21 @@ class Scenario:
             found[LINEAR_INITIAL[key]] = Named({name: v for name, v in values.items() if train.is_slide(name)})
         return written.model_copy(update=found)
 
-    def start(self, initial: Initial | TrainInitial | None = None) -> dict[str, float]:
+    def start(
+        self, initial: Initial | TrainInitial | None = None, given: Collection[str] | None = None
+    ) -> dict[str, float]:
         """State at t = 0 by the names of its variables.
 
         Parameters
         ----------
         initial
             State in place of the initial state of the scenario.
+        given
+            Names of the shafts whose motion is given, if others than those of the scenario.
         """
         train = self.train()
         state = self.begin() if initial is None else initial.of_train()
-        driven = self.tables.given()
+        driven = self.tables.given() if given is None else given
         values = start_values(train, state, self.core(), driven)
         angles = angles_at_start(train, state.of_all("angles"), state.of_all("twists"), driven)
         known = []
@@ -471,21 +472,3 @@ def _made_again(written: DriveTables | TrainTables, is_axis: bool) -> Scenario:
 def is_train(tables: Mapping[str, Any]) -> bool:
     """Whether the tables of a scenario are in the long form."""
     return any(table in tables for table in LONG_TABLES)
-
-
-def drive_of(what: Scenario | Drive) -> Drive:
-    """The drive of a scenario, or a drive as it is.
-
-    Raises
-    ------
-    InputError
-        The scenario is another drive train.
-    """
-    if isinstance(what, Drive):
-        return what
-    if not isinstance(what.written, DriveTables):
-        raise InputError(
-            f"drive: {shown(what)} is a drive train, and this is defined for one motor, one gearbox and one load; give such a "
-            "scenario, or take simulate, check_drive or self_locking of the train"
-        )
-    return what.written.drive()

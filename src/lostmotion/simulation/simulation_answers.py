@@ -41,7 +41,6 @@ class SimulationAnswers(SimulationReadings):
     """Base of simulations: answers to a load torque, and snapshots."""
 
     _made: dict[str, Any]
-    _short: bool
     _motions: dict[str, tuple[int, int]]
     _input_places: dict[str, int]
     _masses: dict[str, Any]

@@ -57,9 +57,9 @@ class SimulationReadings:
         """Names of the shafts of a train whose motion `advance` is given."""
         return self._given
 
-    def _add_signals(self, scenario: Scenario | None) -> None:
+    def _add_signals(self, scenario: Scenario) -> None:
         """Add the signals of controllers, and the torque of a winding in place of the straight line that drives the mechanics."""
-        if scenario is None or not self._controllers:
+        if not self._controllers:
             return
         names = (*ALL_SIGNALS, *WINDING_SIGNALS)
         for k, (prefix, controller) in enumerate(scenario.by_prefix().items()):

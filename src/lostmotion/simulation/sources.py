@@ -57,14 +57,3 @@ def load(source: ScenarioName | Path, overrides: Mapping[str, Any] | Iterable[st
         raise InputError(f"{path}: the scenario within it is damaged; run the original one again") from None
     override(tables, overrides, path)
     return changed(tables, path)
-
-
-def load_drive(source: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> Scenario:
-    """Load a scenario as `load` does, if only the short form is allowed.
-
-    Raises
-    ------
-    InputError
-        Also if the scenario is in the long form.
-    """
-    return load(source, overrides).short_form(str(source))

@@ -10,12 +10,12 @@ from copy import deepcopy
 from typing import Any, Self
 
 from .. import _core
-from ..control.axis import OPEN_LOOP, Bound
+from ..control.axis import Bound
 from ..control.continuous import ContinuousController
 from ..control.controller import Controller
 from ..control.law import as_laws
 from ..errors import InputError
-from ..inputs.arguments import checked, lacks, misfit
+from ..inputs.arguments import checked
 from ..inputs.quantities import Time, argument
 from ..inputs.validation import did_you_mean, shown
 from ..model.couplings import FULL_COMMAND
@@ -30,10 +30,8 @@ from .simulation_readings import Derived
 from .simulation_state import SimulationState
 from .step_bound import StepBound
 from .stepping_parts import GIVE, MAX_INTERVAL, MIN_INTERVAL, Ramp, ends_of, masses_given, no_input, no_interval, parts
-from .train_state import start_values
 from .train_tables import TrainInitial
-from .train_variables import train_variables
-from .variables import VARIABLES, Variable
+from .variables import Variable
 from .windings import bounded, coarser
 
 
@@ -102,16 +100,15 @@ class Simulation(SimulationAnswers):
         self._stepping = False
         if not MIN_INTERVAL <= step <= MAX_INTERVAL:
             raise InputError(f"step {step} s must lie between {MIN_INTERVAL:g} s and {MAX_INTERVAL:g} s")
-        scenario = drive if isinstance(drive, Scenario) else None
-        self._scenario = scenario
-        self._controllers = dict(scenario.axes()) if scenario is not None else {}
+        scenario, core, self._loaded, self._given = parts(drive, loaded, given)
+        self._drive = drive.written.alone() if isinstance(drive, Scenario) else drive
+        self._scenario, self._train, self._core_train = scenario, scenario.train(), core
+        self._initial = scenario.begin()
+        self._controllers = dict(scenario.axes())
         laws = as_laws(law, self._controllers)
-        self._control = self._exchanging(scenario.control(laws)) if scenario is not None else OPEN_LOOP
+        self._control = self._exchanging(scenario.control(laws))
         self._bound: StepBound | None = None
         self._signals: dict[str, int] = {}  # of the controllers
-        self._drive, self._train, core, self._loaded, self._given, self._initial = parts(drive, loaded, given)
-        self._core_train = core
-        self._short = core.short_form
         self._masses = dict(self._train.mass_matrices)
         names = core.input_names()
         self._core = self._simulation_of(core)
@@ -121,15 +118,12 @@ class Simulation(SimulationAnswers):
         self._input_units = {name: unit.removeprefix("1") for name, _, unit, _ in channels}
         # Inputs that are commands of brakes and clutches.
         self._shares = {f"{name}_command" for name in self._train.commanded() if name not in self._train.motors}
-        self._variables: tuple[Variable, ...] = VARIABLES if self._short else train_variables(self._train, core)
-        self._derived: dict[str, Derived]
-        if self._short:
-            self._derived = {"efficiency": self._efficiency, "motor_power": self._motor_power}
-        else:
-            self._derived = self._derived_of(self._train)
+        self._variables: tuple[Variable, ...] = scenario.written.variables(core)
+        following = {"efficiency": self._efficiency, "motor_power": self._motor_power} | self._derived_of(self._train)
+        self._derived: dict[str, Derived] = {v.name: following[v.name] for v in self._variables if v.derived}
         self._add_signals(scenario)
         if error_bound:
-            of_windings = {} if scenario is None else bounded(scenario)
+            of_windings = bounded(scenario)
             if not of_windings:
                 raise InputError(
                     'error_bound: is for controllers with current.kind = "field_oriented", and there is none; leave it out'
@@ -171,7 +165,11 @@ class Simulation(SimulationAnswers):
         motions = {k for places in self._motions.values() for k in places}
         controlled = self._controlled()
         self._input_places = {name: k for k, name in enumerate(names) if name not in controlled and k not in motions}
-        self._required = [name for name in self._input_places if not name.endswith("load_torque")]
+        loads = {self._train.load_torque_of(shaft) for shaft in self._loaded}
+        self._only = {  # what `advance` calls so
+            "command": [name for name in self._input_places if name not in loads],
+            "load_torque": [name for name in self._input_places if name in loads],
+        }
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For copies, which go on by themselves from the present state, and for pickling."""
@@ -199,25 +197,15 @@ class Simulation(SimulationAnswers):
         Raises
         ------
         InputError
-            A train is given the state of a drive or the other way round, or a state that it cannot have.
+            It cannot have such a state.
         """
         with self._turn:
             self._idle()
-            if initial is not None and isinstance(initial, Initial) != self._short:
-                raise InputError(
-                    "initial: is the state of a train; that of a drive is an Initial"
-                    if self._short
-                    else "initial: is the state of a drive; that of a train is a TrainInitial"
-                )
             self._reset(self._initial if initial is None else initial.of_train())
 
     def _reset(self, start: TrainInitial) -> None:
         self._change_masses(self._train.mass_matrices)
-        if self._scenario is not None:
-            self._core.reset(self._scenario.start(start), self._scenario.capacities(start))
-        else:
-            values = start_values(self._train, start, self._core_train, self._given)
-            self._core.reset(values, dict(start.hysteresis_capacities))
+        self._core.reset(self._scenario.start(start, self._given), self._scenario.capacities(start))
         self._begin_motions(start)
         self._initial = start
         if self._bound is not None:
@@ -258,7 +246,7 @@ class Simulation(SimulationAnswers):
         return tuple(self._input_places)
 
     def _all_controllers(self) -> dict[str, Controller | ContinuousController]:
-        return {**self._controllers, **(self._scenario.continuous() if self._scenario is not None else {})}
+        return {**self._controllers, **self._scenario.continuous()}
 
     def _controlled(self) -> set[str]:
         return {self._train.command_of(motor) for motor in self._controllers}
@@ -285,8 +273,8 @@ class Simulation(SimulationAnswers):
         interval
             A number [s], or text with a unit; of NumPy and xarray too, as all numbers here.
         command, load_torque
-            Of a drive E_C [-] and M_Z [N·m]: one value, held over the interval, or a pair of values, between which it runs in a
-            straight line.
+            Where there is one command or reference, and one load torque: one value, held over the interval, or a pair of values,
+            between which it runs in a straight line.
         motion
             By the name of each shaft whose motion is given a dictionary: its ``speed`` [rad/s] at the end of the interval, and if wanted its ``angle``
             [rad], of a slide its ``position`` [m], and ``acceleration`` [rad/s²] there. On the way from the present values the acceleration is constant; with more
@@ -296,7 +284,7 @@ class Simulation(SimulationAnswers):
             By the name of a mass matrix of the train its rows [kg·m²] from now on, also in the steps that follow. The speeds stay
             as they are; what the change of the inertia does to the motion is to be given as load torques.
         inputs
-            Of a train the same by the names in `inputs`, among them the references of continuous controllers, such as ``servo_command=0.2`` and ``table_load_torque=(0.0, 5.0)``. All
+            The same by the names in `inputs`, among them the references of continuous controllers, such as ``servo_command=0.2`` and ``table_load_torque=(0.0, 5.0)``. All
             commands are to be given; a load torque that is left out is 0.
 
         Raises
@@ -318,10 +306,10 @@ class Simulation(SimulationAnswers):
         self, command: Ramp, load_torque: Ramp, inputs: dict[str, Ramp]
     ) -> tuple[list[float], list[float]]:
         """The inputs of the core at the begin and the end of an interval."""
-        if self._short:
-            inputs = self._of_drive(command, load_torque, inputs)
-        elif command is not GIVE or ends_of("load_torque", load_torque, "N*m") != (0.0, 0.0):
-            raise InputError(f"a train takes its inputs by name: {', '.join(self._input_places)}")
+        if command is not GIVE:
+            inputs[self._the_only("command")] = command
+        if load_torque.__class__ is not float or load_torque != 0.0:
+            inputs[self._the_only("load_torque")] = load_torque
         places, begin, end = self._input_places, [0.0] * self._inputs, [0.0] * self._inputs
         for name, value in inputs.items():
             if name in self._controlled():
@@ -331,7 +319,7 @@ class Simulation(SimulationAnswers):
             ramp = begin[places[name]], end[places[name]] = ends_of(name, value, self._input_units[name])
             if name in self._shares and max(ramp) > FULL_COMMAND:
                 raise InputError(f"{name} {shown(value)} is a share, and 1 is the full torque; give at most that")
-        if missing := [name for name in self._required if name not in inputs]:
+        if missing := [name for name in self._only["command"] if name not in inputs]:
             raise InputError(f"{', '.join(sorted(missing))}: missing; all commands and references are to be given")
         return begin, end
 
@@ -392,15 +380,15 @@ class Simulation(SimulationAnswers):
                     rows.append(row)
                 self._step(t1 - t0, rows[0], rows[1])
 
-    def _of_drive(self, command: Ramp, load_torque: Ramp, others: dict[str, Ramp]) -> dict[str, Ramp]:
-        """The inputs of a drive by name."""
-        if others or (command is GIVE and not self._controllers):
-            raise misfit("Simulation.advance", ("interval", "command", "load_torque"), others, lacks("command"))
-        if not self._controllers:
-            return {"command": command, "load_torque": load_torque}
-        if command is not GIVE:
-            raise InputError("command: the controller of the scenario turns the motor; leave it out")
-        return {"load_torque": load_torque}
+    def _the_only(self, word: str) -> str:
+        """Name of the one input that `advance` calls a command or a load torque."""
+        names = self._only[word]
+        if len(names) == 1:
+            return names[0]
+        if word == "command" and self._controlled():
+            raise InputError("command: a controller of the scenario turns the motor; leave it out")
+        known = f"there are several; give them by name: {', '.join(names)}" if names else "there is none; leave it out"
+        raise InputError(f"{word}: {known}")
 
     @staticmethod
     def _exchanging(control: Bound) -> Bound:

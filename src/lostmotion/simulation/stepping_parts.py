@@ -12,9 +12,8 @@ from ..inputs.validation import did_you_mean, shown
 from ..model.drive import Drive
 from ..model.mass_matrix import MassMatrix
 from ..model.train import DriveTrain
-from .scenario import Scenario, drive_of
-from .train_ports import given_train
-from .train_tables import TrainInitial
+from .scenario import Scenario
+from .train_variables import check_names
 
 GIVE: Any = object()  # in place of what has no default
 
@@ -26,21 +25,33 @@ MIN_INTERVAL, MAX_INTERVAL = 1e-12, 1e12
 
 def parts(
     what: Drive | Scenario | DriveTrain, loaded: Sequence[str] | None, given: Sequence[str] | None
-) -> tuple[Drive | DriveTrain, DriveTrain, _core.Train, tuple[str, ...], tuple[str, ...], TrainInitial]:
-    """Parts of a simulation: its subject, the train with the names of its variables, the solver's train, the loadable
-    shafts, the shafts with given motion, and the start."""
-    if isinstance(what, DriveTrain) or (isinstance(what, Scenario) and not what.is_drive):
-        train, shafts, moved = given_train(what, loaded, given)
-        if isinstance(what, DriveTrain):
-            return train, train, train.core(shafts, given=moved), tuple(shafts), tuple(moved), TrainInitial()
-        return train, train, what.core(loaded=shafts, given=moved), tuple(shafts), tuple(moved), what.begin()
-    if loaded is not None:
-        raise InputError("loaded: is for trains; a drive has one load torque, on its load")
-    if given is not None:
-        raise InputError("given: is for trains; give drive.train() for a drive whose motor or load has a given motion")
-    start = what.begin() if isinstance(what, Scenario) else TrainInitial()
-    drive = drive_of(what)
-    return drive, drive.named_train(), what.core(), (), (), start
+) -> tuple[Scenario, _core.Train, tuple[str, ...], tuple[str, ...]]:
+    """Parts of a simulation: its scenario, the solver's train, the loadable shafts, and those whose motion is given.
+
+    A load torque may act on all shafts of a train alone.
+
+    Raises
+    ------
+    InputError
+        One of them is no shaft, or names of variables coincide.
+    """
+    scenario = Scenario.of_any(what)
+    if isinstance(what, DriveTrain) and loaded is None:
+        loaded = list(what.shafts)
+    if loaded is None and given is None:
+        return scenario, scenario.core(), tuple(scenario.loaded()), tuple(scenario.given())
+    scenario = scenario.long()
+    train = scenario.train()
+    for key, names in (("loaded", loaded), ("given", given)):
+        for name in names or ():
+            if name not in train.shafts:
+                meant = did_you_mean(name, train.shafts, f"the shafts are {', '.join(train.shafts)}")
+                raise InputError(f"{key}: {shown(name)} is no shaft of this train; {meant}")
+    core = scenario.core(loaded=loaded, given=given)
+    train.check(core)
+    check_names(train, core)
+    shafts = scenario.loaded() if loaded is None else loaded
+    return scenario, core, tuple(shafts), tuple(scenario.given() if given is None else given)
 
 
 def masses_given(masses: Mapping[str, MassMatrix], given: Any) -> dict[str, MassMatrix]:

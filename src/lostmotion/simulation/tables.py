@@ -14,6 +14,7 @@ from ..control.controller import Controller
 from ..data_sheets.components import ACCESSORIES
 from ..inputs.part import Part
 from ..inputs.quantities import Positive, Time
+from ..model.drive import Drive
 from ..model.gearbox import Transmission
 from ..model.train import DriveTrain
 from .variables import Variable
@@ -163,6 +164,14 @@ class ScenarioTables(Part):
 
     def derive(self, data: dict[str, Any], time: Any) -> None:
         """Add the variables that follow from those of the solver."""
+        raise NotImplementedError
+
+    def alone(self) -> Drive | DriveTrain:
+        """The drive or the train without its surroundings."""
+        raise NotImplementedError
+
+    def of_inertia(self, shaft: str, inertia: float) -> dict[str, Any]:
+        """The tables that change with another inertia of a shaft of the load."""
         raise NotImplementedError
 
     def of_axes(self, axes: Mapping[str, Controller]) -> dict[str, Any]:

@@ -222,8 +222,15 @@ class TrainTables(ScenarioTables, LinearElements):
     def derive(self, data: dict[str, Any], time: Any) -> None:
         add_angles(self.train(), data, time)
 
+    def alone(self) -> DriveTrain:
+        return self.train()
+
+    def of_inertia(self, shaft: str, inertia: float) -> dict[str, Any]:
+        return {"shafts": {**self.shafts, shaft: self.shafts[shaft].model_copy(update={"inertia": inertia})}}
+
     def of_axes(self, axes: Mapping[str, Controller]) -> dict[str, Any]:
-        return {"controllers": {**self.controllers, **axes}}
+        command = {name: signal for name, signal in self.command.items() if name not in axes}
+        return {"controllers": {**self.controllers, **axes}, "command": command}
 
     def of_gears(self, gears: Mapping[str, Transmission]) -> dict[str, Any]:
         return {"gears": {**self.gears, **{key.removeprefix("gears."): gear for key, gear in gears.items()}}}

@@ -98,8 +98,7 @@ def resonance(motor: Motor, g: Gearbox, load_inertia: float, command: CommandSig
 
 def dead_zone(scenario: Scenario, result: RunArrays) -> Finding:
     """The commands that move the load from rest."""
-    against = float(result["load_torque"][0])
-    forward, backward = smallest_commands(scenario.drive(), against)
+    forward, backward = smallest_commands(scenario, {"load_torque": float(result["load_torque"][0])})
     peak = float(abs(result["command"]).max())
     value = f"the load moves above a command of {forward:.4g} and below {backward:.4g}"
     moves = bool((result["motor_speed"] != 0.0).any())

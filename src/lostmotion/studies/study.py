@@ -16,6 +16,7 @@ from ..inputs.quantities import Whole
 from ..inputs.validation import did_you_mean, listed
 from ..model.duty import HoldingBrake
 from ..model.motor import Motor
+from ..simulation.one_gear import as_drive
 from ..simulation.scenario import Scenario
 from ..simulation.units_of_keys import unit_in, unit_of_key
 from ..sizing.stages import stage_of, together
@@ -272,7 +273,7 @@ class Study(Part):
     @property
     def drive(self) -> Scenario:
         """The base of a task, or of a study of a drive."""
-        return self.scenario.short_form("study")
+        return as_drive(self.scenario, "study")
 
     @property
     def vocabulary(self) -> Vocabulary:
@@ -453,7 +454,7 @@ class Study(Part):
 
     def drive_at(self, row: np.ndarray) -> Scenario:
         """The same, of a study of a drive."""
-        return self.scenario_at(row).short_form("study")
+        return as_drive(self.scenario_at(row), "study")
 
     def _with_records(self, records: dict[str, Any]) -> Scenario:
         """The base with other records; the last ones are kept, since other parameters may vary beside them."""
