@@ -15,7 +15,7 @@ import pytest
 from typer.testing import CliRunner
 
 import lostmotion as lm
-from conftest import ALL_SCENARIOS, ROOT, SCENARIOS, lostmotion
+from conftest import ALL_SCENARIOS, ROOT, SCENARIOS, forks, lostmotion
 from lostmotion.cli import app, terminal
 from lostmotion.data_sheets.records import table_of
 from lostmotion.reports import plots, thinning
@@ -172,30 +172,25 @@ def test_the_template_of_a_gearbox_sheet_takes_its_kind() -> None:
 
 # --- before the work ---
 
-UNWRITABLE = [
-    ("run", SMALL, "-o", "/proc/result.csv"),
-    ("run", SMALL, "--plot", "/proc/run.png"),
-    ("rig", "schaeffler-rt1-h-20-100", "-o", "/proc/rig"),
-    ("response", SMALL, "-o", "/proc/response"),
-    ("reproduce", "-o", "/proc/paper"),
-    ("study", "study.toml", "-o", "/proc/study"),
-]
 
-
-@pytest.mark.parametrize("call", UNWRITABLE, ids=lambda c: " ".join(c[:1] + c[-2:]))
-def test_output_is_tried_before_the_work(tmp_path: Path, call: tuple[str, ...]) -> None:
+def test_output_is_tried_before_the_work(tmp_path: Path) -> None:
     (tmp_path / "study.toml").write_text(
         (ROOT / "examples" / "tolerance.toml").read_text().replace("../scenarios/", "")
     )
     (tmp_path / f"{SMALL}.toml").write_text(f'base = "{SMALL}"\n')
-    done = subprocess.run(
-        [sys.executable, "-c", STOPS_AT_THE_FIRST_COMPUTATION, *call],
-        cwd=tmp_path, capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 1
-    assert "computes" not in done.stdout
-    assert done.stderr.startswith(f"lostmotion: {call[-1]}: ")
-    assert len(done.stderr.strip().splitlines()) == 1
+    calls = [
+        ("run", SMALL, "-o", "/proc/result.csv"),
+        ("run", SMALL, "--plot", "/proc/run.png"),
+        ("rig", "schaeffler-rt1-h-20-100", "-o", "/proc/rig"),
+        ("response", SMALL, "-o", "/proc/response"),
+        ("reproduce", "-o", "/proc/paper"),
+        ("study", "study.toml", "-o", "/proc/study"),
+    ]
+    for done in forks(calls, tmp_path, STOPS_AT_THE_FIRST_COMPUTATION):
+        assert done.returncode == 1, done
+        assert "computes" not in done.stdout
+        assert done.stderr.startswith(f"lostmotion: {done.args[-1]}: ")
+        assert len(done.stderr.strip().splitlines()) == 1
 
 
 def test_trying_leaves_nothing_behind(tmp_path: Path) -> None:
@@ -206,44 +201,20 @@ def test_trying_leaves_nothing_behind(tmp_path: Path) -> None:
 
 # --- quick to start ---
 
+# An exit takes the worker threads along.
 STOPS_AT_THE_FIRST_COMPUTATION = """
-import os, sys, time, lostmotion._core
+import lostmotion._core, lostmotion.simulation.scenario
 def stop(*arguments, **options):
-    print("computes", time.process_time(), *sorted({m.partition(".")[0] for m in sys.modules}), flush=True)
+    print("computes", *sorted(sys.modules), flush=True)
     os._exit(0)
 core = sys.modules["lostmotion._core"]
 core.run = core.respond = core.run_batch = stop
-from lostmotion.cli import main
-main()
 """
 # Libraries that take a tenth of a second or more to import.
 DATASETS = {"xarray", "pandas", "pyarrow"}
 NETCDF = {"h5netcdf", "h5py"}
 FIGURES = {"matplotlib", "jinja2"}
 SLOW = DATASETS | NETCDF | FIGURES | {"pint", "scipy", "control", "SALib", "distributed", "rich"}
-
-
-@pytest.mark.parametrize(
-    "call",
-    [
-        ("run", SMALL),
-        ("rig", "schaeffler-rt1-h-20-100"),
-        ("drive", "check", "catalogue-robot-joint"),
-        ("response", SMALL),
-        ("reproduce", "-o", "out"),
-        ("reproduce",),
-    ],
-    ids=" ".join,
-)
-def test_no_command_imports_a_slow_library_before_it_computes(tmp_path: Path, call: tuple[str, ...]) -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", STOPS_AT_THE_FIRST_COMPUTATION, *call],
-        cwd=tmp_path, capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    word, _, *modules = done.stdout.split()
-    assert word == "computes"
-    assert {"numpy", "pydantic", "lostmotion"} <= set(modules)
-    assert not SLOW & set(modules)
 
 
 STUDY = """
@@ -271,44 +242,41 @@ sys.stderr.isatty = lambda: True
 """
 
 
-@pytest.mark.parametrize("design", ["random", "latin_hypercube"])
-def test_a_study_imports_no_slow_library_before_it_computes(tmp_path: Path, design: str) -> None:
-    (tmp_path / "s.toml").write_text(STUDY.format(design=design))
-    script = STOPS_AT_THE_FIRST_COMPUTATION.replace('m.partition(".")[0]', "m")
-    done = subprocess.run(
-        [sys.executable, "-c", script, "study", "s.toml", "-o", "s"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    word, _, *modules = done.stdout.split()
-    assert word == "computes"
-    assert not (SLOW | {"scipy.stats", "scipy.special"}) & set(modules)
+def test_no_command_imports_a_slow_library_before_it_computes(tmp_path: Path) -> None:
+    for design in ("random", "latin_hypercube"):
+        (tmp_path / f"{design}.toml").write_text(STUDY.format(design=design))
+    calls = [
+        ("rig", "schaeffler-rt1-h-20-100"),
+        ("response", SMALL),
+        ("reproduce", "-o", "out"),
+        ("reproduce",),
+        ("study", "random.toml", "-o", "random"),
+        ("study", "latin_hypercube.toml", "-o", "latin"),
+    ]
+    for done in forks(calls, tmp_path, STOPS_AT_THE_FIRST_COMPUTATION):
+        word, *modules = done.stdout.split()
+        assert word == "computes", done
+        assert {"numpy", "pydantic", "lostmotion"} <= set(modules)
+        assert not (SLOW | {"scipy.stats", "scipy.special"}) & set(modules), done.args
 
 
 def test_the_engine_of_sobol_points_is_imported_behind_all_checks_and_the_progress_bar(tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text(STUDY.format(design="sobol"))
     (tmp_path / "bad.toml").write_text(STUDY.format(design="sobol").replace("runs = 8", "runs = -8"))
-    script = SAYS_WHEN_IT_IMPORTS + STOPS_AT_THE_FIRST_COMPUTATION
-    call = [sys.executable, "-c", script, "study"]
-    done = subprocess.run([*call, "s.toml", "-o", "s"], cwd=tmp_path, capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "imports, progress shown: True"
-    done = subprocess.run([*call, "bad.toml", "-o", "bad"], cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 1
-    assert "key runs: -8 must be at least 1" in done.stderr
-    assert done.stdout == ""
+    calls = [("study", f"{name}.toml", "-o", name) for name in ("s", "bad")]
+    good, bad = forks(calls, tmp_path, SAYS_WHEN_IT_IMPORTS + STOPS_AT_THE_FIRST_COMPUTATION)
+    assert good.stdout.strip() == "imports, progress shown: True"
+    assert bad.returncode == 1
+    assert "key runs: -8 must be at least 1" in bad.stderr
+    assert bad.stdout == ""
 
 
-@pytest.mark.parametrize("call", [("--help",), ("--version",), ("run", "--help"), ("study", "--help")], ids=" ".join)
-def test_help_imports_next_to_nothing(tmp_path: Path, call: tuple[str, ...]) -> None:
-    done = subprocess.run(
-        [sys.executable, "-X", "importtime", "-m", "lostmotion", *call],
-        cwd=tmp_path, capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    imported = {line.rpartition("|")[2].strip().partition(".")[0] for line in done.stderr.splitlines()}
-    assert "typer" in imported
-    assert not imported & (SLOW | {"numpy"})
+def test_help_imports_next_to_nothing(tmp_path: Path) -> None:
+    for done in forks([("--help",), ("--version",), ("run", "--help"), ("study", "--help"), ("scenarios",)], tmp_path):
+        assert done.returncode == 0, done
+        assert "typer" in done.modules
+        assert not done.modules & (SLOW | {"numpy"}), done.args
+    assert "pydantic" in done.modules
 
 
 # Which slow libraries a whole command may import.
@@ -322,7 +290,6 @@ MAY_IMPORT = {
     "run paper-2dof-nl-small -o run.parquet": DATASETS,
     "run paper-2dof-nl-small -o run.nc": DATASETS | NETCDF,
     "run paper-2dof-nl-small --plot run.svg": DATASETS | FIGURES,
-    "scenarios": set(),
     "schema": set(),
     "catalogue": set(),
     "catalogue schaeffler-rt1-h-20-100": set(),
@@ -332,34 +299,20 @@ MAY_IMPORT = {
     "rig schaeffler-rt1-h-20-100": DATASETS | FIGURES,
     "response paper-2dof-nl-small --amplitudes 0.1 --frequencies 1.0,2.0": DATASETS | NETCDF | FIGURES,
     "servo position-axis": {"scipy", "rich"},
-    "track tracking-loss-map": FIGURES | {"rich"},
+    "track tracking-loss-map --set simulation.duration=0.5": FIGURES | {"rich"},
     "study study.toml -o rows": DATASETS,
 }
-# xarray imports dask and pint by itself where they are installed.
-WITHOUT_WHAT_XARRAY_FINDS = """
-import sys
-sys.modules.update(dask=None, pint=None)
-from lostmotion.cli import main
-try:
-    main()
-finally:
-    print("modules", *sorted({name.partition(".")[0] for name, module in sys.modules.items() if module}), file=sys.stderr)
-"""
 
 
-@pytest.mark.parametrize("call", MAY_IMPORT)
-def test_a_command_imports_what_it_needs_alone(tmp_path: Path, call: str) -> None:
+def test_a_command_imports_what_it_needs_alone(tmp_path: Path) -> None:
+    """Without dask and pint, which xarray imports by itself where they are installed."""
     (tmp_path / "study.toml").write_text(STUDY.format(design="random"))
-    done = subprocess.run(
-        [sys.executable, "-c", WITHOUT_WHAT_XARRAY_FINDS, *call.split()],
-        cwd=tmp_path, capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode in (0, 1, 3), done.stderr  # a verdict, which an error has not
-    assert "lostmotion: " not in done.stderr
-    imported = set(done.stderr.splitlines()[-1].split()[1:])
-    assert "pydantic" in imported
-    assert imported & SLOW <= MAY_IMPORT[call]
-    assert ("numpy" in imported) is (call != "scenarios")
+    before = "sys.modules.update(dask=None, pint=None); import lostmotion.simulation.scenario"
+    for done in forks(map(str.split, MAY_IMPORT), tmp_path, before):
+        assert done.returncode in (0, 1, 3), done  # a verdict, which an error has not
+        assert "lostmotion: " not in done.stderr
+        assert {"numpy", "pydantic"} <= done.modules
+        assert done.modules & SLOW <= MAY_IMPORT[" ".join(done.args)], done.args
 
 
 # --- help, version, completion, progress ---
@@ -456,7 +409,7 @@ def test_a_run_of_minutes_says_so_at_once_and_is_interrupted() -> None:
 @pytest.mark.parametrize(("scenario", "changes"), [(SMALL, {}), ("worm-lowering", {}), ("position-axis", {})])
 def test_the_length_of_a_run_is_estimated_within_a_factor(scenario: str, changes: dict[str, float]) -> None:
     loaded = lm.load(scenario)
-    duration = 50.0 * loaded.simulation.duration
+    duration = 20.0 * loaded.simulation.duration
     whole = loaded.replace(**{"simulation.duration": duration}, **changes)
     run(whole)
     begin = time.process_time()
@@ -476,7 +429,6 @@ def test_the_estimate_sees_a_motion_that_begins_late() -> None:
         command={"m": {"amplitude": 0.06, "frequency": 5.0, "steps": [{"time": 1e3, "height": 0.05}]}},
         simulation={"duration": 1e5, "sample_interval": 100.0},
     )
-    run(scenario)
     begin = time.process_time()
     run(scenario)
     taken = time.process_time() - begin

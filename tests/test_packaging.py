@@ -8,13 +8,13 @@ import shutil
 import subprocess
 import sys
 import tomllib
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 import pytest
 
 import lostmotion as lm
-from conftest import ROOT
+from conftest import ROOT, Command, forks
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 EXTRAS = PROJECT["optional-dependencies"]
@@ -68,98 +68,77 @@ def without(libraries: Collection[str]) -> str:
     return f"import sys; sys.modules.update(dict.fromkeys({list(libraries)!r}));"
 
 
-def without_extras(*call: str, cwd: Path, but: Collection[str] = ()) -> subprocess.CompletedProcess[str]:
-    """A command in a process where the optional libraries cannot be imported, but for some."""
-    script = f"{without([name for name in OPTIONAL if name not in but])} from lostmotion.cli import main; main()"
-    return subprocess.run([sys.executable, "-c", script, *call], cwd=cwd, capture_output=True, text=True, check=False)
-
-
-@pytest.mark.parametrize(
-    "call",
-    [
-        ("run", "paper-2dof-nl-small", "-o", "small.csv", "--plot", "small.png", "--explain", "0.3"),
-        ("drive", "check", "catalogue-robot-joint"),
-        ("catalogue",),
-        ("catalogue", "schaeffler-rt1-h-20-100"),
-        ("scenarios",),
-        ("schema",),
-    ],
-    ids=lambda c: " ".join(c[:2]),
-)
-def test_the_core_installation_runs_checks_and_draws(tmp_path: Path, call: tuple[str, ...]) -> None:
-    done = without_extras(*call, cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+def without_extras(*calls: str, cwd: Path, but: Collection[str] = ()) -> Iterator[Command]:
+    """Commands in processes where the optional libraries cannot be imported, but for some."""
+    before = f"{without([name for name in OPTIONAL if name not in but])} import lostmotion.simulation.scenario"
+    return forks(map(shlex.split, calls), cwd, before)
 
 
 MAKEFILE = (ROOT / "Makefile").read_text()
 NEXT = re.findall(r"echo '(?:Next:| {5}) \$\(BIN\)/lostmotion ([^']+)'", MAKEFILE)
 
 
-@pytest.mark.parametrize("command", NEXT)
-def test_the_commands_that_make_demo_names_need_only_what_it_installs(tmp_path: Path, command: str) -> None:
-    installed = re.findall(r'--editable "\.\[([\w,]+)\]"', MAKEFILE)[0].split(",")
-    libraries = {re.match(r"[\w-]+", text)[0] for extra in installed for text in EXTRAS[extra]}  # type: ignore[index]
-    done = without_extras(*shlex.split(command), cwd=tmp_path, but=libraries)
-    misses = "does not fit: stable, but misses the window" in done.stdout  # the verdict on the axis, which is no error
-    assert misses == command.startswith("servo ")
-    assert done.returncode == (1 if misses else 0), done.stderr
-    assert done.stderr == ""
-
-
-def test_make_demo_names_commands() -> None:
-    assert [command.split()[0] for command in NEXT] == ["run", "rig", "servo"]
-
-
-def test_a_response_leaves_out_only_the_file_that_it_cannot_write(tmp_path: Path) -> None:
-    grid = ("--amplitudes", "0.1,1", "--frequencies", "1,2,3")
-    done = without_extras("response", "paper-2dof-nl-small", *grid, "-o", "r", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert 'response.nc is left out: it needs h5netcdf; install it: pip install "lostmotion[netcdf]"' in done.stdout
+def test_the_core_installation_runs_checks_and_draws(tmp_path: Path) -> None:
+    grid = "--amplitudes 0.1,1 --frequencies 1,2,3"
+    response, *others = without_extras(
+        f"response paper-2dof-nl-small {grid} -o r",
+        "run paper-2dof-nl-small -o small.csv --plot small.png --explain 0.3",
+        "drive check catalogue-robot-joint",
+        "catalogue",
+        "catalogue schaeffler-rt1-h-20-100",
+        "scenarios",
+        "schema",
+        cwd=tmp_path,
+    )
+    assert [done.args for done in (response, *others) if done.returncode != 0] == []
+    # It leaves out only the file that it cannot write.
+    assert 'response.nc is left out: it needs h5netcdf; install it: pip install "lostmotion[netcdf]"' in response.stdout
     assert {p.name for p in (tmp_path / "r").iterdir()} == {
         "response.html", "bode.csv", "response.csv", "characteristics.csv",
     }  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("call", "library", "extra"),
-    [
-        (("run", "paper-2dof-nl-small", "-o", "a.nc"), "h5netcdf", "netcdf"),
-        (("run", "paper-2dof-nl-small", "-o", "a.parquet"), "pyarrow", "study"),
-        (("reproduce", "-o", "out"), "jinja2", "report"),
-        (("study", str(ROOT / "examples" / "tolerance.toml"), "-o", "t"), "pyarrow", "study"),
-        (
-            ("study", str(ROOT / "examples" / "tolerance.toml"), "-o", "t", "--scheduler", "tcp://a:1"),
-            "distributed",
-            "cluster",
-        ),
-    ],
-    ids=lambda v: " ".join(v[:2]) if isinstance(v, tuple) else None,
-)
-def test_a_missing_library_ends_in_one_line_that_says_what_to_install(
-    tmp_path: Path, call: tuple[str, ...], library: str, extra: str
-) -> None:
-    done = without_extras(*call, cwd=tmp_path)
-    assert done.returncode == 1
-    (line,) = done.stderr.splitlines()
-    assert line.endswith(f'needs {library}; install it: pip install "lostmotion[{extra}]"')
-    assert library.lower() in names(EXTRAS[extra])
+def test_the_commands_that_make_demo_names_need_only_what_it_installs(tmp_path: Path) -> None:
+    installed = re.findall(r'--editable "\.\[([\w,]+)\]"', MAKEFILE)[0].split(",")
+    libraries = {re.match(r"[\w-]+", text)[0] for extra in installed for text in EXTRAS[extra]}  # type: ignore[index]
+    for done, name in zip(without_extras(*NEXT, cwd=tmp_path, but=libraries), ("run", "rig", "servo"), strict=True):
+        assert done.args[0] == name
+        misses = "does not fit: stable, but misses the window" in done.stdout  # the verdict on the axis, no error
+        assert misses == (name == "servo")
+        assert done.returncode == (1 if misses else 0), done
+        assert done.stderr == ""
+
+
+def test_a_missing_library_ends_in_one_line_that_says_what_to_install(tmp_path: Path) -> None:
+    study = f"study {ROOT / 'examples' / 'tolerance.toml'} -o t"
+    needs = {
+        "run paper-2dof-nl-small -o a.nc": ("h5netcdf", "netcdf"),
+        "run paper-2dof-nl-small -o a.parquet": ("pyarrow", "study"),
+        "reproduce -o out": ("jinja2", "report"),
+        study: ("pyarrow", "study"),
+        f"{study} --scheduler tcp://a:1": ("distributed", "cluster"),
+    }
+    for done, (library, extra) in zip(without_extras(*needs, cwd=tmp_path), needs.values(), strict=True):
+        assert done.returncode == 1
+        (line,) = done.stderr.splitlines()
+        assert line.endswith(f'needs {library}; install it: pip install "lostmotion[{extra}]"')
+        assert library.lower() in names(EXTRAS[extra])
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(
-    ("what", "library"),
-    [
-        ("lm.response.bandwidth(s, 1.0)", "scipy"),
-        ("lm.linearize(s, lm.Initial(motor_speed=1.0)).antiresonances()", "scipy"),
-        ("lm.linearize(s, lm.Initial(motor_speed=1.0)).to_scipy()", "scipy"),
-        ("lm.linearize(s, lm.Initial(motor_speed=1.0)).to_control()", "control"),
-    ],
-)
-def test_in_python_too(what: str, library: str) -> None:
-    script = f"{without(OPTIONAL)} import lostmotion as lm; s = lm.load('paper-2dof-nl-small')\ntry: {what}\n"
-    script += "except lm.MissingLibraryError as error: print(error)"
+def test_in_python_too() -> None:
+    """Each of these without the optional libraries."""
+    calls = {
+        "lm.response.bandwidth(s, 1.0)": "scipy",
+        "lm.linearize(s, lm.Initial(motor_speed=1.0)).antiresonances()": "scipy",
+        "lm.linearize(s, lm.Initial(motor_speed=1.0)).to_scipy()": "scipy",
+        "lm.linearize(s, lm.Initial(motor_speed=1.0)).to_control()": "control",
+    }
+    script = f"{without(OPTIONAL)} import lostmotion as lm; s = lm.load('paper-2dof-nl-small')\n"
+    script += "".join(f"try: {call}\nexcept lm.MissingLibraryError as error: print(error)\n" for call in calls)
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert done.stdout.strip().endswith(f'needs {library}; install it: pip install "lostmotion[control]"')
+    for line, library in zip(done.stdout.splitlines(), calls.values(), strict=True):
+        assert line.endswith(f'needs {library}; install it: pip install "lostmotion[control]"')
 
 
 # --- building ---

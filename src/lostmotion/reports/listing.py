@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
@@ -111,7 +112,7 @@ def summary() -> str:
     for record in catalogue():
         of_kind.setdefault((table_of(record), record.kind), []).append(record)
     for (table, kind), records in of_kind.items():
-        levels = {level: sum(r.level() == level for r in records) for r in records if (level := r.level()) is not None}
+        levels = Counter(level for r in records if (level := r.level()) is not None)
         runs = ", ".join(f"{number} {level}" for level, number in levels.items()) or "none"
         spans = [
             _span(records, data_of, unit, factor)
