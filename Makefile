@@ -164,13 +164,14 @@ report-where-node:
 test-page: page-where-node
 	@$(NODE) || exit 0; { command -v chromium >/dev/null || { apt-get update -q && apt-get install -qy chromium; }; } && cd page && npm run --silent lint && npm test --silent
 
-# All random cases of the core's tests, and 100,000 random drives of each kind; CASES and SEED choose others.
+# All random cases of the tests, and 100,000 random drives of each kind; CASES and SEED choose others.
 CASES ?= 100000
 SEED ?= 1
 .PHONY: soak
-soak: with-core-tests
+soak: with-core-tests $(VENV)/dev
 	$(BUILD) --target core_tests core_tests_many soak
 	LOSTMOTION_CASES=1 $(BIN)/ctest --test-dir $(TREE) --output-on-failure --parallel 2 --tests-regex '^core'
+	LOSTMOTION_CASES=1 $(BIN)/pytest -k random
 	$(TREE)/core/tests/soak $(CASES) $(SEED)
 
 # Random input of all kinds, for some minutes; CASE repeats one that failed, KINDS chooses some.

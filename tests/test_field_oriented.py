@@ -13,6 +13,7 @@ import pytest
 from scipy.optimize import brentq, minimize_scalar
 
 import lostmotion as lm
+from conftest import some
 from full_equations import Axis
 from lostmotion.reports.run import summary
 from lostmotion.simulation.run import whole_run
@@ -132,9 +133,9 @@ def random_axis(rng: np.random.Generator, number: int) -> Axis:
 
 
 TICKS = 40
-CASES = 500
+CASES = some(500, 100)
 """in all; each worker takes a part"""
-PARTS = 10
+PARTS = 5
 
 
 @pytest.mark.parametrize("part", range(PARTS))

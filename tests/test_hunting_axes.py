@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 import lostmotion as lm
+from conftest import some
 from lostmotion.response.limit_cycle import Loop
 
-AXES = 24
+AXES = some(24, 12)
 SLIPS = 30  # that a run of an axis which hunts has at least
 ROUNDING = 1e-9  # of the largest error, with which a run ends a slip that creeps to rest
 

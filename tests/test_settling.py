@@ -1,7 +1,6 @@
 """Settling of axes: the window in the unit of the reference's shaft, moves that repeat, and verdicts against long runs."""
 
 import math
-import os
 import random
 from dataclasses import replace
 from typing import Any, get_args
@@ -10,6 +9,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
+from conftest import some
 from lostmotion.servo.motion import at_rest, errors_of, ran
 from lostmotion.servo.regimes import axis_of
 from lostmotion.servo.settling import Moves, Settling, State, default_window, repeated, settling
@@ -189,7 +189,7 @@ def re_number(text: str, pattern: str) -> float:
 
 # --- random axes against long runs ---
 
-AXES = 200 if os.environ.get("LOSTMOTION_CASES") == "1" else 20
+AXES = some(200, 12)
 LONGER = (5.0, 20.0)  # times as long as what was watched
 LONGEST = 6e6  # samples of a controller, of a long run
 

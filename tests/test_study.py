@@ -13,13 +13,14 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from scipy import stats
 from typer.testing import CliRunner
 
 import lostmotion as lm
-from conftest import ROOT, rows_by_any_threads_and_executor
+from conftest import ROOT, forks, rows_by_any_threads_and_executor
 from html_pages import Page, charts
 from lostmotion.cli import app
 from lostmotion.errors import InputError
@@ -274,7 +275,7 @@ def test_coupled_keys_go_together(tmp_path: Path):
 
 LONG = """
 base = "{base}"
-set = {{ "simulation.duration" = 2.0 }}
+set = {{ "simulation.duration" = 0.5 }}
 design = "random"
 runs = 6000
 [[vary]]
@@ -285,11 +286,16 @@ peak = "peak(load_speed)"
 """
 
 
-@pytest.fixture
-def long_study(tmp_path: Path) -> Path:
-    path = tmp_path / "long.toml"
+@pytest.fixture(scope="module")
+def long_study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("long") / "long.toml"
     path.write_text(LONG.format(base=ROOT / "scenarios" / "paper-2dof-nl-large.toml"))
     return path
+
+
+@pytest.fixture(scope="module")
+def whole(long_study: Path) -> pa.Table:
+    return read_table(lm.study(lm.studies.load_study(long_study), long_study.parent / "whole"))
 
 
 def started(study: Path, directory: Path, parts: int) -> subprocess.Popen:
@@ -303,7 +309,9 @@ def started(study: Path, directory: Path, parts: int) -> subprocess.Popen:
 
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
-def test_killed_and_started_again_it_goes_on_where_it_was(long_study: Path, tmp_path: Path, how: signal.Signals):
+def test_killed_and_started_again_it_goes_on_where_it_was(
+    long_study: Path, whole: pa.Table, tmp_path: Path, how: signal.Signals
+):
     directory = tmp_path / "killed"
     process = started(long_study, directory, 2)
     os.kill(process.pid, how)
@@ -319,24 +327,21 @@ def test_killed_and_started_again_it_goes_on_where_it_was(long_study: Path, tmp_
     for name, stamp in kept.items():
         assert (directory / name).stat().st_mtime_ns == stamp  # nothing twice
     assert not list(directory.glob(".part*"))
-    whole = lm.study(lm.studies.load_study(long_study), tmp_path / "whole")
-    assert read_table(directory).equals(read_table(whole))
-    assert read_table(directory)["run"].to_pylist() == list(range(6000))
+    assert read_table(directory).equals(whole)
+    assert whole["run"].to_pylist() == list(range(6000))
 
 
-def test_a_full_disk_stops_it_with_one_line_and_loses_nothing(long_study: Path, tmp_path: Path):
-    directory = tmp_path / "full"
-    script = (
-        "import resource, signal, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN);"
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (4000, 4000));"  # room for the note, not for a part
-        "from lostmotion.cli import main; sys.argv = ['lostmotion', *sys.argv[1:]]; main()"
+def test_a_full_disk_stops_it_with_one_line_and_loses_nothing(tmp_path: Path):
+    (tmp_path / "s.toml").write_text(GOOD.format(base="step-to-standstill"))
+    before = (
+        "import resource, signal; signal.signal(signal.SIGXFSZ, signal.SIG_IGN);"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (4000, 4000))"  # room for the note, not for a part
     )
-    command = [sys.executable, "-c", script, "study", str(long_study), "-o", str(directory)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    (done,) = forks([("study", "s.toml", "-o", "full")], tmp_path, before)
     assert done.returncode == 1
     assert "cannot be written" in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
-    assert not list(directory.glob("*part*"))
+    assert not list((tmp_path / "full").glob("*part*"))
 
 
 def test_a_directory_of_another_study_is_left_alone(tmp_path: Path):
@@ -522,29 +527,6 @@ def test_a_note_is_restored_from_a_part_that_matches_its_checksum(tmp_path: Path
     assert read_table(directory).equals(whole)
 
 
-@pytest.mark.filterwarnings("default")
-def test_a_dask_worker_that_dies_takes_no_run_with_it(tmp_path: Path):
-    from distributed import Client, LocalCluster
-
-    study = make(design="random", runs=12 * CHUNK)
-    with (
-        LocalCluster(n_workers=3, threads_per_worker=1, processes=True, dashboard_address=None) as cluster,
-        Client(cluster) as client,
-    ):
-        pids = list(client.run(os.getpid).values())
-        seen: list[int] = []
-
-        def kill_one(done: int) -> None:
-            seen.append(done)
-            if len(seen) == 3:
-                os.kill(pids[0], signal.SIGKILL)
-
-        lm.study(study, tmp_path / "d", executor=client.get_executor(pure=False), progress=kill_one)
-        assert pids[0] not in client.run(os.getpid).values()
-    assert seen[-1] == study.total
-    assert read_table(tmp_path / "d").equals(read_table(lm.study(study, tmp_path / "t")))
-
-
 class Lost(Executor):
     """An executor whose second chunk is lost."""
 
@@ -577,8 +559,8 @@ def test_lost_workers_end_in_one_line_and_lose_no_part(tmp_path: Path, name: str
 class Cluster:
     """A Dask scheduler and two workers as processes of their own, as docs/studies.md starts them on several machines."""
 
-    def __init__(self, directory: Path, port: int = 0) -> None:
-        self.directory, self.port = directory, port
+    def __init__(self, directory: Path) -> None:
+        self.directory = directory
 
     def start(self, name: str, *words: str) -> subprocess.Popen:
         with (self.directory / f"{name}.log").open("a") as log:
@@ -587,8 +569,7 @@ class Cluster:
 
     def __enter__(self) -> "Cluster":
         about = self.directory / "scheduler.json"
-        about.unlink(missing_ok=True)
-        where = ("--host", "127.0.0.1", "--port", str(self.port), "--scheduler-file", str(about))
+        where = ("--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(about))
         self.scheduler = self.start("scheduler", *where)
         while not (about.is_file() and about.stat().st_size):  # however long a busy machine takes
             assert self.scheduler.poll() is None
@@ -604,36 +585,41 @@ class Cluster:
 
 
 @pytest.mark.filterwarnings("default")
-def test_a_scheduler_that_dies_takes_no_written_part_with_it(tmp_path: Path):
+def test_dask_workers_compute_and_neither_a_worker_nor_the_scheduler_takes_anything_with_it(tmp_path: Path):
     from distributed import Client
 
-    study = make(design="random", runs=30 * CHUNK)
-    directory = tmp_path / "s"
-    with Cluster(tmp_path) as cluster, Client(cluster.address, timeout="10s") as client:
-
-        def kill_scheduler(done: int) -> None:
-            if done >= 2 * CHUNK:
-                cluster.scheduler.kill()
-
-        with pytest.raises(InputError, match="workers or their scheduler were lost"):
-            lm.study(study, directory, executor=client.get_executor(pure=False), progress=kill_scheduler)
-    kept = {p.name: p.stat().st_mtime_ns for p in directory.glob("part-*.parquet")}
-    assert 2 <= len(kept) < 30
-    (tmp_path / "scheduler.json").unlink()
-    with Cluster(tmp_path) as cluster, Client(cluster.address, timeout="60s") as client:
-        lm.study(study, directory, executor=client.get_executor(pure=False))
-    assert {name: (directory / name).stat().st_mtime_ns for name in kept} == kept
-    assert read_table(directory).equals(read_table(lm.study(study, tmp_path / "t")))
-
-
-@pytest.mark.filterwarnings("default")
-def test_the_command_line_computes_on_the_workers_of_a_scheduler(tmp_path: Path):
     example = ROOT / "examples" / "tolerance.toml"
+    study, directory = make(design="random", runs=12 * CHUNK), tmp_path / "s"
+    whole = read_table(lm.study(study, tmp_path / "t"))
     with Cluster(tmp_path) as cluster:
-        words = ["study", str(example), "-o", str(tmp_path / "s"), "--scheduler", cluster.address]
+        words = ["study", str(example), "-o", str(tmp_path / "e"), "--scheduler", cluster.address]
         done = CliRunner().invoke(app, words)
-    assert done.exit_code == 0, done.output
-    assert read_table(tmp_path / "s").equals(read_table(lm.study(lm.studies.load_study(example), tmp_path / "t")))
+        assert done.exit_code == 0, done.output
+        assert read_table(tmp_path / "e").equals(read_table(lm.study(lm.studies.load_study(example), tmp_path / "f")))
+        with Client(cluster.address, timeout="10s") as client:
+            seen: list[int] = []
+
+            def kill_a_worker(done: int) -> None:
+                seen.append(done)
+                if len(seen) == 3:
+                    cluster.workers[0].kill()
+
+            lm.study(study, tmp_path / "d", executor=client.get_executor(pure=False), progress=kill_a_worker)
+            assert len(client.scheduler_info()["workers"]) == 1
+            assert seen[-1] == study.total
+            assert read_table(tmp_path / "d").equals(whole)
+
+            def kill_scheduler(done: int) -> None:
+                if done >= 2 * CHUNK:
+                    cluster.scheduler.kill()
+
+            with pytest.raises(InputError, match="workers or their scheduler were lost"):
+                lm.study(study, directory, executor=client.get_executor(pure=False), progress=kill_scheduler)
+    kept = {p.name: p.stat().st_mtime_ns for p in directory.glob("part-*.parquet")}
+    assert 2 <= len(kept) < 12
+    lm.study(study, directory)
+    assert {name: (directory / name).stat().st_mtime_ns for name in kept} == kept
+    assert read_table(directory).equals(whole)
 
 
 def test_progress_rises_to_the_total_and_starts_from_what_is_there(tmp_path: Path):

@@ -51,6 +51,8 @@ def main() -> None:
         100_000
     )  # loading makes many objects that stay; looking through them again and again takes a tenth of it
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # a search of all that is installed
+    # Matrices are so small that the threads of BLAS take more time than they save.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     warnings.showwarning = _show_warning
     with harmless_output():
         _run()

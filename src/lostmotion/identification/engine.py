@@ -43,8 +43,7 @@ class Engine:
     def __init__(self, rig: Rig, threads: int | None = None) -> None:
         self.rig = rig
         self.threads = threads or os.cpu_count() or 1
-        self.runs = 0
-        """so far, without those for differences"""
+        self._ahead: _Ahead | None = None
         self.by_differences: dict[str, str] = {}
         """by parameter: why its derivatives are differences"""
         self.touching: dict[str, str] = {}
@@ -52,11 +51,25 @@ class Engine:
         self.failed: dict[str, str] = {}
         """by log: why it has no run, where residuals were last asked for"""
 
-    def residuals(self, logs: Sequence[Prepared], point: Point, rung: int) -> list[np.ndarray]:
+    def residuals(
+        self,
+        logs: Sequence[Prepared],
+        point: Point,
+        rung: int,
+        derivatives: Mapping[str, FreeParameter] | None = None,
+    ) -> list[np.ndarray]:
         """Residuals of each log, weighted, one row for each measured channel, SI; NaN if the rig has no motion,
         0 where the log has no number.
+
+        Parameters
+        ----------
+        derivatives
+            Parameters of which `jacobians` is likely to be asked next at this point: their derivatives add a tenth to a run.
         """
-        rows, self.failed = self._residuals([(log, point.of(log)) for log in logs], rung)
+        requests = [(log, point.of(log)) for log in logs]
+        found, exact = self._exact(requests, rung, derivatives or {})
+        self._ahead = _Ahead(logs, point, rung, found, exact) if derivatives else None
+        rows, self.failed = _residuals(requests, found)
         return rows
 
     def jacobians(
@@ -69,15 +82,12 @@ class Engine:
         bound is changed to the inner side alone.
         """
         names = list(parameters)
-        self.runs += len(logs)
         requests = [(log, point.of(log)) for log in logs]
-        while True:
-            exact = {name: p for name, p in parameters.items() if name not in self.by_differences}
-            try:
-                found = self._run(requests, rung, exact)
-                break
-            except NoDerivativeError as refused:
-                self.by_differences[refused.name] = str(refused)
+        ahead, self._ahead = self._ahead, None
+        if ahead is not None and ahead.logs is logs and ahead.point is point and ahead.rung == rung:
+            found, exact = ahead.found, ahead.exact
+        else:
+            found, exact = self._exact(requests, rung, parameters)
         out = []
         wanted: list[tuple[int, str]] = []
         for k, (log, seen) in enumerate(zip(logs, found, strict=True)):
@@ -108,6 +118,20 @@ class Engine:
             for seen in run_logs(self.rig, requests[k : k + TOGETHER], rung, parameters, threads=self.threads)
         ]
 
+    def _exact(
+        self,
+        requests: Sequence[tuple[Prepared, Mapping[str, float]]],
+        rung: int,
+        parameters: Mapping[str, FreeParameter],
+    ) -> tuple[list[Seen], list[str]]:
+        """(runs, names of the parameters by which they have derivatives)."""
+        while True:
+            exact = {name: p for name, p in parameters.items() if name not in self.by_differences}
+            try:
+                return self._run(requests, rung, exact), list(exact)
+            except NoDerivativeError as refused:
+                self.by_differences[refused.name] = str(refused)
+
     def _differences(
         self,
         requests: Sequence[tuple[Prepared, Mapping[str, float]]],
@@ -124,22 +148,33 @@ class Engine:
             above, below = min(values[name] + h, p.max), max(values[name] - h, p.min)
             work += [(log, {**values, name: above}), (log, {**values, name: below})]
             widths.append(above - below)
-        rows = self._residuals(work, rung)[0] if work else []
+        rows = _residuals(work, self._run(work, rung, {}))[0] if work else []
         return [(a - b) / w for a, b, w in zip(rows[::2], rows[1::2], widths, strict=True)]
 
-    def _residuals(
-        self, requests: Sequence[tuple[Prepared, Mapping[str, float]]], rung: int
-    ) -> tuple[list[np.ndarray], dict[str, str]]:
-        """Residuals of each request; and by log the reason for a missing run."""
-        self.runs += len(requests)
-        found = self._run(requests, rung, {})
-        failed = {
-            log.name: str(seen.error or "the run has no finite values")
-            for (log, _), seen in zip(requests, found, strict=True)
-            if seen.error is not None or not np.isfinite(seen.values).all()
-        }
-        rows = [
-            np.where(log.valid, (np.array(list(log.measured.values())) - seen.values) * log.weight, 0.0)
-            for (log, _), seen in zip(requests, found, strict=True)
-        ]
-        return rows, failed
+
+@dataclass(frozen=True)
+class _Ahead:
+    """Runs with derivatives from which the next Jacobian may be made."""
+
+    logs: Sequence[Prepared]
+    point: Point
+    rung: int
+    found: list[Seen]
+    exact: list[str]
+    """parameters of the derivatives"""
+
+
+def _residuals(
+    requests: Sequence[tuple[Prepared, Mapping[str, float]]], found: Sequence[Seen]
+) -> tuple[list[np.ndarray], dict[str, str]]:
+    """Residuals of each request; and by log the reason for a missing run."""
+    failed = {
+        log.name: str(seen.error or "the run has no finite values")
+        for (log, _), seen in zip(requests, found, strict=True)
+        if seen.error is not None or not np.isfinite(seen.values).all()
+    }
+    rows = [
+        np.where(log.valid, (np.array(list(log.measured.values())) - seen.values) * log.weight, 0.0)
+        for (log, _), seen in zip(requests, found, strict=True)
+    ]
+    return rows, failed

@@ -213,7 +213,8 @@ def search(
     InputError
         The rig has no motion at the start, or no log can be run.
     """
-    residuals = problem.engine.residuals(problem.logs, start, problem.rung)
+    both = {**problem.parameters, **problem.nuisance}
+    residuals = problem.engine.residuals(problem.logs, start, problem.rung, both)
     for name, why in problem.engine.failed.items():
         model = problem.engine.rig.rungs()[problem.rung].name
         raise InputError(
@@ -232,7 +233,7 @@ def search(
         better = None
         while damping < LARGEST_DAMPING:
             candidate = _stepped(problem, point, linear, damping)
-            found = problem.engine.residuals(problem.logs, candidate, problem.rung)
+            found = problem.engine.residuals(problem.logs, candidate, problem.rung, both)
             new = problem.cost(found, deviations, candidate, correlation)
             if math.isfinite(new) and new < cost:
                 better = (candidate, found, new)

@@ -84,22 +84,22 @@ class Flow:
         """Largest magnitude of each mode."""
         return np.asarray(np.abs(self.middle) + np.abs(self.half) + self.radius)
 
-    def values(self, row: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Least and largest values of an output at instants."""
+    def values(self, rows: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Least and largest values of an output, or of several, at instants."""
         decay = np.exp(np.outer(times, self.of.slip_rates))
-        middle, half = (decay @ (row * part) for part in (self.middle, self.half))
-        loose = np.abs(decay) @ (np.abs(row) * (self.radius + self.of.rounding * self.size))
-        spread = np.abs(half.real) + loose
-        return middle.real - spread, middle.real + spread
+        middle, half = ((decay @ (rows * part).T).real.T for part in (self.middle, self.half))
+        loose = np.abs(decay) @ (np.abs(rows) * (self.radius + self.of.rounding * self.size)).T
+        spread = np.abs(half) + loose.T
+        return middle - spread, middle + spread
 
-    def between(self, row: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Least and largest values of an output between each instant and the next."""
-        low, high = self.values(row, times)
+    def between(self, rows: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Least and largest values of an output, or of several, between each instant and the next."""
+        low, high = self.values(rows, times)
         bend = np.exp(np.outer(times[:-1], self.of.slip_rates.real)) @ (
-            np.abs(row) * np.abs(self.of.slip_rates) ** 2 * self.size
-        )
-        off = 0.125 * np.diff(times) ** 2 * bend
-        return np.minimum(low[:-1], low[1:]) - off, np.maximum(high[:-1], high[1:]) + off
+            np.abs(rows) * np.abs(self.of.slip_rates) ** 2 * self.size
+        ).T
+        off = 0.125 * np.diff(times) ** 2 * bend.T
+        return np.minimum(low[..., :-1], low[..., 1:]) - off, np.maximum(high[..., :-1], high[..., 1:]) + off
 
     def range_of(self, row: np.ndarray, times: np.ndarray) -> tuple[float, float]:
         low, high = self.between(row, times)
@@ -112,16 +112,11 @@ class Flow:
 
     def boxes(self, rows: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Middles and radii of several complex outputs over the time between the first instant and the last."""
-        middle, radius = np.zeros(len(rows), complex), np.zeros(len(rows))
-        for k, row in enumerate(rows):
-            parts = (
-                [self.range_of(part, times) for part in (row, -1j * row)]
-                if np.any(row.imag)
-                else [self.range_of(row, times)]
-            )
-            centre, off = ([0.5 * (a + b) for a, b in parts], [0.5 * (b - a) for a, b in parts])
-            middle[k], radius[k] = complex(*centre), math.hypot(*off)
-        return middle, radius
+        low, high = self.between(np.vstack([rows, -1j * rows]), times)
+        least, largest = low.min(axis=1).reshape(2, -1), high.max(axis=1).reshape(2, -1)
+        least[1, ~rows.imag.any(axis=1)] = largest[1, ~rows.imag.any(axis=1)] = 0.0
+        centre, off = 0.5 * (least + largest), 0.5 * (largest - least)
+        return centre[0] + 1j * centre[1], np.hypot(*off)
 
     @property
     def latest(self) -> float:
@@ -176,11 +171,9 @@ class Flow:
     def end_within(self, times: np.ndarray) -> tuple[float, float] | str:
         """The same with these instants."""
         rates, speed = self.of.slip_rates, self.of.speed
-        low = self.between(speed, times)[0]
-        moving = low > 0.0
+        moving, *rising = self.between(np.array([speed, speed * rates, speed * rates**2]), times)[0] > 0.0
         # From 0 the speed rises as long as its first or its second derivative, times one of the same sign before, is positive.
-        for order in (1, 2):
-            positive = self.between(speed * rates**order, times)[0] > 0.0
+        for positive in rising:
             moving[: int(np.argmin(positive)) if not positive.all() else len(positive)] = True
         if moving.all():
             return self.latest, math.inf
