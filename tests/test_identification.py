@@ -99,7 +99,7 @@ def test_the_data_sheet_of_a_rigid_gear_makes_a_gearbox_and_is_measured(
     sheet = tmp_path / "gearbox.toml"
     sheet.write_text(found.record_text())
     gearbox, c = lm.gearbox(str(sheet)), found.values["load_friction"]
-    assert gearbox.stiffness.kind == "rigid" and "nothing of its stiffness" in gearbox.note
+    assert gearbox.stiffness.kind == "rigid" and "nothing of its stiffness" in gearbox.note["stiffness"]
     rig = lm.test_rig.TestRig(gearbox)
     assert rig.efficiency(0.5, 1.0) == pytest.approx(1.0 / (1.0 + c), rel=1e-9)
     assert rig.efficiency(0.5, -1.0) == pytest.approx(1.0 - c, rel=1e-9)

@@ -1,6 +1,7 @@
 """Notes of parts after an override: none is left that is no longer true, and those that are still true stay."""
 
 import json
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -12,7 +13,7 @@ from typer.testing import CliRunner
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.cli import app
-from lostmotion.model.notes import still_true
+from lostmotion.inputs.toml_text import toml_text
 
 MAP = {
     "kind": "map",
@@ -21,7 +22,14 @@ MAP = {
     "values": [[0.01, 0.02], [0.03, 0.05]],
     "mirrored": True,
 }
-ESTIMATED = "nord-si50-i10"  # whose efficiency is not printed
+
+
+def train(tmp_path: Path, **changes: Any) -> lm.Scenario:
+    gear = {"gearbox": "paper-gearbox", "input": "a", "output": "b"} | changes
+    shafts = {"a": {"inertia": 1e-3}, "b": {"inertia": 1.0}}
+    time = {"duration": 0.1, "sample_interval": 0.01}
+    (tmp_path / "train.toml").write_text(toml_text({"shafts": shafts, "gears": {"stage": gear}, "simulation": time}))
+    return lm.load(tmp_path / "train.toml")
 
 
 def with_base(tmp_path: Path) -> lm.Scenario:
@@ -34,66 +42,84 @@ def with_base(tmp_path: Path) -> lm.Scenario:
 
 WAYS: dict[str, Callable[[Path], lm.Scenario]] = {
     "overrides": lambda _: lm.load("paper-2dof-nl-small", {"gearbox.losses": MAP}),
-    "one key": lambda _: lm.load(
-        "paper-2dof-nl-small",
-        {"gearbox.losses.values": lm.load("paper-2dof-nl-small").gearbox.losses.model_dump()["values"]},
-    ),
+    "one key": lambda _: lm.load("paper-2dof-nl-small", {"gearbox.losses.values.0.0": 0.03}),
     "replace": lambda _: lm.load("paper-2dof-nl-small").replace(**{"gearbox.losses": MAP}),
     "base": with_base,
+    "beside its record": lambda _: lm.load(
+        "paper-2dof-nl-small", {"gearbox": {"from": "paper-gearbox", "losses": MAP}}
+    ),
+    "train": lambda path: train(path, losses=MAP),
+    "train, override": lambda path: lm.load(train(path) and path / "train.toml", {"gears.stage.losses": MAP}),
+    "train, replace": lambda path: train(path).replace(**{"gears.stage.losses": MAP}),
 }
 
 
 @pytest.mark.parametrize("way", WAYS)
 def test_a_loss_table_that_was_replaced_is_no_stand_in(way: str, tmp_path: Path) -> None:
-    before = lm.load("paper-2dof-nl-small")
-    assert "stand-in" in before.gearbox.note
+    assert "stand-in" in lm.load("paper-2dof-nl-small").note()
+    assert "stand-in" in train(tmp_path).note()
     scenario = WAYS[way](tmp_path)
-    assert "stand-in" not in scenario.gearbox.note
-    assert "stand-in" not in str(lm.simulate(scenario).attrs.get("note", ""))
+    assert scenario.note() == ""
+    assert "note" not in lm.simulate(scenario).attrs
 
 
 def test_a_note_that_is_still_true_stays() -> None:
-    for changes in ({"load.inertia": 2.0}, {"gearbox.ratio": 80.0}, {"gearbox.hysteresis.efficiency": 0.9}):
-        assert "stand-in" in lm.load("paper-2dof-nl-small", changes).gearbox.note
-    own = lm.load("paper-2dof-nl-small", {"gearbox.losses": MAP, "gearbox.note": "The table of our rig."})
-    assert own.gearbox.note == "The table of our rig."
+    same = {"gearbox.losses.values": lm.load("paper-2dof-nl-small").gearbox.losses.model_dump()["values"]}
+    for changes in (same, {"load.inertia": 2.0}, {"gearbox.ratio": 80.0}, {"gearbox.hysteresis.efficiency": 0.9}):
+        for scenario in (lm.load("paper-2dof-nl-small", changes), lm.load("paper-2dof-nl-small").replace(**changes)):
+            assert "stand-in" in scenario.note()
+    own = {"gearbox.note": {"losses": "The table of our rig."}}
+    for both in (own | {"gearbox.losses": MAP}, {"gearbox.losses": MAP} | own):
+        assert lm.load("paper-2dof-nl-small", both).note() == "The table of our rig."
+    text = {"gearbox.note": "The losses of our rig."}
+    assert lm.load("paper-2dof-nl-small", text).replace(**{"gearbox.losses": MAP}).note() == "The losses of our rig."
 
 
-def test_a_record_whose_losses_are_given_says_nothing_of_its_own() -> None:
-    whole = {"gearbox": {"from": "paper-gearbox"}}
-    assert "stand-in" in lm.load("paper-2dof-nl-small", whole).gearbox.note
-    given: dict[str, Any] = {"gearbox": {"from": "paper-gearbox", "losses": MAP}}
-    assert "stand-in" not in lm.load("paper-2dof-nl-small", given).gearbox.note
+def test_a_note_is_about_the_value_that_it_names_whatever_its_words_are(tmp_path: Path) -> None:
+    """Of an own record: the words speak of losses, the key is the backlash; and a limit among several."""
+    shutil.copy(ROOT / "src" / "lostmotion" / "catalogue" / "paper.toml", tmp_path / "own.toml")
+    text = (tmp_path / "own.toml").read_text()
+    note = 'note = {stiffness = "No loss of the gap is known.", "limits.max_input_speed" = "Of a torn page."}'
+    (tmp_path / "own.toml").write_text(re.sub("note.losses = .*", note, text))
+    table = {"from": str(tmp_path / "own.toml")}
+    joint = lm.load("paper-2dof-nl-small", {"gearbox": table})
+    for changes, left in (
+        ({"gearbox.losses": MAP}, {"stiffness", "limits.max_input_speed"}),
+        ({"gearbox.stiffness.backlash": "1 arcmin"}, {"limits.max_input_speed"}),
+        ({"gearbox.limits.max_input_speed": "5000 rpm"}, {"stiffness"}),
+        ({"gearbox.limits.average_input_speed": "3000 rpm"}, {"stiffness", "limits.max_input_speed"}),
+    ):
+        assert joint.replace(**changes).gearbox.note.keys() == left
+        assert lm.load("paper-2dof-nl-small", {"gearbox": table, **changes}).gearbox.note.keys() == left
+    worn = lm.load("paper-2dof-nl-small", {"gearbox": {**table, "added_backlash": "1 arcmin"}})
+    assert worn.gearbox.note.keys() == {"limits.max_input_speed"}
+    with pytest.raises(lm.InputError) as refused:
+        lm.load("paper-2dof-nl-small", {"gearbox.note": {"lossez": "A misprint."}})
+    assert refused.value.problems[0].keys == ("gearbox.note",)
 
 
 def test_what_is_said_of_a_friction_that_is_not_printed_goes_when_it_is_given() -> None:
     joint = "catalogue-robot-joint"
     changes = {"motor": {"from": "siemens-1ft7044-ak7"}}
-    assert "friction" in lm.load(joint, changes).motor.note
-    for key in (
-        {"motor": {"from": "siemens-1ft7044-ak7", "friction_torque": 0.05}},
-        changes | {"motor.friction_torque": 0.05},
+    assert lm.load(joint, changes).motor.note.keys() == {"winding", "kind", "friction_torque"}
+    for scenario in (
+        lm.load(joint, {"motor": {"from": "siemens-1ft7044-ak7", "friction_torque": 0.05}}),
+        lm.load(joint, changes | {"motor.friction_torque": 0.05}),
+        lm.load(joint, changes).replace(**{"motor.friction_torque": 0.05}),
     ):
-        note = lm.load(joint, key).motor.note
-        assert "friction" not in note.partition("cannot")[0]
-        assert "torque source" in note  # still one
-    assert "friction" not in lm.load(joint, changes).replace(**{"motor.friction_torque": 0.05}).motor.note
+        assert scenario.motor.note.keys() == {"winding", "kind"}  # still a torque source
 
 
 def test_losses_that_replace_estimated_ones_are_no_estimate() -> None:
     estimated = next(
-        record.name
-        for record in lm.catalogue()
-        if record.name.startswith("harmonic")
-        or (getattr(record, "loss_estimate", lambda: None)() is not None and not record.missing())
+        r.name for r in lm.catalogue() if r.kind in ("planetary", "strain_wave") and r.level() == "estimated losses"
     )
     scenario = lm.load("catalogue-robot-joint", {"gearbox": {"from": estimated}})
     assert scenario.gearbox.loss_range is not None
-    assert "estimated" in scenario.gearbox.note
+    assert "estimated" in scenario.gearbox.note["losses"]
     changed = scenario.replace(**{"gearbox.losses": MAP})
     assert changed.gearbox.loss_range is None
-    assert "estimated" not in changed.gearbox.note
-    assert changed.gearbox.losses == lm.load("paper-2dof-nl-small", {"gearbox.losses": MAP}).gearbox.losses
+    assert "losses" not in changed.gearbox.note
 
 
 def test_the_rig_says_of_a_record_what_is_true_of_the_gearbox_that_it_measures() -> None:
@@ -102,19 +128,6 @@ def test_the_rig_says_of_a_record_what_is_true_of_the_gearbox_that_it_measures()
     own = ["--set", "losses={kind='constant_efficiency', efficiency=0.9}"]
     done = CliRunner().invoke(app, ["rig", "paper-gearbox", *own])
     assert "stand-in" not in done.output
-
-
-@pytest.mark.parametrize(
-    ("note", "changed", "left"),
-    [
-        ("The friction of M is not given and taken as 0. M runs as a torque source, since its winding is not given.", ["friction_torque"], "M runs as a torque source, since its winding is not given."),
-        ("A note on nothing.", ["losses", "stiffness"], "A note on nothing."),
-        ("All losses are multiplied by 1.3.", ["ratio"], "All losses are multiplied by 1.3."),
-        ("", ["losses"], ""),
-    ],
-)  # fmt: skip
-def test_sentences_about_a_changed_value_go(note: str, changed: list[str], left: str) -> None:
-    assert still_true(note, changed) == left
 
 
 # --- titles ---

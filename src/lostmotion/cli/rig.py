@@ -105,11 +105,12 @@ def _measured(name: str, sheet: Record, overrides: Sequence[str]) -> tuple[RigRe
     from ..simulation.scenario_files import gearbox_from_record, screw_from_record
 
     if isinstance(sheet, ScrewSheet):
+        from ..model.notes import Notes
         from ..test_rig.screw_measurement import WORK, measure_screw
 
         screw = screw_from_record(name, overrides)
         with progress(WORK, "Measuring") as step:
-            return measure_screw(screw, sheet, progress=step), tuple(filter(None, [sheet.note]))
+            return measure_screw(screw, sheet, progress=step), tuple(Notes(screw.note).values())
     from ..test_rig.measurement import WORK, measure
 
     assert isinstance(sheet, GearboxSheet)

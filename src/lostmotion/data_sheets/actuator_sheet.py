@@ -6,6 +6,7 @@ from pydantic import Field
 
 from ..inputs.quantities import Inertia, Number, Positive, Speed, Torque, Voltage, Whole
 from ..model.motor import Motor, MotorLimits
+from ..model.notes import Notes
 from .gearbox_sheet import GearboxSheet
 from .loss_data import Efficiency, EfficiencyPoint, LossData
 from .sheet import Record
@@ -50,11 +51,15 @@ class ActuatorSheet(Record):
         """Assumptions of a run beyond the data, one sentence each."""
         if self.missing():
             return ()
-        said = (
-            f"{self.name} runs as a torque source behind a rigid gearbox without backlash: voltage, current and lost motion are not judged.",
-            f"The inertia of the gearbox of {self.name} and the friction of its motor are taken as 0.",
-        )
-        return (*said, *self.gearbox_sheet().assumptions())
+        gearbox = self.gearbox_sheet()
+        return (*self._assumed().values(), *Notes(gearbox.note).values(), *gearbox.assumptions())
+
+    def _assumed(self) -> dict[str, str]:
+        """Assumptions about its motor."""
+        return {
+            "kind": f"{self.name} runs as a torque source: voltage and current are not judged.",
+            "friction_torque": f"The friction of the motor of {self.name} is taken as 0.",
+        }
 
     def gearbox_sheet(self) -> GearboxSheet:
         """The sheet of its gearbox."""
@@ -73,6 +78,10 @@ class ActuatorSheet(Record):
             rated_output_torque=self.rated_output_torque,
             peak_output_torque=self.peak_output_torque,
             losses=losses,
+            note={
+                "stiffness": f"The gearbox of {self.name} is taken as rigid, without backlash: lost motion is not judged.",
+                "inertia": f"The inertia of the gearbox of {self.name} is taken as 0.",
+            },
         )
 
     def motor(self) -> Motor:
@@ -94,5 +103,5 @@ class ActuatorSheet(Record):
                 peak_torque=None if peak is None else per_output * peak,
                 max_speed=self.ratio * fastest,
             ),
-            note=" ".join(filter(None, [self.note, *self.assumptions()])),
+            note=self._notes(),
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from ..errors import InputError, prefixed
 from ..inputs.arguments import RecordName, checked
@@ -17,7 +17,7 @@ from ..inputs.toml_files import is_in_file
 from ..inputs.validation import shortened, shown, unknown_key
 from ..model.gearbox import Gearbox
 from ..model.motor import DC_KEYS, Motor
-from ..model.notes import forget_stale
+from ..model.notes import Noted, Notes, together
 from ..model.torsion import LinearStiffness, TorsionCurve
 
 if TYPE_CHECKING:
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from .gearbox_sheet import GearboxSheet
     from .loss_map_builder import BuiltMap
     from .motor_sheet import MotorSheet
+
+S = TypeVar("S", bound="GearboxSheet | MotorSheet | ActuatorSheet")
 
 
 class Conditions(Part):
@@ -79,12 +81,12 @@ def gearbox_of(sheet: GearboxSheet) -> Gearbox:
 def _table_of_sheet(
     record: GearboxSheet, name: str, changes: Mapping[str, Any], where: str
 ) -> tuple[dict[str, Any], BuiltMap | None]:
-    from .gearbox_sheet import SCALARS, GearboxSheet
+    from .gearbox_sheet import SCALARS
     from .loss_map_builder import build_loss_map
 
     scalars = {key: value for key, value in changes.items() if key in SCALARS}
     try:
-        sheet = GearboxSheet(**_given(record) | scalars) if scalars else record
+        sheet = _with(record, scalars)
         conditions = Conditions(**{key: changes[key] for key in Conditions.model_fields if key in changes})
     except InputError as error:
         raise InputError(error, table=where, record=name) from None
@@ -105,12 +107,13 @@ def _table_of_sheet(
         table["losses"] = built.losses.model_dump()
         if (estimate := sheet.loss_estimate()) is not None:
             table["loss_range"] = estimate.factors()
-    if notes := [*filter(None, [sheet.note]), *(built.notes if built else ())]:
-        table["note"] = " ".join(notes)
+    table["note"] = together(sheet.note, {"losses": " ".join(built.notes if built else ())})
+    noted = Noted(table)
     _change(table, changes)
     if "hysteresis" not in changes:
         table["hysteresis"] = _hysteresis(record, sheet, table["stiffness"])
     _wear(table, changes, conditions, where)
+    noted.keep_true(table)
     return table, built
 
 
@@ -119,8 +122,13 @@ def _naming(where: str) -> str:
     return "`gearbox`" if where.startswith("gears.") else "`from`"
 
 
-def _given(sheet: GearboxSheet | MotorSheet | ActuatorSheet) -> dict[str, Any]:
-    return {name: getattr(sheet, name) for name in sheet.model_fields_set}
+def _with(sheet: S, values: Mapping[str, Any]) -> S:
+    """A sheet with other values, and with the notes that are still true of it."""
+    if not values:
+        return sheet
+    given = {name: getattr(sheet, name) for name in sheet.model_fields_set}
+    changed = {**given, **values}
+    return type(sheet)(**{**changed, "note": Notes(sheet.note).still_true(given, changed)})
 
 
 def _whole(table: Any) -> bool:
@@ -129,8 +137,7 @@ def _whole(table: Any) -> bool:
 
 
 def _change(table: dict[str, Any], changes: Mapping[str, Any]) -> None:
-    """Puts changes into a part's values; a table without a kind changes single keys. What no longer holds goes."""
-    forget_stale(table, changes)
+    """Puts changes into a part's values; a table without a kind changes single keys."""
     for key, value in changes.items():
         if key in Conditions.model_fields:
             continue
@@ -296,8 +303,7 @@ def actuator(
     assert isinstance(sheet, ActuatorSheet)
     beside = {"rotor_inertia": rotor_inertia, "efficiency": efficiency}
     beside = {key: value for key, value in beside.items() if value is not None}
-    if beside:
-        sheet = ActuatorSheet(**_given(sheet) | beside)
+    sheet = _with(sheet, beside)
     for key, hint in sheet.missing().items():
         raise InputError(f"the record lacks {key}, {hint}", table="actuator", record=shown(name))
     return sheet.motor(), gearbox_of(sheet.gearbox_sheet())
@@ -334,7 +340,7 @@ def motor_table(reference: str, changes: Mapping[str, Any], where: str = "motor"
     if record.kind == "brushless" and isinstance(winding, Mapping) and "pole_pairs" in winding:
         gaps["pole_pairs"] = winding["pole_pairs"]
     try:
-        sheet = MotorSheet(**_given(record) | gaps) if gaps else record
+        sheet = _with(record, gaps)
         table = (sheet.synchronous() if changes.get("kind") == "synchronous" else sheet.motor()).model_dump()
     except ValueError as error:
         needed = {*record.missing(), *(["dc_voltage"] if changes.get("kind") == "synchronous" else [])}
@@ -342,11 +348,13 @@ def motor_table(reference: str, changes: Mapping[str, Any], where: str = "motor"
         remedy = f"; give {' and '.join(keys)} beside `from`" if keys else ""
         reason = error.reason if isinstance(error, InputError) else str(error)
         raise InputError(reason + remedy, table=where, record=shown(reference)) from None
+    noted = Noted(table)
     if changes.get("kind") == "torque_source":
         table = as_torque_source(table)
     elif "rated_voltage" in changes:
         table = at_voltage(table, changes["rated_voltage"], changes, where)
     _change(table, changes)
+    noted.keep_true(table)
     return table
 
 

@@ -167,15 +167,14 @@ class GearboxSheet(described.GearboxLoadsFields, Record):
         """Level of a run with these data: ``"printed losses"``, ``"estimated losses"``, or None."""
         return None if self.missing() else "printed losses" if self.loss_estimate() is None else "estimated losses"
 
-    def assumptions(self) -> tuple[str, ...]:
-        """Assumptions of a run beyond the data, one sentence each."""
+    def _assumed(self) -> dict[str, str]:
         estimate = self.loss_estimate()
         if estimate is None:
-            return ()
-        return (
-            f"The losses of {self.name} are not printed. Its efficiency at rated load is estimated as {estimate.efficiency:.0%}, "
-            f"of its kind {estimate.lowest:.0%} to {estimate.highest:.0%} ({estimate.source}).",
-        )
+            return {}
+        return {
+            "losses": f"The losses of {self.name} are not printed. Its efficiency at rated load is estimated as {estimate.efficiency:.0%}, "
+            f"of its kind {estimate.lowest:.0%} to {estimate.highest:.0%} ({estimate.source})."
+        }
 
     def torsion(self) -> TorsionCurve | Rigid | None:
         """The compliance, where the sheet says it."""

@@ -9,6 +9,7 @@ from ..errors import InputError, inside
 from ..inputs.part import Part
 from ..inputs.quantities import Force, Positive
 from ..inputs.validation import shortened, shown, unknown_key
+from ..model.notes import Noted
 from ..reproducible import cbrt
 
 if TYPE_CHECKING:
@@ -46,6 +47,7 @@ def linear_table(kind: str, reference: str, changes: Mapping[str, Any], where: s
         if key not in known:
             raise InputError(unknown_key(key, known), f"{where}.{shortened(key)}")
     values = record.values()
+    noted = Noted(values)
     own = {key: value for key, value in changes.items() if key not in conditions}
     values = _without_replaced(record, values, own) | own
     _need_all(record, reference, values, where)
@@ -60,6 +62,7 @@ def linear_table(kind: str, reference: str, changes: Mapping[str, Any], where: s
         values.pop("rated_current", None)
     if "peak_force" in values and "peak_current" not in changes:
         values.pop("peak_current", None)
+    noted.keep_true(values)
     return values
 
 

@@ -220,12 +220,10 @@ class LinearMotorSheet(LinearSheet, LinearMotorData):
         winding = (self.force_constant, self.resistance, self.inductance, self.pole_pitch)
         return super().level() if self.missing() or None not in winding else FORCE_SOURCE
 
-    def assumptions(self) -> tuple[str, ...]:
-        """Assumptions of a run beyond the data, one sentence each."""
+    def _assumed(self) -> dict[str, str]:
         if self.level() != FORCE_SOURCE:
-            return ()
-        return (
-            f"{self.name} runs as a force source, since its winding is not given: voltage and heat are not judged.",
-        )
+            return {}
+        lacks = "runs as a force source, since its winding is not given: voltage and heat are not judged."
+        return {"force_constant": f"{self.name} {lacks}"}
 
     _is_a_motor = model_validator(mode="after")(_as_it_is)

@@ -95,20 +95,16 @@ class MotorSheet(described.MotorHeatFields, Record):
         constants = self.torque_constant is not None and self.resistance is not None
         return DC_EQUIVALENT if constants or self.armature_voltage_constant is not None else TORQUE_SOURCE
 
-    def assumptions(self) -> tuple[str, ...]:
-        """Assumptions of a run beyond the data, one sentence each."""
-        level, out = self.level(), []
+    def _assumed(self) -> dict[str, str]:
+        level, out = self.level(), {}
         if level == TORQUE_SOURCE:
             lacks = "its dc voltage is not given" if self.winding is not None else "its winding is not given"
-            out.append(f"{self.name} runs as a torque source, since {lacks}: voltage and current are not judged.")
+            out["kind"] = f"{self.name} runs as a torque source, since {lacks}: voltage and current are not judged."
         if self.friction_torque is None and (self.no_load_current is None or self.torque_constant is None):
-            out.append(f"The friction of {self.name} is not given and taken as 0.")
+            out["friction_torque"] = f"The friction of {self.name} is not given and taken as 0."
         if level == DC_EQUIVALENT and self.electrical_time_constant is None and self.inductance is None:
-            out.append(f"The inductance of {self.name} is not given and taken as 0.")
-        return tuple(out)
-
-    def _note(self) -> str:
-        return " ".join(filter(None, [self.note, *self.assumptions()]))
+            out["electrical_time_constant"] = f"The inductance of {self.name} is not given and taken as 0."
+        return out
 
     def motor(self) -> Motor:
         """Parameters of eq. (2), or of the synchronous motor.
@@ -144,7 +140,7 @@ class MotorSheet(described.MotorHeatFields, Record):
             electrical_time_constant=tau,
             armature_voltage_constant=k_N,
             limits=self._limits(M_DR, resistance=R, torque_constant=k_t),
-            note=self._note(),
+            note=self._notes(),
         )
 
     def _torque_source(self) -> Motor:
@@ -156,7 +152,7 @@ class MotorSheet(described.MotorHeatFields, Record):
             rated_torque=torque,
             winding=self.winding,
             limits=self._limits(torque),
-            note=self._note(),
+            note=self._notes(),
         )
 
     def synchronous(self) -> Motor:
@@ -223,7 +219,7 @@ class MotorSheet(described.MotorHeatFields, Record):
             winding=winding,
             dc_voltage=dc_voltage,
             limits=self._limits(torque),
-            note=self._note(),
+            note=self._notes(),
         )
 
     def _limits(self, torque: float | None, **constants: float | None) -> MotorLimits:

@@ -7,6 +7,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from ..inputs.part import Part
 from ..inputs.quantities import Length, Mass, Number, Positive, Switch, Time
+from ..model.notes import NO_NOTE, Note, Notes, together
 from ..model.synchronous_motor import Winding
 from .loss_data import LossData
 
@@ -66,8 +67,8 @@ class Record(Part):
     manufacturer: str = ""
     title: str = ""
     """name of the product at the manufacturer"""
-    note: str = ""
-    """note for readers of results"""
+    note: Note = NO_NOTE
+    """for readers of results: text, or by the key of the part in a scenario that it is about"""
     illustrative: Switch = False
     """no product that can be bought: a filter of the catalogue passes it over unless it asks for its name"""
     total_mass: Annotated[Mass, Positive] | None = None
@@ -106,7 +107,14 @@ class Record(Part):
 
     def assumptions(self) -> tuple[str, ...]:
         """Assumptions of a run beyond the data, one sentence each."""
-        return ()
+        return tuple(self._assumed().values())
+
+    def _assumed(self) -> dict[str, str]:
+        """The assumptions, by the key of the part that each is about."""
+        return {}
+
+    def _notes(self) -> Notes:
+        return together(self.note, self._assumed())
 
     def source_of(self, datum: str) -> Source | None:
         """The source that covers a datum."""

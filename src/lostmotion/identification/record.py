@@ -49,7 +49,7 @@ def gear_sheet(gear: Gear, name: str, title: str, source: str) -> GearboxSheet:
         data["losses"] = {"table": losses.model_dump()}
     given = {key: value for key, value in data.items() if value is not None}
     sources = (Source(data=tuple(sorted(given)), status="identified", text=source),)
-    note = RIGID if "rigid" in given else ""
+    note = {"stiffness": RIGID} if "rigid" in given else ""
     return GearboxSheet(kind="other", name=name, title=title, note=note, sources=sources, **given)
 
 

@@ -9,6 +9,7 @@ from ..inputs.described import TransmissionFields
 from ..units.practical import practical
 from .losses import ConstantEfficiency, LossMap
 from .mesh_stiffness import MeshStiffness
+from .notes import NO_NOTE, Note, note_is_about
 from .torsion import Hysteresis, LinearStiffness, Rigid, TorsionCurve
 
 
@@ -27,8 +28,10 @@ class Transmission(described.TransmissionDataFields, TransmissionFields):
     mesh_stiffness: MeshStiffness | None = None
     """factor on the stiffness over the angle of the input shaft; left out, 1"""
     limits: GearboxLimits | None = None
-    note: str = ""
-    """note for readers of the results, such as that a loss table is a stand-in"""
+    note: Note = NO_NOTE
+    """for readers of the results, such as that a loss table is a stand-in: text, or by the key that it is about"""
+
+    _note_is_about_a_key = field_validator("note")(classmethod(note_is_about))
 
     @field_validator("ratio")
     @classmethod

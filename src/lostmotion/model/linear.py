@@ -8,7 +8,7 @@ slide.
 import math
 from typing import Annotated, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from .. import _core
 from ..errors import InputError
@@ -18,6 +18,7 @@ from ..reproducible import arctan
 from .angle_torques import AngleCurve, ErrorCurve, ErrorHarmonic, Harmonic
 from .gear import Gear
 from .losses import ConstantEfficiency, MeshEfficiency
+from .notes import NO_NOTE, Note, note_is_about
 from .torsion import Hysteresis, LinearStiffness, Rigid, TorsionCurve, check_segments
 
 STEEL = 7850.0  # [kg/m^3]
@@ -60,8 +61,10 @@ class LinearDrive(described.LinearDriveFields):
     hysteresis: Hysteresis | None = None
     pitch_error: PitchError | None = None
     """e over the angle of the input shaft, at the slide: deflection = input angle/ratio - position - e"""
-    note: str = ""
-    """note for readers of the results"""
+    note: Note = NO_NOTE
+    """for readers of the results: text, or by the key that it is about"""
+
+    _note_is_about_a_key = field_validator("note")(classmethod(note_is_about))
 
     @model_validator(mode="after")
     def _compliance_is_clear(self) -> Self:
@@ -144,7 +147,7 @@ class LinearDrive(described.LinearDriveFields):
             mesh_damping=self.damping,
             hysteresis=self.hysteresis,
             transmission_error=None if self.pitch_error is None else self.pitch_error.gear_error(),
-            note=self.note,
+            note=str(self.note),
         )
 
 

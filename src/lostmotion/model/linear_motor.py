@@ -3,11 +3,12 @@
 import math
 from typing import Self
 
-from pydantic import model_validator
+from pydantic import field_validator, model_validator
 
 from ..inputs import described
 from .angle_torques import PositionHarmonic
 from .motor import ShaftMotor
+from .notes import NO_NOTE, Note, note_is_about
 
 
 class LinearMotorData(described.LinearMotorDataFields):
@@ -19,8 +20,10 @@ class LinearMotorData(described.LinearMotorDataFields):
     (200.0, 600.0)
     """
 
-    note: str = ""
-    """note for readers of the results"""
+    note: Note = NO_NOTE
+    """for readers of the results: text, or by the key that it is about"""
+
+    _note_is_about_a_key = field_validator("note")(classmethod(note_is_about))
 
     @model_validator(mode="after")
     def _is_a_motor(self) -> Self:

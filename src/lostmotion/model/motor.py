@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import model_validator
+from pydantic import field_validator, model_validator
 
 from ..errors import InputError
 from ..inputs import described
@@ -14,6 +14,7 @@ from ..inputs.described import MotorFields, ShaftMotorFields
 from ..inputs.quantities import Number, Positive, Voltage
 from ..reproducible import total
 from ..units.practical import practical
+from .notes import NO_NOTE, Note, note_is_about
 from .synchronous_motor import PhaseValues, Winding
 
 MotorLaw = tuple[tuple[str, Any], ...]
@@ -82,8 +83,10 @@ class Motor(described.MotorDataFields, MotorFields):
     winding: Winding | None = None
     """winding of a synchronous motor, or of one that is modelled as a torque source, for its current and its heat"""
     limits: MotorLimits | None = None
-    note: str = ""
-    """note for readers of the results, such as that the friction is not printed"""
+    note: Note = NO_NOTE
+    """for readers of the results, such as that the friction is not printed: text, or by the key that it is about"""
+
+    _note_is_about_a_key = field_validator("note")(classmethod(note_is_about))
 
     @model_validator(mode="after")
     def _complete(self) -> Self:

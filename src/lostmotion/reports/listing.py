@@ -243,7 +243,7 @@ def record_text(name: str) -> str:
     if isinstance(record, LinearSheet) and (choices := record.open_choices(record.values())):
         beside = " and ".join(f"{key} ({text})" for key, text in choices.items())
         lines.append(f"Beside `from` a scenario gives {beside}.")
-    lines += [f"Note: {record.note}"] if record.note else []
+    lines += [f"Note: {record.note!s}"] if record.note else []
     if table in ("gearbox", "screw") and not missing:
         lines.append(f"Measure it: lostmotion rig {name}")
     else:

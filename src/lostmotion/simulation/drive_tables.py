@@ -129,7 +129,7 @@ class DriveTables(ScenarioTables):
         yield from ("gearbox", "motor", *(f"gearbox.{name}" for name in Conditions.model_fields))
 
     def note(self) -> str:
-        return " ".join(filter(None, [self.gearbox.note, self.motor.note]))
+        return " ".join(filter(None, map(str, (self.gearbox.note, self.motor.note))))
 
     def attributes(self) -> dict[str, float]:
         return {"gear_ratio": self.gearbox.ratio}

@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..inputs.doubts import doubt
 from ..inputs.toml_files import MAX_LEVELS, shallow
 from ..inputs.validation import shortened, shown
-from ..model.notes import forget_stale
+from ..model.notes import Noted
 from ..units.scalars import is_number, plain
 
 
@@ -63,7 +63,8 @@ def set_values(data: dict[str, Any], changes: Iterable[tuple[str, Any]]) -> None
     own = _Copies()
 
     def rank(change: tuple[str, Any]) -> int:
-        return next((n for n, pattern in enumerate(_FIRST) if pattern.fullmatch(change[0])), len(_FIRST))
+        last = len(_FIRST) + (".note" in change[0])  # a note is about the values as they are then
+        return next((n for n, pattern in enumerate(_FIRST) if pattern.fullmatch(change[0])), last)
 
     for key, value in sorted(changes, key=rank):
         if key.count(".") > MAX_LEVELS:
@@ -112,6 +113,7 @@ def _change_what_follows(data: dict[str, Any], key: str, value: Any, given: Sequ
         changed = at_voltage(node, value, [k.removeprefix(f"{where}.") for k in given], where)
     else:
         return
+    Noted(node).keep_true(changed)
     if table:
         data["motors"] = own.of(data["motors"])
         data["motors"][name] = changed
@@ -145,8 +147,9 @@ def _changed(node: Any, keys: list[str], value: Any, where: str, signals: re.Pat
     if node is not None and not isinstance(node, dict):
         raise InputError(f"{where} is the value {shown(node)}, not a table; it has no {key}", inner)
     fields = own.of(node or {})
-    forget_stale(fields, [key])
+    noted = Noted(fields)
     fields[key] = _changed(fields.get(key), rest, value, inner, signals, own)
+    noted.keep_true(fields)
     return fields
 
 

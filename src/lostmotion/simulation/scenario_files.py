@@ -20,7 +20,7 @@ from ..inputs.toml_text import toml_text, without_empty
 from ..inputs.validation import names_like, shortened, shown
 from ..model.gearbox import Gearbox
 from ..model.linear import RatedScrew, ScrewData
-from ..model.notes import forget_stale
+from ..model.notes import Noted, Notes
 from .axis_form import file_schema
 from .keys import parse_override, set_values
 from .scenario import Scenario
@@ -279,7 +279,6 @@ def units_of_series(place: tuple[str, ...]) -> list[str]:
 def _merge(base: dict[str, Any], changes: dict[str, Any], where: tuple[str, ...] = ()) -> dict[str, Any]:
     """Tables are merged; one of another `kind`, or with a record, takes the place of the old one."""
     merged = dict(base)
-    forget_stale(merged, changes)
     for key, value in changes.items():
         old = base.get(key)
         if not isinstance(value, dict) or not isinstance(old, dict):
@@ -292,6 +291,7 @@ def _merge(base: dict[str, Any], changes: dict[str, Any], where: tuple[str, ...]
             merged[key] = _merge(old, value, (*where, key))
         else:
             merged[key] = value
+    Noted(base).keep_true(merged)
     return merged
 
 
@@ -312,8 +312,8 @@ def gearbox_from_record(reference: str, overrides: Iterable[str] = ()) -> tuple[
     values, built = gearbox_table(reference, changes)
     with prefixed(f"gearbox {reference}"):
         gearbox = Gearbox(**values)
-    told = find(reference, "gearbox").note
-    return gearbox, tuple(note for note in (told, *(built.notes if built else ())) if note and note in gearbox.note)
+    told = Notes(find(reference, "gearbox").note).values()
+    return gearbox, tuple(note for note in (*told, *(built.notes if built else ())) if note in str(gearbox.note))
 
 
 def screw_from_record(reference: str, overrides: Iterable[str] = ()) -> ScrewData:

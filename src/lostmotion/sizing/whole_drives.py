@@ -98,5 +98,5 @@ def force_source(sheet: LinearMotorSheet, data: LinearMotorData, guide_friction:
         winding=winding,
         dc_voltage=None if winding is None else sheet.dc_voltage,
         limits=MotorLimits(**limits),
-        note=sheet.note,
+        note=str(sheet.note),
     )
