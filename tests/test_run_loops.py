@@ -11,6 +11,7 @@ import pytest
 import lostmotion as lm
 from lostmotion.reports.page import render
 from lostmotion.reports.run import run_report, summary, verdict_of
+from lostmotion.reports.run_loops import loop_errors
 from lostmotion.reports.servo import servo_report
 from lostmotion.servo.margins import instability
 from lostmotion.servo.regimes import axis_of, regimes
@@ -56,8 +57,30 @@ def test_a_limit_cycle_of_a_stable_loop_is_a_reservation_however_large() -> None
     assert "does not die out" in verdict.lines[0]
 
 
-def test_a_loop_that_works_gets_no_verdict_of_a_run() -> None:
-    assert verdict_of(lm.simulate(axis({"gain": 1.1, "integral_gain": 45.0}))) is None
+SINE = {"controllers.m.reference": {"kind": "position", "amplitude": 0.1, "frequency": 2.0}}
+DISTURBED = {"shafts.load.torque": {"amplitude": 1.0, "frequency": 3.0}}
+
+
+@pytest.mark.parametrize("changes", [{}, SINE, DISTURBED])
+def test_a_loop_that_works_gets_no_verdict_of_a_run(changes: dict[str, Any]) -> None:
+    """Nor does an error that swings as an input does, which never comes to rest."""
+    scenario = axis({"gain": 1.1, "integral_gain": 45.0}).replace(**changes)
+    result = lm.simulate(scenario)
+    assert verdict_of(result) is None
+    unstable = verdict_of(lm.simulate(axis(SLUGGISH).replace(**changes)))
+    assert unstable is not None
+    assert unstable.state == "does not fit"
+
+
+def test_both_errors_of_a_speed_are_at_the_shaft_of_its_reference() -> None:
+    """The encoder on the motor turns 100 times as fast as the load, whose speed the reference is."""
+    result = lm.simulate(lm.load("speed-axis"))
+    (errors,) = loop_errors(result)
+    assert errors.measured is not None
+    ratio = lm.load("speed-axis").gearbox.ratio
+    read = (result["speed_reference"].values - result["measured_speed"].values) / ratio
+    np.testing.assert_allclose(errors.measured, read, rtol=1e-12)
+    assert np.abs(errors.measured).max() == pytest.approx(np.abs(errors.true).max(), rel=0.2)
 
 
 def test_an_error_that_grows_while_the_reference_moves_on_is_said_to_diverge() -> None:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..control.turning import turns
 from ..errors import InputError
-from ..response.standstill import rises_of
+from ..response.standstill import moving_input, rises_of
 from ..simulation.results import RunArrays
 from ..simulation.scenario import Scenario
 from ..units.practical import practical
@@ -37,14 +38,16 @@ class LoopErrors:
     name: str
     quantity: str
     """position or speed"""
+    shaft: str
+    """shaft of the reference"""
     unit: str
     true: np.ndarray
     """reference less the true value at its shaft"""
     measured: np.ndarray | None
-    """reference less the value that the loop reads; None of a continuous controller, which reads the true value"""
+    """reference less the value that the loop reads, both at the shaft of the reference; None of a continuous controller, which reads
+    the true value"""
     encoder: str
     """shaft with the encoder that is read"""
-    measured_unit: str
     overshoot: float
     """by which the true value leaves the range of its reference"""
     range: float
@@ -61,11 +64,10 @@ class LoopErrors:
     def lines(self) -> Iterator[str]:
         """Lines of a summary."""
         of = f"{self.name.replace('_', ' ')} {self.quantity}".strip()
-        yield f"{of} error, true (reference less load): {_ends(self.true, self.unit)}"
+        yield f"{of} error, true (reference less {self.shaft}): {_ends(self.true, self.unit)}"
         if self.measured is not None:
-            yield (
-                f"{of} error, measured (reference less encoder on {self.encoder}): {_ends(self.measured, self.measured_unit)}"
-            )
+            ends = _ends(self.measured, self.unit)
+            yield f"{of} error, measured (reference less encoder on {self.encoder}): {ends}"
         if self.overshoot > SEEN * self.range:
             beyond = _shown(self.overshoot, self.unit, 4)
             yield f"{of} leaves the range of its reference by {beyond}"
@@ -127,21 +129,28 @@ def _of_axis(result: Any, scenario: Scenario, motor: str) -> LoopErrors | None:
     error = reference - actual
     low, high = min(reference.min(), actual[0]), max(reference.max(), actual[0])
     begin = c.reference.duration if sampled else _last_change(time, reference)
+    begin = max([begin, *(signal.breakpoint_list()[-1][0] for signal in scenario.signals().values())])
     swing, frequency, grows = _swings(time, error, begin, float(high - low))
+    pole = _pole(scenario, motor) if sampled and swing > 0.0 else ""
+    if not grows and not pole and moving_input(scenario):
+        swing = 0.0  # of the input, which never comes to rest
+    measured = np.asarray(result[names[0]]) - np.asarray(result[names[1]]) if sampled else None
+    if measured is not None and kind == "speed":
+        measured = measured / (turns(train, own, shaft) or 1.0)
     return LoopErrors(
         motor if prefix or not sampled else "",
         kind,
+        shaft,
         unit,
         error,
-        np.asarray(result[names[0]]) - np.asarray(result[names[1]]) if sampled else None,
+        measured,
         read,
-        unit if kind == "position" else train.speed_unit(own),
         max(float(actual.max()) - high, low - float(actual.min()), 0.0),
         float(high - low),
         swing,
         frequency,
         grows,
-        _pole(scenario, motor) if sampled and swing > 0.0 else "",
+        pole,
     )
 
 
