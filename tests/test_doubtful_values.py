@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 import lostmotion as lm
 from conftest import ROOT, lostmotion
 from lostmotion.cli import app
-from lostmotion.inputs.doubts import LARGEST, ValueWarning
+from lostmotion.inputs.doubts import LARGEST, ValueWarning, doubt_all
 
 JOINT = "catalogue-robot-joint"
 
@@ -23,9 +23,17 @@ def test_a_gap_of_3_is_said_to_be_172_degrees() -> None:
         lambda: lm.load(JOINT, {"gearbox.added_backlash": 3}),
         lambda: lm.load(JOINT, ["gearbox.added_backlash=3"]),
         lambda: lm.gearbox("schaeffler-rt1-h-20-100", added_backlash=3),
+        lambda: lm.load(JOINT).replace(**{"gearbox.stiffness.backlash": 3}),
     ):
-        with pytest.warns(ValueWarning, match=r'added_backlash: 3 is read as 3 rad \(172 deg\).*"3 arcmin"'):
+        with pytest.warns(ValueWarning, match=r'backlash: 3 is read as 3 rad \(172 deg\).*"3 arcmin"'):
             call()
+
+
+def test_the_gap_of_a_slide_is_in_metres() -> None:
+    """20, meant in micrometres."""
+    for table in ("axis.screw", "screws.left", "racks.a"):
+        with pytest.warns(ValueWarning, match=rf'key {table}.backlash: 20 is read as 20 m; .*"20 um"'):
+            doubt_all({f"{table}.backlash": 20}, "file")
 
 
 @pytest.mark.parametrize("gap", ["3 arcmin", "6 deg", 1e-3, math.radians(4.9)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import warnings
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -19,17 +20,23 @@ class Usual(NamedTuple):
 
 
 GAP = Usual(math.radians(5.0), "rad", "arcmin")
+GAP_OF_SLIDE = Usual(5e-3, "m", "um")
+OF_SLIDE = re.compile(r"(axis\.(screw|rack|belt)|(screws|racks|belts)\.[^.]+)\.backlash")
 SPEED = Usual(1e5 * math.pi / 30.0, "rad/s", "rpm")
+INPUT_SPEED = Usual(4e4 * math.pi / 30.0, "rad/s", "rpm")
+PITCH = Usual(0.5, "m", "mm")
 TICK = Usual(1.0, "s", "us")
 LARGEST: dict[str, Usual] = {
     **dict.fromkeys(("backlash", "added_backlash", "hysteresis_loss", "max_lost_motion", "settling_window"), GAP),
     **dict.fromkeys(("max_tracking_error", "max_reversal_error"), GAP),
-    **dict.fromkeys(("rated_speed", "max_speed", "no_load_speed", "max_input_speed", "rated_input_speed"), SPEED),
+    **dict.fromkeys(("rated_speed", "max_speed", "no_load_speed"), SPEED),
+    **dict.fromkeys(("max_input_speed", "rated_input_speed"), INPUT_SPEED),
+    **dict.fromkeys(("lead", "pitch", "module", "grating_period"), PITCH),
     **dict.fromkeys(("sample_time", "electrical_time_constant"), TICK),
     "rotor_inertia": Usual(10.0, "kg*m^2", "kg*cm^2"),
     "ambient_temperature": Usual(150.0, "degC", "K"),
 }
-"""by key; gaps and errors of slides are in m, of which 0.09 is as much too large"""
+"""by key; gaps and errors of a task may be those of a slide in m, of which 0.09 is as much too large"""
 
 
 class ValueWarning(UserWarning):
@@ -48,7 +55,7 @@ def doubt(key: str, value: Any, where: object = "") -> None:
     where
         File or function that the warning begins with.
     """
-    usual = LARGEST.get(key.rpartition(".")[2])
+    usual = GAP_OF_SLIDE if OF_SLIDE.fullmatch(key) else LARGEST.get(key.rpartition(".")[2])
     if usual is None or not is_number(value) or not abs(value) > usual.most:
         return
     begin = f"{where}: key {key}" if where else key

@@ -19,6 +19,7 @@ from ..control.turning import turns
 from ..data_sheets.components import use_records
 from ..data_sheets.train_components import use_train_records
 from ..errors import InputError
+from ..inputs.doubts import doubt_all
 from ..inputs.kept import kept, kept_while_used
 from ..inputs.named import Named
 from ..inputs.validation import did_you_mean, shown
@@ -256,6 +257,7 @@ class Scenario:
 
     def replace(self, **changes: Any) -> Self:
         """The same scenario with changes by dotted key, such as ``**{"load.inertia": 0.1}``, checked anew."""
+        doubt_all(changes, "replace")
         data = self.written.model_dump()
         set_values(data, changes.items())
         return type(self)(**data)
