@@ -335,7 +335,7 @@ def test_the_drive_check_takes_a_train_and_says_how_it_lowers():
     judged = {f.what: f.verdict for f in belt}
     assert judged["strain_wave: output torque, largest"] == judged["servo: motor torque, rms"] == "ok"
     assert judged["belt: output torque, largest"] == "unknown"
-    assert judged["holding without power"] == "ok"  # no load acts at rest
+    assert judged["holding with command 0"] == "ok"  # no load acts at rest
 
 
 def test_explain_says_that_a_gearbox_locks():

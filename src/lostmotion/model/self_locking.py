@@ -277,7 +277,7 @@ def _growth(names: list[str], rate: np.ndarray) -> tuple[list[complex], float]:
     limit = ROUNDING * float(abs(values).max(initial=0.0))
     growing = [complex(v.real, v.imag if abs(v.imag) > limit else 0.0) for v in values if v.real > limit]
     speeds = [k for k, name in enumerate(names) if name.endswith("_speed")]
-    twists = [k for k, name in enumerate(names) if name.endswith(("_twist", "_deflection"))]
+    twists = [k for k, name in enumerate(names) if name.endswith(("twist", "_deflection"))]
     # w' = a d, d' = b w: the squares of the rates are the eigenvalues of b a.
     squares = np.linalg.eigvals(rate[np.ix_(twists, speeds)] @ rate[np.ix_(speeds, twists)]).astype(complex)
     fastest = float(abs(squares).max(initial=0.0))

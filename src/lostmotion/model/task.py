@@ -4,8 +4,8 @@ from ..inputs import described
 from .duty import Amplifier, Bus, HoldingBrake
 
 
-class TrainTask(described.TrainTaskFields):
-    """Cycle and surroundings of a drive train. No run depends on them; the drive check compares with them."""
+class Task(described.TaskFields, described.TrainTaskFields):
+    """Cycle, surroundings and requirements of a drive. No run depends on them; the drive check compares with them."""
 
     supply: Bus | None = None
     """DC bus that feeds all motors, and takes what they return"""
@@ -13,7 +13,3 @@ class TrainTask(described.TrainTaskFields):
     """amplifier that feeds the motor, also as the name of a record; for one motor"""
     brake: HoldingBrake | None = None
     """holding brake on the motor, also as the name of a record, or "of the motor"; or on the slide, with a force"""
-
-
-class Task(described.TaskFields, TrainTask):
-    """Requirements of a drive. No run depends on them; the drive check compares with them."""

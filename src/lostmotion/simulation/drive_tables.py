@@ -20,7 +20,7 @@ from ..model.gearbox import Gearbox, Transmission
 from ..model.load import Load
 from ..model.motor import Motor
 from ..model.signals import CommandSignal, TorqueSignal
-from ..model.task import Task, TrainTask
+from ..model.task import Task
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
 from .tables import BASE, RECORD_NAME, ScenarioTables, SimulationTable, Whole, check_on_reference, with_accessories
@@ -100,7 +100,7 @@ class DriveTables(ScenarioTables):
             command=Named({MOTOR: self.command} if self.controller is None else {}),
             controllers=Named({} if self.controller is None else {MOTOR: self.controller}),
             initial=self.initial.of_train(),
-            task=TrainTask.like(self.task),
+            task=self.task,
             simulation=self.simulation,
         )
 

@@ -262,7 +262,7 @@ def _verdicts(train: DriveTrain, named: dict[str, float]) -> Iterator[SelfLockin
     if train.fixed_gears() != train.gears:
         return
     for name, gear in train.gears.items():
-        load = named.get(train.load_torque_of(gear.output), 0.0)
-        torque = load or abs(named[train.output_torque_of(name)]) or gear.rated_output_torque
+        carried = abs(named[train.output_torque_of(name)])
+        torque = named.get(train.load_torque_of(gear.output), carried) or gear.rated_output_torque
         if torque and (verdict := self_locking(train, name, torque)).notable:
             yield verdict

@@ -12,7 +12,6 @@ from ..model.gearbox import Gearbox
 from ..model.motor import Motor
 from ..model.shaft import Shaft
 from ..model.signals import TorqueSignal
-from ..model.task import Task
 from ..model.train import DriveTrain, TrainElements
 from .drive_tables import GEARBOX, LOAD, MOTOR, DriveTables, Initial, LoadTable
 from .scenario import Scenario
@@ -72,7 +71,7 @@ def as_drive(scenario: Scenario, function: str) -> Scenario:
                 hysteresis_capacity=tables.initial.hysteresis_capacities.get(gear_name, 0.0),
                 on_reference=tables.initial.on_reference,
             ),
-            task=Task.like(tables.task),
+            task=tables.task,
             simulation=tables.simulation,
             **changes,
         )

@@ -29,11 +29,9 @@ RECORD_NAME = {"type": "string", "description": "name of a record of the catalog
 def with_accessories(schema: dict[str, Any]) -> dict[str, Any]:
     """A JSON Schema in which brake and amplifier of a task may name a record."""
     from_record = {"type": "object", "properties": {"from": RECORD_NAME}, "required": ["from"]}
-    for task in ("Task", "TrainTask"):
-        properties = schema["$defs"].get(task, {}).get("properties", {})
-        for key in ACCESSORIES:
-            if key in properties:
-                properties[key]["anyOf"] += [RECORD_NAME, from_record]
+    properties = schema["$defs"]["Task"]["properties"]
+    for key in ACCESSORIES:
+        properties[key]["anyOf"] += [RECORD_NAME, from_record]
     return schema
 
 

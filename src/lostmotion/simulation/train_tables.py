@@ -24,7 +24,7 @@ from ..model.motor import MotorLaw
 from ..model.shaft import Shaft
 from ..model.signals import CommandSignal, ForceSignal, Signal
 from ..model.slide import Slide
-from ..model.task import TrainTask
+from ..model.task import Task
 from ..model.train import DriveTrain
 from .given_motion import MotionDerivative
 from .linear_units import in_si
@@ -87,7 +87,7 @@ class TrainTables(ScenarioTables, LinearElements):
     controllers: Elements[AnyController] = Field(default_factory=nothing)
     """controllers of motors, which then have no command"""
     initial: TrainInitial = TrainInitial()
-    task: TrainTask = TrainTask()
+    task: Task = Task()
     simulation: SimulationTable
 
     @model_validator(mode="before")

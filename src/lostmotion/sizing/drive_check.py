@@ -7,23 +7,28 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..control.turning import turns
 from ..inputs.arguments import checked
+from ..model.linear import RatedScrew
+from ..model.losses import LossMap
+from ..simulation.needs import need_no_impacts
 from ..simulation.results import RunArrays
 from ..simulation.run import run
 from ..simulation.scenario import Scenario
-from .axis_rules import brake_of_a_run
+from .axis_rules import HOUR, AxialLoad, missing, screw_life, screw_rules
 from .duty_cycle import MIN_REST, STANDSTILL, DutyCycle, duty_cycle
 from .finding import Finding, Findings
-from .gearbox_check import input_speeds, loads, locks, loss_map, lost_motion
-from .motion_check import dead_zone, holdings, inertia, load_torques, resonance, resonances
+from .gearbox_check import input_speeds, loads, locks, loss_map
+from .motion_check import resonances
 from .motor_check import command_of_run, current, heat, largest_speed, peak_torque, voltage
 from .motor_run import oriented_amplitudes
+from .one_axis import OneAxis, axis_rules
+from .power_off import holdings
 from .supply import amplifier_of_a_run, bus_findings, power_in_run
-from .train_check import check_train
 
 POINTS = 40  # samples to a period of the fastest resonance, so that no peak is missed
 SAMPLES = (2_000, 200_000)  # the fewest of a run, and the most at the finest interval
-ON_BUS = 20_000  # the fewest where the energy of braking is summed, since the power jumps with the torque
+ON_BUS = 20_000  # the fewest where the energy of braking is summed, since the power jumps with the torque, or resonances are not known
 
 MEANS = ("average_output_torque", "average_input_speed", "motor_torque", "winding_temperature")
 
@@ -34,7 +39,7 @@ def check_drive(scenario: Scenario) -> Findings:
 
     The scenario is run. Loads, speeds, voltage, current and heat are those of that run, over the duty cycle of `task.cycle`, or with
     the motion repeated without a pause. Limits are `gearbox.limits` and `motor.limits` (records of the catalogue include theirs) and
-    those of `task`. Rules without a limit are reported as unknown, and so are those that are not judged in a train.
+    those of `task`. Rules without a limit are reported as unknown, and so are those that this train gives no answer to, with the reason.
 
     Parameters
     ----------
@@ -65,46 +70,127 @@ def check_drive(scenario: Scenario) -> Findings:
 
 
 def _findings(scenario: Scenario) -> list[Finding]:
-    if not scenario.is_drive:
-        return list(check_train(scenario))
-    result = _finely_sampled(scenario)
-    cycle = duty_cycle(result, scenario.task.cycle)
-    g, m, task = scenario.gearbox, scenario.motor, scenario.task
-    command, torque, speed = (result[name] for name in ("command", "motor_torque", "motor_speed"))
-    command = command_of_run(m, scenario.controller, command, torque, speed)
-    oriented = oriented_amplitudes(result, "motor")
-    findings = [
-        *loads(g, float(abs(result["output_torque"]).max()), cycle),
-        *input_speeds(g, cycle),
-        largest_speed(m, float(abs(speed).max())),
-        *peak_torque(m, torque),
-        *heat(m, cycle, task.ambient_temperature),
-        voltage(m, command, torque, speed, oriented=None if oriented is None else oriented[1]),
-        current(m, torque),
-        inertia(scenario),
-        *resonance(m, g, scenario.load.inertia, scenario.command),
-        dead_zone(scenario, result),
-        lost_motion(g, task.max_lost_motion),
-        *holdings(scenario, result),
-        *locks(scenario.drive().train(), "gearbox", load_torques(result) or [g.rated_output_torque]),
-    ]
-    powers = {"motor": power_in_run(m, result, command, "motor_torque", "motor_speed", "motor")}
-    findings += bus_findings(result, powers, task.supply, task.cycle)
-    findings += _accessories(scenario, result, torque, speed)
-    if g.losses.kind == "map":
+    need_no_impacts(scenario, "drive check")
+    axis, train = OneAxis.of(scenario), scenario.train()
+    result = _finely_sampled(scenario, axis)
+    several = max(len(train.gears), len(train.motors)) > 1
+    findings: list[Finding] = []
+    powers: dict[str, np.ndarray] = {}
+    for name in train.gears:
+        findings += _named(name if several else "", _gear(scenario, name, result))
+    for name, screw in scenario.screws.items():
+        findings += _named(name if several else "", _screw(scenario, name, screw, result))
+    for name in train.motors:
+        judged, powers[scenario.key_in_file(scenario.motor_key(name))] = _motor(scenario, name, result)
+        findings += _named(name if several else "", judged)
+    findings += axis_rules(scenario, axis, result)
+    findings += holdings(scenario, result)
+    findings += bus_findings(result, powers, scenario.task.supply, scenario.task.cycle)
+    findings += _amplifier(scenario, result)
+    if any(isinstance(gear.losses, LossMap) for gear in train.gears.values()):
         findings.append(loss_map(result))
-    return [_with_sinking(f, result, cycle) if f.rule in MEANS else f for f in findings]
+    return findings
 
 
-def _accessories(scenario: Scenario, result: RunArrays, torque: np.ndarray, speed: np.ndarray) -> list[Finding]:
-    """The rules of the holding brake and of the amplifier, where the task has them."""
-    task, found = scenario.task, list[Finding]()
-    if task.brake is not None:
-        loads = load_torques(result)
-        found.append(brake_of_a_run(task.brake, max(map(abs, loads), default=0.0) / abs(scenario.gearbox.ratio)))
-    if task.amplifier is not None:
-        found += amplifier_of_a_run(result, scenario.motor, torque, speed, task)
-    return found
+def _named(name: str, findings: list[Finding]) -> list[Finding]:
+    return [replace(f, what=f"{name}: {f.what}") for f in findings] if name else findings
+
+
+def _amplifier(scenario: Scenario, result: RunArrays) -> list[Finding]:
+    """The rules of the amplifier of the one motor; not judged of several motors."""
+    train = scenario.train()
+    if scenario.task.amplifier is None:
+        return []
+    if len(train.motors) != 1:
+        remark = f"one amplifier feeds one motor, and this train has {len(train.motors)}; check each axis on its own"
+        return [Finding("amplifier_current", "amplifier", "not judged", "unknown", remark)]
+    ((name, motor),) = train.motors.items()
+    torque, speed = result[train.motor_torque_of(name)], result[f"{motor.shaft}_speed"]
+    where = scenario.key_in_file(scenario.motor_key(name))
+    return amplifier_of_a_run(result, motor, torque, speed, scenario.task, where)
+
+
+def _gear(scenario: Scenario, name: str, result: RunArrays) -> list[Finding]:
+    train = scenario.train()
+    gear, where = train.gears[name], scenario.key_in_file(scenario.gear_key(name))
+    torque = train.output_torque_of(name)
+    cycle = duty_cycle(
+        result,
+        scenario.task.cycle,
+        speed=f"{gear.input}_speed",
+        motor_torque=train.input_torque_of(name),
+        output_torque=torque,
+    )
+    peak = float(abs(result[torque]).max())
+    findings = _force(scenario.kind_of(name), peak) if train.is_slide(gear.output) else loads(gear, peak, cycle, where)
+    if gear.rated_input_speed is not None or gear.limits is not None:
+        findings += input_speeds(gear, cycle, where)
+    if train.fixed_gears() == train.gears:  # else what its load drives has no verdict
+        findings += locks(train, name, _load_torques(scenario, name, result))
+    return [_with_sinking(scenario, f, result, cycle) if f.rule in MEANS else f for f in findings]
+
+
+def _force(kind: str, peak: float) -> list[Finding]:
+    """Largest force of a rack or a belt, whose ratings no table holds. A screw has rules of its own."""
+    remark = f"a {kind} has no rated force here; compare with its data sheet"
+    what = "output force, largest"
+    return [] if kind == "screw" else [Finding("peak_output_torque", what, f"{peak:.4g} N", "unknown", remark)]
+
+
+def _screw(scenario: Scenario, name: str, screw: RatedScrew, result: RunArrays) -> list[Finding]:
+    """Life, static load, buckling, bending speed and ball speed of a screw, over the run, repeated without a pause."""
+    train, time = scenario.train(), result.time
+    force, speed = result[train.output_torque_of(name)], result[f"{train.gears[name].output}_speed"]
+    load = AxialLoad(time, speed, force, scenario.task.cycle or float(time[-1] - time[0]))
+    life = screw_life(load, screw)
+    where = scenario.key_in_file(f"screws.{name}")
+    findings = screw_rules(load, screw, None, key=where)
+    if life is None:
+        return [missing("screw_life", "life of the screw, L10h", f"{where}.dynamic_capacity"), *findings]
+    value = "without end" if math.isinf(life) else f"{life / HOUR:.4g} h"
+    remark = "no wanted life is given; a task has task.life"
+    return [Finding("screw_life", "life of the screw, L10h", value, "unknown", remark), *findings]
+
+
+def _load_torques(scenario: Scenario, name: str, result: RunArrays) -> list[float]:
+    """The largest and the least load torque at the output of a gear, from the shafts behind it through their ratios [N·m]; its
+    rated torque where there are none."""
+    train = scenario.train()
+    gear, share = train.gears[name], 1.0
+    shaft, found = gear.output, list[float]()
+    while not found:
+        if shaft in scenario.loads():
+            torque = result[train.load_torque_of(shaft)]
+            found = [share * t for t in sorted({float(torque.max()), float(torque.min())} - {0.0})]
+        behind = next((g for g in train.gears.values() if g.input == shaft), None)
+        if behind is None:
+            break
+        shaft, share = behind.output, share / behind.ratio
+    if found or gear.rated_output_torque is None:
+        return found
+    return [gear.rated_output_torque]
+
+
+def _motor(scenario: Scenario, name: str, result: RunArrays) -> tuple[list[Finding], np.ndarray]:
+    """Findings, and the power that it takes [W]."""
+    train = scenario.train()
+    motor, key = train.motors[name], scenario.motor_key(name)
+    where = scenario.key_in_file(key)
+    torque, speed = train.motor_torque_of(name), f"{motor.shaft}_speed"
+    cycle = duty_cycle(result, scenario.task.cycle, speed=speed, motor_torque=torque, output_torque=torque)
+    command, T, w = (result[key] for key in (train.command_of(name), torque, speed))
+    command = command_of_run(motor, scenario.controllers.get(name), command, T, w)
+    oriented = oriented_amplitudes(result, key)
+    slides = train.is_slide(motor.shaft)
+    findings = [
+        largest_speed(motor, float(abs(w).max()), where, slides=slides),
+        *peak_torque(motor, T, where, slides=slides),
+        *heat(motor, cycle, scenario.task.ambient_temperature, where, slides=slides),
+        voltage(motor, command, T, w, where, oriented=None if oriented is None else oriented[1]),
+        current(motor, T, where),
+    ]
+    findings = [_with_sinking(scenario, f, result, cycle) if f.rule in MEANS else f for f in findings]
+    return findings, power_in_run(motor, result, command, torque, speed, key)
 
 
 def _over_estimates(scenario: Scenario, findings: list[Finding]) -> list[Finding]:
@@ -137,13 +223,13 @@ def _known_losses(scenario: Scenario, end: int) -> Scenario:
     return scenario.with_gears(known) if known else scenario
 
 
-def _with_sinking(finding: Finding, result: RunArrays, cycle: DutyCycle) -> Finding:
+def _with_sinking(scenario: Scenario, finding: Finding, result: RunArrays, cycle: DutyCycle) -> Finding:
     """A mean, with what the load does to it where it drives the motor with command 0.
 
     If such a motion has not ended at the end of the run, the mean depends on the duration. It is not judged then,
     unless `task.cycle` states that all of the run repeats. Elsewhere it is a part of the cycle, and is told.
     """
-    sinking, at_end = _sinking(result)
+    sinking, at_end = _sinking(scenario, result)
     shortest = MIN_REST * cycle.duration
     if sinking <= shortest:
         return finding
@@ -155,25 +241,33 @@ def _with_sinking(finding: Finding, result: RunArrays, cycle: DutyCycle) -> Find
     return finding.noted(told)
 
 
-def _sinking(result: RunArrays) -> tuple[float, float]:
-    """Time [s] in which the load torque drives the turning motor with command 0: of the whole run, and after the last command."""
-    time, command = result["time"], result["command"]
-    speed = result["motor_speed"]
-    driven = result["load_torque"] * speed < 0.0
-    sinks = (command == 0.0) & (abs(speed) > STANDSTILL * abs(speed).max()) & driven
+def _sinking(scenario: Scenario, result: RunArrays) -> tuple[float, float]:
+    """Time [s] in which loads drive the turning motors with commands of 0: of the whole run, and after the last command."""
+    train, time = scenario.train(), result.time
+    command = np.sum([abs(result[train.command_of(name)]) for name in train.motors], axis=0)
+    speed = np.sum([abs(result[train.speed_of(motor.shaft)]) for motor in train.motors.values()], axis=0)
+    if not train.motors or not scenario.loads():
+        return 0.0, 0.0
+    first = next(iter(train.motors.values())).shaft
+    power = np.zeros_like(time)
+    for shaft in scenario.loads():
+        ratio = turns(train, shaft, first) if len(train.motors) == 1 else None
+        turned = result[train.speed_of(shaft)] if ratio is None else ratio * result[train.speed_of(first)]
+        power += result[train.load_torque_of(shaft)] * turned
+    sinks = (command == 0.0) & (speed > STANDSTILL * speed.max()) & (power < 0.0)
     lasting = np.diff(time) * (sinks[1:] & sinks[:-1])
     commanded = np.flatnonzero(command)
     last = int(commanded[-1]) if len(commanded) else 0
     return float(lasting.sum()), float(lasting[last:].sum())
 
 
-def _finely_sampled(scenario: Scenario) -> RunArrays:
+def _finely_sampled(scenario: Scenario, axis: OneAxis | str) -> RunArrays:
     """The run with samples so close that no peak is missed; of a very long one only the beginning, since long ones end in rest."""
     table = scenario.simulation
-    parts = scenario.motor, scenario.gearbox, scenario.load.inertia
     excited = [f for signal in scenario.signals().values() for _, f, _ in signal.sine_list()]
-    fastest = max((*excited, *(f for _, f, _ in resonances(*parts))), default=0.0)
-    fewest = SAMPLES[0] if scenario.task.supply is None else ON_BUS
+    swings = () if isinstance(axis, str) else resonances(scenario.train().motors[axis.motor], axis.whole, axis.load)
+    fastest = max((*excited, *(f for _, f, _ in swings)), default=0.0)
+    fewest = ON_BUS if scenario.task.supply is not None or isinstance(axis, str) else SAMPLES[0]
     fine = min(table.sample_interval, table.duration / fewest, 1.0 / (POINTS * fastest) if fastest else math.inf)
     if table.duration <= fine * SAMPLES[1]:
         return run(scenario.with_inputs(sample_interval=fine), energy=False)

@@ -1,34 +1,17 @@
-"""The check of the motion of a drive: inertia ratio, resonance, dead zone, holding."""
+"""The check of the motion of a drive: inertia ratio, resonance."""
 
 from __future__ import annotations
 
 import math
 
-from .. import _core
 from ..model.gearbox import Gearbox
 from ..model.motor import Motor
 from ..model.signals import CommandSignal
 from ..model.torsion import Rigid
-from ..simulation.explanation import smallest_commands
-from ..simulation.results import RunArrays
-from ..simulation.scenario import Scenario
-from ..test_rig.rig import TestRig
 from .finding import Finding, Judgement
-from .holding import holding
 
 INERTIA_RATIO = 10.0  # beyond it a load is usually called hard to control
 NEAR_RESONANCE = 1.5  # a command within this factor of a resonance excites it
-
-
-def load_torques(result: RunArrays) -> list[float]:
-    """The largest and the least load torque of a run, but not 0 [N·m]."""
-    torque = result["load_torque"]
-    return sorted({float(torque.max()), float(torque.min())} - {0.0})
-
-
-def inertia(scenario: Scenario) -> Finding:
-    """Inertia of the load relative to the inertia of the rotor."""
-    return inertia_ratio(scenario.motor, scenario.gearbox, scenario.load.inertia)
 
 
 def ratio_of_inertias(motor: Motor, gearbox: Gearbox, load_inertia: float) -> float:
@@ -94,62 +77,3 @@ def resonance(motor: Motor, g: Gearbox, load_inertia: float, command: CommandSig
         verdict: Judgement = "caution" if near else "ok"
         out.append(Finding("resonance", f"resonance on the {name} segment", value, verdict, remark))
     return out
-
-
-def dead_zone(scenario: Scenario, result: RunArrays) -> Finding:
-    """The commands that move the load from rest."""
-    forward, backward = smallest_commands(scenario, {"load_torque": float(result["load_torque"][0])})
-    peak = float(abs(result["command"]).max())
-    value = f"the load moves above a command of {forward:.4g} and below {backward:.4g}"
-    moves = bool((result["motor_speed"] != 0.0).any())
-    if peak == 0.0:
-        return Finding("dead_zone", "dead zone", value, "ok", "the command is 0 throughout")
-    if peak <= min(forward, -backward) and not moves:
-        remark = f"the command never exceeds {peak:.4g}: the load does not move"
-        return Finding("dead_zone", "dead zone", value, "warning", remark)
-    small = peak < 3.0 * max(forward, -backward)
-    remark = f"a large part of the command, which reaches {peak:.4g}" if small else ""
-    return Finding("dead_zone", "dead zone", value, "caution" if small else "ok", remark)
-
-
-def holdings(scenario: Scenario, result: RunArrays) -> list[Finding]:
-    """Whether the drive bears the load torques of the run with command 0."""
-    loads = load_torques(result)
-    if not loads:
-        return [
-            Finding("holding", "holding with command 0", "no load torque acts", "ok", _static_holding(scenario.gearbox))
-        ]
-    return [_held(scenario, load, float(abs(result["load_speed"]).max())) for load in loads]
-
-
-def _held(scenario: Scenario, load_torque: float, speed: float) -> Finding:
-    what = f"holding {load_torque:.4g} N·m with command 0"
-    try:
-        found = holding(scenario, load_torque, speed)
-    except _core.SolverError as error:
-        return Finding("holding", what, "cannot be determined", "unknown", str(error))
-    if found.holds:
-        value = f"the load stays at rest, and comes to rest if the power fails at {abs(found.begin):.3g} rad/s"
-        return Finding("holding", what, value, "ok")
-    if found.from_rest != 0.0:
-        value = f"the load torque drives the load {_at(found.from_rest)}"
-    else:
-        value = f"at rest only: if the power fails at {abs(found.begin):.3g} rad/s, the load goes on {_at(found.from_motion)}"
-    if scenario.task.brake is not None:
-        return Finding("holding", what, value, "ok", "the brake holds the load")
-    if not scenario.task.hold_without_power:
-        return Finding("holding", what, value, "ok", "not required by the task")
-    remedy = "it needs a brake, task.brake, or a motor under control, task.hold_without_power = false"
-    return Finding("holding", what, value, "warning", f"{remedy}; {_static_holding(scenario.gearbox)}")
-
-
-def _at(speed: float) -> str:
-    return f"at {speed:.3g} rad/s" if math.isfinite(speed) else "ever faster"
-
-
-def _static_holding(g: Gearbox) -> str:
-    """Torque that the gearbox alone holds at rest."""
-    back = TestRig(g).backdriving_torque() if g.losses.kind == "map" and not isinstance(g.stiffness, Rigid) else 0.0
-    if back is None:
-        return "the gearbox alone holds more than three times rated torque at rest"
-    return f"the gearbox alone holds {back:.4g} N·m at rest"

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..model.duty import Amplifier, Bus
 from ..model.motor import Motor
-from ..model.task import TrainTask
+from ..model.task import Task
 from ..simulation.results import RunArrays
 from .axis_rules import missing
 from .duty_cycle import integral
@@ -181,7 +181,7 @@ def amplifier_rules(
 
 
 def amplifier_of_a_run(
-    result: RunArrays, motor: Motor, torque: np.ndarray, speed: np.ndarray, task: TrainTask, where: str = "motor"
+    result: RunArrays, motor: Motor, torque: np.ndarray, speed: np.ndarray, task: Task, where: str = "motor"
 ) -> list[Finding]:
     """The rules of an amplifier for a run, over the cycle of the task, or repeated without a pause."""
     assert task.amplifier is not None

@@ -5,22 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
-from ..control.turning import turns
 from ..model.gearbox import Gearbox
 from ..model.losses import ConstantEfficiency
+from ..simulation.explanation import smallest_commands
 from ..simulation.results import RunArrays
 from ..simulation.scenario import Scenario
-from .axis_rules import SLIDE_BRAKE, brake_of_a_run, held_by
 from .finding import Finding
 from .gearbox_check import lost_motion
 from .motion_check import inertia_ratio, resonance
 from .stages import DIRECT, together
-
-NOT_JUDGED = ("inertia_ratio", "resonance", "lost_motion")
-"""rules that need one motor and one load"""
-HOLDING = "holding without power"
 
 
 @dataclass(frozen=True)
@@ -81,62 +74,62 @@ def _gearbox(gear: Any) -> Gearbox:
     return Gearbox(**{**own, **known, **lossless})
 
 
-def axis_rules(scenario: Scenario, result: RunArrays) -> list[Finding]:
-    """Ratio of inertias, resonance, lost motion, holding and the brake of a train.
-
-    A train that is more than one axis has the physical reason with what is not judged.
-    """
-    found = OneAxis.of(scenario)
-    if isinstance(found, str):
-        findings = [_not_judged(rule, found) for rule in NOT_JUDGED]
+def axis_rules(scenario: Scenario, axis: OneAxis | str, result: RunArrays) -> list[Finding]:
+    """Ratio of inertias, resonance, dead zone and lost motion of a train that is one axis; of another the reason why not."""
+    if isinstance(axis, str):
+        found = [not_judged(rule, axis) for rule in ("inertia_ratio", "resonance", "lost_motion")]
     else:
-        motor = scenario.train().motors[found.motor]
-        command = scenario.command.get(found.motor)
-        findings = [
-            inertia_ratio(motor, found.whole, found.load),
-            *resonance(motor, found.whole, found.load, command),
-            replace(
-                lost_motion(found.whole, None, slides=found.slides), remark="the task of a train has no limit for it"
-            )
-            if found.rated
-            else _not_judged("lost_motion", "the gear has no rated_output_torque"),
+        motor = scenario.train().motors[axis.motor]
+        found = [
+            inertia_ratio(motor, axis.whole, axis.load),
+            *resonance(motor, axis.whole, axis.load, scenario.tables.command.get(axis.motor)),
+            _lost_motion(axis, scenario.task.max_lost_motion),
         ]
-    controlled = "the command comes from a controller" if scenario.axes() else "it is judged in the short form alone"
-    return [*findings, _not_judged("dead_zone", controlled), *_held(scenario, result)]
+    return [*found, dead_zone(scenario, result)]
 
 
-def _not_judged(rule: str, why: str) -> Finding:
-    return Finding(rule, rule.replace("_", " "), "not judged of this train", "unknown", why)
+def not_judged(rule: str, why: str) -> Finding:
+    """A rule that a train gives no answer to."""
+    return Finding(rule, rule.replace("_", " "), "not judged", "unknown", why)
 
 
-def _held(scenario: Scenario, result: RunArrays) -> list[Finding]:
-    """The brake against the loads of the run without friction, and whether it is what holds them without power."""
-    brake, train = scenario.task.brake, scenario.train()
-    asked = ["holding", *([] if brake is None else ["holding_brake"])]
-    loads = {shaft: result[train.load_torque_of(shaft)] for shaft in scenario.loads()}
-    shares = {s: turns(train, s, m.shaft) for m in train.motors.values() for s in loads}
-    if len(train.motors) != 1 or None in shares.values() or train.fixed_gears() != train.gears:
-        why = "the share of each motor in the loads follows from the motion; judge each axis apart"
-        return [_not_judged(rule, why) for rule in asked]
-    if scenario.gravity or scenario.springs or scenario.angle_torques:
-        return [_not_judged(rule, "a load that depends on the angle acts beside the load of the run") for rule in asked]
-    (motor,) = train.motors.values()
-    need = _largest([(shares[shaft] or 0.0) * torque for shaft, torque in loads.items()])
-    nothing = Finding("holding", HOLDING, "no load acts", "ok")
-    if brake is None:
-        return [
-            nothing
-            if need == 0.0
-            else _not_judged("holding", f"the load takes {need:.4g} N·m at the motor; give task.brake")
-        ]
-    if brake.force is None and not train.is_slide(motor.shaft):
-        found = brake_of_a_run(brake, need)
-    else:
-        force = _largest([torque for shaft, torque in loads.items() if train.is_slide(shaft)])
-        found = held_by(brake.force, SLIDE_BRAKE, force, "N", "force")
-    return [nothing if need == 0.0 else Finding("holding", HOLDING, "by the brake", found.verdict), found]
+def _lost_motion(axis: OneAxis, limit: float | None) -> Finding:
+    if not axis.rated:
+        return not_judged("lost_motion", "the gear has no rated_output_torque")
+    if axis.slides and limit is not None:
+        return not_judged("lost_motion", "task.max_lost_motion is an angle, and that of a slide is a length")
+    found = lost_motion(axis.whole, limit, slides=axis.slides)
+    return replace(found, remark="there is no limit for that of a slide") if axis.slides else found
 
 
-def _largest(torques: list[np.ndarray]) -> float:
-    """Largest magnitude of a sum over time."""
-    return float(np.abs(np.sum(torques, axis=0)).max()) if torques else 0.0
+def depends_on_angles(scenario: Scenario) -> bool:
+    """Whether torques act that depend on the angles of shafts."""
+    return bool(scenario.gravity or scenario.springs or scenario.angle_torques)
+
+
+def dead_zone(scenario: Scenario, result: RunArrays) -> Finding:
+    """The commands that move the load from rest."""
+    train = scenario.train()
+    if len(train.motors) != 1:
+        return not_judged("dead_zone", f"{len(train.motors)} motors turn the train; judge each axis apart")
+    if given := scenario.given():
+        return not_judged("dead_zone", f"{scenario.key_in_file(scenario.given_key(given[0]))} gives a motion")
+    if depends_on_angles(scenario):
+        return not_judged("dead_zone", "a load that depends on the angle acts")
+    if scenario.continuous():
+        return not_judged("dead_zone", "a continuous controller turns the motor, which sees the smallest error")
+    ((name, motor),) = train.motors.items()
+    inputs = scenario.core(sampled=False).input_names()
+    others = {n: float(result[n][0]) for n in inputs if n != train.command_of(name)}
+    forward, backward = smallest_commands(scenario, others)
+    peak = float(abs(result[train.command_of(name)]).max())
+    value = f"the load moves above a command of {forward:.4g} and below {backward:.4g}"
+    moves = bool((result[train.speed_of(motor.shaft)] != 0.0).any())
+    if peak == 0.0:
+        return Finding("dead_zone", "dead zone", value, "ok", "the command is 0 throughout")
+    if peak <= min(forward, -backward) and not moves:
+        remark = f"the command never exceeds {peak:.4g}: the load does not move"
+        return Finding("dead_zone", "dead zone", value, "warning", remark)
+    small = peak < 3.0 * max(forward, -backward)
+    remark = f"a large part of the command, which reaches {peak:.4g}" if small else ""
+    return Finding("dead_zone", "dead zone", value, "caution" if small else "ok", remark)
