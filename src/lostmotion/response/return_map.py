@@ -95,9 +95,10 @@ class Flow:
     def between(self, rows: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Least and largest values of an output, or of several, between each instant and the next."""
         low, high = self.values(rows, times)
-        bend = np.exp(np.outer(times[:-1], self.of.slip_rates.real)) @ (
-            np.abs(rows) * np.abs(self.of.slip_rates) ** 2 * self.size
-        ).T
+        bend = (
+            np.exp(np.outer(times[:-1], self.of.slip_rates.real))
+            @ (np.abs(rows) * np.abs(self.of.slip_rates) ** 2 * self.size).T
+        )
         off = 0.125 * np.diff(times) ** 2 * bend.T
         return np.minimum(low[..., :-1], low[..., 1:]) - off, np.maximum(high[..., :-1], high[..., 1:]) + off
 

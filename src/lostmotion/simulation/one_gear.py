@@ -45,7 +45,7 @@ def as_drive(scenario: Scenario, function: str) -> Scenario:
     train, tables = scenario.train(), scenario.tables
     ((name, motor),), ((gear_name, gear),) = train.motors.items(), train.gears.items()
     names = {gear.input: MOTOR, gear.output: LOAD}
-    rotor = motor.rotor_inertia + train.shafts[gear.input].inertia
+    inertia = gear.inertia + train.shafts[gear.input].inertia  # of all but the rotor, which has its own limits
     load = train.shafts[gear.output]
     controller: Any = tables.controllers.get(name)
     changes: dict[str, Any] = {"command": tables.command.get(name)} if name in tables.command else {}
@@ -54,8 +54,8 @@ def as_drive(scenario: Scenario, function: str) -> Scenario:
     return Scenario.of(
         DriveTables(
             title=tables.title,
-            motor=Motor.like(motor, rotor_inertia=rotor),
-            gearbox=Gearbox(**{key: getattr(gear, key) for key in Gearbox.model_fields}),
+            motor=Motor.like(motor),
+            gearbox=Gearbox(**{key: getattr(gear, key) for key in Gearbox.model_fields} | {"inertia": inertia}),
             load=LoadTable(
                 inertia=load.inertia,
                 viscous_friction=load.viscous_friction,

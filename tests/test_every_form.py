@@ -1,0 +1,143 @@
+"""Public functions take every scenario, in each form in which it can be written, or refuse it for a physical reason."""
+
+from __future__ import annotations
+
+import random
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lostmotion as lm
+from test_random_axes import random_axis
+
+LARGE = ("conveyor-start", "gantry-two-screws", "thruster-in-ice")  # which only take longer
+NAMES_A_FORM = re.compile(
+    r"\[shafts\]|\[axis\]|short form|long form|is a (drive )?train|are for (drives|trains)|must be a Drive|give an Initial",
+    re.I,
+)
+HINGE = '<mujoco><worldbody><body><joint name="j" axis="0 0 1"/><geom type="box" size=".1 .2 .3" mass="1"/></body></worldbody></mujoco>'
+
+
+def inertias(scenario: lm.Scenario) -> Iterator[str]:
+    yield from (f"shafts.{name}.inertia" for name, shaft in scenario.shafts.items() if shaft.inertia > 0.0)
+    yield from (f"slides.{name}.mass" for name, slide in scenario.slides.items() if slide.mass > 0.0)
+    yield from (f"mass_matrices.{name}.matrix.0.0" for name in scenario.mass_matrices)
+
+
+def stepped(scenario: lm.Scenario, _: Path) -> None:
+    simulation = lm.Simulation(scenario)
+    simulation.reset(lm.TrainInitial() if scenario.given() else lm.Initial())
+
+
+def stepped_together(scenario: lm.Scenario, _: Path) -> None:
+    lm.SimulationBatch(scenario, step=1e-3, count=2).step(0.1)
+
+
+def studied(scenario: lm.Scenario, path: Path) -> None:
+    vary = {"key": next(inertias(scenario)), "relative": True, "values": [1.0, 1.01]}
+    what = lm.studies.Study(
+        scenario=scenario,
+        vary=[vary],
+        keep={"largest": f"peak({scenario.variables()[0].name})"},
+        select={"drive_check": True},
+    )
+    lm.study(what, path / "study", threads=1)
+
+
+def attached(scenario: lm.Scenario, path: Path) -> None:
+    (path / "model.xml").write_text(HINGE)
+    lm.mujoco.attach(path / "model.xml", {"j": scenario}, replace=True)
+
+
+FUNCTIONS: dict[str, Callable[[lm.Scenario, Path], Any]] = {
+    "simulate": lambda s, _: lm.simulate(s),
+    "sensitivities": lambda s, _: lm.simulate(s, sensitivities=[next(inertias(s))]),
+    "Simulation": stepped,
+    "SimulationBatch": stepped_together,
+    "explain": lambda s, _: lm.explain(s, time=0.0),
+    "linearize": lambda s, _: lm.linearize(s, lm.TrainInitial()),
+    "linearize at rest": lambda s, _: lm.linearize(s, lm.Initial()),
+    "linearize at a time": lambda s, _: lm.linearize(s, time=0.0),
+    "periodic_motion": lambda s, _: lm.periodic_motion(s, max_periods=5),
+    "spectrum": lambda s, _: lm.spectrum(s),
+    "check_drive": lambda s, _: lm.check_drive(s),
+    "tune": lambda s, _: lm.tune(s),
+    "study": studied,
+    "attach": attached,
+    "write_drive": lambda s, path: lm.mujoco.write_drive(s, path / "x.drive"),
+    "rigid_constants": lambda s, _: lm.response.rigid_constants(s),
+}
+
+
+def refusals(scenario: lm.Scenario, path: Path) -> list[str]:
+    """What the functions say that refuse a scenario by its form."""
+    found = []
+    for name, function in FUNCTIONS.items():
+        (path / name).mkdir()
+        try:
+            function(scenario, path / name)
+        except (lm.InputError, lm.SolverError, RuntimeError) as refusal:
+            if NAMES_A_FORM.search(str(refusal)):
+                found.append(f"{name}: {refusal}")
+    return found
+
+
+def brief(name: str) -> lm.Scenario:
+    scenario = lm.load(name)
+    duration = min(scenario.simulation.duration, 0.01)
+    times = {"simulation.duration": duration, "simulation.sample_interval": 0.1 * duration}
+    return scenario.replace(**times, task={})
+
+
+@pytest.mark.parametrize("name", [name for name in lm.shipped_scenarios() if name not in LARGE])
+def test_no_function_refuses_a_shipped_scenario_by_its_form(name: str, tmp_path: Path) -> None:
+    (tmp_path / "own").mkdir()
+    scenario = brief(name)
+    assert refusals(scenario, tmp_path / "own") == []
+    if (long := scenario.long()) != scenario:
+        (tmp_path / "long").mkdir()
+        assert refusals(long, tmp_path / "long") == []
+        own, other = lm.simulate(scenario), lm.simulate(long)
+        for shaft in ("motor", "load"):
+            assert np.array_equal(own[f"{shaft}_speed"], other[f"{shaft}_speed"])
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_no_function_refuses_a_random_axis_by_its_form(seed: int, tmp_path: Path) -> None:
+    scenario = random_axis(seed)
+    times = {"simulation.duration": 0.01, "simulation.sample_interval": 0.001}
+    assert refusals(scenario.replace(**times), tmp_path) == []
+
+
+def random_gear(seed: int) -> dict[str, Any]:
+    """A motor that turns a load through one gear, with names of its own."""
+    r = random.Random(f"gear {seed}")
+    gear: dict[str, Any] = {"input": "a", "output": "b", "ratio": r.uniform(2.0, 100.0) * r.choice([1.0, -1.0])}
+    gear |= {"rated_input_speed": 300.0, "rated_output_torque": 50.0}
+    if r.random() < 0.7:
+        gear["stiffness"] = {"kind": "curve", "backlash": r.choice([0.0, 1e-3]), "slopes": [1e4], "breaks": []}
+    gear["losses"] = {"kind": "constant_efficiency", "efficiency": r.uniform(0.6, 1.0)}
+    return {
+        "shafts": {"a": {"inertia": r.choice([0.0, 1e-5])}, "b": {"inertia": r.uniform(0.1, 2.0), "torque": {"mean": r.uniform(-5.0, 5.0)}}},
+        "motors": {"m": {"shaft": "a", "kind": "torque_source", "rotor_inertia": 1e-4, "rated_torque": 1.0, "friction_torque": r.choice([0.0, 0.02])}},
+        "gears": {"g": gear},
+        "command": {"m": {"amplitude": r.uniform(0.2, 1.0), "frequency": 20.0}},
+        "simulation": {"duration": 0.05, "sample_interval": 0.005},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_train_of_one_gear_moves_to_the_last_bit_as_the_drive_that_it_is(seed: int, tmp_path: Path) -> None:
+    from lostmotion.simulation.one_gear import as_drive
+
+    scenario = lm.Scenario(**random_gear(seed))
+    assert refusals(scenario, tmp_path) == []
+    drive, train = lm.simulate(as_drive(scenario, "test")), lm.simulate(scenario)
+    assert np.array_equal(drive["load_speed"], train["b_speed"])
+    assert np.array_equal(drive["twist"], train["g_twist"])
+    short, long = lm.check_drive(as_drive(scenario, "test")), lm.check_drive(scenario)
+    assert [(f.rule, f.verdict) for f in short] == [(f.rule, f.verdict) for f in long]
