@@ -7,16 +7,18 @@ from typing import Any
 import pytest
 
 import lostmotion as lm
+from conftest import ROOT
 from lostmotion.control.references import PositionReference
 from lostmotion.studies.axis import reference_of
 from lostmotion.studies.axis_rows import Axes
+from lostmotion.studies.check import UNSTABLE
 from lostmotion.studies.engine import study
 from lostmotion.studies.nearest import least_factor, misses, not_judged, slowed
 from lostmotion.studies.records import names_that_fit
 from lostmotion.studies.selection import candidates, prices
 from lostmotion.studies.study import Study
 from lostmotion.studies.table import read_table
-from lostmotion.studies.task_file import task_of
+from lostmotion.studies.task_file import load_task, task_of
 from test_axis_tasks import ARM, GEARBOX, MOTOR
 
 EXCESS = 0.44
@@ -117,6 +119,20 @@ def test_records_without_data_are_listed_apart(tmp_path: Path):
 def test_illustrative_records_are_no_candidates_unless_asked_for():
     assert "paper-gearbox" not in names_that_fit("gearbox", {"ratio": [85.0, 95.0]})
     assert names_that_fit("gearbox", {"name": "paper-*"}) == ["paper-gearbox"]
+
+
+def test_a_loop_by_rule_that_is_unstable_is_the_reason_before_the_limits_that_its_swing_exceeds(tmp_path: Path):
+    """Both gears of the press feed have the same load; the swing of the stiffer one is that of its loop, not of its task."""
+    feed = load_task(ROOT / "examples" / "tasks" / "press-feed.toml")
+    motors = {**feed.vary[1].model_dump(), "values": ["yaskawa-sgmsh-10aa"]}
+    feed = feed.model_copy(update={"vary": (feed.vary[0], type(feed.vary[1])(**motors))})
+    rows = read_table(study(feed, tmp_path / "rows"))
+    for candidate in candidates(rows, feed):
+        axis = feed.axis_at(feed.parameters(candidate.run, candidate.run + 1)[0], 2)
+        assert lm.commission(axis).stable != candidate.why.startswith(UNSTABLE)
+        assert candidate.fits != candidate.open
+    (miss,) = misses(feed, candidates(rows, feed), 1)
+    assert str(miss).startswith(f"{UNSTABLE}, with average_output_torque")
 
 
 def test_a_candidate_whose_run_violates_a_limit_is_run_in_slower_cycles(tmp_path: Path):

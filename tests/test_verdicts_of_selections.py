@@ -1,9 +1,12 @@
 """The verdict of a selection: a fit, a reservation, no fit, or not decided, and what each says first."""
 
+from dataclasses import replace
+
 import pytest
 
 from lostmotion.reports.study_selection import _verdict
-from lostmotion.studies.axis_rows import HOLDS, NO_DATA
+from lostmotion.studies.axis_rows import HOLDS
+from lostmotion.studies.check import NO_DATA, UNSTABLE
 from lostmotion.studies.select import Selection
 from lostmotion.studies.selection import NOT_RUN, Candidate, prices
 from lostmotion.verdict import Verdict
@@ -54,8 +57,8 @@ def test_no_pair_that_fits_does_not_fit() -> None:
     assert (found.state, found.exit_code, found.lines[0]) == ("does not fit", 1, "0 of 2 candidates fit")
 
 
-@pytest.mark.parametrize("why", [NO_DATA, NOT_RUN])
+@pytest.mark.parametrize("why", [NO_DATA, NOT_RUN, UNSTABLE])
 def test_no_pair_that_fits_is_not_decided_while_one_cannot_be_judged(why: str) -> None:
-    found = verdict(candidate(0, "current"), candidate(1, why))
+    found = verdict(candidate(0, "current"), replace(candidate(1, why), why=why))
     assert (found.state, found.exit_code) == ("not decided", 3)
     assert found.lines[0] == "0 of 2 candidates fit, 1 cannot be judged"

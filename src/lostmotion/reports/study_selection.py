@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..studies.axis_rows import HOLDS, NO_DATA
-from ..studies.check import ESTIMATED
+from ..studies.axis_rows import HOLDS
+from ..studies.check import ESTIMATED, NO_DATA
 from ..studies.choice import CHOICE
 from ..studies.nearest import Lacking, Miss, misses, not_judged, rules_not_judged
 from ..studies.select import TASK_SHARES, USE, Selection
@@ -107,7 +107,7 @@ def _verdict(
     count = (
         f"{len(fitting)} of {counted(len(ranked), 'candidate')} {'fits' if 1 in (len(fitting), len(ranked)) else 'fit'}"
     )
-    open_ones = sum(bool({NO_DATA, NOT_RUN} & set(c.violated)) for c in ranked)
+    open_ones = sum(c.open for c in ranked)
     count += f", {open_ones} cannot be judged" if open_ones else ""
     lines, points = list[str](), list[Point]()
     objective, direction = next(iter(select.objectives.items()))

@@ -14,6 +14,8 @@ from ..errors import InputError, Problem
 from ..model.gearbox import Gearbox
 from ..model.linear import RatedScrew
 from ..model.motor import Motor
+from ..servo.margins import unstable_pole
+from ..servo.regimes import axis_of
 from ..sizing.axis_rules import (
     derated,
     emergency_stop,
@@ -47,15 +49,12 @@ from ..worker_threads import thread_pool
 from .axis import AxisTask, reference_of
 from .axis_columns import COLUMNS, Repeated, columns_of_gearbox, row_of
 from .axis_run import until_it_repeats
-from .check import BETWEEN, ESTIMATED, MISSING, columns_of
+from .check import BETWEEN, ESTIMATED, MISSING, NO_DATA, UNSTABLE, columns_of
 from .check import TASK_COLUMNS as CHECKS
 from .choice import CHOICE, lacks, value_of
 from .choice import judged as judged_choice
 from .runs import Runs
 from .study import Study
-
-NO_DATA = "data"
-"""stands among the violated rules of a pair whose record lacks what a run needs"""
 
 HOLDS = "holds from the least to the largest losses of its kind"
 """verdict on a gearbox with estimated losses that none of them turns"""
@@ -371,7 +370,10 @@ class Axes:
         made = until_it_repeats(self.study, row)
         columns = row_of(made, slides=self.study.slides_itself(row))
         found = self._after_run(row, made, columns["winding_temperature"])
-        return columns_of(found, CHECKS) | columns | self._without_run(row), int(made.result.attrs["switching_count"])
+        whole = columns_of(found, CHECKS) | columns | self._without_run(row)
+        if self.over(whole) and (pole := unstable_pole(axis_of(made.scenario))):
+            whole["why"] = "; ".join(filter(None, [f"{UNSTABLE}: {pole}", str(whole["why"])]))
+        return whole, int(made.result.attrs["switching_count"])
 
     def _after_run(self, row: np.ndarray, made: Repeated, winding: float) -> list[Finding]:
         """The same rules, of the cycle that was run, and the temperature of its winding [°C]; those that only the required motion

@@ -13,7 +13,8 @@ from ..control.references import PositionReference
 from ..errors import InputError
 from ..units.practical import excess, told_apart
 from .axis import AxisTask, reference_of
-from .axis_rows import NO_DATA, Axes
+from .axis_rows import Axes
+from .check import NO_DATA, UNSTABLE
 from .choice import CHOICE
 from .selection import WINDOW, Candidate
 from .study import Study
@@ -47,6 +48,8 @@ class Miss:
 
     def __str__(self) -> str:
         short = ", ".join(f"{name} {excess(x)} over its limit" for name, x in self.lacks.items())
+        if short and self.candidate.why.startswith(UNSTABLE):
+            short = f"{UNSTABLE}, with {short}"
         return f"{short or self.candidate.why}{'; ' if self.then else ''}{self.then}"
 
 
@@ -212,9 +215,10 @@ def _said(study: Study, slower: Study, row: np.ndarray, factor: float) -> str:
     slow, now = told_apart(after.cycle, before.cycle)
     times = f"the cycle takes {slow} s instead of {now} s{what}"
     axes = Axes(slower)
-    over = axes.over(axes.measured(row)[0])
-    if over:
-        return f"keeps the rules if {times}, but its run then violates {', '.join(over)}"
+    measured = axes.measured(row)[0]
+    if over := axes.over(measured):
+        unstable = f"{UNSTABLE}, and " if str(measured["why"]).startswith(UNSTABLE) else ""
+        return f"keeps the rules if {times}, but {unstable}its run then violates {', '.join(over)}"
     return f"{FITS} {times}"
 
 

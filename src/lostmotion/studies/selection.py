@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..units.practical import practical, share_of_limit, told_apart
-from .check import BETWEEN, ESTIMATED, MISSING
+from .check import BETWEEN, ESTIMATED, MISSING, NO_DATA, UNSTABLE
 from .choice import CHOICE
 from .records import shown_name
 from .select import TASK_SHARES, USE, Selection
@@ -56,6 +56,11 @@ class Candidate:
     def fits(self) -> bool:
         """Whether it keeps all limits."""
         return not self.violated
+
+    @property
+    def open(self) -> bool:
+        """Whether it cannot be judged: data are missing, its run has failed, or its loop with gains by rule is unstable."""
+        return NOT_RUN in self.violated or NO_DATA in self.violated or self.why.startswith(UNSTABLE)
 
 
 @dataclass(frozen=True)
