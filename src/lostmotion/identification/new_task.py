@@ -367,16 +367,25 @@ def _input_lines(inputs: Sequence[_Seen], scenario: Scenario | None) -> list[str
             continue
         name = fits[0] if fits else f"MOTOR{k + 1 if k else ''}{wanted}"
         lines += [f"[inputs.{name}]", f"channel = {_text(c.name)}", *_about_unit(c)]
-        if name.endswith("_command") and c.quantity in ("A", "V"):
-            what, factor = ("torque", "torque_constant") if c.quantity == "A" else ("voltage", "1/rated_voltage")
-            lines.append(
-                f'# Doubt: it is in {c.quantity}, and a command is a multiple of the rated {what}; give scale = "...", such as {factor}'
-            )
+        lines += _scale_lines(name, c.quantity, scenario)
         if len(fits) > 1:
             lines.append(_comment(f"Doubt: it may act as {listed(fits[1:])} just as well"))
         lines.append("")
         free = [other for other in free if other != name]
     return lines
+
+
+def _scale_lines(name: str, quantity: str, scenario: Scenario | None) -> list[str]:
+    """Factor from a channel to a command, which is a multiple of the rated torque or voltage."""
+    if not name.endswith("_command") or quantity not in ("N*m", "N", "A", "V"):
+        return []
+    motor = None if scenario is None else scenario.train().motors.get(name.removesuffix("_command"))
+    if quantity in ("N*m", "N") and (motor is None or motor.kind == "torque_source"):
+        rated = 1.0 if motor is None else motor.rated_torque
+        return [] if rated == 1.0 else [f"scale = {1.0 / rated!r}  # a command is a multiple of {rated:g} {quantity}"]
+    what, factor = ("voltage", "1/rated_voltage") if quantity == "V" else ("torque", "torque_constant")
+    text = f"it is in {quantity}, and a command is a multiple of the rated {what}"
+    return [f'# Doubt: {text}; give scale = "...", such as {factor}']
 
 
 def _signals(scenario: Scenario | None) -> list[str]:

@@ -284,7 +284,7 @@ def _refuse_other_kinds(
             of_rig = "a multiple of the rated torque or voltage" if wanted == "1" else f"in {wanted}"
             raise InputError(
                 f"{table}.{name}: channel {entry.channel} is in {unit}, and {variable} is {of_rig}; give a scale that "
-                f'turns one into the other, such as scale = "torque_constant" of a current',
+                f'turns one into the other, such as 1/rated_torque of a torque, or "torque_constant" of a current',
                 where=log.name,
             )
 
