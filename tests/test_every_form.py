@@ -141,3 +141,37 @@ def test_a_train_of_one_gear_moves_to_the_last_bit_as_the_drive_that_it_is(seed:
     assert np.array_equal(drive["twist"], train["g_twist"])
     short, long = lm.check_drive(as_drive(scenario, "test")), lm.check_drive(scenario)
     assert [(f.rule, f.verdict) for f in short] == [(f.rule, f.verdict) for f in long]
+
+
+@pytest.mark.parametrize(
+    ("name", "own", "long"),
+    [
+        ("ball-screw-axis", "axis.slide.mass", "slides.slide.mass"),
+        ("ball-screw-axis", "axis.screw.lead", "screws.screw.lead"),
+        ("ball-screw-axis", "controller.position.gain", "controllers.motor.position.gain"),
+        ("catalogue-robot-joint", "load.inertia", "shafts.load.inertia"),
+        ("catalogue-robot-joint", "command.amplitude", "command.motor.amplitude"),
+        ("position-axis", "controller.speed.gain", "controllers.motor.speed.gain"),
+    ],
+)
+def test_a_key_of_the_file_and_that_of_the_long_form_are_one(name: str, own: str, long: str) -> None:
+    scenario = lm.load(name).replace(**{"simulation.duration": 0.01, "simulation.sample_interval": 0.001})
+    value = 1.25 * lm.simulation.sensitivities.value_at(scenario, own)
+    changed = scenario.replace(**{own: value})
+    assert changed == scenario.replace(**{long: value}) != scenario
+    assert lm.load(name, {own: value}).written == lm.load(name, {long: value}).written
+    one, other = (lm.simulate(scenario, sensitivities=[key]) for key in (own, long))
+    for variable in one:
+        assert np.array_equal(one[variable], other[variable], equal_nan=True)
+    for key in (own, long):
+        vary = {"key": key, "values": [value]}
+        study = lm.studies.Study(scenario=scenario, vary=[vary], keep={"x": f"peak({scenario.variables()[0].name})"})
+        assert study.scenario_at(study.parameters(0, 1)[0]) == changed
+        assert study.vary[0].title == key
+
+
+def test_a_changed_axis_speaks_of_the_keys_of_its_file() -> None:
+    changed = lm.load("ball-screw-axis").replace(**{"axis.slide.mass": 21.0})
+    with pytest.raises(lm.InputError) as refusal:
+        changed.replace(**{"slides.slide.mass": -1.0})
+    assert [problem.keys for problem in refusal.value.problems] == [("axis.slide.mass",)]

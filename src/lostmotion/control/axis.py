@@ -213,15 +213,12 @@ class _Place:
 def core_control(
     train: DriveTrain,
     controllers: Mapping[str, Controller],
-    key: str = "controllers.{}.",
     laws: Mapping[str, Law] = NO_LAWS,
 ) -> Bound:
     """The controllers of the motors of a train.
 
     Parameters
     ----------
-    key
-        Of the table of one controller in a scenario file, for messages.
     laws
         Of controllers with ``law = true``.
 
@@ -236,7 +233,7 @@ def core_control(
     axes = []
     for name, controller in controllers.items():
         place = _Place(train, name, controller)
-        with inside(key.format(name).removesuffix(".")):
+        with inside(f"controllers.{name}"):
             samples = whole_multiple(controller.sample_time, base, "sample_time")
             axis = place.axis(samples)
             if name in laws:

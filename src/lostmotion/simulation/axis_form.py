@@ -9,23 +9,11 @@ from typing import Any
 
 from ..errors import InputError
 from ..inputs.validation import did_you_mean, shown
+from .aliases import DRIVES, GEARBOX, MOTOR, SLIDE
 from .drive_tables import drive_schema
 from .tables import RECORD_NAME
 from .train_tables import train_schema
 
-DRIVES = {"screw": "screws", "rack": "racks", "belt": "belts"}
-MOTOR, SLIDE, GEARBOX = "motor", "slide", "gearbox"  # names in the long form; the drive is called after its kind
-# Keys of the long form that such a scenario is checked by, and those of its file.
-KEYS = {
-    **{f"{long}.{short}": f"axis.{short}" for short, long in DRIVES.items()},
-    **{f"shafts.{short}": f"axis.{short}" for short in DRIVES},
-    f"controllers.{MOTOR}": "controller",
-    f"command.{MOTOR}": "command",
-    f"motors.{MOTOR}": "axis.motor",
-    f"gears.{GEARBOX}.gearbox": "axis.gearbox.from",
-    f"gears.{GEARBOX}": "axis.gearbox",
-    f"slides.{SLIDE}": "axis.slide",
-}
 BESIDE = ("title", "task", "command", "controller", "initial", "simulation")
 
 

@@ -7,18 +7,10 @@ from typing import Any
 
 from ..control.continuous import ContinuousController
 from ..errors import InputError
-from .drive_tables import GEARBOX, LOAD, MOTOR, DriveTables
+from .aliases import GEARBOX, LOAD, MOTOR
+from .drive_tables import DriveTables
 
 GIVEN = ("speed", "motion")
-# Keys of the long form that such a scenario is checked by, and those of its file.
-KEYS = {
-    f"controllers.{MOTOR}": "controller",
-    f"command.{MOTOR}": "command",
-    f"shafts.{LOAD}": LOAD,
-    f"gears.{GEARBOX}": GEARBOX,
-    f"initial.speeds.{LOAD}": "initial.load_speed",
-    f"initial.angles.{LOAD}": "initial.load_angle",
-}
 
 
 def is_short(tables: Mapping[str, Any]) -> bool:

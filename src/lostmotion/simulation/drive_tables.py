@@ -23,11 +23,11 @@ from ..model.signals import CommandSignal, TorqueSignal
 from ..model.task import Task
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
+from .aliases import DRIVE, GEARBOX, LOAD, MOTOR
+from .keys import renamed
 from .tables import BASE, RECORD_NAME, ScenarioTables, SimulationTable, Whole, check_on_reference, with_accessories
 from .train_tables import ShaftTable, TrainInitial, TrainTables
 from .variables import VARIABLES, Variable, add_efficiency
-
-MOTOR, LOAD, GEARBOX = "motor", "load", "gearbox"  # names in the long form
 
 
 class LoadTable(described.LoadTableFields, Load):
@@ -107,17 +107,11 @@ class DriveTables(ScenarioTables):
     def prefix(self, motor: str) -> str:  # noqa: ARG002
         return ""
 
-    def controller_key(self, motor: str) -> str:  # noqa: ARG002
-        return "controller"
-
-    def gear_key(self, name: str) -> str:
-        return name
-
     def gears_by_key(self) -> Mapping[str, Transmission]:
         return {GEARBOX: self.gearbox}
 
-    def motor_key(self, name: str) -> str:
-        return name
+    def own_key(self, key: str) -> str:
+        return renamed(key, DRIVE)
 
     def input_key(self, name: str) -> str:
         return {"load_torque": "load.torque", "reference": "controller.reference"}.get(name, name)

@@ -16,7 +16,7 @@ def need_open_loop(scenario: Scenario, function: str) -> None:
     InputError
     """
     if scenario.axes():
-        table = scenario.controller_key("").partition(".")[0]
+        table = scenario.key_in_file(scenario.controller_key(next(iter(scenario.axes())))).partition(".")[0]
         none = "None" if table == "controller" else "{}"
         has = f"a {table}" if table == "controller" else table
         raise InputError(

@@ -13,7 +13,8 @@ from ..model.motor import Motor
 from ..model.shaft import Shaft
 from ..model.signals import TorqueSignal
 from ..model.train import DriveTrain, TrainElements
-from .drive_tables import GEARBOX, LOAD, MOTOR, DriveTables, Initial, LoadTable
+from .aliases import GEARBOX, LOAD, MOTOR
+from .drive_tables import DriveTables, Initial, LoadTable
 from .scenario import Scenario
 
 OTHERS = tuple(table for table in TrainElements.model_fields if table not in ("motors", "gears"))

@@ -30,6 +30,7 @@ from ..model.motor import Motor
 from ..model.signals import Signal
 from ..model.train import DriveTrain
 from . import axis_form, drive_form
+from .aliases import AXIS, DRIVE, of_axis
 from .drive_tables import DriveTables, Initial, LoadTable, check_drive, of_inputs
 from .keys import renamed, set_values
 from .tables import ScenarioTables, SimulationTable
@@ -92,7 +93,7 @@ class Scenario:
         if nameless:
             raise InputError(f"the scenario takes its values by name, such as title=...; not {shown(nameless[0])}")
         if axis_form.is_axis(tables):
-            written = partial(renamed, names=axis_form.KEYS)
+            written = partial(renamed, names=AXIS)
             with _in_keys(written):
                 self._set(_in_long_form(axis_form.long_form(tables), written), is_axis=True)
         elif is_train(tables):
@@ -103,7 +104,7 @@ class Scenario:
             if drive_form.is_short(data):
                 self._set(DriveTables(**data))
             else:
-                with _in_keys(partial(renamed, names=drive_form.KEYS)):
+                with _in_keys(partial(renamed, names=DRIVE)):
                     self._set(TrainTables(**drive_form.long_form(data)))
 
     def _set(self, written: DriveTables | TrainTables, *, is_axis: bool = False, checked: bool = True) -> None:
@@ -256,11 +257,16 @@ class Scenario:
         return self.of(self.written.unchecked(**tables), is_axis=self.is_axis, checked=False)
 
     def replace(self, **changes: Any) -> Self:
-        """The same scenario with changes by dotted key, such as ``**{"load.inertia": 0.1}``, checked anew."""
+        """The same scenario with changes by dotted key, such as ``**{"load.inertia": 0.1}``, checked anew.
+
+        Keys are those of its file, or of the long form.
+        """
         doubt_all(changes, "replace")
         data = self.written.model_dump()
-        set_values(data, changes.items())
-        return type(self)(**data)
+        set_values(data, [(self.key_of_tables(key), value) for key, value in changes.items()])
+        with _in_keys(self.key_in_file):
+            made = type(self)(**data)
+        return self.of(made.written, is_axis=True, checked=False) if self.is_axis else made
 
     def with_inputs(self, **changes: Any) -> Self:
         """The same scenario with the inputs and times that `simulate` is given; None leaves a value as it is."""
@@ -281,7 +287,11 @@ class Scenario:
 
     def key_in_file(self, key: str) -> str:
         """A dotted key of the long form as the file of the scenario has it."""
-        return renamed(key, axis_form.KEYS) if self.is_axis else key
+        return renamed(key, AXIS) if self.is_axis else self.own_key(key)
+
+    def key_of_tables(self, key: str) -> str:
+        """A dotted key of the file or of the long form as the tables that are kept have it."""
+        return of_axis(key) if self.is_axis else self.own_key(key)
 
     @property
     def is_drive(self) -> bool:
@@ -374,7 +384,8 @@ class Scenario:
         return self._bound(NO_LAWS)
 
     def _bound(self, laws: Mapping[str, Law]) -> Bound:
-        return core_control(self.train(), self.axes(), self.written.controller_key("{}") + ".", laws)
+        with _in_keys(self.written.own_key):
+            return core_control(self.train(), self.axes(), laws)
 
     def signals(self) -> dict[str, Signal[Any]]:
         """All that acts on the train, after delays of brakes and clutches, by the name of its result variable."""

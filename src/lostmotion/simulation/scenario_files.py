@@ -21,6 +21,7 @@ from ..inputs.validation import names_like, shortened, shown
 from ..model.gearbox import Gearbox
 from ..model.linear import RatedScrew, ScrewData
 from ..model.notes import Noted, Notes
+from .aliases import in_file
 from .axis_form import file_schema
 from .keys import parse_override, set_values
 from .scenario import Scenario
@@ -130,7 +131,7 @@ def override(data: dict[str, Any], overrides: Mapping[str, Any] | Iterable[str],
         items: Iterable[tuple[str, Any]] = overrides.items()
     else:
         items = [parse_override(text) for text in overrides]
-    items = list(items)
+    items = [(in_file(key, data), value) for key, value in items]
     with prefixed(path):
         set_values(data, items)
     keys = [key.removesuffix(".mean") for key, _ in items]

@@ -15,7 +15,7 @@ from tomlkit.items import InlineTable
 from ..atomic_writer import write_whole
 from ..errors import InputError
 from ..inputs.toml_files import RESULTS, is_in_file
-from .axis_form import is_axis
+from .aliases import in_file
 from .keys import list_index
 from .scenario import Scenario
 from .scenario_files import CHANGED, find_base, find_scenario, scenario_text
@@ -81,8 +81,7 @@ def changed_text(source: Path, changes: Mapping[str, Any], target: Path, notes: 
     document = tomlkit.parse(source.read_text(encoding="utf-8"))
     new: list[Any] = []
     for key, value in changes.items():
-        in_file = key.replace("controllers.motor.", "controller.", 1) if is_axis(document) else key
-        _set(document, in_file.split("."), value, new, inline)
+        _set(document, in_file(key, document).split("."), value, new, inline)
     for table in new:
         table.add(tomlkit.nl())  # before what follows
     if os.path.abspath(target.parent) != os.path.abspath(source.parent):

@@ -76,7 +76,7 @@ def _is_a_number(value: Any) -> bool:
 def _entry_at(scenario: Scenario, key: str) -> Any:
     """Entry of a scenario under a dotted key, of a signal its mean; None where there is nothing."""
     node: Any = scenario.model_dump()
-    for part in key.split("."):
+    for part in scenario.key_of_tables(key).split("."):
         try:
             node = node[list_index(node, part)] if isinstance(node, list | tuple) else node[part]
         except (KeyError, TypeError, ValueError):
@@ -107,7 +107,7 @@ def neighbours(scenario: Scenario, key: str) -> list[Neighbour]:
 
 def _is_signal(scenario: Scenario, key: str) -> bool:
     node: Any = scenario.model_dump()
-    for part in key.split("."):
+    for part in scenario.key_of_tables(key).split("."):
         node = node.get(part) if isinstance(node, Mapping) else None
     return isinstance(node, Mapping) and "mean" in node
 
@@ -117,7 +117,8 @@ _INPUT = re.compile(r"(command|(load|shafts\.[^.]+)\.torque)(\..*)?")
 
 def core_variation(scenario: Scenario, key: str, beside: Sequence[Neighbour]) -> tuple[str, list[Any]]:
     """A parameter as the core takes it: of its neighbours what may differ from the scenario itself."""
-    of_start, of_inputs = key.startswith("initial."), _INPUT.fullmatch(key) is not None
+    own = scenario.key_of_tables(key)
+    of_start, of_inputs = own.startswith("initial."), _INPUT.fullmatch(own) is not None
     out = []
     for n in beside:
         other = n.scenario

@@ -120,21 +120,25 @@ class ScenarioTables(Part):
         """Prefix of the names of the variables of a motor's controller."""
         raise NotImplementedError
 
+    def own_key(self, key: str) -> str:
+        """A key of the long form as these tables have it."""
+        return key
+
     def controller_key(self, motor: str) -> str:
         """Key of the table of a motor's controller."""
-        raise NotImplementedError
-
-    def gear_key(self, name: str) -> str:
-        """Key of the table of a gear."""
-        raise NotImplementedError
+        return self.own_key(f"controllers.{motor}")
 
     def gears_by_key(self) -> Mapping[str, Transmission]:
         """The gears by the keys of their tables."""
         return {self.gear_key(name): gear for name, gear in self.train().gears.items()}
 
+    def gear_key(self, name: str) -> str:
+        """Key of the table of a gear."""
+        return self.own_key(self.long().key_of("gears", name))
+
     def motor_key(self, name: str) -> str:
         """Key of the table of a motor."""
-        raise NotImplementedError
+        return self.own_key(self.long().key_of("motors", name))
 
     def input_key(self, name: str) -> str:
         """Key of the signal or reference that an input of the core stands for."""

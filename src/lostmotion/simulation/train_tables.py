@@ -171,15 +171,6 @@ class TrainTables(ScenarioTables, LinearElements):
     def prefix(self, motor: str) -> str:
         return f"{motor}_"
 
-    def controller_key(self, motor: str) -> str:
-        return f"controllers.{motor}"
-
-    def gear_key(self, name: str) -> str:
-        return f"{self.kind_of(name)}s.{name}"
-
-    def motor_key(self, name: str) -> str:
-        return f"{'linear_motors' if name in self.linear_motors else 'motors'}.{name}"
-
     def input_key(self, name: str) -> str:
         if name.endswith("_load_force"):
             slide = name.removesuffix("_load_force")

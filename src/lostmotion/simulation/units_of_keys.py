@@ -34,6 +34,7 @@ def unit_in(form: type[ScenarioTables], key: str) -> str | None:
 
 def unit_for(scenario: Scenario, key: str) -> str | None:
     """SI unit of a dotted key of a scenario, where its controllers move slides in units of translation."""
+    key = scenario.key_of_tables(key)
     unit = unit_in(type(scenario.written), key)
     if not unit or not key.startswith("controllers."):
         return unit

@@ -31,7 +31,7 @@ from .expressions import Expression, read_expression
 from .own_keys import COMMON, with_value
 from .records import is_condition, kind_of_record, name_key, names_a_record, owner_of, with_records
 from .select import SHARES, TASK_SHARES, USE, Selection, check_bounds
-from .vary import Vary, base_value, check_key, check_spelling, scaled
+from .vary import Vary, base_value, check_key, check_spelling, scaled, with_keys_of_tables
 from .vocabulary import Vocabulary, vocabulary_of
 
 MAX_RUNS = 100_000_000
@@ -89,7 +89,9 @@ class Study(Part):
             base = Scenario.model_validate(base)
             data = data | {"scenario": base}
         if isinstance(base, Scenario):
-            check_spelling(base, data.get("vary"))
+            vary = with_keys_of_tables(base, data.get("vary"), data.get("axis") is not None)
+            check_spelling(base, vary)
+            data = data | {"vary": vary}
         return data
 
     @model_validator(mode="after")

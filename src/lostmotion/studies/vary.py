@@ -217,6 +217,26 @@ def _may_be_left_out(scenario: Scenario, key: str) -> bool:
     return True
 
 
+def with_keys_of_tables(scenario: Scenario, entries: Any, of_task: bool) -> Any:
+    """Entries of `vary` whose keys are those of the tables of the scenario; columns keep the names that were written."""
+    if of_task or not isinstance(entries, list | tuple):
+        return entries
+    out = []
+    for entry in entries:
+        changed = entry
+        if isinstance(entry, dict):
+            keys = [k for k in (entry.get("key"), *(entry.get("keys") or ())) if isinstance(k, str) and k]
+            found = {key: scenario.key_of_tables(key) for key in keys}
+            if any(key != own for key, own in found.items()):
+                own = {
+                    "key": found.get(entry.get("key") or "", ""),
+                    "keys": [found[k] for k in entry.get("keys") or ()],
+                }
+                changed = {"name": keys[0]} | entry | own
+        out.append(changed)
+    return out
+
+
 def check_spelling(scenario: Scenario, entries: Any) -> None:
     """Sees, before the units of their values are asked for, that the keys of a study are known.
 
