@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "few.hpp"
+#include "numbers.hpp"
 
 namespace lostmotion {
 
@@ -35,7 +36,7 @@ struct Dims {
 // an input is told from it as in any other kernel. The places are so many that no train for which there is memory has
 // more; arrays over them all do not exist.
 struct Any : Dims<1 << 12, 1 << 8, 1 << 12, 1 << 13, 1 << 13, 1 << 12> {
-    using Memory = Few<double, 16>;
+    using Memory = NumbersIn<16>;
 };
 
 // How many a train has: of coupled states as many as whole vectors hold.
@@ -65,38 +66,36 @@ void each_state(const CountsOf<D>& n, Use&& use) {
     for (int j = 0; j < n.angles; ++j) use(D::coupled + j);
 }
 
-// Numbers, or what is copied like them, in an array of n: for trains of any size as many as are set.
+// Flags, counts and the like in an array of n: for trains of any size as many as are set.
 template <class D, class T, int n>
-struct ListIn {
-    using Type = std::array<T, static_cast<std::size_t>(n)>;
-};
-template <class T, int n>
-struct ListIn<Any, T, n> {
-    using Type = Few<T, 4>;
-};
-template <class D, class T, int n>
-using ListOf = typename ListIn<D, T, n>::Type;
-
+using ListOf = std::conditional_t<std::same_as<D, Any>, Few<T, 4>, std::array<T, static_cast<std::size_t>(n)>>;
 // Larger things in an array of n: for trains of any size, as many as there is asked for.
 template <class D, class T, int n>
-struct ArrayIn {
-    using Type = std::array<T, static_cast<std::size_t>(n)>;
-};
-template <class T, int n>
-struct ArrayIn<Any, T, n> {
-    using Type = std::vector<T>;
-};
-template <class D, class T, int n>
-using ArrayOf = typename ArrayIn<D, T, n>::Type;
+using ArrayOf = std::conditional_t<std::same_as<D, Any>, std::vector<T>, std::array<T, static_cast<std::size_t>(n)>>;
 template <class T, std::size_t n>
 void make_room(std::array<T, n>&, int) {}
 template <class T, std::size_t few>
 void make_room(Few<T, few>& array, int count) {
     array.reach(static_cast<std::size_t>(count));
 }
+template <int few>
+void make_room(NumbersIn<few>& array, int count) {
+    array.reach(count);
+}
 template <class T>
 void make_room(std::vector<T>& array, int count) {
     array.resize(static_cast<std::size_t>(count));
+}
+
+// As many zeros.
+template <std::size_t n>
+void clear(std::array<double, n>& numbers, int) {
+    numbers = {};
+}
+template <int few>
+void clear(NumbersIn<few>& numbers, int count) {
+    double* to = numbers.resized((count + 3) / 4 * 4);
+    std::fill_n(to, numbers.size(), 0.0);
 }
 
 // Things by the place of a state.

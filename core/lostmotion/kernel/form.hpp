@@ -7,10 +7,16 @@
 #include <cmath>
 #include <concepts>
 #include <type_traits>
+#include <utility>
+#include <variant>
+#include <vector>
 
-#include "numbers.hpp"
+#include "dims.hpp"
 
 namespace lostmotion {
+
+// Up to so many coupled states, whole matrices cost less than what of them is not zero.
+inline constexpr int few_states = 16;
 
 // A linear expression sum_k c[k] * term[k].
 template <int N>
@@ -41,112 +47,216 @@ struct Form {
     friend Form operator-(Form f) { return f *= -1.0; }
 };
 
-template <class D>
-struct FormIn {
-    using Type = Form<D::terms>;
-};
-template <>
-struct FormIn<Any> {
-    using Type = AnyForm;
-};
-template <class D>
-using LinearFormOf = typename FormIn<D>::Type;
+// A linear expression with few terms, in the order of their places.
+class AnyForm {
+ public:
+    struct Term {
+        int place;
+        double factor;
+    };
+    enum Part { of_coupled, of_angles, of_one, of_memory, of_inputs };
 
+    class Coefficients {
+     public:
+        double operator[](int place) const {
+            const std::size_t at = find(place);
+            return at < terms_.size() && terms_[at].place == place ? terms_[at].factor : 0.0;
+        }
+        double& operator[](int place) {
+            const std::size_t at = find(place);
+            if (at == terms_.size() || terms_[at].place != place) {
+                terms_.insert(terms_.begin() + static_cast<std::ptrdiff_t>(at), {place, 0.0});
+                count(place);
+            }
+            return terms_[at].factor;
+        }
+        // A term whose place is beyond those of all others.
+        void append(int place, double factor) {
+            terms_.push_back({place, factor});
+            count(place);
+        }
+        const std::vector<Term>& terms() const { return terms_; }
+        // The first term of one of the parts and the end of the part.
+        std::pair<const Term*, const Term*> part(Part p) const {
+            const Term* all = terms_.data();
+            return {p == of_coupled ? all : all + end_[p - 1], p == of_inputs ? all + terms_.size() : all + end_[p]};
+        }
+        void scale(double a) {
+            for (Term& t : terms_) t.factor *= a;
+        }
+
+     private:
+        std::size_t find(int place) const {
+            const auto below = [](const Term& t, int p) { return t.place < p; };
+            return static_cast<std::size_t>(std::lower_bound(terms_.begin(), terms_.end(), place, below) -
+                                            terms_.begin());
+        }
+        void count(int place) {
+            constexpr std::array beyond{Any::coupled, Any::states, Any::first_memory, Any::first_input};
+            for (std::size_t p = 0; p < beyond.size(); ++p) end_[p] += place < beyond[p];
+        }
+
+        std::vector<Term> terms_;
+        std::array<int, of_inputs> end_{};  // of each part but the last
+    };
+    Coefficients c;
+
+    AnyForm& operator+=(const AnyForm& o) {
+        for (const Term& t : o.c.terms()) c[t.place] += t.factor;
+        return *this;
+    }
+    AnyForm& operator*=(double a) {
+        c.scale(a);
+        return *this;
+    }
+    friend AnyForm operator*(double a, AnyForm f) { return f *= a; }
+    // Calls use(place, factor) for each term.
+    template <class Use>
+    void each_term(Use&& use) const {
+        for (const Term& t : c.terms()) use(t.place, t.factor);
+    }
+    // Calls use(number, factor) for each term of a part, whose first number is at `first`.
+    template <class Use>
+    [[gnu::always_inline]] void each_of(Part part, int first, Use&& use) const {
+        for (auto [t, end] = c.part(part); t != end; ++t) use(t->place - first, t->factor);
+    }
+    // sum value(place, factor) over the coupled states, in fours.
+    template <class Value>
+    double sum_of_coupled(Value&& value) const {
+        double all = 0.0;
+        for (auto [t, end] = c.part(of_coupled); t != end;) {
+            const int four = t->place / 4;
+            double part[4] = {};
+            for (; t != end && t->place / 4 == four; ++t) part[t->place % 4] = value(t->place, t->factor);
+            all += (part[0] + part[1]) + (part[2] + part[3]);
+        }
+        return all;
+    }
+};
+
+template <class D>
+using LinearFormOf = std::conditional_t<std::same_as<D, Any>, AnyForm, Form<D::terms>>;
 // The coupled states, in registers; then a state, and its coupled part alone, in memory.
 template <class D>
-struct CoupledIn {
-    using Type = Pack<D::coupled>;
-};
-template <>
-struct CoupledIn<Any> {
-    using Type = Numbers;
-};
-template <class D>
-using CoupledOf = typename CoupledIn<D>::Type;
+using CoupledOf = std::conditional_t<std::same_as<D, Any>, Numbers, Pack<D::coupled>>;
 template <class D>
 struct alignas(sizeof(typename CoupledOf<D>::Part)) StateOf : std::array<double, D::states> {};
-template <>
-struct StateOf<Any> {
-    Numbers coupled;
-    Few<double, 4> angle;
-
-    double operator[](int k) const { return k < Any::coupled ? coupled[k] : angle[k - Any::coupled]; }
-    double& operator[](int k) { return k < Any::coupled ? coupled[k] : angle[k - Any::coupled]; }
-    friend bool operator==(const StateOf&, const StateOf&) = default;
-};
 template <class D>
 struct alignas(sizeof(typename CoupledOf<D>::Part)) ColumnOf : std::array<double, D::coupled> {};
 template <>
 struct ColumnOf<Any> : Numbers {
-    ColumnOf() = default;
-    ColumnOf(Numbers numbers) : Numbers(std::move(numbers)) {}
+    using Numbers::Numbers;
+    using Numbers::operator=;
 };
 template <class D>
-using InputsOf = std::conditional_t<std::same_as<D, Any>, Few<double, 8>, std::array<double, D::inputs>>;
+using InputsOf = std::conditional_t<std::same_as<D, Any>, NumbersIn<8>, std::array<double, D::inputs>>;
 template <class D>
-using AnglesOf = std::conditional_t<std::same_as<D, Any>, Few<double, 4>, std::array<double, D::angles>>;
+using AnglesOf = std::conditional_t<std::same_as<D, Any>, NumbersIn<4>, std::array<double, D::angles>>;
 
 // A state in registers.
 template <class D>
-struct LanesOf {
+struct Lanes {
     CoupledOf<D> coupled{};
     AnglesOf<D> angle{};
 
-    [[gnu::always_inline]] static LanesOf load(const StateOf<D>& from) {
-        if constexpr (std::same_as<D, Any>) {
-            return {from.coupled, from.angle};
-        } else {
-            LanesOf x{CoupledOf<D>::load(from.data()), {}};
-            for (int j = 0; j < D::angles; ++j) x.angle[j] = from[D::coupled + j];
-            return x;
-        }
+    [[gnu::always_inline]] static Lanes load(const StateOf<D>& from) {
+        Lanes x{CoupledOf<D>::load(from.data()), {}};
+        for (int j = 0; j < D::angles; ++j) x.angle[j] = from[D::coupled + j];
+        return x;
     }
     [[gnu::always_inline]] void store(StateOf<D>& to) const {
-        if constexpr (std::same_as<D, Any>) {
-            to.coupled = coupled;
-            to.angle = angle;
-        } else {
-            coupled.store(to.data());
-            for (int j = 0; j < D::angles; ++j) to[D::coupled + j] = angle[j];
-        }
+        coupled.store(to.data());
+        for (int j = 0; j < D::angles; ++j) to[D::coupled + j] = angle[j];
     }
-    [[gnu::always_inline]] friend LanesOf operator+(LanesOf a, const LanesOf& b) {
+    [[gnu::always_inline]] friend Lanes operator+(Lanes a, const Lanes& b) {
         a.coupled = a.coupled + b.coupled;
-        for (std::size_t j = 0; j < b.angle.size(); ++j) a.angle[j] += b.angle[j];
+        for (int j = 0; j < D::angles; ++j) a.angle[j] += b.angle[j];
         return a;
     }
-    [[gnu::always_inline]] friend LanesOf operator*(double a, LanesOf b) {
+    [[gnu::always_inline]] friend Lanes operator*(double a, Lanes b) {
         b.coupled = a * b.coupled;
         for (double& angle : b.angle) angle *= a;
         return b;
     }
 };
+// The same of a train of any size, with sums and multiples that are computed where they are assigned.
+template <class C, class A>
+struct LanesIn {
+    C coupled;
+    A angle;
+};
+template <>
+struct StateOf<Any> {
+    Numbers coupled;
+    NumbersIn<4> angle;
+
+    StateOf() = default;
+    template <InFours C, InFours A = NumbersIn<4>>
+    [[gnu::always_inline]] StateOf(const C& c, const A& a = {}) : coupled(c), angle(a) {}
+    template <class C, class A>
+    [[gnu::always_inline]] StateOf(const LanesIn<C, A>& of) : coupled(of.coupled), angle(of.angle) {}
+    template <class C, class A>
+    [[gnu::always_inline]] StateOf& operator=(const LanesIn<C, A>& of) {
+        coupled = of.coupled;
+        angle = of.angle;
+        return *this;
+    }
+    [[gnu::always_inline]] void store(StateOf& to) const { to = *this; }
+    double operator[](int k) const { return k < Any::coupled ? coupled[k] : angle[k - Any::coupled]; }
+    double& operator[](int k) { return k < Any::coupled ? coupled[k] : angle[k - Any::coupled]; }
+    friend bool operator==(const StateOf&, const StateOf&) = default;
+};
 template <class D>
-[[gnu::always_inline]] inline LanesOf<D> load(const StateOf<D>& x) {
-    return LanesOf<D>::load(x);
+using LanesOf = std::conditional_t<std::same_as<D, Any>, StateOf<Any>, Lanes<D>>;
+
+template <class L>
+inline constexpr bool any_lanes = false;
+template <>
+inline constexpr bool any_lanes<StateOf<Any>> = true;
+template <class C, class A>
+inline constexpr bool any_lanes<LanesIn<C, A>> = true;
+template <class C, class A>
+LanesIn(C, A) -> LanesIn<C, A>;
+template <class L, class M>
+    requires any_lanes<L> && any_lanes<M>
+[[gnu::always_inline]] inline auto operator+(const L& a, const M& b) {
+    return LanesIn{a.coupled + b.coupled, a.angle + b.angle};
 }
-template <class D>
-[[gnu::always_inline]] inline CoupledOf<D> load(const ColumnOf<D>& x) {
-    return CoupledOf<D>::load(x.data());
+template <class L>
+    requires any_lanes<L>
+[[gnu::always_inline]] inline auto operator*(double a, const L& b) {
+    return LanesIn{a * b.coupled, a * b.angle};
 }
-inline const Numbers& load(const ColumnOf<Any>& x) { return x; }
+
+// Into registers; a train of any size is left where it is.
 template <class D>
-[[gnu::always_inline]] inline CoupledOf<D> coupled(const StateOf<D>& x) {
-    return CoupledOf<D>::load(x.data());
-}
-inline const Numbers& coupled(const StateOf<Any>& x) { return x.coupled; }
-// The coupled states into memory.
-template <class D>
-[[gnu::always_inline]] inline void store(const CoupledOf<D>& x, ColumnOf<D>& to) {
+[[gnu::always_inline]] inline decltype(auto) load(const StateOf<D>& x) {
     if constexpr (std::same_as<D, Any>)
-        static_cast<Numbers&>(to) = x;
+        return (x);
     else
-        x.store(to.data());
+        return Lanes<D>::load(x);
 }
 template <class D>
-[[gnu::always_inline]] inline void store(const CoupledOf<D>& x, StateOf<D>& to) {
+[[gnu::always_inline]] inline decltype(auto) load(const ColumnOf<D>& x) {
     if constexpr (std::same_as<D, Any>)
+        return static_cast<const Numbers&>(x);
+    else
+        return CoupledOf<D>::load(x.data());
+}
+template <class D>
+[[gnu::always_inline]] inline decltype(auto) coupled(const StateOf<D>& x) {
+    if constexpr (std::same_as<D, Any>)
+        return (x.coupled);
+    else
+        return CoupledOf<D>::load(x.data());
+}
+// The coupled states into memory.
+template <class D, class To>
+[[gnu::always_inline]] inline void store(const auto& x, To& to) {
+    if constexpr (std::same_as<To, StateOf<Any>>)
         to.coupled = x;
+    else if constexpr (std::same_as<D, Any>)
+        to = x;
     else
         x.store(to.data());
 }
@@ -155,9 +265,7 @@ template <class D>
 [[gnu::always_inline]] inline CoupledOf<D> coupled(const LinearFormOf<D>& f) {
     if constexpr (std::same_as<D, Any>) {
         Numbers out;
-        f.each_term([&](int place, double factor) {
-            if (place < Any::coupled) out[place] = factor;
-        });
+        f.each_of(AnyForm::of_coupled, 0, [&](int k, double factor) { out[k] = factor; });
         return out;
     } else {
         return CoupledOf<D>::load(f.c.data());
@@ -165,7 +273,16 @@ template <class D>
 }
 template <class D>
 void add_scaled(StateOf<D>& y, double a, const StateOf<D>& x) {
-    (load(y) + a * load(x)).store(y);
+    const LanesOf<D> sum = load(y) + a * load(x);
+    sum.store(y);
+}
+// Room for all states.
+template <class D>
+void make_room(StateOf<D>& x, [[maybe_unused]] const CountsOf<D>& n) {
+    if constexpr (std::same_as<D, Any>) {
+        x.coupled.reach(n.coupled);
+        x.angle.reach(n.angles);
+    }
 }
 // The same number for all states.
 template <class D>
@@ -205,48 +322,58 @@ struct InstantOf {
     InputsOf<D> input_magnitudes{};  // sums of the magnitudes of the inputs' parts
 };
 
-// Calls use(place, factor) for each term of a form that may be other than zero.
-template <int N, class Use>
-[[gnu::always_inline]] inline void each_term(const Form<N>& f, Use&& use) {
-    for (int k = 0; k < N; ++k) use(k, f.c[k]);
-}
-template <class Use>
-void each_term(const AnyForm& f, Use&& use) {
-    f.each_term(use);
-}
-// Of those that belong to states, or to inputs by their number.
+// Calls use(place, factor) for each term of a form that may be other than zero and belongs to a state; use(number,
+// factor) for those that belong to inputs, or to the memory.
 template <class D, class Use>
 [[gnu::always_inline]] inline void each_state_of(const LinearFormOf<D>& f, Use&& use) {
     if constexpr (std::same_as<D, Any>) {
-        const auto [begin, end] = f.between(0, D::states);
-        for (auto* t = begin; t != end; ++t) use(t->place, t->factor);
+        f.each_of(AnyForm::of_coupled, 0, use);
+        f.each_of(AnyForm::of_angles, 0, use);
     } else {
         for (int k = 0; k < D::states; ++k) use(k, f.c[k]);
     }
 }
 template <class D, class Use>
 [[gnu::always_inline]] inline void each_input_of(const LinearFormOf<D>& f, Use&& use) {
-    if constexpr (std::same_as<D, Any>) {
-        const auto [begin, end] = f.between(D::first_input, D::terms);
-        for (auto* t = begin; t != end; ++t) use(t->place - D::first_input, t->factor);
-    } else {
+    if constexpr (std::same_as<D, Any>)
+        f.each_of(AnyForm::of_inputs, D::first_input, use);
+    else
         for (int i = 0; i < D::inputs; ++i) use(i, f.c[D::first_input + i]);
-    }
 }
 template <class D, class Use>
 [[gnu::always_inline]] inline void each_memory_of(const LinearFormOf<D>& f, Use&& use) {
-    if constexpr (std::same_as<D, Any>) {
-        const auto [begin, end] = f.between(D::first_memory, D::first_input);
-        for (auto* t = begin; t != end; ++t) use(t->place - D::first_memory, t->factor);
-    } else {
+    if constexpr (std::same_as<D, Any>)
+        f.each_of(AnyForm::of_memory, D::first_memory, use);
+    else
         for (int k = 0; k < D::memory; ++k) use(k, f.c[D::first_memory + k]);
+}
+// The coefficient of 1.
+template <class D>
+double constant_of(const LinearFormOf<D>& f) {
+    if constexpr (std::same_as<D, Any>) {
+        const auto [one, end] = f.c.part(AnyForm::of_one);
+        return one == end ? 0.0 : one->factor;
+    } else {
+        return f.c[D::one];
+    }
+}
+// term(0) + term(1) + ... of the coupled states, in pairs and fours.
+template <class D, class Term>
+[[gnu::always_inline]] inline auto sum_of_states([[maybe_unused]] int coupled, Term&& term) {
+    if constexpr (std::same_as<D, Any>) {
+        decltype(term(0)) sum{};
+        for (std::ptrdiff_t k = 0; k < coupled; k += 4)
+            sum = sum + ((term(k) + term(k + 1)) + (term(k + 2) + term(k + 3)));
+        return sum;
+    } else {
+        return sum_in_fours<D::coupled>(term);
     }
 }
 
 // The part of a form that depends on neither state nor inputs: constant within a regime.
 template <class D>
 double constant_part(const LinearFormOf<D>& f, const typename D::Memory& m) {
-    double sum = f.c[D::one];
+    double sum = constant_of<D>(f);
     each_memory_of<D>(f, [&](int k, double factor) ALWAYS_INLINE { sum += factor * m[k]; });
     return sum;
 }
@@ -268,8 +395,7 @@ double input_part(const LinearFormOf<D>& f, const InputsOf<D>& u) {
 template <class D>
 double coupled_part(const LinearFormOf<D>& f, const StateOf<D>& x) {
     if constexpr (std::same_as<D, Any>) {
-        const auto [begin, end] = f.between(0, D::coupled);
-        return AnyForm::sum_of_coupled(begin, end, [&](const auto& t) { return t.factor * x.coupled[t.place]; });
+        return f.sum_of_coupled([&](int k, double factor) { return factor * x.coupled[k]; });
     } else {
         return (CoupledOf<D>::load(f.c.data()) * coupled(x)).sum();
     }
@@ -279,8 +405,7 @@ template <class D>
 double evaluate(const LinearFormOf<D>& f, const StateOf<D>& x, const typename D::Memory& m, const InputsOf<D>& u) {
     double own = coupled_part<D>(f, x);
     if constexpr (std::same_as<D, Any>) {
-        const auto [begin, end] = f.between(D::coupled, D::states);
-        for (auto* t = begin; t != end; ++t) own += t->factor * x[t->place];
+        f.each_of(AnyForm::of_angles, 0, [&](int k, double factor) { own += factor * x[k]; });
     } else {
         for (int j = D::coupled; j < D::states; ++j) own += f.c[j] * x[j];
     }
@@ -290,7 +415,7 @@ double evaluate(const LinearFormOf<D>& f, const StateOf<D>& x, const typename D:
 // Sum of the magnitudes of the terms: rounding in evaluate() is a small multiple of epsilon times this.
 template <class D>
 double magnitude(const LinearFormOf<D>& f, const StateOf<D>& x, const typename D::Memory& m, const InputsOf<D>& u) {
-    double sum = std::fabs(f.c[D::one]);
+    double sum = std::fabs(constant_of<D>(f));
     each_memory_of<D>(f, [&](int k, double factor) ALWAYS_INLINE { sum += std::fabs(factor * m[k]); });
     each_input_of<D>(f, [&](int i, double factor) ALWAYS_INLINE { sum += std::fabs(factor * u[i]); });
     each_state_of<D>(f, [&](int k, double factor) ALWAYS_INLINE { sum += std::fabs(factor * x[k]); });
@@ -306,12 +431,13 @@ double evaluate_rate(const LinearFormOf<D>& f, const StateOf<D>& rate, const Inp
 }
 
 // Up to N forms, as many side by side as a vector holds, so that all of them are evaluated at once. None may depend on
-// an angle.
+// an angle. Of large trains the forms are kept one by one, without their zeros.
 template <class D, int N>
 class FormTable {
  public:
     static_assert(N % vec_width == 0);
-    using Values = std::array<double, N>;
+    static constexpr bool any = std::same_as<D, Any>;
+    using Values = std::conditional_t<any, NumbersIn<32>, std::array<double, N>>;
     using LinearForm = LinearFormOf<D>;
     using State = StateOf<D>;
     using Inputs = InputsOf<D>;
@@ -321,41 +447,75 @@ class FormTable {
 
     // Forms that are not there are 1.
     void clear() {
-        block_ = {};
-        for (int row = 0; row < N; ++row) place(row, D::one) = 1.0;
+        if constexpr (any) {
+            forms_.clear();
+            block_.clear();
+        } else {
+            std::memset(block_.data(), 0, sizeof block_);
+            for (int row = 0; row < N; ++row) at_place(row, one_column()) = 1.0;
+        }
         rows_ = 0;
         driven_ = false;
         depends_on_ = {};
     }
+    // How many there are of what the forms depend on: side by side if there are few states.
+    void set_counts(const CountsOf<D>& n) {
+        if constexpr (any) {
+            n_ = n;
+            sparse_ = n.coupled > few_states;
+        }
+    }
 
     void set(int row, const LinearForm& f) {
-        for (int j = D::coupled; j < D::states; ++j) assert(f.c[j] == 0.0);
-        for (int k = 0; k < D::terms; ++k) place(row, k) = f.c[k];
         rows_ = std::max(rows_, (row + vec_width) / vec_width * vec_width);
-        for (int i = 0; i < D::inputs; ++i) {
-            driven_ = driven_ || f.c[D::first_input + i] != 0.0;
-            depends_on_.see_input(i, f.c[D::first_input + i]);
+        if (sparse()) {
+            if constexpr (any) {
+                if (row >= static_cast<int>(forms_.size())) forms_.resize(static_cast<std::size_t>(row) + 1);
+                forms_[static_cast<std::size_t>(row)] = f;
+            }
+        } else {
+            if constexpr (any)
+                for (std::size_t n = block_.size(); n < static_cast<std::size_t>(rows_ * width()); ++n)
+                    block_.push_back(static_cast<int>(n) / vec_width % width() == one_column() ? 1.0 : 0.0);
+            at_place(row, one_column()) = constant_of<D>(f);
+            each_state_of<D>(f, [&](int k, double c) {
+                assert(k < D::coupled || c == 0.0);
+                if (k < D::coupled) at_place(row, k) = c;
+            });
+            each_memory_of<D>(f, [&](int k, double c) { at_place(row, memory_column() + k) = c; });
+            each_input_of<D>(f, [&](int i, double c) { at_place(row, input_column() + i) = c; });
         }
-        for (int k = 0; k < D::memory; ++k) depends_on_.see_memory(k, f.c[D::first_memory + k]);
+        each_input_of<D>(f, [&](int i, double c) {
+            driven_ = driven_ || c != 0.0;
+            depends_on_.see_input(i, c);
+        });
+        each_memory_of<D>(f, [&](int k, double c) { depends_on_.see_memory(k, c); });
     }
     int rows() const { return rows_; }  // rounded up to whole vectors
-    double coefficient(int row, int term) const { return block_[row / vec_width][term][row % vec_width]; }
-    LinearForm form(int row) const {
-        LinearForm f;
-        for (int k = 0; k < D::terms; ++k) f.c[k] = coefficient(row, k);
-        return f;
+    double coefficient(int row, int term) const {
+        if constexpr (any)
+            if (sparse()) return forms_[static_cast<std::size_t>(row)].c[term];
+        const int column = term < D::coupled        ? term
+                           : term < D::first_memory ? one_column()
+                           : term < D::first_input  ? memory_column() + term - D::first_memory
+                                                    : input_column() + term - D::first_input;
+        return block_[index(row, column)];
     }
 
     // The parts that depend on neither state nor inputs.
     void constants(const Memory& m, Values& out) const {
-        for (int g = 0; g < rows_; g += vec_width) {
-            Vec sum = at(D::one, g);
-            for (int k = 0; k < depends_on_.memory; ++k) sum += m[k] * at(D::first_memory + k, g);
-            store(sum, &out[g]);
-        }
+        each_vector(out, [&](int g) ALWAYS_INLINE {
+            if constexpr (any)
+                if (sparse())
+                    return each_form<Vec>(g, 1.0, [&](const LinearForm& f) { return constant_part<D>(f, m); });
+            const auto c = factors(g);
+            Vec sum = c(one_column());
+            for (int k = 0; k < depends_on_.memory; ++k) sum += m[k] * c(memory_column() + k);
+            return sum;
+        });
     }
     [[gnu::always_inline]] void evaluate(const Values& constant, const State& x, const Inputs& u, Values& out) const {
-        for (int g = 0; g < rows_; g += vec_width) store(load(&constant[g]) + terms(g, x, u), &out[g]);
+        each_vector(out, [&](int g) ALWAYS_INLINE { return load(constant.data() + g) + terms(g, x, u); });
     }
     // Values and time derivatives at once; the inputs are asked for theirs where the forms depend on them.
     template <class Input>
@@ -366,14 +526,15 @@ class FormTable {
             input.values(depends_on_.inputs, u);
             input.rates(depends_on_.inputs, u_rate);
         }
-        for (int g = 0; g < rows_; g += vec_width) {
-            store(load(&constant[g]) + terms(g, x, u), &value[g]);
-            store(terms(g, rate, u_rate), &slope[g]);
-        }
+        make_room(slope, rows_);
+        each_vector(value, [&](int g) ALWAYS_INLINE {
+            store(terms(g, rate, u_rate), slope.data() + g);
+            return load(constant.data() + g) + terms(g, x, u);
+        });
     }
     // Sums of the magnitudes of the terms, from magnitudes of what the forms depend on.
     void magnitudes(const Memory& m, const State& x, const Inputs& u, Values& out) const {
-        for (int g = 0; g < rows_; g += vec_width) store(magnitude<Vec>(g, m, x, u), &out[g]);
+        each_vector(out, [&](int g) { return magnitude<Vec>(g, m, x, u); });
     }
     // The same of one form.
     template <class Input>
@@ -381,181 +542,108 @@ class FormTable {
         return magnitude<double>(row, m, x, driven_ ? input.magnitudes() : Inputs{});
     }
     void rate_magnitudes(const State& rate, const Inputs& input_rate, Values& out) const {
-        for (int g = 0; g < rows_; g += vec_width) store(terms<true>(g, rate, input_rate), &out[g]);
+        each_vector(out, [&](int g) ALWAYS_INLINE { return terms<true>(g, rate, input_rate); });
     }
     // Time derivatives, from those of state and inputs.
     [[gnu::always_inline]] void rates(const State& rate, const Inputs& input_rate, Values& out) const {
-        for (int g = 0; g < rows_; g += vec_width) store(terms(g, rate, input_rate), &out[g]);
+        each_vector(out, [&](int g) ALWAYS_INLINE { return terms(g, rate, input_rate); });
     }
 
  private:
-    // V: Vec for as many forms as it holds, from the g-th on; double for that alone.
+    template <class Value>
+    [[gnu::always_inline]] void each_vector(Values& out, Value&& value) const {
+        make_room(out, rows_);
+        for (int g = 0; g < rows_; g += vec_width) store(value(g), out.data() + g);
+    }
+    // The coefficients of the forms of a vector, from the g-th on, or of that alone, by their columns.
     template <class V = Vec>
-    V at(int term, int g) const {
-        V v;
-        std::memcpy(&v, &block_[g / vec_width][term][g % vec_width], sizeof v);
-        return v;
+    [[gnu::always_inline]] auto factors(int g) const {
+        return [c = &block_[index(g, 0)]](std::ptrdiff_t column) ALWAYS_INLINE {
+            V v;
+            std::memcpy(&v, c + column * vec_width, sizeof v);
+            return v;
+        };
     }
     template <bool magnitudes = false, class V = Vec>
     [[gnu::always_inline]] V terms(int g, const State& x, const Inputs& u) const {
-        const auto c = [&](int term) { return magnitudes ? absolute(at<V>(term, g)) : at<V>(term, g); };
-        const V sum = sum_in_fours<D::coupled>([&](auto k) { return c(k) * x[k]; });
+        if constexpr (any)
+            if (sparse())
+                return each_form<V>(g, 0.0, [&](const LinearForm& f) { return form_terms<magnitudes>(f, x, u); });
+        const auto c = [at = factors<V>(g)](std::ptrdiff_t k)
+                           ALWAYS_INLINE { return magnitudes ? absolute(at(k)) : at(k); };
+        const double* state = coupled_numbers(x);
+        const V sum = sum_of_states<D>(n_.coupled, [&](auto k) ALWAYS_INLINE { return c(k) * state[k]; });
         if (!driven_) return sum;
-        V forced = c(D::first_input) * u[0];
-        for (int i = 1; i < depends_on_.inputs; ++i) forced += c(D::first_input + i) * u[i];
+        V forced = c(input_column()) * u[0];
+        for (int i = 1; i < depends_on_.inputs; ++i) forced += c(input_column() + i) * u[i];
         return sum + forced;
     }
     template <class V>
     [[gnu::always_inline]] V magnitude(int g, const Memory& m, const State& x, const Inputs& u) const {
-        V kept = m[0] * absolute(at<V>(D::first_memory, g));
-        for (int k = 1; k < depends_on_.memory; ++k) kept += m[k] * absolute(at<V>(D::first_memory + k, g));
-        return absolute(at<V>(D::one, g)) + kept + terms<true, V>(g, x, u);
+        if constexpr (any)
+            if (sparse())
+                return each_form<V>(g, 0.0, [&](const LinearForm& f) {
+                    double kept = 0.0;
+                    each_memory_of<D>(f, [&](int k, double c) { kept += m[k] * std::fabs(c); });
+                    return std::fabs(constant_of<D>(f)) + kept + form_terms<true>(f, x, u);
+                });
+        const auto c = factors<V>(g);
+        V kept = m[0] * absolute(c(memory_column()));
+        for (int k = 1; k < depends_on_.memory; ++k) kept += m[k] * absolute(c(memory_column() + k));
+        return absolute(c(one_column())) + kept + terms<true, V>(g, x, u);
     }
-
-    double& place(int row, int term) { return block_[row / vec_width][term][row % vec_width]; }
-
-    // Term by term the coefficients of the forms of one vector, vector by vector: what is used lies together.
-    alignas(64) std::array<std::array<std::array<double, vec_width>, D::terms>, N / vec_width> block_;
-    int rows_;
-    bool driven_;
-    [[no_unique_address]] DependsOn<D> depends_on_;
-};
-
-// For trains of any size: the coefficients that are not zero, form by form.
-template <int N>
-class FormTable<Any, N> {
- public:
-    using D = Any;
-    using Values = Few<double, 32>;
-    using LinearForm = AnyForm;
-    using State = StateOf<D>;
-    using Inputs = InputsOf<D>;
-    using Memory = D::Memory;
-
-    void clear() {
-        forms_.clear();
-        block_.clear();
-        states_ = 0;
-        depends_on_ = {};
-        driven_ = false;
-    }
-    // Of few states the coefficients are kept whole, side by side as the other kernels keep them.
-    void set_states(int coupled) { states_ = coupled <= few_states ? coupled : 0; }
-    void set(int row, const LinearForm& f) {
-        if (static_cast<std::size_t>(row) >= forms_.size()) forms_.resize(static_cast<std::size_t>(row) + 1, one());
-        forms_[static_cast<std::size_t>(row)] = f;
-        block_.resize(static_cast<std::size_t>(rows() * states_));
-        each_state_of<D>(f, [&](int k, double factor) {
-            if (k < states_)
-                block_[static_cast<std::size_t>((row / vec_width * states_ + k) * vec_width + row % vec_width)] =
-                    factor;
-        });
-        each_input_of<D>(f, [&](int i, double factor) {
-            driven_ = driven_ || factor != 0.0;
-            depends_on_.see_input(i, factor);
-        });
-    }
-    int rows() const { return (static_cast<int>(forms_.size()) + vec_width - 1) / vec_width * vec_width; }
-    double coefficient(int row, int term) const { return form(row).c[term]; }
-    const LinearForm& form(int row) const { return forms_[static_cast<std::size_t>(row)]; }
-
-    void constants(const Memory& m, Values& out) const {
-        fill(out, [&](const LinearForm& f) { return constant_part<D>(f, m); }, 1.0);
-    }
-    void evaluate(const Values& constant, const State& x, const Inputs& u, Values& out) const {
-        terms(x, u, out);
-        double* to = out.data();
-        for (int g = 0; g < rows(); ++g) to[g] = constant.data()[g] + to[g];
-    }
-    template <class Input>
-    void evaluate(const Values& constant, const State& x, const State& rate, const Input& input, Values& value,
-                  Values& slope) const {
-        Inputs u{}, u_rate{};
-        if (driven_) {
-            input.values(depends_on_.inputs, u);
-            input.rates(depends_on_.inputs, u_rate);
-        }
-        evaluate(constant, x, u, value);
-        rates(rate, u_rate, slope);
-    }
-    void magnitudes(const Memory& m, const State& x, const Inputs& u, Values& out) const {
-        fill(out, [&](const LinearForm& f) { return magnitude(f, m, x, u); });
-    }
-    template <class Input>
-    double magnitude_of(int row, const Memory& m, const State& x, const Input& input) const {
-        return magnitude(form(row), m, x, driven_ ? input.magnitudes() : Inputs{});
-    }
-    void rate_magnitudes(const State& rate, const Inputs& input_rate, Values& out) const {
-        terms<true>(rate, input_rate, out);
-    }
-    void rates(const State& rate, const Inputs& input_rate, Values& out) const { terms(rate, input_rate, out); }
-
- private:
-    static const LinearForm& one() {
-        static const LinearForm form = [] {
-            LinearForm f;
-            f.c[D::one] = 1.0;
-            return f;
-        }();
-        return form;
-    }
-    // Of each form, and of those that are missing to whole vectors.
-    template <class Value>
-    void fill(Values& out, Value&& value, double missing = 0.0) const {
-        out.reach(static_cast<std::size_t>(rows()));
-        double* to = out.data();
-        for (const LinearForm& f : forms_) *to++ = value(f);
-        while (to < out.data() + rows()) *to++ = missing;
-    }
-    // Of all forms.
-    template <bool magnitudes = false>
-    void terms(const State& x, const Inputs& u, Values& out) const {
-        if (states_ == 0) {
-            fill(out, [&](const LinearForm& f) { return terms<magnitudes>(f, x, u); });
-            return;
-        }
-        out.reach(static_cast<std::size_t>(rows()));
-        for (int g = 0; g < rows(); g += vec_width) {
-            const double* c = block_.data() + g * states_;
-            Vec sum{};
-            for (int k = 0; k < states_; k += 4) {
-                const auto part = [&](int j) ALWAYS_INLINE {
-                    const Vec factor = load(c + (k + j) * vec_width);
-                    return (magnitudes ? absolute(factor) : factor) * x.coupled.data()[k + j];
-                };
-                sum += (part(0) + part(1)) + (part(2) + part(3));
-            }
-            store(sum, out.data() + g);
-        }
-        if (!driven_) return;
-        double* to = out.data();
-        for (const LinearForm& f : forms_) {
-            double forced = 0.0;
-            each_input_of<D>(f, [&](int i, double c) { forced += (magnitudes ? std::fabs(c) : c) * u[i]; });
-            *to++ += forced;
+    // Of forms that are kept one by one.
+    template <class V, class Value>
+    V each_form(int g, double missing, Value&& value) const {
+        const auto of = [&](int row) {
+            return row < static_cast<int>(forms_.size()) ? value(forms_[static_cast<std::size_t>(row)]) : missing;
+        };
+        if constexpr (std::same_as<V, double>) {
+            return of(g);
+        } else {
+            V out;
+            for (int k = 0; k < vec_width; ++k) out[k] = of(g + k);
+            return out;
         }
     }
-    template <bool magnitudes = false>
-    static double terms(const LinearForm& f, const State& x, const Inputs& u) {
+    template <bool magnitudes>
+    static double form_terms(const LinearForm& f, const State& x, const Inputs& u) {
         const auto c = [](double factor) { return magnitudes ? std::fabs(factor) : factor; };
-        const auto [begin, end] = f.between(0, D::coupled);
-        const double own = AnyForm::sum_of_coupled(
-            begin, end, [&](const AnyForm::Term& t) { return c(t.factor) * x.coupled[t.place]; });
+        const double own = f.sum_of_coupled([&](int k, double factor) { return c(factor) * x.coupled[k]; });
         double forced = 0.0;
         each_input_of<D>(f, [&](int i, double factor) { forced += c(factor) * u[i]; });
         return own + forced;
     }
-    static double magnitude(const LinearForm& f, const Memory& m, const State& x, const Inputs& u) {
-        double kept = 0.0;
-        each_memory_of<D>(f, [&](int k, double factor) { kept += m[k] * std::fabs(factor); });
-        return std::fabs(f.c[D::one]) + kept + terms<true>(f, x, u);
-    }
 
-    std::vector<LinearForm> forms_;
-    std::vector<double> block_;
-    int states_ = 0;
-    bool driven_ = false;
-    DependsOn<D> depends_on_;
+    bool sparse() const {
+        if constexpr (any)
+            return sparse_;
+        else
+            return false;
+    }
+    static const double* coupled_numbers(const State& x) {
+        if constexpr (any)
+            return x.coupled.data();
+        else
+            return x.data();
+    }
+    // Where the coefficients lie: column by column those of the forms of one vector, vector by vector, so that what is
+    // used lies together. The columns are [coupled states][angles, where sizes are fixed][1][memory][inputs].
+    int one_column() const { return any ? n_.coupled : D::one; }
+    int memory_column() const { return one_column() + 1; }
+    int input_column() const { return any ? memory_column() + n_.memory : D::first_input; }
+    int width() const { return any ? input_column() + n_.inputs : D::terms; }
+    std::size_t index(int row, int column) const {
+        return static_cast<std::size_t>((row / vec_width * width() + column) * vec_width + row % vec_width);
+    }
+    double& at_place(int row, int column) { return block_[index(row, column)]; }
+
+    alignas(64) ArrayOf<D, double, N * D::terms> block_;
+    int rows_;
+    bool driven_, sparse_ = any;
+    [[no_unique_address]] CountsOf<D> n_;
+    [[no_unique_address]] DependsOn<D> depends_on_;
+    [[no_unique_address]] std::conditional_t<any, std::vector<LinearForm>, std::monostate> forms_;
 };
 
 }  // namespace lostmotion

@@ -281,7 +281,7 @@ class InputState {
     void jet(Inputs* u) const {
         u[0] = linear_;
         if constexpr (N > 1) u[1] = slope_;
-        for (int k = 2; k < N; ++k) u[k] = {};
+        for (int k = 2; k < N; ++k) clear(u[k], n_inputs());
         for (int q = 0; q < sines_end_[n_inputs() - 1]; q += 2) {
             const int i = basis_[q].input;
             const double omega = basis_[q].omega, turned_twice = -omega * omega;
@@ -373,7 +373,7 @@ class InputState {
     // what has just been written number by number.
     [[gnu::always_inline]] void add_slopes(const InputState& from, double h) {
         if constexpr (std::same_as<D, Any>) {
-            for (int i = 0; i < n_inputs(); ++i) linear_[i] = from.linear_[i] + h * slope_[i];
+            linear_ = from.linear_ + h * slope_;
         } else {
             constexpr int n = D::inputs, width = vec_width < n ? vec_width : n, whole = n / width * width;
             const auto add = [&]<int count>(std::integral_constant<int, count>, int i) ALWAYS_INLINE {
@@ -389,7 +389,10 @@ class InputState {
     template <class Term>
     [[gnu::always_inline]] void sum([[maybe_unused]] int n, const Inputs& begin, Term&& term, Inputs& out) const {
         if constexpr (D::inputs > 2) {  // of many inputs few have a sine
-            for (int i = 0; i < n; ++i) out[i] = begin[i];
+            if constexpr (std::same_as<D, Any>)
+                out = begin;
+            else
+                for (int i = 0; i < n; ++i) out[i] = begin[i];
             for (int q = 0; q < sines_end_[n - 1]; q += 2) out[basis_[q].input] += term(q);
         } else {
             int q = 0;

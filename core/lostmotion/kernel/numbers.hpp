@@ -1,166 +1,215 @@
-// What form.hpp has in registers and arrays of compile-time sizes, for trains of any size. All sums are added up in the
-// same order there.
+// Arrays of as many numbers as a train has. Sums and products of whole arrays are computed in one loop, four numbers
+// at once, where they are assigned; every build adds in the same order.
 #pragma once
 
 #include <algorithm>
-#include <cmath>
+#include <cstddef>
 #include <utility>
-#include <vector>
 
-#include "dims.hpp"
 #include "vec.hpp"
 
 namespace lostmotion {
 
-// Up to so many coupled states, whole matrices cost less than what of them is not zero.
-inline constexpr int few_states = 16;
+// Anything with numbers in fours: four(k) are the numbers k to k + 3, zeros beyond the size.
+template <class E>
+concept InFours = requires(const E& e) {
+    e.size();
+    e.four(0);
+};
+// Numbers that are computed when they are asked for.
+template <class Four>
+struct Computed {
+    int count;
+    Four computed;
 
-// Numbers that are computed with at once, in whole fours.
-class Numbers : public Few<double, few_states> {
+    int size() const { return count; }
+    [[gnu::always_inline]] Pack<4> four(int k) const { return computed(k); }
+};
+template <class Four>
+Computed(int, Four) -> Computed<Four>;
+// Numbers that are in memory.
+struct NumbersAt {
+    const double* at;
+    int count;
+
+    int size() const { return count; }
+    [[gnu::always_inline]] Pack<4> four(int k) const { return k < count ? Pack<4>::load(at + k) : Pack<4>{}; }
+};
+
+// As many numbers as have been asked for, in whole fours; those beyond are zero. The first `few` need no allocation.
+template <int few>
+class NumbersIn {
  public:
-    using Few::operator=;
-    Numbers() = default;
+    static_assert(few % 4 == 0);
 
-    // Takes them from where there are so many, a multiple of four.
-    static Numbers load(const double* from, std::size_t count) {
-        Numbers out;
-        out.reach(count);
-        std::copy_n(from, count, out.data());
+    NumbersIn() = default;
+    NumbersIn(const NumbersIn& o) { *this = o; }
+    NumbersIn(NumbersIn&& o) noexcept { *this = std::move(o); }
+    template <InFours E>
+    [[gnu::always_inline]] NumbersIn(const E& e) {
+        *this = e;
+    }
+    [[gnu::always_inline]] ~NumbersIn() {
+        if (at_ != few_) [[unlikely]]
+            release(at_);
+    }
+    [[gnu::always_inline]] NumbersIn& operator=(const NumbersIn& o) { return *this = o.all(); }
+    [[gnu::always_inline]] NumbersIn& operator=(NumbersIn&& o) noexcept {
+        if (o.at_ != o.few_) [[unlikely]]
+            take(o);
+        else
+            *this = o.all();
+        return *this;
+    }
+    template <InFours E>
+    [[gnu::always_inline]] NumbersIn& operator=(const E& e) {
+        const int n = e.size();
+        double* before = nullptr;  // it may be what is assigned
+        if (n > room_) [[unlikely]]
+            before = widen(n);
+        size_ = n;
+        double* const to = at_;
+        for (int k = 0; k < n; k += 4) e.four(k).store(to + k);
+        if (before != nullptr) [[unlikely]]
+            release(before);
+        return *this;
+    }
+    static NumbersIn zeros(int size) {
+        NumbersIn out;
+        out.reach(size);
         return out;
     }
-    void store(double* to, std::size_t count) const {
-        for (std::size_t k = 0; k < count; ++k) to[k] = (*this)[k];
+
+    int size() const { return size_; }
+    [[gnu::always_inline]] NumbersAt all() const { return {at_, size_}; }
+    [[gnu::always_inline]] Pack<4> four(int k) const { return all().four(k); }
+    [[gnu::always_inline]] void reach(int size) {
+        if (size > size_) grow((size + 3) / 4 * 4);
     }
-    void set(int k, double number) { (*this)[k] = number; }
-    // act(four of this, four of the other) for all of both.
-    template <class Act>
-    [[gnu::always_inline]] Numbers& each_four(const Numbers& o, Act&& act) {
-        reach(o.size());
-        double* to = data();
-        const double* from = o.data();
-        for (std::size_t k = 0; k < o.size(); k += 4) act(Pack<4>::load(to + k), Pack<4>::load(from + k)).store(to + k);
-        return *this;
+    // That many, whose values are to follow.
+    [[gnu::always_inline]] double* resized(int size) {
+        if (size > room_) [[unlikely]]
+            release(widen(size));
+        size_ = size;
+        return at_;
     }
-    template <class Act>
-    [[gnu::always_inline]] Numbers& each_four(Act&& act) {
-        double* to = data();
-        for (std::size_t k = 0; k < size(); k += 4) act(Pack<4>::load(to + k)).store(to + k);
-        return *this;
+    template <class Index>
+    [[gnu::always_inline]] double operator[](Index k) const {
+        return static_cast<int>(k) < size_ ? at_[k] : 0.0;
     }
-    [[gnu::always_inline]] double sum() const {
-        double all = 0.0;
-        for (std::size_t k = 0; k < size(); k += 4) all += Pack<4>::load(data() + k).sum();
-        return all;
+    template <class Index>
+    [[gnu::always_inline]] double& operator[](Index k) {
+        reach(static_cast<int>(k) + 1);
+        return at_[k];
     }
-    friend Numbers operator+(Numbers a, const Numbers& b) {
-        a.each_four(b, [](Pack<4> x, const Pack<4>& y) { return x + y; });
-        return a;
+    double* data() { return at_; }
+    const double* data() const { return at_; }
+    double* begin() { return at_; }
+    double* end() { return at_ + size_; }
+    const double* begin() const { return at_; }
+    const double* end() const { return at_ + size_; }
+
+    friend bool operator==(const NumbersIn& a, const NumbersIn& b) {
+        const NumbersIn &less = a.size_ < b.size_ ? a : b, &more = a.size_ < b.size_ ? b : a;
+        return std::equal(less.begin(), less.end(), more.begin()) &&
+               std::all_of(more.begin() + less.size_, more.end(), [](double v) { return v == 0.0; });
     }
-    friend Numbers operator*(double a, Numbers b) {
-        b.each_four([a](const Pack<4>& x) { return a * x; });
-        return b;
+
+ private:
+    // What is rare is not inlined.
+    [[gnu::noinline, gnu::cold]] static void release(double* many) { delete[] many; }
+    [[gnu::noinline, gnu::cold]] void take(NumbersIn& o) {
+        if (at_ != few_) release(at_);
+        at_ = std::exchange(o.at_, o.few_);
+        size_ = std::exchange(o.size_, 0);
+        room_ = std::exchange(o.room_, few);
     }
-    // Beyond the shorter of them there is nothing but zeros.
-    friend Numbers operator*(Numbers a, const Numbers& b) {
-        a.reach(b.size());
-        double* to = a.data();
-        for (std::size_t k = 0; k < a.size(); k += 4)
-            (k < b.size() ? Pack<4>::load(to + k) * Pack<4>::load(b.data() + k) : Pack<4>{}).store(to + k);
-        return a;
+    // Makes room for so many. Returns what there was allocated before.
+    [[gnu::noinline, gnu::cold]] double* widen(int size) {
+        const int room = std::max(size, 2 * room_);
+        double* const before = std::exchange(at_, new double[static_cast<std::size_t>(room)]);
+        room_ = room;
+        return before == few_ ? nullptr : before;
     }
-    friend Numbers absolute(Numbers a) {
-        a.each_four([](const Pack<4>& x) { return lostmotion::absolute(x); });
-        return a;
+    [[gnu::noinline]] void grow(int size) {
+        if (size > room_) {
+            const double* from = at_;
+            double* before = widen(size);
+            std::copy_n(from, size_, at_);
+            release(before);
+        }
+        std::fill(at_ + size_, at_ + size, 0.0);
+        size_ = size;
     }
-    friend Numbers max_of(Numbers a, const Numbers& b) {
-        a.each_four(b, [](const Pack<4>& x, const Pack<4>& y) { return lostmotion::max_of(x, y); });
-        return a;
-    }
-    friend Numbers at_most(Numbers a, double bound) {
-        a.each_four([bound](const Pack<4>& x) { return lostmotion::at_most(x, bound); });
-        return a;
-    }
-    // The sum of the products.
-    friend double product(const Numbers& a, const Numbers& b) {
-        double all = 0.0;
-        for (std::size_t k = 0; k < std::min(a.size(), b.size()); k += 4)
-            all += (Pack<4>::load(a.data() + k) * Pack<4>::load(b.data() + k)).sum();
-        return all;
-    }
+
+    double* at_ = few_;
+    int size_ = 0, room_ = few;
+    double few_[few];
 };
-inline Pack<4> sums(const Numbers& a, const Numbers& b, const Numbers& c, const Numbers& d) {
-    return Pack<4>::of({a.sum(), b.sum(), c.sum(), d.sum()});
+using Numbers = NumbersIn<32>;
+
+// What an expression keeps of its parts: of an array where it is, of another expression all.
+template <InFours E>
+[[gnu::always_inline]] inline auto part_of(const E& e) {
+    if constexpr (requires { e.all(); })
+        return e.all();
+    else
+        return e;
 }
-template <class T, std::size_t few>
-Few<T, few> magnitudes(Few<T, few> v) {
-    for (T& x : v) x = std::fabs(x);
-    return v;
+template <InFours A, class Act>
+[[gnu::always_inline]] inline auto each_four(const A& a, Act&& act) {
+    return Computed{a.size(), [a = part_of(a), act](int k) ALWAYS_INLINE { return act(a.four(k)); }};
 }
-
-// A linear expression with few terms, in the order of their places.
-class AnyForm {
- public:
-    struct Term {
-        int place;
-        double factor;
-    };
-    class Coefficients {
-     public:
-        double operator[](int place) const {
-            const auto at = find(place);
-            return at != terms_.end() && at->place == place ? at->factor : 0.0;
-        }
-        double& operator[](int place) {
-            auto at = terms_.begin() + (find(place) - terms_.begin());
-            if (at == terms_.end() || at->place != place) at = terms_.insert(at, {place, 0.0});
-            return at->factor;
-        }
-        const std::vector<Term>& terms() const { return terms_; }
-        std::vector<Term>& terms() { return terms_; }
-
-     private:
-        std::vector<Term>::const_iterator find(int place) const {
-            return std::lower_bound(terms_.begin(), terms_.end(), place,
-                                    [](const Term& t, int p) { return t.place < p; });
-        }
-        std::vector<Term> terms_;
-    };
-    Coefficients c;
-
-    AnyForm& operator+=(const AnyForm& o) {
-        for (const Term& t : o.c.terms()) c[t.place] += t.factor;
-        return *this;
-    }
-    AnyForm& operator*=(double a) {
-        for (Term& t : c.terms()) t.factor *= a;
-        return *this;
-    }
-    friend AnyForm operator*(double a, AnyForm f) { return f *= a; }
-    // Calls use(place, factor) for each term.
-    template <class Use>
-    void each_term(Use&& use) const {
-        for (const Term& t : c.terms()) use(t.place, t.factor);
-    }
-    // Terms of the places from `first` on to `end`.
-    std::pair<const Term*, const Term*> between(int first, int end) const {
-        const Term* begin = c.terms().data();
-        const Term* last = begin + c.terms().size();
-        const auto below = [](const Term& t, int p) { return t.place < p; };
-        const Term* from = std::lower_bound(begin, last, first, below);
-        return {from, std::lower_bound(from, last, end, below)};
-    }
-    // sum factor value(place) over the coupled states, in fours.
-    template <class Value>
-    static double sum_of_coupled(const Term* t, const Term* end, Value&& value) {
-        double all = 0.0;
-        while (t != end) {
-            const int four = t->place / 4;
-            double part[4] = {};
-            for (; t != end && t->place / 4 == four; ++t) part[t->place % 4] = value(*t);
-            all += (part[0] + part[1]) + (part[2] + part[3]);
-        }
-        return all;
-    }
-};
+template <InFours A, InFours B, class Act>
+[[gnu::always_inline]] inline auto each_four(const A& a, const B& b, Act&& act) {
+    return Computed{std::max(a.size(), b.size()),
+                    [a = part_of(a), b = part_of(b), act](int k) ALWAYS_INLINE { return act(a.four(k), b.four(k)); }};
+}
+template <InFours A, InFours B>
+[[gnu::always_inline]] inline auto operator+(const A& a, const B& b) {
+    return each_four(a, b, [](const Pack<4>& x, const Pack<4>& y) ALWAYS_INLINE { return x + y; });
+}
+template <InFours A, InFours B>
+[[gnu::always_inline]] inline auto operator*(const A& a, const B& b) {
+    return each_four(a, b, [](const Pack<4>& x, const Pack<4>& y) ALWAYS_INLINE { return x * y; });
+}
+template <InFours A>
+[[gnu::always_inline]] inline auto operator*(double factor, const A& a) {
+    return each_four(a, [factor](const Pack<4>& x) ALWAYS_INLINE { return factor * x; });
+}
+template <InFours A>
+[[gnu::always_inline]] inline auto absolute(const A& a) {
+    return each_four(a, [](const Pack<4>& x) ALWAYS_INLINE { return absolute(x); });
+}
+template <InFours A, InFours B>
+[[gnu::always_inline]] inline auto max_of(const A& a, const B& b) {
+    return each_four(a, b, [](const Pack<4>& x, const Pack<4>& y) ALWAYS_INLINE { return max_of(x, y); });
+}
+template <InFours A>
+[[gnu::always_inline]] inline auto at_most(const A& a, double bound) {
+    return each_four(a, [bound](const Pack<4>& x) ALWAYS_INLINE { return at_most(x, bound); });
+}
+template <InFours A>
+[[gnu::always_inline]] inline double sum_of(const A& a) {
+    double all = 0.0;
+    for (int k = 0; k < a.size(); k += 4) all += a.four(k).sum();
+    return all;
+}
+template <int n>
+[[gnu::always_inline]] inline double sum_of(const Pack<n>& a) {
+    return a.sum();
+}
+// The sums of four.
+template <InFours A, InFours B, InFours C, InFours E>
+[[gnu::always_inline]] inline Pack<4> sums(const A& a, const B& b, const C& c, const E& d) {
+    Pack<4> all{};
+    for (int k = 0; k < std::max({a.size(), b.size(), c.size(), d.size()}); k += 4)
+        all = all + sums(a.four(k), b.four(k), c.four(k), d.four(k));
+    return all;
+}
+template <int few>
+NumbersIn<few> magnitudes(const NumbersIn<few>& v) {
+    return absolute(v);
+}
 
 }  // namespace lostmotion

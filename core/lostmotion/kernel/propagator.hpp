@@ -43,16 +43,21 @@ struct ResponseOf {
     std::array<AnglesOf<D>, 2> angle;
     std::array<Column, 2> rate;  // of x'
 
-    Lanes of(int c) const { return {load(change[c]), angle[c]}; }
+    auto of(int c) const {
+        if constexpr (std::same_as<D, Any>)
+            return LanesIn{change[c].all(), angle[c].all()};
+        else
+            return Lanes{load(change[c]), angle[c]};
+    }
     void set(int c, const Lanes& x) {
         store<D>(x.coupled, change[c]);
         angle[c] = x.angle;
     }
     // From the weights of the pair.
-    [[gnu::always_inline]] Lanes operator*(const double* weights) const {
+    [[gnu::always_inline]] auto operator*(const double* weights) const {
         return weights[0] * of(0) + weights[1] * of(1);
     }
-    [[gnu::always_inline]] CoupledOf<D> rates(const double* weights) const {
+    [[gnu::always_inline]] auto rates(const double* weights) const {
         return weights[0] * load(rate[0]) + weights[1] * load(rate[1]);
     }
 };
@@ -239,8 +244,7 @@ class Propagator {
                         const Lanes change = series.change();
                         sum = sum + change;
                         rate.coupled = rate.coupled + series.rate_change();
-                        const auto turned = propagator.rates().angle_rate(change.coupled);
-                        for (std::size_t j = 0; j < turned.size(); ++j) rate.angle[j] += turned[j];
+                        rate.angle = rate.angle + propagator.rates().angle_rate(change.coupled);
                     }
                     return sum;
                 }
@@ -338,7 +342,7 @@ class Propagator {
         const int size = a.change.size(), angles = rates().n.angles;
         for (Matrix* m : {&b.change, &b.integral.coupled, &b.exponential_bound}) m->make_room_like(a.change);
         for (int c = 0; c < size; ++c) {
-            const Coupled change = a.change.at(c), integral = a.integral.coupled.at(c);
+            const auto change = a.change.at(c), integral = a.integral.coupled.at(c);
             b.change.set_column(c, 2.0 * change + a.change * change);
             b.integral.coupled.set_column(c, 2.0 * integral + a.change * integral);
             // |exp(A (h + s))| <= |exp(A s)| |exp(A h)|, of which the second is known.
@@ -367,7 +371,7 @@ class Propagator {
                 const Lanes own = from.of(c);
                 Lanes out = own;
                 out.coupled = own.coupled + a.change * from.change[c];
-                for (int j = 0; j < angles; ++j) out.angle[j] = own.angle[j] + (angle[j] * own.coupled).sum();
+                for (int j = 0; j < angles; ++j) out.angle[j] = own.angle[j] + sum_of(angle[j] * own.coupled);
                 return out;
             };
             if (basis->kind == InputBasis::cosine) {

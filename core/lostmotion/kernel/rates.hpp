@@ -9,171 +9,168 @@
 
 namespace lostmotion {
 
-// A linear map of the coupled states, column by column.
 template <class D>
-struct MatrixOf {
+struct MatrixOf;
+
+// The columns of a matrix of the coupled states.
+template <class D>
+struct ColumnsOf {
     static constexpr int n = D::coupled;
     using Coupled = CoupledOf<D>;
     using Column = ColumnOf<D>;
 
     std::array<Column, n> column{};
 
-    static const MatrixOf& identity() {
-        static constexpr MatrixOf one = [] {
-            MatrixOf m{};
+    static constexpr int size() { return n; }
+    // Zero, as large as another.
+    static MatrixOf<D> like(const ColumnsOf&) { return {}; }
+    void make_room_like(const ColumnsOf&) {}
+    double operator()(int row, int col) const { return column[col][row]; }
+    double& operator()(int row, int col) { return column[col][row]; }
+    [[gnu::always_inline]] Coupled at(int c) const { return load(column[c]); }
+    [[gnu::always_inline]] void set_column(int c, const Coupled& v) { v.store(column[c].data()); }
+
+    static const MatrixOf<D>& identity() {
+        static constexpr MatrixOf<D> one = [] {
+            MatrixOf<D> m{};
             for (std::size_t k = 0; k < n; ++k) m.column[k][k] = 1.0;
             return m;
         }();
         return one;
     }
+    Coupled unit(int c) const { return identity().at(c); }
+    void add_identity(double factor) { static_cast<MatrixOf<D>&>(*this).add(factor, identity()); }
 
-    [[gnu::always_inline]] Coupled at(int c) const { return load(column[c]); }
-    [[gnu::always_inline]] Coupled operator*(const Coupled& v) const {
+    template <bool magnitudes = false>
+    [[gnu::always_inline]] Coupled product(const Coupled& v) const {
         return sum_in_fours<n>([&](auto k) ALWAYS_INLINE { return v.template spread<k>() * at(k); });
     }
     // The same for a vector that is in memory.
-    [[gnu::always_inline]] Coupled operator*(const Column& v) const {
+    [[gnu::always_inline]] Coupled product(const Column& v) const {
         return sum_in_fours<n>([&](auto k) ALWAYS_INLINE { return v[k] * at(k); });
-    }
-    double operator()(int row, int col) const { return column[col][row]; }
-    double& operator()(int row, int col) { return column[col][row]; }
-    // Zero, as large as another.
-    static MatrixOf like(const MatrixOf&) { return {}; }
-    void make_room_like(const MatrixOf&) {}
-    void add_identity(double factor) { add(factor, identity()); }
-    // A column of 1.
-    Coupled unit(int c) const { return identity().at(c); }
-    void set_column(int c, const Coupled& v) { v.store(column[c].data()); }
-    int size() const { return n; }
-    Coupled row(int r) const {
-        std::array<double, n> numbers;
-        for (int c = 0; c < n; ++c) numbers[c] = column[c][r];
-        return Coupled::of(numbers);
-    }
-    // A row times this.
-    Coupled after(const Coupled& row) const {
-        Coupled out;
-        for (int c = 0; c < n; c += 4)
-            out.set_four(c / 4, sums(row * at(c), row * at(c + 1), row * at(c + 2), row * at(c + 3)));
-        return out;
-    }
-
-    // factor * other, entry by entry
-    void add(double factor, const MatrixOf& other) {
-        for (int c = 0; c < n; ++c) (at(c) + factor * other.at(c)).store(column[c].data());
-    }
-    void scale(double factor) {
-        for (int c = 0; c < n; ++c) (factor * at(c)).store(column[c].data());
-    }
-    MatrixOf magnitudes() const {
-        MatrixOf out;
-        for (int c = 0; c < n; ++c) absolute(at(c)).store(out.column[c].data());
-        return out;
-    }
-    friend MatrixOf operator*(const MatrixOf& a, const MatrixOf& b) {
-        MatrixOf out;
-        for (int c = 0; c < n; ++c) (a * b.column[c]).store(out.column[c].data());
-        return out;
     }
 };
 
 // The same of a train of any size: one block of as many numbers as there are.
 template <>
-struct MatrixOf<Any> {
+struct ColumnsOf<Any> {
     using Coupled = Numbers;
     using Column = ColumnOf<Any>;
 
-    MatrixOf() = default;
-    explicit MatrixOf(int n) : n_(n), entry_(static_cast<std::size_t>(n) * static_cast<std::size_t>(n)) {}
-    static MatrixOf like(const MatrixOf& o) { return MatrixOf(o.n_); }
-    void make_room_like(const MatrixOf& o) {
+    ColumnsOf() = default;
+    explicit ColumnsOf(int n) : n_(n), entry_(static_cast<std::size_t>(n) * static_cast<std::size_t>(n) / 4) {}
+    static MatrixOf<Any> like(const ColumnsOf& o);
+    void make_room_like(const ColumnsOf& o) {
         n_ = o.n_;
         entry_.resize(o.entry_.size());
     }
-
     int size() const { return n_; }
-    const double* column(int c) const { return entry_.data() + c * n_; }
-    double* column(int c) { return entry_.data() + c * n_; }
     double operator()(int row, int col) const { return column(col)[row]; }
     double& operator()(int row, int col) { return column(col)[row]; }
-    Coupled at(int c) const { return Numbers::load(column(c), static_cast<std::size_t>(n_)); }
-    void set_column(int c, const Coupled& v) { v.store(column(c), static_cast<std::size_t>(n_)); }
+    NumbersAt at(int c) const { return {column(c), n_}; }
+    template <InFours E>
+    void set_column(int c, const E& v) {
+        for (int k = 0; k < n_; k += 4) v.four(k).store(column(c) + k);
+    }
     Coupled unit(int c) const {
         Coupled out;
         out[c] = 1.0;
         return out;
     }
-    Coupled row(int r) const {
-        Coupled out;
-        out.reach(static_cast<std::size_t>(n_));
-        for (int c = 0; c < n_; ++c) out[c] = (*this)(r, c);
-        return out;
-    }
-    // Column by column, four at a time, and as many rows as registers hold.
-    Coupled operator*(const Coupled& v) const {
-        Coupled out;
-        out.reach(static_cast<std::size_t>(n_));
-        multiply(v.data(), std::min(n_, static_cast<int>(v.size())), out.data());
-        return out;
-    }
-    Coupled after(const Coupled& row) const {
-        Coupled out;
-        out.reach(static_cast<std::size_t>(n_));
-        const int known = std::min(n_, static_cast<int>(row.size()));
-        for (int c = 0; c < n_; ++c) {
-            double sum = 0.0;
-            for (int k = 0; k < known; k += 4)
-                sum += (Pack<4>::load(row.data() + k) * Pack<4>::load(column(c) + k)).sum();
-            out[c] = sum;
-        }
-        return out;
-    }
-    void add(double factor, const MatrixOf& o) {
-        for (std::size_t k = 0; k < entry_.size(); k += 4)
-            (Pack<4>::load(&entry_[k]) + factor * Pack<4>::load(&o.entry_[k])).store(&entry_[k]);
-    }
     void add_identity(double factor) {
         for (int k = 0; k < n_; ++k) (*this)(k, k) += factor;
     }
-    void scale(double factor) {
-        for (double& v : entry_) v *= factor;
-    }
-    MatrixOf magnitudes() const {
-        MatrixOf out = *this;
-        for (double& v : out.entry_) v = std::fabs(v);
-        return out;
-    }
-    friend MatrixOf operator*(const MatrixOf& a, const MatrixOf& b) {
-        MatrixOf out = like(a);
-        for (int c = 0; c < a.n_; ++c) a.multiply(b.column(c), a.n_, out.column(c));
-        return out;
+    // Column by column, four at a time, and as many rows as registers hold. What comes behind v is zero.
+    template <bool magnitudes = false, InFours E>
+    Coupled product(const E& v) const {
+        if constexpr (requires { v.at; }) {
+            Coupled out;
+            multiply<magnitudes>(v.at, std::min(n_, v.size()), out.resized(n_));
+            return out;
+        } else if constexpr (requires { v.all(); }) {
+            return product<magnitudes>(v.all());
+        } else {
+            return product<magnitudes>(Numbers(v).all());
+        }
     }
 
  private:
-    // The first `count` columns; what comes behind is multiplied by zero.
+    const double* column(int c) const { return entry_.data()->number + c * n_; }
+    double* column(int c) { return entry_.data()->number + c * n_; }
+    template <bool magnitudes>
     void multiply(const double* v, int count, double* out) const {
-        static constexpr int strip = 16;
-        for (int r = 0; r < n_; r += strip) {
-            const int rows = std::min(strip, n_ - r);
-            if (rows == strip)
-                multiply_rows<strip>(r, v, count, out);
-            else
-                for (int four = r; four < n_; four += 4) multiply_rows<4>(four, v, count, out);
-        }
+        int r = 0;
+        for (; r + 16 <= n_; r += 16) multiply_rows<16, magnitudes>(r, v, count, out);
+        if (n_ - r == 12)
+            multiply_rows<12, magnitudes>(r, v, count, out);
+        else
+            for (; r < n_; r += 4) multiply_rows<4, magnitudes>(r, v, count, out);
     }
-    template <int rows>
+    template <int rows, bool magnitudes>
     void multiply_rows(int r, const double* v, int count, double* out) const {
         Pack<rows> sum{};
-        for (int c = 0; c < count; c += 4) {
-            const auto part = [&](int k) ALWAYS_INLINE { return v[c + k] * Pack<rows>::load(column(c + k) + r); };
+        const double* from = column(0) + r;
+        for (int c = 0; c < count; c += 4, from += 4 * n_) {
+            const auto part = [&](int k) ALWAYS_INLINE {
+                const auto factors = Pack<rows>::load(from + k * n_);
+                return v[c + k] * (magnitudes ? absolute(factors) : factors);
+            };
             sum = sum + ((part(0) + part(1)) + (part(2) + part(3)));
         }
         sum.store(out + r);
     }
 
+    struct alignas(32) Four {
+        double number[4];
+    };
     int n_ = 0;
-    std::vector<double> entry_;  // column by column
+    std::vector<Four> entry_;  // column by column
 };
+
+// A linear map of the coupled states.
+template <class D>
+struct MatrixOf : ColumnsOf<D> {
+    using Coupled = CoupledOf<D>;
+    using Base = ColumnsOf<D>;
+    using Base::at, Base::set_column, Base::size, Base::Base;
+
+    template <class Vector>
+    [[gnu::always_inline]] Coupled operator*(const Vector& v) const {
+        return this->product(v);
+    }
+    Coupled row(int r) const {
+        ColumnOf<D> out;
+        make_room(out, size());
+        for (int c = 0; c < size(); ++c) out[c] = (*this)(r, c);
+        return load(out);
+    }
+    // A row times this.
+    Coupled after(const Coupled& row) const {
+        ColumnOf<D> out;
+        make_room(out, size());
+        for (int c = 0; c < size(); c += 4)
+            sums(row * at(c), row * at(c + 1), row * at(c + 2), row * at(c + 3)).store(out.data() + c);
+        return load(out);
+    }
+    // factor * other, entry by entry
+    void add(double factor, const MatrixOf& other) {
+        for (int c = 0; c < size(); ++c) set_column(c, at(c) + factor * other.at(c));
+    }
+    void scale(double factor) {
+        for (int c = 0; c < size(); ++c) set_column(c, factor * at(c));
+    }
+    MatrixOf magnitudes() const {
+        MatrixOf out = Base::like(*this);
+        for (int c = 0; c < size(); ++c) out.set_column(c, absolute(at(c)));
+        return out;
+    }
+    friend MatrixOf operator*(const MatrixOf& a, const MatrixOf& b) {
+        MatrixOf out = Base::like(a);
+        for (int c = 0; c < a.size(); ++c) out.set_column(c, a * b.at(c));
+        return out;
+    }
+};
+inline MatrixOf<Any> ColumnsOf<Any>::like(const ColumnsOf& o) { return MatrixOf<Any>(o.n_); }
 
 // dx/dt = A x + constant + B u of one regime. The angles follow their speeds, and no rate depends on them.
 template <class D>
@@ -300,31 +297,24 @@ struct LinearRatesOf {
 struct SparseRates {
     std::vector<int> begin{0}, column;
     std::vector<double> factor;
+    std::vector<double> positive;  // without their signs, but for what decays by itself
     std::vector<std::vector<std::pair<int, double>>> of_input;
 
-    // A x
-    void multiply(const double* x, double* out) const {
+    // A x, or that of the positive coefficients.
+    void multiply(const double* x, double* out, bool of_positive = false) const {
+        const double* factors = of_positive ? positive.data() : factor.data();
         const int rows = static_cast<int>(begin.size()) - 1;
         for (int r = 0; r < rows; ++r) {
             double sum = 0.0;
             for (int k = begin[static_cast<std::size_t>(r)]; k < begin[static_cast<std::size_t>(r) + 1]; ++k)
-                sum += factor[static_cast<std::size_t>(k)] * x[column[static_cast<std::size_t>(k)]];
+                sum += factors[k] * x[column[static_cast<std::size_t>(k)]];
             out[r] = sum;
         }
     }
-    // Without the signs, but for what decays by itself.
-    SparseRates magnitudes() const {
-        SparseRates out = *this;
-        for (std::size_t r = 0; r + 1 < begin.size(); ++r)
-            for (auto k = static_cast<std::size_t>(begin[r]); k < static_cast<std::size_t>(begin[r + 1]); ++k)
-                out.factor[k] =
-                    static_cast<std::size_t>(column[k]) == r ? std::fmax(0.0, factor[k]) : std::fabs(factor[k]);
-        return out;
-    }
 };
 
-// The same of a train of any size. Its rates are added up row by row, of the coefficients that are not zero; the matrix
-// is made where it is needed.
+// The same of a train of any size. The rates of a large train are added up row by row, of the coefficients that are not
+// zero, and its matrix is made where it is needed.
 template <>
 struct LinearRatesOf<Any> {
     using D = Any;
@@ -336,12 +326,37 @@ struct LinearRatesOf<Any> {
     using Memory = D::Memory;
 
     CountsOf<D> n;
-    Few<double, 4> angle_coefficient;
+    AnglesOf<D> angle_coefficient;
     AngleSpeeds<D> angle_speed;
     std::vector<Column> input_column;
     DependsOn<D> depends_on;
     const std::vector<GivenState>* given = nullptr;
 
+ private:
+    struct OfMemory {
+        int row, memory;
+        double factor;
+    };
+    const AnyForm& row(int r) const { return (*rows_)[static_cast<std::size_t>(r)]; }
+    template <class Value>
+    Coupled of_memory(Value&& value) const {
+        Coupled kept = Coupled::zeros(n.coupled);
+        for (const OfMemory& t : of_memory_) kept.data()[t.row] += value(t);
+        return kept;
+    }
+    // sum_i u_i of(column i)
+    template <class Of>
+    [[gnu::always_inline]] auto of_inputs(const Inputs& u, Of of) const {
+        return Computed{n.coupled, [this, &u, of](int k) ALWAYS_INLINE {
+                            Pack<4> sum{};
+                            for (int i = 0; i < depends_on.inputs; ++i)
+                                sum = sum +
+                                      u[i] * of(Pack<4>::load(input_column[static_cast<std::size_t>(i)].data() + k));
+                            return sum;
+                        }};
+    }
+
+ public:
     LinearRatesOf() = default;
     LinearRatesOf(const CountsOf<D>& counts, const ByState<D, AnyForm>& of)
         : n(counts), input_column(static_cast<std::size_t>(counts.inputs)), rows_(&of.coupled) {
@@ -351,54 +366,52 @@ struct LinearRatesOf<Any> {
                 angle_speed.set(j, place);
                 angle_coefficient[j] = factor;
             });
+        make_room(angle_coefficient, n.angles);
+        make_room(fixed_, n.coupled);
+        for (Column& c : input_column) make_room(c, n.coupled);
+        sparse_.of_input.resize(input_column.size());
         for (int r = 0; r < n.coupled; ++r) {
             const AnyForm& f = row(r);
             each_input_of<D>(f, [&](int i, double factor) {
+                if (factor == 0.0) return;
                 input_column[static_cast<std::size_t>(i)][r] = factor;
+                sparse_.of_input[static_cast<std::size_t>(i)].emplace_back(r, factor);
                 depends_on.see_input(i, factor);
             });
-            fixed_[r] = f.c[D::one];
-            each_memory_of<D>(f, [&](int k, double factor) {
-                depends_on.see_memory(k, factor);
-                of_memory_.push_back({r, k, factor});
-            });
-            each_coupled(r, [&](const AnyForm::Term& t) {
-                sparse_.column.push_back(t.place);
-                sparse_.factor.push_back(t.factor);
+            fixed_[r] = constant_of<D>(f);
+            each_memory_of<D>(f, [&](int k, double factor) { of_memory_.push_back({r, k, factor}); });
+            each_in_row(r, [&](int c, double factor) {
+                sparse_.column.push_back(c);
+                sparse_.factor.push_back(factor);
+                sparse_.positive.push_back(c == r ? std::fmax(0.0, factor) : std::fabs(factor));
             });
             sparse_.begin.push_back(static_cast<int>(sparse_.column.size()));
         }
-        for (const Column& c : input_column) {
-            auto& of = sparse_.of_input.emplace_back();
-            for (int r = 0; r < n.coupled; ++r)
-                if (c[r] != 0.0) of.emplace_back(r, c[r]);
-        }
-        for (Column& c : input_column) c.reach(static_cast<std::size_t>(n.coupled));
+        if (is_small()) matrix();
     }
 
+    // Whether the whole matrix is used in place of what of it is not zero.
+    bool is_small() const { return n.coupled <= few_states; }
     const SparseRates& sparse() const { return sparse_; }
-    const AnyForm& row(int r) const { return (*rows_)[static_cast<std::size_t>(r)]; }
     // Whole, once it is asked for.
     const MatrixOf<D>& matrix() const {
         if (matrix_.size() == 0) {
             matrix_ = MatrixOf<D>(n.coupled);
-            for (int r = 0; r < n.coupled; ++r)
-                each_coupled(r, [&](const AnyForm::Term& t) { matrix_(r, t.place) = t.factor; });
+            for (int r = 0; r < n.coupled; ++r) each_in_row(r, [&](int c, double factor) { matrix_(r, c) = factor; });
         }
         return matrix_;
     }
 
     Column constant(const Memory& m) const {
-        Coupled kept;
-        kept.reach(static_cast<std::size_t>(n.coupled));
-        for (const OfMemory& t : of_memory_) kept[t.row] += m[t.memory] * t.factor;
-        return fixed_ + kept;
+        return fixed_ + of_memory([&](const OfMemory& t) { return m[t.memory] * t.factor; });
     }
+    // What the inputs bring, as an expression if the train is small.
     Coupled forced(const Inputs& u) const {
-        Coupled out;
-        out.reach(static_cast<std::size_t>(n.coupled));
+        if (is_small()) return of_inputs(u, [](const Pack<4>& c) { return c; });
+        Coupled out = Coupled::zeros(n.coupled);
         for (int i = 0; i < depends_on.inputs; ++i)
-            for (const auto& [r, factor] : sparse_.of_input[static_cast<std::size_t>(i)]) out[r] += factor * u[i];
+            for (const auto& [r, factor] : sparse_.of_input[static_cast<std::size_t>(i)])
+                out.data()[r] += factor * u[i];
         return out;
     }
     template <class Input>
@@ -407,42 +420,36 @@ struct LinearRatesOf<Any> {
         input.values(depends_on.inputs, u);
         return forced(u);
     }
-    Few<double, 4> angle_rate(const Coupled& x) const {
-        Few<double, 4> out;
-        for (int j = 0; j < n.angles; ++j) out[j] = angle_coefficient[j] * x[angle_speed[j]];
+    AnglesOf<D> angle_rate(const Coupled& x) const {
+        AnglesOf<D> out;
+        double* to = out.resized(angle_coefficient.size());
+        for (int j = 0; j < out.size(); ++j)
+            to[j] = j < n.angles ? angle_coefficient.data()[j] * x[angle_speed[j]] : 0.0;
         return out;
     }
     // A x; of few states in the order of a matrix.
     Coupled operator*(const Coupled& x) const {
-        if (n.coupled <= few_states) return matrix() * x;
-        if (x.size() < static_cast<std::size_t>(n.coupled)) {  // what lies beyond is zero
+        if (is_small()) return matrix_ * x;
+        if (x.size() < n.coupled) {  // what lies beyond is zero
             Coupled whole = x;
-            whole.reach(static_cast<std::size_t>(n.coupled));
+            whole.reach(n.coupled);
             return *this * whole;
         }
         Coupled out;
-        out.reach(static_cast<std::size_t>(n.coupled));
-        sparse_.multiply(x.data(), out.data());
+        sparse_.multiply(x.data(), out.resized(n.coupled));
         return out;
     }
     template <class Input>
     Lanes operator()(const Coupled& x, const Column& constant, const Input& u) const {
-        return {(*this * x + forced(u)) + load(constant), angle_rate(x)};
+        return {(*this * x + forced(u)) + constant, angle_rate(x)};
     }
     State operator()(const State& x, const Column& constant, const Inputs& u) const {
-        State out;
-        (*this)(coupled(x), constant, u).store(out);
-        return out;
+        return (*this)(x.coupled, constant, u);
     }
     State higher(const State& derivative, const Inputs& u) const { return (*this)(derivative, Column{}, u); }
 
     double fastest() const {
-        double square = 0.0;
-        for (int r = 0; r < n.coupled; ++r)
-            each_coupled(r, [&](const AnyForm::Term& t) {
-                if (t.place <= r) square = std::fmax(square, std::fabs(t.factor * row(t.place).c[r]));
-            });
-        return std::sqrt(square);
+        return fastest([](int r, int c) { return c <= r; });
     }
     // The fastest rates [1/s] by which a state decays or grows by itself, and by which two swing.
     double fastest_decay() const {
@@ -451,59 +458,48 @@ struct LinearRatesOf<Any> {
         return most;
     }
     double fastest_swing() const {
-        double square = 0.0;
-        for (int r = 0; r < n.coupled; ++r)
-            each_coupled(r, [&](const AnyForm::Term& t) {
-                if (t.place != r) square = std::fmax(square, std::fabs(t.factor * row(t.place).c[r]));
-            });
-        return std::sqrt(square);
+        return fastest([](int r, int c) { return c != r; });
     }
     // Calls use(column, coefficient) for what of a row may be other than zero.
     template <class Use>
     void each_in_row(int r, Use&& use) const {
-        each_coupled(r, [&](const AnyForm::Term& t) { use(t.place, t.factor); });
+        row(r).each_of(AnyForm::of_coupled, 0, use);
     }
 
     State magnitude(const State& x, const Memory& m, const Inputs& u) const {
         State out = higher_magnitude(x, u);
-        out.coupled = out.coupled + of_rows([&](int r) {
-                          double kept = 0.0;
-                          each_memory_of<D>(row(r), [&](int k, double c) { kept += m[k] * std::fabs(c); });
-                          return std::fabs(row(r).c[D::one]) + kept;
-                      });
+        out.coupled = out.coupled + (absolute(fixed_) +
+                                     of_memory([&](const OfMemory& t) { return m[t.memory] * std::fabs(t.factor); }));
         return out;
     }
     State higher_magnitude(const State& derivative, const Inputs& u) const {
+        if (is_small())
+            return {
+                matrix_.product<true>(derivative.coupled) + of_inputs(u, [](const Pack<4>& c) { return absolute(c); }),
+                angle_rate(derivative.coupled)};
         State out;
-        out.coupled = of_rows([&](int r) {
-            const auto [begin, end] = row(r).between(0, D::coupled);
-            const double own = AnyForm::sum_of_coupled(
-                begin, end, [&](const auto& t) { return derivative.coupled[t.place] * std::fabs(t.factor); });
+        double* to = out.coupled.resized(n.coupled);
+        for (int r = 0; r < n.coupled; ++r) {
+            to[r] =
+                row(r).sum_of_coupled([&](int k, double factor) { return derivative.coupled[k] * std::fabs(factor); });
             double forced = 0.0;
             each_input_of<D>(row(r), [&](int i, double c) { forced += u[i] * std::fabs(c); });
-            return own + forced;
-        });
-        for (int j = 0; j < n.angles; ++j) out.angle[j] = angle_coefficient[j] * derivative.coupled[angle_speed[j]];
+            to[r] += forced;
+        }
+        out.angle = angle_rate(derivative.coupled);
         return out;
     }
 
  private:
-    struct OfMemory {
-        int row, memory;
-        double factor;
-    };
-    template <class Use>
-    void each_coupled(int r, Use&& use) const {
-        const auto [begin, end] = row(r).between(0, D::coupled);
-        for (auto* t = begin; t != end; ++t) use(*t);
-    }
-    template <class Value>
-    Coupled of_rows(Value&& value) const {
-        Coupled out;
-        out.reach(static_cast<std::size_t>(n.coupled));
-        double* to = out.data();
-        for (int r = 0; r < n.coupled; ++r) to[r] = value(r);
-        return out;
+    // Of two states that act on each other, of those pairs that count.
+    template <class Counts>
+    double fastest(Counts&& counts) const {
+        double square = 0.0;
+        for (int r = 0; r < n.coupled; ++r)
+            each_in_row(r, [&](int c, double factor) {
+                if (counts(r, c)) square = std::fmax(square, std::fabs(factor * row(c).c[r]));
+            });
+        return std::sqrt(square);
     }
 
     const std::vector<AnyForm>* rows_ = nullptr;  // those of the regime

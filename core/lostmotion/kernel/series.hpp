@@ -63,13 +63,11 @@ class Series {
     // Bound on |exp(A s)| times these magnitudes for 0 <= s <= h, |A| h <= theta.
     static Numbers exponential_bound(const LinearRatesOf<Any>& rates, const Numbers& magnitudes, double h,
                                      double theta) {
-        const SparseRates positive = rates.sparse().magnitudes();
-        Numbers sum = magnitudes, last = magnitudes, next;
-        sum.reach(static_cast<std::size_t>(rates.n.coupled));
-        last.reach(sum.size());
-        next.reach(sum.size());
-        for (int k = 1; k <= terms(theta); ++k) {
-            positive.multiply(last.data(), next.data());
+        Numbers sum = magnitudes, last, next;
+        sum.reach(rates.n.coupled);
+        last = sum;
+        for (int k = 1, count = terms(theta); k <= count; ++k) {
+            rates.sparse().multiply(last.data(), next.resized(sum.size()), true);
             last = h / k * next;
             sum = sum + last;
         }
@@ -77,13 +75,12 @@ class Series {
     }
     // Bound on their fourth derivatives all through the step.
     Numbers fourth_bound() const {
-        Numbers out;
-        out.reach(n_);
+        Numbers out = Numbers::zeros(static_cast<int>(n_));
         const double h4 = h_ * h_ * h_ * h_;
         for (int k = count_; k >= 4; --k) {
             const double* c = term(k);
             const double factor = k * (k - 1.0) * (k - 2.0) * (k - 3.0) / h4;
-            for (std::size_t j = 0; j < n_; ++j) out[j] += factor * std::fabs(c[j]);
+            for (std::size_t j = 0; j < n_; ++j) out.data()[j] += factor * std::fabs(c[j]);
         }
         return out;
     }
@@ -122,8 +119,7 @@ class Series {
     const double* term(int k) const { return c_.data() + static_cast<std::size_t>(k - 1) * n_; }
     template <class Factor>
     Numbers sum(Factor&& factor) const {
-        Numbers out;
-        out.reach(n_);
+        Numbers out = Numbers::zeros(static_cast<int>(n_));
         double* to = out.data();
         for (int k = count_; k >= 1; --k) {
             const double* c = term(k);
@@ -150,7 +146,7 @@ class Series {
     double h_ = 0.0;
     int count_ = 0;
     const LinearRatesOf<Any>* rates_ = nullptr;
-    Few<double, 4> angle_rate_;
+    AnglesOf<Any> angle_rate_;
     std::vector<double> c_;  // term by term
     std::vector<Varying> varying_;
 };

@@ -24,9 +24,12 @@ struct InstantsOf {
 
     [[gnu::always_inline]] void set(int k, const LanesOf<D>& state, const InputsOf<D>& input) {
         if constexpr (std::same_as<D, Any>) {
-            x.coupled.resize(std::max(x.coupled.size(), state.coupled.size()));
-            x.angle.resize(std::max(x.angle.size(), state.angle.size()));
-            u.resize(std::max(u.size(), input.size()));
+            const auto widen = [](auto& columns, int size) {
+                columns.resize(std::max(columns.size(), static_cast<std::size_t>(size)));
+            };
+            widen(x.coupled, state.coupled.size());
+            widen(x.angle, state.angle.size());
+            widen(u, input.size());
             for (std::size_t j = 0; j < x.coupled.size(); ++j) x.coupled[j][k] = state.coupled[j];
             for (std::size_t j = 0; j < x.angle.size(); ++j) x.angle[j][k] = state.angle[j];
             for (std::size_t i = 0; i < u.size(); ++i) u[i][k] = input[i];
@@ -107,7 +110,7 @@ class Stride {
                 t.sine_cosine = t.rotation * t.sine_cosine;
             }
             Lanes own{step_->change * x.coupled, {}};
-            for (int j = 0; j < n_.angles; ++j) own.angle[j] = (angle_row_[j] * x.coupled).sum();
+            for (int j = 0; j < n_.angles; ++j) own.angle[j] = sum_of(angle_row_[j] * x.coupled);
             x = own + (x + driven);  // so that one sum less waits for the step before
             forced = forced + growth_;
             for (int i = 0; i < n_.inputs; ++i) linear_[i] += increase_[i];

@@ -88,7 +88,7 @@ class Expansion {
  private:
     // A vector times one of four numbers.
     template <int k>
-    [[gnu::always_inline]] static Coupled by(const Pack<4>& c, const Coupled& v) {
+    [[gnu::always_inline]] static auto by(const Pack<4>& c, const Coupled& v) {
         if constexpr (D::coupled == 4)
             return c.spread<k>() * v;
         else
@@ -131,10 +131,8 @@ struct IntegralOf {
  private:
     [[gnu::always_inline]] AnglesOf<D> angle_changes(const CoupledOf<D>& rate) const {
         AnglesOf<D> out;
-        if constexpr (std::same_as<D, Any>) {
-            for (int j = 0; j < n.angles; ++j) out[j] = product(load(angle[static_cast<std::size_t>(j)]), rate);
-        } else if constexpr (D::angles == 1) {
-            out[0] = (load(angle[0]) * rate).sum();
+        if constexpr (std::same_as<D, Any> || D::angles == 1) {
+            for (int j = 0; j < n.angles; ++j) out[j] = sum_of(load(angle[static_cast<std::size_t>(j)]) * rate);
         } else {  // at once
             constexpr int last = D::angles - 1;
             const auto of = [&](int j) ALWAYS_INLINE { return load(angle[std::min(j, last)]) * rate; };
@@ -171,8 +169,7 @@ class Taylor {
 
     const LinearRates& rates() const { return *rates_; }
 
-    // At an instant with this rate and these inputs.
-    // Without the powers of the matrix.
+    // About an instant with this rate and these inputs, without the powers of the matrix.
     static void expand_by_rates(const LinearRates& rates, const Lanes& rate, const InputState<D>& input,
                                 Expansion<D>& out)
         requires(std::same_as<D, Any>)
@@ -186,6 +183,7 @@ class Taylor {
         for (std::size_t k = 1; k < terms; ++k)
             out.coupled[k] = rates * out.coupled[k - 1] + rates.forced(out.input[k]);
     }
+    // The same by the powers of the matrix.
     [[gnu::always_inline]] void expand(const Lanes& rate, const InputState<D>& input, Expansion<D>& out) const {
         input.template jet<terms + 1>(out.input.data());
         Varies varies;
@@ -255,7 +253,7 @@ class Taylor {
         Coupled now, next, after;
 
         // To x^(k+3), from the k-th derivative of the input and the two after it.
-        [[gnu::always_inline]] Coupled bring(double first, double second, double third) const {
+        [[gnu::always_inline]] auto bring(double first, double second, double third) const {
             return first * after + (second * next + third * now);
         }
     };
@@ -267,25 +265,32 @@ class Taylor {
         out.angle_coefficient = rates_->angle_coefficient;
         out.angle_speed = rates_->angle_speed;
         out.n = rates_->n;
-        const auto recur = [&](auto forced) ALWAYS_INLINE {
+        const auto recur = [&](auto force) ALWAYS_INLINE {
             auto& v = out.coupled;
+            const auto set = [&](Coupled& to, Coupled x, int k) ALWAYS_INLINE {
+                force(x, k);
+                to = x;
+            };
             v[0] = rate.coupled;
-            v[1] = forced(rates_->matrix() * v[0], -2);
-            v[2] = forced(squared_ * v[0], -1);
-            for (int k = 0; k + 3 < terms; ++k) v[k + 3] = forced(cubed_ * v[k], k);
+            set(v[1], rates_->matrix() * v[0], -2);
+            set(v[2], squared_ * v[0], -1);
+            for (int k = 0; k + 3 < terms; ++k) set(v[k + 3], cubed_ * v[k], k);
         };
-        const auto force = [&](Coupled x, int k, int i) ALWAYS_INLINE {
+        const auto force = [&](Coupled& x, int k, int i) ALWAYS_INLINE {
             const auto u = [&](int j) { return j < 1 ? 0.0 : out.input[static_cast<std::size_t>(j)][i]; };
-            return x + input_[i].bring(u(k + 1), u(k + 2), u(k + 3));
+            x = x + input_[i].bring(u(k + 1), u(k + 2), u(k + 3));
         };
-        const auto free = [](Coupled x, int) ALWAYS_INLINE { return x; };
+        const auto free = [](Coupled&, int) ALWAYS_INLINE {};
         if constexpr (D::inputs == 2) {  // every case by itself, for the sake of speed
             if (varies[0] && varies[1])
-                recur([&](Coupled x, int k) ALWAYS_INLINE { return force(force(x, k, 0), k, 1); });
+                recur([&](Coupled& x, int k) ALWAYS_INLINE {
+                    force(x, k, 0);
+                    force(x, k, 1);
+                });
             else if (varies[0])
-                recur([&](Coupled x, int k) ALWAYS_INLINE { return force(x, k, 0); });
+                recur([&](Coupled& x, int k) ALWAYS_INLINE { force(x, k, 0); });
             else if (varies[1])
-                recur([&](Coupled x, int k) ALWAYS_INLINE { return force(x, k, 1); });
+                recur([&](Coupled& x, int k) ALWAYS_INLINE { force(x, k, 1); });
             else
                 recur(free);
         } else {
@@ -296,11 +301,10 @@ class Taylor {
             if (n == 0)
                 recur(free);
             else if (n == 1)
-                recur([&, i = varying[0]](Coupled x, int k) ALWAYS_INLINE { return force(x, k, i); });
+                recur([&, i = varying[0]](Coupled& x, int k) ALWAYS_INLINE { force(x, k, i); });
             else
-                recur([&](Coupled x, int k) {
-                    for (int j = 0; j < n; ++j) x = force(x, k, varying[j]);
-                    return x;
+                recur([&](Coupled& x, int k) {
+                    for (int j = 0; j < n; ++j) force(x, k, varying[j]);
                 });
         }
     }

@@ -259,6 +259,7 @@ template <int n>
 
 inline Vec min_of(Vec a, Vec b) { return chosen(a < b, a, b); }
 template <class V>
+    requires(!requires(V v) { v.four(0); })
 [[gnu::always_inline]] inline V absolute(V a) {
     return magnitude_of(a);
 }

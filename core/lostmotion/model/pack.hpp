@@ -27,15 +27,14 @@ template <class D>
 PackedForm<D> pack(const Row& f, const Layout& n) {
     PackedForm<D> out;
     if constexpr (std::same_as<D, Any>) {
-        auto& terms = out.c.terms();
         const double* c = f.c.begin();
         for (int k = 0, end = std::min(static_cast<int>(f.c.size()), n.terms); k < end; ++k)
             if (c[k] != 0.0)
-                terms.push_back({k < n.states         ? state_place<D>(n, k)
-                                 : k < n.first_memory ? D::one
-                                 : k < n.first_input  ? D::first_memory + k - n.first_memory
-                                                      : D::first_input + k - n.first_input,
-                                 c[k]});
+                out.c.append(k < n.states         ? state_place<D>(n, k)
+                             : k < n.first_memory ? D::one
+                             : k < n.first_input  ? D::first_memory + k - n.first_memory
+                                                  : D::first_input + k - n.first_input,
+                             c[k]);
     } else {
         const int known = static_cast<int>(f.c.size());
         // Most often as many as there is room for.
@@ -194,6 +193,7 @@ SignalsOf<D> packed_signals(const std::vector<Signal>& inputs) {
 template <class D>
 StartOf<D> packed_start(const Layout& n, std::span<const double> x, std::span<const double> memory) {
     StartOf<D> start;
+    make_room<D>(start.x, CountsOf<D>(counts_of(n)));
     for (std::size_t k = 0; k < x.size(); ++k) start.x[state_place<D>(n, static_cast<int>(k))] = x[k];
     for (std::size_t k = 0; k < memory.size(); ++k) start.memory[k] = memory[k];
     return start;

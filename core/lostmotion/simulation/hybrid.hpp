@@ -66,7 +66,7 @@ Status SimulationOf<System>::follow(const typename System::Guard* fired) {
     now.x = now_.x;
     now.memory = now_.memory;
     now.input[0] = inputs();
-    for (std::size_t k = 0; k < now.input[0].size(); ++k) now.input_magnitudes[k] = std::fabs(now.input[0][k]);
+    now.input_magnitudes = magnitudes(now.input[0]);
     const Inputs before = fired != nullptr ? now.input[0] : now_.course.input;
     const Found found = system_.next(solver_.cache(), now, fired, now_.key, before);
     if (found != Found::yes) return status_of(found);

@@ -26,7 +26,7 @@ class PowerIntegral {
  public:
     using State = StateOf<D>;
     using LinearForm = LinearFormOf<D>;
-    using Flows = std::conditional_t<std::same_as<D, Any>, Few<double, 32>, std::array<double, N>>;
+    using Flows = typename FormTable<D, N>::Values;
 
     Flows flow{};              // [J] so far
     double turned_over = 0.0;  // [J] sum of the magnitudes of all flows, panel by panel (or of apparent energies)

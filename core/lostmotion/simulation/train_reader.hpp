@@ -154,8 +154,7 @@ class TrainReader {
     static Vec evaluate(const LinearFormOf<D>& f, double constant, const Instants& at, int k) {
         if constexpr (std::same_as<D, Any>) {
             Vec own{}, forced{};
-            const auto [begin, end] = f.between(0, D::coupled);
-            for (auto* t = begin; t != end;) {
+            for (auto [t, end] = f.c.part(AnyForm::of_coupled); t != end;) {
                 const int four = t->place / 4;
                 Vec part[4] = {};
                 for (; t != end && t->place / 4 == four; ++t)

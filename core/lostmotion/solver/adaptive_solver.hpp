@@ -127,6 +127,7 @@ class AdaptiveSolver {
         if (!std::is_same_v<Remainder, NoRemainder> && system_.has_dry_contacts()) return Status::unseen;
         time_ = time;
         now_.x = x;
+        make_room<D>(now_.x, system_.counts());
         now_.memory = memory;
         input_.anchor(time_);
         see_inputs(system_, input_, time_, now_);

@@ -121,14 +121,9 @@ template <class System>
 inline auto ExactSolver<System>::bound_fourth(const GuardTable& guards, Propagator& p, int level,
                                               const Coupled& magnitude) -> void {
     State bound;
-    if constexpr (std::same_as<D, Any>) {
-        if (p.by_series())
-            bound.coupled = p.series().fourth_bound();
-        else
-            bound.coupled = p.level(level).exponential_bound * magnitude;
-    } else {
-        store<D>(p.level(level).exponential_bound * magnitude, bound);
-    }
+    if constexpr (std::same_as<D, Any>)
+        if (p.by_series()) bound.coupled = p.series().fourth_bound();
+    if (!p.by_series()) store<D>(p.level(level).exponential_bound * magnitude, bound);
     guards.rate_magnitudes(bound, input_bound_, bounds_.fourth);
 }
 
@@ -165,16 +160,14 @@ inline auto ExactSolver<System>::judge(Entry& e, const Memory& memory, const Cur
                                        const Ends& there, double h, bool shortest) -> Verdict {
     Guards doubtful = enclose(e.guards.rows(), here, there, h);
     n_crossing_ = 0;
-    // What counts as zero when the speed of a twist grazes it.
-    ListOf<D, double, D::twists> grazing{};
     for (int t = 0; t < e.n_twists; ++t) {
         const int g = e.twists[t].grazing_guard;
         if (g < 0) continue;
         auto& twist = course_.twist[t];
         twist.grazing_magnitude = std::max(twist.grazing_magnitude, e.grazing_magnitude(e.twists[t], cursor.x()));
-        grazing[t] = cursor.carries_rate() ? twist_speed_rounding(e, t, cursor) : rounding * twist.grazing_magnitude;
-        twist.off_zero |= here.value[g] > grazing[t];
-        if (bounds_.lower[g] <= grazing[t]) doubtful.set(g);
+        grazing_[t] = cursor.carries_rate() ? twist_speed_rounding(e, t, cursor) : rounding * twist.grazing_magnitude;
+        twist.off_zero |= here.value[g] > grazing_[t];
+        if (bounds_.lower[g] <= grazing_[t]) doubtful.set(g);
     }
     doubtful -= e.behind;
     if (doubtful.empty()) return Verdict::clear;
@@ -185,7 +178,7 @@ inline auto ExactSolver<System>::judge(Entry& e, const Memory& memory, const Cur
         const double low = bounds_.lower[g], error = bounds_.error[g];
         const Cubic c(here.value[g], here.slope[g], there.value[g], there.slope[g], h);
         const int t = e.grazing_twist(g);
-        const double near = t >= 0 ? grazing[t] : 0.0;
+        const double near = t >= 0 ? grazing_[t] : 0.0;
         const bool grazes = t >= 0 && course_.twist[t].off_zero && low - error <= near && c.c3 > near;
         if (low > error && !grazes) return true;
         const double magnitude = e.guards.magnitude_of(g, memory_magnitudes, state_magnitudes, cursor.input());
@@ -247,7 +240,7 @@ inline auto ExactSolver<System>::departure(const Entry& e, const Memory& memory,
     -> Departure {
     const InstantOf<D> now{time_, cursor.x(), memory, cursor.input().jet(), cursor.input().magnitudes()};
     Flow<D> flow(e.rates, now);
-    const LinearForm form = e.guards.form(g);
+    const LinearForm& form = e.regime.guards[g].form;
     Departure out;
     for (std::size_t k = 1; k < 4; ++k) {
         const double value = out.derivative[k] = flow.rate(form, static_cast<int>(k));

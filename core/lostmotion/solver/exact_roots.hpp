@@ -88,20 +88,19 @@ inline auto ExactSolver<System>::first_crossing(Entry& e, const Memory& memory, 
                                                 const Ends& there, double h, const Guard*& fired) -> void {
     double best = std::numeric_limits<double>::infinity();
     const auto cubic = [&](int g) { return Cubic(here.value[g], here.slope[g], there.value[g], there.slope[g], h); };
-    ListOf<D, double, D::guards> estimate;
     for (int k = 0; k < n_crossing_; ++k) {
-        const auto& [g, grazing, starts_on_zero] = crossing_[k];
-        const Cubic c = cubic(g);
-        estimate[g] = grazing ? c.lowest_at() : c.zero(c.c3 < 0.0 && c.slope(1.0) <= 0.0 ? 1.0 : c.lowest_at());
+        Crossing& at = crossing_[k];
+        const Cubic c = cubic(at.guard);
+        at.estimate = at.grazing ? c.lowest_at() : c.zero(c.c3 < 0.0 && c.slope(1.0) <= 0.0 ? 1.0 : c.lowest_at());
     }
     if (n_crossing_ > 1)
         std::sort(crossing_.begin(), crossing_.begin() + n_crossing_,
-                  [&](const Crossing& a, const Crossing& b) { return estimate[a.guard] < estimate[b.guard]; });
+                  [](const Crossing& a, const Crossing& b) { return a.estimate < b.estimate; });
     for (int k = 0; k < n_crossing_; ++k) {
-        const auto& [g, grazing, starts_on_zero] = crossing_[k];
+        const auto& [g, grazing, starts_on_zero, estimate] = crossing_[k];
         // Still positive where another has crossed: later.
         if (k > 0 && cubic(g)(best / h) > bounds_.error[g]) continue;
-        double s = estimate[g] * h;
+        double s = estimate * h;
         if (grazing) {
             trial_->advance_from(cursor, s);
         } else {

@@ -84,6 +84,7 @@ class ExactSolver {
     void resume(double time, const State& x, const Memory& memory, const Key& key, const Course& course = {}) {
         set_time(time);
         now_.x = x;
+        make_room<D>(now_.x, system_.counts());
         now_.memory = memory;
         key_ = key;
         course_ = course;
@@ -148,12 +149,7 @@ class ExactSolver {
     };
 
     // What is known beside the state: exact_course.hpp.
-    static bool moderate(const State& rate) {
-        if constexpr (std::same_as<D, Any>)
-            return absolute(rate.coupled).sum() < 1e100;
-        else
-            return sum_in_fours<D::coupled>([&](auto k) { return std::fabs(rate[k]); }) < 1e100;
-    }
+    static bool moderate(const State& rate) { return sum_of(absolute(coupled(rate))) < 1e100; }
     [[gnu::noinline]] bool has_settled(const Regime& regime, const State& rate) const;
     bool rest_unforced(Entry& e, const State& rate);
     [[gnu::cold]] void follow_inputs(const Key& before, const State& x_before);
@@ -223,8 +219,10 @@ class ExactSolver {
     struct Crossing {
         int guard;
         bool grazing, starts_on_zero;
+        double estimate = 0.0;  // of when, as a share of the event check
     };
     ListOf<D, Crossing, D::guards> crossing_{};
+    ListOf<D, double, D::twists> grazing_{};  // by twist: what counts as zero when its speed grazes it
     int n_crossing_ = 0;
     Course course_;
     Accumulation accumulation_;
@@ -251,6 +249,7 @@ Status ExactSolver<System>::begin(double time, const State& x, const Memory& mem
     course_ = {};
     switchings_ = 0;
     now_.x = x;
+    make_room<D>(now_.x, system_.counts());
     now_.memory = memory;
     anchor_inputs();
     course_.input = now_.input[0];

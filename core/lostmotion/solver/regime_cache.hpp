@@ -65,7 +65,7 @@ class RegimeCache {
             std::construct_at(&rates, system.counts(), r.rate);
             if constexpr (requires { r.given; }) rates.given = r.given.empty() ? nullptr : &r.given;
             guards.clear();
-            if constexpr (std::same_as<D, Any>) guards.set_states(rates.n.coupled);
+            guards.set_counts(rates.n);
             neighbour = {};
             n_speeds = 0;
             contacts = behind = {};
@@ -110,14 +110,11 @@ class RegimeCache {
         }
         // Sum of the magnitudes of the terms of a guard that ends by touching, a speed.
         double grazing_magnitude(const Twist& twist, const State& x) const {
-            if constexpr (std::same_as<D, Any>) {
-                const auto [begin, end] = guards.form(twist.grazing_guard).between(0, D::coupled);
-                return AnyForm::sum_of_coupled(begin, end,
-                                               [&](const auto& t) { return std::fabs(t.factor * x[t.place]); });
-            } else {
-                return sum_in_fours<D::coupled>(
-                    [&](auto k) { return std::fabs(guards.coefficient(twist.grazing_guard, k) * x[k]); });
-            }
+            const LinearForm& f = regime.guards[twist.grazing_guard].form;
+            if constexpr (std::same_as<D, Any>)
+                return f.sum_of_coupled([&](int k, double factor) { return std::fabs(factor * x[k]); });
+            else
+                return sum_of(absolute(coupled<D>(f) * coupled(x)));
         }
         // The states that an input acts on, by way of others, too.
         const States& reached(int input) {
@@ -163,8 +160,8 @@ class RegimeCache {
                 const auto next = [this](const AnyForm::Term*& t, const AnyForm::Term* end) {
                     while (t != end && (t->factor == 0.0 || regime.resting[t->place])) ++t;
                 };
-                auto [a, end_a] = speed.between(0, D::coupled);
-                auto [b, end_b] = rate.between(0, D::coupled);
+                auto [a, end_a] = speed.c.part(AnyForm::of_coupled);
+                auto [b, end_b] = rate.c.part(AnyForm::of_coupled);
                 double first_a = 0.0, first_b = 0.0;
                 for (next(a, end_a), next(b, end_b); a != end_a || b != end_b; next(a, end_a), next(b, end_b)) {
                     if (a == end_a || b == end_b || a->place != b->place) return 0.0;
