@@ -175,3 +175,23 @@ def test_a_changed_axis_speaks_of_the_keys_of_its_file() -> None:
     with pytest.raises(lm.InputError) as refusal:
         changed.replace(**{"slides.slide.mass": -1.0})
     assert [problem.keys for problem in refusal.value.problems] == [("axis.slide.mass",)]
+
+
+def test_the_one_command_and_the_one_load_are_given_alike_in_each_form() -> None:
+    scenario = lm.load("catalogue-robot-joint")
+    wave = lm.CommandSignal(amplitude=0.2, frequency=2.0)
+    times = {"duration": 0.1, "sample_interval": 0.01}
+    state = lm.Initial(motor_speed=5.0, load_speed=0.05)
+    calls: list[Callable[[lm.Scenario], Any]] = [
+        lambda s: lm.simulate(s, command=wave, load_torque=1.0, initial=state, **times)["load_speed"],
+        lambda s: lm.simulate(s, initial=state.of_train(), **times)["load_speed"],
+        lambda s: lm.periodic_motion(s, wave, 1.0)["load_speed"],
+        lambda s: lm.linearize(s, state, command=0.1, load_torque=1.0).response(
+            3.0, "load_speed", next(iter(s.signals()))
+        ),
+        lambda s: lm.frequency_response(s, [2.0], 0.2, mean_command=0.05, mean_load_torque=1.0)["response"].sel(
+            output="load_speed"
+        ),
+    ]
+    for call in calls:
+        assert np.array_equal(call(scenario), call(scenario.long()))

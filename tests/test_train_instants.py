@@ -181,7 +181,7 @@ REFUSED = [
     (lambda s: setattr(s, "state", lm.Simulation(WORM.replace(**{"shafts.drum.inertia": 3.0})).state), "of another drive"),
     (lambda _: lm.Simulation(WORM, loaded=["dum"]), 'loaded: "dum" is no shaft of this train; did you mean drum?'),
     (lambda _: lm.linearize(WORM), "depends on the operating point (dry contacts: rotor_contact, worm_contact)"),
-    (lambda _: lm.linearize(lm.load("two-motors-one-ring"), lm.TrainInitial(), command=0.1), "command: there are several; give one in inputs"),
+    (lambda _: lm.linearize(lm.load("two-motors-one-ring"), lm.TrainInitial(), command=0.1), "command: there are several; give them by name"),
     (lambda _: lm.linearize(WORM, lm.TrainInitial(), inputs={"motor_comand": 1.0}), '"motor_comand" is no input of this train; did you'),
     (lambda _: lm.linearize(WORM, lm.TrainInitial(), time=0.1), "state: at a time of a run, state and inputs are its own"),
     (lambda _: lm.linearize(WORM.train(), time=0.1), "time: a drive alone has no run"),

@@ -211,9 +211,9 @@ REFUSED = [
     ),
     (
         lambda t: lm.frequency_response(t, [1.0], [0.1], source="left_command", mean_command=0.1),
-        "mean_command: is for drives",
+        "mean_command: there are several",
     ),
-    (lambda t: lm.periodic_motion(t, 0.1), "command: is for drives; what acts on a train stands in its scenario"),
+    (lambda t: lm.periodic_motion(t, 0.1), "command: there are several"),
     (lm.periodic_motion, "needs at least one sine"),
 ]
 

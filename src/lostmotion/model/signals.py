@@ -348,3 +348,8 @@ class TorqueSignal(described.TorqueSignalFields, Signal[Torque]):
             raise ValueError("has wind and samples, which cannot be scaled together; give one of them")
         plain = self.model_copy(update={"wind": None, "samples": Samples[Torque](times=time, values=torque)})
         return super(TorqueSignal, plain).scaled(factor)
+
+
+def constant_or(value: Any, kind: Any) -> Any:
+    """A number as a constant signal of a kind; a signal as it is."""
+    return kind(mean=value) if isinstance(value, int | float) else value

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +24,7 @@ from ..simulation.scenario import Scenario
 from ..simulation.stepping import Simulation
 from ..simulation.train_parts import NO_CONTACT
 from ..simulation.train_tables import TrainInitial
-from ..simulation.train_variables import angle_through, angles_through_gears, train_variables
+from ..simulation.train_variables import angle_through, angles_through_gears, only_input, train_variables
 from ..simulation.variables import CONTACTS, STATES, VARIABLES
 
 if TYPE_CHECKING:
@@ -227,7 +227,8 @@ def linearize(
         ("load_torque_rate", of_rates, rates["load_torque_rate"]),
     ):
         if given[name]:
-            values[_the_only(name, scenario, names)] = value
+            word = name.removesuffix("_rate")
+            values[only_input(scenario.train(), word, names, name)] = value
     return _model_at(scenario, core, None if state is None else state.of_train(), of_inputs, of_rates)
 
 
@@ -236,17 +237,6 @@ def _subject(what: Drive | DriveTrain | Scenario) -> tuple[Scenario, _core.Train
     scenario = Scenario.of_any(what)
     need_free_motion(scenario, "linearize")
     return scenario, scenario.core(sampled=False, loaded=list(what.shafts) if isinstance(what, DriveTrain) else None)
-
-
-def _the_only(name: str, scenario: Scenario, names: Sequence[str]) -> str:
-    """The input that is called so where there is one of its kind."""
-    train = scenario.train()
-    loads = {train.load_torque_of(shaft) for shaft in train.shafts}
-    found = [n for n in names if (n in loads) == name.startswith("load_torque")]
-    if len(found) == 1:
-        return found[0]
-    several = f"there are several; give one in inputs, by name: {', '.join(found)}" if found else "there is none"
-    raise InputError(f"{name}: {several}")
 
 
 def _refuse(given: dict[str, bool], why: str) -> None:

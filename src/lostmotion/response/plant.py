@@ -14,9 +14,10 @@ from ..errors import InputError
 from ..inputs.validation import listed, shown
 from ..model.drive import Drive
 from ..model.signals import Signal
+from ..model.train import DriveTrain
 from ..simulation.needs import need_free_motion, need_open_loop
 from ..simulation.scenario import Scenario
-from ..simulation.train_variables import REFERENCE_UNITS, axis_variables
+from ..simulation.train_variables import REFERENCE_UNITS, axis_variables, only_input
 from ..simulation.variables import Variable
 
 
@@ -24,6 +25,7 @@ from ..simulation.variables import Variable
 class Plant:
     """A drive or a train as the search for periodic motions takes it: with commands, or with controllers and their references."""
 
+    train: DriveTrain
     core: _core.Train
     signals: Mapping[str, Signal[Any]]
     """by the name of their variable; of open loops in the order of the core"""
@@ -84,25 +86,22 @@ class Plant:
         return next(v.unit for v in self.variables if v.name == source)
 
     def with_means(self, command: float | None, load_torque: float | None) -> Plant:
-        """The same with other constant inputs of a drive.
+        """The same with another constant part of the one command and the one load torque.
 
         Raises
         ------
         InputError
-            It is a train.
+            There is none, or there are several.
         """
-        given = {"command": command, "load_torque": load_torque}
-        wanted = {name: mean for name, mean in given.items() if mean is not None}
-        for name in wanted:
-            if name not in self.signals and self.closed is not None:
+        wanted = {}
+        for word, mean in (("command", command), ("load_torque", load_torque)):
+            if mean is None:
+                continue
+            if word == "command" and self.closed is not None:
                 raise InputError(
-                    f"mean_{name}: a controller turns the motor; the constant part of its reference is that of the scenario"
+                    "mean_command: a controller turns the motor; the constant part of its reference is that of the scenario"
                 )
-            if name not in self.signals:
-                raise InputError(
-                    f"mean_{name}: is for drives; of a train the constant parts of its inputs are those of its scenario, "
-                    f"{', '.join(self.signals)}; change them by scenario.replace"
-                )
+            wanted[only_input(self.train, word, self.signals, f"mean_{word}")] = mean
         means = {name: type(s)(mean=wanted.get(name, s.mean)) for name, s in self.signals.items()}
         return replace(self, signals=means)
 
@@ -178,6 +177,7 @@ def _plant_of(scenario: Scenario) -> Plant:
                 train.speed_of(gear.output): gear.rated_input_speed / abs(gear.ratio),
             }
     return Plant(
+        train=train,
         core=core,
         signals={name: signals[name] for name in core.input_names()},
         source=source,

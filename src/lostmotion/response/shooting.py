@@ -13,10 +13,11 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count, Number, Torque
 from ..model.drive import Drive
-from ..model.signals import CommandSignal, Signal, TorqueSignal
+from ..model.signals import CommandSignal, Signal, TorqueSignal, constant_or
 from ..simulation.drive_tables import Initial
 from ..simulation.scenario import Scenario
 from ..simulation.train_tables import TrainInitial
+from ..simulation.train_variables import only_input
 from ..units.practical import counted
 from .plant import Plant, plant_of
 
@@ -123,8 +124,8 @@ def periodic_motion(
     drive : Drive or Scenario
         The drive or the scenario.
     command, load_torque : CommandSignal, TorqueSignal or float, optional
-        E_C [-] and M_Z [N·m] of a drive: constants, or signals of mean and sines with a common period. Default: the values in the
-        scenario, or 0. The inputs of a train are those of its scenario.
+        The one command E_C [-] and the one load torque M_Z [N·m]: constants, or signals of mean and sines with a common period.
+        Default: the values in the scenario, or 0.
     multiple : int
         Number of periods of the inputs after which the motion repeats (sub-harmonics).
     start : Initial or TrainInitial, optional
@@ -153,7 +154,7 @@ def periodic_motion(
     (1, 1.0)
     """
     plant = plant_of(drive)
-    signals = _replaced(plant.signals, {"command": command, "load_torque": load_torque})
+    signals = _replaced(plant, {"command": command, "load_torque": load_torque})
     period = multiple * _period(signals.values())
     point = ([s.core() for s in signals.values()], period, plant.start if start is None else plant.start_of(start))
     r = respond(plant, [point], harmonics=1, keep_table=True, max_periods=max_periods, threads=1, progress=None)
@@ -162,18 +163,13 @@ def periodic_motion(
     return motion_of(r, plant, period)
 
 
-def _replaced(signals: Mapping[str, Signal[Any]], given: Mapping[str, Any]) -> dict[str, Signal[Any]]:
+def _replaced(plant: Plant, given: Mapping[str, Any]) -> dict[str, Signal[Any]]:
     """The inputs of a plant, with those that are given in place of its own."""
-    out = dict(signals)
-    for name, value in given.items():
-        if value is None:
-            continue
-        if name not in signals:
-            raise InputError(
-                f"{name}: is for drives; what acts on a train stands in its scenario, as {', '.join(signals)}; change it by "
-                "scenario.replace"
-            )
-        out[name] = type(signals[name])(mean=value) if isinstance(value, int | float) else value
+    out = dict(plant.signals)
+    for word, value in given.items():
+        if value is not None:
+            name = only_input(plant.train, word, out)
+            out[name] = constant_or(value, type(out[name]))
     return out
 
 

@@ -19,7 +19,7 @@ from ..model.drive import Drive
 from ..model.gearbox import Gearbox, Transmission
 from ..model.load import Load
 from ..model.motor import Motor
-from ..model.signals import CommandSignal, TorqueSignal
+from ..model.signals import CommandSignal, TorqueSignal, constant_or
 from ..model.task import Task
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
@@ -58,6 +58,30 @@ class Initial(described.InitialFields):
         }
         found = {key: {name: x for name, x in named.items() if x} for key, named in values.items()}
         return TrainInitial(**found, on_reference=self.on_reference)
+
+    @classmethod
+    def of_state(
+        cls, state: TrainInitial, shaft: str = MOTOR, load: str = LOAD, motor: str = MOTOR, gear: str = GEARBOX
+    ) -> Initial:
+        """The state of a drive from that of its train, whose shafts, motor and gear have these names.
+
+        Raises
+        ------
+        InputError
+            It has a value that a drive does not have.
+        """
+        keys = {
+            ("speeds", shaft): "motor_speed",
+            ("speeds", load): "load_speed",
+            ("angles", load): "load_angle",
+            ("twists", gear): "twist",
+            ("motor_torques", motor): "motor_torque",
+            ("hysteresis_capacities", gear): "hysteresis_capacity",
+        }
+        given = {(key, name): x for key, values in state if isinstance(values, dict) for name, x in values.items()}
+        if unknown := [f"initial.{key}.{name}" for key, name in given if (key, name) not in keys]:
+            raise InputError("is no state of a motor, a gearbox and a load; leave it out", *unknown)
+        return cls(**{keys[place]: x for place, x in given.items()}, on_reference=state.on_reference)
 
     def at_rest(self) -> Initial:
         """The same without motion and twist."""
@@ -191,18 +215,17 @@ def check_drive(scenario: Whole, written: DriveTables) -> None:
 
 def of_inputs(load: Load, simulation: SimulationTable | None, given: Mapping[str, Any]) -> dict[str, Any]:
     """The tables that change where `simulate` is given inputs and times."""
-    changes = {key: given[key] for key in ("initial",) if key in given}
+    changes: dict[str, Any] = {}
+    if "initial" in given:
+        start = given["initial"]
+        changes["initial"] = start if isinstance(start, Initial) else Initial.of_state(start)
     if times := {key: given[key] for key in SimulationTable.model_fields if key in given}:
         changes["simulation"] = SimulationTable(**dict(simulation or ()) | times)
     if "command" in given:
-        changes["command"] = _signal(given["command"], CommandSignal)
+        changes["command"] = constant_or(given["command"], CommandSignal)
     if "load_torque" in given:
-        changes["load"] = LoadTable(**dict(load) | {"torque": _signal(given["load_torque"], TorqueSignal)})
+        changes["load"] = LoadTable(**dict(load) | {"torque": constant_or(given["load_torque"], TorqueSignal)})
     return changes
-
-
-def _signal(value: Any, kind: Any) -> Any:
-    return kind(mean=value) if isinstance(value, int | float) else value
 
 
 def drive_schema() -> dict[str, Any]:

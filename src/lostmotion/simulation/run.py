@@ -23,6 +23,7 @@ from .results import RunArrays, raw_result, variables_of
 from .scenario import Scenario
 from .sensitivities import run_sensitivities
 from .train_parts import SIDE_BY_SIDE
+from .train_tables import TrainInitial
 from .windings import ATTRIBUTE as ERROR_BOUND
 from .windings import coarser, error_bound, oriented, too_slow
 
@@ -47,7 +48,7 @@ def simulate(
     load_torque: TorqueSignal | float | None = None,
     duration: float | None = None,
     sample_interval: float | None = None,
-    initial: Initial | None = None,
+    initial: Initial | TrainInitial | None = None,
     solver: SolverName = "exact",
     relative_tolerance: Number | None = None,
     energy: bool | None = None,
@@ -63,7 +64,7 @@ def simulate(
     load_torque: TorqueSignal | float | None = None,
     duration: float | None = None,
     sample_interval: float | None = None,
-    initial: Initial | None = None,
+    initial: Initial | TrainInitial | None = None,
     solver: SolverName = "exact",
     relative_tolerance: Number | None = None,
     energy: bool | None = None,
@@ -78,7 +79,7 @@ def simulate(
     load_torque: TorqueSignal | float | None = None,
     duration: float | None = None,
     sample_interval: float | None = None,
-    initial: Initial | None = None,
+    initial: Initial | TrainInitial | None = None,
     solver: SolverName = "exact",
     relative_tolerance: Number | None = None,
     energy: bool | None = None,
@@ -91,15 +92,15 @@ def simulate(
     Parameters
     ----------
     scenario_or_drive : Scenario or Drive
-        A scenario, whose values the other arguments replace, or a drive alone. The inputs of a drive train are those of its
-        scenario (`Scenario.replace` changes them); only duration and sample_interval can be given here.
+        A scenario, whose values the other arguments replace, or a drive alone. `Scenario.replace` changes the inputs of a train that
+        has several.
     command : CommandSignal or float, optional
-        E_C [-]. Default: the value in the scenario; 0 for a drive alone.
+        The one command, E_C [-]. Default: the value in the scenario; 0 for a drive alone.
     load_torque : TorqueSignal or float, optional
-        M_Z [N·m]. Default: the value in the scenario; 0 for a drive alone.
+        The one load torque M_Z [N·m], of a slide load force [N]. Default: the value in the scenario; 0 for a drive alone.
     duration, sample_interval : float, optional
         Times [s], required for a drive alone. They set the instants of the result and do not affect the motion.
-    initial : Initial, optional
+    initial : Initial or TrainInitial, optional
         State at t = 0. Default: rest.
     solver : str
         ``"exact"``, or ``"dormand-prince"`` for the adaptive solver, which computes no energy ledger.

@@ -31,6 +31,7 @@ from .simulation_state import SimulationState
 from .step_bound import StepBound
 from .stepping_parts import GIVE, MAX_INTERVAL, MIN_INTERVAL, Ramp, ends_of, masses_given, no_input, no_interval, parts
 from .train_tables import TrainInitial
+from .train_variables import only_input
 from .variables import Variable
 from .windings import bounded, coarser
 
@@ -166,10 +167,8 @@ class Simulation(SimulationAnswers):
         controlled = self._controlled()
         self._input_places = {name: k for k, name in enumerate(names) if name not in controlled and k not in motions}
         loads = {self._train.load_torque_of(shaft) for shaft in self._loaded}
-        self._only = {  # what `advance` calls so
-            "command": [name for name in self._input_places if name not in loads],
-            "load_torque": [name for name in self._input_places if name in loads],
-        }
+        self._required = [name for name in self._input_places if name not in loads]
+        self._only: dict[str, str] = {}  # what `advance` calls so
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For copies, which go on by themselves from the present state, and for pickling."""
@@ -319,7 +318,7 @@ class Simulation(SimulationAnswers):
             ramp = begin[places[name]], end[places[name]] = ends_of(name, value, self._input_units[name])
             if name in self._shares and max(ramp) > FULL_COMMAND:
                 raise InputError(f"{name} {shown(value)} is a share, and 1 is the full torque; give at most that")
-        if missing := [name for name in self._only["command"] if name not in inputs]:
+        if missing := [name for name in self._required if name not in inputs]:
             raise InputError(f"{', '.join(sorted(missing))}: missing; all commands and references are to be given")
         return begin, end
 
@@ -382,13 +381,11 @@ class Simulation(SimulationAnswers):
 
     def _the_only(self, word: str) -> str:
         """Name of the one input that `advance` calls a command or a load torque."""
-        names = self._only[word]
-        if len(names) == 1:
-            return names[0]
-        if word == "command" and self._controlled():
-            raise InputError("command: a controller of the scenario turns the motor; leave it out")
-        known = f"there are several; give them by name: {', '.join(names)}" if names else "there is none; leave it out"
-        raise InputError(f"{word}: {known}")
+        if word not in self._only:
+            if word == "command" and self._controlled():
+                raise InputError("command: a controller of the scenario turns the motor; leave it out")
+            self._only[word] = only_input(self._train, word, self._input_places)
+        return self._only[word]
 
     @staticmethod
     def _exchanging(control: Bound) -> Bound:

@@ -14,7 +14,7 @@ from ..control.continuous import ContinuousController
 from ..control.controller import AnyController, Controller
 from ..control.references import MovesReference  # noqa: F401
 from ..data_sheets.train_components import CONDITIONS, RECORDS
-from ..errors import InputError, inside
+from ..errors import inside
 from ..inputs import described
 from ..inputs.kept import kept
 from ..inputs.named import Elements, Named, nothing
@@ -22,14 +22,14 @@ from ..model.gearbox import Transmission
 from ..model.linear_train import LinearElements
 from ..model.motor import MotorLaw
 from ..model.shaft import Shaft
-from ..model.signals import CommandSignal, ForceSignal, Signal
+from ..model.signals import CommandSignal, ForceSignal, Signal, TorqueSignal, constant_or
 from ..model.slide import Slide
 from ..model.task import Task
 from ..model.train import DriveTrain
 from .given_motion import MotionDerivative
 from .linear_units import in_si
 from .tables import BASE, RECORD_NAME, ScenarioTables, SimulationTable, with_accessories
-from .train_variables import add_angles, train_variables
+from .train_variables import add_angles, only_input, train_variables
 from .variables import Variable
 
 
@@ -227,11 +227,24 @@ class TrainTables(ScenarioTables, LinearElements):
         return {"gears": {**self.gears, **{key.removeprefix("gears."): gear for key, gear in gears.items()}}}
 
     def of_inputs(self, given: Mapping[str, Any]) -> dict[str, Any]:
-        if others := [name for name in given if name not in SimulationTable.model_fields]:
-            raise InputError(
-                f"{others[0]}: a drive train has several; give them in its scenario, such as scenario.replace(**{{'command.NAME': 0.5}})"
+        times = {name: value for name, value in given.items() if name in SimulationTable.model_fields}
+        changes: dict[str, Any] = {"simulation": SimulationTable(**{**dict(self.simulation), **times})}
+        if "initial" in given:
+            changes["initial"] = given["initial"].of_train()
+        train, movers = self.train(), self.movers()
+        if "command" in given:
+            names = {train.command_of(name): name for name in train.commanded()}
+            name = names[only_input(train, "command", names)]
+            changes["command"] = {**self.command, name: constant_or(given["command"], CommandSignal)}
+        if "load_torque" in given:
+            names = {train.load_torque_of(name): name for name in self.loaded()}
+            name = names[only_input(train, "load_torque", names)]
+            table, key, kind = (
+                ("slides", "force", ForceSignal) if name in self.slides else ("shafts", "torque", TorqueSignal)
             )
-        return {"simulation": SimulationTable(**{**dict(self.simulation), **given})}
+            changed = movers[name].model_copy(update={key: constant_or(given["load_torque"], kind)})
+            changes[table] = {**getattr(self, table), name: changed}
+        return changes
 
     def open_loop(self) -> dict[str, Any]:
         commands = {name: CommandSignal() for name in self.controllers}

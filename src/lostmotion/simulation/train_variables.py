@@ -112,6 +112,31 @@ def named_signals(controllers: Mapping[str, Controller], values: Any) -> dict[st
     }
 
 
+def only_input(train: DriveTrain, word: str, names: Collection[str], argument: str = "") -> str:
+    """Name of the one command, or the one load torque, among inputs.
+
+    Parameters
+    ----------
+    word
+        command or load_torque
+    names
+        Of the inputs; references count as commands.
+    argument
+        What is given, for messages; default: the word.
+
+    Raises
+    ------
+    InputError
+        There is none, or there are several.
+    """
+    loads = {train.load_torque_of(shaft) for shaft in train.shafts}
+    found = [name for name in names if (name in loads) == (word == "load_torque")]
+    if len(found) == 1:
+        return found[0]
+    why = f"there are several; give them by name: {', '.join(found)}" if found else "there is none; leave it out"
+    raise InputError(f"{argument or word}: {why}")
+
+
 def angles_through_gears(train: DriveTrain, known: Collection[str]) -> Iterator[tuple[str, str, str, bool]]:
     """Relation of the angles that the solver does not integrate to those that it does.
 
