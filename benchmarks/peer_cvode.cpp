@@ -153,7 +153,7 @@ class Cvode {
         time_ = t;
         input_.anchor(t);
         see_inputs(input_, t, now_);
-        if (task_.system.start(task_.cache, now_, key_) != Found::yes) return Status::jammed;
+        if (task_.system.start(now_, key_) != Found::yes) return Status::jammed;
         enter();
         return Status::done;
     }

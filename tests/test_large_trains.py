@@ -241,7 +241,7 @@ def test_all_that_takes_a_train_takes_a_large_one(scenario: lm.Scenario) -> None
     assert len(lm.linearize(scenario, time=0.05).resonances()) > 0
     if scenario is LOOSE:  # of 40 masses it takes a quarter of a minute
         assert describe(scenario, "chain")["name"] == "chain"
-    with pytest.raises(lm.errors.InputError, match="must be a Drive"):
+    with pytest.raises(lm.errors.InputError, match="one motor that turns one load"):
         lm.SimulationBatch(scenario.train(), step=1e-3, count=2)  # type: ignore[arg-type]
 
     simulation = lm.Simulation(scenario)

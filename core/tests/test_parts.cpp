@@ -58,7 +58,7 @@ void with_propagator(const Drive& drive, bool slipping, const Use& use) {
     RegimeCache<model::TrainSystem<D>> cache(system);
     InstantOf<D> now;
     model::Key key;
-    REQUIRE(system.start(cache, now, key) == Found::yes);
+    REQUIRE(system.start(now, key) == Found::yes);
     const auto& contacts = model.assembly.places().contacts;
     for (std::size_t c = 0; slipping && c < contacts.size(); ++c)
         if (key.modes[c] == 0 && !contacts[c].bilateral) key.modes[c] = 1;

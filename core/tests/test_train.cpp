@@ -5,6 +5,7 @@
 #include "lostmotion/model/check.hpp"
 #include "lostmotion/model/names.hpp"
 #include "lostmotion/model/pack.hpp"
+#include "lostmotion/model/scales.hpp"
 #include "lostmotion/simulation/train_status.hpp"
 #include "random_trains.hpp"
 

@@ -190,15 +190,14 @@ TEST_CASE("accelerations of trains with housings that turn are those of Gauss's 
         if (!check(t).empty()) continue;
         for (Shaft& s : t.shafts) s.friction.breakaway_torque = 0.0;  // the principle needs one capacity
         const Assembly a(t);
-        const SwitchedTrain<> system(a);
-        MapCache cache(system);
+        SwitchedTrain search(a);
         Instant now = random.instant(a, 0.0);
         Key key;
         CAPTURE(n);
-        REQUIRE(system.start(cache, now, key) == Found::yes);
+        REQUIRE(search.start(now, key) == Found::yes);
         const std::vector<double> expected = least_constraint(a, now, 4000);
         for (std::size_t s = 0; s < expected.size(); ++s) {
-            const double mine = evaluate(a.layout(), cache.regime(key).rate[a.places().shafts[s].speed], now);
+            const double mine = evaluate(search.regimes()[key].rate[a.places().shafts[s].speed], now);
             CHECK(mine == doctest::Approx(expected[s]).scale(1.0).epsilon(1e-6));
             at_rest += mine == 0.0;
         }

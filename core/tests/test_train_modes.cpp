@@ -3,6 +3,7 @@
 
 #include "gauss_principle.hpp"
 #include "lostmotion/model/check.hpp"
+#include "lostmotion/model/system.hpp"
 #include "random_trains.hpp"
 #include "referee_polynomial.hpp"
 #include "train_run.hpp"
@@ -115,22 +116,21 @@ TEST_CASE("accelerations of random trains are those of the principle of least co
         Train t = random.train(random.pick(2, 6), false);
         for (Shaft& s : t.shafts) s.friction.breakaway_torque = 0.0;  // the principle needs one capacity
         const Assembly a(t);
-        const SwitchedTrain<> system(a);
-        MapCache cache(system);
+        SwitchedTrain search(a);
         Instant now = random.instant(a, n % 3 == 0 ? 0.0 : 0.3);
         const Instant before = now;
         Key key;
         CAPTURE(n);
-        REQUIRE(system.start(cache, now, key) == Found::yes);
-        const Regime& r = cache.regime(key);
+        REQUIRE(search.start(now, key) == Found::yes);
+        const SearchedRegime& r = search.regimes()[key];
         const std::vector<double> expected = least_constraint(a, before, 4000);
         for (std::size_t s = 0; s < expected.size(); ++s) {
-            const double mine = evaluate(a.layout(), r.rate[a.places().shafts[s].speed], now);
+            const double mine = evaluate(r.rate[a.places().shafts[s].speed], now);
             CHECK(mine == doctest::Approx(expected[s]).scale(1.0).epsilon(1e-6));
             at_rest += mine == 0.0;
         }
-        for (const Guard& g : r.guards)
-            CHECK(evaluate(a.layout(), g.form, now) >= -rounding * magnitude(a.layout(), g.form, now));
+        for (const SearchedRegime::Guard& g : r.guards)
+            CHECK(evaluate(g.form, now) >= -rounding * magnitude(g.form, now));
         ++compared;
     }
     CHECK(compared == cases(1500));
@@ -143,17 +143,16 @@ TEST_CASE("pivoting and trying all combinations find the same accelerations, wit
     long worst = 0;
     for (int n = 0; n < cases(500); ++n) {
         const Assembly a(random.train(random.pick(2, 5), true));
-        SwitchedTrain<> all(a), pivoting(a);
+        SwitchedTrain all(a), pivoting(a);
         all.few = 1e9;
         pivoting.few = 0.0;
-        MapCache cache(all);
         const Instant start = random.instant(a, n % 3 == 0 ? 0.0 : 0.3);
         Instant now = start, other = start;
         Key key, other_key;
         CAPTURE(n);
-        const Found found = all.start(cache, now, key);
+        const Found found = all.start(now, key);
         pivoting.searches = {};
-        const Found other_found = pivoting.start(cache, other, other_key);
+        const Found other_found = pivoting.start(other, other_key);
         worst = std::max(worst, pivoting.searches.trials);
         CHECK(static_cast<int>(found) == static_cast<int>(other_found));
         if (found != Found::yes || other_found != Found::yes) continue;
@@ -168,8 +167,8 @@ TEST_CASE("pivoting and trying all combinations find the same accelerations, wit
             continue;
         ++compared;
         for (const ShaftPlace& s : a.places().shafts)
-            CHECK(evaluate(a.layout(), cache.regime(key).rate[s.speed], now) ==
-                  doctest::Approx(evaluate(a.layout(), cache.regime(other_key).rate[s.speed], other)).epsilon(1e-9));
+            CHECK(evaluate(all.regimes()[key].rate[s.speed], now) ==
+                  doctest::Approx(evaluate(pivoting.regimes()[other_key].rate[s.speed], other)).epsilon(1e-9));
     }
     CHECK(compared > share(200));
     CHECK(worst < 1000);  // of a self-locking train, all ways of searching together
@@ -194,78 +193,60 @@ TEST_CASE("a jump that starts a chain with all its contacts at rest is found in 
             t.gears.push_back(gear);
         }
         const Assembly a(t);
-        const SwitchedTrain<> system(a);
-        MapCache cache(system);
+        SwitchedTrain search(a);
         Instant now;
         for (int g = 0; g < 6; ++g) now.memory[a.places().gears[g].hysteresis] = random.spread(0.05, 1.0);
         Key key;
-        REQUIRE(system.start(cache, now, key) == Found::yes);
+        REQUIRE(search.start(now, key) == Found::yes);
         for (int i = 0; i < a.layout().inputs; ++i) now.input[0][i] = random.uniform(-3.0, 3.0);
-        system.searches = {};
+        search.searches = {};
         CAPTURE(n);
-        REQUIRE(system.next(cache, now, static_cast<const Guard*>(nullptr), key,
-                            std::decay_t<decltype(now.input[0])>{}) == Found::yes);
-        worst = std::max(worst, system.searches.trials);
+        REQUIRE(search.next(now, nowhere, key, {}) == Found::yes);
+        worst = std::max(worst, search.searches.trials);
         contacts = a.layout().contacts;
         const std::vector<double> expected = least_constraint(a, now, 20000);
         for (std::size_t s = 0; s < expected.size(); ++s)
-            CHECK(evaluate(a.layout(), cache.regime(key).rate[a.places().shafts[s].speed], now) ==
+            CHECK(evaluate(search.regimes()[key].rate[a.places().shafts[s].speed], now) ==
                   doctest::Approx(expected[s]).scale(1.0).epsilon(1e-6));
     }
     CHECK(contacts == 13);
     CHECK(worst <= 60);  // at both ends of the way of the torques, of 3^13 combinations
 }
 
-TEST_CASE("the search works on packed regimes and the kernel's own instant as on the train's") {
-    struct WideInstant {
-        double time = 0.0;
-        std::array<double, 30> x{};
-        std::array<double, 16> memory{};
-        std::array<std::array<double, 14>, n_derivatives> input{};
-        std::array<double, 14> input_magnitudes{};
-    };
-    struct WideCache {
-        const Assembly& assembly;
-        std::unordered_map<Key, std::unique_ptr<PackedRegime<WidestTest>>, KeyHash> regimes;
-        const PackedRegime<WidestTest>& regime(const Key& key) {
-            auto& r = regimes[key];
-            if (!r) r = std::make_unique<PackedRegime<WidestTest>>(pack<WidestTest>(assembly.build(key), assembly));
-            return *r;
-        }
-    };
+TEST_CASE("a kernel hands over to the search all that it needs, and takes back what it changes") {
     RandomTrains random(24);
     for (int n = 0; n < cases(200); ++n) {
         const Assembly a(random.train(random.pick(2, 4), true));
-        const SwitchedTrain<> plain(a);
-        const SwitchedTrain<WidestTest> packed(a, WidestTest{});
-        MapCache cache(plain);
-        WideCache wide_cache{a, {}};
+        SwitchedTrain search(a);
+        const TrainSystem<WidestTest> system(a);
+        RegimeCache<TrainSystem<WidestTest>> cache(system);
         Instant now = random.instant(a, 0.2);
-        WideInstant wide;
+        now.reach(a.layout());
+        InstantOf<WidestTest> packed;
         const auto copy = [](const auto& from, auto& to) {
-            for (std::size_t k = 0; k < to.size(); ++k) to[k] = from[k];
+            for (std::size_t k = 0; k < to.size(); ++k) to[k] = std::as_const(from)[k];
         };
-        std::copy_n(now.x.begin(), a.layout().coupled, wide.x.begin());
-        copy(now.memory, wide.memory);
-        copy(now.input_magnitudes, wide.input_magnitudes);
+        for (int k = 0; k < a.layout().states; ++k) packed.x[state_place<WidestTest>(a.layout(), k)] = now.x[k];
+        copy(now.memory, packed.memory);
+        copy(now.input_magnitudes, packed.input_magnitudes);
         const auto inputs = [&] {
-            for (int k = 0; k < n_derivatives; ++k) copy(now.input[k], wide.input[k]);
+            for (int k = 0; k < n_derivatives; ++k) copy(now.input[k], packed.input[k]);
         };
         inputs();
-        Key key, wide_key;
+        Key key, packed_key;
         CAPTURE(n);
-        CHECK(plain.start(cache, now, key) == packed.start(wide_cache, wide, wide_key));
-        CHECK(key == wide_key);
+        CHECK(search.start(now, key) == system.start(packed, packed_key));
+        CHECK(key == packed_key);
         for (int jump = 0; jump < 3; ++jump) {
             const auto before = now.input[0];
-            const auto wide_before = wide.input[0];
+            const auto packed_before = packed.input[0];
             for (int i = 0; i < a.layout().inputs; ++i) now.input[0][i] = random.uniform(-2.0, 2.0);
             inputs();
-            CHECK(plain.next(cache, now, static_cast<const Guard*>(nullptr), key, before) ==
-                  packed.next(wide_cache, wide, static_cast<const PackedGuard<WidestTest>*>(nullptr), wide_key,
-                              wide_before));
-            CHECK(key == wide_key);
-            for (std::size_t k = 0; k < wide.memory.size(); ++k) CHECK(wide.memory[k] == std::as_const(now.memory)[k]);
+            CHECK(search.next(now, nowhere, key, before) ==
+                  system.next(cache, packed, nullptr, packed_key, packed_before));
+            CHECK(key == packed_key);
+            for (std::size_t k = 0; k < packed.memory.size(); ++k)
+                CHECK(packed.memory[k] == std::as_const(now.memory)[k]);
         }
     }
 }

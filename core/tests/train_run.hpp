@@ -1,6 +1,9 @@
 // A plain integrator for trains: Taylor steps of fixed length, guards watched at points of each step and bisected.
 #pragma once
 
+#include <memory>
+#include <unordered_map>
+
 #include "lostmotion/model/power.hpp"
 #include "train_support.hpp"
 
@@ -33,11 +36,10 @@ class TrainRun {
     Found found = Found::yes;
     double step = 1e-3;
 
-    explicit TrainRun(Train train)
-        : inputs(100, {TestInput{}}), assembly(std::move(train)), system(assembly), cache_(system) {}
+    explicit TrainRun(Train train) : inputs(100, {TestInput{}}), assembly(std::move(train)), search(assembly) {}
 
     const Assembly assembly;
-    const SwitchedTrain<> system;
+    SwitchedTrain search;
 
     const Layout& layout() const { return assembly.layout(); }
     double& speed(int shaft) { return now.x[assembly.places().shafts[shaft].speed]; }
@@ -46,13 +48,17 @@ class TrainRun {
     double& twist(int gear) { return now.x[assembly.places().gears[gear].twist]; }
     int command(int motor) const { return assembly.places().motors[motor].command; }
     int load(int shaft) const { return assembly.places().shafts[shaft].load; }
-    const Regime& regime() { return cache_.regime(key); }
+    const Regime& regime() {
+        auto& r = regimes_[key];
+        if (!r) r = std::make_unique<Regime>(assembly.build(key));
+        return *r;
+    }
     double value(const Row& f) { return evaluate(layout(), f, now); }
     int mode(int contact) const { return key.modes[contact]; }
 
     bool begin() {
         see_inputs(now.time);
-        found = system.start(cache_, now, key);
+        found = search.start(now, key);
         return found == Found::yes;
     }
     // Runs to t_end; false if no regime follows.
@@ -67,8 +73,8 @@ class TrainRun {
             const Guard* fired = advance(turn);
             if (fired != nullptr) {
                 events.push_back({now.time, fired->kind, fired->contact, fired->branch, key, key});
-                found =
-                    fired->kind == Guard::outside ? Found::outside : system.next(cache_, now, fired, key, now.input[0]);
+                const auto number = static_cast<int>(fired - regime().guards.data());
+                found = fired->kind == Guard::outside ? Found::outside : search.next(now, number, key, now.input[0]);
                 events.back().after = key;
             } else if ((now.time == limit && limit < t_end) || turn < end) {
                 auto before = now.input[0];
@@ -76,7 +82,7 @@ class TrainRun {
                     before[static_cast<std::size_t>(i)] =
                         left_piece(static_cast<std::size_t>(i), now.time).derivative(0, now.time);
                 see_inputs(now.time);
-                found = system.next(cache_, now, static_cast<const Guard*>(nullptr), key, before);
+                found = search.next(now, nowhere, key, before);
             }
             if (events.size() > 100000) return false;
         }
@@ -206,7 +212,7 @@ class TrainRun {
     double gained = 0.0, turned_over = 0.0, least_loss = 0.0;  // [J]
 
  private:
-    MapCache cache_;
+    std::unordered_map<Key, std::unique_ptr<Regime>, KeyHash> regimes_;
 };
 
 }  // namespace lostmotion::model

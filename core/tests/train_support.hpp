@@ -2,12 +2,10 @@
 #pragma once
 
 #include <algorithm>
-#include <memory>
-#include <unordered_map>
 
-#include "lostmotion/model/modes.hpp"
 #include "lostmotion/model/pack.hpp"
 #include "lostmotion/model/power.hpp"
+#include "lostmotion/model/switched_train.hpp"
 #include "support.hpp"
 
 namespace lostmotion::model {
@@ -46,28 +44,8 @@ double stored_energy(const Assembly& a, const X& x) {
     return stored_change(a, zero, x).all;
 }
 
-// Dimensions as the kernel's.
-struct WidestTest {
-    static constexpr int coupled = 24, angles = 6, inputs = 14, memory = 16, contacts = 20, guards = 96;
-    static constexpr int states = coupled + angles, one = states, first_memory = one + 1,
-                         first_input = first_memory + memory, terms = first_input + inputs;
-};
-
-// Regimes visited so far; they stay where they are.
-class MapCache {
- public:
-    explicit MapCache(const SwitchedTrain<>& system) : system_(system) {}
-    const Regime& regime(const Key& key) {
-        auto& r = regimes_[key];
-        if (!r) r = std::make_unique<Regime>(system_.build(key));
-        return *r;
-    }
-    std::size_t size() const { return regimes_.size(); }
-
- private:
-    const SwitchedTrain<>& system_;
-    std::unordered_map<Key, std::unique_ptr<Regime>, KeyHash> regimes_;
-};
+// Dimensions for more than any train of the tests has.
+using WidestTest = Dims<24, 6, 14, 16, 20, 96>;
 
 }  // namespace lostmotion::model
 

@@ -7,12 +7,15 @@ template <class Numbers>
 static std::uint64_t sum_of_products(const Numbers& numbers, std::uint64_t factor) {
     constexpr std::size_t each = sizeof(std::uint64_t) / sizeof(*numbers.begin());
     std::uint64_t h = 0;
-    for (std::size_t k = 0; k < numbers.size(); k += each) {
+    const auto add = [&](std::size_t k, std::size_t count) {
         std::uint64_t word = 0;
-        std::memcpy(&word, numbers.begin() + k, std::min(each, numbers.size() - k) * sizeof(*numbers.begin()));
+        std::memcpy(&word, numbers.begin() + k, count * sizeof(*numbers.begin()));
         h += (word ^ (word >> 29)) * factor;
         factor += 0xc2b2ae3d27d4eb4eu;
-    }
+    };
+    std::size_t k = 0;
+    for (const std::size_t n = numbers.size(); k + each <= n; k += each) add(k, each);
+    if (k < numbers.size()) add(k, numbers.size() - k);
     return h;
 }
 

@@ -14,8 +14,8 @@ inline constexpr long max_pieces = 30000;  // of a law: they are counted in 16 b
 
 // Which regime: the mode of each contact (slips forward +1, backward -1, stuck 0) and the branch of each piecewise law.
 struct Key {
-    Few<std::int8_t, 32> modes;
-    Few<std::int16_t, 64> branch;
+    Few<std::int8_t, 16> modes;
+    Few<std::int16_t, 32> branch;
 
     friend bool operator==(const Key&, const Key&) = default;
     std::size_t hash() const;
@@ -24,8 +24,7 @@ struct KeyHash {
     std::size_t operator()(const Key& k) const { return k.hash(); }
 };
 
-// A regime holds while each of its guards is >= 0.
-struct Guard {
+struct GuardKinds {
     enum Kind : std::uint8_t {
         speed,        // a slipping contact comes to rest
         capacity,     // a stuck contact is overcome
@@ -36,7 +35,17 @@ struct Guard {
         set_off,      // a contact at rest whose speed is given begins to move
         impact,       // rigid flanks strike, or have done so infinitely often
     };
-    Row form{};
+};
+
+// A regime holds while each of its guards is >= 0.
+template <class Form>
+struct GuardOf {
+    using Kind = GuardKinds::Kind;
+    static constexpr Kind speed = GuardKinds::speed, capacity = GuardKinds::capacity, edge = GuardKinds::edge,
+                          input_limit = GuardKinds::input_limit, turning = GuardKinds::turning,
+                          outside = GuardKinds::outside, set_off = GuardKinds::set_off, impact = GuardKinds::impact;
+
+    Form form{};
     Kind kind = outside;
     int contact = -1;         // for speed and capacity; the contact that a law belongs to, if any
     int branch = -1;          // for edges and limits: the law
@@ -46,15 +55,23 @@ struct Guard {
     double shift = 0.0;
     bool behind = false;  // an edge that the twist slips away from, so that it does not reach it
 
+    // The same guard with another form.
+    template <class Other>
+    GuardOf<Other> with(Other other) const {
+        return {std::move(other), kind, contact, branch, neighbour, by_grazing, memory, shift, behind};
+    }
     // Edge of a law or limit of an input, with a neighbour beyond.
     bool is_edge() const { return kind == edge || kind == input_limit; }
     // Says whether a contact goes on in its mode.
     bool is_of_contact() const {
         return kind == speed || kind == capacity || kind == turning || kind == set_off || kind == impact;
     }
+    // The contact; -2 - branch for a law that belongs to no contact.
+    int subject() const { return contact < 0 && branch >= 0 ? -2 - branch : contact; }
     // The derivative of the form that is the acceleration of the contact.
     static int acceleration_order(Kind kind) { return kind == impact ? 2 : kind == speed ? 1 : 0; }
 };
+using Guard = GuardOf<Row>;
 
 using Flags = Few<bool, 32>;  // of contacts or shafts
 std::size_t hash_of(const Flags& flags);
@@ -132,6 +149,12 @@ struct LockedTorque {
     // well, by contact.
     Few<double, 4> needs_torque;
 
+    // The same torque with other forms: other(form) of each.
+    template <class Other>
+    auto with(Other&& other) const -> LockedTorque<decltype(other(low))> {
+        return {contact,    memory,      has_low,      has_high,        on_held_shaft,
+                other(low), other(high), other(needs), other(friction), needs_torque};
+    }
     // The bound that is a sum of forms: calls use(form, factor) for each, and says whether other torques count as well.
     template <class Use>
     bool each_form(Bound bound, Use&& use) const {

@@ -65,7 +65,7 @@ class BitSet {
     bool operator==(const BitSet& o) const { return (*this - o).empty() && (o - *this).empty(); }
     // Calls use(k) for each, in their order. Where it returns a truth value, a false one ends that.
     template <class Use>
-    void each(Use&& use) const {
+    [[gnu::always_inline]] void each(Use&& use) const {
         for (int w = 0; w < size(); ++w)
             for (std::uint64_t left = word(w); left != 0; left &= left - 1) {
                 const int k = 64 * w + std::countr_zero(left);

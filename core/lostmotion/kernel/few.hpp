@@ -61,6 +61,8 @@ class Few {
     const T* data() const { return begin(); }
 
     friend bool operator==(const Few& a, const Few& b) {
+        if constexpr (std::has_unique_object_representations_v<T>)
+            if (a.many_ == nullptr && b.many_ == nullptr) return std::memcmp(a.few_, b.few_, sizeof a.few_) == 0;
         const std::size_t both = std::min(a.size(), b.size());
         const Few& longer = a.size() > both ? a : b;
         return std::equal(a.begin(), a.begin() + both, b.begin()) &&

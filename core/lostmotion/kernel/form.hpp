@@ -601,7 +601,7 @@ class FormTable {
         if constexpr (std::same_as<V, double>) {
             return of(g);
         } else {
-            V out;
+            V out{};
             for (int k = 0; k < vec_width; ++k) out[k] = of(g + k);
             return out;
         }

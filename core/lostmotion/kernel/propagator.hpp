@@ -157,13 +157,9 @@ class Propagator {
     const LinearRates& rates() const { return *rates_; }
     const Taylor<D>& taylor() const { return taylor_; }
 
-    const Step& level(int k) {
-        while (levels_ <= k) {
-            if (levels_ > 0)
-                add_doubled();
-            else
-                begin_levels();
-        }
+    [[gnu::always_inline]] const Step& level(int k) {
+        if (levels_ <= k) [[unlikely]]
+            make_levels(k);
         return steps_[k];
     }
     // The level or, if the motion grows beyond all bounds before it ends, the highest whose `exponential_bound` is a
@@ -302,6 +298,10 @@ class Propagator {
         if (responses_.size() < levels * pairs) responses_.resize(levels * pairs);
     }
 
+    [[gnu::noinline]] void make_levels(int k) {
+        if (levels_ == 0) begin_levels();
+        while (levels_ <= k) add_doubled();
+    }
     void begin_levels() {
         taylor_.prepare(rates());
         add_base();

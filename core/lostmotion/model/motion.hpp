@@ -1,143 +1,108 @@
-// Values and time derivatives of linear forms along the flow of one regime.
+// Linear forms of a train of any size at one instant, by its layout: what the search of modes computes with.
 #pragma once
 
+#include <array>
 #include <cmath>
-#include <utility>
+#include <vector>
 
 #include "../elements/row.hpp"
 #include "../kernel/flow.hpp"
 
 namespace lostmotion::model {
 
-// All that a regime's equations depend on at one instant. The kernel's is the same with its own dimensions.
+// All that a regime's equations depend on at one instant. That of a kernel is the same in its own places.
 struct Instant {
     double time = 0.0;  // [s]
     Few<double, 20> x;
     Few<double, 12> memory;
     std::array<Few<double, 8>, n_derivatives> input;  // [k]: k-th derivatives
     Few<double, 8> input_magnitudes;
+
+    // Makes room for all that a train has.
+    void reach(const Layout& n) {
+        x.reach(static_cast<std::size_t>(n.states));
+        memory.reach(static_cast<std::size_t>(n.memory));
+        for (auto& u : input) u.reach(static_cast<std::size_t>(n.inputs));
+        input_magnitudes.reach(static_cast<std::size_t>(n.inputs));
+    }
+    // With neither state nor inputs.
+    Instant at_rest() const {
+        Instant out = *this;
+        std::fill(out.x.begin(), out.x.end(), 0.0);
+        for (auto& u : out.input) std::fill(u.begin(), u.end(), 0.0);
+        return out;
+    }
 };
 
-// Added up as the kernel does: the constants, the inputs, the coupled states in fours, the angles.
-template <class Sizes, class F, class Now>
-double evaluate(const Sizes& n, const F& f, const Now& now) {
-    double constant = f.c[n.one], input = 0.0, state = 0.0;
-    for (int k = 0; k < n.memory; ++k) constant += f.c[n.first_memory + k] * now.memory[k];
-    for (int k = 0; k < n.inputs; ++k) input += f.c[n.first_input + k] * now.input[0][k];
-    for (int k = 0; k < n.coupled; k += 4) {
-        double part[4] = {};
-        for (int j = k; j < n.coupled && j < k + 4; ++j) part[j - k] = f.c[j] * now.x[j];
-        state += (part[0] + part[1]) + (part[2] + part[3]);
-    }
-    for (int k = n.coupled; k < n.states; ++k) state += f.c[k] * now.x[k];
-    return (constant + input) + state;
-}
+// Added up as a kernel does: the constants, the inputs, the coupled states in fours, the angles.
+double evaluate(const Layout& n, const Row& f, const Instant& now);
 // Sum of the magnitudes of the terms, with those of the inputs' parts.
-template <class Sizes, class F, class Now>
-double magnitude(const Sizes& n, const F& f, const Now& now) {
-    double sum = std::fabs(f.c[n.one]);
-    for (int k = 0; k < n.memory; ++k) sum += std::fabs(f.c[n.first_memory + k] * now.memory[k]);
-    for (int k = 0; k < n.inputs; ++k)
-        sum += std::fabs(f.c[n.first_input + k]) * std::fmax(std::fabs(now.input[0][k]), now.input_magnitudes[k]);
-    for (int k = 0; k < n.states; ++k) sum += std::fabs(f.c[k] * now.x[k]);
-    return sum;
-}
+double magnitude(const Layout& n, const Row& f, const Instant& now);
 
-// The same in the places of the kernel for trains of any size.
-template <class Now>
-double evaluate(const Any&, const AnyForm& f, const Now& now) {
-    return lostmotion::evaluate<Any>(f, now.x, now.memory, now.input[0]);
-}
-template <class Now>
-double magnitude(const Any&, const AnyForm& f, const Now& now) {
-    double sum = 0.0;
-    f.each_term([&](int place, double factor) {
-        if (place < Any::states)
-            sum += std::fabs(factor * now.x[place]);
-        else if (place == Any::one)
-            sum += std::fabs(factor);
-        else if (place < Any::first_input)
-            sum += std::fabs(factor * now.memory[place - Any::first_memory]);
-        else
-            sum += std::fabs(factor) * std::fmax(std::fabs(now.input[0][place - Any::first_input]),
-                                                 now.input_magnitudes[place - Any::first_input]);
-    });
-    return sum;
-}
+// A form as the terms that are not zero. They lie in a block of many forms, those of one kind together.
+struct SparseForm {
+    struct Term {
+        int place;  // among those of its kind
+        double factor;
+    };
+    const Term* begin = nullptr;
+    int coupled = 0, states = 0, memory = 0, inputs = 0;  // where the terms of each kind end
+    double one = 0.0;
 
-// Calls use(place, factor) for each state of a form, use(number, factor) for each of its inputs.
-template <class Sizes, class F, class Use>
-void each_state_of(const Sizes& n, const F& f, Use&& use) {
-    for (int k = 0; k < n.states; ++k) use(k, f.c[k]);
-}
-template <class Sizes, class F, class Use>
-void each_input_of(const Sizes& n, const F& f, Use&& use) {
-    for (int k = 0; k < n.inputs; ++k) use(k, f.c[n.first_input + k]);
-}
-template <class Use>
-void each_state_of(const Any&, const AnyForm& f, Use&& use) {
-    lostmotion::each_state_of<Any>(f, use);
-}
-template <class Use>
-void each_input_of(const Any&, const AnyForm& f, Use&& use) {
-    lostmotion::each_input_of<Any>(f, use);
-}
+    // From a row, whose terms are added to the block.
+    SparseForm() = default;
+    SparseForm(const Row& f, const Layout& n, std::vector<Term>& block);
 
-// Time derivatives along the flow of one regime, computed as far as they are asked for: the kernel's Flow for forms of
-// a run-time layout.
-template <class Sizes, class Regime, class Now>
-class RowFlow {
+    struct Block;
+};
+// One form with its own block.
+struct SparseForm::Block {
+    std::vector<Term> terms;
+    SparseForm form;
+
+    Block(const Row& f, const Layout& n) {
+        terms.reserve(f.c.size());
+        form = SparseForm(f, n, terms);
+    }
+    Block(const Block&) = delete;
+    Block& operator=(const Block&) = delete;
+};
+
+double evaluate(const SparseForm& f, const Instant& now);
+double magnitude(const SparseForm& f, const Instant& now);
+// Both at once, added up in the order of the terms.
+struct Sized {
+    double value, size;
+};
+Sized sized(const SparseForm& f, const Instant& now);
+
+// Time derivatives along the flow of one regime, computed as far as they are asked for: the kernel's Flow for sparse
+// forms.
+class SparseFlow {
  public:
-    RowFlow(const Sizes& sizes, const Regime& regime, const Now& now) : n_(sizes), regime_(regime), now_(now) {}
+    // Memory of the derivatives, used again from flow to flow.
+    using Room = std::vector<double>;
+
+    SparseFlow(const std::vector<SparseForm>& rate, const Instant& now, Room& room);
 
     double noise(double size, double rate) const {
         return rounding * size + time_rounding * std::fabs(now_.time * rate);
     }
     // Value of the k-th derivative of a form, k > 0, and the sum of the magnitudes of its terms.
-    template <class F>
-    double rate(const F& f, int k) {
-        return derivative(f, k).first;
-    }
-    template <class F>
-    double rate_magnitude(const F& f, int k) {
-        return derivative(f, k).second;
-    }
+    double rate(const SparseForm& f, int k);
+    double rate_magnitude(const SparseForm& f, int k);
 
  private:
-    template <class F>
-    std::pair<double, double> derivative(const F& f, int k) {
-        while (order_ < k) extend();
-        double sum = 0.0, size = 0.0;
-        for (int i = 0; i < n_.inputs; ++i) {
-            sum += f.c[n_.first_input + i] * now_.input[k][i];
-            size += std::fabs(f.c[n_.first_input + i] * now_.input[k][i]);
-        }
-        for (int j = 0; j < n_.states; ++j) {
-            sum += f.c[j] * x_[k][j];
-            size += std::fabs(f.c[j]) * size_[k][j];
-        }
-        return {sum, size};
-    }
-    void extend() {
-        const int k = order_++;
-        for (int r = 0; r < n_.states; ++r) {
-            const auto& f = regime_.rate[r];
-            if (k == 0) {
-                x_[1][r] = evaluate(n_, f, now_);
-                size_[1][r] = magnitude(n_, f, now_);
-                continue;
-            }
-            const auto [value, size] = derivative(f, k);
-            x_[k + 1][r] = value;
-            size_[k + 1][r] = size;
-        }
-    }
+    double* derivative(int k) { return room_.data() + static_cast<std::size_t>(k) * states_; }
+    double* sizes(int k) { return derivative(n_derivatives + 1 + k); }
+    void extend(int k);
+    void extend_sizes(int k);
 
-    const Sizes& n_;
-    const Regime& regime_;
-    const Now& now_;
-    int order_ = 0;
-    std::array<Few<double, 20>, n_derivatives + 1> x_, size_;  // as far as they are known
+    const std::vector<SparseForm>& rate_;
+    const Instant& now_;
+    Room& room_;
+    std::size_t states_;
+    int order_ = 0, sized_ = 0;
 };
 
 }  // namespace lostmotion::model

@@ -61,27 +61,7 @@ void unpack_state(const State& x, const Layout& n, To to) {
 }
 
 template <class D>
-struct PackedGuard {
-    using Kind = Guard::Kind;
-    static constexpr Kind speed = Guard::speed, capacity = Guard::capacity, edge = Guard::edge,
-                          input_limit = Guard::input_limit, turning = Guard::turning, outside = Guard::outside,
-                          set_off = Guard::set_off, impact = Guard::impact;
-
-    PackedForm<D> form;
-    Kind kind = outside;
-    int contact = -1, branch = -1, neighbour = 0;
-    bool by_grazing = false;
-    int memory = -1;
-    double shift = 0.0;
-    bool behind = false;
-
-    // The contact; -2 - branch for a law that belongs to no contact.
-    int subject() const { return contact < 0 && branch >= 0 ? -2 - branch : contact; }
-    bool is_edge() const { return kind == edge || kind == input_limit; }
-    bool is_of_contact() const {
-        return kind == speed || kind == capacity || kind == turning || kind == set_off || kind == impact;
-    }
-};
+using PackedGuard = GuardOf<PackedForm<D>>;
 
 template <class D>
 struct PackedRegime {
@@ -149,8 +129,7 @@ void pack(const Regime& r, const Assembly& a, PackedRegime<D>& out) {
     out.complete = r.guards.size() <= static_cast<std::size_t>(D::guards);
     for (const Guard& g : r.guards) {
         if (out.n_guards == D::guards) break;
-        out.guards[out.n_guards++] = {pack<D>(g.form, n), g.kind,   g.contact, g.branch, g.neighbour,
-                                      g.by_grazing,       g.memory, g.shift,   g.behind};
+        out.guards[out.n_guards++] = g.with(pack<D>(g.form, n));
     }
     for (const Row& f : r.motor_torque) out.motor_torque.push_back(pack<D>(f, n));
     for (const Row& f : r.drive_torque) out.drive_torque.push_back(pack<D>(f, n));
@@ -169,8 +148,7 @@ void pack(const Regime& r, const Assembly& a, PackedRegime<D>& out) {
     out.driving_way = r.driving_way;
     for (const Driver<Row>& d : r.drivers) out.drivers.push_back({d.contact, pack<D>(d.torque, n), pack<D>(d.rate, n)});
     for (const LockedTorque<Row>& l : r.locked)
-        out.locked.push_back({l.contact, l.memory, l.has_low, l.has_high, l.on_held_shaft, pack<D>(l.low, n),
-                              pack<D>(l.high, n), pack<D>(l.needs, n), pack<D>(l.friction, n), l.needs_torque});
+        out.locked.push_back(l.with([&](const Row& f) { return pack<D>(f, n); }));
     out.in_data = r.in_data;
     out.given = given_states(r, a.places());
 }

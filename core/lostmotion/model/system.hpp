@@ -2,12 +2,11 @@
 #pragma once
 
 #include <optional>
-#include <type_traits>
 #include <vector>
 
-#include "modes.hpp"
 #include "pack.hpp"
 #include "scales.hpp"
+#include "switched_train.hpp"
 
 namespace lostmotion::model {
 
@@ -36,7 +35,7 @@ class TrainSystem {
     using State = StateOf<D>;
 
     explicit TrainSystem(const Assembly& assembly)
-        : assembly_(assembly), counts_(counts_of(assembly.layout())), search_(assembly, D{}) {
+        : assembly_(assembly), counts_(counts_of(assembly.layout())), search_(assembly) {
         for (const GearPlace& g : assembly.places().gears) {
             if (g.twist != nowhere) twists_[n_twists_++] = g.twist;
             has_parametric_work_ = has_parametric_work_ || g.parametric_work != nowhere;
@@ -54,19 +53,15 @@ class TrainSystem {
     }
     // Whether a regime has had more guards than there is room for: then nothing that follows is certain.
     bool overflowed() const { return overflowed_; }
-    SearchCounts& searches() const { return search_.searches; }
+    SwitchedTrain& search() const { return search_; }
 
     // r: as it has been made.
     void build(const Key& key, Regime& r) const {
-        assembly_.build(key, composed_);
-        pack<D>(composed_, assembly_, r);
+        pack<D>(composed(key), assembly_, r);
         if (!r.complete) overflowed_ = true;
     }
-    // One that has been built, in full; most often the last.
-    const model::Regime& composed(const Regime& r) const {
-        if (composed_.rate.empty() || !(composed_.key == r.key)) assembly_.build(r.key, composed_);
-        return composed_;
-    }
+    // A regime in full; most often the last one.
+    const model::Regime& composed(const Key& key) const { return search_.regimes().composed(key); }
     Regime build(const Key& key) const {
         Regime r;
         build(key, r);
@@ -74,23 +69,45 @@ class TrainSystem {
     }
     // In these modes, at the instant and the torques of another regime.
     Regime build_at(const Regime& other, const Key& modes, const InstantOf<D>& now) const {
-        return build(search_.branches_at(other, modes, now));
+        return build(search_.branches_at(other.key, modes, by_layout(now)));
     }
-    template <class Cache>
-    Found start(Cache& cache, InstantOf<D>& now, Key& key) const {
-        const Found found = search_.start(cache, now, key);
+    Found start(InstantOf<D>& now, Key& key) const {
+        Instant at = by_layout(now);
+        const Found found = search_.start(at, key);
+        take(at, now);
         add_parametric_work(assembly_.meshes_at(now.x), key, now);
         return certain(found);
     }
+    // Regime that follows `key`: after a guard of its own has reached zero or, without one, after an input has changed.
+    // Most regimes go on or lead across an edge: there is nothing to search then. input: the inputs up to this instant.
     template <class Cache>
     Found next(Cache& cache, InstantOf<D>& now, const Guard* fired, Key& key, const InputsOf<D>& input) const {
-        const Key before = key;
-        const Found found = search_.next(cache, now, fired, key, input);
-        if (has_parametric_work_) add_parametric_work(before, key, now);
+        std::optional<Key> before;
+        if (has_parametric_work_) before = key;
+        Flags given_rest{};
+        const bool comes_to_rest = fired == nullptr && search_.follow_given(now.x, now.input[0], key, given_rest);
+        Found found = Found::yes;
+        if (!(fired != nullptr ? goes_on<D>(cache, now, *fired, key)
+                               : !comes_to_rest && stays<D>(cache.entry(key), now, input))) {
+            const auto number = fired == nullptr ? nowhere : fired - cache.regime(key).guards.data();
+            Instant at = by_layout(now);
+            SwitchedTrain::Inputs left;
+            copy_numbers(input, counts_.inputs, left);
+            found = search_.next(at, static_cast<int>(number), key, left, given_rest);
+            take(at, now);
+        }
+        if (before) add_parametric_work(*before, key, now);
         return certain(found);
     }
+    // What each guard has to exceed, beside its share of its terms, to be far from an event.
     void near_event(const FormTable<D, D::guards>& guards, typename FormTable<D, D::guards>::Values& out) const {
-        search_.near_event(guards, out);
+        StateOf<D> state{};
+        InputsOf<D> input{};
+        const Layout& n = assembly_.layout();
+        for (int k = 0; k < n.states; ++k)
+            state[state_place<D>(n, k)] = search_.regimes().near_state()[static_cast<std::size_t>(k)];
+        for (int i = 0; i < n.inputs; ++i) input[i] = search_.regimes().near_input()[static_cast<std::size_t>(i)];
+        guards.rate_magnitudes(state, input, out);
     }
     template <class X, class AtRest>
     void stop(X& x, AtRest& at_rest) const {
@@ -142,6 +159,27 @@ class TrainSystem {
 
  private:
     Found certain(Found found) const { return overflowed_ ? Found::outside : found; }
+    // An instant as the search has it, and what this has changed of it.
+    Instant by_layout(const InstantOf<D>& now) const {
+        const Layout& n = assembly_.layout();
+        Instant at;
+        at.time = now.time;
+        at.reach(n);
+        for (int k = 0; k < n.states; ++k) at.x[k] = now.x[state_place<D>(n, k)];
+        copy_numbers(now.memory, n.memory, at.memory);
+        for (std::size_t k = 0; k < n_derivatives; ++k) copy_numbers(now.input[k], n.inputs, at.input[k]);
+        copy_numbers(now.input_magnitudes, n.inputs, at.input_magnitudes);
+        return at;
+    }
+    void take(const Instant& at, InstantOf<D>& now) const {
+        const Layout& n = assembly_.layout();
+        for (int k = 0; k < n.states; ++k) now.x[state_place<D>(n, k)] = at.x[k];
+        copy_numbers(at.memory, n.memory, now.memory);
+    }
+    template <class From, class To>
+    static void copy_numbers(const From& from, int count, To& to) {
+        for (int k = 0; k < count; ++k) to[static_cast<std::size_t>(k)] = from[static_cast<std::size_t>(k)];
+    }
     // A step of the stiffness changes the energy of a spring at the twist that it has.
     void add_parametric_work(const Key& before, const Key& after, InstantOf<D>& now) const {
         for (std::size_t g = 0; g < assembly_.train().gears.size(); ++g) {
@@ -156,12 +194,11 @@ class TrainSystem {
 
     const Assembly& assembly_;
     const CountsOf<D> counts_;
-    SwitchedTrain<D> search_;
+    mutable SwitchedTrain search_;
     ListOf<D, int, D::coupled> twists_{};
     int n_twists_ = 0;
     bool has_parametric_work_ = false;
     mutable bool overflowed_ = false;
-    mutable model::Regime composed_;  // its memory is used again
 };
 
 }  // namespace lostmotion::model

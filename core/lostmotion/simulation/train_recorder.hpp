@@ -31,7 +31,7 @@ class TrainMeter {
     bool segment(const Segment<model::TrainSystem<D>>& s) {
         model::TrainRegime<D>& r = s.entry.regime;
         if (!(s.end > s.begin)) return true;
-        if (!r.flows) find_flows(r, s.system.composed(r));
+        if (!r.flows) find_flows(r, s.system.composed(r.key));
         for (const auto& f : *r.flows) place(f.number);
         if (std::ranges::all_of(assembly_.places().shafts, [&](const model::ShaftPlace& p) {
                 return r.resting[static_cast<std::size_t>(p.speed)];

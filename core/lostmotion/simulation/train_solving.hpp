@@ -44,7 +44,7 @@ void end_report(TrainReport& report, const System& system, Solver& solver) {
     report.time = solver.time();
     report.contact = solver.stopped_at();
     report.switching_count = solver.switchings();
-    report.searches = system.searches();
+    report.searches = system.search().searches;
     report.too_many_guards = system.overflowed();
     report.x.resize(static_cast<std::size_t>(n.states));
     const auto& r = solver.regime();
@@ -116,7 +116,7 @@ TrainReport run_train_exactly_in(const TrainModel& model, const RunStart& start,
     auto& own = static_cast<TrainWorkspace<D>&>(*workspace);
     own.serve(model.assembly);
     const model::TrainSystem<D>& system = own.system;
-    system.searches() = {};
+    system.search().searches = {};
     ExactSolver<model::TrainSystem<D>> solver(system, c.signals, options.sample_interval, system.balanced_scale(),
                                               &own.cache);
     if (watcher != nullptr) watcher->begin(solver);

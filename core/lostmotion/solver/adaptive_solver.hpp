@@ -134,7 +134,7 @@ class AdaptiveSolver {
         step_ = 0.0;
         switchings_ = 0;
         left_.reset();
-        return status_of(system_.start(cache_, now_, key_));
+        return status_of(system_.start(now_, key_));
     }
 
     // As of the exact solver.

@@ -20,11 +20,8 @@ auto ExactSolver<System>::has_settled(const Regime& regime, const State& rate) c
 // they are zero. Returns whether one has become so.
 template <class System>
 inline auto ExactSolver<System>::rest_unforced(Entry& e, const State& rate) -> bool {
-    typename Cache::States forced;
-    for (int i = 0, n = system_.counts().inputs; i < n; ++i)
-        if (begin_->input().varies(i)) forced |= e.reached(i);
     bool changed = false;
-    (Cache::States::below(system_.counts().coupled) - forced).each([&](int k) {
+    e.unreached([&](int i) { return begin_->input().varies(i); }).each([&](int k) {
         const double limit = settled * scale_[k];
         if (now_.x[k] == 0.0 || !(std::fabs(now_.x[k]) <= limit && std::fabs(rate[k]) <= limit)) return;
         now_.x[k] = 0.0;

@@ -174,7 +174,7 @@ inline auto ExactSolver<System>::judge(Entry& e, const Memory& memory, const Cur
     const Memory memory_magnitudes = magnitudes(memory);
     const State state_magnitudes = magnitudes(cursor.x());
     bool certain = true;
-    doubtful.each([&](int g) {
+    doubtful.each([&](int g) ALWAYS_INLINE {
         const double low = bounds_.lower[g], error = bounds_.error[g];
         const Cubic c(here.value[g], here.slope[g], there.value[g], there.slope[g], h);
         const int t = e.grazing_twist(g);

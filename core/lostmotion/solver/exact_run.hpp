@@ -253,7 +253,7 @@ Status ExactSolver<System>::begin(double time, const State& x, const Memory& mem
     now_.memory = memory;
     anchor_inputs();
     course_.input = now_.input[0];
-    return status_of(system_.start(cache_, now_, key_));
+    return status_of(system_.start(now_, key_));
 }
 
 template <class System>

@@ -69,8 +69,7 @@ class RegimeCache {
             neighbour = {};
             n_speeds = 0;
             contacts = behind = {};
-            reach_.clear();  // it may have been of another train
-            reach_known_ = {};
+            unreached_known_ = false;
             for (int g = 0; g < r.n_guards; ++g) {
                 const Guard& guard = r.guards[g];
                 guards.set(g, guard.form);
@@ -116,23 +115,26 @@ class RegimeCache {
             else
                 return sum_of(absolute(coupled<D>(f) * coupled(x)));
         }
-        // The states that an input acts on, by way of others, too.
-        const States& reached(int input) {
-            if (reach_.empty()) reach_.resize(static_cast<std::size_t>(rates.n.inputs));
-            States& all = reach_[static_cast<std::size_t>(input)];
-            if (reach_known_[input]) return all;
-            reach_known_[input] = true;
-            all = {};
-            for (int r = 0; r < rates.n.coupled; ++r)
-                if (rates.input_column[static_cast<std::size_t>(input)][r] != 0.0) all.set(r);
-            for (States before; before != all;) {
-                before = all;
+        // The states that the inputs that vary do not act on, by way of others either.
+        template <class Varies>
+        const States& unreached(Varies&& varies) {
+            std::uint64_t which = 0;
+            for (int i = 0; i < rates.n.inputs; ++i) which |= std::uint64_t{varies(i)} << (i % 64);
+            if (unreached_known_ && which == unreached_by_ && rates.n.inputs <= 64) return unreached_;
+            States reached;
+            for (int i = 0; i < rates.n.inputs; ++i)
+                for (int r = 0; r < rates.n.coupled && varies(i); ++r)
+                    if (rates.input_column[static_cast<std::size_t>(i)][r] != 0.0) reached.set(r);
+            for (States before; before != reached;) {
+                before = reached;
                 for (int r = 0; r < rates.n.coupled; ++r)
                     rates.each_in_row(r, [&](int c, double rate) {
-                        if (rate != 0.0 && all[c]) all.set(r);
+                        if (rate != 0.0 && reached[c]) reached.set(r);
                     });
             }
-            return all;
+            unreached_known_ = true;
+            unreached_by_ = which;
+            return unreached_ = States::below(rates.n.coupled) - reached;
         }
 
      private:
@@ -182,8 +184,9 @@ class RegimeCache {
             }
         }
 
-        std::vector<States> reach_;  // by input, so far as it has been asked for
-        ListOf<D, bool, D::inputs> reach_known_;
+        States unreached_;
+        std::uint64_t unreached_by_;  // the inputs that it was found for, as bits
+        bool unreached_known_;
     };
 
     explicit RegimeCache(const System& system) : system_(system) {}

@@ -1,42 +1,35 @@
 // Which combination of modes follows.
-#pragma once
-
+#include "scales.hpp"
 #include "switched_train.hpp"
 
 namespace lostmotion::model {
 
-template <class Sizes>
-void SwitchedTrain<Sizes>::set_near_event() {
-    const Layout& n = assembly_.layout();
-    near_state_.resize(static_cast<std::size_t>(n.states));
-    near_input_.assign(static_cast<std::size_t>(n.inputs), far_from_event);
-    rated_scale(assembly_, near_state_);
-    for (double& x : near_state_) x *= far_from_event;
-    for (int a = 0; a < n.angles; ++a) near_state_[n.coupled + a] = far_from_event;
-    for (std::size_t s = 0; s < train().shafts.size(); ++s)
-        if (const int load = places().shafts[s].load; load != nowhere)
-            near_input_[load] = far_from_event * rated_torque(train(), static_cast<int>(s));
-}
-
-template <class Sizes>
-template <class X, class AtRest>
-void SwitchedTrain<Sizes>::stop(X& x, AtRest& at_rest) const {
-    Rest now;
-    for (int c = 0; c < contacts(); ++c)
-        if (at_rest[c]) now[c] = true;
-    const Stopped& all = stopped(now);
-    for (int c = 0; c < contacts(); ++c) at_rest[c] = all.kept[c] && places().contacts[c].may_rest(x);
-    if (places().driven.empty()) {
-        set_tied_speeds(x, all.ties);
-    } else {  // whose speeds stay what they are, to the last bit
-        std::vector<std::int8_t> modes;
-        for (int c = 0; c < contacts(); ++c) modes.push_back(at_rest[c] ? 0 : 1);
-        set_tied_speeds(x, places().ties(modes.data()));
+SwitchedTrain::SwitchedTrain(const Assembly& assembly) : assembly_(assembly), regimes_(assembly) {
+    const auto strike =
+        std::count_if(train().gears.begin(), train().gears.end(), [](const Gear& g) { return g.strikes(); });
+    has_flanks_ = strike > 0;
+    least_flight_ = strike > 1 ? flight_among_others : one_flight;
+    for (int c = 0; c < contacts(); ++c) {
+        some_redundant_ = some_redundant_ || places().contacts[c].locked != nowhere;
+        holds_more_[c] = !places().contacts[c].bilateral && holds_more(places().contacts[c]);
     }
 }
 
-template <class Sizes>
-auto SwitchedTrain<Sizes>::stopped(const Rest& at_rest) const -> const Stopped& {
+Key SwitchedTrain::branches_at(const Key& other, const Key& modes, Instant now) {
+    now.reach(assembly_.layout());
+    return branches_at(regimes_[other], modes, now);
+}
+Key SwitchedTrain::branches_at(const SearchedRegime& other, const Key& modes, const Instant& now) const {
+    Key key;
+    key.modes = modes.modes;
+    Torques T_2{};
+    for (std::size_t g = 0; g < train().gears.size(); ++g) T_2[g] = evaluate(other.output_torque[g], now);
+    locate(now, key);
+    locate_losses(now, T_2, key);
+    return key;
+}
+
+auto SwitchedTrain::stopped(const Rest& at_rest) const -> const Stopped& {
     std::unique_ptr<Stopped>& known = stopped_[hash_of(at_rest) % stopped_.size()];
     if (known != nullptr && known->at_rest == at_rest) return *known;
     std::vector<std::int8_t> modes;
@@ -47,45 +40,13 @@ auto SwitchedTrain<Sizes>::stopped(const Rest& at_rest) const -> const Stopped& 
     return *known;
 }
 
-template <class Sizes>
-template <class X>
-void SwitchedTrain<Sizes>::set_tied_speeds(X& x, const Ties& ties) const {
-    for (std::size_t s = 0; s < train().shafts.size(); ++s) {
-        double& w = x[places().shafts[s].speed];
-        if (!ties.at_rest[s] && !ties.follows(static_cast<int>(s))) continue;
-        w = 0.0;
-        ties.each_share(static_cast<int>(s), [&](int k, double share) { w += x[places().shafts[k].speed] * share; });
-    }
-}
-
-template <class Sizes>
-template <class Now>
-bool SwitchedTrain<Sizes>::follow_given(Now& now, const Key& key, Rest& rests) const {
-    if (places().driven.empty()) return false;
-    for (const int s : places().driven) now.x[places().shafts[s].speed] = now.input[0][places().shafts[s].given_speed];
-    const Ties ties = places().ties(key.modes.data());
-    bool some = false;
-    for (int c = 0; c < contacts(); ++c) {
-        if (key.modes[c] == 0) continue;
-        const Shares moves = tied_speed(places().contacts[c], ties);
-        const auto is_given = [&](int s) { return std::ranges::binary_search(places().driven, s); };
-        if (moves.empty() || !std::ranges::all_of(moves, is_given, &Share::shaft)) continue;
-        double speed = 0.0;
-        for (const Share& s : moves) speed += s.share * now.x[places().shafts[s.shaft].speed];
-        rests[c] = speed == 0.0;
-        some = some || rests[c];
-    }
-    return some;
-}
-
-template <class Sizes>
-template <class Cache, class Now>
-Found SwitchedTrain<Sizes>::start(Cache& cache, Now& now, Key& key) const {
+Found SwitchedTrain::start(Instant& now, Key& key) {
     constexpr double few_roundings = 8.0 * std::numeric_limits<double>::epsilon();
     key = Key{};
     Event event;
     Rest given_rest{};
-    follow_given(now, key, given_rest);
+    now.reach(assembly_.layout());
+    follow_given(now.x, now.input[0], key, given_rest);
     bool snap = !places().driven.empty();
     for (int c = 0; c < contacts(); ++c) {
         const ContactPlace& p = places().contacts[c];
@@ -104,9 +65,8 @@ Found SwitchedTrain<Sizes>::start(Cache& cache, Now& now, Key& key) const {
         snap = snap || (same && !p.bilateral && speed != 0.0);
     }
     if (snap) stop(now.x, event.at_rest);
-    Now before = now;  // as if nothing had acted on the train, with brakes and clutches as they are commanded
-    before.x = {};
-    before.input = {};
+    // As if nothing had acted on the train, with brakes and clutches as they are commanded.
+    Instant before = now.at_rest();
     const auto keep = [&](const auto& e) {
         if (e->command != nowhere) before.input[0][e->command] = now.input[0][e->command];
     };
@@ -135,33 +95,31 @@ Found SwitchedTrain<Sizes>::start(Cache& cache, Now& now, Key& key) const {
     // A run that goes on from the end of another keeps the torques that rest has left open there, if it can.
     const auto has_torque = [&](const ContactPlace& p) { return p.locked != nowhere && now.memory[p.locked] != 0.0; };
     if (std::any_of(places().contacts.begin(), places().contacts.end(), has_torque)) {
-        Now going_on = now;
+        Instant going_on = now;
         Key kept = key;
-        if (find(cache, going_on, now, event, kept) == Found::yes) {
+        if (find(going_on, [&] { return now; }, event, kept) == Found::yes) {
             now = going_on;
             key = kept;
             return Found::yes;
         }
     }
-    return find(cache, now, before, event, key);
+    return find(now, [&] { return before; }, event, key);
 }
 
-template <class Sizes>
-template <class Cache, class Now, class G, class Input>
-Found SwitchedTrain<Sizes>::next(Cache& cache, Now& now, const G* fired, Key& key, const Input& input) const {
-    if (fired != nullptr && fired->kind == Guard::impact) return strikes(cache, now, *fired, key);
-    Rest given_rest{};
-    const bool comes_to_rest = fired == nullptr && follow_given(now, key, given_rest);
-    auto& ended = look_up(cache, key);
-    if (fired != nullptr ? goes_on(cache, ended, now, *fired, key) : !comes_to_rest && stays(ended, now, input))
-        return Found::yes;
-    Now past = now;
-    past.input[0] = input;
-    const auto& old = regime_of(ended);
+Found SwitchedTrain::next(Instant& now, int fired_number, Key& key, const Inputs& input, const Rest& given_rest) {
+    now.reach(assembly_.layout());
+    regimes_.make_room();
+    const SearchedRegime& old = regimes_[key];
+    const Guard* fired = fired_number == nowhere ? nullptr : &old.guards[static_cast<std::size_t>(fired_number)];
+    if (fired != nullptr && fired->kind == Guard::impact) return strikes(now, *fired, key);
     Event event;
     event.before = key;
-    for (std::size_t g = 0; g < train().gears.size(); ++g) event.gear[g] = evaluate(n_, old.output_torque[g], past);
-    each_coupling_contact([&](int c) { event.coupling[c] = evaluate(n_, old.contact_torque[c], past); });
+    Inputs left = input;
+    left.reach(static_cast<std::size_t>(assembly_.layout().inputs));
+    std::swap(left, now.input[0]);
+    for (std::size_t g = 0; g < train().gears.size(); ++g) event.gear[g] = evaluate(old.output_torque[g], now);
+    each_coupling_contact([&](int c) { event.coupling[c] = evaluate(old.contact_torque[c], now); });
+    std::swap(left, now.input[0]);
     double margin_size = 0.0, near = 0.0;
     if (fired != nullptr) {
         event.with_guard = true;
@@ -177,31 +135,34 @@ Found SwitchedTrain<Sizes>::next(Cache& cache, Now& now, const G* fired, Key& ke
     for (int c = 0; c < contacts(); ++c) event.at_rest[c] = before[c] || given_rest[c];
     if (fired != nullptr && fired->kind == Guard::speed) event.at_rest[fired->contact] = true;
     stop(now.x, event.at_rest);
-    past.x = now.x;
     for (int c = 0; c < contacts(); ++c) event.stopped[c] = event.at_rest[c] && !before[c];
     if (fired != nullptr && fired->kind == Guard::capacity) {
-        margin_size = magnitude(n_, fired->form, now);
-        near = near_event(fired->form);
+        margin_size = magnitude(fired->form, now);
+        near = old.near_event[static_cast<std::size_t>(fired_number)];
     }
+    const auto memory = now.memory;
     for (std::size_t g = 0; g < train().gears.size(); ++g) {
         const GearPlace& p = places().gears[g];
         if (p.hysteresis != nowhere && event.at_rest[p.contact] && !before[p.contact])
             now.memory[p.hysteresis] = assembly_.stiffness_factor(static_cast<int>(g), key) *
                                        train().gears[g].law.hysteresis_capacity(now.x[p.twist]);
     }
-    if (event.with_guard && event.kind == Guard::capacity && breaks_away(cache, now, event, margin_size, near, key))
+    if (event.with_guard && event.kind == Guard::capacity && breaks_away(now, event, margin_size, near, key))
         return Found::yes;
-    const Found found = find(cache, now, past, event, key);
-    return found == Found::inconsistent ? locks(cache, now, event, past, key) : found;
+    const auto past = [&] {
+        Instant out = now;
+        out.memory = memory;
+        out.input[0] = left;
+        return out;
+    };
+    const Found found = find(now, past, event, key);
+    return found == Found::inconsistent ? locks(now, event, past(), key) : found;
 }
 
 // A contact whose capacity has been overcome begins to slip that way, from rest: there is nothing to decide as long as
 // all others go on as they were. If the capacity itself has gone with its margin, as where a load that alone holds a
 // self-locking gear reverses, the contact may as well stay stuck.
-template <class Sizes>
-template <class Cache, class Now>
-bool SwitchedTrain<Sizes>::breaks_away(Cache& cache, Now& now, const Event& event, double margin_size, double near,
-                                       Key& key) const {
+bool SwitchedTrain::breaks_away(Instant& now, const Event& event, double margin_size, double near, Key& key) {
     if (margin_size <= near) return false;
     Key modes = key;
     modes.modes[event.contact] = static_cast<std::int8_t>(event.neighbour);
@@ -213,9 +174,9 @@ bool SwitchedTrain<Sizes>::breaks_away(Cache& cache, Now& now, const Event& even
     slipping.coupling = event.coupling;
     const auto memory = now.memory;
     Key slips;
-    if (settle(cache, now, modes, slipping, slips).found == Found::yes) {
+    if (settle(now, modes, slipping, slips).found == Found::yes) {
         // With a self-locking gear more torque may turn it the other way; by rounding it only seems to.
-        if (!turns_the_other_way(look_up(cache, slips), now, event)) {
+        if (!turns_the_other_way(regimes_[slips], now, event)) {
             key = slips;
             return true;
         }
@@ -225,29 +186,27 @@ bool SwitchedTrain<Sizes>::breaks_away(Cache& cache, Now& now, const Event& even
 }
 
 // Does a contact that is to slip turn against that just after now, by more than rounding may make?
-template <class Sizes>
-template <class E, class Now>
-bool SwitchedTrain<Sizes>::turns_the_other_way(const E& e, const Now& now, const Event& event) const {
+bool SwitchedTrain::turns_the_other_way(const SearchedRegime& r, const Instant& now, const Event& event) {
     const ContactPlace& c = places().contacts[event.contact];
-    std::decay_t<decltype(regime_of(e).guards[0].form)> speed;
-    c.each_shaft([&](int s, double per) { speed.c[places().shafts[s].speed] += event.neighbour * per; });
-    auto along = flow(e, now);
-    return sign_after(along, speed, evaluate(n_, speed, now), magnitude(n_, speed, now)).relative < -max_violation;
+    Row row;
+    c.each_shaft([&](int s, double per) { row.c[places().shafts[s].speed] += event.neighbour * per; });
+    const SparseForm::Block block(row, assembly_.layout());
+    const SparseForm& speed = block.form;
+    SparseFlow along(r.rate, now, room_);
+    return sign_after(along, speed, evaluate(speed, now), magnitude(speed, now)).relative < -max_violation;
 }
 
 // Tries the combinations of modes. Usually pieces and cells are found by a walk from those before. If the guards that
 // are zero or nearly so leave none, the motion is too small beside its torques for rounding to tell which of them
 // rise: then the combination that violates its guards least is taken. A train that jams violates them by more.
-template <class Sizes>
-template <class Cache, class Now>
-Found SwitchedTrain<Sizes>::find(Cache& cache, Now& now, const Now& before, Event event, Key& key) const {
+Found SwitchedTrain::find(Instant& now, const std::function<Instant()>& before, Event event, Key& key) {
     const Key from = key;
     bool may_hold_more = false;
     for (int c = 0; c < contacts(); ++c) may_hold_more = may_hold_more || (event.at_rest[c] && holds_more_[c]);
     const bool tries_all = !may_hold_more && combinations(event) <= few;
-    const Key path = tries_all ? from : follow(cache, now, before, event, from);
+    const Key path = tries_all ? from : follow(now, before(), event, from);
     const auto search = [&] {
-        return tries_all ? enumerate(cache, now, event, from, key) : pivot(cache, now, event, path, from, key);
+        return tries_all ? enumerate(now, event, from, key) : pivot(now, event, path, from, key);
     };
     // Flanks without a gap that approach each other strike next: until then their ends are not to be seen.
     std::vector<std::pair<int, double>> hidden;
@@ -269,8 +228,7 @@ Found SwitchedTrain<Sizes>::find(Cache& cache, Now& now, const Now& before, Even
     return found;
 }
 
-template <class Sizes>
-bool SwitchedTrain<Sizes>::at_its_limit(const Key& key) const {
+bool SwitchedTrain::at_its_limit(const Key& key) const {
     if (!some_redundant_) return false;
     Limit& known = limits_[hash_of(key.modes) % limits_.size()];
     if (!known.known || !(known.modes == key.modes)) known = {key.modes, true, pushes_against_rest(key)};
@@ -280,8 +238,7 @@ bool SwitchedTrain<Sizes>::at_its_limit(const Key& key) const {
 // A contact that "slips" while those that are stuck keep its speed at zero, or that would have to slip against another
 // that is tied to it, does not move: it gives all that it can, and what everything at rest leaves open follows from
 // that.
-template <class Sizes>
-bool SwitchedTrain<Sizes>::pushes_against_rest(const Key& key) const {
+bool SwitchedTrain::pushes_against_rest(const Key& key) const {
     const std::vector<ContactPlace>& all = places().contacts;
     const Ties ties = places().ties(key.modes.data());
     std::vector<int> direction(train().shafts.size());  // of each free shaft
@@ -300,17 +257,82 @@ bool SwitchedTrain<Sizes>::pushes_against_rest(const Key& key) const {
     return false;
 }
 
+// In how many ways contacts at rest may stick and slip.
+double SwitchedTrain::combinations(const Event& event) const {
+    double n = 1.0;
+    for (int c = 0; c < contacts(); ++c)
+        if (event.at_rest[c] && !places().contacts[c].bilateral) n *= places().contacts[c].one_way ? 2.0 : 3.0;
+    return n;
+}
+
+// One of them: the last contact changes first, from stuck to forward to backward. next(n): the mode of the next
+// contact, below n. Returns how many contacts slip.
+template <class Next>
+int SwitchedTrain::combination(Next&& next, const Event& event, const Key& from, Key& out) const {
+    int slips = 0;
+    for (int c = contacts(); c-- > 0;) {
+        const ContactPlace& p = places().contacts[c];
+        if (p.bilateral) continue;
+        out.modes[c] = from.modes[c];
+        if (event.at_rest[c]) {
+            const std::uint64_t mode = next(std::uint64_t{p.one_way ? 2u : 3u});
+            out.modes[c] = mode == 0 ? 0 : mode == 1 && !p.one_way ? +1 : -1;
+        }
+        slips += out.modes[c] != 0;
+    }
+    return slips;
+}
+int SwitchedTrain::numbered_combination(std::uint64_t number, const Event& event, const Key& from, Key& out) const {
+    const auto next = [&](std::uint64_t n) {
+        const std::uint64_t mode = number % n;
+        number /= n;
+        return mode;
+    };
+    return combination(next, event, from, out);
+}
+
+double SwitchedTrain::torque_change(const SearchedRegime& r, const Instant& now, const Event& event) const {
+    double sum = 0.0;
+    for (std::size_t g = 0; g < train().gears.size(); ++g)
+        sum += std::fabs(evaluate(r.output_torque[g], now) - event.gear[g]);
+    each_coupling_contact([&](int c) { sum += std::fabs(evaluate(r.contact_torque[c], now) - event.coupling[c]); });
+    return sum;
+}
+
+const SwitchedTrain::Guard* SwitchedTrain::first_left(const SearchedRegime& r, const Instant& now,
+                                                      const std::vector<std::size_t>& ignored, const Event& event,
+                                                      Violated& of_contacts) {
+    const auto each_near_zero = [&](auto&& use) {
+        for (std::size_t g = 0; g < r.guards.size(); ++g) {
+            const Guard& guard = r.guards[g];
+            if (guard.behind || is_of_moving(guard, event)) continue;
+            if (!ignored.empty() && std::ranges::find(ignored, g) != ignored.end()) continue;
+            const auto [value, size] = sized(guard.form, now);
+            if (value > clear_of_zero * size + r.near_event[g]) continue;
+            if (!use(guard, value, size)) return;
+        }
+    };
+    return model::first_left<SparseForm>(
+        SparseFlow(r.rate, now, room_), r.drivers, each_near_zero,
+        [&](const Guard& g) { return event.by_value_alone(g); }, of_contacts);
+}
+
 // Those with most contacts stuck first. While everything is at rest the torques stay as they were, and give way only if
 // neither that nor a motion is consistent, and then by as little as they can.
-template <class Sizes>
-template <class Cache, class Now>
-Found SwitchedTrain<Sizes>::enumerate(Cache& cache, Now& now, const Event& event, const Key& from, Key& key) const {
+Found SwitchedTrain::enumerate(Instant& now, const Event& event, const Key& from, Key& key) {
     Key modes;
-    slips_of_.resize(static_cast<std::size_t>(combinations(event)));
-    for (std::size_t number = 0; number < slips_of_.size(); ++number)
-        slips_of_[number] = combination(number, event, from, modes);
     const auto before = now.memory;  // all that a trial may change
     Found worst = Found::inconsistent;
+    numbered_combination(0, event, from, modes);  // that with most contacts stuck
+    const bool tried = !event.closest && !at_its_limit(modes);
+    if (tried) {
+        worst = settle(now, modes, event, key).found;
+        if (worst == Found::yes) return worst;
+    }
+    slips_of_.resize(static_cast<std::size_t>(combinations(event)));
+    for (std::size_t number = 0; number < slips_of_.size(); ++number)
+        slips_of_[number] = numbered_combination(number, event, from, modes);
+    if (tried) slips_of_[0] = -1;
     const double limit = event.closest ? max_violation : std::numeric_limits<double>::infinity();
     double smallest = limit;
     Key closest;
@@ -319,16 +341,16 @@ Found SwitchedTrain<Sizes>::enumerate(Cache& cache, Now& now, const Event& event
         for (int slips = 0; slips <= contacts(); ++slips)
             for (std::size_t number = 0; number < slips_of_.size(); ++number) {
                 if (slips_of_[number] != slips) continue;
-                combination(number, event, from, modes);
+                numbered_combination(number, event, from, modes);
                 if (at_its_limit(modes) != at_limit) continue;
                 now.memory = before;
-                const Found found = at_limit ? settle_at_limit(cache, now, modes, event, key)
-                                             : settle(cache, now, modes, event, key).found;
+                const Found found =
+                    at_limit ? settle_at_limit(now, modes, event, key) : settle(now, modes, event, key).found;
                 if (found == Found::yes && !event.closest && !at_limit) return found;
                 if (found == Found::outside) worst = found;
                 if (found != Found::yes) continue;
-                const double v = event.closest ? violation(look_up(cache, key), now, event)
-                                               : torque_change(cache.regime(key), now, event);
+                const double v =
+                    event.closest ? violation(regimes_[key], now, event) : torque_change(regimes_[key], now, event);
                 if (v < smallest) {
                     smallest = v;
                     closest = key;
@@ -345,10 +367,7 @@ Found SwitchedTrain<Sizes>::enumerate(Cache& cache, Now& now, const Event& event
     return Found::yes;
 }
 
-template <class Sizes>
-template <class Cache, class Now>
-Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, Key modes, const Key& from,
-                                  Key& key) const {
+Found SwitchedTrain::pivot(Instant& now, const Event& event, Key modes, const Key& from, Key& key) {
     const auto before = now.memory;
     struct Tried {
         Key modes;
@@ -388,7 +407,7 @@ Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, Ke
         for (const auto all = static_cast<std::uint64_t>(std::fmin(count, countable)); drawn <= all;) {
             std::uint64_t number = drawn++ * stride;
             if (count < countable)
-                combination(number % all, event, from, modes);
+                numbered_combination(number % all, event, from, modes);
             else
                 combination([&](std::uint64_t n) { return ((number = number * 6364136223846793005u + 1) >> 33) % n; },
                             event, from, modes);
@@ -399,14 +418,14 @@ Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, Ke
     while (tried.size() < longest_pivoting) {
         now.memory = before;
         std::vector<Violation> violations;
-        const Trial trial = settle(cache, now, modes, event, key, {&violations});
+        const Trial trial = settle(now, modes, event, key, {&violations});
         if (trial.found == Found::inconsistent && trial.turns_back &&
-            settle_at_limit(cache, now, modes, event, key) == Found::yes)
+            settle_at_limit(now, modes, event, key) == Found::yes)
             return Found::yes;
         if (trial.found == Found::outside) worst = Found::outside;
         if (trial.found == Found::yes && !event.closest) return Found::yes;
         if (trial.found == Found::yes) {
-            const double v = violation(look_up(cache, key), now, event);
+            const double v = violation(regimes_[key], now, event);
             if (v < smallest) {
                 smallest = v;
                 closest = key;
@@ -436,8 +455,7 @@ Found SwitchedTrain<Sizes>::pivot(Cache& cache, Now& now, const Event& event, Ke
     return worst;
 }
 
-template <class Sizes>
-bool SwitchedTrain<Sizes>::holds_more(const ContactPlace& c) const {
+bool SwitchedTrain::holds_more(const ContactPlace& c) const {
     if (c.kind == ContactPlace::gear) return false;
     const auto element = static_cast<std::size_t>(c.element);
     if (c.kind == ContactPlace::coupling) return places().couplings[element]->holds_more();
@@ -451,19 +469,15 @@ bool SwitchedTrain<Sizes>::holds_more(const ContactPlace& c) const {
 // value or, of one that is zero to rounding, by the rate. A value is zero, too, if it is so beside what the terms are
 // at rated load and speed: an elimination leaves that where all else is zero. Higher derivatives, of which rounding may
 // leave less, choose among combinations that all else allows.
-template <class Sizes>
-template <class E, class Now>
-double SwitchedTrain<Sizes>::violation(const E& e, const Now& now, const Event& event) const {
-    const auto& r = regime_of(e);
-    const Guards ignored = moving(e, event.at_rest);
-    auto along = flow(e, now);
+double SwitchedTrain::violation(const SearchedRegime& r, const Instant& now, const Event& event) {
+    SparseFlow along(r.rate, now, room_);
     double worst = 0.0;
-    for (std::size_t g = 0; g < guard_count(r); ++g) {
+    for (std::size_t g = 0; g < r.guards.size(); ++g) {
         const auto& guard = r.guards[g];
-        if (ignored[static_cast<int>(g)] || !guard.is_of_contact()) continue;
-        double value = evaluate(n_, guard.form, now);
-        const double size = magnitude(n_, guard.form, now);
-        if (std::fabs(value) <= rounding * near_event(guard.form) / far_from_event) value = 0.0;
+        if (is_of_moving(guard, event) || !guard.is_of_contact()) continue;
+        double value = evaluate(guard.form, now);
+        const double size = magnitude(guard.form, now);
+        if (std::fabs(value) <= rounding * r.near_event[g] / far_from_event) value = 0.0;
         const double rate = along.rate(guard.form, 1);
         const bool zero = std::fabs(value) <= along.noise(size, rate);
         const bool nothing = value == 0.0 && rate == 0.0 && !event.by_value_alone(guard);
@@ -475,39 +489,6 @@ double SwitchedTrain<Sizes>::violation(const E& e, const Now& now, const Event& 
             worst = std::fmax(worst, -value / size);
     }
     return worst;
-}
-
-// Across an edge of a law or a limit the motion is smooth enough for every contact to go on as it was; if that is
-// consistent there is nothing to search.
-template <class Sizes>
-template <class Cache, class E, class Now, class G>
-bool SwitchedTrain<Sizes>::goes_on(Cache& cache, E& from, Now& now, const G& fired, Key& key) const {
-    if (!fired.is_edge()) return false;
-    const auto& e = beyond(cache, from, fired);
-    if (!regime_of(e).solvable) return false;
-    const auto before = now.memory;
-    shift(fired, now);
-    Violated of_contacts;
-    if (first_left(e, now, Guards{}, nullptr, of_contacts) == nullptr && !of_contacts.any) {
-        key = regime_of(e).key;
-        return true;
-    }
-    now.memory = before;
-    return false;
-}
-
-// An input has changed: does the regime go on? The contacts that move keep their direction. A guard that is zero to
-// rounding has not ended it; the solver finds it if it goes on to fall.
-template <class Sizes>
-template <class E, class Now, class Input>
-bool SwitchedTrain<Sizes>::stays(const E& e, const Now& now, const Input& input) const {
-    const auto& r = regime_of(e);
-    for (const auto& driver : r.drivers)
-        if (falls(driver, input, now.input[0])) return false;
-    Event lasting;
-    lasting.by_value = true;
-    Violated of_contacts;
-    return first_left(e, now, moving(e, r.at_rest), &lasting, of_contacts) == nullptr && !of_contacts.any;
 }
 
 }  // namespace lostmotion::model

@@ -8,26 +8,37 @@
 // Flanks of several gears strike in turn. Let K be the kinetic energy of their approach speeds u, delta their gaps,
 // lambda the torques that would press them if all touched. K + sum lambda delta is constant in flight and falls with
 // each impact, so that no later gap of a gear exceeds (K + sum lambda delta)/lambda.
-#pragma once
-
 #include "impulses.hpp"
 #include "switched_train.hpp"
 
 namespace lostmotion::model {
 
 // Flanks have a gap if it is more than rounding makes of it, in space or in time.
-template <class Sizes>
-template <class Now>
-bool SwitchedTrain<Sizes>::has_gap(int contact, const Now& now) const {
+bool SwitchedTrain::has_gap(int contact, const Instant& now) const {
     const ContactPlace& p = places().contacts[contact];
     return p.reach - std::fabs(now.x[p.flanks]) >
            rounding * 2.0 * p.reach + time_rounding * std::fabs(now.time * speed_of(contact, now));
 }
 
+// Do flanks close their gap, by more than rounding?
+bool SwitchedTrain::approach(int contact, const Instant& now) const {
+    double speed = 0.0, size = 0.0;
+    places().contacts[contact].each_shaft([&](int s, double per) {
+        speed += per * now.x[places().shafts[s].speed];
+        size += std::fabs(per * now.x[places().shafts[s].speed]);
+    });
+    const double side = now.x[places().contacts[contact].flanks] > 0.0 ? 1.0 : -1.0;
+    return side * speed > 8.0 * std::numeric_limits<double>::epsilon() * size;
+}
+
+double SwitchedTrain::speed_of(int contact, const Instant& now) const {
+    double speed = 0.0;
+    places().contacts[contact].each_shaft([&](int s, double per) { speed += per * now.x[places().shafts[s].speed]; });
+    return speed;
+}
+
 // Those that touch, and those that have no gap to be seen.
-template <class Sizes>
-template <class Now>
-Impulses SwitchedTrain<Sizes>::impulses(const Now& now, const Key& key) const {
+Impulses SwitchedTrain::impulses(const Instant& now, const Key& key) const {
     std::vector<double> speeds(train().shafts.size());
     for (std::size_t s = 0; s < train().shafts.size(); ++s) speeds[s] = now.x[places().shafts[s].speed];
     const Ties ties = places().ties(key.modes.data());
@@ -48,10 +59,7 @@ Impulses SwitchedTrain<Sizes>::impulses(const Now& now, const Key& key) const {
 }
 
 // The regime after impulses. past: what was before them.
-template <class Sizes>
-template <class Cache, class Now>
-Found SwitchedTrain<Sizes>::land(Cache& cache, Now& now, const Impulses& after, Event event, const Now& past,
-                                 Key& key) const {
+Found SwitchedTrain::land(Instant& now, const Impulses& after, Event event, const Instant& past, Key& key) {
     const Rest before = event.at_rest;
     MovedShafts moved{};
     const auto changes = after.changes();
@@ -68,15 +76,13 @@ Found SwitchedTrain<Sizes>::land(Cache& cache, Now& now, const Impulses& after, 
         now.memory[gear.impact_loss] += f.loss;
         if (!event.at_rest[f.contact] || !before[f.contact]) key.modes[f.contact] = -1;
     }
-    return find_after(cache, now, moved, event, before, past, key);
+    return find_after(now, moved, event, before, past, key);
 }
 
 // The regime after some speeds have jumped. Of flanks the event says whether they rest. before: the contacts at rest
 // before it.
-template <class Sizes>
-template <class Cache, class Now>
-Found SwitchedTrain<Sizes>::find_after(Cache& cache, Now& now, const MovedShafts& moved, Event event,
-                                       const Rest& before, const Now& past, Key& key) const {
+Found SwitchedTrain::find_after(Instant& now, const MovedShafts& moved, Event event, const Rest& before,
+                                const Instant& past, Key& key) {
     constexpr double few_roundings = 8.0 * std::numeric_limits<double>::epsilon();
     for (int c = 0; c < contacts(); ++c) {
         const ContactPlace& p = places().contacts[c];
@@ -103,26 +109,29 @@ Found SwitchedTrain<Sizes>::find_after(Cache& cache, Now& now, const MovedShafts
     }
     stop(now.x, event.at_rest);
     for (int c = 0; c < contacts(); ++c) event.stopped[c] = event.at_rest[c] && !before[c];
-    Now on_the_way = past;
-    on_the_way.x = now.x;
-    on_the_way.memory = now.memory;
-    return find(cache, now, on_the_way, event, key);
+    const auto on_the_way = [&, x = now.x, memory = now.memory] {
+        Instant out = past;
+        out.x = x;
+        out.memory = memory;
+        return out;
+    };
+    return find(now, on_the_way, event, key);
 }
 
 // How long flanks of one gear that have just parted go on to strike; -1 if they do not, or their flights are to be
 // seen.
-template <class Sizes>
-template <class E, class Now>
-double SwitchedTrain<Sizes>::time_to_rest(const E& e, const Now& now, int contact) const {
+double SwitchedTrain::time_to_rest(const SearchedRegime& r, const Instant& now, int contact) {
     constexpr double epsilon = std::numeric_limits<double>::epsilon();
     const ContactPlace& p = places().contacts[contact];
     const double restitution = train().gears[static_cast<std::size_t>(p.element)].restitution;
     const double side = now.x[p.flanks] > 0.0 ? 1.0 : -1.0;
     double v = -side * speed_of(contact, now);
     if (!(v > 0.0)) return -1.0;
-    std::decay_t<decltype(regime_of(e).guards[0].form)> approach;
-    p.each_shaft([&](int s, double per) { approach.c[places().shafts[s].speed] += side * per; });
-    auto along = flow(e, now);
+    Row row;
+    p.each_shaft([&](int s, double per) { row.c[places().shafts[s].speed] += side * per; });
+    const SparseForm::Block block(row, assembly_.layout());
+    const SparseForm& approach = block.form;
+    SparseFlow along(r.rate, now, room_);
     const double a0 = along.rate(approach, 1), a1 = along.rate(approach, 2), a2 = along.rate(approach, 3);
     if (!(a0 > rounding * along.rate_magnitude(approach, 1))) return -1.0;
     const bool elastic = !(restitution < 1.0);
@@ -147,11 +156,9 @@ double SwitchedTrain<Sizes>::time_to_rest(const E& e, const Now& now, int contac
 
 // The same of all flanks that strike in turn, and are pressed in this regime, in which they touch. energy: K. before:
 // where their gaps were.
-template <class Sizes>
-template <class E, class Now>
-double SwitchedTrain<Sizes>::time_to_rest(const E& e, const Now& now, const Now& before, const Impulses& joined,
-                                          double energy) const {
-    auto along = flow(e, now);
+double SwitchedTrain::time_to_rest(const SearchedRegime& r, const Instant& now, const Instant& before,
+                                   const Impulses& joined, double energy) {
+    SparseFlow along(r.rate, now, room_);
     struct Pressed {
         // most: the gap that counts as none; flight: its duration, by sqrt(energy); flights: of all, or without end
         double torque, rate, most, flight, flights;
@@ -161,9 +168,9 @@ double SwitchedTrain<Sizes>::time_to_rest(const E& e, const Now& now, const Now&
         const Flank& flank = joined.flanks[f];
         if (!flank.accumulates && !(flank.struck && flank.touches)) continue;
         const ContactPlace& p = places().contacts[flank.contact];
-        const auto& form = regime_of(e).output_torque[static_cast<std::size_t>(p.element)];
-        const double torque = flank.side * evaluate(n_, form, now);
-        if (!(torque > rounding * magnitude(n_, form, now))) return -1.0;
+        const auto& form = r.output_torque[static_cast<std::size_t>(p.element)];
+        const double torque = flank.side * evaluate(form, now);
+        if (!(torque > rounding * magnitude(form, now))) return -1.0;
         energy += torque * (p.reach - std::fabs(before.x[p.flanks]));
         all.push_back({torque, along.rate(form, 1), least_flight_ * 2.0 * p.reach,
                        2.0 * std::sqrt(2.0 * joined.inertia(f)) / torque, 1.0 / (1.0 - flank.restitution)});
@@ -182,9 +189,7 @@ double SwitchedTrain<Sizes>::time_to_rest(const E& e, const Now& now, const Now&
     return elastic ? for_ever : time;
 }
 
-template <class Sizes>
-template <class Cache, class Now, class G>
-Found SwitchedTrain<Sizes>::strikes(Cache& cache, Now& now, const G& fired, Key& key) const {
+Found SwitchedTrain::strikes(Instant& now, const Guard& fired, Key& key) {
     const int contact = fired.contact;
     const ContactPlace& p = places().contacts[contact];
     now.x[places().gears[static_cast<std::size_t>(p.element)].clock] = 0.0;
@@ -195,12 +200,12 @@ Found SwitchedTrain<Sizes>::strikes(Cache& cache, Now& now, const G& fired, Key&
     now.x[p.flanks] = std::copysign(p.reach, now.x[p.flanks]);
     double first = 0.0;
     for (int round = 0;; ++round) {
-        const auto& old = cache.regime(key);
+        const auto& old = regimes_[key];
         Event event;
-        for (std::size_t g = 0; g < train().gears.size(); ++g) event.gear[g] = evaluate(n_, old.output_torque[g], now);
-        each_coupling_contact([&](int c) { event.coupling[c] = evaluate(n_, old.contact_torque[c], now); });
+        for (std::size_t g = 0; g < train().gears.size(); ++g) event.gear[g] = evaluate(old.output_torque[g], now);
+        each_coupling_contact([&](int c) { event.coupling[c] = evaluate(old.contact_torque[c], now); });
         for (int c = 0; c < contacts(); ++c) event.at_rest[c] = old.at_rest[c];
-        const Now past = now;
+        const Instant past = now;
         const Key from = key;
         Impulses struck = impulses(now, key);
         const double approach = struck.approach();
@@ -208,19 +213,17 @@ Found SwitchedTrain<Sizes>::strikes(Cache& cache, Now& now, const G& fired, Key&
         // Speeds that have come to nothing end with all flanks together, so far as these press.
         const bool last = round >= most_rounds || approach <= negligible * first;
         struck.strike(last);
-        const Found found = land(cache, now, struck, event, past, key);
-        if (found != Found::yes || last || close(cache, now, struck, contact, event, past, from, key)) return found;
+        const Found found = land(now, struck, event, past, key);
+        if (found != Found::yes || last || close(now, struck, contact, event, past, from, key)) return found;
         if (struck.approach() == 0.0) return found;
     }
 }
 
 // Lets flanks touch whose flights are negligible: all that fly that low, or else ever fewer, or the struck ones alone.
 // False if there are none.
-template <class Sizes>
-template <class Cache, class Now>
-bool SwitchedTrain<Sizes>::close(Cache& cache, Now& now, const Impulses& struck, int contact, const Event& event,
-                                 const Now& past, const Key& from, Key& key) const {
-    const Now apart = now;
+bool SwitchedTrain::close(Instant& now, const Impulses& struck, int contact, const Event& event, const Instant& past,
+                          const Key& from, Key& key) {
+    const Instant apart = now;
     const Key key_apart = key;
     const std::size_t m = struck.flanks.size();
     const auto flies = [&](std::size_t f) { return key_apart.modes[struck.flanks[f].contact] != 0; };
@@ -233,7 +236,7 @@ bool SwitchedTrain<Sizes>::close(Cache& cache, Now& now, const Impulses& struck,
         const double energy = joined.join(some);
         now = past;
         key = from;
-        bool rests = land(cache, now, joined, event, past, key) == Found::yes && !(joined.approach() > 0.0);
+        bool rests = land(now, joined, event, past, key) == Found::yes && !(joined.approach() > 0.0);
         for (std::size_t f = 0; f < m; ++f) rests = rests && (!some[f] || key.modes[joined.flanks[f].contact] == 0);
         const double time = rests ? left(energy) : -1.0;
         if (!(time >= 0.0)) return false;
@@ -253,8 +256,7 @@ bool SwitchedTrain<Sizes>::close(Cache& cache, Now& now, const Impulses& struck,
             own = own || (set[f] && joined.flanks[f].contact == contact);
         }
         if (several == 0 || (several == 1 && own)) break;
-        if (rest([&](double energy) { return time_to_rest(look_up(cache, key), now, apart, joined, energy); }))
-            return true;
+        if (rest([&](double energy) { return time_to_rest(regimes_[key], now, apart, joined, energy); })) return true;
         // Those that would part do not belong to them, or that which strikes or parts with the most energy.
         bool part = false;
         std::size_t most = m;
@@ -273,7 +275,7 @@ bool SwitchedTrain<Sizes>::close(Cache& cache, Now& now, const Impulses& struck,
     now = apart;
     key = key_apart;
     if (key.modes[contact] == 0 || struck.approach() > 0.0) return false;
-    const double left = time_to_rest(look_up(cache, key), now, contact);
+    const double left = time_to_rest(regimes_[key], now, contact);
     if (left < 0.0) return false;
     joined = struck;
     for (Flank& f : joined.flanks) f.accumulates = f.contact == contact;
@@ -286,22 +288,20 @@ bool SwitchedTrain<Sizes>::close(Cache& cache, Now& now, const Impulses& struck,
 // Friction that grows with the load may lock a rigid gear in motion (theory.md): where no accelerations are consistent,
 // the torque in ever stiffer meshes grows without limit in no time, and stops its input shaft with all that rigid gears
 // tie to it. Contacts of limited torque take no part in that.
-template <class Sizes>
-template <class Cache, class Now>
-Found SwitchedTrain<Sizes>::locks(Cache& cache, Now& now, const Event& event, const Now& past, Key& key) const {
-    const Now moving = now;
+Found SwitchedTrain::locks(Instant& now, const Event& event, const Instant& past, Key& key) {
+    const Instant moving = now;
     const Key from = key;
-    Now stopped = now;
+    Instant stopped = now;
     Key stopped_key = key;
     bool some = false;
     for (std::size_t g = 0; g < train().gears.size(); ++g) {
-        if (!train().gears[g].may_lock() || !locks_in_motion(cache, moving, event, from, g)) continue;
+        if (!train().gears[g].may_lock() || !locks_in_motion(moving, event, from, g)) continue;
         now = moving;
         key = from;
         MovedShafts moved{};
         double& lost = now.memory[places().gears[g].impact_loss];
         if (!stop_with(now, g, moved, lost)) continue;
-        const Found found = find_after(cache, now, moved, event, event.at_rest, past, key);
+        const Found found = find_after(now, moved, event, event.at_rest, past, key);
         if (found != Found::yes) continue;
         // Of two that may lock, it is only known where both stop the same.
         if (some && !(key == stopped_key && now.x == stopped.x)) {
@@ -318,10 +318,7 @@ Found SwitchedTrain<Sizes>::locks(Cache& cache, Now& now, const Event& event, co
 
 // Is the effective inertia of all that the input of a gear moves negative under a torque by which its output drives it,
 // and positive under the opposite one, while all contacts of limited torque slip?
-template <class Sizes>
-template <class Cache, class Now>
-bool SwitchedTrain<Sizes>::locks_in_motion(Cache& cache, const Now& now, const Event& event, const Key& from,
-                                           std::size_t gear) const {
+bool SwitchedTrain::locks_in_motion(const Instant& now, const Event& event, const Key& from, std::size_t gear) {
     const Gear& g = train().gears[gear];
     const int contact = places().shafts[g.input].contact, way = from.modes[contact];
     if (way == 0 || event.at_rest[contact]) return false;
@@ -335,16 +332,14 @@ bool SwitchedTrain<Sizes>::locks_in_motion(Cache& cache, const Now& now, const E
         Torques T_2 = event.gear;
         T_2[gear] = driven * way * g.sense() * g.rated_torque();
         locate_losses(now, T_2, trial);
-        return cache.regime(trial).solvable;
+        return regimes_[trial].solvable;
     };
     return moves(+1.0) && !moves(-1.0);
 }
 
 // Stops the input of a gear and all that rigid gears tie to it. False if that leaves a part of it in motion, or would
 // move others.
-template <class Sizes>
-template <class Now>
-bool SwitchedTrain<Sizes>::stop_with(Now& now, std::size_t gear, MovedShafts& moved, double& lost) const {
+bool SwitchedTrain::stop_with(Instant& now, std::size_t gear, MovedShafts& moved, double& lost) const {
     const int contact = places().shafts[train().gears[gear].input].contact;
     Key together;
     for (int c = 0; c < contacts(); ++c)

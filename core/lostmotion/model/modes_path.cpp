@@ -1,40 +1,33 @@
 // The way of the torques of contacts at rest from before an event to after it.
-#pragma once
-
 #include "switched_train.hpp"
 
 namespace lostmotion::model {
 
 // In these modes, whether they are consistent or not. What is zero to rounding is zero: the margin of a contact at its
 // limit does not fail by its last bit.
-template <class Sizes>
-template <class Cache, class Now>
-bool SwitchedTrain<Sizes>::conditions(Cache& cache, Now now, const Key& modes, const Event& event,
-                                      Conditions& out) const {
+bool SwitchedTrain::conditions(Instant now, const Key& modes, const Event& event, Conditions& out) {
     ++searches.trials;
     Key trial;
     trial.modes = modes.modes;
     locate(now, trial);
     locate_losses(now, event.gear, trial);
-    if (some_redundant_) hold(cache.regime(trial), now, event);
-    trial = branches_at(cache.regime(trial), trial, now);
-    const auto& e = look_up(cache, trial);
-    const auto& r = regime_of(e);
+    if (some_redundant_) hold(regimes_[trial], now, event);
+    trial = branches_at(regimes_[trial], trial, now);
+    const SearchedRegime& r = regimes_[trial];
     constexpr double none = std::numeric_limits<double>::infinity();
     out.assign(static_cast<std::size_t>(contacts()), {none, none, none});
-    auto along = flow(e, now);
+    SparseFlow along(r.rate, now, room_);
     const auto clear = [](double value, double size) { return std::fabs(value) > rounding * size ? value : 0.0; };
-    for (std::size_t g = 0; g < guard_count(r) && r.solvable; ++g) {
+    for (std::size_t g = 0; g < r.guards.size() && r.solvable; ++g) {
         const auto& guard = r.guards[g];
         if (guard.kind == Guard::capacity)
-            out[guard.contact][guard.neighbour + 1] =
-                clear(evaluate(n_, guard.form, now), magnitude(n_, guard.form, now));
+            out[guard.contact][guard.neighbour + 1] = clear(evaluate(guard.form, now), magnitude(guard.form, now));
         else if (guard.kind == Guard::set_off)
             out[guard.contact][guard.neighbour + 1] =
                 clear(along.rate(guard.form, 1), along.rate_magnitude(guard.form, 1));
         else if (guard.kind == Guard::impact && event.at_rest[guard.contact] && !r.at_rest[guard.contact]) {
             // Two guards, one for each end of the gap: the flanks are at the end whose form is zero.
-            if (evaluate(n_, guard.form, now) == 0.0)
+            if (evaluate(guard.form, now) == 0.0)
                 out[guard.contact][1] = clear(along.rate(guard.form, 2), along.rate_magnitude(guard.form, 2));
         } else if (guard.kind == Guard::speed && event.at_rest[guard.contact] && !r.at_rest[guard.contact])
             out[guard.contact][1] = clear(along.rate(guard.form, 1), along.rate_magnitude(guard.form, 1));
@@ -49,10 +42,7 @@ bool SwitchedTrain<Sizes>::conditions(Cache& cache, Now now, const Key& modes, c
 // changes the mode of its contact: one that is stuck begins to slip where its torque reaches what it holds, one that
 // slips is stuck where its acceleration falls to zero. A contact that then takes less than it held makes others follow
 // at once, in the order in which their conditions fail while its torque falls.
-template <class Sizes>
-template <class Cache, class Now>
-Key SwitchedTrain<Sizes>::follow(Cache& cache, const Now& now, const Now& before, const Event& event,
-                                 const Key& from) const {
+Key SwitchedTrain::follow(const Instant& now, const Instant& before, const Event& event, const Key& from) {
     Key begin, end;
     for (int c = 0; c < contacts(); ++c) {
         const ContactPlace& p = places().contacts[c];
@@ -68,7 +58,7 @@ Key SwitchedTrain<Sizes>::follow(Cache& cache, const Now& now, const Now& before
     before_change.assign(static_cast<std::size_t>(contacts()), {none, none, none});
     for (int changes = 0; changes < most_changes * contacts(); ++changes) {
         Conditions first, last;
-        if (!conditions(cache, before, begin, event, first) || !conditions(cache, now, end, event, last)) break;
+        if (!conditions(before, begin, event, first) || !conditions(now, end, event, last)) break;
         const Failure fails = first_failure(begin, end, first, last, before_change, way);
         if (fails.contact == nowhere) break;
         way = fails.way;
@@ -83,9 +73,8 @@ Key SwitchedTrain<Sizes>::follow(Cache& cache, const Now& now, const Now& before
 }
 
 // Where on the way, from `way` on, which condition fails first.
-template <class Sizes>
-auto SwitchedTrain<Sizes>::first_failure(const Key& begin, const Key& end, Conditions& first, const Conditions& last,
-                                         const Conditions& before_change, double way) const -> Failure {
+auto SwitchedTrain::first_failure(const Key& begin, const Key& end, Conditions& first, const Conditions& last,
+                                  const Conditions& before_change, double way) const -> Failure {
     constexpr double tiny = 1e-9;
     Failure fails;
     double least_fall = std::numeric_limits<double>::infinity();  // share of the fall at the last change

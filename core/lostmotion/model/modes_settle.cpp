@@ -1,14 +1,10 @@
 // One combination of modes: its pieces and cells, its locked torques, and whether it is consistent.
-#pragma once
-
 #include "switched_train.hpp"
 
 namespace lostmotion::model {
 
 // A form of a controller, which depends on states and inputs and has a constant.
-template <class Sizes>
-template <class Now>
-double SwitchedTrain<Sizes>::value_of(const Now& now, const Row& v) const {
+double SwitchedTrain::value_of(const Instant& now, const Row& v) const {
     const Layout& n = assembly_.layout();
     double sum = v.c[n.one];
     for (int k = 0; k < n.coupled; ++k) sum += v.c[k] * now.x[k];
@@ -17,9 +13,7 @@ double SwitchedTrain<Sizes>::value_of(const Now& now, const Row& v) const {
 }
 
 // The branches that the state and the inputs give alone.
-template <class Sizes>
-template <class Now>
-void SwitchedTrain<Sizes>::locate(const Now& now, Key& trial) const {
+void SwitchedTrain::locate(const Instant& now, Key& trial) const {
     const auto set = [&trial](int branch, int value) {
         if (branch != nowhere) trial.branch[branch] = static_cast<std::int16_t>(value);
     };
@@ -72,9 +66,7 @@ void SwitchedTrain<Sizes>::locate(const Now& now, Key& trial) const {
 }
 
 // The cells of the loss laws, at the output torques T_2.
-template <class Sizes>
-template <class Now>
-void SwitchedTrain<Sizes>::locate_losses(const Now& now, const Torques& T_2, Key& trial) const {
+void SwitchedTrain::locate_losses(const Instant& now, const Torques& T_2, Key& trial) const {
     for (std::size_t g = 0; g < train().gears.size(); ++g) {
         const Gear& gear = train().gears[g];
         if (!gear.has_dry_losses()) continue;
@@ -90,9 +82,7 @@ void SwitchedTrain<Sizes>::locate_losses(const Now& now, const Torques& T_2, Key
 
 // Torques that the motion does not determine are held, from the load to the motors. Whether all contacts can hold them,
 // the guards tell.
-template <class Sizes>
-template <class R, class Now>
-void SwitchedTrain<Sizes>::hold(const R& r, Now& now, const Event& event) const {
+void SwitchedTrain::hold(const SearchedRegime& r, Instant& now, const Event& event) const {
     if (r.locked.empty()) return;
     Torques torques{};
     for (int c = 0; c < contacts(); ++c) {
@@ -102,14 +92,11 @@ void SwitchedTrain<Sizes>::hold(const R& r, Now& now, const Event& event) const 
     }
     for (const auto& l : r.locked) now.memory[l.memory] = torques[l.contact];
     for (const auto& l : r.locked)
-        now.memory[l.memory] = held_torque(l, torques, [&](const auto& form) { return evaluate(n_, form, now); }).value;
+        now.memory[l.memory] = held_torque(l, torques, [&](const auto& form) { return evaluate(form, now); }).value;
 }
 
 // Is this combination of modes consistent? Pieces and cells are found by a walk that begins at what the torques were.
-template <class Sizes>
-template <class Cache, class Now>
-auto SwitchedTrain<Sizes>::settle(Cache& cache, Now& now, const Key& modes, const Event& event, Key& key,
-                                  Violated violated) const -> Trial {
+auto SwitchedTrain::settle(Instant& now, const Key& modes, const Event& event, Key& key, Violated violated) -> Trial {
     ++searches.trials;
     Key trial;
     trial.modes = modes.modes;
@@ -125,10 +112,9 @@ auto SwitchedTrain<Sizes>::settle(Cache& cache, Now& now, const Key& modes, cons
             (slip == 2 ? 0.0 : slip * now.memory[p.hysteresis]);
     }
     locate_losses(now, T_2, trial);
-    if (some_redundant_) hold(cache.regime(trial), now, event);
-    Trial result = walk(cache, now, event, trial, key, violated);
-    if (result.found == Found::inconsistent && settle_on_corner(cache, now, event, trial, key))
-        result.found = Found::yes;
+    if (some_redundant_) hold(regimes_[trial], now, event);
+    Trial result = walk(now, event, trial, key, violated);
+    if (result.found == Found::inconsistent && settle_on_corner(now, event, trial, key)) result.found = Found::yes;
     if (result.found != Found::inconsistent || !event.from_each_load) return result;
     // The torque that keeps a twist at rest depends on the cell, and the cell on the torque.
     for (std::size_t g = 0; g < train().gears.size(); ++g) {
@@ -144,7 +130,7 @@ auto SwitchedTrain<Sizes>::settle(Cache& cache, Now& now, const Key& modes, cons
                 if (half == 1 && gear.efficiencies) continue;
                 Key other = trial;
                 other.branch[places().gears[g].cell] = static_cast<std::int16_t>(gear.loss_cell(middle, v) ^ half);
-                const Trial again = walk(cache, now, event, other, key);
+                const Trial again = walk(now, event, other, key);
                 if (again.found == Found::yes) return again;
             }
         }
@@ -156,10 +142,7 @@ auto SwitchedTrain<Sizes>::settle(Cache& cache, Now& now, const Key& modes, cons
 // shaft at rest on one may have
 // that of either side, or, where both sides push it back, any between: does the piece on the other side of such a
 // corner hold, or the corner itself?
-template <class Sizes>
-template <class Cache, class Now>
-bool SwitchedTrain<Sizes>::settle_on_corner(Cache& cache, Now& now, const Event& event, const Key& trial,
-                                            Key& key) const {
+bool SwitchedTrain::settle_on_corner(Instant& now, const Event& event, const Key& trial, Key& key) {
     const auto memory = now.memory;
     bool found = false;
     for (std::size_t g = 0; g < train().gears.size(); ++g)
@@ -175,7 +158,7 @@ bool SwitchedTrain<Sizes>::settle_on_corner(Cache& cache, Now& now, const Event&
                     Key other = trial;
                     other.branch[law.piece] = static_cast<std::int16_t>(turns ? last - k : ahead ? k + 1 : k - 1);
                     if (turns) now.memory[law.turn] += ahead ? curve.period() : -curve.period();
-                    found = walk(cache, now, event, other, key).found == Found::yes;
+                    found = walk(now, event, other, key).found == Found::yes;
                     if (found) return;
                     now.memory = memory;
                 }
@@ -183,7 +166,7 @@ bool SwitchedTrain<Sizes>::settle_on_corner(Cache& cache, Now& now, const Event&
                 if (trial.modes[places().shafts[train().gears[g].input].contact] != 0) continue;
                 Key between = trial;
                 between.branch[law.corner] = ahead ? +1 : -1;
-                found = walk(cache, now, event, between, key).found == Found::yes;
+                found = walk(now, event, between, key).found == Found::yes;
                 if (!found) now.memory = memory;
             }
         });
@@ -192,41 +175,34 @@ bool SwitchedTrain<Sizes>::settle_on_corner(Cache& cache, Now& now, const Event&
 
 // Is this combination, in which a contact is at its limit, consistent, or, if what drives it there turns back, does
 // everything rest at those torques?
-template <class Sizes>
-template <class Cache, class Now>
-Found SwitchedTrain<Sizes>::settle_at_limit(Cache& cache, Now& now, const Key& modes, const Event& event,
-                                            Key& key) const {
+Found SwitchedTrain::settle_at_limit(Instant& now, const Key& modes, const Event& event, Key& key) {
     Event thorough = event;
     thorough.from_each_load = true;
-    const Found found = settle(cache, now, modes, thorough, key).found;
+    const Found found = settle(now, modes, thorough, key).found;
     if (found != Found::inconsistent || event.closest) return found;
     thorough.closest = true;
-    if (settle(cache, now, modes, thorough, key).found != Found::yes) return found;
-    const auto& r = cache.regime(key);
+    if (settle(now, modes, thorough, key).found != Found::yes) return found;
+    const auto& r = regimes_[key];
     Event standing = event;
-    for (std::size_t g = 0; g < train().gears.size(); ++g) standing.gear[g] = evaluate(n_, r.output_torque[g], now);
-    each_coupling_contact([&](int c) { standing.coupling[c] = evaluate(n_, r.contact_torque[c], now); });
+    for (std::size_t g = 0; g < train().gears.size(); ++g) standing.gear[g] = evaluate(r.output_torque[g], now);
+    each_coupling_contact([&](int c) { standing.coupling[c] = evaluate(r.contact_torque[c], now); });
     Key stuck = modes;
     for (int c = 0; c < contacts(); ++c)
         if (r.at_rest[c]) stuck.modes[c] = 0;
-    return settle(cache, now, stuck, standing, key).found;
+    return settle(now, stuck, standing, key).found;
 }
 
 // From a piece and a cell across each of their edges that is violated, until none is: do the contacts hold there?
-template <class Sizes>
-template <class Cache, class Now>
-auto SwitchedTrain<Sizes>::walk(Cache& cache, Now& now, const Event& event, Key trial, Key& key,
-                                Violated violated) const -> Trial {
+auto SwitchedTrain::walk(Instant& now, const Event& event, Key trial, Key& key, Violated violated) -> Trial {
     constexpr int longest_walk = 400;
     Key previous = trial;
-    Guards along;  // edges that lead back to where the walk came from: the motion goes along them
+    std::vector<std::size_t> along;  // edges that lead back to where the walk came from: the motion goes along them
     Trial result;
     for (int step = 0; step < longest_walk; ++step) {
-        const auto& e = look_up(cache, trial);
-        const auto& r = regime_of(e);
+        const SearchedRegime& r = regimes_[trial];
         violated.clear();
         if (!r.solvable) return result;
-        const auto* left = first_left(e, now, moving(e, event.at_rest) | along, &event, violated);
+        const Guard* left = first_left(r, now, along, event, violated);
         if (left != nullptr && left->kind == Guard::outside) {
             result.found = Found::outside;
             return result;
@@ -249,15 +225,14 @@ auto SwitchedTrain<Sizes>::walk(Cache& cache, Now& now, const Event& event, Key 
             return result;
         }
         Key next = trial;
-        const auto g = static_cast<std::size_t>(left - &r.guards[0]);
         cross(*left, next);
         if (step > 0 && next == previous) {
-            along.set(static_cast<int>(g));
+            along.push_back(static_cast<std::size_t>(left - r.guards.data()));
             continue;
         }
-        shift(*left, now);
+        shift(*left, now.memory);
         previous = std::exchange(trial, next);
-        along = {};
+        along.clear();
     }
     return result;
 }
