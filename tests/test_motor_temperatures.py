@@ -164,6 +164,11 @@ def test_the_error_bound_holds_for_random_runs_that_are_sampled_coarsely(seed: i
 def test_rms_torque_is_that_of_the_run() -> None:
     result = lm.simulate(run({"ramps": [{"rise": 0.9, "duration": 60.0}]}, interval=30.0))
     assert float(lm.sizing.temperatures(result)["rms_torque"]) == pytest.approx(0.9 / math.sqrt(3.0), rel=1e-12)
+    limits = {key: value for key, value in THERMAL.items() if key.startswith("thermal")}
+    spindle = lm.load("field-weakening").replace(**{"motors.m.limits": limits})  # under field orientation
+    torque = lm.simulate(spindle, sample_interval=2e-5)["m_torque"].values
+    coarse = lm.sizing.temperatures(lm.simulate(spindle, sample_interval=0.05))
+    assert float(coarse["rms_torque"]) == pytest.approx(float(np.sqrt(np.mean(torque**2))), rel=1e-4)
 
 
 def test_the_drive_check_takes_the_peak_of_the_repeated_cycle() -> None:

@@ -196,14 +196,14 @@ def _heating(
     if any(controller.law for controller in scenario.axes().values()):
         return torque, mean_square(torque), math.inf, rms(time, torque)
     name = next(name for name in scenario.train().motors if scenario.motor_key(name) == where)
+    found = squares_of(scenario, name, time)
     if m.winding is None or (oriented := oriented_amplitudes(result, where)) is None:
-        found = squares_of(scenario, name, time)
         return torque, found.square, found.lead, found.rms
     phase = m.winding.phase_values()
     heat = result[f"{_prefix(where)}copper_heat"].values
     square = phase.torque_constant**2 * np.diff(heat) / (1.5 * phase.resistance * np.diff(time))
     lead = float((square * np.diff(time)).max(initial=0.0))  # no heat is negative
-    return phase.torque_constant * oriented[0], square, lead, rms(time, torque)
+    return phase.torque_constant * oriented[0], square, lead, found.rms
 
 
 def _prefix(where: str) -> str:
