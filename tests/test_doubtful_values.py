@@ -78,6 +78,12 @@ def test_a_window_that_holds_the_whole_move_is_doubted() -> None:
         ValueWarning, match=r"window: 2 rad \(115 deg\) is no less than the whole motion, .* rad \(45 deg\)"
     ):
         lm.commission(lm.load("position-axis"), window=2.0)
+    coarse = lm.load("position-axis-load-encoder", {"controller.position_encoder": {"shaft": "load", "bits": 4}})
+    with pytest.warns(
+        ValueWarning, match=r"window: 1\.5708 rad \(90 deg\) is no less than the whole motion"
+    ):  # 4 steps
+        found = lm.commission(coarse)
+    assert found.settling[-1].time == 0.0  # and not the rounding of two instants
 
 
 def test_the_settling_window_of_a_task_is_compared_with_its_motion(tmp_path: Path) -> None:

@@ -379,11 +379,12 @@ def commission(
         progress()
     followed = following(axis)
     wide = default_window(axis) if asked is None else asked
-    if asked is not None:
-        doubt_window(asked, float(np.ptp(followed.reference)), followed.unit, "window")
     progress()
     stiffness = tuple(_stiffness(axis, regime) for regime in points) if axis.loops[-1] == "position" else ()
     moves = repeated(axis, wide)
+    if moves is not None:
+        positions = [moves.reference.start, *(move.to for move in moves.reference.moves)]
+        doubt_window(wide, float(np.ptp(positions)), followed.unit, "window")
     cycle = limit_cycle(axis) if moves is None else limit_cycle(moves.axis, moves.longest)
     progress()
     certificate = None

@@ -272,10 +272,15 @@ def _before_the_next(moves: Moves, k: int, seen: _Seen, window: float) -> Settli
     if until <= end + moves.interval or not len(during):
         return None
     error = seen.error[during]
-    time = settled(seen.time[during], error, window) + float(seen.time[during[0]]) - end
+    time = _after(end, seen.time[during], error, window)
     state: State = "not settled" if math.isnan(time) else "settled"
     swing = _swing(seen.time[during], error)
     return Settling(end, to, state, time, False, "", float(error[-1]), float(seen.unseen[during[-1]]), swing)
+
+
+def _after(end: float, time: np.ndarray, error: np.ndarray, window: float) -> float:
+    """Time from the end of a move until the error stays within the window, without the rounding of the instants [s]."""
+    return round(settled(time, error, window) + float(time[0]) - end, 9)
 
 
 def _swing(time: np.ndarray, error: np.ndarray, begin: float = 0.5) -> float:
@@ -297,7 +302,7 @@ def _held(moves: Moves, rest: AtRest, seen: _Seen, window: float) -> Settling:
         worst = float(error[-1])
         if abs(to - rest.range[1] - worst) > SAME * window:
             rest = replace(rest, verdict="not decided", reason="rounding decides between two motions")
-    within = settled(time, error, window) + float(time[0]) - end
+    within = _after(end, time, error, window)
     goes_on = rest.verdict == "not decided" and seen.covers and abs(_limit(error)) > window
     goes_on = goes_on and bool(np.abs(error[int(LATER * len(error)) :]).max() > window)  # as far as its flanks let it
     state: State = "not settled"
