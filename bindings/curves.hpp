@@ -3,7 +3,7 @@
 
 #include "arrays.hpp"
 #include "fields.hpp"
-#include "lostmotion/kernel/signal.hpp"
+#include "lostmotion/base/signal.hpp"
 #include "lostmotion/parts/gear.hpp"
 #include "lostmotion/parts/stiffness_curve.hpp"
 #include "lostmotion/scenario/part_fields.hpp"

@@ -4,9 +4,9 @@
 #include <limits>
 
 #include "arrays.hpp"
-#include "lostmotion/kernel/arctangent.hpp"
-#include "lostmotion/kernel/powers.hpp"
-#include "lostmotion/kernel/sine.hpp"
+#include "lostmotion/base/arctangent.hpp"
+#include "lostmotion/base/powers.hpp"
+#include "lostmotion/base/sine.hpp"
 
 namespace lostmotion::binding {
 

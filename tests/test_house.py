@@ -81,8 +81,9 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
 
 # The same for the rooms of the core.
 CORE_LAYERS = [
-    {"kernel"},
-    {"solver", "parts"},
+    {"base"},
+    {"kernel", "parts"},
+    {"solver"},
     {"control"},
     {"elements"},
     {"model"},
@@ -111,9 +112,26 @@ def test_no_headers_include_each_other_in_a_circle() -> None:
     TopologicalSorter(includes).prepare()
 
 
+def test_only_kernels_see_the_solver() -> None:
+    """Headers of `kernel` and `solver` are compiled in `core/kernels` alone, and in the steps of batches."""
+    known: dict[Path, set[Path]] = {}
+
+    def all_of(source: Path) -> set[Path]:
+        if source not in known:
+            known[source] = set()
+            own = {(source.parent / name).resolve() for name in re.findall(r'#include "(\.*[^"]*)"', source.read_text())}
+            known[source] = own.union(*(all_of(h) for h in own if h.exists()))
+        return known[source]
+
+    units = [s for s in SOURCES if s.suffix == ".cpp" and s.parent.name != "batch"]
+    assert len(units) > 50
+    for unit in units:
+        assert {h.name for h in all_of(unit) if h.parent.name in ("kernel", "solver")} == set(), unit
+
+
 # What ties code to a platform: threads, exceptions, and functions of the mathematical library that it need not round
 # correctly, so that their last bits differ from system to system (sqrt, fma, floor, ldexp and the like are exact).
-PORTABLE = ("kernel", "solver", "parts", "control", "elements", "model", "simulation", "scenario")
+PORTABLE = ("base", "kernel", "solver", "parts", "control", "elements", "model", "simulation", "scenario")
 PLATFORM = (
     r"\b(thread_local|throw|try|catch)\b"
     r"|#include <(thread|mutex|atomic|condition_variable|future|exception|stdexcept|iostream)>"

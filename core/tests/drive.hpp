@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <array>
 
-#include "lostmotion/kernel/signal.hpp"
+#include "lostmotion/base/signal.hpp"
 #include "lostmotion/parts/gearbox.hpp"
 #include "lostmotion/parts/motor.hpp"
 

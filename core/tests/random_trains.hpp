@@ -1,7 +1,7 @@
 // Random trains: chains and trees of 2 to 6 shafts with gears, motors, couplings and brakes.
 #pragma once
 
-#include "lostmotion/kernel/signal.hpp"
+#include "lostmotion/base/signal.hpp"
 #include "train_support.hpp"
 
 namespace lostmotion::model {

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "lostmotion/kernel/signal.hpp"
+#include "lostmotion/base/signal.hpp"
 #include "lostmotion/parts/gearbox.hpp"
 #include "referee_polynomial.hpp"
 

@@ -2,7 +2,7 @@
 #include <doctest/doctest.h>
 #include <quadmath.h>
 
-#include "lostmotion/kernel/random.hpp"
+#include "lostmotion/base/random.hpp"
 
 TEST_SUITE_BEGIN("random");
 

@@ -11,7 +11,7 @@
 #include <cmath>
 #include <vector>
 
-#include "lostmotion/kernel/signal.hpp"
+#include "lostmotion/base/signal.hpp"
 #include "lostmotion/model/train.hpp"
 
 namespace lostmotion::model {

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <vector>
 
-#include "../kernel/sine.hpp"
+#include "../base/sine.hpp"
 
 namespace lostmotion {
 

@@ -8,7 +8,7 @@
 #include <limits>
 #include <span>
 
-#include "../kernel/vec.hpp"
+#include "../base/vec.hpp"
 #include "../simulation/enum_table.hpp"
 
 namespace lostmotion {

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "../model/components.hpp"
+#include "../model/periodic_angles.hpp"
 #include "regime_tangent.hpp"
 
 namespace lostmotion {

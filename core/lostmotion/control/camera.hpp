@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "../kernel/random.hpp"
+#include "../base/random.hpp"
 #include "../parts/field.hpp"
 #include "slots.hpp"
 

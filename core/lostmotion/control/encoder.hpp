@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "../kernel/sine.hpp"
+#include "../base/sine.hpp"
 #include "../parts/field.hpp"
 #include "slots.hpp"
 

@@ -1,6 +1,6 @@
 #include "field_orientation.hpp"
 
-#include "../kernel/powers.hpp"
+#include "../base/powers.hpp"
 
 namespace lostmotion::control {
 

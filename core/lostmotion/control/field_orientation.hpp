@@ -13,7 +13,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "../kernel/sine.hpp"
+#include "../base/sine.hpp"
 #include "current_loop.hpp"
 #include "slots.hpp"
 #include "synchronous_winding.hpp"

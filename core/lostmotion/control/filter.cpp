@@ -2,7 +2,7 @@
 
 #include <numbers>
 
-#include "../kernel/sine.hpp"
+#include "../base/sine.hpp"
 
 namespace lostmotion::control {
 

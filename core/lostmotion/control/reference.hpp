@@ -4,8 +4,8 @@
 #include <numbers>
 #include <vector>
 
-#include "../kernel/signal.hpp"
-#include "../kernel/sine.hpp"
+#include "../base/signal.hpp"
+#include "../base/sine.hpp"
 
 namespace lostmotion::control {
 

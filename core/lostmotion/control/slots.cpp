@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "../kernel/powers.hpp"
+#include "../base/powers.hpp"
 
 namespace lostmotion::control {
 

@@ -13,7 +13,7 @@
 #include <array>
 #include <cmath>
 
-#include "../kernel/vec.hpp"
+#include "../base/vec.hpp"
 
 namespace lostmotion {
 

@@ -1,6 +1,6 @@
 #include "row.hpp"
 
-#include "../kernel/vec.hpp"
+#include "../base/vec.hpp"
 
 namespace lostmotion::model {
 

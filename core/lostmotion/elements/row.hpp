@@ -5,7 +5,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "../kernel/few.hpp"
+#include "../base/few.hpp"
 
 namespace lostmotion::model {
 

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "few.hpp"
+#include "../base/few.hpp"
 #include "numbers.hpp"
 
 namespace lostmotion {

@@ -11,6 +11,7 @@
 #include <variant>
 #include <vector>
 
+#include "../base/sign.hpp"
 #include "dims.hpp"
 
 namespace lostmotion {
@@ -308,7 +309,6 @@ template <class D>
 }
 
 // Value and time derivatives of the inputs at one instant: u[k][input] is the k-th derivative.
-inline constexpr int n_derivatives = 6;
 template <class D>
 using InputJetOf = std::array<InputsOf<D>, n_derivatives>;
 

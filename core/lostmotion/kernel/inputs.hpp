@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include "../base/signal.hpp"
 #include "form.hpp"
-#include "signal.hpp"
 
 namespace lostmotion {
 

@@ -13,7 +13,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "double_double.hpp"
+#include "../base/double_double.hpp"
 #include "propagator.hpp"
 
 namespace lostmotion {

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <utility>
 
-#include "vec.hpp"
+#include "../base/vec.hpp"
 
 namespace lostmotion {
 

@@ -8,8 +8,8 @@
 #include <array>
 #include <cassert>
 
+#include "../base/polynomial.hpp"
 #include "inputs.hpp"
-#include "polynomial.hpp"
 #include "rates.hpp"
 
 namespace lostmotion {

@@ -5,7 +5,7 @@
 #include <limits>
 #include <numeric>
 
-#include "../kernel/elimination.hpp"
+#include "../base/elimination.hpp"
 
 namespace lostmotion::model {
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <vector>
 
+#include "../base/sign.hpp"
 #include "../elements/row.hpp"
-#include "../kernel/flow.hpp"
 
 namespace lostmotion::model {
 

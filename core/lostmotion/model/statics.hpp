@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "../kernel/elimination.hpp"
+#include "../base/elimination.hpp"
 #include "places.hpp"
 
 namespace lostmotion::model {

@@ -22,7 +22,7 @@
 #include <utility>
 #include <vector>
 
-#include "../solver/status.hpp"
+#include "../base/status.hpp"
 #include "guards_after.hpp"
 #include "held_torque.hpp"
 #include "impulses.hpp"

@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "going_on.hpp"
 #include "pack.hpp"
 #include "scales.hpp"
 #include "switched_train.hpp"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "../kernel/powers.hpp"
+#include "../base/powers.hpp"
 
 namespace lostmotion::model {
 

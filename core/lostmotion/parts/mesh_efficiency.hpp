@@ -8,7 +8,7 @@
 
 #include <cmath>
 
-#include "../kernel/sine.hpp"
+#include "../base/sine.hpp"
 #include "loss_map.hpp"
 
 namespace lostmotion::model {

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "../kernel/sine.hpp"
+#include "../base/sine.hpp"
 
 namespace lostmotion::model {
 

@@ -1,7 +1,7 @@
 // The parts of drives and trains, field by field, in the order of a description.
 #pragma once
 
-#include "../kernel/signal.hpp"
+#include "../base/signal.hpp"
 #include "../model/train.hpp"
 #include "../parts/stiffness_curve.hpp"
 #include "fields.hpp"

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "../solver/status.hpp"
+#include "../base/status.hpp"
 #include "motion_state.hpp"
 #include "train_point.hpp"
 

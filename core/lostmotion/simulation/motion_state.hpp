@@ -3,8 +3,8 @@
 
 #include <vector>
 
+#include "../base/twist_course.hpp"
 #include "../elements/regime.hpp"
-#include "../solver/twist_course.hpp"
 #include "controllers.hpp"
 
 namespace lostmotion {

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "../solver/status.hpp"
+#include "../base/status.hpp"
 
 namespace lostmotion {
 

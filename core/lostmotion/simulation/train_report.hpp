@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "../base/status.hpp"
 #include "../model/power.hpp"
-#include "../solver/status.hpp"
 #include "result_names.hpp"
 #include "sample_times.hpp"
 #include "train_control.hpp"

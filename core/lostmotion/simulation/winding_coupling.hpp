@@ -14,9 +14,9 @@
 #include <span>
 #include <vector>
 
+#include "../base/status.hpp"
 #include "../control/axis.hpp"
 #include "../kernel/form.hpp"
-#include "../solver/status.hpp"
 
 namespace lostmotion {
 

@@ -15,7 +15,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "../kernel/powers.hpp"
+#include "../base/powers.hpp"
 #include "exact_solver.hpp"
 
 namespace lostmotion {

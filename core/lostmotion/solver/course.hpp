@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <array>
 
+#include "../base/twist_course.hpp"
 #include "../kernel/form.hpp"
-#include "twist_course.hpp"
 
 namespace lostmotion {
 

@@ -3,7 +3,7 @@
 
 #include <limits>
 
-#include "../kernel/polynomial.hpp"
+#include "../base/polynomial.hpp"
 #include "exact_run.hpp"
 
 namespace lostmotion {

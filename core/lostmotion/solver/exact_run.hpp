@@ -6,8 +6,8 @@
 #include <cmath>
 #include <memory>
 
+#include "../base/interruption.hpp"
 #include "../kernel/cursor.hpp"
-#include "../kernel/interruption.hpp"
 #include "course.hpp"
 #include "regime_cache.hpp"
 #include "switching.hpp"

@@ -3,11 +3,11 @@
 
 #include <optional>
 
+#include "../base/status.hpp"
 #include "../kernel/flow.hpp"
 #include "../kernel/inputs.hpp"
 #include "../kernel/rates.hpp"
 #include "observer.hpp"
-#include "status.hpp"
 
 namespace lostmotion {
 

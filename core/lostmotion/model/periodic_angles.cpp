@@ -1,4 +1,4 @@
-#include "components.hpp"
+#include "periodic_angles.hpp"
 
 namespace lostmotion::model {
 
