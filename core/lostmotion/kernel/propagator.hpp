@@ -140,6 +140,8 @@ class Propagator {
             return false;
     }
     double theta(double h) const { return norm_ * std::fabs(h); }
+    // How many steps by series a length needs.
+    double series_parts(double h) const { return std::fmax(1.0, std::ceil(h / length(longest_))); }
     // Of the last step that was taken with it.
     auto& series() { return series_; }
     // What its levels take [bytes], of trains of any size; then without them, until it is prepared again.
@@ -233,7 +235,7 @@ class Propagator {
             if constexpr (std::same_as<D, Any>)
                 if (!integral) {
                     Lanes sum;
-                    const double parts = std::fmax(1.0, std::ceil(h / propagator.length(propagator.longest_level())));
+                    const double parts = propagator.series_parts(h);
                     Series& series = propagator.series_;
                     for (double k = 0.0; k < parts; ++k) {
                         series.expand(propagator.rates(), rate, h / parts, propagator.theta(h / parts));
