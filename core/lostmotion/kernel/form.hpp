@@ -243,6 +243,7 @@ template <class D>
     else
         return CoupledOf<D>::load(x.data());
 }
+[[gnu::always_inline]] inline NumbersAt load(const NumbersRoom& x) { return {x.at, x.count}; }
 template <class D>
 [[gnu::always_inline]] inline decltype(auto) coupled(const StateOf<D>& x) {
     if constexpr (std::same_as<D, Any>)
@@ -252,8 +253,8 @@ template <class D>
 }
 // The coupled states into memory.
 template <class D, class To>
-[[gnu::always_inline]] inline void store(const auto& x, To& to) {
-    if constexpr (std::same_as<To, StateOf<Any>>)
+[[gnu::always_inline]] inline void store(const auto& x, To&& to) {
+    if constexpr (std::same_as<std::remove_cvref_t<To>, StateOf<Any>>)
         to.coupled = x;
     else if constexpr (std::same_as<D, Any>)
         to = x;
