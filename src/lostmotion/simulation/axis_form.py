@@ -34,7 +34,7 @@ def long_form(tables: Mapping[str, Any]) -> dict[str, Any]:
     """
     kind = _kind_of(tables)
     table: dict[str, dict[str, Any]] = {
-        key: {"from": value} if isinstance(value, str) else dict(value) for key, value in axis.items()
+        key: {"from": value} if isinstance(value, str) else dict(value) for key, value in tables["axis"].items()
     }
     shaft = MOTOR
     long: dict[str, Any] = {
@@ -61,7 +61,7 @@ def long_form(tables: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _kind_of(tables: Mapping[str, Any]) -> str:
-    """What moves the slide: screw, rack or belt.
+    """Kind of what moves the slide: screw, rack or belt.
 
     Raises
     ------
