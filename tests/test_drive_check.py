@@ -677,3 +677,41 @@ def test_a_vertical_screw_holds_by_itself_only_if_it_locks(efficiency, verdict):
     assert by_rule(scenario)["holding"].verdict == verdict
     off = scenario.replace(**{"task.hold_without_power": False})
     assert by_rule(off)["holding"].verdict == "ok"
+
+
+def test_a_brake_and_a_payload_of_an_axis_are_those_of_the_long_form():
+    """Weight of 32 kg at a lead of 20 mm: 32 g 0.02/(2 pi) = 0.9989 N m at the motor, beyond the 0.8 N m of the brake."""
+    axis = {"motor": {"kind": "torque_source", "rotor_inertia": 3e-4, "rated_torque": 2.0}}
+    axis["screw"] = {"lead": 0.02, "efficiency": 0.9, "stiffness": 1e8, "damping": 2e4}
+    axis["slide"] = {"mass": "30 kg", "inclination": math.pi / 2}
+    times = {"duration": 0.1, "sample_interval": 0.01}
+    short = lm.Scenario(
+        axis=axis | {"payload": {"mass": 2.0}, "brake": {"torque": 0.8, "command": 1.0}}, simulation=times
+    )
+    long = lm.Scenario(axis=axis | {"slide": axis["slide"] | {"mass": 32.0}}, simulation=times).written
+    assert short.slides == long.slides
+    assert short.brakes["brake"] == lm.Brake(shaft="motor", torque=0.8)
+    found = by_rule(short)
+    assert found["holding_brake"].use == pytest.approx(32.0 * 9.80665 * 0.02 / (2.0 * math.pi) / 0.8, rel=1e-9)
+    assert found["holding_brake"].verdict == found["holding"].verdict == "warning"
+    assert by_rule(short.replace(**{"axis.brake.torque": 1.0}))["holding"].verdict == "ok"
+    # Closed, it holds what it can: the brake slips under 0.9989 N m, and not under the weight of 20 kg.
+    assert lm.simulate(short)["slide_position"][-1] < 0.0
+    held = lm.simulate(short.replace(**{"slides.slide.mass": 20.0}))
+    assert not held["motor_speed"].any()
+
+
+@pytest.mark.parametrize(
+    ("axis", "key"),
+    [
+        ({"brake": {"torque": 1.0}}, "axis.brake.command"),
+        ({"brake": {"torque": -1.0, "command": 0.0}}, "axis.brake.torque"),
+        ({"payload": {"mass": "2 m"}}, "axis.payload.mass"),
+        ({"payload": {"inertia": 2.0}}, "axis.payload.inertia"),
+    ],
+)
+def test_what_is_wrong_with_them_is_said_with_the_key_of_the_file(axis, key):
+    whole = {"motor": {"kind": "torque_source", "rotor_inertia": 3e-4, "rated_torque": 2.0}, "slide": {"mass": 1.0}}
+    with pytest.raises(lm.InputError) as refusal:
+        lm.Scenario(axis=whole | {"screw": {"lead": 0.02}} | axis, simulation={"duration": 1, "sample_interval": 0.1})
+    assert refusal.value.problems[0].keys == (key,)

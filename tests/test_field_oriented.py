@@ -470,7 +470,9 @@ def test_a_law_must_give_both_voltages() -> None:
 
 def test_the_bound_is_in_the_summary_and_the_heat_is_that_of_both_currents() -> None:
     result = lm.simulate(scenario(changed(ROUND, **SALIENT, reference=7.0), 80))
-    assert "error of the field-oriented control at most: direct current" in summary(result)
+    largest = float(abs(result["direct_current"]).max())
+    text = re.escape(f" of {largest:.4g} A peak")  # an amplitude
+    assert re.search(rf"error of the field-oriented control at most: direct current [\d.e-]+{text}", summary(result))
     both = np.hypot(result["direct_current"], result["quadrature_current"]).to_numpy()
     assert lm.sizing.motor_current(result)["current"].to_numpy() == pytest.approx(both)
     voltage = np.hypot(result["direct_voltage"], result["quadrature_voltage"]).to_numpy()

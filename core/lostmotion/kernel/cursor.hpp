@@ -103,7 +103,7 @@ class Cursor {
         carries_rate_ = from.carries_rate_;
         if constexpr (std::same_as<D, Any>)
             if (p.by_series()) {
-                const double parts = std::fmax(1.0, std::ceil(h / p.length(p.longest_level())));
+                const double parts = p.series_parts(h);
                 series_step(from, h / parts);
                 for (double k = 1.0; k < parts; ++k) series_step(*this, h / parts);
                 return 0.0;

@@ -68,7 +68,7 @@ void each_state(const CountsOf<D>& n, Use&& use) {
 
 // Flags, counts and the like in an array of n: for trains of any size as many as are set.
 template <class D, class T, int n>
-using ListOf = std::conditional_t<std::same_as<D, Any>, Few<T, 4>, std::array<T, static_cast<std::size_t>(n)>>;
+using ListOf = std::conditional_t<std::same_as<D, Any>, Few<T, 8>, std::array<T, static_cast<std::size_t>(n)>>;
 // Larger things in an array of n: for trains of any size, as many as there is asked for.
 template <class D, class T, int n>
 using ArrayOf = std::conditional_t<std::same_as<D, Any>, std::vector<T>, std::array<T, static_cast<std::size_t>(n)>>;

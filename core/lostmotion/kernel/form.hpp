@@ -244,6 +244,7 @@ template <class D>
     else
         return CoupledOf<D>::load(x.data());
 }
+[[gnu::always_inline]] inline NumbersAt load(const NumbersRoom& x) { return {x.at, x.count}; }
 template <class D>
 [[gnu::always_inline]] inline decltype(auto) coupled(const StateOf<D>& x) {
     if constexpr (std::same_as<D, Any>)
@@ -253,8 +254,8 @@ template <class D>
 }
 // The coupled states into memory.
 template <class D, class To>
-[[gnu::always_inline]] inline void store(const auto& x, To& to) {
-    if constexpr (std::same_as<To, StateOf<Any>>)
+[[gnu::always_inline]] inline void store(const auto& x, To&& to) {
+    if constexpr (std::same_as<std::remove_cvref_t<To>, StateOf<Any>>)
         to.coupled = x;
     else if constexpr (std::same_as<D, Any>)
         to = x;
@@ -540,6 +541,16 @@ class FormTable {
     template <class Input>
     double magnitude_of(int row, const Memory& m, const State& x, const Input& input) const {
         return magnitude<double>(row, m, x, driven_ ? input.magnitudes() : Inputs{});
+    }
+    // Of its states alone.
+    double state_magnitude(int row, const State& x) const {
+        if constexpr (any)
+            if (sparse())
+                return forms_[static_cast<std::size_t>(row)].sum_of_coupled(
+                    [&](int k, double c) { return std::fabs(c * x.coupled[k]); });
+        const auto c = factors<double>(row);
+        const double* state = coupled_numbers(x);
+        return sum_of_states<D>(n_.coupled, [&](auto k) ALWAYS_INLINE { return std::fabs(c(k) * state[k]); });
     }
     void rate_magnitudes(const State& rate, const Inputs& input_rate, Values& out) const {
         each_vector(out, [&](int g) ALWAYS_INLINE { return terms<true>(g, rate, input_rate); });

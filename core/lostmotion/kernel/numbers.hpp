@@ -36,6 +36,24 @@ struct NumbersAt {
     [[gnu::always_inline]] Pack<4> four(int k) const { return k < count ? Pack<4>::load(at + k) : Pack<4>{}; }
 };
 
+// The same to be written to.
+struct NumbersRoom {
+    double* at;
+    int count;
+
+    template <InFours E>
+    [[gnu::always_inline]] void operator=(const E& e) const {
+        for (int k = 0; k < count; k += 4) e.four(k).store(at + k);
+    }
+};
+// Arrays of the same size that lie one behind the other.
+struct NumbersRows {
+    double* at;
+    int count;
+
+    NumbersRoom operator[](int k) const { return {at + k * count, count}; }
+};
+
 // As many numbers as have been asked for, in whole fours; those beyond are zero. The first `few` need no allocation.
 template <int few>
 class NumbersIn {

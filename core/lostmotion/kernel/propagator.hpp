@@ -28,28 +28,31 @@ namespace lostmotion {
 // Everything needed to step by one length h in one regime.
 template <class D>
 struct StepOf {
-    IntegralOf<D> integral;         // G(h)
-    MatrixOf<D> exponential_bound;  // bound on |exp(A s)|, element by element, for 0 <= s <= h; 1e200 if it is no less
-    MatrixOf<D> change;             // E(h) = exp(A h) - 1
+    static constexpr bool any = std::same_as<D, Any>;
+    using Matrix = std::conditional_t<any, MatrixAt, MatrixOf<D>>;
+    using Integral = std::conditional_t<any, IntegralOf<D, MatrixAt, NumbersRows>, IntegralOf<D>>;
+
+    Integral integral;         // G(h)
+    Matrix exponential_bound;  // bound on |exp(A s)|, element by element, for 0 <= s <= h; 1e200 if it is no less
+    Matrix change;             // E(h) = exp(A h) - 1
 };
 
-// What a pair of functions of the inputs brings over one length.
+// What a pair of functions of the inputs brings over one length: changes of x, of its angles and of x'.
 template <class D>
 struct ResponseOf {
-    using Lanes = LanesOf<D>;
-    using Column = ColumnOf<D>;
+    static constexpr bool any = std::same_as<D, Any>;
 
-    std::array<Column, 2> change;  // of x
-    std::array<AnglesOf<D>, 2> angle;
-    std::array<Column, 2> rate;  // of x'
+    std::conditional_t<any, NumbersRows, std::array<ColumnOf<D>, 2>> change;
+    std::conditional_t<any, NumbersRows, std::array<AnglesOf<D>, 2>> angle;
+    std::conditional_t<any, NumbersRows, std::array<ColumnOf<D>, 2>> rate;
 
-    auto of(int c) const {
-        if constexpr (std::same_as<D, Any>)
-            return LanesIn{change[c].all(), angle[c].all()};
+    [[gnu::always_inline]] auto of(int c) const {
+        if constexpr (any)
+            return LanesIn{load(change[c]), load(angle[c])};
         else
-            return Lanes{load(change[c]), angle[c]};
+            return LanesOf<D>{load(change[c]), angle[c]};
     }
-    void set(int c, const Lanes& x) {
+    void set(int c, const LanesOf<D>& x) {
         store<D>(x.coupled, change[c]);
         angle[c] = x.angle;
     }
@@ -60,6 +63,65 @@ struct ResponseOf {
     [[gnu::always_inline]] auto rates(const double* weights) const {
         return weights[0] * load(rate[0]) + weights[1] * load(rate[1]);
     }
+};
+
+// The steps of all levels and their responses. What an earlier use has left there is written over.
+inline constexpr std::size_t usual_levels = 12;
+template <class D>
+class LevelsOf {
+ public:
+    void reach(std::size_t levels, const CountsOf<D>&, int pairs) {
+        pairs_ = pairs;
+        const auto all = levels * static_cast<std::size_t>(pairs);
+        if (steps_.empty()) steps_.reserve(usual_levels);
+        if (steps_.size() < levels) steps_.resize(levels);
+        if (responses_.empty()) responses_.reserve(usual_levels * static_cast<std::size_t>(pairs));
+        if (responses_.size() < all) responses_.resize(all);
+    }
+    StepOf<D>& step(int k, double) { return steps_[static_cast<std::size_t>(k)]; }
+    ResponseOf<D>* responses(int k) { return responses_.data() + k * pairs_; }
+
+ private:
+    int pairs_ = 0;
+    std::vector<StepOf<D>> steps_;          // one a level
+    std::vector<ResponseOf<D>> responses_;  // levels x pairs
+};
+// The same of a train of any size: level by level in one block.
+template <>
+class LevelsOf<Any> {
+ public:
+    struct Responses {
+        double* at;
+        int n, angles;
+        ResponseOf<Any> operator[](int pair) const {
+            double* const of = at + pair * (4 * n + 2 * angles);
+            return {{of, n}, {of + 4 * n, angles}, {of + 2 * n, n}};
+        }
+    };
+    void reach(std::size_t levels, const CountsOf<Any>& n, int pairs) {
+        n_ = n;
+        angles_ = (n.angles + 3) / 4 * 4;
+        responses_ = pairs * (4 * n.coupled + 2 * angles_);
+        stride_ = responses_ + n.coupled * (3 * n.coupled + n.angles);
+        const std::size_t fours = static_cast<std::size_t>(stride_) / 4;
+        if (block_.empty()) block_.reserve(usual_levels * fours);
+        if (block_.size() < levels * fours) block_.resize(levels * fours);
+    }
+    std::size_t bytes() const { return block_.size() * sizeof(FourInRow); }
+    StepOf<Any> step(int k, double length) {
+        const int n = n_.coupled;
+        double *const integral = level(k) + responses_, *const rows = integral + n * n,
+                      *const bound = rows + n * n_.angles, *const change = bound + n * n;
+        return {{{integral, n}, {rows, n}, length, n_}, {bound, n}, {change, n}};
+    }
+    Responses responses(int k) { return {level(k), n_.coupled, angles_}; }
+
+ private:
+    double* level(int k) { return block_.data()->number + static_cast<std::ptrdiff_t>(k) * stride_; }
+
+    CountsOf<Any> n_;
+    int angles_ = 0, responses_ = 0, stride_ = 0;
+    std::vector<FourInRow> block_;
 };
 
 // Doubling level k, for short level: the step of 2^k base intervals, made from two of level k - 1.
@@ -73,11 +135,8 @@ class Propagator {
     using Matrix = MatrixOf<D>;
     using LinearRates = LinearRatesOf<D>;
     using Integral = IntegralOf<D>;
-    using Step = StepOf<D>;
-    using Response = ResponseOf<D>;
 
     static constexpr int max_levels = 40;
-    static constexpr int usual_levels = 12;
     static constexpr double unbounded = 1e200;  // exponential_bound from here on is no longer computed
     static constexpr double max_norm = 1e18;    // |A| [1/s] of which time can be resolved
     static constexpr double base_norm = 0.25;   // |A| h of the base interval, in scaled units
@@ -140,27 +199,29 @@ class Propagator {
             return false;
     }
     double theta(double h) const { return norm_ * std::fabs(h); }
+    // How many steps by series a length needs.
+    double series_parts(double h) const { return std::fmax(1.0, std::ceil(h / length(longest_))); }
     // Of the last step that was taken with it.
     auto& series() { return series_; }
     // What its levels take [bytes], of trains of any size; then without them, until it is prepared again.
-    std::size_t bytes() const {
-        const auto n = static_cast<std::size_t>(steps_.empty() ? 0 : steps_[0].change.size());
-        return steps_.size() * 3 * n * n * sizeof(double);
+    std::size_t bytes() const
+        requires(std::same_as<D, Any>)
+    {
+        return computed_.bytes();
     }
     void release() {
         reset();
-        steps_ = {};
-        responses_ = {};
+        computed_ = {};
         taylor_ = {};
     }
 
     const LinearRates& rates() const { return *rates_; }
     const Taylor<D>& taylor() const { return taylor_; }
 
-    [[gnu::always_inline]] const Step& level(int k) {
+    [[gnu::always_inline]] decltype(auto) level(int k) {
         if (levels_ <= k) [[unlikely]]
             make_levels(k);
-        return steps_[k];
+        return computed_.step(k, length(k));
     }
     // The level or, if the motion grows beyond all bounds before it ends, the highest whose `exponential_bound` is a
     // bound.
@@ -168,7 +229,7 @@ class Propagator {
         level(k);
         return std::min(k, bounded_);
     }
-    const Response* responses(int k) const { return responses_.data() + k * n_pairs_; }
+    auto responses(int k) { return computed_.responses(k); }
     const PhaseRotation* rotations(int k) const { return rotations_of_level_[k]; }
 
     // Whether the regime is slow enough to be followed in time.
@@ -202,18 +263,18 @@ class Propagator {
     // x after the step of level k; `rate` is x' at the anchor, `weights` the input state there.
     [[gnu::always_inline]] Lanes step(int k, const Lanes& x, const Lanes& rate, const double* weights) {
         const Lanes free = level(k).integral * rate;
-        const Response* response = responses(k);
-        Lanes forced = *response * weights;
+        const auto response = responses(k);
+        Lanes forced = response[0] * weights;
         for (int p = 1; p < n_pairs_; ++p) forced = forced + response[p] * (weights + 2 * p);
         return x + (free + forced);
     }
     // The same for x and x' at once, without the rates of the regime in between.
     [[gnu::always_inline]] void step(int k, Lanes& x, Lanes& rate, const double* weights) {
-        const Step& s = level(k);
-        const Response* response = responses(k);
+        const auto& s = level(k);
+        const auto response = responses(k);
         // What the inputs bring does not wait for the step before, so it is summed up by itself.
-        Lanes forced = *response * weights;
-        Coupled forced_rate = response->rates(weights);
+        Lanes forced = response[0] * weights;
+        Coupled forced_rate = response[0].rates(weights);
         for (int p = 1; p < n_pairs_; ++p) {
             forced = forced + response[p] * (weights + 2 * p);
             forced_rate = forced_rate + response[p].rates(weights + 2 * p);
@@ -233,7 +294,7 @@ class Propagator {
             if constexpr (std::same_as<D, Any>)
                 if (!integral) {
                     Lanes sum;
-                    const double parts = std::fmax(1.0, std::ceil(h / propagator.length(propagator.longest_level())));
+                    const double parts = propagator.series_parts(h);
                     Series& series = propagator.series_;
                     for (double k = 0.0; k < parts; ++k) {
                         series.expand(propagator.rates(), rate, h / parts, propagator.theta(h / parts));
@@ -255,7 +316,7 @@ class Propagator {
         level(0);
         Integral sum{Matrix::like(rates().matrix()), {}, 0.0, rates().n};
         lostmotion::make_room(sum.angle, rates().n.angles);
-        const auto append = [this, &sum](const Matrix& change, const Integral& next) {
+        const auto append = [this, &sum](const auto& change, const auto& next) {
             // G(s + h) = G(h) + exp(A h) G(s)
             for (int j = 0; j < rates().n.angles; ++j)
                 store<D>(load(sum.angle[j]) + (sum.coupled.after(angle_change(next, j)) + load(next.angle[j])),
@@ -285,18 +346,12 @@ class Propagator {
     }
 
     // The row of an angle in exp(A h) - 1.
-    Coupled angle_change(const Integral& over_h, int j) const {
+    Coupled angle_change(const auto& over_h, int j) const {
         return rates().angle_coefficient[j] * over_h.coupled.row(rates().angle_speed[j]);
     }
 
-    // Room for one level more. What an earlier use has left there is written over.
-    void make_room() {
-        const auto levels = static_cast<std::size_t>(levels_ + 1), pairs = static_cast<std::size_t>(n_pairs_);
-        if (steps_.empty()) steps_.reserve(usual_levels);
-        if (steps_.size() < levels) steps_.resize(levels);
-        if (responses_.empty()) responses_.reserve(usual_levels * pairs);
-        if (responses_.size() < levels * pairs) responses_.resize(levels * pairs);
-    }
+    // Room for one level more.
+    void make_room() { computed_.reach(static_cast<std::size_t>(levels_ + 1), rates().n, n_pairs_); }
 
     [[gnu::noinline]] void make_levels(int k) {
         if (levels_ == 0) begin_levels();
@@ -308,22 +363,24 @@ class Propagator {
     }
     void add_base() {
         make_room();
-        Step& s = steps_[0];
+        auto&& s = computed_.step(0, base_);
         bounded_ = max_levels;
         const double h = base_;
-        s.integral = taylor_.integral(h);
-        s.change = rates().matrix() * s.integral.coupled;
+        const Integral integral = taylor_.integral(h);
+        s.integral.coupled.assign(integral.coupled);
+        for (int j = 0; j < rates().n.angles; ++j) store<D>(load(integral.angle[j]), s.integral.angle[j]);
+        s.integral.length = h;
+        s.change.assign(rates().matrix() * integral.coupled);
         // |exp(A s)| from the powers of a matrix without negative entries beside its diagonal.
         Matrix positive = rates().matrix().magnitudes();
         for (int k = 0; k < positive.size(); ++k) positive(k, k) = std::fmax(rates().matrix()(k, k), 0.0);
         positive.scale(h);
         const Matrix twice = positive * positive;
-        s.exponential_bound = Taylor<D>::template power_series<0>(positive, twice, positive * twice);
+        s.exponential_bound.assign(Taylor<D>::template power_series<0>(positive, twice, positive * twice));
         for (int p = 0; p < n_pairs_; ++p)
             for (int c = 0; c < 2; ++c) {
                 const InputBasis& function = rotations_->basis()[static_cast<std::size_t>(2 * p + c)];
-                responses_[static_cast<std::size_t>(p)].set(
-                    c, function.kind == InputBasis::nothing ? Lanes{} : taylor_.response(function, h));
+                responses(0)[p].set(c, function.kind == InputBasis::nothing ? Lanes{} : taylor_.response(function, h));
             }
         finish_level();
     }
@@ -337,10 +394,9 @@ class Propagator {
     void add_doubled() {
         make_room();
         const int k = levels_ - 1;
-        const Step& a = steps_[static_cast<std::size_t>(k)];
-        Step& b = steps_[static_cast<std::size_t>(k + 1)];
+        const auto& a = computed_.step(k, length(k));
+        auto&& b = computed_.step(k + 1, length(k + 1));
         const int size = a.change.size(), angles = rates().n.angles;
-        for (Matrix* m : {&b.change, &b.integral.coupled, &b.exponential_bound}) m->make_room_like(a.change);
         for (int c = 0; c < size; ++c) {
             const auto change = a.change.at(c), integral = a.integral.coupled.at(c);
             b.change.set_column(c, 2.0 * change + a.change * change);
@@ -355,8 +411,6 @@ class Propagator {
                 if (!(b.exponential_bound(r, c) < unbounded)) bounded_ = std::min(bounded_, k);
         ArrayOf<D, Coupled, D::angles> angle;
         lostmotion::make_room(angle, angles);
-        lostmotion::make_room(b.integral.angle, angles);
-        b.integral.n = rates().n;
         for (int j = 0; j < angles; ++j) {
             angle[j] = angle_change(a.integral, j);
             store<D>(2.0 * load(a.integral.angle[j]) + a.integral.coupled.after(angle[j]), b.integral.angle[j]);
@@ -364,13 +418,13 @@ class Propagator {
         b.integral.length = 2.0 * a.integral.length;
         for (int p = 0; p < n_pairs_; ++p) {
             const InputBasis* basis = &rotations_->basis()[static_cast<std::size_t>(2 * p)];
-            const Response& from = responses(k)[p];
-            Response& to = responses_[static_cast<std::size_t>((k + 1) * n_pairs_ + p)];
+            const auto& from = responses(k)[p];
+            auto&& to = responses(k + 1)[p];
             const auto held = [&](int input) { return a.integral * rates().input_column[input]; };
             const auto kept = [&](int c) {
                 const Lanes own = from.of(c);
                 Lanes out = own;
-                out.coupled = own.coupled + a.change * from.change[c];
+                out.coupled = own.coupled + a.change * load(from.change[c]);
                 for (int j = 0; j < angles; ++j) out.angle[j] = own.angle[j] + sum_of(angle[j] * own.coupled);
                 return out;
             };
@@ -395,13 +449,13 @@ class Propagator {
         const PhaseRotation* turn = rotations_of_level_[k] = rotations_->over(exponent_ + k);
         for (int p = 0; p < n_pairs_; ++p) {
             const InputBasis* basis = &rotations_->basis()[static_cast<std::size_t>(2 * p)];
-            Response& r = responses_[static_cast<std::size_t>(k * n_pairs_ + p)];
+            auto&& r = responses(k)[p];
             for (int c = 0; c < 2; ++c) {
                 const double input = basis[c].kind == InputBasis::nothing  ? 0.0
                                      : basis[c].kind == InputBasis::ramp   ? length(k)
                                      : basis[c].kind == InputBasis::cosine ? cosine_change(k, p)
                                                                            : turn[p].sin;
-                store<D>(rates().matrix() * r.change[c] + input * load(rates().input_column[basis[c].input]),
+                store<D>(rates().matrix() * load(r.change[c]) + input * load(rates().input_column[basis[c].input]),
                          r.rate[c]);
             }
         }
@@ -422,8 +476,7 @@ class Propagator {
     int n_pairs_ = 0;           // of functions of the inputs
     PhaseRotations* rotations_ = nullptr;
     int levels_ = 0;
-    std::vector<Step> steps_;          // one a level, kept when others are computed
-    std::vector<Response> responses_;  // levels x n_pairs
+    LevelsOf<D> computed_;
     std::array<const PhaseRotation*, max_levels> rotations_of_level_{};
 };
 

@@ -24,7 +24,6 @@ struct ColumnsOf {
     static constexpr int size() { return n; }
     // Zero, as large as another.
     static MatrixOf<D> like(const ColumnsOf&) { return {}; }
-    void make_room_like(const ColumnsOf&) {}
     double operator()(int row, int col) const { return column[col][row]; }
     double& operator()(int row, int col) { return column[col][row]; }
     [[gnu::always_inline]] Coupled at(int c) const { return load(column[c]); }
@@ -51,26 +50,21 @@ struct ColumnsOf {
     }
 };
 
-// The same of a train of any size: one block of as many numbers as there are.
-template <>
-struct ColumnsOf<Any> {
+// Columns of a train of any size that lie in a block.
+class ColumnsAt {
+ public:
     using Coupled = Numbers;
     using Column = ColumnOf<Any>;
 
-    ColumnsOf() = default;
-    explicit ColumnsOf(int n) : n_(n), entry_(static_cast<std::size_t>(n) * static_cast<std::size_t>(n) / 4) {}
-    static MatrixOf<Any> like(const ColumnsOf& o);
-    void make_room_like(const ColumnsOf& o) {
-        n_ = o.n_;
-        entry_.resize(o.entry_.size());
-    }
+    ColumnsAt() = default;
+    ColumnsAt(double* at, int n) : at_(at), n_(n) {}
     int size() const { return n_; }
-    double operator()(int row, int col) const { return column(col)[row]; }
-    double& operator()(int row, int col) { return column(col)[row]; }
-    NumbersAt at(int c) const { return {column(c), n_}; }
+    double operator()(int row, int col) const { return at_[col * n_ + row]; }
+    double& operator()(int row, int col) { return at_[col * n_ + row]; }
+    NumbersAt at(int c) const { return {at_ + c * n_, n_}; }
     template <InFours E>
     void set_column(int c, const E& v) {
-        for (int k = 0; k < n_; k += 4) v.four(k).store(column(c) + k);
+        NumbersRoom{at_ + c * n_, n_} = v;
     }
     Coupled unit(int c) const {
         Coupled out;
@@ -94,9 +88,11 @@ struct ColumnsOf<Any> {
         }
     }
 
+ protected:
+    double* at_ = nullptr;
+    int n_ = 0;
+
  private:
-    const double* column(int c) const { return entry_.data()->number + c * n_; }
-    double* column(int c) { return entry_.data()->number + c * n_; }
     template <bool magnitudes>
     void multiply(const double* v, int count, double* out) const {
         int r = 0;
@@ -109,7 +105,7 @@ struct ColumnsOf<Any> {
     template <int rows, bool magnitudes>
     void multiply_rows(int r, const double* v, int count, double* out) const {
         Pack<rows> sum{};
-        const double* from = column(0) + r;
+        const double* from = at_ + r;
         for (int c = 0; c < count; c += 4, from += 4 * n_) {
             const auto part = [&](int k) ALWAYS_INLINE {
                 const auto factors = Pack<rows>::load(from + k * n_);
@@ -119,54 +115,88 @@ struct ColumnsOf<Any> {
         }
         sum.store(out + r);
     }
+};
+struct alignas(32) FourInRow {
+    double number[4];
+};
+// The same in a block of their own.
+template <>
+struct ColumnsOf<Any> : ColumnsAt {
+    ColumnsOf() = default;
+    explicit ColumnsOf(int n) {
+        own_.resize(static_cast<std::size_t>(n * n / 4));
+        refer(n);
+    }
+    ColumnsOf(const ColumnsOf& o) : ColumnsAt(), own_(o.own_) { refer(o.n_); }
+    ColumnsOf(ColumnsOf&& o) noexcept : ColumnsAt(o), own_(std::move(o.own_)) {}
+    ColumnsOf& operator=(ColumnsOf o) {
+        own_.swap(o.own_);
+        refer(o.n_);
+        return *this;
+    }
+    static MatrixOf<Any> like(const ColumnsOf& o);
 
-    struct alignas(32) Four {
-        double number[4];
-    };
-    int n_ = 0;
-    std::vector<Four> entry_;  // column by column
+ private:
+    void refer(int n) {
+        n_ = n;
+        at_ = own_.data()->number;
+    }
+    std::vector<FourInRow> own_;
 };
 
-// A linear map of the coupled states.
-template <class D>
-struct MatrixOf : ColumnsOf<D> {
-    using Coupled = CoupledOf<D>;
-    using Base = ColumnsOf<D>;
-    using Base::at, Base::set_column, Base::size, Base::Base;
+// A linear map of the coupled states, by columns.
+template <class Columns>
+struct MatrixBy : Columns {
+    using Columns::at, Columns::set_column, Columns::size, Columns::Columns;
+    using typename Columns::Coupled, typename Columns::Column;
 
     template <class Vector>
     [[gnu::always_inline]] Coupled operator*(const Vector& v) const {
         return this->product(v);
     }
     Coupled row(int r) const {
-        ColumnOf<D> out;
+        Column out;
         make_room(out, size());
         for (int c = 0; c < size(); ++c) out[c] = (*this)(r, c);
         return load(out);
     }
     // A row times this.
     Coupled after(const Coupled& row) const {
-        ColumnOf<D> out;
+        Column out;
         make_room(out, size());
         for (int c = 0; c < size(); c += 4)
             sums(row * at(c), row * at(c + 1), row * at(c + 2), row * at(c + 3)).store(out.data() + c);
         return load(out);
     }
     // factor * other, entry by entry
-    void add(double factor, const MatrixOf& other) {
+    template <class Other>
+    void add(double factor, const MatrixBy<Other>& other) {
         for (int c = 0; c < size(); ++c) set_column(c, at(c) + factor * other.at(c));
     }
     void scale(double factor) {
         for (int c = 0; c < size(); ++c) set_column(c, factor * at(c));
     }
+    // Takes the numbers of another.
+    template <class Other>
+    void assign(const MatrixBy<Other>& other) {
+        for (int c = 0; c < size(); ++c) set_column(c, other.at(c));
+    }
+};
+using MatrixAt = MatrixBy<ColumnsAt>;
+template <class D>
+struct MatrixOf : MatrixBy<ColumnsOf<D>> {
+    using Base = ColumnsOf<D>;
+    using MatrixBy<Base>::MatrixBy;
+
     MatrixOf magnitudes() const {
         MatrixOf out = Base::like(*this);
-        for (int c = 0; c < size(); ++c) out.set_column(c, absolute(at(c)));
+        for (int c = 0; c < this->size(); ++c) out.set_column(c, absolute(this->at(c)));
         return out;
     }
-    friend MatrixOf operator*(const MatrixOf& a, const MatrixOf& b) {
-        MatrixOf out = Base::like(a);
-        for (int c = 0; c < a.size(); ++c) out.set_column(c, a * b.at(c));
+    template <class Columns>
+    friend MatrixOf operator*(const MatrixBy<Columns>& a, const MatrixOf& b) {
+        MatrixOf out = Base::like(b);
+        for (int c = 0; c < b.size(); ++c) out.set_column(c, a * b.at(c));
         return out;
     }
 };

@@ -50,16 +50,18 @@ class Stride {
 
     // On a regime, with steps of one doubling level, from where a cursor is.
     void place(Propagator<D>& propagator, int level, const ColumnOf<D>& constant, const Cursor<D>& from) {
-        step_ = &propagator.level(level);
+        propagator_ = &propagator;
+        level_ = level;
+        const auto& step = propagator.level(level);
         const double length = propagator.length(level);
         const InputState<D>& input = from.input();
         const LinearRatesOf<D>& rates = propagator.rates();
-        const ResponseOf<D>* responses = propagator.responses(level);
+        const auto responses = propagator.responses(level);
         const PhaseRotation* rotations = propagator.rotations(level);
         n_ = rates.n;
         make_room(angle_row_, n_.angles);
         for (int j = 0; j < n_.angles; ++j)
-            angle_row_[j] = rates.angle_coefficient[j] * step_->integral.coupled.row(rates.angle_speed[j]);
+            angle_row_[j] = rates.angle_coefficient[j] * step.integral.coupled.row(rates.angle_speed[j]);
         x_ = from.x();
         linear_ = input.linear();
         Coupled driving = load(constant), ramp{};
@@ -68,21 +70,21 @@ class Stride {
             driving = driving + linear_[i] * load(rates.input_column[i]);
             ramp = ramp + increase_[i] * load(rates.input_column[i]);
         }
-        forced_ = step_->integral * Lanes{driving};
-        growth_ = step_->integral * Lanes{ramp};
+        forced_ = step.integral * Lanes{driving};
+        growth_ = step.integral * Lanes{ramp};
         std::size_t sines = 0;
         sines_.resize(static_cast<std::size_t>(input.size() / 2));
         sines_end_ = {};
         for (int q = 0; q < input.size(); q += 2) {
             const InputBasis& basis = input.basis(q);
-            const ResponseOf<D>& response = responses[q / 2];
+            const auto& response = responses[q / 2];
             const double* weights = input.weights() + q;
             if (basis.kind == InputBasis::cosine) {
                 sines_end_[basis.input] = sines + 1;
                 RotatingSine& t = sines_[sines++];  // in place, for the sake of speed
                 t.sine_cosine = Pack<2>::load(weights);
                 t.rotation = rotations[q / 2];
-                t.by_sine = step_->integral * rates.input_column[basis.input] + response.of(0);
+                t.by_sine = step.integral * rates.input_column[basis.input] + response.of(0);
                 t.by_cosine = response.of(1);
             } else {
                 forced_ = forced_ + response * weights;
@@ -93,6 +95,7 @@ class Stride {
 
     // Where the cursor stood and n - 1 steps on from there.
     void run(int n, InstantsOf<D>& to) {
+        const auto& step = propagator_->level(level_);
         Lanes x = load(x_), forced = forced_;
         for (int k = 0;; ++k) {
             InputsOf<D> u = linear_;
@@ -109,7 +112,7 @@ class Stride {
                 driven = driven + (t.sine_cosine[0] * t.by_sine + t.sine_cosine[1] * t.by_cosine);
                 t.sine_cosine = t.rotation * t.sine_cosine;
             }
-            Lanes own{step_->change * x.coupled, {}};
+            Lanes own{step.change * x.coupled, {}};
             for (int j = 0; j < n_.angles; ++j) own.angle[j] = sum_of(angle_row_[j] * x.coupled);
             x = own + (x + driven);  // so that one sum less waits for the step before
             forced = forced + growth_;
@@ -126,7 +129,8 @@ class Stride {
         Lanes by_sine, by_cosine;
     };
 
-    const StepOf<D>* step_ = nullptr;
+    Propagator<D>* propagator_ = nullptr;
+    int level_ = 0;
     [[no_unique_address]] CountsOf<D> n_;
     ArrayOf<D, Coupled, D::angles> angle_row_;  // the rows of the angles in exp(A h) - 1
     State x_{};

@@ -108,13 +108,13 @@ class Expansion {
     }
 };
 
-// G(h), the integral of exp(A s) from 0 to h.
-template <class D>
+// G(h), the integral of exp(A s) from 0 to h. Matrix, Rows: where its numbers are.
+template <class D, class Matrix = MatrixOf<D>, class Rows = ArrayOf<D, ColumnOf<D>, D::angles>>
 struct IntegralOf {
     using Lanes = LanesOf<D>;
 
-    MatrixOf<D> coupled;
-    ArrayOf<D, ColumnOf<D>, D::angles> angle{};  // the rows of the angles, but for their own rates
+    Matrix coupled;
+    Rows angle{};  // the rows of the angles, but for their own rates
     double length = 0.0;
     [[no_unique_address]] CountsOf<D> n;
 

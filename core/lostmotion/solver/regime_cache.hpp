@@ -109,11 +109,7 @@ class RegimeCache {
         }
         // Sum of the magnitudes of the terms of a guard that ends by touching, a speed.
         double grazing_magnitude(const Twist& twist, const State& x) const {
-            const LinearForm& f = regime.guards[twist.grazing_guard].form;
-            if constexpr (std::same_as<D, Any>)
-                return f.sum_of_coupled([&](int k, double factor) { return std::fabs(factor * x[k]); });
-            else
-                return sum_of(absolute(coupled<D>(f) * coupled(x)));
+            return guards.state_magnitude(twist.grazing_guard, x);
         }
         // The states that the inputs that vary do not act on, by way of others either.
         template <class Varies>

@@ -30,7 +30,7 @@ def catalogue(
         str | None, typer.Option("--lead", metavar="MIN..MAX", help='Lead of a screw [m], e.g. "5 mm..10 mm".')
     ] = None,
     current: Annotated[
-        str | None, typer.Option("--current", metavar="MIN..MAX", help="Continuous current of an amplifier [A].")
+        str | None, typer.Option("--current", metavar="MIN..MAX", help="Continuous current of an amplifier [A rms].")
     ] = None,
     complete: Annotated[bool, typer.Option("--complete", help="Only records that can be simulated.")] = False,
     every: Annotated[bool, typer.Option("--all", help="List all that fit, not only a screen of them.")] = False,

@@ -111,7 +111,7 @@ def error_lines(result: xarray.Dataset | RunArrays) -> list[str]:
         return []
     shown = (
         f"{name.replace('_', ' ')} {bound:.1e} of {np.max(np.abs(np.asarray(result[name]))):.4g} {unit}"
-        for (name, bound), unit in zip(bounds.items(), ("A", "A", "N·m", "rad/s") * len(bounds), strict=False)
+        for (name, bound), unit in zip(bounds.items(), ("A peak", "A peak", "N·m", "rad/s") * len(bounds), strict=False)
     )
     return [f"  error of the field-oriented control at most: {', '.join(shown)}"]
 

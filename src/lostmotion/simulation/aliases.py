@@ -7,7 +7,7 @@ from typing import Any
 
 from .keys import renamed
 
-MOTOR, LOAD, GEARBOX, SLIDE = "motor", "load", "gearbox", "slide"  # names in the long form
+MOTOR, LOAD, GEARBOX, SLIDE, BRAKE = "motor", "load", "gearbox", "slide", "brake"  # names in the long form
 DRIVES = {"screw": "screws", "rack": "racks", "belt": "belts"}
 """what moves the slide of an axis, called after its kind, and its table in the long form"""
 DRIVE = {
@@ -29,6 +29,8 @@ AXIS = {
     **{f"shafts.{short}": f"axis.{short}" for short in DRIVES},
     f"controllers.{MOTOR}": "controller",
     f"command.{MOTOR}": "command",
+    f"command.{BRAKE}": f"axis.{BRAKE}.command",
+    f"brakes.{BRAKE}": f"axis.{BRAKE}",
     f"motors.{MOTOR}": "axis.motor",
     f"gears.{GEARBOX}.gearbox": "axis.gearbox.from",
     f"gears.{GEARBOX}": "axis.gearbox",
@@ -45,7 +47,7 @@ def in_file(key: str, tables: Mapping[str, Any]) -> str:
 
 def of_axis(key: str) -> str:
     """A key of a file with the table `axis` in the long form; others, and `command` as a whole, as they are."""
-    if key in ("command", f"command.{MOTOR}") or key.startswith(f"command.{MOTOR}."):
+    if key.partition(".")[0] == "command" and (key == "command" or key.split(".")[1] in (MOTOR, BRAKE)):
         return key
     first: dict[str, str] = {}
     for long, short in AXIS.items():

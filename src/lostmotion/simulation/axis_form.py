@@ -9,11 +9,13 @@ from typing import Any
 
 from ..errors import InputError
 from ..inputs.validation import did_you_mean, shown
-from .aliases import DRIVES, GEARBOX, MOTOR, SLIDE
+from ..units.conversion import Unit
+from .aliases import BRAKE, DRIVES, GEARBOX, MOTOR, SLIDE
 from .drive_tables import drive_schema
 from .tables import RECORD_NAME
 from .train_tables import train_schema
 
+PAYLOAD = "payload"
 BESIDE = ("title", "task", "command", "controller", "initial", "simulation")
 
 
@@ -30,19 +32,55 @@ def long_form(tables: Mapping[str, Any]) -> dict[str, Any]:
     InputError
         A table is missing, or is none of this form.
     """
+    kind = _kind_of(tables)
+    table: dict[str, dict[str, Any]] = {
+        key: {"from": value} if isinstance(value, str) else dict(value) for key, value in tables["axis"].items()
+    }
+    shaft = MOTOR
+    long: dict[str, Any] = {
+        "shafts": {MOTOR: {}},
+        "slides": {SLIDE: _carrying(table[SLIDE], table.get(PAYLOAD))},
+        "motors": {MOTOR: {"shaft": MOTOR, **table[MOTOR]}},
+    }
+    if GEARBOX in table:
+        shaft = kind
+        long["shafts"][shaft] = {}
+        gearbox = table[GEARBOX]
+        if "from" in gearbox:
+            gearbox = {"gearbox": gearbox.pop("from"), **gearbox}
+        long["gears"] = {GEARBOX: {"input": MOTOR, "output": shaft, **gearbox}}
+    long[DRIVES[kind]] = {kind: {"input": shaft, "output": SLIDE, **table[kind]}}
+    for short, in_long in (("controller", "controllers"), ("command", "command")):
+        if short in tables:
+            long[in_long] = {MOTOR: _on_slide(tables[short]) if short == "controller" else tables[short]}
+    if BRAKE in table:
+        if "command" in table[BRAKE]:
+            long["command"] = {**long.get("command", {}), BRAKE: table[BRAKE].pop("command")}
+        long["brakes"] = {BRAKE: {"shaft": MOTOR, **table[BRAKE]}}
+    return {**{key: tables[key] for key in ("title", "task", "initial", "simulation") if key in tables}, **long}
+
+
+def _kind_of(tables: Mapping[str, Any]) -> str:
+    """Kind of what moves the slide: screw, rack or belt.
+
+    Raises
+    ------
+    InputError
+        A table is missing, or is none of this form.
+    """
     for key in tables:
         if key not in ("axis", *BESIDE):
             meant = did_you_mean(key, ("axis", *BESIDE), f"beside [axis] there may be {', '.join(BESIDE)}")
             raise InputError(f"is not allowed beside [axis]; {meant}", key)
     axis = tables["axis"]
-    parts = (MOTOR, GEARBOX, *DRIVES, SLIDE)
+    parts = (MOTOR, BRAKE, GEARBOX, *DRIVES, SLIDE, PAYLOAD)
     all_parts = f"they are {', '.join(parts)}"
     if not isinstance(axis, Mapping):
         raise InputError(f"{shown(axis)} must be a table with {', '.join(parts)}", "axis")
     for key, value in axis.items():
         if key not in parts:
             raise InputError(f"is no part of an axis; {did_you_mean(key, parts, all_parts)}", f"axis.{key}")
-        if not isinstance(value, Mapping | str) or (isinstance(value, str) and key == SLIDE):
+        if not isinstance(value, Mapping | str) or (isinstance(value, str) and key in (BRAKE, SLIDE, PAYLOAD)):
             raise InputError(f"{shown(value)} must be a table", f"axis.{key}")
     given = [kind for kind in DRIVES if kind in axis]
     if len(given) != 1:
@@ -57,26 +95,33 @@ def long_form(tables: Mapping[str, Any]) -> dict[str, Any]:
             raise InputError("is missing; add it", f"axis.{key}")
     if "controller" in tables and "command" in tables:
         raise InputError("both turn the motor; leave one of them out", "command", "controller")
-    (kind,) = given
-    table = {key: {"from": value} if isinstance(value, str) else dict(value) for key, value in axis.items()}
-    shaft = MOTOR
-    long: dict[str, Any] = {
-        "shafts": {MOTOR: {}},
-        "slides": {SLIDE: table[SLIDE]},
-        "motors": {MOTOR: {"shaft": MOTOR, **table[MOTOR]}},
-    }
-    if GEARBOX in table:
-        shaft = kind
-        long["shafts"][shaft] = {}
-        gearbox = table[GEARBOX]
-        if "from" in gearbox:
-            gearbox = {"gearbox": gearbox.pop("from"), **gearbox}
-        long["gears"] = {GEARBOX: {"input": MOTOR, "output": shaft, **gearbox}}
-    long[DRIVES[kind]] = {kind: {"input": shaft, "output": SLIDE, **table[kind]}}
-    for short, in_long in (("controller", "controllers"), ("command", "command")):
-        if short in tables:
-            long[in_long] = {MOTOR: _on_slide(tables[short]) if short == "controller" else tables[short]}
-    return {**{key: tables[key] for key in ("title", "task", "initial", "simulation") if key in tables}, **long}
+    return given[0]
+
+
+def _carrying(slide: dict[str, Any], payload: dict[str, Any] | None) -> dict[str, Any]:
+    """The slide with the mass of its payload.
+
+    Raises
+    ------
+    InputError
+        The payload has no mass, or something else.
+    """
+    if payload is None:
+        return slide
+    for key in payload:
+        if key != "mass":
+            raise InputError("is not known; a payload has its mass", f"axis.{PAYLOAD}.{key}")
+    if "mass" not in payload:
+        raise InputError("is missing; add it", f"axis.{PAYLOAD}.mass")
+    masses = []
+    for part, mass in ((SLIDE, slide.get("mass", 0.0)), (PAYLOAD, payload["mass"])):
+        try:
+            masses.append(Unit("kg").read(mass))
+        except ValueError as problem:
+            raise InputError(f"{shown(mass)} {problem}", f"axis.{part}.mass") from None
+        if not masses[-1] >= 0.0:
+            raise InputError(f"{shown(mass)} must be at least 0", f"axis.{part}.mass")
+    return {**slide, "mass": sum(masses)}
 
 
 def _on_slide(controller: Any) -> Any:
@@ -100,6 +145,11 @@ def axis_schema() -> dict[str, Any]:
         record = {"properties": {"from": RECORD_NAME}, "required": ["from"], "type": "object"}
         return {"anyOf": [own, record, RECORD_NAME]}
 
+    mass = definitions["SlideTable"]["properties"]["mass"]
+    brake = deepcopy(definitions["Brake"])
+    del brake["properties"]["shaft"]
+    brake["required"].remove("shaft")
+    brake["properties"]["command"] = whole["properties"]["command"]["additionalProperties"]
     properties = {
         MOTOR: part("ShaftMotor", "shaft"),
         GEARBOX: part("Gear", "input", "output", "housing"),
@@ -107,6 +157,8 @@ def axis_schema() -> dict[str, Any]:
         "rack": part("Rack", "input", "output"),
         "belt": part("Belt", "input", "output"),
         SLIDE: {"$ref": "#/$defs/SlideTable"},
+        PAYLOAD: {"type": "object", "properties": {"mass": mass}, "required": ["mass"], "additionalProperties": False},
+        BRAKE: brake,
     }
     long = whole["properties"]
     axis = {
@@ -114,7 +166,7 @@ def axis_schema() -> dict[str, Any]:
         "properties": properties,
         "required": [MOTOR, SLIDE],
         "additionalProperties": False,
-        "description": "A motor, a gearbox if there is one, one of screw, rack and belt, and the slide that it moves.",
+        "description": "A motor with its brake, a gearbox if there is one, one of screw, rack and belt, and the slide that it moves with its payload.",
     }
     beside = {key: long[key] for key in ("title", "task", "initial", "simulation", "base")}
     beside["command"] = long["command"]["additionalProperties"]

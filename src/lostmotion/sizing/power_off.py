@@ -11,7 +11,7 @@ from ..control.turning import turns
 from ..simulation.results import RunArrays
 from ..simulation.scenario import Scenario
 from ..test_rig.rig import TestRig
-from .axis_rules import SLIDE_BRAKE, brake_of_a_run, held_by
+from .axis_rules import BRAKE, SLIDE_BRAKE, against, brake_of_a_run, held_by
 from .finding import Finding
 from .holding import holding
 from .one_axis import depends_on_angles, not_judged
@@ -33,6 +33,20 @@ def holdings(scenario: Scenario, result: RunArrays) -> list[Finding]:
     elif brake is not None:
         slides = [torque for shaft, torque in loads.items() if train.is_slide(shaft)]
         held = [held_by(brake.force, SLIDE_BRAKE, _largest(slides), "N", "force")]
+    on_motor = {name: b for name, b in train.brakes.items() if b.shaft == motor.shaft}
+    if not held and len(on_motor) == 1:
+        ((name, own),) = on_motor.items()
+        held = [
+            against(
+                "holding_brake",
+                BRAKE,
+                _largest(at_motor),
+                own.breakaway_torque or own.torque,
+                "N·m",
+                "torque of the brake",
+                scenario.key_in_file(f"brakes.{name}.torque"),
+            )
+        ]
     acting = {shaft: torque for shaft, torque in loads.items() if torque.any()}
     if not acting:
         return [Finding("holding", HOLDING, "no load acts", "ok", _static_holding(scenario)), *held]
