@@ -33,19 +33,11 @@ struct Form {
         for (int k = 0; k < N; ++k) c[k] += o.c[k];
         return *this;
     }
-    Form& operator-=(const Form& o) {
-        for (int k = 0; k < N; ++k) c[k] -= o.c[k];
-        return *this;
-    }
     Form& operator*=(double a) {
         for (int k = 0; k < N; ++k) c[k] *= a;
         return *this;
     }
-    friend Form operator+(Form a, const Form& b) { return a += b; }
-    friend Form operator-(Form a, const Form& b) { return a -= b; }
     friend Form operator*(double a, Form f) { return f *= a; }
-    friend Form operator/(Form f, double a) { return f *= 1.0 / a; }
-    friend Form operator-(Form f) { return f *= -1.0; }
 };
 
 // A linear expression with few terms, in the order of their places.
@@ -82,9 +74,6 @@ class AnyForm {
             const Term* all = terms_.data();
             return {p == of_coupled ? all : all + end_[p - 1], p == of_inputs ? all + terms_.size() : all + end_[p]};
         }
-        void scale(double a) {
-            for (Term& t : terms_) t.factor *= a;
-        }
 
      private:
         std::size_t find(int place) const {
@@ -102,15 +91,6 @@ class AnyForm {
     };
     Coefficients c;
 
-    AnyForm& operator+=(const AnyForm& o) {
-        for (const Term& t : o.c.terms()) c[t.place] += t.factor;
-        return *this;
-    }
-    AnyForm& operator*=(double a) {
-        c.scale(a);
-        return *this;
-    }
-    friend AnyForm operator*(double a, AnyForm f) { return f *= a; }
     // Calls use(place, factor) for each term.
     template <class Use>
     void each_term(Use&& use) const {
