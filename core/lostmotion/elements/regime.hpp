@@ -89,7 +89,7 @@ class Shares {
     const Share* end() const { return at_.begin() + count_; }
     std::size_t size() const { return count_; }
     bool empty() const { return count_ == 0; }
-    // Of a shaft, or 0.
+    // The share of a shaft, or 0 where it has none.
     double of(int shaft) const {
         const Share* found = find(shaft);
         return found != end() && found->shaft == shaft ? found->share : 0.0;
@@ -98,7 +98,7 @@ class Shares {
         const Share* found = find(shaft);
         return found != end() && found->shaft == shaft;
     }
-    // In the place of what there is of the shaft.
+    // Sets the share of a shaft, which may have one already.
     void set(int shaft, double share);
     void erase(int shaft);
 

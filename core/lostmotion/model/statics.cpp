@@ -116,7 +116,7 @@ std::vector<int> Statics::stuck() const {
 
 // Do the inertias of shafts that hang together, as one of them feels them, differ that much?
 bool Statics::has_light_shafts() const {
-    std::vector<double> speed(shafts());  // magnitudes, of each shaft for that of the first of its part
+    std::vector<double> speed(shafts());  // of each shaft, while the first shaft of its part turns at 1: magnitudes
     for (std::size_t first = 0; first < shafts(); ++first) {
         if (speed[first] != 0.0) continue;
         speed[first] = 1.0;

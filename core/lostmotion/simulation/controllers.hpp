@@ -96,7 +96,7 @@ struct RunRequest {
     void* interrupted_context = nullptr;
     Control control;                // nothing: the inputs alone act
     double* control_out = nullptr;  // (axes x signals) x samples, as ControlRecord
-    // Of a run under controllers, the sample at which the observer may end it; 0: none. Up to there the run is the one
+    // The sample at which the observer may end a run under controllers; 0: none. Up to there the run is the one
     // that ends there, and it goes on as if there was no pause.
     std::size_t pause = 0;
 

@@ -44,7 +44,7 @@ class Motion {
     // The same, with the answer of a shaft to its load torque.
     virtual Status answer(double interval, std::span<const double> begin, std::span<const double> end,
                           const LoadShaft& shaft, LoadAnswer& out) = 0;
-    // What the controller of an axis follows from now on: value + rate (t - now), in the place of its reference.
+    // Replaces the reference of the controller of an axis by value + rate (t - now).
     virtual void set_reference(std::size_t axis, double value, double rate) = 0;
     virtual void set_interrupt(bool (*poll)(void*), void* context) = 0;
 
@@ -54,7 +54,7 @@ class Motion {
     virtual std::vector<double> values() = 0;  // of all channels
     virtual const ControlCourse& control() const = 0;
     virtual std::size_t control_slots() const = 0;  // how many numbers the controllers remember
-    // What the controllers show, axis by axis, each with its winding's signals behind.
+    // The signals of the controllers, axis by axis; those of a winding follow those of its axis.
     virtual std::vector<double> control_signals() const = 0;
     // Why the last step has not ended well: as TrainReport.
     virtual int stopped_at() const = 0;

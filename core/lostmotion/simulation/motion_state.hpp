@@ -13,11 +13,11 @@ namespace lostmotion {
 struct MotionState {
     double time = 0.0;  // [s]
     std::vector<double> x, memory;
-    std::vector<double> input;  // last values of those that are given, for reading variables
+    std::vector<double> input;  // the last values that the caller gave, from which variables are read
     model::Key key;
     bool started = false;
     bool steady = false;  // the inputs were constant in the last interval
-    // What the solver knows of the motion in the present regime beside its state.
+    // What the solver carries along with the state in the present regime: rates and their rounding.
     std::vector<double> rate;  // x', if it is known better than from x
     bool rate_known = false;
     std::vector<double> rate_input;  // inputs up to here, which the rate belongs to

@@ -23,7 +23,7 @@ class SimulationOf {
         StateOf<D> x{};
         typename D::Memory memory{};
         typename System::Key key;
-        Inputs input{};  // last values of those that are given, for reading variables
+        Inputs input{};  // the last values that the caller gave, from which variables are read
         bool started = false;
         bool steady = false;  // the inputs were constant in the last interval
         CourseOf<D> course;   // what is known of the motion in the present regime beside its state
@@ -70,7 +70,7 @@ class SimulationOf {
     Status find_regime();
     const Regime& regime();
     RegimeCache<System>& regimes() { return solver_.cache(); }
-    // What the controller of an axis follows from now on: value + rate (t - now), in the place of its reference.
+    // Replaces the reference of the controller of an axis by value + rate (t - now).
     void set_reference(std::size_t axis, double value, double rate) {
         laws_[axis].reference = {{{now_.time, {value, rate}}}, {}};
     }

@@ -16,7 +16,7 @@ std::string check_control(const model::Assembly& a, const Control& control);
 // A controller in a train.
 struct AxisRows {
     int command;  // of its motor, among the inputs
-    // What it measures, in the order of control::Sampled.
+    // The measured signals, in the order of control::Sampled.
     std::array<model::Row, 7> measured;
 };
 std::vector<AxisRows> axis_rows(const model::Assembly& a, const Control& control);
