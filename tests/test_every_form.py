@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
+from lostmotion.studies.table import read_table
 from test_random_axes import random_axis
 
 LARGE = ("conveyor-start", "gantry-two-screws", "thruster-in-ice")  # which only take longer
@@ -195,3 +196,18 @@ def test_the_one_command_and_the_one_load_are_given_alike_in_each_form() -> None
     ]
     for call in calls:
         assert np.array_equal(call(scenario), call(scenario.long()))
+
+
+def test_a_study_of_a_train_of_one_gear_has_the_words_of_a_drive(tmp_path: Path) -> None:
+    scenario = brief("catalogue-robot-joint")
+    keep = {"ideal": "peak(ideal_speed)", "band": "bandwidth(0.2)"}
+    tables = [
+        read_table(
+            lm.study(
+                lm.studies.Study(scenario=one, vary=[{"key": key, "values": [50.0, 100.0]}], keep=keep), tmp_path / key
+            )
+        )
+        for one, key in ((scenario, "gearbox.ratio"), (scenario.long(), "gears.gearbox.ratio"))
+    ]
+    assert tables[0].to_pydict()["ideal"] == tables[1].to_pydict()["ideal"]
+    assert tables[0].to_pydict()["band"] == tables[1].to_pydict()["band"]

@@ -119,7 +119,9 @@ def test_only_kernels_see_the_solver() -> None:
     def all_of(source: Path) -> set[Path]:
         if source not in known:
             known[source] = set()
-            own = {(source.parent / name).resolve() for name in re.findall(r'#include "(\.*[^"]*)"', source.read_text())}
+            own = {
+                (source.parent / name).resolve() for name in re.findall(r'#include "(\.*[^"]*)"', source.read_text())
+            }
             known[source] = own.union(*(all_of(h) for h in own if h.exists()))
         return known[source]
 

@@ -248,9 +248,9 @@ def test_what_cannot_vary_ends_in_one_clear_line(tmp_path: Path, text: str, sent
         ("energy.gear_losses", "energy.gear_losses is none of servo_motor, "),
         (
             "bandwidth()",
-            "bandwidth in 'bandwidth()' is of a drive of one motor, gearbox and load, not of a drive train",
+            "bandwidth in 'bandwidth()' is of one motor that turns one load through one gearbox",
         ),
-        ("peak(ideal_speed)", "ideal_speed in 'peak(ideal_speed)' is of a drive"),
+        ("peak(ideal_speed)", "ideal_speed in 'peak(ideal_speed)' is of one motor"),
     ],
 )
 def test_what_a_train_does_not_have_cannot_be_kept(expression: str, sentence: str):

@@ -80,6 +80,11 @@ def drive_keys(what: Drive | DriveTrain | Scenario) -> dict[str, str]:
     return {f"shafts.{between.output}": LOAD, f"gears.{gear}": GEARBOX, f"motors.{motor}": MOTOR}
 
 
+def is_drive(scenario: Scenario) -> bool:
+    """Whether it is one motor that turns one load through one gearbox."""
+    return isinstance(scenario.written, DriveTables) or _more(scenario) is None
+
+
 def _more(scenario: Scenario) -> str | None:
     """Reason why it is more than one motor, one gearbox and one load."""
     train = scenario.train()

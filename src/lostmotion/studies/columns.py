@@ -91,7 +91,7 @@ def _names(study: Study, data: dict[str, np.ndarray], runs: Runs, threads: int) 
     if asks_for(study, "energy"):
         names["energy"] = {k: each_run(v) for k, v in runs.energy.items()}
     if asks_for(study, "ideal_speed"):
-        names["ideal_speed"] = names["command"] * each_run(_ideal_speeds(study, runs))
+        names["ideal_speed"] = names[study.vocabulary.command] * each_run(_ideal_speeds(study, runs))
     names["bandwidth"] = lambda amplitude=None: each_run(_bandwidths(study, runs, amplitude, threads))
     return names
 
@@ -104,7 +104,7 @@ def _ideal_speeds(study: Study, runs: Runs) -> np.ndarray:
 
     base = study.drive
     keys = {key for v in study.vary for key in v.all_keys}
-    if not any(key.startswith("motor") or key == "gearbox.ratio" or kind_of_record(key) for key in keys):
+    if not any(key.startswith("motor") or key.endswith(".ratio") or kind_of_record(key) for key in keys):
         return np.full(len(runs.errors), of(base))
     rows = zip(runs.parameters, runs.errors, strict=True)
     return np.array([math.nan if error else of(study.drive_at(row)) for row, error in rows])

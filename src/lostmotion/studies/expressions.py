@@ -83,7 +83,7 @@ class Expression:
         """instants [s] that it reads by .sel(time=...)"""
         self.indices = tuple(reader.indices)
         """samples that it reads by .isel(time=...)"""
-        self.variables = (self.names & known) | ({"command"} if "ideal_speed" in self.names else frozenset())
+        self.variables = (self.names & known) | ({vocabulary.command} if "ideal_speed" in self.names else frozenset())
         """the result variables that it needs"""
         self.unit = text_of(self._term.measure, KNOWN_UNITS)
         """unit of the values, ``"1"`` for a plain number; empty where it cannot be determined"""
@@ -109,7 +109,7 @@ def read_expression(text: str, vocabulary: Vocabulary = OF_DRIVES) -> Expression
 
 def _unknown(name: str, text: str, vocabulary: Vocabulary) -> ValueError:
     if name in OF_THE_RUN:
-        return ValueError(f"{name} in {text!r} is of a drive of one motor, gearbox and load, not of a drive train")
+        return ValueError(f"{name} in {text!r} is of one motor that turns one load through one gearbox")
     choice = listed((*FUNCTIONS, *vocabulary.of_the_run))
     near = nearest(name, [v for v, _ in vocabulary.variables])
     hint = f"; did you mean {near}?" if near else ""

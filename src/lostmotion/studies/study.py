@@ -120,13 +120,7 @@ class Study(Part):
     def _check_axis(self, task: AxisTask) -> None:
         if self.keep or self.trajectories is not None:
             raise ValueError("has keep or trajectories, but a task keeps columns of its own; leave them out")
-        try:
-            drive = self.drive
-        except InputError:
-            raise ValueError(
-                "is the task of a drive train, but only a drive can be selected; write the short form"
-            ) from None
-        task.check(drive)
+        task.check(self.drive)
 
     def _is_own(self, key: str) -> bool:
         """Whether it is a key of a task, and none of its motor or gearbox."""

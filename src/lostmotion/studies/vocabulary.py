@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from ..simulation.one_gear import is_drive
 from ..simulation.pointing_error import pointing_names
 from ..simulation.results import ENERGY
 from ..simulation.scenario import Scenario
@@ -28,6 +29,8 @@ class Vocabulary(NamedTuple):
     energies: tuple[tuple[str, str], ...]
     """entries of the ledger, each as expressions call it and as the ledger does"""
     of_the_run: tuple[str, ...]
+    command: str = "command"
+    """the command of the one motor"""
 
 
 OF_DRIVES = Vocabulary(
@@ -59,5 +62,6 @@ def vocabulary_of(scenario: Scenario) -> Vocabulary:
         (*((v.name, v.unit) for v in variables), *_controlled(scenario)),
         tuple(v.name for v in variables if not v.derived),
         tuple((entry.replace(": ", "_").replace(" ", "_"), entry) for entry in scenario.core().ledger_names()),
-        OF_THE_RUN if scenario.is_drive else OF_TRAINS,
+        OF_THE_RUN if is_drive(scenario) else OF_TRAINS,
+        *(scenario.train().command_of(motor) for motor in scenario.train().motors if is_drive(scenario)),
     )
