@@ -151,6 +151,7 @@ struct MatrixBy : Columns {
     using typename Columns::Coupled, typename Columns::Column;
 
     template <class Vector>
+        requires(!requires { typename Vector::Column; })  // of a matrix: below
     [[gnu::always_inline]] Coupled operator*(const Vector& v) const {
         return this->product(v);
     }
