@@ -171,7 +171,7 @@ SEED ?= 1
 soak: with-core-tests $(VENV)/dev
 	$(BUILD) --target core_tests core_tests_many soak
 	LOSTMOTION_CASES=1 $(BIN)/ctest --test-dir $(TREE) --output-on-failure --parallel 2 --tests-regex '^core'
-	LOSTMOTION_CASES=1 $(BIN)/pytest -k random
+	LOSTMOTION_CASES=1 $(BIN)/pytest
 	$(TREE)/core/tests/soak $(CASES) $(SEED)
 
 # Random input of all kinds, for some minutes; CASE repeats one that failed, KINDS chooses some.

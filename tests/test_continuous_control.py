@@ -18,6 +18,7 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 import lostmotion as lm
+from conftest import some
 
 J = 1.0  # kg m2
 PID = {"gain": 4.0, "integral_gain": 1.5, "derivative_gain": 0.8}
@@ -286,8 +287,8 @@ def random_scenario(rng: np.random.Generator) -> lm.Scenario:
 
 def test_exact_and_adaptive_solver_agree_on_random_loops_and_the_energy_ledger_closes() -> None:
     rng = np.random.default_rng(20261122)
-    switchings = 0
-    for _ in range(60):
+    switchings, cases = 0, some(60, 20)
+    for _ in range(cases):
         scenario = random_scenario(rng)
         exact = lm.simulate(scenario)
         adaptive = lm.simulate(scenario, solver="dormand-prince", relative_tolerance=1e-13)
@@ -297,7 +298,7 @@ def test_exact_and_adaptive_solver_agree_on_random_loops_and_the_energy_ledger_c
             np.testing.assert_allclose(a, b, rtol=0.0, atol=1e-6 * max(np.abs(a).max(), 1e-3), err_msg=name)
         ledger = lm.energy_of(exact)
         assert abs(ledger["residual"]) <= 1e-11 * ledger["turned_over"]
-    assert switchings > 300
+    assert switchings > 5 * cases
 
 
 def test_linear_model_has_the_controller_inside() -> None:

@@ -17,12 +17,12 @@ from fuzz.watchdog import Case, failure_of
 
 NEEDS = {"log_files": ("asammdf", "nptdms", "mcap", "rosbags", "h5py", "openpyxl"), "study_folders": ("pyarrow",)}
 COUNTS = {
-    "scenario_files": 15,
-    "command_lines": 5,
-    "study_folders": 5,
-    "log_files": 30,
+    "scenario_files": 8,
+    "command_lines": 4,
+    "study_folders": 4,
+    "log_files": 12,
     "fmu_calls": 3,
-    "random_trains": 12,
+    "random_trains": 8,
 }
 
 

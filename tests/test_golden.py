@@ -29,7 +29,6 @@ def test_every_bit_is_as_recorded(build: str) -> None:
 AVX_512 = [name for name in DISPATCHED if "512" in name or name == "X86_V4"]
 PROCESSORS = {
     "without AVX-512": (AVX_512, "-AVX512F,-AVX512VL"),
-    "without fused multiply-add": (DISPATCHED, "-FMA,-FMA4,-AVX512F"),
     "with SSE alone": (DISPATCHED, "-FMA,-FMA4,-AVX,-AVX2,-AVX512F,-BMI2"),
 }
 

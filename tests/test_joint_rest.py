@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
+from conftest import some
 
 linprog = pytest.importorskip("scipy.optimize").linprog
 STEP = 2e-3  # s between samples
@@ -76,8 +77,8 @@ def margin(train: dict[str, Any], time: float) -> float:
 
 @pytest.mark.parametrize("losses", [False, True])
 def test_random_trees_break_away_when_no_torques_between_them_are_consistent(losses: bool) -> None:
-    broken = 0
-    for seed in range(40):
+    broken, cases = 0, some(40, 16)
+    for seed in range(cases):
         train = tree(seed, losses)
         result = lm.simulate(lm.Scenario(**train))
         moves = np.nonzero(np.asarray(result["s0_speed"]))[0]
@@ -88,7 +89,7 @@ def test_random_trees_break_away_when_no_torques_between_them_are_consistent(los
         last = float(result["time"][moves[0] - 1])
         assert margin(train, last) > -1e-9, seed
         assert margin(train, last + STEP) < 1e-9, seed
-    assert broken > 20
+    assert broken >= cases // 2
 
 
 def joint_rest(tmp_path: Path, torque_a: str, torque_b: str, coulomb: float = 3.0) -> Any:

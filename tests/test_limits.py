@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
+from conftest import some
 
 KINDS = ["ideal", "first_order", "pi", "field_oriented"]
 MODES = ["torque", "speed", "position"]
@@ -121,9 +122,9 @@ def lag(T: float, tau: float) -> float:
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("kind", KINDS)
 def test_axes_turn_around_after_a_run_up_at_the_limit(kind: str, mode: str) -> None:
-    """Two hundred and forty random axes in all, both ways, with and without a limit of the torque beside that of the voltage."""
+    """Random axes both ways, with and without a limit of the torque beside that of the voltage."""
     rng = np.random.default_rng(1000 * KINDS.index(kind) + MODES.index(mode))
-    for n in range(20):
+    for n in range(some(20, 8)):
         line, T, tau, turn, end = random_axis(rng, kind, mode)
         way = 1.0 if n % 2 else -1.0
         run = lm.simulate(lm.Scenario(**axis(line, kind, mode, T, tau, turn, end, way)), energy=False)
@@ -179,7 +180,7 @@ def test_an_observer_of_the_speed_stays_right_at_the_voltage_limit(kind: str) ->
 def test_no_integrator_of_a_position_winds_up_on_random_axes(kind: str, within: str) -> None:
     """Sample times over a range of 32, time constants over one of 80, both ways: the speed reference turns around with the reference."""
     rng = np.random.default_rng(100 + 10 * KINDS.index(kind) + len(within))
-    for n in range(10):
+    for n in range(some(10, 6)):
         line, T, tau, turn, _ = random_axis(rng, kind, "position")
         line = replace(line, most=0.3 * line.stall if within == "torque" else math.inf)
         at, way = round(turn / T), 1.0 if n % 2 else -1.0
@@ -200,7 +201,7 @@ def test_observers_stay_right_at_limits_on_random_axes(kind: str) -> None:
     of the two times under the torque of standstill.
     """
     rng = np.random.default_rng(200 + KINDS.index(kind))
-    for n in range(20):
+    for n in range(some(20, 8)):
         line, T, tau, turn, end = random_axis(rng, kind, "torque")
         line = replace(line, most=line.stall)
         scenario = axis(line, kind, "speed", T, tau, turn, end, 1.0 if n % 2 else -1.0)
@@ -257,7 +258,7 @@ def continuous(line: Line, controller: dict[str, Any], turn: float, end: float, 
 def test_continuous_controllers_do_not_wind_up(mode: str, way: float) -> None:
     """Constant torque both ways: a triangle of the speed, on random axes, without any anti_windup_time given."""
     rng = np.random.default_rng(5)
-    for _ in range(30):
+    for _ in range(some(30, 10)):
         J, limit = math.exp(rng.uniform(-7.0, 2.0)), math.exp(rng.uniform(-3.0, 3.0))
         turn = rng.uniform(0.2, 2.0)
         far = 100.0 * way * limit / J * turn * (turn if mode == "position" else 1.0)
