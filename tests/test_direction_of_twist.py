@@ -115,7 +115,6 @@ def test_the_half_periods_follow_from_the_derivative_by_the_factor() -> None:
     assert result.arm_angle_sensitivity.sel(parameter=key).values == pytest.approx((one - other) / (2.0 * h), abs=1e-6)
 
 
-@pytest.mark.filterwarnings("ignore::lostmotion.inputs.doubts.ValueWarning")
 def test_programs_without_python_run_and_change_it(library: c.CDLL) -> None:  # noqa: F811
     scenario = lm.load("paper-2dof-nl-large").replace(
         **{"gearbox.stiffness.backward": 1.5, "simulation.duration": 0.3, "simulation.sample_interval": 0.01}

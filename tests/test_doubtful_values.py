@@ -123,3 +123,10 @@ def test_an_efficiency_of_96_is_refused_with_both_ways_to_write_it(value: str) -
     assert '0.96, or "96 %"' in str(found.value)
     losses: Any = lm.load("paper-2dof-l-small", ["gearbox.losses.efficiency=96 %"]).gearbox.losses
     assert losses.efficiency == 0.96
+
+
+def test_numbers_that_are_computed_are_not_doubted() -> None:
+    loose = lm.load("paper-2dof-nl-small").replace(**{"gearbox.stiffness.backlash": "20 deg"})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        lm.simulate(loose, sensitivities=["gearbox.stiffness.backlash"])

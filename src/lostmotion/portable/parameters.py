@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..inputs.doubts import trusted
 from ..inputs.quantities import Limit
 from ..simulation.scenario import Scenario
 from ..simulation.units_of_keys import limit_in, meaning_in, unit_for
@@ -128,7 +129,8 @@ def values_of(node: Any, key: str = "") -> Iterator[tuple[str, float]]:
 def _changed(scenario: Scenario, changes: Mapping[str, float], numbers: Numbers) -> np.ndarray | None:
     """The numbers with other values; None where these cannot be used."""
     try:
-        return numbers(scenario.replace(**changes))
+        with trusted():
+            return numbers(scenario.replace(**changes))
     except (InputError, ValueError):
         return None
 

@@ -16,6 +16,7 @@ import numpy as np
 from .. import _core
 from ..control.axis import Bound
 from ..errors import InputError
+from ..inputs.doubts import trusted
 from ..inputs.validation import shortened, shown
 from .core_runs import core_case
 from .keys import list_index
@@ -99,7 +100,10 @@ def neighbours(scenario: Scenario, key: str) -> list[Neighbour]:
     for sign, stencil in ((1, CENTRAL), (1, ONE_SIDED), (-1, ONE_SIDED)):
         h = sign * step
         try:
-            return [Neighbour(k * h, weight / h, scenario.replace(**{name: value + k * h})) for k, weight in stencil]
+            with trusted():
+                return [
+                    Neighbour(k * h, weight / h, scenario.replace(**{name: value + k * h})) for k, weight in stencil
+                ]
         except InputError as error:
             problem = problem or error
     raise InputError(f"{key}: cannot be varied about its value {value:g}: {problem}", where="sensitivities")

@@ -20,6 +20,7 @@ from ..data_sheets.loss_data import Lubricant
 from ..data_sheets.loss_map_builder import VISCOSITY_EXPONENT
 from ..errors import InputError
 from ..inputs.arguments import checked
+from ..inputs.doubts import trusted
 from ..inputs.quantities import Number, Temperature, Time
 from ..inputs.validation import did_you_mean
 from ..model.gearbox import Transmission
@@ -84,7 +85,8 @@ class _Law:
             resistance = 1.0 + self.bodies.alpha * (winding - self.bodies.reference)
             warm = _warm_motor(self.motor, resistance, self.magnet_factor(housing), winding)
             changes |= {f"{self.scenario.motor_key(self.name)}.{name}": value for name, value in warm.items()}
-        return self.scenario.replace(**changes)
+        with trusted():
+            return self.scenario.replace(**changes)
 
 
 def _thinned(gear: Transmission, factor: float) -> dict[str, Any]:
