@@ -43,7 +43,7 @@ SearchedRegime::SearchedRegime(const Regime& r, const Layout& n, const std::vect
     for (const LockedTorque<Row>& l : r.locked) locked.push_back(l.with(sparse));
 }
 
-SearchedRegimes::SearchedRegimes(const Assembly& assembly) : assembly_(assembly) {
+SearchedRegimes::SearchedRegimes(const Assembly& assembly) : assembly_(assembly), slots_(first_slots, nullptr) {
     const Layout& n = assembly.layout();
     near_state_.resize(static_cast<std::size_t>(n.states));
     near_input_.assign(static_cast<std::size_t>(n.inputs), far_from_event);
@@ -57,20 +57,32 @@ SearchedRegimes::SearchedRegimes(const Assembly& assembly) : assembly_(assembly)
 }
 
 const SearchedRegime& SearchedRegimes::operator[](const Key& key) {
-    const SearchedRegime*& recent = recent_[key.hash() % recent_.size()];
-    if (recent != nullptr && recent->key == key) return *recent;
-    auto& known = known_[key];
-    if (known == nullptr) {
-        known = std::make_unique<const SearchedRegime>(composed(key), assembly_.layout(), near_state_, near_input_);
-        bytes_ += known->bytes();
+    std::size_t k = slot(key);
+    if (slots_[k] == nullptr) {
+        if (2 * (known_.size() + 1) > slots_.size()) {
+            slots_.assign(2 * slots_.size(), nullptr);
+            for (const auto& r : known_) slots_[slot(r->key)] = r.get();
+            k = slot(key);
+        }
+        known_.push_back(
+            std::make_unique<const SearchedRegime>(composed(key), assembly_.layout(), near_state_, near_input_));
+        slots_[k] = known_.back().get();
+        bytes_ += known_.back()->bytes();
     }
-    return *(recent = known.get());
+    return *slots_[k];
+}
+
+std::size_t SearchedRegimes::slot(const Key& key) const {
+    const std::size_t mask = slots_.size() - 1;
+    std::size_t k = key.hash() & mask;
+    while (slots_[k] != nullptr && !(slots_[k]->key == key)) k = (k + 1) & mask;
+    return k;
 }
 
 void SearchedRegimes::make_room() {
     if (bytes_ <= most_bytes) return;
     known_.clear();
-    recent_ = {};
+    slots_.assign(first_slots, nullptr);
     bytes_ = 0;
 }
 

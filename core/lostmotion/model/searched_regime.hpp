@@ -1,9 +1,7 @@
 // The regimes that the search of modes has visited, for trains of any size.
 #pragma once
 
-#include <array>
 #include <memory>
-#include <unordered_map>
 #include <vector>
 
 #include "assembly.hpp"
@@ -54,12 +52,15 @@ class SearchedRegimes {
     const std::vector<double>& near_input() const { return near_input_; }
 
  private:
-    static constexpr std::size_t most_bytes = std::size_t{16} << 20;
+    static constexpr std::size_t most_bytes = std::size_t{16} << 20, first_slots = 64;
+
+    // Where the regime is, or where it has to go.
+    std::size_t slot(const Key& key) const;
 
     const Assembly& assembly_;
     std::vector<double> near_state_, near_input_;
-    std::unordered_map<Key, std::unique_ptr<const SearchedRegime>, KeyHash> known_;
-    std::array<const SearchedRegime*, 512> recent_{};  // by hash
+    std::vector<std::unique_ptr<const SearchedRegime>> known_;
+    std::vector<const SearchedRegime*> slots_;  // a power of two, by hash, at most half full
     std::size_t bytes_ = 0;
     Regime composed_;  // its memory is used again
 };
