@@ -12,7 +12,6 @@ import numpy as np
 from report import Report
 
 import lostmotion as lm
-from lostmotion.simulation.exact_batches import controlled
 from lostmotion.simulation.variables import STATES
 
 STEP, COUNT, COMPARED = 1e-3, 4096, 256
@@ -157,7 +156,7 @@ def under_controllers() -> list[str]:
     errors = np.zeros(2)
     for k, (drive, target) in enumerate(zip(drives, targets, strict=True)):
         hold = axis.controller.model_copy(update={"reference": lm.PositionReference(mean=float(target))})
-        alone = lm.Simulation(controlled(drive, hold), step=STEP)
+        alone = lm.Simulation(lm.Scenario.of_any(drive).with_axes({"motor": hold}), step=STEP)
         for _ in range(1000):
             alone.advance(STEP)
         found = np.array([many[name][k] - alone[name] for name in ("load_angle", "load_speed")])

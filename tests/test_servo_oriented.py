@@ -53,7 +53,7 @@ def at_speed(scenario: lm.Scenario, monkeypatch: pytest.MonkeyPatch) -> tuple[An
 @pytest.mark.parametrize("saliency", [{}, ROUND])
 def test_at_rest_both_current_loops_have_the_closed_form(saliency: dict[str, float]) -> None:
     """L = g/(z (z - 1)) each, where the rotor stands and none acts on the other."""
-    scenario = axis(0.0, **saliency).replace(**{"motors.m.rotor_inertia": 1e6})
+    scenario = axis(0.0, **saliency).replace(**{"motors.m.rotor_inertia": "1e6 kg*m^2"})
     whole = axis_of(scenario.replace(**{"controllers.m.reference.mean": 1e-9}))
     (regime,) = regimes(whole)
     x = 2.0 * math.asin(1.0 / 6.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field
 
 from ..inputs.named import Named
 
@@ -34,7 +34,13 @@ class Notes(Named[str]):
         return Notes({key: text for key, text in self.items() if key == WHOLE or _at(old, key) == _at(new, key)})
 
 
-Note = Annotated[str | dict[str, str], AfterValidator(Notes), Field(validate_default=True)]
+def _texts(note: Any) -> Any:
+    if isinstance(note, str) or (isinstance(note, Mapping) and all(isinstance(part, str) for part in note.values())):
+        return note
+    raise ValueError("must be text, in quotes, or a table of texts by the key that each is about")
+
+
+Note = Annotated[str | dict[str, str], BeforeValidator(_texts), AfterValidator(Notes), Field(validate_default=True)]
 """text, or a table of texts by the key that each is about"""
 NO_NOTE: dict[str, str] = {}
 
