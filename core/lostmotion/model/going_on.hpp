@@ -1,5 +1,5 @@
-// Whether contacts go on as they were where an edge is crossed or an input changes, in a kernel: then there is nothing to
-// search.
+// Whether contacts go on as they were where an edge is crossed or an input changes, in a kernel: then there is nothing
+// to search.
 #pragma once
 
 #include "../kernel/bit_set.hpp"
