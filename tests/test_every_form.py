@@ -75,7 +75,7 @@ FUNCTIONS: dict[str, Callable[[lm.Scenario, Path], Any]] = {
 
 
 def refusals(scenario: lm.Scenario, path: Path) -> list[str]:
-    """What the functions say that refuse a scenario by its form."""
+    """Messages of the functions that refuse a scenario by its form."""
     found = []
     for name, function in FUNCTIONS.items():
         (path / name).mkdir()

@@ -41,7 +41,7 @@ def invoke(*words: str) -> tuple[int, str]:
 
 @pytest.mark.parametrize("rated", [1.0, 250.0])
 def test_the_command_reads_the_file_with_a_rig_and_finds_the_truth(logs: Path, rated: float) -> None:
-    """Of a motor of 250 N a command is force/250 N."""
+    """The command of a motor of 250 N is force/250 N."""
     rig = (logs / "rig.toml").read_text()
     (logs / "rig.toml").write_text(rig.replace("rated_torque = 1.0", f"rated_torque = {rated}"))
     code, said = invoke("identify", "new", str(logs), "--rig", str(logs / "rig.toml"))

@@ -122,7 +122,7 @@ def lag(T: float, tau: float) -> float:
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("kind", KINDS)
 def test_axes_turn_around_after_a_run_up_at_the_limit(kind: str, mode: str) -> None:
-    """Random axes both ways, with and without a limit of the torque beside that of the voltage."""
+    """Random axes in both directions, with and without a limit of the torque beside that of the voltage."""
     rng = np.random.default_rng(1000 * KINDS.index(kind) + MODES.index(mode))
     for n in range(some(20, 8)):
         line, T, tau, turn, end = random_axis(rng, kind, mode)

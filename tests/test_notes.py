@@ -76,7 +76,7 @@ def test_a_note_that_is_still_true_stays() -> None:
 
 
 def test_a_note_is_about_the_value_that_it_names_whatever_its_words_are(tmp_path: Path) -> None:
-    """Of an own record: the words speak of losses, the key is the backlash; and a limit among several."""
+    """The note of an own record speaks of losses and is about the backlash; another is about one limit of several."""
     shutil.copy(ROOT / "src" / "lostmotion" / "catalogue" / "paper.toml", tmp_path / "own.toml")
     text = (tmp_path / "own.toml").read_text()
     note = 'note = {stiffness = "No loss of the gap is known.", "limits.max_input_speed" = "Of a torn page."}'

@@ -4,6 +4,7 @@
 #include "gauss_principle.hpp"
 #include "lostmotion/model/check.hpp"
 #include "lostmotion/model/system.hpp"
+#include "lostmotion/solver/regime_cache.hpp"
 #include "random_trains.hpp"
 #include "referee_polynomial.hpp"
 #include "train_run.hpp"

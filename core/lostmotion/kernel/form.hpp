@@ -522,7 +522,7 @@ class FormTable {
     double magnitude_of(int row, const Memory& m, const State& x, const Input& input) const {
         return magnitude<double>(row, m, x, driven_ ? input.magnitudes() : Inputs{});
     }
-    // Of its states alone.
+    // Sum of the magnitudes of the terms in coupled states.
     double state_magnitude(int row, const State& x) const {
         if constexpr (any)
             if (sparse())

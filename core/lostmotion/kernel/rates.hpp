@@ -331,7 +331,7 @@ struct SparseRates {
     std::vector<double> positive;  // without their signs, but for what decays by itself
     std::vector<std::vector<std::pair<int, double>>> of_input;
 
-    // A x, or that of the positive coefficients.
+    // Product A x, or that of the matrix `positive` with x.
     void multiply(const double* x, double* out, bool of_positive = false) const {
         const double* factors = of_positive ? positive.data() : factor.data();
         const int rows = static_cast<int>(begin.size()) - 1;
@@ -436,7 +436,7 @@ struct LinearRatesOf<Any> {
     Column constant(const Memory& m) const {
         return fixed_ + of_memory([&](const OfMemory& t) { return m[t.memory] * t.factor; });
     }
-    // What the inputs bring, as an expression if the train is small.
+    // Part of dx/dt by the inputs, as an expression if the train is small.
     Coupled forced(const Inputs& u) const {
         if (is_small()) return of_inputs(u, [](const Pack<4>& c) { return c; });
         Coupled out = Coupled::zeros(n.coupled);

@@ -54,7 +54,7 @@ class SearchedRegimes {
  private:
     static constexpr std::size_t most_bytes = std::size_t{16} << 20, first_slots = 64;
 
-    // Where the regime is, or where it has to go.
+    // Slot of the regime, or the free slot where it has to go.
     std::size_t slot(const Key& key) const;
 
     const Assembly& assembly_;

@@ -42,7 +42,6 @@ class SwitchedTrain {
 
     explicit SwitchedTrain(const Assembly& assembly);
 
-    const Assembly& assembly() const { return assembly_; }
     SearchedRegimes& regimes() { return regimes_; }
 
     // Regime at the start of a run, where nothing is known but the state.
@@ -55,7 +54,7 @@ class SwitchedTrain {
     // input: the inputs up to this instant. given_rest: contacts that given motions bring to rest.
     Found next(Instant& now, int fired, Key& key, const Inputs& input, const Rest& given_rest = {});
 
-    // Where the motion of shafts is given, sets their speeds to what they are now. True if contacts that slip and whose
+    // Sets the speeds of shafts whose motion is given to what they are now. True if contacts that slip and whose
     // speeds follow from that alone have none: those are marked.
     template <class X, class Input>
     bool follow_given(X& x, const Input& input, const Key& key, Rest& rests) const;

@@ -17,7 +17,7 @@ struct MotionState {
     model::Key key;
     bool started = false;
     bool steady = false;  // the inputs were constant in the last interval
-    // What the solver carries along with the state in the present regime: rates and their rounding.
+    // Rates and their rounding, which the solver carries along with the state in the present regime.
     std::vector<double> rate;  // x', if it is known better than from x
     bool rate_known = false;
     std::vector<double> rate_input;  // inputs up to here, which the rate belongs to

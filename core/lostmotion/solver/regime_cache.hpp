@@ -263,7 +263,7 @@ class RegimeCache {
         }
         return *(last_ = slots_[k]);
     }
-    // Where the regime is, or where it has to go.
+    // Slot of the regime, or the free slot where it has to go.
     std::size_t slot(const Key& key) const {
         const std::size_t mask = slots_.size() - 1;
         std::size_t k = key.hash() & mask;
