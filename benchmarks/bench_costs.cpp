@@ -118,16 +118,16 @@ void response(const TrainRun& train) {
 }
 
 // Multiplications and additions in equal numbers, in chains side by side; nothing leaves the registers. [Gflop/s]
-constexpr int chains = 6, rounds = 1000000;
+constexpr int abreast = 6, rounds = 1000000;
 
 [[gnu::noinline]] void multiply_and_add() {
     const Vec factor = Vec{} + 1.0000000001, summand = Vec{} + 1e-9;
-    Vec product[chains], sum[chains];
+    Vec product[abreast], sum[abreast];
 #pragma GCC unroll 6
-    for (int c = 0; c < chains; ++c) product[c] = sum[c] = factor;
+    for (int c = 0; c < abreast; ++c) product[c] = sum[c] = factor;
     for (int k = 0; k < rounds; ++k) {
 #pragma GCC unroll 6
-        for (int c = 0; c < chains; ++c) {
+        for (int c = 0; c < abreast; ++c) {
             product[c] *= factor;
             sum[c] += summand;
             asm volatile("" : "+x"(product[c]), "+x"(sum[c]));  // so that no round is left out
@@ -135,7 +135,7 @@ constexpr int chains = 6, rounds = 1000000;
     }
 }
 
-double peak() { return 2.0 * chains * vec_width * rounds / (1e6 * best_ms(10, multiply_and_add)); }
+double peak() { return 2.0 * abreast * vec_width * rounds / (1e6 * best_ms(10, multiply_and_add)); }
 
 }  // namespace
 

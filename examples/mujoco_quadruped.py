@@ -228,13 +228,13 @@ if __name__ == "__main__":
     else:
         for gait in ("trot", "squat"):
             for kind in ("ideal", "quasi-direct", "strain wave"):
-                found = move(kind, gait)
+                found = move(kind, gait, 0.5)  # a period of the trot, a squat down
                 work, loss = STEP * found.power.sum(), STEP * found.loss.sum()
                 print(
                     f"{gait}, {kind}: joints off by {1e3 * np.sqrt(np.mean(found.errors**2)):.1f} mrad (root mean square), "
                     f"trunk by up to {1e3 * np.abs(found.sag).max():.1f} mm; work of the motors {work:.1f} J, gear losses {loss:.1f} J"
                 )
         for kind in ("quasi-direct", "strain wave"):
-            joints, trunk = rest(kind, 1.0)
+            joints, trunk = rest(kind, 0.5)
             print(f"brakes closed, {kind}: the joints move by {joints:g} rad, the trunk by {1e6 * trunk:.1g} um")
         print(f"friction loss of MuJoCo in place of brakes: the trunk sinks by {1e3 * sink(0.5):.0f} mm in 0.5 s")

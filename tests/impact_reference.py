@@ -77,25 +77,30 @@ class Chain:
         self.G = np.zeros((n - 1, n))  # rates of the twists
         for k in range(n - 1):
             self.G[k, k], self.G[k, k + 1] = 1.0 / self.ratios[k], -1.0
+        self.mobility = self.G @ (self.G / self.inertias).T
         self.side = np.where(self.twists >= 0.0, 1.0, -1.0)
         self.gap = 0.5 * self.backlash - np.abs(self.twists)
         self.touches = [False] * (n - 1)
         self.size = float(np.abs(self.speeds).max())
+        self.rubbed = [s for s in range(n) if self.friction[s] > 0.0]
         t = 0.0
         while t < duration:
             a = self.accelerations()
             left, what, index = duration - t, "end", 0
-            for s in range(n):
-                if self.friction[s] > 0.0 and self.speeds[s] * a[s] < 0.0 and -self.speeds[s] / a[s] < left:
+            for s in self.rubbed:
+                if self.speeds[s] * a[s] < 0.0 and -self.speeds[s] / a[s] < left:
                     left, what, index = -self.speeds[s] / a[s], "stops", s
+            u, b = self.approach(self.speeds).tolist(), self.approach(a).tolist()
             for k in range(n - 1):
                 if self.touches[k]:
                     continue
-                for way in (1.0, -1.0):
-                    h = flight(*self.to_end(k, way, a))
-                    if h < left:
-                        left, what, index = h, "strikes", k
-            self.fly(a, left)
+                near = float(self.gap[k])
+                speed = 0.0 if near <= 0.0 and abs(u[k]) <= 1e-13 * self.size else u[k]  # rounding
+                # At the nearer end, and at the other.
+                h = min(flight(near, speed, b[k]), flight(float(self.backlash[k]) - near, -u[k], -b[k]))
+                if h < left:
+                    left, what, index = h, "strikes", k
+            self.fly(a, left, u, b)
             t += left
             self.size = max(self.size, float(np.abs(self.speeds).max()))
             if what == "stops":
@@ -109,16 +114,7 @@ class Chain:
     def approach(self, a: Vector) -> Vector:
         return self.side * (self.G @ a)
 
-    def to_end(self, k: int, way: float, a: Vector) -> tuple[float, float, float]:
-        """Gap, approach speed and acceleration at the nearer end, or at the other."""
-        gap = self.gap[k] if way > 0.0 else self.backlash[k] - self.gap[k]
-        u = self.approach(self.speeds)[k]
-        if gap <= 0.0 and abs(u) <= 1e-13 * self.size:  # rounding
-            u = 0.0
-        return gap, way * u, way * self.approach(a)[k]
-
-    def fly(self, a: Vector, h: float) -> None:
-        u, b = self.approach(self.speeds), self.approach(a)
+    def fly(self, a: Vector, h: float, u: list[float], b: list[float]) -> None:
         for k in range(len(self.gap)):
             if not self.touches[k]:
                 self.gap[k] -= h * (u[k] + 0.5 * h * b[k])
@@ -147,8 +143,10 @@ class Chain:
             on or (self.gap[k] <= 0.0 and abs(u[k]) <= 1e-13 * self.size) for k, on in enumerate(self.touches)
         ]
         near = [k for k in range(n - 1) if self.touches[k]]
-        still = [s for s in range(n) if self.friction[s] > 0.0 and self.speeds[s] == 0.0]
+        still = [s for s in self.rubbed if self.speeds[s] == 0.0]
         force = self.torques - self.friction * np.sign(self.speeds)
+        if not near and not still:
+            return np.asarray(force / self.inertias, dtype=np.float64)
         best, chosen = math.inf, None
         for presses in itertools.product((True, False), repeat=len(near)):
             for ways in itertools.product((0, 1, -1), repeat=len(still)):
@@ -160,7 +158,7 @@ class Chain:
                 C = np.array(rows).reshape(-1, n)
                 K = C @ (C / self.inertias).T
                 held: NDArray[Any] = np.zeros(0)
-                if len(rows) and np.linalg.matrix_rank(K, tol=1e-12 * np.abs(K).max()) < len(rows):
+                if len(rows) > 1 and np.linalg.matrix_rank(K, tol=1e-12 * np.abs(K).max()) < len(rows):
                     # Rest leaves torques open: any that are allowed.
                     limits = [(0.0, None)] * sum(presses)
                     limits += [
@@ -209,12 +207,12 @@ class Chain:
         rebound = np.where(self.touches, 0.0, self.restitution * np.maximum(u, 0.0))
         rebound[rebound < self.negligible * self.size] = 0.0
         before = np.where(self.touches, 0.0, u)
-        W = self.G @ (self.G / self.inertias).T * np.outer(self.side, self.side)
+        W = self.mobility * np.outer(self.side, self.side)
         for number in range(2 ** len(some) - 1, -1, -1):
             of = [k for j, k in enumerate(some) if number >> j & 1]
             P = np.zeros(len(u))
             if of:
-                P[of] = np.linalg.solve(W[np.ix_(of, of)], (before + rebound)[of])
+                P[of] = np.linalg.solve(W[of][:, of], (before + rebound)[of])
             after = before - W @ P
             if all(P[k] >= 0.0 for k in of) and all(after[k] <= -rebound[k] + 2e-14 * self.size for k in some):
                 break

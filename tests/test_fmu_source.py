@@ -19,8 +19,12 @@ from lostmotion.portable.fmu_sources import SOURCES
 fmpy: Any = pytest.importorskip("fmpy", reason="FMPy is missing: .venv/bin/pip install --group dev")
 COMPILER = shutil.which("g++") or shutil.which("c++")
 CMAKE = shutil.which("cmake") or shutil.which("cmake", path=str(Path(sys.executable).parent))
-FAST_TO_BUILD = ("-DCMAKE_CXX_FLAGS=-Wall -Wextra -Werror", "-DCMAKE_CXX_FLAGS_RELEASE=-O1 -DNDEBUG")
-STRICT = ("-std=c++20", "-O1", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fvisibility=hidden", "-fPIC")
+FAST_TO_BUILD = (
+    "-DCMAKE_CXX_FLAGS=-Wall -Wextra -Werror",
+    "-DCMAKE_CXX_FLAGS_RELEASE=-DNDEBUG",
+    "-DCMAKE_UNITY_BUILD=ON",
+)
+STRICT = ("-std=c++20", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fvisibility=hidden", "-fPIC")
 
 
 def exported(name: str, to: Path, fmi: int = 2) -> Path:

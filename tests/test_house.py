@@ -2,6 +2,7 @@
 
 import ast
 import re
+import runpy
 import subprocess
 import sys
 from graphlib import TopologicalSorter
@@ -427,8 +428,10 @@ def test_typing_marker_is_shipped() -> None:
 
 
 @pytest.mark.parametrize("path", sorted((ROOT / "examples").glob("*.py")), ids=lambda p: p.stem)
-def test_examples_run(path: Path, tmp_path: Path) -> None:
-    subprocess.run([sys.executable, str(path)], cwd=tmp_path, check=True, capture_output=True, timeout=600)
+def test_examples_run(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", [str(path)])
+    runpy.run_path(str(path), run_name="__main__")
 
 
 def test_help_names_every_command() -> None:

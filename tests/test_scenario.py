@@ -99,9 +99,10 @@ def test_backlash_and_preload_reshape_the_curve() -> None:
         assert gap.torque(d + 1e-3) == pytest.approx(curve.torque(d))
     for preload in (0.5, 1.59, 10.0, 52.47, 80.0):
         tight = lm.model.TorsionCurve(**(curve.model_dump() | {"preload": preload}))
-        at = next(d for d in np.linspace(0, 6e-3, 600001) if curve.torque(float(d)) >= preload - 1e-9)
+        # 1.59 N m at the first break, 52.47 N m at the second.
+        at = float(np.interp(preload, [0.0, 1.59, 52.47, 52.47 + 26500.0], [0.0, 0.6e-3, 3e-3, 3e-3 + 1.0]))
         for d in (0.1e-3, 1e-3, 4e-3):
-            assert tight.torque(d) == pytest.approx(curve.torque(at + d) - curve.torque(at), abs=2e-4)
+            assert tight.torque(d) == pytest.approx(curve.torque(at + d) - preload)
             assert tight.torque(-d) == -tight.torque(d)
 
 

@@ -101,10 +101,11 @@ def _resources(description: np.ndarray, names: str) -> str:
     numbers = ",\n".join(f"    {float(number).hex()}" for number in description)
     text = "\n".join(f'    "{_escaped(line)}\\n"' for line in names.splitlines())
     return (
-        '#include "lostmotion.hpp"\n\nnamespace lostmotion::fmu {\n\n'
+        '#include "configuration.hpp"\n\n#include <limits>\n#include <string>\n#include <vector>\n\n'
+        "namespace lostmotion::fmu {\n\n"
         "[[maybe_unused]] static constexpr double inf = std::numeric_limits<double>::infinity();\n"
-        f"const std::vector<double> embedded_scenario = {{\n{numbers}}};\n"
-        f"const std::string embedded_names =\n{text};\n\n}}  // namespace lostmotion::fmu\n"
+        f"extern const std::vector<double> embedded_scenario = {{\n{numbers}}};\n"
+        f"extern const std::string embedded_names =\n{text};\n\n}}  // namespace lostmotion::fmu\n"
     )
 
 
