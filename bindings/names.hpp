@@ -7,18 +7,33 @@ namespace lostmotion::binding {
 
 inline void bind_names(nb::module_& m) {
     const auto drive = [] { return model::Assembly(model::drive_train()); };
-    m.def("channels", [drive] { return channel_rows(train_channels(drive())); }, "Name, symbol, unit, meaning.");
-    m.def("states", [drive] { return model::state_names(drive()); });
-    m.def("energy_entries", [drive] { return ledger_names(drive()); });
-    m.def("switching_columns", [drive] { return switching_columns(drive()); });
     m.def(
-        "causes",
-        [](bool short_form) {
-            std::vector<std::pair<int, std::string>> all;
-            for (const SwitchingCause& c : switching_causes(short_form)) all.emplace_back(c.number, c.name);
+        "aliases_of_drive",
+        [] {
+            std::vector<std::pair<std::string, std::string>> all;
+            for (const model::Alias& a : model::aliases_of_drive()) all.emplace_back(a.name, a.shown);
             return all;
         },
-        "short_form"_a, "Of switchings: number and name.");
+        "What the results of a motor, a gearbox and a load are called: name in the long form and name that is shown.");
+    m.def("result_name", &model::result_name, "element"_a, "what"_a, "slide"_a,
+          "Name of a result variable: NAME_WHAT, of a slide with position, deflection and force.");
+    m.def(
+        "variables", [drive] { return variable_rows(Variables(drive())); },
+        "Of a drive: name, symbol, unit, meaning, whether it is derived.");
+    m.def("states", [drive] { return model::state_names(drive()); });
+    m.def("energy_entries", [drive] { return ledger_names(drive()); });
+    m.def("switching_columns", [drive] {
+        const model::Assembly a = drive();
+        return SwitchingTable(a).columns();
+    });
+    m.def(
+        "causes",
+        [] {
+            std::vector<std::pair<int, std::string>> all;
+            for (const SwitchingCause& c : switching_causes()) all.emplace_back(c.number, c.name);
+            return all;
+        },
+        "Of switchings: number and name.");
     m.def(
         "parameters",
         [] {

@@ -20,6 +20,7 @@
 #include "lostmotion/analysis/train_batch.hpp"
 #include "lostmotion/model/train_description.hpp"
 #include "lostmotion/scenario/machine_fields.hpp"
+#include "lostmotion/scenario/variables.hpp"
 
 namespace lostmotion::binding {
 
@@ -29,6 +30,15 @@ inline std::vector<ChannelRow> channel_rows(const std::vector<TrainChannel>& cha
     std::vector<ChannelRow> rows;
     for (const TrainChannel& c : channels)
         rows.emplace_back(c.name, c.symbol, c.unit.empty() ? "1" : c.unit, c.meaning);
+    return rows;
+}
+
+// The same, and whether it follows from the others.
+using VariableRow = std::tuple<std::string, std::string, std::string, std::string, bool>;
+inline std::vector<VariableRow> variable_rows(const Variables& all) {
+    std::vector<VariableRow> rows;
+    for (const Variable& v : all.all())
+        rows.emplace_back(v.name, v.symbol, v.unit, v.meaning, rows.size() >= all.channels());
     return rows;
 }
 
@@ -71,6 +81,10 @@ class SharedRun : public TrainRun {
         return w ? std::move(w) : spare_->take();
     }
     void give_back(std::unique_ptr<Workspace> w) const { own_.give_back(std::move(w)); }
+    const Variables& variables() const {
+        std::call_once(once_, [this] { variables_ = std::make_unique<Variables>(assembly()); });
+        return *variables_;
+    }
 
  private:
     // Of trains that are gone, the one of this module.
@@ -79,6 +93,8 @@ class SharedRun : public TrainRun {
         return all;
     }
     mutable Workspaces own_;
+    mutable std::once_flag once_;
+    mutable std::unique_ptr<const Variables> variables_;
     std::shared_ptr<Workspaces> spare_ = store();
 };
 
@@ -170,7 +186,29 @@ class TrainDescription : public model::TrainDescription {
     std::vector<ChannelRow> channels() const { return channel_rows(run()->channels()); }
     std::vector<std::string> ledger_names() const { return lostmotion::ledger_names(run()->assembly()); }
     std::vector<std::string> input_names() const { return model::input_names(run()->assembly()); }
-    std::vector<std::string> switching_columns() const { return lostmotion::switching_columns(run()->assembly()); }
+    std::vector<std::string> switching_columns() const { return SwitchingTable(run()->assembly()).columns(); }
+    std::vector<VariableRow> variables() const { return variable_rows(run()->variables()); }
+    // The variables that follow, from the channels; rows of a table.
+    Array derive(const Values& channels) const {
+        const Variables& all = run()->variables();
+        const std::size_t n = channels.shape(1), derived = all.size() - all.channels();
+        if (channels.shape(0) != all.channels()) throw nb::value_error("not the channels of this train");
+        std::vector<double> data(all.size() * n);
+        std::copy_n(channels.data(), all.channels() * n, data.begin());
+        for (std::size_t k = 0; k < n; ++k) all.derive(data.data(), n, k);
+        auto out = std::make_unique_for_overwrite<double[]>(derived * n);
+        std::copy_n(data.begin() + static_cast<std::ptrdiff_t>(all.channels() * n), derived * n, out.get());
+        return as_array(std::move(out), {derived, n});
+    }
+    void name_as(const std::vector<std::pair<std::string, std::string>>& aliases) {
+        for (const auto& [name, shown] : aliases) train.aliases.push_back({name, shown});
+    }
+    // Also those that have an alias although there are none.
+    std::vector<std::string> shown_contacts() const {
+        std::vector<std::string> names;
+        for (const model::ShownContact& c : model::shown_contacts(run()->assembly())) names.push_back(c.name);
+        return names;
+    }
     std::vector<std::string> contact_names() const {
         const model::Assembly& a = run()->assembly();
         std::vector<std::string> names;
@@ -218,8 +256,9 @@ inline nb::dict in_order(const NamedInOrder& values) {
 }
 
 inline Array switching_table(const TrainReport& report, const model::Assembly& a) {
-    return column(report.switchings, {switching_columns(a).size()},
-                  [&](const TrainSwitching& s, double* to) { write_switching(a, s, to); });
+    const SwitchingTable table(a);
+    return column(report.switchings, {table.columns().size()},
+                  [&](const TrainSwitching& s, double* to) { table.write(s, to); });
 }
 
 inline void check_train_run(const TrainReport& report, const model::Assembly& a) {
@@ -405,10 +444,7 @@ inline void bind_train(nb::module_& m) {
              "fields"_a, "What joins two shafts and is no gear, in the same way.")
         .def("add_controller", &TrainDescription::add_controller, "motor"_a, "fields"_a)
         .def("check", &TrainDescription::check)
-        .def_prop_rw(
-            "short_form", [](const TrainDescription& t) { return t.train.short_form; },
-            [](TrainDescription& t, bool v) { t.train.short_form = v; },
-            "Whether results have the names of a drive: `twist`, not `gearbox_twist`.")
+        .def("name_as", &TrainDescription::name_as, "aliases"_a, "What entries of results are called.")
         .def("kernel", [](const TrainDescription& t) { return t.run()->kernel().name(); })
         .def(
             "guards", [](const TrainDescription& t) { return t.run()->kernel().sizes().guards; },
@@ -416,6 +452,9 @@ inline void bind_train(nb::module_& m) {
         .def("massless_shafts", &TrainDescription::massless_shafts)
         .def("check_start", &TrainDescription::check_start, "speeds"_a)
         .def("channels", &TrainDescription::channels, "Name, symbol, unit, meaning.")
+        .def("variables", &TrainDescription::variables, "Name, symbol, unit, meaning, whether it is derived.")
+        .def("derive", &TrainDescription::derive, "channels"_a,
+             "The variables that follow, from the channels, row by row.")
         .def("ledger_names", &TrainDescription::ledger_names)
         .def("input_names", &TrainDescription::input_names)
         .def("switching_columns", &TrainDescription::switching_columns)
@@ -423,7 +462,9 @@ inline void bind_train(nb::module_& m) {
              "Inertia [kg m2] and friction that holds at rest [N m] of each shaft.")
         .def("mesh_loss", &TrainDescription::mesh_loss, "gear"_a, "driven"_a, "speed"_a)
         .def("steady_regime", &TrainDescription::steady_regime, "speeds"_a, "torques"_a)
-        .def("contact_names", &TrainDescription::contact_names);
+        .def("contact_names", &TrainDescription::contact_names)
+        .def("shown_contacts", &TrainDescription::shown_contacts,
+             "Also those that have an alias although the train has none of them.");
     nb::class_<Case>(m, "Case")
         .def(
             "__init__",

@@ -12,7 +12,6 @@ import lostmotion as lm
 from conftest import ROOT
 from lostmotion import _core
 from lostmotion.model.drive import Drive
-from lostmotion.simulation.variables import CONTACTS
 from lostmotion.studies.in_core import core_can
 from lostmotion.studies.table import read_table
 from lostmotion.units.conversion import Unit
@@ -103,8 +102,9 @@ def test_a_cause_s_number_goes_with_what_the_contacts_do() -> None:
     assert len(flags) == len(meanings)
     of = dict(zip(meanings, flags, strict=False))
     rest = s["cause"].values == of["came_to_rest"]
-    before = np.stack([s[f"{c}_before"].values for c in CONTACTS])
-    after = np.stack([s[f"{c}_after"].values for c in CONTACTS])
+    contacts = [name.removesuffix("_before") for name in s if str(name).endswith("contact_before")]
+    before = np.stack([s[f"{c}_before"].values for c in contacts])
+    after = np.stack([s[f"{c}_after"].values for c in contacts])
     # Where a contact has come to rest one was slipping before; where one has broken away one was stuck.
     assert rest.any() and (np.abs(before[:, rest]) == 1).any(axis=0).all()
     free = s["cause"].values == of["broke_away"]

@@ -39,7 +39,7 @@ def test_the_tutorial_can_be_followed(tmp_path: Path) -> None:
     assert "holds 3.89 N·m" in printed[1]
     assert (tmp_path / "rig" / "rig.html").exists()
     assert (tmp_path / "my-drive.png").exists()
-    assert "input shaft: stuck" in printed[4]
+    assert "input_contact: stuck" in printed[4]
     assert "motor first_motor: its shaft turns forward with a constant command above" in printed[5]
     result = lm.simulate(lm.load(tmp_path / "my-drive.toml"))
     assert float(abs(result["load_speed"]).max()) > 0.1

@@ -62,8 +62,8 @@ def test_parts_give_the_dataset_of_the_whole(make: Any, monkeypatch: pytest.Monk
         sizes = {entry: d.pop(entry, 0.0) for d in (a, b) for entry in ("turned_over",)}
         scale = max(abs(v) for v in (*b.values(), *sizes.values()))
         assert list(a.values()) == pytest.approx(list(b.values()), abs=1e-10 * scale)
-    assert {k: parts.attrs[k] for k in ("contacts", "switching_count", "scenario")} == {
-        k: whole.attrs[k] for k in ("contacts", "switching_count", "scenario")
+    assert {k: parts.attrs[k] for k in ("switching_columns", "switching_count", "scenario")} == {
+        k: whole.attrs[k] for k in ("switching_columns", "switching_count", "scenario")
     }
     a, b = lm.switchings_of(parts), lm.switchings_of(whole)
     for name in b:

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "lostmotion/model/short_form.hpp"
+#include "lostmotion/model/drive_train.hpp"
 
 namespace lm = lostmotion;
 

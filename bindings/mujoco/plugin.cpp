@@ -20,6 +20,7 @@
 #include <string>
 #include <vector>
 
+#include "lostmotion/model/drive_train.hpp"
 #include "lostmotion/scenario/description.hpp"
 #include "lostmotion/scenario/simulation.hpp"
 #include "lostmotion/simulation/joint_trains.hpp"
@@ -57,7 +58,8 @@ lm::Scenario scenario_of(const mjModel* m, int instance) {
     if (!description.error().empty())
         fail(m, instance, "scenario " + std::string(path) + ": is no file of lostmotion.mujoco.write_drive");
     lm::Scenario s = description.scenario();
-    if (!s.train.short_form) fail(m, instance, "scenario " + std::string(path) + ": is no drive in the short form");
+    if (!lm::model::is_drive(s.train))
+        fail(m, instance, "scenario " + std::string(path) + ": is more than a motor, a gear and a load");
     s.references_given = true;
     return s;
 }

@@ -17,8 +17,18 @@ class Stop:
 
     def watch(self) -> None: ...
 
-def channels() -> list[tuple[str, str, str, str]]:
-    """Name, symbol, unit, meaning."""
+def aliases_of_drive() -> list[tuple[str, str]]:
+    """
+    What the results of a motor, a gearbox and a load are called: name in the long form and name that is shown.
+    """
+
+def result_name(element: str, what: str, slide: bool) -> str:
+    """
+    Name of a result variable: NAME_WHAT, of a slide with position, deflection and force.
+    """
+
+def variables() -> list[tuple[str, str, str, str, bool]]:
+    """Of a drive: name, symbol, unit, meaning, whether it is derived."""
 
 def states() -> list[str]: ...
 
@@ -26,7 +36,7 @@ def energy_entries() -> list[str]: ...
 
 def switching_columns() -> list[str]: ...
 
-def causes(short_form: bool) -> list[tuple[int, str]]:
+def causes() -> list[tuple[int, str]]:
     """Of switchings: number and name."""
 
 def parameters() -> list[tuple[str, str]]:
@@ -245,14 +255,8 @@ class Train:
 
     def check(self) -> tuple[str, str, str] | None: ...
 
-    @property
-    def short_form(self) -> bool:
-        """
-        Whether results have the names of a drive: `twist`, not `gearbox_twist`.
-        """
-
-    @short_form.setter
-    def short_form(self, arg: bool, /) -> None: ...
+    def name_as(self, aliases: Sequence[tuple[str, str]]) -> None:
+        """What entries of results are called."""
 
     def kernel(self) -> str: ...
 
@@ -265,6 +269,12 @@ class Train:
 
     def channels(self) -> list[tuple[str, str, str, str]]:
         """Name, symbol, unit, meaning."""
+
+    def variables(self) -> list[tuple[str, str, str, str, bool]]:
+        """Name, symbol, unit, meaning, whether it is derived."""
+
+    def derive(self, channels: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> NDArray[numpy.float64]:
+        """The variables that follow, from the channels, row by row."""
 
     def ledger_names(self) -> list[str]: ...
 
@@ -280,6 +290,9 @@ class Train:
     def steady_regime(self, speeds: Sequence[float], torques: Sequence[float]) -> tuple[list[str], NDArray[numpy.float64], bool]: ...
 
     def contact_names(self) -> list[str]: ...
+
+    def shown_contacts(self) -> list[str]:
+        """Also those that have an alias although the train has none of them."""
 
 class Case:
     def __init__(self, train: Train, *, inputs: Sequence[Signal], start: Mapping[str, float] = {}, hysteresis_capacities: Mapping[str, float] = {}) -> None:

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "../model/short_form.hpp"
+#include "../model/drive_train.hpp"
 #include "../simulation/train_run.hpp"
 #include "reduction.hpp"
 #include "workers.hpp"

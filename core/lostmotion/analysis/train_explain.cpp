@@ -9,7 +9,7 @@ std::vector<ContactReport> explain_contacts(const model::Assembly& a, const Trai
     std::vector<ContactReport> all;
     for (int c = 0; c < a.layout().contacts; ++c) {
         ContactReport report;
-        report.name = model::contact_text(a, c);
+        report.name = model::contact_name(a, c);
         report.mode = r.at_rest[c] ? 0 : r.key.modes[c];
         report.speed = r.at_rest[c] ? 0.0 : model::evaluate(a.layout(), a.contact_speed(c), p.now);
         report.torque = model::evaluate(a.layout(), r.contact_torque[c], p.now);

@@ -17,26 +17,27 @@ std::vector<NamedComponent> train_components(const model::Assembly& a) {
     std::vector<NamedComponent> out;
     const std::vector<bool> moves = model::moved_states(a);
     for (int k = 0; k < a.layout().coupled; ++k)
-        out.push_back({states[static_cast<std::size_t>(k)], k, !t.short_form && !moves[static_cast<std::size_t>(k)]});
+        out.push_back({states[static_cast<std::size_t>(k)], k,
+                       !moves[static_cast<std::size_t>(k)] &&
+                           model::place_in_tables(t, states[static_cast<std::size_t>(k)]) == t.aliases.size()});
     for (int part = 0; part < a.layout().angles; ++part)
         if (p.shafts[p.last_shaft[part]].angle == model::nowhere)
             out.push_back({model::angle_of(t, static_cast<std::size_t>(p.last_shaft[part])), D::coupled + part, true});
-    if (t.short_form) {  // both torques, whether there are such or not
-        const int locked =
-            p.gears[0].contact == model::nowhere ? model::nowhere : p.contacts[p.gears[0].contact].locked;
-        out.push_back({"hysteresis_capacity", D::states + (locked == 0 ? 1 : 0), false});
-        out.push_back({"locked_torque", D::states + (locked == 0 ? 0 : 1), false});
-        return out;
-    }
+    int free = a.layout().memory;  // for what has an alias, but no place
+    const auto add = [&](const std::string& name, int memory) {
+        if (memory == model::nowhere && model::has_alias(t, name)) memory = free++;
+        if (memory != model::nowhere) out.push_back({model::shown_name(t, name), D::states + memory, false});
+    };
     for (std::size_t g = 0; g < t.gears.size(); ++g)
-        if (p.gears[g].hysteresis != model::nowhere)
-            out.push_back({model::gear_result(t, g, "hysteresis_capacity"), D::states + p.gears[g].hysteresis, false});
+        add(model::gear_name(t, g, "hysteresis_capacity"), p.gears[g].hysteresis);
+    for (std::size_t g = 0; g < t.gears.size(); ++g)
+        if (p.gears[g].contact == model::nowhere) add(model::gear_name(t, g, "locked_torque"), model::nowhere);
     for (const model::ContactPlace& c : p.contacts)
-        if (c.locked != model::nowhere)
-            out.push_back({c.kind == model::ContactPlace::gear
-                               ? model::gear_result(t, static_cast<std::size_t>(c.element), "locked_torque")
-                               : p.couplings[c.element]->name + "_locked_torque",
-                           D::states + c.locked, false});
+        if (c.kind != model::ContactPlace::shaft)
+            add(c.kind == model::ContactPlace::gear
+                    ? model::gear_name(t, static_cast<std::size_t>(c.element), "locked_torque")
+                    : p.couplings[c.element]->name + "_locked_torque",
+                c.locked);
     return out;
 }
 

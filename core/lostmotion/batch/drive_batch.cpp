@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "../model/short_form.hpp"
+#include "../model/drive_train.hpp"
 #include "../simulation/train_status.hpp"
 #include "walk.hpp"
 
@@ -60,7 +60,7 @@ struct DriveBatch::Worker {
 std::string DriveBatch::error(const model::Train& train) {
     const TrainRun run(train);
     if (!run.error().empty()) return run.error();
-    if (!train.short_form || !sizes_of<D>.hold(train, run.assembly().layout()) ||
+    if (!model::is_drive(train) || !sizes_of<D>.hold(train, run.assembly().layout()) ||
         run.assembly().layout().branches > Label::max_branches)
         return "is more than a motor, a gearbox with torsion curve and losses, and a load with plain friction";
     return "";

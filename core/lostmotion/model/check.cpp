@@ -164,7 +164,6 @@ Fault TrainCheck::flanks(const Gear& g, const Fault& name) const {
     if (g.mesh_damping > 0.0 || g.transmission_error.present())
         return name + "has rigid flanks with " + (g.mesh_damping > 0.0 ? "mesh damping" : "a transmission error") +
                "; leave that out, or give a stiffness";
-    if (train_.short_form) return name + "has rigid flanks, which the long form takes: give [shafts] and [gears]";
     for (std::size_t k = 0; k < train_.gears.size(); ++k)
         if (const Gear& o = train_.gears[k]; (o.rigid() || o.strikes()) && !lossless(o))
             return named("gears", "gear", o.name, k) + "is rigid and has losses, which impacts in " + name +

@@ -106,8 +106,8 @@ class ComponentLaws<model::TrainSystem<D>> {
             jump.row[D::states + c.locked] = {};
             some_locked = true;
         }
-        // The short form shows such a torque whether there is one or not.
-        if (!some_locked && assembly_.train().short_form) jump.row[D::states + 1] = {};
+        // Such a torque may be shown although there is none.
+        if (!some_locked && !assembly_.train().aliases.empty()) jump.row[D::states + 1] = {};
         hold(r, jump, rates);
         return rates;
     }

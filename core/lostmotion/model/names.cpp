@@ -1,5 +1,6 @@
 #include "names.hpp"
 
+#include <algorithm>
 #include <string_view>
 #include <utility>
 
@@ -20,11 +21,18 @@ std::string law_text(const Train& t, int shaft, std::string law) {
     const std::size_t at = law.find(rotary);
     return is_slide(t, shaft) && at != std::string::npos ? law.replace(at, rotary.size(), "force over position") : law;
 }
+std::string result_name(const std::string& element, std::string what, bool slide) {
+    for (const auto& [rotary, linear] :
+         {std::pair{"angle", "position"}, std::pair{"twist", "deflection"}, std::pair{"torque", "force"}})
+        if (const std::size_t at = what.find(rotary); slide && at != std::string::npos)
+            what.replace(at, std::string_view(rotary).size(), linear);
+    return element + "_" + what;
+}
 std::string angle_of(const Train& t, std::size_t shaft) {
-    return t.shafts[shaft].name + (is_slide(t, static_cast<int>(shaft)) ? "_position" : "_angle");
+    return result_name(t.shafts[shaft].name, "angle", is_slide(t, static_cast<int>(shaft)));
 }
 std::string motor_torque_of(const Train& t, std::size_t motor) {
-    return t.motors[motor].name + "_" + torque_word(t, t.motors[motor].shaft);
+    return result_name(t.motors[motor].name, "torque", is_slide(t, t.motors[motor].shaft));
 }
 std::string twist_of(const Train& t, std::size_t gear) { return gear_result(t, gear, "twist"); }
 const char* twist_meaning(const Train& t, std::size_t gear) {
@@ -32,20 +40,26 @@ const char* twist_meaning(const Train& t, std::size_t gear) {
                                              : "angle of input/ratio less that of output";
 }
 
+std::string shown_name(const Train& t, const std::string& name) {
+    const auto alias = std::ranges::find(t.aliases, name, &Alias::name);
+    return alias == t.aliases.end() ? name : alias->shown;
+}
+bool has_alias(const Train& t, const std::string& name) {
+    return std::ranges::find(t.aliases, name, &Alias::name) != t.aliases.end();
+}
+std::size_t place_in_tables(const Train& t, const std::string& shown) {
+    return static_cast<std::size_t>(std::ranges::find(t.aliases, shown, &Alias::shown) - t.aliases.begin());
+}
+
+std::string gear_name(const Train& t, std::size_t gear, const char* what) {
+    return result_name(t.gears[gear].name, what, is_slide(t, t.gears[gear].output));
+}
 std::string gear_result(const Train& t, std::size_t gear, const char* what) {
-    if (t.short_form) return what;
-    std::string name = what;
-    if (is_slide(t, t.gears[gear].output))
-        for (const auto& [rotary, linear] : {std::pair{"twist", "deflection"}, std::pair{"torque", "force"}})
-            if (const std::size_t at = name.find(rotary); at != std::string::npos)
-                name.replace(at, std::string_view(rotary).size(), linear);
-    return t.gears[gear].name + "_" + name;
+    return shown_name(t, gear_name(t, gear, what));
 }
-std::string command_of(const Train& t, std::size_t motor) {
-    return t.short_form ? "command" : t.motors[motor].name + "_command";
-}
+std::string command_of(const Train& t, std::size_t motor) { return shown_name(t, t.motors[motor].name + "_command"); }
 std::string load_torque_of(const Train& t, std::size_t shaft) {
-    return t.short_form ? "load_torque" : t.shafts[shaft].name + "_load_" + torque_word(t, static_cast<int>(shaft));
+    return shown_name(t, result_name(t.shafts[shaft].name, "load_torque", is_slide(t, static_cast<int>(shaft))));
 }
 
 std::vector<std::string> state_names(const Assembly& a) {
@@ -117,8 +131,7 @@ std::string contact_name(const Assembly& a, int contact) {
     const ContactPlace& c = a.places().contacts[static_cast<std::size_t>(contact)];
     const auto k = static_cast<std::size_t>(c.element);
     switch (c.kind) {
-        case ContactPlace::shaft:
-            return a.train().short_form && k == 0 ? "input_contact" : a.train().shafts[k].name + "_contact";
+        case ContactPlace::shaft: return shown_name(a.train(), a.train().shafts[k].name + "_contact");
         case ContactPlace::gear: return gear_result(a.train(), k, "twist_contact");
         default: return a.places().couplings[k]->name + "_contact";
     }
@@ -134,10 +147,24 @@ int contact_shaft(const Assembly& a, int contact) {
     }
 }
 
-std::string contact_text(const Assembly& a, int contact) {
-    const ContactPlace& c = a.places().contacts[static_cast<std::size_t>(contact)];
-    if (!a.train().short_form) return contact_name(a, contact);
-    return c.kind == ContactPlace::gear ? "twist of the gear" : c.element == 0 ? "input shaft" : "load bearing";
+std::vector<ShownContact> shown_contacts(const Assembly& a) {
+    const Train& t = a.train();
+    const Places& p = a.places();
+    std::vector<ShownContact> all;
+    for (int c = 0; c < a.layout().contacts; ++c) {
+        const ContactPlace& at = p.contacts[static_cast<std::size_t>(c)];
+        all.push_back({c, at.kind, at.element, contact_name(a, c)});
+    }
+    const auto add = [&](int contact, ContactPlace::Kind kind, std::size_t element, const std::string& name) {
+        if (contact == nowhere && has_alias(t, name))
+            all.push_back({nowhere, kind, static_cast<int>(element), shown_name(t, name)});
+    };
+    for (std::size_t k = 0; k < t.shafts.size(); ++k)
+        add(p.shafts[k].contact, ContactPlace::shaft, k, t.shafts[k].name + "_contact");
+    for (std::size_t k = 0; k < t.gears.size(); ++k)
+        add(p.gears[k].contact, ContactPlace::gear, k, gear_name(t, k, "twist_contact"));
+    as_in_tables(t, all, &ShownContact::name);
+    return all;
 }
 
 std::vector<std::string> branch_names(const Assembly& a) {

@@ -39,7 +39,7 @@ void each_flow(const Assembly& a, Use&& use) {
         if (p.load != nowhere)
             use(PowerFlow::output, name, "load",
                 [&](const Regime&) -> Flow { return {{terms.input(p.load), speed(shaft)}}; });
-        if (p.contact == nowhere && !train.short_form) continue;  // whose ledger has all entries
+        if (p.contact == nowhere && !has_alias(train, name + ": dry friction")) continue;
         use(PowerFlow::loss, name, "dry friction", [&](const Regime& r) -> Flow {
             if (!slips(r)) return {};
             return {{a.sliding_friction(shaft, r.key), speed(shaft)}};
@@ -69,7 +69,7 @@ void each_flow(const Assembly& a, Use&& use) {
             use(PowerFlow::source, gear.name, "parametric work", [](const Regime&) -> Flow { return {}; });
         if (gear.strikes() || gear.may_lock())
             use(PowerFlow::loss, gear.name, "impacts", [](const Regime&) -> Flow { return {}; });
-        if ((gear.rigid() || gear.strikes()) && !train.short_form) continue;
+        if ((gear.rigid() || gear.strikes()) && !has_alias(train, gear.name + ": hysteresis and damping")) continue;
         use(PowerFlow::loss, gear.name, "hysteresis and damping", [&](const Regime& r) -> Flow {
             if (a.twist_rests(g, r)) return {};
             // All of the output torque that is not the spring's.

@@ -19,9 +19,14 @@
 
 namespace lostmotion::model {
 
+// What an entry of results that has this name is shown as; empty: it is not shown.
+struct Alias {
+    std::string name, shown;
+};
+
 struct Train {
-    // The drive of the paper: shafts `motor` and `load`, motor `motor`, gear `gearbox`. Its results have shorter names.
-    bool short_form = false;
+    // In the order of tables. Entries are shown, too, that have an alias and that the train has nothing of.
+    std::vector<Alias> aliases;
     std::vector<Shaft> shafts;
     std::vector<MassMatrix> mass_matrices;
     std::vector<ShaftMotor> motors;

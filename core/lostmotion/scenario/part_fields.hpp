@@ -185,7 +185,10 @@ void describe(F& f, LinearController& c) {
 template <class F>
 void describe(F& f, Train& t) {
     const auto element = [&](auto& e) { describe(f, e); };
-    f.flag("short_form", t.short_form);
+    f.each("aliases", t.aliases, [&](Alias& a) {
+        f.text("name", a.name);
+        f.text("shown", a.shown);
+    });
     f.each("shafts", t.shafts, element);
     f.each("mass_matrices", t.mass_matrices, element);
     f.each("motors", t.motors, element);

@@ -25,7 +25,7 @@ struct Scenario {
 
     // Before the names of what a controller shows.
     std::string prefix(const ControlledAxis& axis) const {
-        return train.short_form ? "" : train.motors[static_cast<std::size_t>(axis.motor)].name + "_";
+        return model::shown_name(train, train.motors[static_cast<std::size_t>(axis.motor)].name + "_");
     }
     std::size_t samples() const { return sample_count(duration, sample_interval); }
 };

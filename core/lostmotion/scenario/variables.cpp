@@ -2,22 +2,16 @@
 
 namespace lostmotion {
 
-Variables::Variables(const Scenario& s) : train_(s.train) {
-    for (const TrainChannel& c : train_channels(model::Assembly(train_)))
-        all_.push_back({c.name, c.unit.empty() ? "1" : c.unit, c.meaning});
+Variables::Variables(const model::Assembly& a) : train_(a.train()) {
+    for (const TrainChannel& c : train_channels(a))
+        all_.push_back({c.name, c.unit.empty() ? "1" : c.unit, c.meaning, c.symbol});
     channels_ = all_.size();
-    if (train_.short_form) {
-        add_efficiency();
-    } else {
-        for (const model::Gear& g : train_.gears) {
-            const auto k = static_cast<std::size_t>(&g - train_.gears.data());
-            if (const std::string name = model::twist_of(train_, k); place(name) < 0) {
-                derived_.push_back({Derived::nothing});
-                all_.push_back({name, model::angle_unit(train_, g.output), model::twist_meaning(train_, k)});
-            }
-        }
-        add_angles();
-    }
+    add_twists();
+    add_angles();
+    add_efficiencies();
+}
+
+Variables::Variables(const Scenario& s) : Variables(model::Assembly(s.train)) {
     for (std::size_t a = 0; a < s.control.axes.size(); ++a) {
         const control::Axis& law = s.control.axes[a].law;
         const std::string prefix = s.prefix(s.control.axes[a]);
@@ -65,11 +59,40 @@ bool Variables::shows(const control::Axis& a, int signal) {
     }
 }
 
-void Variables::add_efficiency() {
-    derived_.push_back({Derived::efficiency, place("output_torque"), place("motor_speed"), place("input_torque"), 0});
-    all_.push_back({"efficiency", "1", "useful torque / torque fed in, undefined at standstill"});
-    derived_.push_back({Derived::product, place("motor_torque"), place("motor_speed")});
-    all_.push_back({"motor_power", "W", "mechanical power of the motor"});
+void Variables::add(Derived derived, Variable variable) {
+    variable.name = model::shown_name(train_, variable.name);
+    if (variable.name.empty()) return;
+    derived_.push_back(derived);
+    all_.push_back(std::move(variable));
+}
+
+void Variables::add_efficiencies() {
+    for (std::size_t g = 0; g < train_.gears.size(); ++g) {
+        const model::Gear& gear = train_.gears[g];
+        const std::string name = model::gear_name(train_, g, "efficiency");
+        if (!model::has_alias(train_, name)) continue;
+        add({Derived::efficiency, place(model::gear_result(train_, g, "output_torque")), place(speed_of(gear.input)),
+             place(model::gear_result(train_, g, "input_torque")), static_cast<int>(g)},
+            {name, "1",
+             "useful torque / torque fed in, by the direction of the load; 0 where both sides feed the losses, "
+             "undefined "
+             "at standstill",
+             "eta"});
+    }
+    for (std::size_t m = 0; m < train_.motors.size(); ++m) {
+        const std::string name = train_.motors[m].name + "_power";
+        if (model::has_alias(train_, name))
+            add({Derived::product, place(model::motor_torque_of(train_, m)), place(speed_of(train_.motors[m].shaft))},
+                {name, "W", "mechanical power of the motor", "p"});
+    }
+}
+
+void Variables::add_twists() {
+    for (std::size_t g = 0; g < train_.gears.size(); ++g)
+        if (place(model::twist_of(train_, g)) < 0)
+            add({Derived::nothing},
+                {model::gear_name(train_, g, "twist"), model::angle_unit(train_, train_.gears[g].output),
+                 model::twist_meaning(train_, g), "d"});
 }
 
 void Variables::add_angles() {
@@ -86,9 +109,10 @@ void Variables::add_angles() {
             const bool forward = gear.input == shaft;
             const int other = forward ? gear.output : gear.input;
             if (place(angle(other)) >= 0) continue;
-            derived_.push_back({forward ? Derived::angle_of_output : Derived::angle_of_input, place(angle(shaft)),
-                                place(model::twist_of(train_, g)), -1, static_cast<int>(g)});
-            all_.push_back({angle(other), model::angle_unit(train_, other), model::angle_meaning(train_, other)});
+            if (model::shown_name(train_, angle(other)).empty()) continue;
+            add({forward ? Derived::angle_of_output : Derived::angle_of_input, place(angle(shaft)),
+                 place(model::twist_of(train_, g)), -1, static_cast<int>(g)},
+                {angle(other), model::angle_unit(train_, other), model::angle_meaning(train_, other), "phi"});
             waiting.push_back(static_cast<std::size_t>(other));
         }
     }

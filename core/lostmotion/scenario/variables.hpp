@@ -11,13 +11,15 @@
 namespace lostmotion {
 
 struct Variable {
-    std::string name, unit, meaning;
+    std::string name, unit, meaning, symbol = {};
 };
 
 class Variables {
  public:
     // The scenario has passed its check.
     explicit Variables(const Scenario& s);
+    // Those of a train alone.
+    explicit Variables(const model::Assembly& a);
 
     const std::vector<Variable>& all() const { return all_; }
     std::size_t size() const { return all_.size(); }
@@ -49,7 +51,9 @@ class Variables {
 
     static bool shows(const control::Axis& a, int signal);
 
-    void add_efficiency();
+    void add(Derived derived, Variable variable);
+    void add_efficiencies();
+    void add_twists();
     // Angles that the solver does not integrate follow through gears whose housing stands.
     void add_angles();
 
@@ -70,6 +74,7 @@ class Variables {
     // Driving (T_2 has the sign of w_M) it is T_2/(i T_1), overrunning i T_1/T_2; 0 where both sides feed the losses.
     static double efficiency(double T_2, double w_M, double T_1, double ratio);
     double ratio(const Derived& d) const { return train_.gears[static_cast<std::size_t>(d.gear)].law.ratio; }
+    std::string speed_of(int shaft) const { return train_.shafts[static_cast<std::size_t>(shaft)].name + "_speed"; }
 
     std::vector<Variable> all_;
     std::size_t channels_ = 0;

@@ -79,10 +79,11 @@ WholeRun run(const Scenario& s, const WholeRunOptions& given, Solve&& solve) {
         if (options.energy)
             for (const auto& [name, energy] : named_ledger(r, a)) add(out.energies, out.energy, name, energy);
         for (const auto& [name, value] : named_end(r, a)) add(out.end_states, out.end_state, name, value);
-        out.switching_columns = switching_columns(a);
+        const SwitchingTable table(a);
+        out.switching_columns = table.columns();
         out.switchings.resize(r.switchings.size() * out.switching_columns.size());
         double* to = out.switchings.data();
-        for (const TrainSwitching& w : r.switchings) to = write_switching(a, w, to);
+        for (const TrainSwitching& w : r.switchings) to = table.write(w, to);
         out.switching_count = r.switching_count;
         out.left_data_at = r.left_data_at;
     }

@@ -28,32 +28,6 @@ void add_controller_channels(const model::Assembly& a, int controller, std::vect
 
 namespace {
 
-// In the order and the words of the paper.
-std::vector<TrainChannel> short_channels(const model::Assembly& a) {
-    using C = TrainChannel;
-    const model::Places& p = a.places();
-    const auto contact = [](int place, C::Kind sign, int index, const char* name, const char* meaning) {
-        return place == model::nowhere ? C{sign, index, name, "1", meaning}
-                                       : C{C::contact_mode, place, name, "1", meaning};
-    };
-    return {
-        {C::input, p.motors[0].command, "command", "1", "control signal, relative armature voltage", "E_C"},
-        {C::input, p.shafts[1].load, "load_torque", "N*m", "disturbance torque on the load", "M_Z"},
-        {C::motor_torque, 0, "motor_torque", "N*m", "torque of the motor", "M_D"},
-        {C::state, p.shafts[0].speed, "motor_speed", "rad/s", "speed of rotor and input shaft", "w_M"},
-        {C::state, p.shafts[1].speed, "load_speed", "rad/s", "speed of the load", "w"},
-        {C::state, a.layout().coupled, "load_angle", "rad", "angle of the load", "phi"},
-        {C::state, p.gears[0].twist, "twist", "rad", "torsion of the gearbox, input angle / ratio - output angle", "d"},
-        {C::output_torque, 0, "output_torque", "N*m", "torque of the gearbox on the load", "T_2"},
-        {C::input_torque, 0, "input_torque", "N*m", "torque of the gearbox on the input shaft", "T_1"},
-        {C::loss_coefficient, 0, "loss_coefficient", "1",
-         "torque lost in the gearbox, at the output, / rated output torque", "m_2B"},
-        contact(p.shafts[0].contact, C::shaft_sign, 0, "input_contact", "input shaft: +1 or -1 slipping, 0 stuck"),
-        contact(p.gears[0].contact, C::twist_sign, 0, "twist_contact", "twist: +1 or -1 slipping, 0 stuck"),
-        contact(p.shafts[1].contact, C::shaft_sign, 1, "load_contact", "load bearing: +1 or -1 slipping, 0 stuck"),
-    };
-}
-
 bool is_given(const model::Places& p, int input) {
     return std::any_of(p.shafts.begin(), p.shafts.end(), [input](const model::ShaftPlace& s) {
         return input == s.given_speed || input == s.given_acceleration;
@@ -66,26 +40,29 @@ std::vector<TrainChannel> train_channels(const model::Assembly& a) {
     using C = TrainChannel;
     const model::Train& t = a.train();
     const model::Places& p = a.places();
-    if (t.short_form) return short_channels(a);
     std::vector<C> out;
+    const auto add = [&](C channel) {
+        channel.name = model::shown_name(t, channel.name);
+        if (!channel.name.empty()) out.push_back(std::move(channel));
+    };
     const auto inputs = model::input_names(a);
     for (std::size_t k = 0; k < inputs.size(); ++k) {
         if (k >= first_reference(a)) break;
         if (is_given(p, static_cast<int>(k))) continue;  // the speed is a state
         const auto loaded = std::ranges::find(p.shafts, static_cast<int>(k), &model::ShaftPlace::load);
         if (loaded == p.shafts.end()) {
-            out.push_back({C::input, static_cast<int>(k), inputs[k], "", "command"});
+            out.push_back({C::input, static_cast<int>(k), inputs[k], "1", "command: 1 is the rated value", "E_C"});
         } else {
             const int s = static_cast<int>(loaded - p.shafts.begin());
             out.push_back({C::input, static_cast<int>(k), inputs[k], model::torque_unit(t, s),
-                           model::is_slide(t, s) ? "force against the slide" : "torque against the shaft"});
+                           model::is_slide(t, s) ? "force against the slide" : "torque against the shaft", "M_Z"});
         }
     }
     for (std::size_t k = 0; k < t.controllers.size(); ++k) add_controller_channels(a, static_cast<int>(k), out);
     for (std::size_t k = 0; k < t.motors.size(); ++k)
         out.push_back({C::motor_torque, static_cast<int>(k), model::motor_torque_of(t, k),
                        model::torque_unit(t, t.motors[k].shaft),
-                       std::string(model::torque_word(t, t.motors[k].shaft)) + " of the motor"});
+                       std::string(model::torque_word(t, t.motors[k].shaft)) + " of the motor", "M_D"});
     for (std::size_t k = 0; k < p.driven.size(); ++k) {
         const model::ShaftPlace& shaft = p.shafts[static_cast<std::size_t>(p.driven[k])];
         const std::string& name = t.shafts[static_cast<std::size_t>(p.driven[k])].name;
@@ -96,16 +73,17 @@ std::vector<TrainChannel> train_channels(const model::Assembly& a) {
                        model::is_slide(t, p.driven[k]) ? "m/s^2" : "rad/s^2", "given acceleration"});
     }
     for (std::size_t k = 0; k < t.shafts.size(); ++k) {
-        const int massless = p.shafts[k].massless;
+        const int massless = p.shafts[k].massless, shaft = static_cast<int>(k);
+        const bool motor = std::ranges::find(t.motors, shaft, &model::ShaftMotor::shaft) != t.motors.end();
         out.push_back({massless == model::nowhere ? C::state : C::massless_speed,
                        massless == model::nowhere ? p.shafts[k].speed : massless, t.shafts[k].name + "_speed",
-                       model::speed_unit(t, static_cast<int>(k)),
-                       model::is_slide(t, static_cast<int>(k)) ? "speed of the slide" : "speed of the shaft"});
+                       model::speed_unit(t, shaft),
+                       model::is_slide(t, shaft) ? "speed of the slide" : "speed of the shaft", motor ? "w_M" : "w"});
     }
     const auto add_angle = [&](int state, std::size_t k) {
         const int shaft = static_cast<int>(k);
-        out.push_back(
-            {C::state, state, model::angle_of(t, k), model::angle_unit(t, shaft), model::angle_meaning(t, shaft)});
+        add({C::state, state, model::angle_of(t, k), model::angle_unit(t, shaft), model::angle_meaning(t, shaft),
+             "phi"});
     };
     for (std::size_t k = 0; k < t.shafts.size(); ++k)
         if (p.shafts[k].angle != model::nowhere) add_angle(p.shafts[k].angle, k);
@@ -116,22 +94,31 @@ std::vector<TrainChannel> train_channels(const model::Assembly& a) {
     for (std::size_t k = 0; k < t.gears.size(); ++k) {
         const int gear = static_cast<int>(k);
         const int input = t.gears[k].input, output = t.gears[k].output;
-        if (!t.gears[k].rigid())
+        if (!t.gears[k].rigid() || model::has_alias(t, model::gear_name(t, k, "twist")))
             out.push_back({C::state, p.gears[k].twist, model::twist_of(t, k), model::angle_unit(t, output),
-                           model::twist_meaning(t, k)});
+                           model::twist_meaning(t, k), "d"});
         out.push_back({C::output_torque, gear, model::gear_result(t, k, "output_torque"), model::torque_unit(t, output),
-                       model::is_slide(t, output) ? "force on the slide" : "torque on the output shaft"});
-        out.push_back({C::input_torque, gear, t.gears[k].name + "_input_" + model::torque_word(t, input),
-                       model::torque_unit(t, input),
-                       model::is_slide(t, input) ? "force taken from the slide" : "torque taken from the input shaft"});
+                       model::is_slide(t, output) ? "force on the slide" : "torque on the output shaft", "T_2"});
+        add({C::input_torque, gear, model::result_name(t.gears[k].name, "input_torque", model::is_slide(t, input)),
+             model::torque_unit(t, input),
+             model::is_slide(t, input) ? "force taken from the slide" : "torque taken from the input shaft", "T_1"});
+        if (const std::string loss = model::gear_name(t, k, "loss_coefficient"); model::has_alias(t, loss))
+            add({C::loss_coefficient, gear, loss, "1", "torque lost in the gear, at the output, / rated output torque",
+                 "m_2B"});
     }
-    for (int c = 0; c < a.layout().contacts; ++c) {
-        const std::string name = model::contact_name(a, c);
-        const int shaft = model::contact_shaft(a, c);
-        out.push_back({C::contact_torque, c, name + "_" + model::torque_word(t, shaft), model::torque_unit(t, shaft),
-                       "what the dry contact takes"});
-        out.push_back({C::contact_mode, c, name, "", "slips forward (+1) or backward (-1), or is stuck (0)"});
+    constexpr const char* meaning = "slips forward (+1) or backward (-1), or is stuck (0)";
+    for (const model::ShownContact& c : model::shown_contacts(a)) {
+        const bool gear = c.kind == model::ContactPlace::gear;
+        if (c.contact == model::nowhere) {
+            out.push_back({gear ? C::twist_sign : C::shaft_sign, c.element, c.name, "1", meaning});
+            continue;
+        }
+        const int shaft = model::contact_shaft(a, c.contact);
+        add({C::contact_torque, c.contact, c.name + "_" + model::torque_word(t, shaft), model::torque_unit(t, shaft),
+             "what the dry contact takes"});
+        out.push_back({C::contact_mode, c.contact, c.name, "1", meaning});
     }
+    model::as_in_tables(t, out, &TrainChannel::name);
     return out;
 }
 

@@ -20,9 +20,11 @@ template <class D>
 class TrainMeter {
  public:
     explicit TrainMeter(const model::Assembly& a) : assembly_(a) {
-        place_.assign(model::all_flows(a).size(), -1);
-        if (a.train().short_form)
-            for (const int number : in_words_of_paper) place(number);
+        const std::vector<model::PowerFlow> all = model::all_flows(a);
+        place_.assign(all.size(), -1);
+        for (const model::Alias& alias : a.train().aliases)  // in their order
+            if (const auto flow = std::ranges::find(all, alias.name, &model::PowerFlow::name); flow != all.end())
+                place(static_cast<int>(flow - all.begin()));
     }
 
     Interruption& interruption() { return integral_.interruption; }
@@ -56,8 +58,6 @@ class TrainMeter {
  private:
     static constexpr int max_flows = std::same_as<D, Any> ? Any::coupled : D::guards <= 16 ? 8 : 96;
     using Integral = PowerIntegral<D, max_flows>;
-    // Motor, viscous and dry friction of its shaft, mesh, hysteresis, the same friction of the load, load torque.
-    static constexpr int in_words_of_paper[] = {0, 1, 2, 6, 7, 3, 5, 4};
 
     [[gnu::cold]] void find_flows(model::TrainRegime<D>& r, const model::Regime& composed) const {
         const model::Layout& n = assembly_.layout();

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "../base/status.hpp"
+#include "../model/names.hpp"
 #include "../model/power.hpp"
 #include "result_names.hpp"
 #include "sample_times.hpp"
@@ -57,11 +58,21 @@ struct SwitchingCause {
     int number;
     const char* name;
 };
-std::vector<SwitchingCause> switching_causes(bool short_form);
-// Names of the columns of a table of switchings: instant, cause, the modes of all contacts before and after; in the
-// short form also the torque of the gearbox, and contacts that it has not, whose modes are 2.
-std::vector<std::string> switching_columns(const model::Assembly& a);
-double* write_switching(const model::Assembly& a, const TrainSwitching& s, double* to);
+std::vector<SwitchingCause> switching_causes();
+// A table of switchings: instant, cause, the modes of all contacts that are shown before and after, 2 of those that the
+// train does not have; the torque of the last gear where it has an alias.
+class SwitchingTable {
+ public:
+    explicit SwitchingTable(const model::Assembly& a);
+    const std::vector<std::string>& columns() const { return columns_; }
+    double* write(const TrainSwitching& s, double* to) const;
+
+ private:
+    const model::Assembly& assembly_;
+    std::vector<model::ShownContact> contacts_;
+    std::vector<std::string> columns_;
+    bool torque_;
+};
 
 struct TrainEnergy {
     std::string name;
@@ -99,7 +110,7 @@ std::string error_text(const TrainReport& report, const model::Assembly& a);
 std::vector<std::string> ledger_names(const model::Assembly& a);
 NamedInOrder named_ledger(const TrainReport& report, const model::Assembly& a);
 
-// Of the hysteresis of gears [N m], from the memory by the layout; in the short form also where there is none.
+// Of the hysteresis of gears [N m], from the memory by the layout; where it has an alias, also where there is none.
 NamedInOrder capacities_at(const model::Assembly& a, const double* memory);
 // States, and these capacities.
 NamedInOrder named_end(const TrainReport& report, const model::Assembly& a);

@@ -1,5 +1,6 @@
 """A drive: a motor, a gearbox and a load, as frozen objects in SI units; a scenario file spells them word for word."""
 
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import ClassVar, Self
 
@@ -22,28 +23,7 @@ from .train import DriveTrain
 class DriveOfOneGear(DriveTrain):
     """The train of a drive, with the names that its variables have."""
 
-    drive_names: ClassVar[bool] = True
-
-    def contact_of(self, shaft: str) -> str:
-        return "input_contact" if shaft == "motor" else f"{shaft}_contact"
-
-    def command_of(self, name: str) -> str:  # noqa: ARG002
-        return "command"
-
-    def load_torque_of(self, shaft: str) -> str:  # noqa: ARG002
-        return "load_torque"
-
-    def twist_of(self, gear: str) -> str:  # noqa: ARG002
-        return "twist"
-
-    def capacity_of(self, gear: str) -> str:  # noqa: ARG002
-        return "hysteresis_capacity"
-
-    def output_torque_of(self, gear: str) -> str:  # noqa: ARG002
-        return "output_torque"
-
-    def input_torque_of(self, gear: str) -> str:  # noqa: ARG002
-        return "input_torque"
+    aliases: ClassVar[Mapping[str, str]] = dict(_core.aliases_of_drive())
 
 
 class Drive(Part):

@@ -102,8 +102,8 @@ class DriveTrain(TrainElements):
     ['coupling', 'worm_gear']
     """
 
-    drive_names: ClassVar[bool] = False
-    """whether its variables have the names of those of a drive"""
+    aliases: ClassVar[Mapping[str, str]] = {}
+    """entries of its results with another name than the core gives them; empty: not shown"""
     shafts: Elements[Shaft] = Field(min_length=1)
 
     def is_slide(self, shaft: str) -> bool:
@@ -136,47 +136,54 @@ class DriveTrain(TrainElements):
         """(one, other, entry) of all that mass matrices couple, each pair once."""
         return [pair for mass in self.mass_matrices.values() for pair in mass.couples()]
 
-    # Names of result variables and their units, as the core has them (core/lostmotion/model/names.cpp).
+    # Names of result variables, as the core has them (core/lostmotion/model/names.cpp).
+
+    def shown(self, name: str) -> str:
+        """The name that an entry of results has; empty: it is not shown."""
+        return self.aliases.get(name, name)
+
+    def _named(self, element: str, what: str, shaft: str) -> str:
+        return self.shown(_core.result_name(element, what, self.is_slide(shaft)))
 
     def angle_of(self, shaft: str) -> str:
         """NAME_angle of a shaft, NAME_position of a slide."""
-        return f"{shaft}_position" if self.is_slide(shaft) else f"{shaft}_angle"
+        return _core.result_name(shaft, "angle", self.is_slide(shaft))
 
     def speed_of(self, shaft: str) -> str:
         """NAME_speed."""
-        return f"{shaft}_speed"
+        return self._named(shaft, "speed", shaft)
 
     def contact_of(self, shaft: str) -> str:
         """NAME_contact of the friction on a shaft."""
-        return f"{shaft}_contact"
+        return self._named(shaft, "contact", shaft)
 
     def command_of(self, name: str) -> str:
         """NAME_command of a motor, a brake or a clutch."""
-        return f"{name}_command"
+        return self.shown(_core.result_name(name, "command", False))
 
     def load_torque_of(self, shaft: str) -> str:
         """NAME_load_torque of a shaft, NAME_load_force of a slide."""
-        return f"{shaft}_load_{self.torque_word(shaft)}"
+        return self._named(shaft, "load_torque", shaft)
 
     def motor_torque_of(self, motor: str) -> str:
         """NAME_torque, NAME_force of a linear motor."""
-        return f"{motor}_{self.torque_word(self.motors[motor].shaft)}"
+        return self._named(motor, "torque", self.motors[motor].shaft)
 
     def twist_of(self, gear: str) -> str:
         """NAME_twist of a gear, NAME_deflection of what moves a slide."""
-        return f"{gear}_deflection" if self.is_slide(self.gears[gear].output) else f"{gear}_twist"
+        return self._named(gear, "twist", self.gears[gear].output)
 
     def capacity_of(self, gear: str) -> str:
         """NAME_hysteresis_capacity of a gear."""
-        return f"{gear}_hysteresis_capacity"
+        return self._named(gear, "hysteresis_capacity", self.gears[gear].output)
 
     def output_torque_of(self, gear: str) -> str:
         """NAME_output_torque of a gear, NAME_output_force of what moves a slide."""
-        return f"{gear}_output_{self.torque_word(self.gears[gear].output)}"
+        return self._named(gear, "output_torque", self.gears[gear].output)
 
     def input_torque_of(self, gear: str) -> str:
         """NAME_input_torque of a gear."""
-        return f"{gear}_input_{self.torque_word(self.gears[gear].input)}"
+        return self._named(gear, "input_torque", self.gears[gear].input)
 
     def torque_word(self, shaft: str) -> str:
         """Torque or force."""
@@ -239,7 +246,7 @@ class DriveTrain(TrainElements):
         Controllers keep to the torque_limit of the motors that such loops drive.
         """
         train = _core.Train()
-        train.short_form = self.drive_names and not given
+        train.name_as(list(self.aliases.items()))
         for name, s in self.shafts.items():
             inputs = {"loaded": name in loaded, "given_motion": name in given}
             train.add_shaft({"name": name, **s.core_fields(), **inputs})

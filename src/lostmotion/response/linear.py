@@ -22,17 +22,13 @@ from ..simulation.drive_tables import Initial
 from ..simulation.needs import need_free_motion, need_open_loop
 from ..simulation.scenario import Scenario
 from ..simulation.stepping import Simulation
-from ..simulation.train_parts import NO_CONTACT
 from ..simulation.train_tables import TrainInitial
-from ..simulation.train_variables import angle_through, angles_through_gears, only_input, train_variables
-from ..simulation.variables import CONTACTS, STATES, VARIABLES
+from ..simulation.train_variables import only_input
+from ..simulation.variables import variables_of_core
 
 if TYPE_CHECKING:
     import control
     import scipy.signal
-
-INPUTS = ("command", "load_torque")
-OUTPUTS = (*STATES, "output_torque", "input_torque")
 
 
 @dataclass(frozen=True)
@@ -52,14 +48,14 @@ class LinearModel:
     offset: np.ndarray
     """c, constant part of the outputs"""
     contacts: dict[str, int]
-    """modes of the contacts: -1, 0 stuck, +1; 2: a drive has none"""
+    """modes of the contacts: -1, 0 stuck, +1"""
     point: dict[str, float]
-    """operating point (SI): states, inputs and, of a drive, the hysteresis capacity, by name"""
+    """operating point (SI): states, inputs and hysteresis capacities, by name"""
     units: dict[str, str]
     """units of states, inputs and outputs, by name"""
-    states: tuple[str, ...] = STATES
-    inputs: tuple[str, ...] = INPUTS
-    outputs: tuple[str, ...] = OUTPUTS
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
 
     def __repr__(self) -> str:
         """Operating point and regime as text."""
@@ -202,7 +198,7 @@ def linearize(
     >>> import lostmotion as lm
     >>> model = lm.linearize(lm.load("paper-2dof-nl-small"), lm.Initial(motor_speed=100.0, load_speed=1.1))
     >>> model.contacts
-    {'input_contact': 1, 'twist_contact': 1, 'load_contact': 2}
+    {'input_contact': 1, 'twist_contact': 1}
     """
     rates = {
         "command_rate": argument("command_rate", command_rate, "1/s"),
@@ -279,7 +275,7 @@ def _model_at(
             if name not in names:
                 meant = did_you_mean(name, names, f"the inputs are {', '.join(names)}")
                 raise InputError(f"{which}: {shown(name)} is no input of this train; {meant}")
-    unit = {v.name: v.unit.replace("1", "") for v in scenario.written.variables(core)}
+    unit = {v.name: v.unit.replace("1", "") for v in variables_of_core(core.variables())}
     ramps = [
         _ramp(
             argument(f"inputs.{name}", inputs.get(name, 0.0), unit[name]),
@@ -299,35 +295,7 @@ def _model_at(
 
 def _model(train: DriveTrain, core: _core.Train, regime: Mapping[str, Any]) -> LinearModel:
     """The linear model, from what the solver says of one of its regimes."""
-    return _drive_model(**regime) if core.short_form else train_model(train, core, **regime)
-
-
-def _drive_model(
-    states: dict[str, float],
-    capacities: dict[str, float],
-    inputs: dict[str, float],
-    rates: np.ndarray,
-    outputs: list[str],
-    values: np.ndarray,
-    contacts: dict[str, int],
-) -> LinearModel:
-    """With all states and outputs of a drive: those that this one does not have are 0."""
-    n, own, rows = len(STATES), [STATES.index(name) for name in states], dict(zip(outputs, values, strict=True))
-
-    def whole(row: np.ndarray) -> np.ndarray:
-        out = np.zeros(n + 3)
-        out[[*own, n, n + 1, n + 2]] = row
-        return out
-
-    of = np.zeros((n, n + 3))
-    of[own] = [whole(row) for row in rates]
-    out = np.array([whole(rows[name]) if name in rows else np.zeros(n + 3) for name in OUTPUTS])
-    modes = {name: contacts.get(name, int(NO_CONTACT)) for name in CONTACTS}
-    point = dict.fromkeys(STATES, 0.0) | states | capacities | inputs
-    units = {v.name: v.unit for v in VARIABLES if v.name in (*INPUTS, *OUTPUTS)}
-    return LinearModel(
-        of[:, :n], of[:, n : n + 2], out[:, :n], out[:, n : n + 2], of[:, -1], out[:, -1], modes, point, units
-    )
+    return train_model(train, core, **regime)
 
 
 def train_model(
@@ -345,14 +313,14 @@ def train_model(
     n, m = len(states), len(inputs)
     of = dict(zip(outputs, values, strict=True))
     nothing = np.zeros(n + m + 1)
+    variables = variables_of_core(core.variables())
     if all(gear.transmission_error is None for gear in train.gears.values()):  # else the angles are not linear
-        known = [name for name in train.shafts if train.angle_of(name) in of]
-        for shaft, source, name, forward in angles_through_gears(train, known):
-            twist = of.get(train.twist_of(name), nothing)
-            angle = of[train.angle_of(source)]
-            of[train.angle_of(shaft)] = angle_through(train.gears[name], angle, twist, forward=forward)
+        known = np.array([of.get(name, nothing) for name, *_ in core.channels()])
+        angles = {train.angle_of(name) for name in train.shafts}
+        following = zip((v.name for v in variables if v.derived), core.derive(known), strict=True)
+        of |= {name: row for name, row in following if name in angles}
     whole = np.array(list(of.values()))
-    units = {v.name: v.unit for v in train_variables(train, core) if v.name in {*states, *inputs, *of}}
+    units = {v.name: v.unit for v in variables if v.name in {*states, *inputs, *of}}
     return LinearModel(
         A=rates[:, :n],
         B=rates[:, n : n + m],

@@ -7,7 +7,6 @@ from typing import Any
 
 from pydantic import ConfigDict
 
-from .. import _core
 from ..control.axis import check_torques
 from ..control.controller import Controller
 from ..data_sheets.components import Conditions
@@ -27,7 +26,6 @@ from .aliases import DRIVE, GEARBOX, LOAD, MOTOR
 from .keys import renamed
 from .tables import BASE, RECORD_NAME, ScenarioTables, SimulationTable, Whole, check_on_reference, with_accessories
 from .train_tables import ShaftTable, TrainInitial, TrainTables
-from .variables import VARIABLES, Variable, add_efficiency
 
 
 class LoadTable(described.LoadTableFields, Load):
@@ -151,12 +149,6 @@ class DriveTables(ScenarioTables):
 
     def attributes(self) -> dict[str, float]:
         return {"gear_ratio": self.gearbox.ratio}
-
-    def variables(self, core: _core.Train) -> tuple[Variable, ...]:  # noqa: ARG002
-        return VARIABLES
-
-    def derive(self, data: dict[str, Any], time: Any) -> None:  # noqa: ARG002
-        add_efficiency(data, self.gearbox.ratio)
 
     def alone(self) -> Drive:
         return self.drive()

@@ -12,17 +12,8 @@ from ..control.axis import OPEN_LOOP, driven
 from ..control.controller import Controller
 from ..errors import InputError
 from ..inputs.validation import shown
-from ..model.drive import Drive
+from ..model.drive import Drive, DriveOfOneGear
 from .scenario import Scenario
-
-IN_THE_LONG_FORM = {
-    "twist": "gearbox_twist",
-    "output_torque": "gearbox_output_torque",
-    "input_torque": "gearbox_input_torque",
-    "input_contact": "motor_contact",
-    "twist_contact": "gearbox_twist_contact",
-}
-"""names of variables of a drive whose load has a given motion"""
 
 
 class ExactBatch:
@@ -53,7 +44,8 @@ class ExactBatch:
                 kinds[key] = len(kinds)
                 law = None if pair is None else driven(pair[1])
                 shafts: tuple[tuple[str, ...], tuple[str, ...]] = ((), ("load",)) if given else (("load",), ())
-                core = drive.named_train().core(shafts[0], {"motor": law}, shafts[1])
+                train = drive.train() if given else drive.named_train()
+                core = train.core(shafts[0], {"motor": law}, shafts[1])
                 trains.append(core)
                 if pair is not None and key[1:] not in bound:
                     bound[key[1:]] = Scenario.of_any(pair[0]).with_axes({"motor": pair[1]}).control()
@@ -61,10 +53,10 @@ class ExactBatch:
             kind_of.append(kinds[key])
         self._core = _core.ExactBatch(trains, controls=controls, kind_of=kind_of, step=step)
         self._given, self._count, self._steps = given, len(kind_of), 0
-        self._names = IN_THE_LONG_FORM if given else {}
+        self._long = {short: long for long, short in DriveOfOneGear.aliases.items() if given and short}
         rows = self._core.values
         self.variables: dict[str, np.ndarray] = dict(zip(self._core.variables, rows, strict=True))
-        self.variables |= {name: self.variables[long] for name, long in self._names.items() if long in self.variables}
+        self.variables |= {name: self.variables[long] for name, long in self._long.items() if long in self.variables}
         self.reset(None, {})
 
     @property
@@ -80,8 +72,8 @@ class ExactBatch:
     def step(self, command: np.ndarray, load_torque: np.ndarray, motion: dict[str, np.ndarray], threads: int) -> None:
         """Advance all drives; `command` is the reference where controllers act."""
         zero = np.zeros(1)
-        given = {"command": command, "motor_command": command, "reference": command, "motor_reference": command}
-        given |= {"load_torque": load_torque}
+        given = {"command": command, "reference": command, "load_torque": load_torque}
+        given |= {"motor_command": command, "motor_reference": command}
         self._core.step([given.get(name, zero) for name in self._core.inputs], **motion, threads=threads)
         self._steps += self._count
 
@@ -90,7 +82,7 @@ class ExactBatch:
         states = self._core.states
         start = np.zeros((self._count, len(states) + 1))
         for name, values in initial.items():
-            place = self._names.get(name, name)
+            place = self._long.get(name, name)
             if place in states:
                 start[:, states.index(place)] = values
             elif values.any():

@@ -198,7 +198,7 @@ def explain(what: Scenario | Simulation, time: Time | None = None) -> Explanatio
     >>> import lostmotion as lm
     >>> explanation = lm.explain(lm.load("paper-2dof-nl-small"), time=0.1)
     >>> [contact.name for contact in explanation.contacts]
-    ['input shaft', 'twist of the gear']
+    ['input_contact', 'twist_contact']
     """
     if isinstance(what, Simulation):
         if time is not None:

@@ -18,7 +18,7 @@ from ..version import __version__
 from .ledger import largest_stored, ledger_of, with_energy
 from .scenario import Scenario, is_train
 from .switchings import ATTRIBUTE as SWITCHINGS
-from .switchings import CONTACTS_OF_TRAIN, columns_of, packed
+from .switchings import COLUMNS, columns_of, packed
 from .train_variables import axis_variables, named_signals
 from .variables import VARIABLES, Variable
 from .windings import set_torques
@@ -146,14 +146,12 @@ def raw_result(
         "mode_trials": int(result["mode_trials"]),
         "mode_fallbacks": int(result["mode_fallbacks"]),
         SWITCHINGS: packed(result["switchings"]),
+        COLUMNS: " ".join(core.switching_columns()),
     }
-    if not core.short_form:
-        attributes[CONTACTS_OF_TRAIN] = " ".join(core.contact_names())
     if np.isfinite(result["left_data_at"]):
-        losses = "gearbox.losses" if core.short_form else "the losses of the gear"
         attributes["warning"] = (
             f"from t = {result['left_data_at']:.6g} s on a loss map is used outside its data; there it continues with the slope "
-            f"of its edge. Extend {losses}."
+            "of its edge. Extend the losses of the gear."
         )
     if ledger:
         attributes = with_energy(attributes, result["energy"], largest_stored(data))

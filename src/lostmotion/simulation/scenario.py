@@ -8,6 +8,7 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from typing import Any, ClassVar, Self
 
+import numpy as np
 from pydantic_core import core_schema
 
 from .. import _core
@@ -37,7 +38,7 @@ from .tables import ScenarioTables, SimulationTable
 from .train_checks import check_train
 from .train_state import angles_at_start, given_speeds, start_values
 from .train_tables import LINEAR_INITIAL, ShaftTable, TrainInitial, TrainTables, core_train
-from .variables import Variable
+from .variables import Variable, variables_of_core
 
 LONG_TABLES = ("shafts", "slides", *LinearElements.model_fields)  # of which one makes a scenario one in the long form
 
@@ -313,7 +314,16 @@ class Scenario:
 
     def variables(self) -> tuple[Variable, ...]:
         """The variables that a result has, without those of controllers."""
-        return self.written.variables(self.core())
+        return variables_of_core(self.core().variables())
+
+    def derive(self, data: dict[str, Any], time: Any) -> None:
+        """Add the variables that follow from those of the solver; a channel that is not there counts as 0."""
+        core = self.core()
+        following = [v.name for v in self.variables() if v.derived]
+        if following:
+            nothing = np.zeros_like(time)
+            channels = np.array([data.get(name, nothing) for name, *_ in core.channels()], dtype=float)
+            data |= zip(following, core.derive(channels), strict=True)
 
     def axes(self) -> dict[str, Controller]:
         """The sampled controllers by the names of their motors."""

@@ -24,7 +24,6 @@ from .near_keys import near_key
 from .needs import need_free_motion
 from .scenario import Scenario
 from .train_variables import named_signals
-from .variables import CONTACTS
 
 if TYPE_CHECKING:
     import xarray
@@ -143,7 +142,7 @@ def sensitive_case(scenario: Scenario, variations: Sequence[Any], control: Bound
 
 def channels_of(core: _core.Train) -> list[str]:
     """Names of the channels that have a derivative: all but the modes of the contacts and the loss coefficient."""
-    without = {*core.contact_names(), *(CONTACTS if core.short_form else ()), "loss_coefficient"}
+    without = {*core.shown_contacts(), "loss_coefficient"}
     return [name for name, *_ in core.channels() if name not in without]
 
 

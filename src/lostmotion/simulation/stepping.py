@@ -32,7 +32,7 @@ from .step_bound import StepBound
 from .stepping_parts import GIVE, MAX_INTERVAL, MIN_INTERVAL, Ramp, ends_of, masses_given, no_input, no_interval, parts
 from .train_tables import TrainInitial
 from .train_variables import only_input
-from .variables import Variable
+from .variables import Variable, variables_of_core
 from .windings import bounded, coarser
 
 
@@ -119,9 +119,9 @@ class Simulation(SimulationAnswers):
         self._input_units = {name: unit.removeprefix("1") for name, _, unit, _ in channels}
         # Inputs that are commands of brakes and clutches.
         self._shares = {f"{name}_command" for name in self._train.commanded() if name not in self._train.motors}
-        self._variables: tuple[Variable, ...] = scenario.written.variables(core)
-        following = {"efficiency": self._efficiency, "motor_power": self._motor_power} | self._derived_of(self._train)
-        self._derived: dict[str, Derived] = {v.name: following[v.name] for v in self._variables if v.derived}
+        self._variables: tuple[Variable, ...] = variables_of_core(core.variables())
+        following = (v.name for v in self._variables if v.derived)
+        self._derived: dict[str, Derived] = {name: self._following(k) for k, name in enumerate(following)}
         self._add_signals(scenario)
         if error_bound:
             of_windings = bounded(scenario)

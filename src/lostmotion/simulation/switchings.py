@@ -15,26 +15,27 @@ from ..inputs.arguments import checked
 if TYPE_CHECKING:
     import xarray
 
-CAUSES = dict(_core.causes(short_form=True))
+CAUSES = dict(_core.causes())
 """what ended a regime, by its number"""
-TRAIN_CAUSES = dict(_core.causes(short_form=False))
-"""the same of a drive train"""
 
 MESH_STEP = next(number for number, cause in CAUSES.items() if cause == "step of the mesh stiffness")
-"""number of that cause, in both forms"""
+"""number of that cause"""
 
 ATTRIBUTE = "switchings"
-NAMES = tuple(_core.switching_columns())
-CONTACTS_OF_TRAIN = "contacts"  # attribute of the result of a train: the names of its contacts, apart by blanks
+COLUMNS = "switching_columns"  # attribute of a result: the names of its columns, apart by blanks
 TORQUES = ("output_torque_before", "output_torque_after")
 
 
 def names_in(attributes: Mapping[str, Any]) -> tuple[str, ...]:
-    """Names of the columns of the switchings of a result with these attributes."""
-    if CONTACTS_OF_TRAIN not in attributes:
-        return NAMES
-    contacts = str(attributes[CONTACTS_OF_TRAIN]).split()
-    return ("instant", "cause", *(f"{contact}_{when}" for when in ("before", "after") for contact in contacts))
+    """Names of the columns of the switchings of a result with these attributes.
+
+    Raises
+    ------
+    InputError
+    """
+    if COLUMNS not in attributes:
+        raise InputError("this result is of an earlier version, whose switchings are numbered otherwise; run it again")
+    return tuple(str(attributes[COLUMNS]).split())
 
 
 def packed(table: Any) -> str:
@@ -96,17 +97,16 @@ def switchings_of(result: xarray.Dataset) -> xarray.Dataset:
         raise InputError(
             "this dataset has no switchings; give a result of simulate or open_result, attributes included"
         )
-    causes = TRAIN_CAUSES if CONTACTS_OF_TRAIN in result.attrs else CAUSES
     columns = columns_of(result.attrs).items()
-    return xr.Dataset({name: ("switching", values, _about(name, causes)) for name, values in columns})
+    return xr.Dataset({name: ("switching", values, _about(name)) for name, values in columns})
 
 
-def _about(name: str, causes: Mapping[int, str]) -> dict[str, Any]:
+def _about(name: str) -> dict[str, Any]:
     if name == "instant":
         return {"units": "s", "long_name": "instant of switching"}
     if name == "cause":
-        meanings = " ".join(cause.replace(" ", "_") for cause in causes.values())
-        return {"long_name": "what ended the regime", "flag_values": list(causes), "flag_meanings": meanings}
+        meanings = " ".join(cause.replace(" ", "_") for cause in CAUSES.values())
+        return {"long_name": "what ended the regime", "flag_values": list(CAUSES), "flag_meanings": meanings}
     what, _, when = name.rpartition("_")
     if name in TORQUES:
         return {"units": "N*m", "long_name": f"output torque, {'left' if when == 'before' else 'right'} limit"}

@@ -17,7 +17,6 @@ from ..inputs.quantities import Positive, Time
 from ..model.drive import Drive
 from ..model.gearbox import Transmission
 from ..model.train import DriveTrain
-from .variables import Variable
 
 MAX_SAMPLES = 100_000_000
 
@@ -159,14 +158,6 @@ class ScenarioTables(Part):
     def attributes(self) -> dict[str, float]:
         """Attributes of what is computed of it, beside those of a run."""
         return {}
-
-    def variables(self, core: _core.Train) -> tuple[Variable, ...]:
-        """The variables that a result has, without those of controllers."""
-        raise NotImplementedError
-
-    def derive(self, data: dict[str, Any], time: Any) -> None:
-        """Add the variables that follow from those of the solver."""
-        raise NotImplementedError
 
     def alone(self) -> Drive | DriveTrain:
         """The drive or the train without its surroundings."""

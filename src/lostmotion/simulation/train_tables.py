@@ -29,8 +29,7 @@ from ..model.train import DriveTrain
 from .given_motion import MotionDerivative
 from .linear_units import in_si
 from .tables import BASE, RECORD_NAME, ScenarioTables, SimulationTable, with_accessories
-from .train_variables import add_angles, only_input, train_variables
-from .variables import Variable
+from .train_variables import only_input
 
 
 class ShaftTable(described.ShaftTableFields, Shaft):
@@ -206,12 +205,6 @@ class TrainTables(ScenarioTables, LinearElements):
         notes |= {name: part.note for name, part in self.motors.items()}
         notes |= {name: part.note for name, part in self.linear_motors.items()}
         return " ".join(f"{name}: {note}" for name, note in notes.items() if note)
-
-    def variables(self, core: _core.Train) -> tuple[Variable, ...]:
-        return train_variables(self.train(), core)
-
-    def derive(self, data: dict[str, Any], time: Any) -> None:
-        add_angles(self.train(), data, time)
 
     def alone(self) -> DriveTrain:
         return self.train()

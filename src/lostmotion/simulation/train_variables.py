@@ -12,47 +12,8 @@ from ..control.controller import Controller
 from ..errors import InputError
 from ..model.gear import Gear
 from ..model.linear_train import LinearElements
-from ..model.torsion import Rigid
 from ..model.train import DriveTrain
-from .variables import Variable
-
-
-def train_variables(train: DriveTrain, core: _core.Train) -> tuple[Variable, ...]:
-    """All variables that a result of this train has.
-
-    Parameters
-    ----------
-    core
-        The solver's train, with what acts on it.
-    """
-    channels = [Variable(*row) for row in core.channels()]
-    known = {channel.name for channel in channels}
-    integrated = [name for name in train.shafts if train.angle_of(name) in known]
-    following = {shaft for shaft, *_ in angles_through_gears(train, integrated)}
-    angles = (
-        Variable(
-            train.angle_of(name),
-            "",
-            train.angle_unit(name),
-            "position of the slide" if train.is_slide(name) else "angle of the shaft",
-            derived=True,
-        )
-        for name in train.shafts
-        if name in following
-    )
-    twists = (
-        Variable(
-            train.twist_of(name),
-            "",
-            train.angle_unit(gear.output),
-            f"angle of input/ratio less {'position' if train.is_slide(gear.output) else 'that'} of output",
-            derived=True,
-        )
-        for name, gear in train.gears.items()
-        if train.twist_of(name) not in known
-    )
-    return (*channels, *angles, *twists)
-
+from .variables import Variable, variables_of_core
 
 ALL_SIGNALS = tuple(name for name, _, _ in _core.axis_signals())
 REFERENCE_UNITS = {
@@ -137,33 +98,6 @@ def only_input(train: DriveTrain, word: str, names: Collection[str], argument: s
     raise InputError(f"{argument or word}: {why}")
 
 
-def angles_through_gears(train: DriveTrain, known: Collection[str]) -> Iterator[tuple[str, str, str, bool]]:
-    """Relation of the angles that the solver does not integrate to those that it does.
-
-    Parameters
-    ----------
-    known
-        Names of the shafts whose angles are known.
-
-    Yields
-    ------
-    tuple
-        Shaft, the shaft from which its angle follows, the gear between them, and whether that leads to the gear's output.
-    """
-    reached = set(known)
-    waiting = [name for name in train.shafts if name in reached]
-    while waiting:
-        shaft = waiting.pop()
-        for name, gear in train.fixed_gears().items():
-            if shaft not in (gear.input, gear.output):
-                continue
-            other = gear.output if shaft == gear.input else gear.input
-            if other not in reached:
-                yield other, shaft, name, other == gear.output
-                reached.add(other)
-                waiting.append(other)
-
-
 def angle_through(gear: Gear, angle: Any, twist: Any, *, forward: bool) -> Any:
     """The angle at the other side of a gear, forward at its output: twist = input angle/ratio - output angle - transmission error.
 
@@ -182,17 +116,6 @@ def angle_through(gear: Gear, angle: Any, twist: Any, *, forward: bool) -> Any:
             if found == before:
                 break
     return found
-
-
-def add_angles(train: DriveTrain, data: dict[str, Any], time: Any) -> None:
-    """Adds what the solver does not integrate: twists of rigid gears, and the angles that follow through the gears."""
-    for name, gear in train.gears.items():
-        if isinstance(gear.stiffness, Rigid):
-            data.setdefault(train.twist_of(name), np.zeros_like(time))
-    known = [name for name in train.shafts if train.angle_of(name) in data]
-    for shaft, source, name, forward in angles_through_gears(train, known):
-        angle, twist = data[train.angle_of(source)], data[train.twist_of(name)]
-        data[train.angle_of(shaft)] = angle_through(train.gears[name], angle, twist, forward=forward)
 
 
 def check_names(
@@ -214,7 +137,7 @@ def check_names(
     """
     seen = {"time"}
     for variable in (
-        *train_variables(train, core),
+        *variables_of_core(core.variables()),
         *axis_variables({f"{name}_": c for name, c in controllers.items()}),
     ):
         if variable.name in seen:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,30 +22,15 @@ class Variable:
     derived: bool = False  # computed from the others, not read from the solver
 
 
-# Those that are read from the core are named by its own table (core/lostmotion/simulation/channels.hpp).
-CHANNELS = tuple(Variable(*row) for row in _core.channels())
-VARIABLES = (
-    *CHANNELS,
-    Variable(
-        "efficiency",
-        "eta",
-        "1",
-        "useful torque / torque fed in, by the direction of the load; "
-        "0 where both sides feed the losses, undefined at standstill",
-        derived=True,
-    ),
-    Variable("motor_power", "p", "W", "mechanical power of the motor", derived=True),
-)
+def variables_of_core(rows: Iterable[tuple[str, str, str, str, bool]]) -> tuple[Variable, ...]:
+    """The variables that the core names (core/lostmotion/scenario/variables.cpp)."""
+    return tuple(Variable(*row) for row in rows)
 
-CHANNEL_NAMES = tuple(v.name for v in CHANNELS)
-CONTACTS = tuple(name for name in CHANNEL_NAMES if name.endswith("_contact"))
+
+VARIABLES = variables_of_core(_core.variables())
+"""those of a motor, a gearbox and a load"""
+CHANNEL_NAMES = tuple(v.name for v in VARIABLES if not v.derived)
 STATES = tuple(_core.states())
-
-
-def add_efficiency(data: dict[str, Any], ratio: Any) -> None:
-    """Adds the variables of a drive that follow from those of the solver."""
-    data["efficiency"] = gear_efficiency(data, ratio)
-    data["motor_power"] = data["motor_torque"] * data["motor_speed"]
 
 
 def gear_efficiency(data: dict[str, Any], ratio: Any) -> Any:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -39,8 +39,7 @@ if TYPE_CHECKING:
     import xarray
 
 SUMS = ("switching_count", "steps", "mode_trials", "mode_fallbacks")
-HEAT = (": viscous friction", ": dry friction", ": mesh", ": hysteresis and damping")
-SHORT_HEAT = ("input_damper", "motor_friction", "gear_losses", "hysteresis")
+HEAT = ("viscous friction", "dry friction", "mesh", "hysteresis and damping")
 WHOLE = 1e-6  # share by which a number of samples may miss a whole one, as numbers in single precision do
 
 
@@ -258,11 +257,10 @@ def _heating(scenario: Scenario, motor: str, given: Sequence[str] | None) -> tup
                     f"warm_up: heating {entry!r} is no entry of the ledger; {did_you_mean(entry, entries, ', '.join(entries))}"
                 )
         return tuple(given)
-    if scenario.core().short_form:
-        return SHORT_HEAT
     train = scenario.train()
     hot = {train.motors[motor].shaft, *train.gears}
-    return tuple(e for e in entries if any(e.endswith(end) and e.removesuffix(end) in hot for end in HEAT))
+    wanted = {train.shown(f"{element}: {loss}") for element in hot for loss in HEAT}
+    return tuple(entry for entry in entries if entry in wanted)
 
 
 def _later(signal: Any, time: float) -> _core.Signal:
@@ -298,7 +296,7 @@ def _course(law: _Law, each: int, start: tuple[float, float]) -> _Course:
         grid: dict[str, Any] = {"duration": length, "sample_interval": table.sample_interval, "samples": samples + 1}
         case = _core.Case(core, inputs=inputs, start=state, hysteresis_capacities=capacities)
         result = _core.run(case, **grid, energy=True, max_switchings=MAX_SWITCHINGS)
-        state, capacities = _end(result["end_state"], capacities, short=scenario.core().short_form)
+        state, capacities = _end(result["end_state"], {gear: scenario.train().capacity_of(gear) for gear in capacities})
         breaks = [p[0] - begin for name in names for p in signals[name].breakpoint_list()]
         torques = squares(case, torque, np.array([0.0, length]), breaks=breaks, fastest=fastest)
         square = float(torques.square[0]) / law.magnet_factor(now[1]) ** 2
@@ -310,9 +308,8 @@ def _course(law: _Law, each: int, start: tuple[float, float]) -> _Course:
     return _Course(_joined(results, each * table.sample_interval), both[0], both[1], heat)
 
 
-def _end(end: Mapping[str, float], gears: Iterable[str], *, short: bool) -> tuple[dict[str, float], dict[str, float]]:
-    """State with which the next interval begins, and the hysteresis capacities of these gears."""
-    names = {gear: "hysteresis_capacity" if short else f"{gear}_hysteresis_capacity" for gear in gears}
+def _end(end: Mapping[str, float], names: Mapping[str, str]) -> tuple[dict[str, float], dict[str, float]]:
+    """State with which the next interval begins, and the hysteresis capacities by gear; `names`: of these in the end state."""
     kept = set(names.values())
     return {name: v for name, v in end.items() if name not in kept}, {
         gear: end.get(n, 0.0) for gear, n in names.items()

@@ -11,7 +11,7 @@ import numpy as np
 from .. import _core
 from ..response.crossovers import bandwidth
 from ..simulation.scenario import Scenario
-from ..simulation.variables import CHANNEL_NAMES, add_efficiency
+from ..simulation.variables import CHANNEL_NAMES, gear_efficiency
 from ..worker_threads import thread_pool
 from .records import kind_of_record
 from .runs import Runs
@@ -64,7 +64,8 @@ def _with_derived(study: Study, runs: Runs) -> dict[str, np.ndarray]:
         return runs.samples
     samples = study.scenario.simulation.samples
     whole = runs.samples | {c: runs.samples.get(c, np.zeros((len(runs.errors), samples))) for c in CHANNEL_NAMES}
-    add_efficiency(whole, runs.ratio[:, None])
+    whole["efficiency"] = gear_efficiency(whole, runs.ratio[:, None])
+    whole["motor_power"] = whole["motor_torque"] * whole["motor_speed"]
     return {name: whole[name] for name in wanted | set(runs.samples)}
 
 
