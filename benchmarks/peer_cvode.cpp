@@ -76,8 +76,8 @@ int roots(realtype t, N_Vector y, realtype* g, void* user) {
     const auto u = c.input->values();
     for (int k = 0; k < static_cast<int>(c.left_zero.size()); ++k) {
         g[k] = 1.0;
-        if (k >= c.regime->n_guards) continue;
-        const LinearFormOf<D>& form = c.regime->guards[k].form;
+        if (k >= static_cast<int>(c.regime->guards.size())) continue;
+        const LinearForm& form = c.regime->guards[static_cast<std::size_t>(k)].form;
         const double value = evaluate<D>(form, x, c.memory, u), size = magnitude<D>(form, x, c.memory, u);
         c.left_zero[k] = c.left_zero[k] || value > 1e-6 * size;
         g[k] = c.left_zero[k] ? value : size;

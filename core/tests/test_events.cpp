@@ -35,23 +35,37 @@ Samples swinging(double at, double duration, double interval) {
 struct BouncingBall {
     using Dims = model::Least;
     using Key = model::Key;
-    using Regime = model::PackedRegime<Dims>;
-    using Guard = model::PackedGuard<Dims>;
-    using Form = LinearFormOf<Dims>;
+    using Guard = model::SparseRegime::Guard;
     enum { height, speed };  // its states
+    // What the solver asks of a regime.
+    struct Regime {
+        model::Key key;
+        std::array<LinearForm, Dims::coupled> rate{};
+        std::array<LinearForm, 1> angle_rate{}, output_torque{};
+        std::vector<Guard> guards;
+        std::array<double, 1> near_event{};
+        std::vector<model::Driver<LinearForm>> drivers;
+        std::vector<GivenState> given;
+        model::Flags resting, following;
+        int driving_input = -1;
+        double driving_way = 0.0;
+    };
     static constexpr int ground = 2;
 
     static CountsOf<Dims> counts() { return {}; }
     static int n_twists() { return 0; }
     static int twist_state(int) { return height; }
-    static const Form& torque_at_load(const Regime& r) { return r.output_torque[0]; }
+    static const LinearForm& torque_at_load(const Regime& r) { return r.output_torque[0]; }
 
     double restitution = 0.5;
-    void build(const Key& key, Regime& r) const {
-        r.key = key;
-        r.rate[height] = Form::unit(speed);
-        r.rate[speed] = Form::unit(Dims::one, -9.81);
-        r.guards[r.n_guards++] = Guard{Form::unit(height), Guard::speed, ground};
+    std::unique_ptr<const Regime> build(const Key& key) const {
+        static constexpr LinearForm::Term of_height{height, 1.0}, of_speed{speed, 1.0};
+        auto r = std::make_unique<Regime>();
+        r->key = key;
+        r->rate[height] = {&of_speed, 1, 1, 1, 1, 0.0};
+        r->rate[speed].one = -9.81;
+        r->guards.push_back({{&of_height, 1, 1, 1, 1, 0.0}, Guard::speed, ground});
+        return r;
     }
     Found start(InstantOf<Dims>&, Key&) const { return Found::yes; }
     template <class Cache>

@@ -135,7 +135,7 @@ struct Checked final : Observer<System> {
         std::vector<int> modes(n);
         for (std::size_t i = 0; i < n; ++i) {
             y[i] = s.at.x()[places.shafts[i].speed];
-            if (tree.friction[i] > 0.0) modes[i] = s.entry.regime.key.modes[places.shafts[i].contact];
+            if (tree.friction[i] > 0.0) modes[i] = s.entry.regime->key.modes[places.shafts[i].contact];
         }
         for (std::size_t g = 0; g < tree.joints.size(); ++g) y[n + g] = s.at.x()[places.gears[g].twist];
         const double length = s.end - s.begin;

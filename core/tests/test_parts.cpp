@@ -18,8 +18,9 @@ template <std::size_t n>
 using LongMatrix = std::array<std::array<Long, n>, n>;  // [row][column]
 
 // exp(A t) by a plain Taylor series of many short steps in extended precision.
-template <class Form, std::size_t n>
-LongMatrix<n> reference_exponential(const std::array<Form, n>& rate, Long t) {
+template <class D>
+LongMatrix<D::states> reference_exponential(const model::SparseRegime& regime, Long t) {
+    constexpr std::size_t n = D::states;
     using Matrix = LongMatrix<n>;
     constexpr int steps = 1 << 14;
     const Long h = t / steps;
@@ -33,8 +34,10 @@ LongMatrix<n> reference_exponential(const std::array<Form, n>& rate, Long t) {
         return c;
     };
     Matrix A{};
-    for (std::size_t i = 0; i < n; ++i)
-        for (std::size_t j = 0; j < n; ++j) A[i][j] = rate[i].c[j] * h;
+    each_rate<D>(regime, [&](int row, const LinearForm& f) {
+        each_state_of<D>(
+            f, [&](int k, double c) { A[static_cast<std::size_t>(row)][static_cast<std::size_t>(k)] = c * h; });
+    });
     for (int k = 1; k < 30; ++k) {
         term = multiply(term, A);
         for (auto& row : term)
@@ -66,9 +69,9 @@ void with_propagator(const Drive& drive, bool slipping, const Use& use) {
     Propagator<D> p;
     const SignalsOf<D> none;
     PhaseRotations turns(1e-3, input_basis(none));
-    const LinearRatesOf<D> rates(system.counts(), regime.rate);
+    const LinearRatesOf<D> rates(system.counts(), regime->rate, regime->angle_rate);
     p.prepare(rates, turns, system.balanced_scale());
-    use(p, rates, regime.rate, system.balanced_scale());
+    use(p, rates, *regime, system.balanced_scale());
 }
 
 }  // namespace
@@ -145,11 +148,11 @@ TEST_SUITE("parts") {
     TEST_CASE("propagation agrees with an exponential in extended precision, over nine decades of time") {
         RandomDrives random(3);
         for (int n = 0; n < 12; ++n) {
-            const auto compare = [&]<class D>(Propagator<D>& p, const LinearRatesOf<D>& rates, const auto& rate,
-                                              const StateOf<D>& scale) {
+            const auto compare = [&]<class D>(Propagator<D>& p, const LinearRatesOf<D>& rates,
+                                              const model::SparseRegime& regime, const StateOf<D>& scale) {
                 for (int level = 0; p.length(level) < 1.0; level += 2) {
                     const auto& step = p.level(level);
-                    const auto expected = reference_exponential(rate, p.length(level));
+                    const auto expected = reference_exponential<D>(regime, p.length(level));
                     for (int i = 0; i < D::states; ++i)
                         for (int j = 0; j < D::states; ++j) {
                             const double e = static_cast<double>(expected[i][j]) - (i == j ? 1.0 : 0.0);

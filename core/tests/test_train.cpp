@@ -56,7 +56,7 @@ TEST_CASE("an accumulation of switchings is reported with its contact or law, if
     CHECK(text(0) == "switching instants of the contact '" + contact_name(a, 0) + "' " + rest);
     CHECK(text(-2) == "switching instants of the law '" + names[0] + "' " + rest);
     CHECK(text(-1) == "switching instants " + rest);
-    PackedGuard<WidestTest> guard;
+    SparseRegime::Guard guard;
     CHECK(guard.subject() == -1);
     guard.branch = 3;
     CHECK(guard.subject() == -2 - 3);
@@ -126,7 +126,7 @@ TEST_CASE("what is wrong with a train is said in one line with the names of its 
     CHECK(check(Train{}).sentence() == "the train has no shaft");
 }
 
-TEST_CASE("a packed regime has the same coefficients in the kernel's order, and zeros elsewhere") {
+TEST_CASE("a regime in a kernel's places has the coefficients of the layout, and zeros elsewhere") {
     RandomTrains random(31);
     for (int n = 0; n < cases(100); ++n) {
         const Assembly a(random.train(random.pick(2, 6), true));
@@ -138,32 +138,24 @@ TEST_CASE("a packed regime has the same coefficients in the kernel's order, and 
         for (const ContactPlace& c : a.places().contacts)
             if (c.one_way) key.modes[&c - a.places().contacts.data()] = -1;
         const Regime r = a.build(key);
-        const auto p = pack<WidestTest>(r, a);
-        CHECK(p.complete);
-        CHECK(p.n_guards == static_cast<int>(r.guards.size()));
+        const auto sparse = SparseRegimes(a).make(key);
+        REQUIRE(sparse->guards.size() == r.guards.size());
         Instant x;
-        std::array<double, WidestTest::terms> wide{};
-        const auto put = [&](int count, int to, auto& values) {
-            for (int k = 0; k < count; ++k)
-                values[k] = wide[static_cast<std::size_t>(to + k)] = random.uniform(-1.0, 1.0);
-        };
-        put(at.coupled, 0, x.x);
-        for (int k = 0; k < at.angles; ++k)
-            x.x[at.coupled + k] = wide[static_cast<std::size_t>(WidestTest::coupled + k)] = random.uniform(-1.0, 1.0);
-        wide[WidestTest::one] = 1.0;
-        put(at.memory, WidestTest::first_memory, x.memory);
-        put(at.inputs, WidestTest::first_input, x.input[0]);
-        const auto value = [&](const PackedForm<WidestTest>& f) {
-            double sum = 0.0;
-            for (int k = 0; k < WidestTest::terms; ++k)
-                sum += f.c[static_cast<std::size_t>(k)] * wide[static_cast<std::size_t>(k)];
-            return sum;
+        x.reach(at);
+        InstantOf<WidestTest> wide{};
+        for (int k = 0; k < at.states; ++k)
+            x.x[k] = wide.x[static_cast<std::size_t>(state_place<WidestTest>(at, k))] = random.uniform(-1.0, 1.0);
+        for (int k = 0; k < at.memory; ++k)
+            x.memory[k] = wide.memory[static_cast<std::size_t>(k)] = random.uniform(-1.0, 1.0);
+        for (int i = 0; i < at.inputs; ++i)
+            x.input[0][i] = wide.input[0][static_cast<std::size_t>(i)] = random.uniform(-1.0, 1.0);
+        const auto value = [&](const LinearForm& f) {
+            return lostmotion::evaluate<WidestTest>(f, wide.x, wide.memory, wide.input[0]);
         };
         for (int k = 0; k < at.coupled; ++k)
-            CHECK(value(p.rate[static_cast<std::size_t>(k)]) == doctest::Approx(evaluate(at, r.rate[k], x)));
-        for (int g = 0; g < p.n_guards; ++g)
-            CHECK(value(p.guards[static_cast<std::size_t>(g)].form) ==
-                  doctest::Approx(evaluate(at, r.guards[static_cast<std::size_t>(g)].form, x)));
+            CHECK(value(sparse->rate[static_cast<std::size_t>(k)]) == doctest::Approx(evaluate(at, r.rate[k], x)));
+        for (std::size_t g = 0; g < r.guards.size(); ++g)
+            CHECK(value(sparse->guards[g].form) == doctest::Approx(evaluate(at, r.guards[g].form, x)));
     }
 }
 

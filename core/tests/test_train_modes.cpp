@@ -123,14 +123,14 @@ TEST_CASE("accelerations of random trains are those of the principle of least co
         Key key;
         CAPTURE(n);
         REQUIRE(search.start(now, key) == Found::yes);
-        const SearchedRegime& r = search.regimes()[key];
+        const SparseRegime& r = search.regimes()[key];
         const std::vector<double> expected = least_constraint(a, before, 4000);
         for (std::size_t s = 0; s < expected.size(); ++s) {
             const double mine = evaluate(r.rate[a.places().shafts[s].speed], now);
             CHECK(mine == doctest::Approx(expected[s]).scale(1.0).epsilon(1e-6));
             at_rest += mine == 0.0;
         }
-        for (const SearchedRegime::Guard& g : r.guards)
+        for (const SparseRegime::Guard& g : r.guards)
             CHECK(evaluate(g.form, now) >= -rounding * magnitude(g.form, now));
         ++compared;
     }

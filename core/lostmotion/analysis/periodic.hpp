@@ -226,14 +226,14 @@ class ShootingOf {
     // to move along it. Where nothing moves, there is no period.
     void free_period(const Image& image, const std::vector<int>& active, const std::vector<double>& scale,
                      std::vector<std::vector<double>>& M, std::vector<double>& rhs) {
-        const auto& regime = cache_.regime(image.end.key);
+        ComponentsOf<D> rate{};
+        each_rate<D>(cache_.regime(image.end.key), [&](int k, const LinearForm& f) {
+            rate[k] = evaluate<D>(f, image.end.x, image.end.memory, input_);
+        });
         std::vector<double> flow;
         double fastest = 0.0;
         for (std::size_t k = 0; k < active.size(); ++k) {
-            const bool is_state = active[k] < D::states;
-            flow.push_back(is_state ? period_ / scale[k] *
-                                          evaluate<D>(regime.rate[active[k]], image.end.x, image.end.memory, input_)
-                                    : 0.0);
+            flow.push_back(period_ / scale[k] * rate[active[k]]);
             fastest = std::fmax(fastest, std::fabs(flow.back()));
         }
         if (fastest == 0.0) return;

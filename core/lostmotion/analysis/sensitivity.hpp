@@ -34,7 +34,7 @@ class SensitivityOf final : public Observer<System> {
         each_state<D>(n_, [&](int k) {
             magnitude[k] = std::fmax(magnitude[k], std::fmax(std::fabs(s.at.x()[k]), std::fabs(s.x_end[k])));
         });
-        const Regime& r = s.entry.regime;
+        const Regime& r = *s.entry.regime;
         regime_ = &r;
         x_ = s.x_end;
         memory_ = s.memory;
@@ -42,7 +42,7 @@ class SensitivityOf final : public Observer<System> {
         const auto G = s.entry.propagator.changes(s.end - s.begin);
         ByState<D, Components> rates;
         rates.make_room(n_);
-        each_state<D>(n_, [&](int row) { rates[row] = gradient<D>(r.rate[row]); });
+        each_rate<D>(r, [&](int row, const LinearForm& f) { rates[row] = gradient<D>(f); });
         // x(s) = x + G x', column by column.
         each_component<D>(n_, [&](int c) {
             State rate{};
@@ -77,7 +77,7 @@ class SensitivityOf final : public Observer<System> {
             const double fall = evaluate_rate<D>(form, rate, u[1]);
             double noise = 0.0;
             each_state_of<D>(form, [&](int k, double c) { noise += std::fabs(c * rate[k]); });
-            each_input_of<D>(form, [&](int i, double c) { noise += std::fabs(c * u[1][i]); });
+            for (const auto& [i, c] : form.of_inputs()) noise += std::fabs(c * u[1][i]);
             if (!(fall < -rounding * noise)) {
                 smooth = false;
             } else {
@@ -97,7 +97,7 @@ class SensitivityOf final : public Observer<System> {
  private:
     Components flow(const Regime& r, const State& x, const typename D::Memory& m, const InputsOf<D>& u) const {
         Components f{};
-        each_state<D>(n_, [&](int k) { f[k] = evaluate<D>(r.rate[k], x, m, u); });
+        each_rate<D>(r, [&](int k, const LinearForm& rate) { f[k] = evaluate<D>(rate, x, m, u); });
         return f;
     }
 

@@ -51,7 +51,7 @@ class TrainSensitivity final : public TrainWatcher<D> {
 
     void segment(const Segment<System>& s) override {
         if (begun_ && s.memory != memory_) set_without_switching(s);
-        enter(s.entry.regime);
+        enter(*s.entry.regime);
         set_states(s.at.x(), s.memory);
         if (!begun_) begin_motion(s.memory);
         begun_ = true;
@@ -133,7 +133,7 @@ class TrainSensitivity final : public TrainWatcher<D> {
         SwitchingOf<System> w;
         w.time = s.begin;
         w.input_jump = true;
-        w.before = w.after = s.entry.regime.key;
+        w.before = w.after = s.entry.regime->key;
         w.x = s.at.x();
         w.memory = s.memory;
         switching(w);
@@ -313,10 +313,11 @@ class TrainSensitivity final : public TrainWatcher<D> {
                const double* shift, const double* set_anew) {
         ComponentsRow before{}, after{};
         const CountsOf<D>& counts = system_.counts();
-        each_state<D>(counts, [&](int c) {
-            if (place(c) < 0) return;
-            before[c] = evaluate<D>(r.before.rate[c], r.x, r.memory, r.input[0]);
-            after[c] = evaluate<D>(r.after.rate[c], r.switching.x, r.switching.memory, r.input_after[0]);
+        each_rate<D>(r.before, [&](int c, const LinearForm& f) {
+            if (place(c) >= 0) before[c] = evaluate<D>(f, r.x, r.memory, r.input[0]);
+        });
+        each_rate<D>(r.after, [&](int c, const LinearForm& f) {
+            if (place(c) >= 0) after[c] = evaluate<D>(f, r.switching.x, r.switching.memory, r.input_after[0]);
         });
         each_component<D>(counts, [&](int c) {
             const int k = place(c);

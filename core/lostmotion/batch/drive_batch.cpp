@@ -249,17 +249,14 @@ void DriveBatch::restore(const Snapshot& s) {
     for (std::size_t k = 0; k < drives_.size(); ++k) show(k);
 }
 
-void DriveBatch::read(double* out, RegimeDetails::Coefficients RegimeDetails::* form,
-                      double RegimeTable::* constant) const {
+void DriveBatch::read(double* out, Coefficients RegimeDetails::* form, double RegimeTable::* constant) const {
     for (std::size_t k = 0; k < drives_.size(); ++k) {
         const DriveState& d = drives_[k];
         out[k] = 0.0;
         if (d.regime == nullptr) continue;
         StateOf<D> x;
         std::ranges::copy(d.x, x.begin());
-        model::PackedForm<D> of{(*d.regime->details).*form};
-        of.c[D::one] = (*d.regime).*constant;
-        out[k] = lostmotion::evaluate<D>(of, x, d.memory, inputs_[k]);
+        out[k] = value_of((*d.regime->details).*form, (*d.regime).*constant, x, d.memory, inputs_[k]);
     }
 }
 

@@ -116,7 +116,7 @@ class DriveBatch {
     void show(std::size_t k) {
         for (std::size_t s = 0; s < D::states; ++s) states_[s * drives_.size() + k] = drives_[k].x[s];
     }
-    void read(double* out, RegimeDetails::Coefficients RegimeDetails::* form, double RegimeTable::* constant) const;
+    void read(double* out, Coefficients RegimeDetails::* form, double RegimeTable::* constant) const;
     void read_contact(std::int8_t* out, std::int8_t RegimeDetails::* contact) const;
 
     Models models_;

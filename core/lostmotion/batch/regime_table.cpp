@@ -36,15 +36,9 @@ Matrix secant_bound(const Matrix& A, double d) {
     return out;
 }
 
-Four row_of(const model::PackedForm<D>& f) {
-    std::array<double, D::coupled> c;
-    std::copy_n(f.c.begin(), D::coupled, c.begin());
-    return Four::of(c);
-}
-
 // A guard that is zero all through, as of a loss law whose load is zero in the gap, ends nothing.
-bool can_fall(const model::PackedGuard<D>& guard) {
-    return !guard.behind && std::ranges::any_of(guard.form.c, [](double c) { return c != 0.0; });
+bool can_fall(const model::SparseRegime::Guard& guard) {
+    return !guard.behind && (guard.form.one != 0.0 || guard.form.inputs != 0);
 }
 
 float rounded_up(double v) {
@@ -53,7 +47,7 @@ float rounded_up(double v) {
 }
 
 // R of each guard.
-void set_departures(const model::PackedRegime<D>& r, Propagator<D>& flow, double h, int halvings, Tabulated& out) {
+void set_departures(const model::SparseRegime& r, Propagator<D>& flow, double h, int halvings, Tabulated& out) {
     const int samples = 1 << halvings;
     const double d = h / samples;
     const Matrix &A = flow.rates().rate, over_part = flow.integral(d).coupled, change = A * over_part;
@@ -66,8 +60,8 @@ void set_departures(const model::PackedRegime<D>& r, Propagator<D>& flow, double
         Matrix next = change * G;
         next.add(1.0, G);
         next.add(1.0, over_part);
-        for (int g = 0; g < r.n_guards; ++g) {
-            const Four C = row_of(r.guards[g].form);
+        for (std::size_t g = 0; g < r.guards.size(); ++g) {
+            const Four C = coupled<D>(r.guards[g].form);
             const Four here = absolute(next.after(C) + (-(j + 1.0) / samples) * end.after(C));
             const Four between = bound.after(absolute(exponential.after(C)));
             most[g] = max_of(most[g], max_of(before[g], here) + between);
@@ -75,10 +69,10 @@ void set_departures(const model::PackedRegime<D>& r, Propagator<D>& flow, double
         }
         G = next;
     }
-    for (int g = 0; g < r.n_guards; ++g) {
+    for (std::size_t g = 0; g < r.guards.size(); ++g) {
         if (!can_fall(r.guards[g])) continue;
         SharedTable::Departure R;
-        Column* place = out.block(g / 4) + D::coupled;
+        Column* place = out.block(static_cast<int>(g / 4)) + D::coupled;
         std::memcpy(&R, place, sizeof R);
         for (int k = 0; k < D::coupled; ++k) R[k][g % 4] = rounded_up(most[g][k]);
         std::memcpy(place, &R, sizeof R);
@@ -86,7 +80,7 @@ void set_departures(const model::PackedRegime<D>& r, Propagator<D>& flow, double
 }
 
 // The speeds that change once each of the moving contacts comes to rest.
-void set_stops(const model::Assembly& a, const model::PackedRegime<D>& r, RegimeDetails& out) {
+void set_stops(const model::Assembly& a, const model::SparseRegime& r, RegimeDetails& out) {
     const auto& contacts = a.places().contacts;
     for (std::size_t c = 0; c < contacts.size(); ++c) {
         if (r.at_rest[c]) continue;
@@ -110,29 +104,45 @@ void set_stops(const model::Assembly& a, const model::PackedRegime<D>& r, Regime
 }
 
 // Whether the steps of this regime need nothing but its rates and guards.
-bool is_plain(const model::PackedRegime<D>& r) {
-    bool plain = r.complete && r.solvable && r.drivers.empty() && r.locked.empty() && r.driving_input < 0;
-    for (int g = 0; g < r.n_guards; ++g)
-        plain = plain && r.guards[g].kind != model::Guard::turning && r.guards[g].kind != model::Guard::set_off &&
-                r.guards[g].memory < 0;
+bool is_plain(const model::SparseRegime& r) {
+    bool plain =
+        r.guards.size() <= D::guards && r.solvable && r.drivers.empty() && r.locked.empty() && r.driving_input < 0;
+    for (const auto& g : r.guards)
+        plain = plain && g.kind != model::Guard::turning && g.kind != model::Guard::set_off && g.memory < 0;
     for (std::size_t c = 0; c < D::contacts; ++c) plain = plain && !(r.at_rest[c] && r.key.modes[c] != 0);
     return plain;
 }
 
 }  // namespace
 
+Coefficients coefficients_of(const LinearForm& f) {
+    Coefficients out{};
+    each_state_of<D>(f, [&](int k, double c) { out[static_cast<std::size_t>(k)] = c; });
+    out[D::one] = f.one;
+    for (const auto& [k, c] : f.of_memory()) out[static_cast<std::size_t>(D::first_memory + k)] = c;
+    for (const auto& [i, c] : f.of_inputs()) out[static_cast<std::size_t>(D::first_input + i)] = c;
+    return out;
+}
+
+double value_of(const Coefficients& c, double constant, const State& x, const Memory& m, const Inputs& u) {
+    for (std::size_t k = 0; k < D::memory; ++k) constant += c[D::first_memory + k] * m[k];
+    double input = 0.0, own = (Four::load(c.data()) * coupled(x)).sum();
+    for (std::size_t i = 0; i < D::inputs; ++i) input += c[D::first_input + i] * u[i];
+    for (std::size_t k = D::coupled; k < D::states; ++k) own += c[k] * x[k];
+    return (constant + input) + own;
+}
+
 Tabulated tabulate(const model::Assembly& assembly, const Label& label, double h) {
-    const model::Regime rows = assembly.build(label.key());
-    const model::PackedRegime<D> r = model::pack<D>(rows, assembly);
+    const auto regime = model::SparseRegimes(assembly).make(label.key());
+    const model::SparseRegime& r = *regime;
     Tabulated out;
     out.table.label = label;
     RegimeDetails& details = out.details;
-    const auto torque = [](const model::PackedForm<D>& form, RegimeDetails::Coefficients& to, double& constant) {
-        to = form.c;
+    const auto torque = [](const LinearForm& form, Coefficients& to, double& constant) {
+        to = coefficients_of(form);
         constant = std::exchange(to[D::one], 0.0);
     };
-    if (!rows.motor_torque.empty())
-        torque(model::pack<D>(rows.motor_torque[0], assembly.layout()), details.motor_torque, out.table.motor_torque);
+    if (!r.motor_torque.empty()) torque(r.motor_torque[0], details.motor_torque, out.table.motor_torque);
     torque(r.output_torque[0], details.output_torque, out.table.output_torque);
     const model::Gear& gear = assembly.train().gears[0];
     const model::GearPlace& place = assembly.places().gears[0];
@@ -145,7 +155,7 @@ Tabulated tabulate(const model::Assembly& assembly, const Label& label, double h
     details.cell_back = static_cast<std::int8_t>(place.cell_back);
     if (gear.law.has_hysteresis()) details.hysteresis = 0.5 * (1.0 - gear.law.hysteresis_efficiency);
     if (!is_plain(r)) return out;
-    const LinearRatesOf<D> rates({}, r.rate);
+    const LinearRatesOf<D> rates({}, r.rate, r.angle_rate);
     State scale;
     scale.fill(1.0);
     model::balanced_scale(assembly, scale, D::coupled);
@@ -154,7 +164,7 @@ Tabulated tabulate(const model::Assembly& assembly, const Label& label, double h
     flow.prepare(rates, constant_inputs, scale);
     const int halvings = flow.level_of(h);
     if (!flow.resolved() || halvings > most_halvings) return out;
-    details.at_rest = r.at_rest;
+    for (std::size_t c = 0; c < D::contacts; ++c) details.at_rest[c] = r.at_rest[c];
     SharedTable& shared = out.shared;
     for (int k = 0; k < D::coupled; ++k) {
         double sum = 0.0;
@@ -169,24 +179,22 @@ Tabulated tabulate(const model::Assembly& assembly, const Label& label, double h
     shared.angle_coefficient = rates.angle_coefficient[0];
     shared.state = rates.rate.column;
     shared.input = rates.input_column;
-    shared.n_blocks = static_cast<std::int8_t>((r.n_guards + 3) / 4);
-    const auto guards = std::span(r.guards).first(static_cast<std::size_t>(r.n_guards));
-    const auto depends = [](const model::PackedForm<D>& f, int first, int count) {
-        return std::any_of(f.c.begin() + first, f.c.begin() + first + count, [](double c) { return c != 0.0; });
-    };
-    const auto by_memory = [&](const model::PackedForm<D>& f) { return depends(f, D::first_memory, D::memory); };
+    shared.n_blocks = static_cast<std::int8_t>((r.guards.size() + 3) / 4);
+    const auto& guards = r.guards;
+    const auto by_memory = [](const LinearForm& f) { return !f.of_memory().empty(); };
     out.table.by_memory = std::ranges::any_of(r.rate, by_memory);
     for (const auto& g : guards) {
         out.table.by_memory = out.table.by_memory || by_memory(g.form);
-        shared.guards_by_input = shared.guards_by_input || depends(g.form, D::first_input, D::inputs);
+        shared.guards_by_input = shared.guards_by_input || !g.form.of_inputs().empty();
     }
     const auto blocks = static_cast<std::size_t>(shared.n_blocks);
     out.blocks.resize(blocks * shared.block_columns());
     out.own.resize((1 + blocks) * out.table.own_columns());
-    const auto set_own = [&](std::size_t forms, std::size_t row, const model::PackedForm<D>& f) {
+    const auto set_own = [&](std::size_t forms, std::size_t row, const LinearForm& form) {
+        const Coefficients c = coefficients_of(form);
         Column* own = out.own.data() + forms * out.table.own_columns();
-        own[0][row] = f.c[D::one];
-        for (std::size_t k = 0; out.table.by_memory && k < D::memory; ++k) own[1 + k][row] = f.c[D::first_memory + k];
+        own[0][row] = c[D::one];
+        for (std::size_t k = 0; out.table.by_memory && k < D::memory; ++k) own[1 + k][row] = c[D::first_memory + k];
     };
     for (std::size_t k = 0; k < D::coupled; ++k) set_own(0, k, r.rate[k]);
     details.mark.resize(guards.size());
@@ -199,18 +207,18 @@ Tabulated tabulate(const model::Assembly& assembly, const Label& label, double h
             out.own[(1 + g / 4) * out.table.own_columns()][g % 4] = 1.0;
             continue;
         }
-        const auto& form = guards[g].form;
-        set_own(1 + g / 4, g % 4, form);
-        const auto varies = [](int term) { return term < D::coupled || term >= D::first_input; };
+        set_own(1 + g / 4, g % 4, guards[g].form);
+        const Coefficients form = coefficients_of(guards[g].form);
+        const auto varies = [](std::size_t term) { return term < D::coupled || term >= D::first_input; };
         double sign = 0.0;
-        for (int term = 0; term < D::terms && sign == 0.0; ++term)
-            if (varies(term) && form.c[term] != 0.0) sign = form.c[term] < 0.0 ? -1.0 : 1.0;
+        for (std::size_t term = 0; term < D::terms && sign == 0.0; ++term)
+            if (varies(term) && form[term] != 0.0) sign = form[term] < 0.0 ? -1.0 : 1.0;
         if (sign < 0.0) out.table.signs[g / 4] |= static_cast<std::uint8_t>(1u << g % 4);
         Column* to = out.block(static_cast<int>(g / 4));
-        for (std::size_t k = 0; k < D::coupled; ++k) to[k][g % 4] = sign * form.c[k] + 0.0;
+        for (std::size_t k = 0; k < D::coupled; ++k) to[k][g % 4] = sign * form[k] + 0.0;
         to += D::coupled + SharedTable::departure_columns;
         for (std::size_t k = 0; shared.guards_by_input && k < D::inputs; ++k)
-            to[k][g % 4] = sign * form.c[D::first_input + k] + 0.0;
+            to[k][g % 4] = sign * form[D::first_input + k] + 0.0;
     }
     set_departures(r, flow, h, std::max(halvings, fewest_halvings), out);
     set_stops(assembly, r, details);

@@ -92,6 +92,12 @@ struct Forms {
     }
 };
 
+// A form by the coefficients of all that it may depend on, in the order of the kernel.
+using Coefficients = std::array<double, D::terms>;
+Coefficients coefficients_of(const LinearForm& f);
+// Its value with another constant.
+double value_of(const Coefficients& c, double constant, const State& x, const Memory& m, const Inputs& u);
+
 // What only events and readers need of a regime. Those of other drives are often the same.
 struct RegimeDetails {
     struct Mark {
@@ -106,8 +112,6 @@ struct RegimeDetails {
         double share = 0.0;
         friend bool operator==(const Stop&, const Stop&) = default;
     };
-    using Coefficients = std::array<double, D::terms>;
-
     std::array<bool, D::contacts> at_rest{};
     std::array<bool, D::contacts> stops_alone{};  // whether no other contact comes to rest with this one
     // Numbers of the contacts, of the states of twist and input shaft, and the branches of the loss law; -1: none.

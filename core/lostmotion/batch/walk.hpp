@@ -282,9 +282,7 @@ inline Walk::Verdict Walk::judge(const Series<double>& c, double size, double ra
 inline double Walk::output_torque() const {
     StateOf<D> x{};
     x_.store(x.data());
-    model::PackedForm<D> form{r_->details->output_torque};
-    form.c[D::one] = r_->output_torque;
-    return lostmotion::evaluate<D>(form, x, memory_, u_);
+    return value_of(r_->details->output_torque, r_->output_torque, x, memory_, u_);
 }
 
 // A contact has come to rest: its speed is zero to the last bit, and a turning point sets the hysteresis (16).

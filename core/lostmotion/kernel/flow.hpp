@@ -11,7 +11,6 @@ template <class D>
 class Flow {
  public:
     using State = StateOf<D>;
-    using LinearForm = LinearFormOf<D>;
     using LinearRates = LinearRatesOf<D>;
     using Instant = InstantOf<D>;
 
@@ -30,7 +29,7 @@ class Flow {
         const State& terms = magnitude(k);
         const auto& u = now_.input[k];
         double sum = 0.0;
-        each_input_of<D>(f, [&](int i, double c) ALWAYS_INLINE { sum += std::fabs(c * u[i]); });
+        for (const auto& [i, c] : f.of_inputs()) sum += std::fabs(c * u[i]);
         each_state_of<D>(f, [&](int j, double c) ALWAYS_INLINE { sum += std::fabs(c) * terms[j]; });
         return sum;
     }

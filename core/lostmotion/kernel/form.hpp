@@ -11,6 +11,7 @@
 #include <variant>
 #include <vector>
 
+#include "../base/linear_form.hpp"
 #include "../base/sign.hpp"
 #include "dims.hpp"
 
@@ -19,104 +20,6 @@ namespace lostmotion {
 // Up to so many coupled states, whole matrices cost less than what of them is not zero.
 inline constexpr int few_states = 16;
 
-// A linear expression sum_k c[k] * term[k].
-template <int N>
-struct Form {
-    std::array<double, N> c{};
-
-    static constexpr Form unit(int term, double factor = 1.0) {
-        Form f;
-        f.c[term] = factor;
-        return f;
-    }
-    Form& operator+=(const Form& o) {
-        for (int k = 0; k < N; ++k) c[k] += o.c[k];
-        return *this;
-    }
-    Form& operator*=(double a) {
-        for (int k = 0; k < N; ++k) c[k] *= a;
-        return *this;
-    }
-    friend Form operator*(double a, Form f) { return f *= a; }
-};
-
-// A linear expression with few terms, in the order of their places.
-class AnyForm {
- public:
-    struct Term {
-        int place;
-        double factor;
-    };
-    enum Part { of_coupled, of_angles, of_one, of_memory, of_inputs };
-
-    class Coefficients {
-     public:
-        double operator[](int place) const {
-            const std::size_t at = find(place);
-            return at < terms_.size() && terms_[at].place == place ? terms_[at].factor : 0.0;
-        }
-        double& operator[](int place) {
-            const std::size_t at = find(place);
-            if (at == terms_.size() || terms_[at].place != place) {
-                terms_.insert(terms_.begin() + static_cast<std::ptrdiff_t>(at), {place, 0.0});
-                count(place);
-            }
-            return terms_[at].factor;
-        }
-        // A term whose place is beyond those of all others.
-        void append(int place, double factor) {
-            terms_.push_back({place, factor});
-            count(place);
-        }
-        const std::vector<Term>& terms() const { return terms_; }
-        // The first term of one of the parts and the end of the part.
-        std::pair<const Term*, const Term*> part(Part p) const {
-            const Term* all = terms_.data();
-            return {p == of_coupled ? all : all + end_[p - 1], p == of_inputs ? all + terms_.size() : all + end_[p]};
-        }
-
-     private:
-        std::size_t find(int place) const {
-            const auto below = [](const Term& t, int p) { return t.place < p; };
-            return static_cast<std::size_t>(std::lower_bound(terms_.begin(), terms_.end(), place, below) -
-                                            terms_.begin());
-        }
-        void count(int place) {
-            constexpr std::array beyond{Any::coupled, Any::states, Any::first_memory, Any::first_input};
-            for (std::size_t p = 0; p < beyond.size(); ++p) end_[p] += place < beyond[p];
-        }
-
-        std::vector<Term> terms_;
-        std::array<int, of_inputs> end_{};  // of each part but the last
-    };
-    Coefficients c;
-
-    // Calls use(place, factor) for each term.
-    template <class Use>
-    void each_term(Use&& use) const {
-        for (const Term& t : c.terms()) use(t.place, t.factor);
-    }
-    // Calls use(number, factor) for each term of a part, whose first number is at `first`.
-    template <class Use>
-    [[gnu::always_inline]] void each_of(Part part, int first, Use&& use) const {
-        for (auto [t, end] = c.part(part); t != end; ++t) use(t->place - first, t->factor);
-    }
-    // sum value(place, factor) over the coupled states, in fours.
-    template <class Value>
-    double sum_of_coupled(Value&& value) const {
-        double all = 0.0;
-        for (auto [t, end] = c.part(of_coupled); t != end;) {
-            const int four = t->place / 4;
-            double part[4] = {};
-            for (; t != end && t->place / 4 == four; ++t) part[t->place % 4] = value(t->place, t->factor);
-            all += (part[0] + part[1]) + (part[2] + part[3]);
-        }
-        return all;
-    }
-};
-
-template <class D>
-using LinearFormOf = std::conditional_t<std::same_as<D, Any>, AnyForm, Form<D::terms>>;
 // The coupled states, in registers; then a state, and its coupled part alone, in memory.
 template <class D>
 using CoupledOf = std::conditional_t<std::same_as<D, Any>, Numbers, Pack<D::coupled>>;
@@ -232,6 +135,13 @@ template <class D>
     else
         return CoupledOf<D>::load(x.data());
 }
+template <class D>
+const double* coupled_numbers(const StateOf<D>& x) {
+    if constexpr (std::same_as<D, Any>)
+        return x.coupled.data();
+    else
+        return x.data();
+}
 // The coupled states into memory.
 template <class D, class To>
 [[gnu::always_inline]] inline void store(const auto& x, To&& to) {
@@ -244,13 +154,15 @@ template <class D, class To>
 }
 // Those of a form.
 template <class D>
-[[gnu::always_inline]] inline CoupledOf<D> coupled(const LinearFormOf<D>& f) {
+[[gnu::always_inline]] inline CoupledOf<D> coupled(const LinearForm& f) {
     if constexpr (std::same_as<D, Any>) {
         Numbers out;
-        f.each_of(AnyForm::of_coupled, 0, [&](int k, double factor) { out[k] = factor; });
+        for (const auto& [k, factor] : f.of_coupled()) out[k] = factor;
         return out;
     } else {
-        return CoupledOf<D>::load(f.c.data());
+        ColumnOf<D> out{};
+        for (const auto& [k, factor] : f.of_coupled()) out[static_cast<std::size_t>(k)] = factor;
+        return load<D>(out);
     }
 }
 template <class D>
@@ -303,40 +215,11 @@ struct InstantOf {
     InputsOf<D> input_magnitudes{};  // sums of the magnitudes of the inputs' parts
 };
 
-// Calls use(place, factor) for each term of a form that may be other than zero and belongs to a state; use(number,
-// factor) for those that belong to inputs, or to the memory.
+// Calls use(place, factor) for each term of a form that belongs to a state, by its place in the kernel.
 template <class D, class Use>
-[[gnu::always_inline]] inline void each_state_of(const LinearFormOf<D>& f, Use&& use) {
-    if constexpr (std::same_as<D, Any>) {
-        f.each_of(AnyForm::of_coupled, 0, use);
-        f.each_of(AnyForm::of_angles, 0, use);
-    } else {
-        for (int k = 0; k < D::states; ++k) use(k, f.c[k]);
-    }
-}
-template <class D, class Use>
-[[gnu::always_inline]] inline void each_input_of(const LinearFormOf<D>& f, Use&& use) {
-    if constexpr (std::same_as<D, Any>)
-        f.each_of(AnyForm::of_inputs, D::first_input, use);
-    else
-        for (int i = 0; i < D::inputs; ++i) use(i, f.c[D::first_input + i]);
-}
-template <class D, class Use>
-[[gnu::always_inline]] inline void each_memory_of(const LinearFormOf<D>& f, Use&& use) {
-    if constexpr (std::same_as<D, Any>)
-        f.each_of(AnyForm::of_memory, D::first_memory, use);
-    else
-        for (int k = 0; k < D::memory; ++k) use(k, f.c[D::first_memory + k]);
-}
-// The coefficient of 1.
-template <class D>
-double constant_of(const LinearFormOf<D>& f) {
-    if constexpr (std::same_as<D, Any>) {
-        const auto [one, end] = f.c.part(AnyForm::of_one);
-        return one == end ? 0.0 : one->factor;
-    } else {
-        return f.c[D::one];
-    }
+[[gnu::always_inline]] inline void each_state_of(const LinearForm& f, Use&& use) {
+    for (const auto& [k, factor] : f.of_coupled()) use(k, factor);
+    for (const auto& [j, factor] : f.of_angles()) use(D::coupled + j, factor);
 }
 // term(0) + term(1) + ... of the coupled states, in pairs and fours.
 template <class D, class Term>
@@ -352,62 +235,43 @@ template <class D, class Term>
 }
 
 // The part of a form that depends on neither state nor inputs: constant within a regime.
-template <class D>
-double constant_part(const LinearFormOf<D>& f, const typename D::Memory& m) {
-    double sum = constant_of<D>(f);
-    each_memory_of<D>(f, [&](int k, double factor) ALWAYS_INLINE { sum += factor * m[k]; });
+template <class Memory>
+double constant_part(const LinearForm& f, const Memory& m) {
+    double sum = f.one;
+    for (const auto& [k, factor] : f.of_memory()) sum += factor * m[k];
+    return sum;
+}
+
+template <class Inputs>
+double input_part(const LinearForm& f, const Inputs& u) {
+    double sum = 0.0;
+    for (const auto& [i, factor] : f.of_inputs()) sum += factor * u[i];
     return sum;
 }
 
 template <class D>
-double input_part(const LinearFormOf<D>& f, const InputsOf<D>& u) {
-    if constexpr (std::same_as<D, Any>) {
-        double sum = 0.0;
-        each_input_of<D>(f, [&](int i, double factor) { sum += factor * u[i]; });
-        return sum;
-    } else {
-        double sum = f.c[D::first_input] * u[0];
-        for (int i = 1; i < D::inputs; ++i) sum += f.c[D::first_input + i] * u[i];
-        return sum;
-    }
-}
-
-// The part of the coupled states.
-template <class D>
-double coupled_part(const LinearFormOf<D>& f, const StateOf<D>& x) {
-    if constexpr (std::same_as<D, Any>) {
-        return f.sum_of_coupled([&](int k, double factor) { return factor * x.coupled[k]; });
-    } else {
-        return (CoupledOf<D>::load(f.c.data()) * coupled(x)).sum();
-    }
-}
-
-template <class D>
-double evaluate(const LinearFormOf<D>& f, const StateOf<D>& x, const typename D::Memory& m, const InputsOf<D>& u) {
-    double own = coupled_part<D>(f, x);
-    if constexpr (std::same_as<D, Any>) {
-        f.each_of(AnyForm::of_angles, 0, [&](int k, double factor) { own += factor * x[k]; });
-    } else {
-        for (int j = D::coupled; j < D::states; ++j) own += f.c[j] * x[j];
-    }
-    return (constant_part<D>(f, m) + input_part<D>(f, u)) + own;
+double evaluate(const LinearForm& f, const StateOf<D>& x, const typename D::Memory& m, const InputsOf<D>& u) {
+    double own = f.sum_of_coupled([at = coupled_numbers<D>(x)](int k, double factor) { return factor * at[k]; });
+    for (const auto& [j, factor] : f.of_angles()) own += factor * x[D::coupled + j];
+    return (constant_part(f, m) + input_part(f, u)) + own;
 }
 
 // Sum of the magnitudes of the terms: rounding in evaluate() is a small multiple of epsilon times this.
 template <class D>
-double magnitude(const LinearFormOf<D>& f, const StateOf<D>& x, const typename D::Memory& m, const InputsOf<D>& u) {
-    double sum = std::fabs(constant_of<D>(f));
-    each_memory_of<D>(f, [&](int k, double factor) ALWAYS_INLINE { sum += std::fabs(factor * m[k]); });
-    each_input_of<D>(f, [&](int i, double factor) ALWAYS_INLINE { sum += std::fabs(factor * u[i]); });
-    each_state_of<D>(f, [&](int k, double factor) ALWAYS_INLINE { sum += std::fabs(factor * x[k]); });
+double magnitude(const LinearForm& f, const StateOf<D>& x, const typename D::Memory& m, const InputsOf<D>& u) {
+    double sum = std::fabs(f.one);
+    for (const auto& [k, factor] : f.of_memory()) sum += std::fabs(factor * m[k]);
+    for (const auto& [i, factor] : f.of_inputs()) sum += std::fabs(factor * u[i]);
+    each_state_of<D>(f, [&](int k, double factor) { sum += std::fabs(factor * x[k]); });
     return sum;
 }
 
 // The same for a time derivative of the form, where the constant terms have dropped out.
 template <class D>
-double evaluate_rate(const LinearFormOf<D>& f, const StateOf<D>& rate, const InputsOf<D>& input_rate) {
-    double sum = input_part<D>(f, input_rate);
-    each_state_of<D>(f, [&](int k, double factor) ALWAYS_INLINE { sum += factor * rate[k]; });
+[[gnu::always_inline]] inline double evaluate_rate(const LinearForm& f, const StateOf<D>& rate,
+                                                   const InputsOf<D>& input_rate) {
+    double sum = input_part(f, input_rate);
+    each_state_of<D>(f, [&](int k, double factor) { sum += factor * rate[k]; });
     return sum;
 }
 
@@ -419,7 +283,6 @@ class FormTable {
     static_assert(N % vec_width == 0);
     static constexpr bool any = std::same_as<D, Any>;
     using Values = std::conditional_t<any, NumbersIn<32>, std::array<double, N>>;
-    using LinearForm = LinearFormOf<D>;
     using State = StateOf<D>;
     using Inputs = InputsOf<D>;
     using Memory = typename D::Memory;
@@ -449,6 +312,7 @@ class FormTable {
 
     void set(int row, const LinearForm& f) {
         rows_ = std::max(rows_, (row + vec_width) / vec_width * vec_width);
+        assert(f.of_angles().empty());
         if (sparse()) {
             if constexpr (any) {
                 if (row >= static_cast<int>(forms_.size())) forms_.resize(static_cast<std::size_t>(row) + 1);
@@ -458,37 +322,39 @@ class FormTable {
             if constexpr (any)
                 for (std::size_t n = block_.size(); n < static_cast<std::size_t>(rows_ * width()); ++n)
                     block_.push_back(static_cast<int>(n) / vec_width % width() == one_column() ? 1.0 : 0.0);
-            at_place(row, one_column()) = constant_of<D>(f);
-            each_state_of<D>(f, [&](int k, double c) {
-                assert(k < D::coupled || c == 0.0);
-                if (k < D::coupled) at_place(row, k) = c;
-            });
-            each_memory_of<D>(f, [&](int k, double c) { at_place(row, memory_column() + k) = c; });
-            each_input_of<D>(f, [&](int i, double c) { at_place(row, input_column() + i) = c; });
+            at_place(row, one_column()) = f.one;
+            for (const auto& [k, c] : f.of_coupled()) at_place(row, k) = c;
+            for (const auto& [k, c] : f.of_memory()) at_place(row, memory_column() + k) = c;
+            for (const auto& [i, c] : f.of_inputs()) at_place(row, input_column() + i) = c;
         }
-        each_input_of<D>(f, [&](int i, double c) {
-            driven_ = driven_ || c != 0.0;
-            depends_on_.see_input(i, c);
-        });
-        each_memory_of<D>(f, [&](int k, double c) { depends_on_.see_memory(k, c); });
+        driven_ = driven_ || !f.of_inputs().empty();
+        for (const auto& [i, c] : f.of_inputs()) depends_on_.see_input(i, c);
+        for (const auto& [k, c] : f.of_memory()) depends_on_.see_memory(k, c);
     }
     int rows() const { return rows_; }  // rounded up to whole vectors
-    double coefficient(int row, int term) const {
+    // About what a table of any size takes beside itself.
+    std::size_t bytes() const { return sizeof(double) * block_.size() + sizeof(LinearForm) * forms_count(); }
+    // Those of coupled states and of inputs in a form.
+    double of_coupled(int row, int k) const {
         if constexpr (any)
-            if (sparse()) return forms_[static_cast<std::size_t>(row)].c[term];
-        const int column = term < D::coupled        ? term
-                           : term < D::first_memory ? one_column()
-                           : term < D::first_input  ? memory_column() + term - D::first_memory
-                                                    : input_column() + term - D::first_input;
-        return block_[index(row, column)];
+            if (sparse()) return forms_[static_cast<std::size_t>(row)].of(k);
+        return block_[index(row, k)];
+    }
+    double of_input(int row, int i) const {
+        if constexpr (any)
+            if (sparse()) {
+                for (const auto& [place, factor] : forms_[static_cast<std::size_t>(row)].of_inputs())
+                    if (place == i) return factor;
+                return 0.0;
+            }
+        return block_[index(row, input_column() + i)];
     }
 
     // The parts that depend on neither state nor inputs.
     void constants(const Memory& m, Values& out) const {
         each_vector(out, [&](int g) ALWAYS_INLINE {
             if constexpr (any)
-                if (sparse())
-                    return each_form<Vec>(g, 1.0, [&](const LinearForm& f) { return constant_part<D>(f, m); });
+                if (sparse()) return each_form<Vec>(g, 1.0, [&](const LinearForm& f) { return constant_part(f, m); });
             const auto c = factors(g);
             Vec sum = c(one_column());
             for (int k = 0; k < depends_on_.memory; ++k) sum += m[k] * c(memory_column() + k);
@@ -529,7 +395,7 @@ class FormTable {
                 return forms_[static_cast<std::size_t>(row)].sum_of_coupled(
                     [&](int k, double c) { return std::fabs(c * x.coupled[k]); });
         const auto c = factors<double>(row);
-        const double* state = coupled_numbers(x);
+        const double* state = coupled_numbers<D>(x);
         return sum_of_states<D>(n_.coupled, [&](auto k) ALWAYS_INLINE { return std::fabs(c(k) * state[k]); });
     }
     void rate_magnitudes(const State& rate, const Inputs& input_rate, Values& out) const {
@@ -562,7 +428,7 @@ class FormTable {
                 return each_form<V>(g, 0.0, [&](const LinearForm& f) { return form_terms<magnitudes>(f, x, u); });
         const auto c = [at = factors<V>(g)](std::ptrdiff_t k)
                            ALWAYS_INLINE { return magnitudes ? absolute(at(k)) : at(k); };
-        const double* state = coupled_numbers(x);
+        const double* state = coupled_numbers<D>(x);
         const V sum = sum_of_states<D>(n_.coupled, [&](auto k) ALWAYS_INLINE { return c(k) * state[k]; });
         if (!driven_) return sum;
         V forced = c(input_column()) * u[0];
@@ -575,8 +441,8 @@ class FormTable {
             if (sparse())
                 return each_form<V>(g, 0.0, [&](const LinearForm& f) {
                     double kept = 0.0;
-                    each_memory_of<D>(f, [&](int k, double c) { kept += m[k] * std::fabs(c); });
-                    return std::fabs(constant_of<D>(f)) + kept + form_terms<true>(f, x, u);
+                    for (const auto& [i, c] : f.of_memory()) kept += m[i] * std::fabs(c);
+                    return std::fabs(f.one) + kept + form_terms<true>(f, x, u);
                 });
         const auto c = factors<V>(g);
         V kept = m[0] * absolute(c(memory_column()));
@@ -602,21 +468,21 @@ class FormTable {
         const auto c = [](double factor) { return magnitudes ? std::fabs(factor) : factor; };
         const double own = f.sum_of_coupled([&](int k, double factor) { return c(factor) * x.coupled[k]; });
         double forced = 0.0;
-        each_input_of<D>(f, [&](int i, double factor) { forced += c(factor) * u[i]; });
+        for (const auto& [i, factor] : f.of_inputs()) forced += c(factor) * u[i];
         return own + forced;
     }
 
+    std::size_t forms_count() const {
+        if constexpr (any)
+            return forms_.size();
+        else
+            return 0;
+    }
     bool sparse() const {
         if constexpr (any)
             return sparse_;
         else
             return false;
-    }
-    static const double* coupled_numbers(const State& x) {
-        if constexpr (any)
-            return x.coupled.data();
-        else
-            return x.data();
     }
     // Where the coefficients lie: column by column those of the forms of one vector, vector by vector, so that what is
     // used lies together. The columns are [coupled states][angles, where sizes are fixed][1][memory][inputs].

@@ -150,10 +150,9 @@ class LongStep {
     template <int N>
     std::vector<double> coefficients(const FormTable<D, N>& forms, int row, double constant) const {
         std::vector<double> c(size());
-        for (std::size_t k = 0; k < n_coupled; ++k) c[k] = forms.coefficient(row, static_cast<int>(k));
+        for (std::size_t k = 0; k < n_coupled; ++k) c[k] = forms.of_coupled(row, static_cast<int>(k));
         c[unit] = constant;
-        for (std::size_t i = 0; i < n_inputs; ++i)
-            c[line + i] = forms.coefficient(row, D::first_input + static_cast<int>(i));
+        for (std::size_t i = 0; i < n_inputs; ++i) c[line + i] = forms.of_input(row, static_cast<int>(i));
         for (std::size_t q = 0; q < sines_.size(); ++q) c[sine + 2 * q] = c[line + sines_[q].input];
         return c;
     }

@@ -224,31 +224,28 @@ struct LinearRatesOf {
     const std::vector<GivenState>* given = nullptr;  // states that are given speeds, if there are any
 
     LinearRatesOf() = default;
-    // From the rates of all states.
-    LinearRatesOf(const CountsOf<D>&, const ByState<D, LinearFormOf<D>>& of) {
-        for (int j = 0; j < D::angles; ++j) {
-            const LinearFormOf<D>& angle = of[D::coupled + j];
-            for (int k = 0; k < D::coupled; ++k)
-                if (angle.c[k] != 0.0) angle_speed.set(j, k);
-            angle_coefficient[j] = angle.c[angle_speed[j]];
-            for (int k = 0; k < D::terms; ++k) assert(k == angle_speed[j] || angle.c[k] == 0.0);
-        }
-        for (int r = 0; r < D::coupled; ++r) {
-            const LinearFormOf<D>& f = of[r];
-            for (int j = D::coupled; j < D::states; ++j) assert(f.c[j] == 0.0);
-            for (int c = 0; c < D::coupled; ++c) rate.column[c][r] = f.c[c];
-            for (int i = 0; i < D::inputs; ++i) {
-                input_column[i][r] = f.c[D::first_input + i];
-                depends_on.see_input(i, input_column[i][r]);
+    // From those of the coupled states and of the angles.
+    LinearRatesOf(const CountsOf<D>&, std::span<const LinearForm> of, std::span<const LinearForm> of_angles) {
+        for (std::size_t j = 0; j < of_angles.size(); ++j)
+            for (const auto& [k, factor] : of_angles[j].of_coupled()) {
+                angle_speed.set(static_cast<int>(j), k);
+                angle_coefficient[j] = factor;
             }
-            fixed[r] = f.c[D::one];
-            for (int k = 0; k < D::memory; ++k) {
-                per_memory[k][r] = f.c[D::first_memory + k];
-                depends_on.see_memory(k, per_memory[k][r]);
+        for (std::size_t r = 0; r < of.size() && r < D::coupled; ++r) {
+            const LinearForm& f = of[r];
+            assert(f.of_angles().empty());
+            for (const auto& [c, factor] : f.of_coupled()) rate.column[static_cast<std::size_t>(c)][r] = factor;
+            for (const auto& [i, factor] : f.of_inputs()) {
+                input_column[static_cast<std::size_t>(i)][r] = factor;
+                depends_on.see_input(i, factor);
+            }
+            fixed[r] = f.one;
+            for (const auto& [k, factor] : f.of_memory()) {
+                per_memory[static_cast<std::size_t>(k)][r] = factor;
+                depends_on.see_memory(k, factor);
             }
         }
     }
-
     // The part of dx/dt that depends on neither state nor inputs.
     Column constant(const Memory& m) const {
         Coupled kept = m[0] * load(per_memory[0]);
@@ -368,7 +365,7 @@ struct LinearRatesOf<Any> {
         int row, memory;
         double factor;
     };
-    const AnyForm& row(int r) const { return (*rows_)[static_cast<std::size_t>(r)]; }
+    const LinearForm& row(int r) const { return rows_[static_cast<std::size_t>(r)]; }
     template <class Value>
     Coupled of_memory(Value&& value) const {
         Coupled kept = Coupled::zeros(n.coupled);
@@ -389,28 +386,26 @@ struct LinearRatesOf<Any> {
 
  public:
     LinearRatesOf() = default;
-    LinearRatesOf(const CountsOf<D>& counts, const ByState<D, AnyForm>& of)
-        : n(counts), input_column(static_cast<std::size_t>(counts.inputs)), rows_(&of.coupled) {
+    LinearRatesOf(const CountsOf<D>& counts, std::span<const LinearForm> of, std::span<const LinearForm> of_angles)
+        : n(counts), input_column(static_cast<std::size_t>(counts.inputs)), rows_(of) {
         for (int j = 0; j < n.angles; ++j)
-            of[D::coupled + j].each_term([&](int place, double factor) {
-                if (factor == 0.0) return;
-                angle_speed.set(j, place);
+            for (const auto& [k, factor] : of_angles[static_cast<std::size_t>(j)].of_coupled()) {
+                angle_speed.set(j, k);
                 angle_coefficient[j] = factor;
-            });
+            }
         make_room(angle_coefficient, n.angles);
         make_room(fixed_, n.coupled);
         for (Column& c : input_column) make_room(c, n.coupled);
         sparse_.of_input.resize(input_column.size());
         for (int r = 0; r < n.coupled; ++r) {
-            const AnyForm& f = row(r);
-            each_input_of<D>(f, [&](int i, double factor) {
-                if (factor == 0.0) return;
+            const LinearForm& f = row(r);
+            for (const auto& [i, factor] : f.of_inputs()) {
                 input_column[static_cast<std::size_t>(i)][r] = factor;
                 sparse_.of_input[static_cast<std::size_t>(i)].emplace_back(r, factor);
                 depends_on.see_input(i, factor);
-            });
-            fixed_[r] = constant_of<D>(f);
-            each_memory_of<D>(f, [&](int k, double factor) { of_memory_.push_back({r, k, factor}); });
+            }
+            fixed_[r] = f.one;
+            for (const auto& [k, factor] : f.of_memory()) of_memory_.push_back({r, k, factor});
             each_in_row(r, [&](int c, double factor) {
                 sparse_.column.push_back(c);
                 sparse_.factor.push_back(factor);
@@ -485,7 +480,7 @@ struct LinearRatesOf<Any> {
     // The fastest rates [1/s] by which a state decays or grows by itself, and by which two swing.
     double fastest_decay() const {
         double most = 0.0;
-        for (int r = 0; r < n.coupled; ++r) most = std::fmax(most, std::fabs(row(r).c[r]));
+        for (int r = 0; r < n.coupled; ++r) most = std::fmax(most, std::fabs(row(r).of(r)));
         return most;
     }
     double fastest_swing() const {
@@ -494,7 +489,7 @@ struct LinearRatesOf<Any> {
     // Calls use(column, coefficient) for what of a row may be other than zero.
     template <class Use>
     void each_in_row(int r, Use&& use) const {
-        row(r).each_of(AnyForm::of_coupled, 0, use);
+        for (const auto& [c, factor] : row(r).of_coupled()) use(c, factor);
     }
 
     State magnitude(const State& x, const Memory& m, const Inputs& u) const {
@@ -514,7 +509,7 @@ struct LinearRatesOf<Any> {
             to[r] =
                 row(r).sum_of_coupled([&](int k, double factor) { return derivative.coupled[k] * std::fabs(factor); });
             double forced = 0.0;
-            each_input_of<D>(row(r), [&](int i, double c) { forced += u[i] * std::fabs(c); });
+            for (const auto& [i, c] : row(r).of_inputs()) forced += u[i] * std::fabs(c);
             to[r] += forced;
         }
         out.angle = angle_rate(derivative.coupled);
@@ -528,12 +523,12 @@ struct LinearRatesOf<Any> {
         double square = 0.0;
         for (int r = 0; r < n.coupled; ++r)
             each_in_row(r, [&](int c, double factor) {
-                if (counts(r, c)) square = std::fmax(square, std::fabs(factor * row(c).c[r]));
+                if (counts(r, c)) square = std::fmax(square, std::fabs(factor * row(c).of(r)));
             });
         return std::sqrt(square);
     }
 
-    const std::vector<AnyForm>* rows_ = nullptr;  // those of the regime
+    std::span<const LinearForm> rows_;  // those of the regime
     SparseRates sparse_;
     Column fixed_;
     std::vector<OfMemory> of_memory_;  // row by row

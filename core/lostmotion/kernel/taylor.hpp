@@ -67,18 +67,16 @@ class Expansion {
     }
 
     // A form of the motion that does not depend on an angle, as a polynomial in the time [s] from the instant.
-    [[gnu::always_inline]] Polynomial polynomial(const LinearFormOf<D>& form, double value) const {
+    [[gnu::always_inline]] Polynomial polynomial(const LinearForm& form, double value) const {
         Polynomial p(value);
         const Coupled c = lostmotion::coupled<D>(form);
-        bool driven = false;
-        each_input_of<D>(form, [&](int, double factor) ALWAYS_INLINE { driven = driven || factor != 0.0; });
         for (int part = 0; part < Polynomial::parts; ++part) {
             const Coupled* v = &coupled[static_cast<std::size_t>(4 * part)];
             p.part[part] = sums(c * v[0], c * v[1], c * v[2], c * v[3]);
-            if (driven) {
+            if (!form.of_inputs().empty()) {
                 const auto* u = &input[static_cast<std::size_t>(4 * part + 1)];
-                p.part[part] = p.part[part] + Pack<4>::of({input_part<D>(form, u[0]), input_part<D>(form, u[1]),
-                                                           input_part<D>(form, u[2]), input_part<D>(form, u[3])});
+                p.part[part] = p.part[part] + Pack<4>::of({input_part(form, u[0]), input_part(form, u[1]),
+                                                           input_part(form, u[2]), input_part(form, u[3])});
             }
             p.part[part] = p.part[part] * four_over_factorial(part);
         }

@@ -15,7 +15,7 @@ class ComponentLaws<model::TrainSystem<D>> {
     using State = StateOf<D>;
     using Memory = typename D::Memory;
     using Components = ComponentsOf<D>;
-    using Locked = model::LockedTorque<LinearFormOf<D>>;
+    using Locked = model::LockedTorque<LinearForm>;
 
     explicit ComponentLaws(const System& system)
         : assembly_(system.assembly()),
@@ -71,7 +71,7 @@ class ComponentLaws<model::TrainSystem<D>> {
     std::vector<Components> constraints(const model::Key& key) const {
         std::vector<Components> out;
         for (const model::Row& r : model::geometric_constraints(assembly_, key))
-            out.push_back(gradient<D>(model::pack<D>(r, assembly_.layout())));
+            out.push_back(gradient<D>(model::OwnForm(r, assembly_.layout())));
         return out;
     }
 
@@ -132,14 +132,14 @@ class ComponentLaws<model::TrainSystem<D>> {
         Components row;
         double by_time;
         const auto add_before = [&](int contact, double share) {
-            const LinearFormOf<D>& was = locked_.torque(r.before, contact);
+            const LinearForm& was = locked_.torque(r.before, contact);
             const Components g = gradient<D>(was);
             each_component<D>(counts_, [&](int i) { row[i] += share * g[i]; });
-            by_time += share * input_part<D>(was, r.input[1]);
+            by_time += share * input_part(was, r.input[1]);
         };
-        const auto add_now = [&](const LinearFormOf<D>& form, double factor) {
+        const auto add_now = [&](const LinearForm& form, double factor) {
             const Components g = gradient<D>(form);
-            by_time += factor * input_part<D>(form, r.input_after[1]);
+            by_time += factor * input_part(form, r.input_after[1]);
             each_component<D>(counts_, [&](int j) {
                 if (g[j] == 0.0) return;
                 each_component<D>(counts_, [&](int i) { row[i] += factor * g[j] * jump.row[j][i]; });
@@ -166,9 +166,6 @@ class ComponentLaws<model::TrainSystem<D>> {
         }
         locked_.each_given(*hold, r.after,
                            [&](const Locked& l) { set(l, [&] { add_now(locked_.torque(in, l.contact), 1.0); }); });
-    }
-    static double magnitude_of(const LinearFormOf<D>& f, const State& x, const Memory& m, const InputsOf<D>& u) {
-        return lostmotion::magnitude<D>(f, x, m, u);
     }
 
     const model::Assembly& assembly_;

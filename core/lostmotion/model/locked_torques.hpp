@@ -21,8 +21,7 @@ class LockedTorques {
     using Regime = typename System::Regime;
     using State = StateOf<D>;
     using Memory = typename D::Memory;
-    using Form = LinearFormOf<D>;
-    using Locked = model::LockedTorque<Form>;
+    using Locked = model::LockedTorque<LinearForm>;
     using Torques = Few<double, 12>;  // by contact
 
     explicit LockedTorques(const System& system) : system_(system) {}
@@ -39,9 +38,10 @@ class LockedTorques {
         Hold hold;
         if (holds(rest, rest, torques, x, memory, u, hold.bounds)) return hold;
         std::vector<const typename System::Guard*> used_up;
-        for (int g = 0; g < rest.n_guards && used_up.size() < max_at_limit; ++g)
-            if (rest.guards[g].kind == model::Guard::capacity && is_zero(rest.guards[g].form, x, memory, u))
-                used_up.push_back(&rest.guards[g]);
+        for (const auto& guard : rest.guards)
+            if (used_up.size() < max_at_limit && guard.kind == model::Guard::capacity &&
+                is_zero(guard.form, x, memory, u))
+                used_up.push_back(&guard);
         InstantOf<D> now{};
         now.x = x;
         now.memory = memory;
@@ -53,7 +53,7 @@ class LockedTorques {
                 for (std::size_t k = 0; k < used_up.size(); ++k)
                     if (some >> k & 1)
                         modes.modes[used_up[k]->contact] = static_cast<std::int8_t>(used_up[k]->neighbour);
-                auto at_limit = std::make_unique<const Regime>(system_.build_at(rest, modes, now));
+                auto at_limit = system_.build_at(rest, modes, now);
                 if (!at_limit->solvable || !holds(*at_limit, rest, torques, x, memory, u, hold.bounds)) continue;
                 hold.at_limit = std::move(at_limit);
                 return hold;
@@ -76,7 +76,7 @@ class LockedTorques {
             if (!hold.at_limit->redundant[l.contact]) use(l);
     }
     // What a contact of a gear or of a coupling takes.
-    const Form& torque(const Regime& r, int contact) const {
+    const LinearForm& torque(const Regime& r, int contact) const {
         const model::ContactPlace& c = system_.assembly().places().contacts[static_cast<std::size_t>(contact)];
         return c.kind == model::ContactPlace::gear ? r.output_torque[c.element] : r.contact_torque[contact];
     }
@@ -84,10 +84,10 @@ class LockedTorques {
  private:
     static constexpr std::size_t max_at_limit = 6;  // contacts that come to their limits together
 
-    static double magnitude_of(const Form& f, const State& x, const Memory& m, const InputsOf<D>& u) {
+    static double magnitude_of(const LinearForm& f, const State& x, const Memory& m, const InputsOf<D>& u) {
         return lostmotion::magnitude<D>(f, x, m, u);
     }
-    static bool is_zero(const Form& f, const State& x, const Memory& m, const InputsOf<D>& u) {
+    static bool is_zero(const LinearForm& f, const State& x, const Memory& m, const InputsOf<D>& u) {
         return std::fabs(evaluate<D>(f, x, m, u)) <= rounding * magnitude_of(f, x, m, u);
     }
     // Are the torques that rest leaves open those that this regime gives?
@@ -99,7 +99,7 @@ class LockedTorques {
         for (std::size_t k = 0; k < r.locked.size(); ++k) {
             const Locked& l = r.locked[k];
             double magnitude = std::fabs(torques[l.contact]);
-            const model::HeldTorque held = model::held_torque(l, torques, [&](const Form& form) {
+            const model::HeldTorque held = model::held_torque(l, torques, [&](const LinearForm& form) {
                 magnitude += magnitude_of(form, x, m, u);
                 return evaluate<D>(form, x, m, u);
             });
@@ -109,9 +109,9 @@ class LockedTorques {
         }
         for (const Locked& l : rest.locked) {
             if (r.redundant[l.contact]) continue;
-            Form gap = torque(r, l.contact);
-            gap.c[D::first_memory + l.memory] -= 1.0;
-            if (!is_zero(gap, x, memory, u)) return false;
+            const LinearForm& given = torque(r, l.contact);
+            const double was = memory[l.memory], gap = evaluate<D>(given, x, memory, u) - was;
+            if (!(std::fabs(gap) <= rounding * (magnitude_of(given, x, memory, u) + std::fabs(was)))) return false;
         }
         return true;
     }

@@ -120,7 +120,7 @@ Found SwitchedTrain::find_after(Instant& now, const MovedShafts& moved, Event ev
 
 // How long flanks of one gear that have just parted go on to strike; -1 if they do not, or their flights are to be
 // seen.
-double SwitchedTrain::time_to_rest(const SearchedRegime& r, const Instant& now, int contact) {
+double SwitchedTrain::time_to_rest(const SparseRegime& r, const Instant& now, int contact) {
     constexpr double epsilon = std::numeric_limits<double>::epsilon();
     const ContactPlace& p = places().contacts[contact];
     const double restitution = train().gears[static_cast<std::size_t>(p.element)].restitution;
@@ -129,8 +129,7 @@ double SwitchedTrain::time_to_rest(const SearchedRegime& r, const Instant& now, 
     if (!(v > 0.0)) return -1.0;
     Row row;
     p.each_shaft([&](int s, double per) { row.c[places().shafts[s].speed] += side * per; });
-    const SparseForm::Block block(row, assembly_.layout());
-    const SparseForm& approach = block.form;
+    const OwnForm approach(row, assembly_.layout());
     SparseFlow along(r.rate, now, room_);
     const double a0 = along.rate(approach, 1), a1 = along.rate(approach, 2), a2 = along.rate(approach, 3);
     if (!(a0 > rounding * along.rate_magnitude(approach, 1))) return -1.0;
@@ -156,7 +155,7 @@ double SwitchedTrain::time_to_rest(const SearchedRegime& r, const Instant& now, 
 
 // The same of all flanks that strike in turn, and are pressed in this regime, in which they touch. energy: K. before:
 // where their gaps were.
-double SwitchedTrain::time_to_rest(const SearchedRegime& r, const Instant& now, const Instant& before,
+double SwitchedTrain::time_to_rest(const SparseRegime& r, const Instant& now, const Instant& before,
                                    const Impulses& joined, double energy) {
     SparseFlow along(r.rate, now, room_);
     struct Pressed {

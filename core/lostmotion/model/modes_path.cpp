@@ -13,7 +13,7 @@ bool SwitchedTrain::conditions(Instant now, const Key& modes, const Event& event
     locate_losses(now, event.gear, trial);
     if (some_redundant_) hold(regimes_[trial], now, event);
     trial = branches_at(regimes_[trial], trial, now);
-    const SearchedRegime& r = regimes_[trial];
+    const SparseRegime& r = regimes_[trial];
     constexpr double none = std::numeric_limits<double>::infinity();
     out.assign(static_cast<std::size_t>(contacts()), {none, none, none});
     SparseFlow along(r.rate, now, room_);

@@ -15,11 +15,7 @@ SwitchedTrain::SwitchedTrain(const Assembly& assembly) : assembly_(assembly), re
     }
 }
 
-Key SwitchedTrain::branches_at(const Key& other, const Key& modes, Instant now) {
-    now.reach(assembly_.layout());
-    return branches_at(regimes_[other], modes, now);
-}
-Key SwitchedTrain::branches_at(const SearchedRegime& other, const Key& modes, const Instant& now) const {
+Key SwitchedTrain::branches_at(const SparseRegime& other, const Key& modes, const Instant& now) const {
     Key key;
     key.modes = modes.modes;
     Torques T_2{};
@@ -109,7 +105,7 @@ Found SwitchedTrain::start(Instant& now, Key& key) {
 Found SwitchedTrain::next(Instant& now, int fired_number, Key& key, const Inputs& input, const Rest& given_rest) {
     now.reach(assembly_.layout());
     regimes_.make_room();
-    const SearchedRegime& old = regimes_[key];
+    const SparseRegime& old = regimes_[key];
     const Guard* fired = fired_number == nowhere ? nullptr : &old.guards[static_cast<std::size_t>(fired_number)];
     if (fired != nullptr && fired->kind == Guard::impact) return strikes(now, *fired, key);
     Event event;
@@ -186,12 +182,11 @@ bool SwitchedTrain::breaks_away(Instant& now, const Event& event, double margin_
 }
 
 // Does a contact that is to slip turn against that just after now, by more than rounding may make?
-bool SwitchedTrain::turns_the_other_way(const SearchedRegime& r, const Instant& now, const Event& event) {
+bool SwitchedTrain::turns_the_other_way(const SparseRegime& r, const Instant& now, const Event& event) {
     const ContactPlace& c = places().contacts[event.contact];
     Row row;
     c.each_shaft([&](int s, double per) { row.c[places().shafts[s].speed] += event.neighbour * per; });
-    const SparseForm::Block block(row, assembly_.layout());
-    const SparseForm& speed = block.form;
+    const OwnForm speed(row, assembly_.layout());
     SparseFlow along(r.rate, now, room_);
     return sign_after(along, speed, evaluate(speed, now), magnitude(speed, now)).relative < -max_violation;
 }
@@ -291,7 +286,7 @@ int SwitchedTrain::numbered_combination(std::uint64_t number, const Event& event
     return combination(next, event, from, out);
 }
 
-double SwitchedTrain::torque_change(const SearchedRegime& r, const Instant& now, const Event& event) const {
+double SwitchedTrain::torque_change(const SparseRegime& r, const Instant& now, const Event& event) const {
     double sum = 0.0;
     for (std::size_t g = 0; g < train().gears.size(); ++g)
         sum += std::fabs(evaluate(r.output_torque[g], now) - event.gear[g]);
@@ -299,7 +294,7 @@ double SwitchedTrain::torque_change(const SearchedRegime& r, const Instant& now,
     return sum;
 }
 
-const SwitchedTrain::Guard* SwitchedTrain::first_left(const SearchedRegime& r, const Instant& now,
+const SwitchedTrain::Guard* SwitchedTrain::first_left(const SparseRegime& r, const Instant& now,
                                                       const std::vector<std::size_t>& ignored, const Event& event,
                                                       Violated& of_contacts) {
     const auto each_near_zero = [&](auto&& use) {
@@ -312,7 +307,7 @@ const SwitchedTrain::Guard* SwitchedTrain::first_left(const SearchedRegime& r, c
             if (!use(guard, value, size)) return;
         }
     };
-    return model::first_left<SparseForm>(
+    return model::first_left<LinearForm>(
         SparseFlow(r.rate, now, room_), r.drivers, each_near_zero,
         [&](const Guard& g) { return event.by_value_alone(g); }, of_contacts);
 }
@@ -469,7 +464,7 @@ bool SwitchedTrain::holds_more(const ContactPlace& c) const {
 // value or, of one that is zero to rounding, by the rate. A value is zero, too, if it is so beside what the terms are
 // at rated load and speed: an elimination leaves that where all else is zero. Higher derivatives, of which rounding may
 // leave less, choose among combinations that all else allows.
-double SwitchedTrain::violation(const SearchedRegime& r, const Instant& now, const Event& event) {
+double SwitchedTrain::violation(const SparseRegime& r, const Instant& now, const Event& event) {
     SparseFlow along(r.rate, now, room_);
     double worst = 0.0;
     for (std::size_t g = 0; g < r.guards.size(); ++g) {

@@ -82,7 +82,7 @@ void SwitchedTrain::locate_losses(const Instant& now, const Torques& T_2, Key& t
 
 // Torques that the motion does not determine are held, from the load to the motors. Whether all contacts can hold them,
 // the guards tell.
-void SwitchedTrain::hold(const SearchedRegime& r, Instant& now, const Event& event) const {
+void SwitchedTrain::hold(const SparseRegime& r, Instant& now, const Event& event) const {
     if (r.locked.empty()) return;
     Torques torques{};
     for (int c = 0; c < contacts(); ++c) {
@@ -199,7 +199,7 @@ auto SwitchedTrain::walk(Instant& now, const Event& event, Key trial, Key& key, 
     std::vector<std::size_t> along;  // edges that lead back to where the walk came from: the motion goes along them
     Trial result;
     for (int step = 0; step < longest_walk; ++step) {
-        const SearchedRegime& r = regimes_[trial];
+        const SparseRegime& r = regimes_[trial];
         violated.clear();
         if (!r.solvable) return result;
         const Guard* left = first_left(r, now, along, event, violated);

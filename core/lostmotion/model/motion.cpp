@@ -1,5 +1,7 @@
 #include "motion.hpp"
 
+#include <algorithm>
+
 namespace lostmotion::model {
 
 double evaluate(const Layout& n, const Row& f, const Instant& now) {
@@ -24,102 +26,87 @@ double magnitude(const Layout& n, const Row& f, const Instant& now) {
     return sum;
 }
 
-SparseForm::SparseForm(const Row& f, const Layout& n, std::vector<Term>& block) : begin(block.data() + block.size()) {
+std::size_t terms_of(const Row& f) {
+    return static_cast<std::size_t>(std::count_if(f.c.begin(), f.c.end(), [](double c) { return c != 0.0; }));
+}
+
+LinearForm linear_form(const Row& f, const Layout& n, std::vector<LinearForm::Term>& block) {
+    LinearForm out;
+    out.begin = block.data() + block.size();
+    const double* c = f.c.begin();
+    const int known = static_cast<int>(f.c.size());
     int count = 0;
     const auto add = [&](int first, int end) {
-        for (int k = first; k < end && k < static_cast<int>(f.c.size()); ++k)
-            if (const double c = f.c[k]; c != 0.0) {
-                block.push_back({k - first, c});
+        for (int k = first; k < std::min(end, known); ++k)
+            if (c[k] != 0.0) {
+                block.push_back({k - first, c[k]});
                 ++count;
             }
         return count;
     };
-    coupled = add(0, n.coupled);
-    for (int k = n.coupled; k < n.states; ++k)
-        if (const double c = f.c[k]; c != 0.0) {
-            block.push_back({k, c});
-            ++count;
-        }
-    states = count;
-    one = f.c[n.one];
-    memory = add(n.first_memory, n.first_memory + n.memory);
-    inputs = add(n.first_input, n.first_input + n.inputs);
+    out.coupled = add(0, n.coupled);
+    out.states = add(n.coupled, n.states);
+    out.one = f.c[n.one];
+    out.memory = add(n.first_memory, n.first_memory + n.memory);
+    out.inputs = add(n.first_input, n.first_input + n.inputs);
+    return out;
 }
 
-double evaluate(const SparseForm& f, const Instant& now) {
-    const SparseForm::Term* t = f.begin;
+OwnForm::OwnForm(const Row& f, const Layout& n) {
+    terms_.reserve(terms_of(f));
+    static_cast<LinearForm&>(*this) = linear_form(f, n, terms_);
+}
+
+double evaluate(const LinearForm& f, const Instant& now) {
     const double* x = now.x.data();
-    double state = 0.0;
-    for (const SparseForm::Term* end = t + f.coupled; t != end;) {
-        const int four = t->place / 4;
-        double first = 0.0, second = 0.0;  // the halves of the four
-        for (; t != end && t->place / 4 == four; ++t) {
-            const double term = t->factor * x[t->place];
-            const bool behind = (t->place & 2) != 0;
-            first += behind ? 0.0 : term;
-            second += behind ? term : 0.0;
-        }
-        state += first + second;
-    }
-    for (; t != f.begin + f.states; ++t) state += t->factor * x[t->place];
+    double state = f.sum_of_coupled([&](int k, double factor) { return factor * x[k]; });
+    for (const auto& [k, factor] : f.of_angles()) state += factor * x[now.coupled + k];
     double constant = f.one, input = 0.0;
-    for (const double* m = now.memory.data(); t != f.begin + f.memory; ++t) constant += t->factor * m[t->place];
-    for (const double* u = now.input[0].data(); t != f.begin + f.inputs; ++t) input += t->factor * u[t->place];
+    for (const auto& [k, factor] : f.of_memory()) constant += factor * now.memory.data()[k];
+    for (const auto& [i, factor] : f.of_inputs()) input += factor * now.input[0].data()[i];
     return (constant + input) + state;
 }
 
-double magnitude(const SparseForm& f, const Instant& now) {
-    const SparseForm::Term* t = f.begin;
-    double sum = std::fabs(f.one);
-    for (; t != f.begin + f.states; ++t) sum += std::fabs(t->factor * now.x.data()[t->place]);
-    for (; t != f.begin + f.memory; ++t) sum += std::fabs(t->factor * now.memory.data()[t->place]);
-    for (; t != f.begin + f.inputs; ++t)
-        sum += std::fabs(t->factor) *
-               std::fmax(std::fabs(now.input[0].data()[t->place]), now.input_magnitudes.data()[t->place]);
-    return sum;
-}
-
-Sized sized(const SparseForm& f, const Instant& now) {
-    const SparseForm::Term* t = f.begin;
+Sized sized(const LinearForm& f, const Instant& now) {
+    const double* x = now.x.data();
     Sized out{f.one, std::fabs(f.one)};
     const auto add = [&](double term, double size) {
         out.value += term;
         out.size += size;
     };
-    for (const double* x = now.x.data(); t != f.begin + f.states; ++t)
-        add(t->factor * x[t->place], std::fabs(t->factor * x[t->place]));
-    for (const double* m = now.memory.data(); t != f.begin + f.memory; ++t)
-        add(t->factor * m[t->place], std::fabs(t->factor * m[t->place]));
-    for (const double* u = now.input[0].data(); t != f.begin + f.inputs; ++t)
-        add(t->factor * u[t->place],
-            std::fabs(t->factor) * std::fmax(std::fabs(u[t->place]), now.input_magnitudes.data()[t->place]));
+    for (const auto& [k, factor] : f.of_coupled()) add(factor * x[k], std::fabs(factor * x[k]));
+    for (const auto& [k, factor] : f.of_angles())
+        add(factor * x[now.coupled + k], std::fabs(factor * x[now.coupled + k]));
+    for (const auto& [k, factor] : f.of_memory())
+        add(factor * now.memory.data()[k], std::fabs(factor * now.memory.data()[k]));
+    for (const auto& [i, factor] : f.of_inputs()) {
+        const double u = now.input[0].data()[i];
+        add(factor * u, std::fabs(factor) * std::fmax(std::fabs(u), now.input_magnitudes.data()[i]));
+    }
     return out;
 }
+double magnitude(const LinearForm& f, const Instant& now) { return sized(f, now).size; }
 
-SparseFlow::SparseFlow(const std::vector<SparseForm>& rate, const Instant& now, Room& room)
+SparseFlow::SparseFlow(std::span<const LinearForm> rate, const Instant& now, Room& room)
     : rate_(rate), now_(now), room_(room), states_(rate.size()) {
     room_.resize(2 * (n_derivatives + 1) * states_);
 }
 
-double SparseFlow::rate(const SparseForm& f, int k) {
+double SparseFlow::rate(const LinearForm& f, int k) {
     while (order_ < k) extend(++order_);
-    const SparseForm::Term* t = f.begin;
     double input = 0.0, state = 0.0;
-    for (const double* x = derivative(k); t != f.begin + f.states; ++t) state += t->factor * x[t->place];
-    t = f.begin + f.memory;
-    for (const double* u = now_.input[static_cast<std::size_t>(k)].data(); t != f.begin + f.inputs; ++t)
-        input += t->factor * u[t->place];
+    for (const double* x = derivative(k); const auto& [j, factor] : f.of_coupled()) state += factor * x[j];
+    for (const double* u = now_.input[static_cast<std::size_t>(k)].data(); const auto& [i, factor] : f.of_inputs())
+        input += factor * u[i];
     return input + state;
 }
 
-double SparseFlow::rate_magnitude(const SparseForm& f, int k) {
+double SparseFlow::rate_magnitude(const LinearForm& f, int k) {
     while (sized_ < k) extend_sizes(++sized_);
-    const SparseForm::Term* t = f.begin;
     double sum = 0.0;
-    for (const double* x = sizes(k); t != f.begin + f.states; ++t) sum += std::fabs(t->factor) * x[t->place];
-    t = f.begin + f.memory;
-    for (const double* u = now_.input[static_cast<std::size_t>(k)].data(); t != f.begin + f.inputs; ++t)
-        sum += std::fabs(t->factor * u[t->place]);
+    for (const double* x = sizes(k); const auto& [j, factor] : f.of_coupled()) sum += std::fabs(factor) * x[j];
+    for (const double* u = now_.input[static_cast<std::size_t>(k)].data(); const auto& [i, factor] : f.of_inputs())
+        sum += std::fabs(factor * u[i]);
     return sum;
 }
 

@@ -3,8 +3,10 @@
 
 #include <array>
 #include <cmath>
+#include <span>
 #include <vector>
 
+#include "../base/linear_form.hpp"
 #include "../base/sign.hpp"
 #include "../elements/row.hpp"
 
@@ -13,6 +15,7 @@ namespace lostmotion::model {
 // All that a regime's equations depend on at one instant. That of a kernel is the same in its own places.
 struct Instant {
     double time = 0.0;  // [s]
+    int coupled = 0;    // how many states come before the angles
     Few<double, 20> x;
     Few<double, 12> memory;
     std::array<Few<double, 8>, n_derivatives> input;  // [k]: k-th derivatives
@@ -20,6 +23,7 @@ struct Instant {
 
     // Makes room for all that a train has.
     void reach(const Layout& n) {
+        coupled = n.coupled;
         x.reach(static_cast<std::size_t>(n.states));
         memory.reach(static_cast<std::size_t>(n.memory));
         for (auto& u : input) u.reach(static_cast<std::size_t>(n.inputs));
@@ -39,58 +43,43 @@ double evaluate(const Layout& n, const Row& f, const Instant& now);
 // Sum of the magnitudes of the terms, with those of the inputs' parts.
 double magnitude(const Layout& n, const Row& f, const Instant& now);
 
-// A form as the terms that are not zero. They lie in a block of many forms, those of one kind together.
-struct SparseForm {
-    struct Term {
-        int place;  // among those of its kind
-        double factor;
-    };
-    const Term* begin = nullptr;
-    int coupled = 0, states = 0, memory = 0, inputs = 0;  // where the terms of each kind end
-    double one = 0.0;
+// How many terms of a row are not zero, and the form of these, which go to a block that has room for them.
+std::size_t terms_of(const Row& f);
+LinearForm linear_form(const Row& f, const Layout& n, std::vector<LinearForm::Term>& block);
 
-    // From a row, whose terms are added to the block.
-    SparseForm() = default;
-    SparseForm(const Row& f, const Layout& n, std::vector<Term>& block);
+// A form with terms of its own.
+struct OwnForm : LinearForm {
+    OwnForm(const Row& f, const Layout& n);
+    OwnForm(OwnForm&&) = default;
 
-    struct Block;
-};
-// One form with its own block.
-struct SparseForm::Block {
-    std::vector<Term> terms;
-    SparseForm form;
-
-    Block(const Row& f, const Layout& n) {
-        terms.reserve(f.c.size());
-        form = SparseForm(f, n, terms);
-    }
-    Block(const Block&) = delete;
-    Block& operator=(const Block&) = delete;
+ private:
+    std::vector<Term> terms_;
 };
 
-double evaluate(const SparseForm& f, const Instant& now);
-double magnitude(const SparseForm& f, const Instant& now);
+double evaluate(const LinearForm& f, const Instant& now);
+double magnitude(const LinearForm& f, const Instant& now);
 // Both at once, added up in the order of the terms.
 struct Sized {
     double value, size;
 };
-Sized sized(const SparseForm& f, const Instant& now);
+Sized sized(const LinearForm& f, const Instant& now);
 
-// Time derivatives along the flow of one regime, computed as far as they are asked for: the kernel's Flow for sparse
-// forms.
+// Time derivatives along the flow of one regime, computed as far as they are asked for: the kernel's Flow for the
+// search.
 class SparseFlow {
  public:
     // Memory of the derivatives, used again from flow to flow.
     using Room = std::vector<double>;
 
-    SparseFlow(const std::vector<SparseForm>& rate, const Instant& now, Room& room);
+    // rate: of the coupled states. No form that is asked for depends on an angle.
+    SparseFlow(std::span<const LinearForm> rate, const Instant& now, Room& room);
 
     double noise(double size, double rate) const {
         return rounding * size + time_rounding * std::fabs(now_.time * rate);
     }
     // Value of the k-th derivative of a form, k > 0, and the sum of the magnitudes of its terms.
-    double rate(const SparseForm& f, int k);
-    double rate_magnitude(const SparseForm& f, int k);
+    double rate(const LinearForm& f, int k);
+    double rate_magnitude(const LinearForm& f, int k);
 
  private:
     double* derivative(int k) { return room_.data() + static_cast<std::size_t>(k) * states_; }
@@ -98,7 +87,7 @@ class SparseFlow {
     void extend(int k);
     void extend_sizes(int k);
 
-    const std::vector<SparseForm>& rate_;
+    std::span<const LinearForm> rate_;
     const Instant& now_;
     Room& room_;
     std::size_t states_;

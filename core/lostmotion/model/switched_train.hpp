@@ -26,7 +26,7 @@
 #include "guards_after.hpp"
 #include "held_torque.hpp"
 #include "impulses.hpp"
-#include "searched_regime.hpp"
+#include "sparse_regime.hpp"
 #include "statics.hpp"
 
 namespace lostmotion::model {
@@ -36,13 +36,13 @@ using lostmotion::SearchCounts;
 
 class SwitchedTrain {
  public:
-    using Guard = SearchedRegime::Guard;
+    using Guard = SparseRegime::Guard;
     using Inputs = decltype(Instant::input)::value_type;
     using Rest = Flags;
 
     explicit SwitchedTrain(const Assembly& assembly);
 
-    SearchedRegimes& regimes() { return regimes_; }
+    SparseRegimes& regimes() { return regimes_; }
 
     // Regime at the start of a run, where nothing is known but the state.
     Found start(Instant& now, Key& key);
@@ -66,7 +66,7 @@ class SwitchedTrain {
     void set_tied_speeds(X& x, const Ties& ties) const;
 
     // The key in these modes, at the instant and the torques of another regime.
-    Key branches_at(const Key& other, const Key& modes, Instant now);
+    Key branches_at(const SparseRegime& other, const Key& modes, const Instant& now) const;
 
     double few = 27.0;  // up to so many combinations are tried one after the other; more are pivoted
     SearchCounts searches;
@@ -147,8 +147,8 @@ class SwitchedTrain {
     Found land(Instant& now, const Impulses& after, Event event, const Instant& past, Key& key);
     Found find_after(Instant& now, const MovedShafts& moved, Event event, const Rest& before, const Instant& past,
                      Key& key);
-    double time_to_rest(const SearchedRegime& e, const Instant& now, int contact);
-    double time_to_rest(const SearchedRegime& e, const Instant& now, const Instant& before, const Impulses& joined,
+    double time_to_rest(const SparseRegime& e, const Instant& now, int contact);
+    double time_to_rest(const SparseRegime& e, const Instant& now, const Instant& before, const Impulses& joined,
                         double energy);
     bool close(Instant& now, const Impulses& struck, int contact, const Event& event, const Instant& past,
                const Key& from, Key& key);
@@ -161,16 +161,15 @@ class SwitchedTrain {
     Trial settle(Instant& now, const Key& modes, const Event& event, Key& key, Violated violated = {});
     bool settle_on_corner(Instant& now, const Event& event, const Key& trial, Key& key);
     Found settle_at_limit(Instant& now, const Key& modes, const Event& event, Key& key);
-    Key branches_at(const SearchedRegime& other, const Key& modes, const Instant& now) const;
     Trial walk(Instant& now, const Event& event, Key trial, Key& key, Violated violated = {});
     bool breaks_away(Instant& now, const Event& event, double margin_size, double near, Key& key);
-    bool turns_the_other_way(const SearchedRegime& e, const Instant& now, const Event& event);
+    bool turns_the_other_way(const SparseRegime& e, const Instant& now, const Event& event);
     void locate(const Instant& now, Key& trial) const;
     void locate_losses(const Instant& now, const Torques& T_2, Key& trial) const;
-    void hold(const SearchedRegime& r, Instant& now, const Event& event) const;
+    void hold(const SparseRegime& r, Instant& now, const Event& event) const;
     double value_of(const Instant& now, const Row& v) const;
-    double violation(const SearchedRegime& e, const Instant& now, const Event& event);
-    double torque_change(const SearchedRegime& r, const Instant& now, const Event& event) const;
+    double violation(const SparseRegime& e, const Instant& now, const Event& event);
+    double torque_change(const SparseRegime& r, const Instant& now, const Event& event) const;
 
     static constexpr double max_violation = 1e-6;                                      // that rounding may make
     static constexpr double on_corner = 8.0 * std::numeric_limits<double>::epsilon();  // of an angle and its period
@@ -184,7 +183,7 @@ class SwitchedTrain {
     static constexpr int most_changes = 4;  // of the mode of each contact along the way of the torques
     static constexpr std::size_t from_one_start = 300, longest_pivoting = 600;
 
-    const Guard* first_left(const SearchedRegime& r, const Instant& now, const std::vector<std::size_t>& ignored,
+    const Guard* first_left(const SparseRegime& r, const Instant& now, const std::vector<std::size_t>& ignored,
                             const Event& event, Violated& of_contacts);
     // Is a guard the speed of a contact that moves? Its mode was chosen by that speed.
     static bool is_of_moving(const Guard& g, const Event& event) {
@@ -192,7 +191,7 @@ class SwitchedTrain {
     }
 
     const Assembly& assembly_;
-    SearchedRegimes regimes_;
+    SparseRegimes regimes_;
     SparseFlow::Room room_;
     Rest holds_more_{};  // contacts that hold more than they take while they slip
     bool has_flanks_ = false;

@@ -17,22 +17,12 @@ using Least = Dims<4, 1, 2, 2, 3, 16>;  // motor, gear and load, as the paper ha
 using Middle = Dims<8, 2, 6, 10, 12, 64>;
 
 template <class D>
-struct TrainRegime : PackedRegime<D> {
-    // The flows of power by their number, once they have been asked for.
-    struct Flow {
-        int number;
-        PackedForm<D> torque, speed;
-    };
-    std::optional<std::vector<Flow>> flows = std::nullopt;
-};
-
-template <class D>
 class TrainSystem {
  public:
     using Dims = D;
     using Key = model::Key;
-    using Guard = PackedGuard<D>;
-    using Regime = TrainRegime<D>;
+    using Guard = SparseRegime::Guard;
+    using Regime = SparseRegime;
     using State = StateOf<D>;
 
     explicit TrainSystem(const Assembly& assembly)
@@ -56,24 +46,18 @@ class TrainSystem {
     bool overflowed() const { return overflowed_; }
     SwitchedTrain& search() const { return search_; }
 
-    // r: as it has been made.
-    void build(const Key& key, Regime& r) const {
-        pack<D>(composed(key), assembly_, r);
-        if (!r.complete) overflowed_ = true;
+    std::unique_ptr<const Regime> build(const Key& key) const {
+        std::unique_ptr<const Regime> out = search_.regimes().make(key);
+        if (out->guards.size() > static_cast<std::size_t>(D::guards)) overflowed_ = true;
+        return out;
     }
-    // A regime in full; most often the last one.
-    const model::Regime& composed(const Key& key) const { return search_.regimes().composed(key); }
-    Regime build(const Key& key) const {
-        Regime r;
-        build(key, r);
-        return r;
-    }
+    const std::vector<Regime::Flow>& flows(const Regime& r) const { return search_.regimes().flows(r); }
     // In these modes, at the instant and the torques of another regime.
-    Regime build_at(const Regime& other, const Key& modes, const InstantOf<D>& now) const {
-        return build(search_.branches_at(other.key, modes, by_layout(now)));
+    std::unique_ptr<const Regime> build_at(const Regime& other, const Key& modes, const InstantOf<D>& now) const {
+        return build(search_.branches_at(other, modes, by_layout(now)));
     }
     Found start(InstantOf<D>& now, Key& key) const {
-        Instant at = by_layout(now);
+        Instant& at = by_layout(now);
         const Found found = search_.start(at, key);
         take(at, now);
         add_parametric_work(assembly_.meshes_at(now.x), key, now);
@@ -91,24 +75,14 @@ class TrainSystem {
         if (!(fired != nullptr ? goes_on<D>(cache, now, *fired, key)
                                : !comes_to_rest && stays<D>(cache.entry(key), now, input))) {
             const auto number = fired == nullptr ? nowhere : fired - cache.regime(key).guards.data();
-            Instant at = by_layout(now);
+            Instant& at = by_layout(now);
             SwitchedTrain::Inputs left;
-            copy_numbers(input, counts_.inputs, left);
+            copy_numbers(input, assembly_.layout().inputs, left);
             found = search_.next(at, static_cast<int>(number), key, left, given_rest);
             take(at, now);
         }
         if (before) add_parametric_work(*before, key, now);
         return certain(found);
-    }
-    // What each guard has to exceed, beside its share of its terms, to be far from an event.
-    void near_event(const FormTable<D, D::guards>& guards, typename FormTable<D, D::guards>::Values& out) const {
-        StateOf<D> state{};
-        InputsOf<D> input{};
-        const Layout& n = assembly_.layout();
-        for (int k = 0; k < n.states; ++k)
-            state[state_place<D>(n, k)] = search_.regimes().near_state()[static_cast<std::size_t>(k)];
-        for (int i = 0; i < n.inputs; ++i) input[i] = search_.regimes().near_input()[static_cast<std::size_t>(i)];
-        guards.rate_magnitudes(state, input, out);
     }
     template <class X, class AtRest>
     void stop(X& x, AtRest& at_rest) const {
@@ -139,7 +113,7 @@ class TrainSystem {
     }
     int n_twists() const { return n_twists_; }
     int twist_state(int t) const { return twists_[static_cast<std::size_t>(t)]; }
-    const LinearFormOf<D>& torque_at_load(const Regime& r) const {
+    const LinearForm& torque_at_load(const Regime& r) const {
         return r.output_torque[assembly_.train().gears.empty() ? 0 : assembly_.train().gears.size() - 1];
     }
     bool has_dry_contacts() const {
@@ -161,25 +135,29 @@ class TrainSystem {
  private:
     Found certain(Found found) const { return overflowed_ ? Found::outside : found; }
     // An instant as the search has it, and what this has changed of it.
-    Instant by_layout(const InstantOf<D>& now) const {
+    Instant& by_layout(const InstantOf<D>& now) const {
         const Layout& n = assembly_.layout();
-        Instant at;
-        at.time = now.time;
-        at.reach(n);
-        for (int k = 0; k < n.states; ++k) at.x[k] = now.x[state_place<D>(n, k)];
-        copy_numbers(now.memory, n.memory, at.memory);
-        for (std::size_t k = 0; k < n_derivatives; ++k) copy_numbers(now.input[k], n.inputs, at.input[k]);
-        copy_numbers(now.input_magnitudes, n.inputs, at.input_magnitudes);
-        return at;
+        at_.reach(n);
+        at_.time = now.time;
+        unpack_state<D>(now.x, n, at_.x.data());
+        copy_numbers(now.memory, n.memory, at_.memory);
+        for (std::size_t k = 0; k < n_derivatives; ++k) copy_numbers(now.input[k], n.inputs, at_.input[k]);
+        copy_numbers(now.input_magnitudes, n.inputs, at_.input_magnitudes);
+        return at_;
     }
     void take(const Instant& at, InstantOf<D>& now) const {
         const Layout& n = assembly_.layout();
-        for (int k = 0; k < n.states; ++k) now.x[state_place<D>(n, k)] = at.x[k];
-        copy_numbers(at.memory, n.memory, now.memory);
+        for (int k = 0; k < n.states; ++k) now.x[state_place<D>(n, k)] = at.x.data()[k];
+        make_room(now.memory, n.memory);
+        std::copy_n(at.memory.data(), n.memory, now.memory.data());
     }
+    // Of a train of any size, those that have not been asked for are zero.
     template <class From, class To>
     static void copy_numbers(const From& from, int count, To& to) {
-        for (int k = 0; k < count; ++k) to[static_cast<std::size_t>(k)] = from[static_cast<std::size_t>(k)];
+        to.reach(static_cast<std::size_t>(count));
+        const int known = std::min(count, static_cast<int>(from.size()));
+        std::copy_n(from.data(), known, to.data());
+        std::fill(to.data() + known, to.data() + count, 0.0);
     }
     // A step of the stiffness changes the energy of a spring at the twist that it has.
     void add_parametric_work(const Key& before, const Key& after, InstantOf<D>& now) const {
@@ -196,6 +174,7 @@ class TrainSystem {
     const Assembly& assembly_;
     const CountsOf<D> counts_;
     mutable SwitchedTrain search_;
+    mutable Instant at_;  // its memory is used again
     ListOf<D, int, D::coupled> twists_{};
     int n_twists_ = 0;
     bool has_parametric_work_ = false;

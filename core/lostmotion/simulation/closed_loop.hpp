@@ -19,7 +19,7 @@ template <class D>
 struct ClosedLoop {
     Ticks ticks;
     std::span<const control::Axis> axes;
-    std::vector<AxisPlace<D>> places;  // of each axis
+    std::vector<AxisPlace> places;  // of each axis
 
     int slots() const {
         int n = 0;
@@ -51,7 +51,7 @@ class ClosedLoopRun {
     void resume(const ControlCourse& course) {
         course_ = course;
         if (course_.slots.empty()) return;  // not begun
-        each_axis([&](const control::Axis& a, const AxisPlace<D>& p, double* slot) {
+        each_axis([&](const control::Axis& a, const AxisPlace& p, double* slot) {
             const Ramp command = command_of(a, slot);
             solver_.set_ramp(p.input, command.value, command.slope);
             return true;
@@ -64,7 +64,7 @@ class ClosedLoopRun {
     // What acts on the motors, among the inputs.
     void write_commands(InputsOf<D>& inputs) {
         if (course_.slots.empty()) return;
-        each_axis([&](const control::Axis& a, const AxisPlace<D>& p, double* slot) {
+        each_axis([&](const control::Axis& a, const AxisPlace& p, double* slot) {
             inputs[p.input] = command_of(a, slot).value;
             return true;
         });
@@ -74,12 +74,12 @@ class ClosedLoopRun {
     Status begin(const StateOf<D>& x, const typename D::Memory& memory, Observer& observer) {
         course_.next = 0;
         course_.slots.assign(static_cast<std::size_t>(loop_.slots()), 0.0);
-        each_axis([&](const control::Axis& a, const AxisPlace<D>& p, double* slot) {
+        each_axis([&](const control::Axis& a, const AxisPlace& p, double* slot) {
             a.start(sample(p, x, memory, 0.0), loop_.ticks.length, slot);
             return true;
         });
         if (!run_tick(x, memory, observer)) return Status::controller;
-        each_axis([&](const control::Axis& a, const AxisPlace<D>& p, double*) {
+        each_axis([&](const control::Axis& a, const AxisPlace& p, double*) {
             if (a.field_orientation) solver_.set_ramp(p.input, 0.0, 0.0);
             return true;
         });
@@ -161,11 +161,11 @@ class ClosedLoopRun {
         }
     }
 
-    control::Sampled sample(const AxisPlace<D>& p, const StateOf<D>& x, const typename D::Memory& memory,
+    control::Sampled sample(const AxisPlace& p, const StateOf<D>& x, const typename D::Memory& memory,
                             double command) const {
         InputsOf<D> u{};
         u[p.input] = command;
-        const auto value = [&](const LinearFormOf<D>& f) { return evaluate<D>(f, x, memory, u); };
+        const auto value = [&](const LinearForm& f) { return evaluate<D>(f, x, memory, u); };
         return {value(p.position_angle), value(p.speed_angle), value(p.speed),       value(p.motor_torque),
                 value(p.rotor_angle),    value(p.rotor_speed), value(p.shaft_angle), solver_.time()};
     }
@@ -186,7 +186,7 @@ class ClosedLoopRun {
     bool run_tick(const StateOf<D>& x, const typename D::Memory& memory, Observer& observer) {
         observer.tick(loop_, course_, x, memory);
         changed_ = course_.next == 0;
-        const bool well = each_axis([&](const control::Axis& a, const AxisPlace<D>& p, double* slot) {
+        const bool well = each_axis([&](const control::Axis& a, const AxisPlace& p, double* slot) {
             const double before =
                 a.field_orientation ? a.winding_torque(solver_.time(), slot) / a.rated_torque : a.command(slot);
             if (!a.step(course_.next, loop_.ticks.length, sample(p, x, memory, before), slot)) return false;
@@ -250,12 +250,8 @@ template <class D>
 ClosedLoop<D> closed_loop_of(const model::Assembly& a, const Control& control, const std::vector<control::Axis>& laws) {
     ClosedLoop<D> loop{{control.tick}, laws, {}};
     for (const AxisRows& rows : axis_rows(a, control)) {
-        AxisPlace<D>& p = loop.places.emplace_back();
-        p.input = rows.command;
-        auto row = rows.measured.begin();
-        for (auto* form : {&p.position_angle, &p.speed_angle, &p.speed, &p.motor_torque, &p.rotor_angle, &p.rotor_speed,
-                           &p.shaft_angle})
-            *form = model::pack<D>(*row++, a.layout());
+        const auto form = [&](std::size_t k) { return model::OwnForm(rows.measured[k], a.layout()); };
+        loop.places.push_back({rows.command, form(0), form(1), form(2), form(3), form(4), form(5), form(6)});
     }
     return loop;
 }

@@ -29,7 +29,7 @@ StateOf<typename System::Dims> SimulationOf<System>::rates() {
     const Regime& r = regime();
     const Inputs input = inputs();
     StateOf<D> out{};
-    each_state<D>(system_.counts(), [&](int k) { out[k] = evaluate<D>(r.rate[k], now_.x, now_.memory, input); });
+    each_rate<D>(r, [&](int k, const LinearForm& f) { out[k] = evaluate<D>(f, now_.x, now_.memory, input); });
     return out;
 }
 
@@ -40,11 +40,10 @@ auto SimulationOf<System>::guards() -> GuardValues {
     const Inputs input = inputs();
     GuardValues out;
     for (std::size_t g = 0; g < guard_count(); ++g) out[g] = 1.0;
-    for (int g = 0; g < r.n_guards; ++g) {
+    for (std::size_t g = 0; g < static_cast<std::size_t>(entry.n_guards); ++g) {
         if (r.guards[g].behind) continue;
         const double natural = entry.near_event[g] / far_from_event;
-        out[static_cast<std::size_t>(g)] =
-            evaluate<D>(r.guards[g].form, now_.x, now_.memory, input) / (natural > 0.0 ? natural : 1.0) + fallen;
+        out[g] = evaluate<D>(r.guards[g].form, now_.x, now_.memory, input) / (natural > 0.0 ? natural : 1.0) + fallen;
     }
     return out;
 }

@@ -25,7 +25,6 @@ template <class D, int N>
 class PowerIntegral {
  public:
     using State = StateOf<D>;
-    using LinearForm = LinearFormOf<D>;
     using Flows = typename FormTable<D, N>::Values;
 
     Flows flow{};              // [J] so far

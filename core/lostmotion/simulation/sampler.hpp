@@ -32,7 +32,7 @@ class SamplerOf : public Observer<System> {
     double left_data_at = std::numeric_limits<double>::infinity();  // first instant outside the loss map's data [s]
 
     bool segment(const Segment<System>& s) final {
-        if (!s.entry.regime.in_data) left_data_at = std::fmin(left_data_at, s.begin);
+        if (!s.entry.regime->in_data) left_data_at = std::fmin(left_data_at, s.begin);
         const std::size_t end = due(s);
         if (next_ < end) {
             std::optional<Piece>& room = pieces_[n_pieces_++];
@@ -84,7 +84,7 @@ class SamplerOf : public Observer<System> {
         auto& propagator = p.entry->propagator;
         const int level = times_.listed.empty() && !propagator.by_series() ? propagator.level_of(times_.interval) : -1;
         if (level < 0 && p.at_once) return write_at_once(p);
-        const Reader reader(model_, p.entry->regime, p.memory);
+        const Reader reader(model_, *p.entry->regime, p.memory);
         for (std::size_t next = p.first;;) {
             int n =
                 static_cast<int>(std::min<std::size_t>(p.end - next, Instants::max_count - next % Instants::max_count));
@@ -121,7 +121,7 @@ class SamplerOf : public Observer<System> {
 
     // By one long step from sample to sample.
     [[gnu::noinline]] bool write_at_once(Piece& p) {
-        const Reader reader(model_, p.entry->regime, p.memory);
+        const Reader reader(model_, *p.entry->regime, p.memory);
         const Cursor<D> first = p.cursor;
         LongStep<D> step = p.cursor.long_step(whole_interval(p));
         for (std::size_t next = p.first;;) {

@@ -41,7 +41,7 @@ class TorqueResponse final : public Observer<System> {
 
     bool segment(const Segment<System>& s) override {
         if (!inputs_) inputs_.emplace(s.at.input());
-        const Regime& r = s.entry.regime;
+        const Regime& r = *s.entry.regime;
         regime_ = &r;
         x_ = s.x_end;
         memory_ = s.memory;
@@ -55,7 +55,7 @@ class TorqueResponse final : public Observer<System> {
             return true;
         }
         State rate{};
-        each_state<D>(n_, [&](int row) { rate[row] = by_torque(r.rate[row]); });
+        each_rate<D>(r, [&](int row, const LinearForm& f) { rate[row] = by_torque(f); });
         State change;
         (s.entry.propagator.changes(length) * load<D>(rate)).store(change);
         each_state<D>(n_, [&](int row) { derivative_[row] += change[row]; });
@@ -90,7 +90,7 @@ class TorqueResponse final : public Observer<System> {
             const auto& g = old.guards[w.guard].form;
             const double change = by_torque(g);
             double fall = 0.0;
-            each_input_of<D>(g, [&](int i, double c) { fall += c * u[1][i]; });
+            for (const auto& [i, c] : g.of_inputs()) fall += c * u[1][i];
             each_state_of<D>(g, [&](int k, double c) { fall += c * before[k]; });
             if (fall < 0.0) {
                 const double shift = -change / fall;
@@ -111,15 +111,17 @@ class TorqueResponse final : public Observer<System> {
         return std::bit_cast<double>((std::bit_cast<std::uint64_t>(length) + least / 2) & ~(least - 1));
     }
     // How a form depends on the torque.
-    double by_torque(const LinearFormOf<D>& f) const {
-        double sum = f.c[D::first_input + input_];
+    double by_torque(const LinearForm& f) const {
+        double sum = 0.0;
+        for (const auto& [i, c] : f.of_inputs())
+            if (i == input_) sum = c;
         each_state_of<D>(f, [&](int k, double c) { sum += c * derivative_[k]; });
-        each_memory_of<D>(f, [&](int k, double c) { sum += c * derivative_[D::states + k]; });
+        for (const auto& [k, c] : f.of_memory()) sum += c * derivative_[D::states + k];
         return sum;
     }
     Components flow(const Regime& r, const State& x, const typename D::Memory& m, const InputsOf<D>& u) const {
         Components f{};
-        each_state<D>(n_, [&](int k) { f[k] = evaluate<D>(r.rate[k], x, m, u); });
+        each_rate<D>(r, [&](int k, const LinearForm& rate) { f[k] = evaluate<D>(rate, x, m, u); });
         return f;
     }
 

@@ -18,7 +18,7 @@ class TrainReader {
     using Memory = typename D::Memory;
     using Instants = InstantsOf<D>;
 
-    TrainReader(const TrainModel& m, const model::TrainRegime<D>& r, const Memory& memory)
+    TrainReader(const TrainModel& m, const model::SparseRegime& r, const Memory& memory)
         : model_(m), regime_(r), memory_(memory) {}
 
     // A channel at the first n instants, rounded up to whole vectors.
@@ -30,8 +30,8 @@ class TrainReader {
             for (int k = 0; k < n; k += vec_width) store(value(k), out + k);
         };
         const auto column = [&](const auto& numbers) { each([&](int k) { return load(&numbers[k]); }); };
-        const auto form = [&](LinearFormOf<D> f) {  // by value: in registers
-            const double constant = constant_part<D>(f, memory_);
+        const auto form = [&](const LinearForm& f) {
+            const double constant = constant_part(f, memory_);
             each([&](int k) { return evaluate(f, constant, at, k); });
         };
         switch (c.kind) {
@@ -108,7 +108,7 @@ class TrainReader {
     }
     // What is added to the torque on the gear. friction: that its input shaft holds, without gears.
     template <class Instants>
-    Vec shared_torque(std::size_t index, const LinearFormOf<D>& friction, const Instants& at, int k) const {
+    Vec shared_torque(std::size_t index, const LinearForm& friction, const Instants& at, int k) const {
         const Vec F = held(index, at, k);
         Vec capacity = evaluate(friction, at, k), own{};
         for (std::size_t g = 0; g < model_.assembly.train().gears.size(); ++g) {
@@ -143,43 +143,30 @@ class TrainReader {
         return lost / gear(index).law.rated_output_torque;
     }
 
-    LinearFormOf<D> row(const model::Row& r) const { return model::pack<D>(r, model_.assembly.layout()); }
+    model::OwnForm row(const model::Row& r) const { return {r, model_.assembly.layout()}; }
 
     template <class Instants>
-    Vec evaluate(const LinearFormOf<D>& f, const Instants& at, int k) const {
-        return evaluate(f, constant_part<D>(f, memory_), at, k);
+    Vec evaluate(const LinearForm& f, const Instants& at, int k) const {
+        return evaluate(f, constant_part(f, memory_), at, k);
     }
     // None of the forms depends on an angle that follows.
     template <class Instants>
-    static Vec evaluate(const LinearFormOf<D>& f, double constant, const Instants& at, int k) {
-        if constexpr (std::same_as<D, Any>) {
-            Vec own{}, forced{};
-            for (auto [t, end] = f.c.part(AnyForm::of_coupled); t != end;) {
-                const int four = t->place / 4;
-                Vec part[4] = {};
-                for (; t != end && t->place / 4 == four; ++t)
-                    part[t->place % 4] = t->factor * load(&at.x[t->place][static_cast<std::size_t>(k)]);
-                own += (part[0] + part[1]) + (part[2] + part[3]);
-            }
-            each_input_of<D>(f, [&](int i, double c) {
-                forced += c * load(&at.u[static_cast<std::size_t>(i)][static_cast<std::size_t>(k)]);
-            });
-            return constant + own + forced;
-        } else {
-            const Vec own = sum_in_fours<D::coupled>([&](auto j) { return f.c[j] * load(&at.x[j][k]); });
-            Vec forced = f.c[D::first_input] * load(&at.u[0][k]);
-            for (int i = 1; i < D::inputs; ++i) forced += f.c[D::first_input + i] * load(&at.u[i][k]);
-            return constant + own + forced;
-        }
+    static Vec evaluate(const LinearForm& f, double constant, const Instants& at, int k) {
+        const Vec own =
+            f.sum_of_coupled([&](int j, double c) { return c * load(&at.x[j][static_cast<std::size_t>(k)]); });
+        Vec forced{};
+        for (const auto& [i, c] : f.of_inputs())
+            forced += c * load(&at.u[static_cast<std::size_t>(i)][static_cast<std::size_t>(k)]);
+        return constant + own + forced;
     }
 
     const TrainModel& model_;
-    const model::TrainRegime<D>& regime_;
+    const model::SparseRegime& regime_;
     const Memory& memory_;
 };
 
 template <class D>
-TrainPoint point_of(const TrainModel& model, const model::TrainRegime<D>& r, double time, const StateOf<D>& x,
+TrainPoint point_of(const TrainModel& model, const model::SparseRegime& r, double time, const StateOf<D>& x,
                     const typename D::Memory& memory, const InputsOf<D>& u) {
     const model::Layout& n = model.assembly.layout();
     TrainPoint p;

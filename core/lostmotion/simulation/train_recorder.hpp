@@ -31,18 +31,17 @@ class TrainMeter {
 
     // False ends the run.
     bool segment(const Segment<model::TrainSystem<D>>& s) {
-        model::TrainRegime<D>& r = s.entry.regime;
+        const model::SparseRegime& r = *s.entry.regime;
         if (!(s.end > s.begin)) return true;
-        if (!r.flows) find_flows(r, s.system.composed(r.key));
-        for (const auto& f : *r.flows) place(f.number);
-        if (std::ranges::all_of(assembly_.places().shafts, [&](const model::ShaftPlace& p) {
-                return r.resting[static_cast<std::size_t>(p.speed)];
-            }))
+        const auto& flows = s.system.flows(r);
+        for (const auto& f : flows) place(f.number);
+        if (std::ranges::all_of(assembly_.places().shafts,
+                                [&](const model::ShaftPlace& p) { return r.resting[p.speed]; }))
             return true;
         typename Integral::Factors factors;
         const int rows = max_flows <= 8 ? max_flows : static_cast<int>(order_.size());
         for (int k = 0; k < rows; ++k) factors.set(k, {}, {});  // none in this regime
-        for (const auto& f : *r.flows) factors.set(place(f.number), f.torque, f.speed);
+        for (const auto& f : flows) factors.set(place(f.number), f.torque, f.speed);
         factors.hold(s.memory);
         return integral_.add(s, factors);
     }
@@ -59,12 +58,6 @@ class TrainMeter {
     static constexpr int max_flows = std::same_as<D, Any> ? Any::coupled : D::guards <= 16 ? 8 : 96;
     using Integral = PowerIntegral<D, max_flows>;
 
-    [[gnu::cold]] void find_flows(model::TrainRegime<D>& r, const model::Regime& composed) const {
-        const model::Layout& n = assembly_.layout();
-        auto& flows = r.flows.emplace();
-        for (const model::NumberedPower& f : model::power_flows(assembly_, composed))
-            flows.push_back({f.flow, model::pack<D>(f.power.torque, n), model::pack<D>(f.power.speed, n)});
-    }
     // The row of a flow, which it keeps from regime to regime.
     int place(int number) {
         int& place = place_[static_cast<std::size_t>(number)];

@@ -17,16 +17,16 @@
 #include "../base/status.hpp"
 #include "../control/axis.hpp"
 #include "../kernel/form.hpp"
+#include "../model/motion.hpp"
 
 namespace lostmotion {
 
 // An axis in a system: the input of its motor, and the forms that give what is sampled.
-template <class D>
 struct AxisPlace {
-    int input = 0;
-    LinearFormOf<D> position_angle{}, speed_angle{}, speed{}, motor_torque{};
-    LinearFormOf<D> rotor_angle{}, rotor_speed{};
-    LinearFormOf<D> shaft_angle{};  // of the reference's shaft
+    int input;
+    model::OwnForm position_angle, speed_angle, speed, motor_torque;
+    model::OwnForm rotor_angle, rotor_speed;
+    model::OwnForm shaft_angle;  // of the reference's shaft
 };
 
 template <class Solver>
@@ -34,8 +34,7 @@ class WindingCoupling {
  public:
     using D = typename Solver::D;
 
-    WindingCoupling(Solver& solver, double tick, std::span<const control::Axis> axes,
-                    std::span<const AxisPlace<D>> places)
+    WindingCoupling(Solver& solver, double tick, std::span<const control::Axis> axes, std::span<const AxisPlace> places)
         : solver_(solver), tick_(tick) {
         int first = 0;
         for (std::size_t k = 0; k < axes.size(); ++k) {
@@ -76,7 +75,7 @@ class WindingCoupling {
 
     struct Motor {
         const control::Axis* axis;
-        const AxisPlace<D>* place;
+        const AxisPlace* place;
         int first;  // slot
         WindingCourse next{};
         double bend = 0.0;  // of its speed, as the last course and the torque make it
@@ -96,7 +95,7 @@ class WindingCoupling {
             return 1.5 * w.pole_pairs * most;
         }
     };
-    static double value(const LinearFormOf<D>& form, const Solver& solver) {
+    static double value(const LinearForm& form, const Solver& solver) {
         return evaluate<D>(form, solver.state(), solver.memory(), InputsOf<D>{});
     }
     static void set_torque(Solver& solver, const Motor& m) {
@@ -107,9 +106,7 @@ class WindingCoupling {
     double inverse_inertia(const Motor& m) const {
         const auto& column = solver_.linear_rates().input_column[m.place->input];
         double sum = 0.0;
-        each_state_of<D>(m.place->rotor_speed, [&](int k, double c) {
-            if (k < D::coupled) sum += c * column[k];
-        });
+        for (const auto& [k, c] : m.place->rotor_speed.of_coupled()) sum += c * column[static_cast<std::size_t>(k)];
         return sum / m.axis->rated_torque;
     }
     // Currents, voltages and speed of this instant.
@@ -189,7 +186,7 @@ class WindingCoupling {
     }
     // The speed that the mechanics have made of the torque. Returns what that changes of the current, of the largest.
     double see_speed(Motor& m, double h) {
-        const AxisPlace<D>& p = *m.place;
+        const AxisPlace& p = *m.place;
         const double first = value(p.rotor_speed, solver_), last = value(p.rotor_speed, *probe_),
                      mean = (value(p.rotor_angle, *probe_) - value(p.rotor_angle, solver_)) / h;
         const PowerSeries<3> seen = parabola(first, last, mean);

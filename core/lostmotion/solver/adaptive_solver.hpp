@@ -88,7 +88,6 @@ class AdaptiveSolver {
     using Contact = typename D::Contact;
     using Memory = typename D::Memory;
     using State = StateOf<D>;
-    using LinearForm = LinearFormOf<D>;
     using Signals = SignalsOf<D>;
     using Inputs = InputsOf<D>;
     using DenseStep = DenseStepOf<D>;
@@ -261,7 +260,7 @@ class AdaptiveSolver {
             if (turned) fired = nullptr;
             const bool ended = fired != nullptr || turned;
             dense.end = ended ? t_event : last ? limit : end;
-            observer.step(entry.regime, now_.memory, dense, !ended && last && limit >= t_end_);
+            observer.step(*entry.regime, now_.memory, dense, !ended && last && limit >= t_end_);
             now_.x = ended ? dense(t_event) : x;
             time_ = dense.end;
             step_ = h;
@@ -313,9 +312,9 @@ class AdaptiveSolver {
                              const DenseStep& dense, double& t_event) {
         const double end = t_event;
         const Guard* crossed = nullptr;
-        for (int g = 0; g < entry.regime.n_guards; ++g) {
+        for (int g = 0; g < entry.n_guards; ++g) {
             if (entry.behind[g]) continue;
-            const Guard& guard = entry.regime.guards[g];
+            const Guard& guard = entry.regime->guards[g];
             const Cubic c(here.value[g], here.slope[g], there.value[g], there.slope[g], dense.length);
             if (c.min() <= 0.0) refine_crossing(guard, dense, end, t_event, crossed);
             if (guard.by_grazing) find_grazing(g, guard, c, dense, t_event, crossed);
@@ -327,19 +326,19 @@ class AdaptiveSolver {
     // that instant there.
     bool first_turn(const typename Cache::Entry& entry, const DenseStep& dense, double end, double& t_event) {
         bool turned = false;
-        if constexpr (requires { entry.regime.drivers; })
-            for (const auto& driver : entry.regime.drivers) {
-                if (entry.regime.driving_input >= 0) break;  // the limit of the step
+        if constexpr (requires { entry.regime->drivers; })
+            for (const auto& driver : entry.regime->drivers) {
+                if (entry.regime->driving_input >= 0) break;  // the limit of the step
                 const auto rate = [&](double t) {
                     const State x = dense(t);
                     const Inputs u = input_at(t, x), u_rate = input_.template jet<2>()[1];
                     double sum = evaluate<D>(driver.rate, x, now_.memory, u),
                            size =
                                solution_error(driver.rate, x) + rounding * magnitude<D>(driver.rate, x, now_.memory, u);
-                    each_input_of<D>(driver.torque, [&](int i, double c) {
+                    for (const auto& [i, c] : driver.torque.of_inputs()) {
                         sum += c * u_rate[i];
                         size += rounding * std::fabs(c * u_rate[i]);
-                    });
+                    }
                     return sum + 2.0 * size;
                 };
                 turned = first_fall(rate, 0.0, dense, end, false, t_event) || turned;

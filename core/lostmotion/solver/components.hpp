@@ -55,11 +55,18 @@ struct StartOf {
 
 // Gradient of a form over the components.
 template <class D>
-ComponentsOf<D> gradient(const LinearFormOf<D>& f) {
+ComponentsOf<D> gradient(const LinearForm& f) {
     ComponentsOf<D> g{};
     each_state_of<D>(f, [&](int k, double c) { g[k] = c; });
-    each_memory_of<D>(f, [&](int k, double c) { g[D::states + k] = c; });
+    for (const auto& [k, c] : f.of_memory()) g[D::states + k] = c;
     return g;
+}
+
+// Calls use(k, form) for the rate of each state of a regime, by its place in the kernel.
+template <class D, class Regime, class Use>
+void each_rate(const Regime& r, Use&& use) {
+    for (std::size_t k = 0; k < r.rate.size() && k < D::coupled; ++k) use(static_cast<int>(k), r.rate[k]);
+    for (std::size_t j = 0; j < r.angle_rate.size(); ++j) use(D::coupled + static_cast<int>(j), r.angle_rate[j]);
 }
 
 // Of the components after a while, by those before.

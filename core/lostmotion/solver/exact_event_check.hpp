@@ -29,7 +29,7 @@ inline auto ExactSolver<System>::run_regime(const Segment<System>& segment, doub
     const bool constant_inputs = cursor->constant_inputs();
     if (cursor->carries_rate() ? !course_.rate_known : e.may_graze && !course_.has_magnitudes())
         begin_in_doubt(e, *cursor, segment.memory);
-    if (e.regime.n_guards == 0 && LongStep<D>::pays(p, limit - time_) && leap(e, limit)) return Status::done;
+    if (e.n_guards == 0 && LongStep<D>::pays(p, limit - time_) && leap(e, limit)) return Status::done;
     evaluate(e, constant, *cursor, *here);
     Coupled forced{};  // bound on what the fourth derivatives of the inputs add to that of the state, per second
     for (int i = 0; i < e.rates.depends_on.inputs; ++i)
@@ -43,7 +43,7 @@ inline auto ExactSolver<System>::run_regime(const Segment<System>& segment, doub
         if (interruption()) return Status::interrupted;
         if (count % 64 == 0) cursor->anchor(time_);
         const State& rate = cursor->rate();
-        if (constant_inputs && has_settled(e.regime, rate)) {
+        if (constant_inputs && has_settled(*e.regime, rate)) {
             rest(segment, *cursor, limit);
             return Status::done;
         }
@@ -240,7 +240,7 @@ inline auto ExactSolver<System>::departure(const Entry& e, const Memory& memory,
     -> Departure {
     const InstantOf<D> now{time_, cursor.x(), memory, cursor.input().jet(), cursor.input().magnitudes()};
     Flow<D> flow(e.rates, now);
-    const LinearForm& form = e.regime.guards[g].form;
+    const LinearForm& form = e.regime->guards[g].form;
     Departure out;
     for (std::size_t k = 1; k < 4; ++k) {
         const double value = out.derivative[k] = flow.rate(form, static_cast<int>(k));

@@ -15,7 +15,7 @@ namespace lostmotion {
 // what would change the state: then the steps grow, up to where the bound is below zero by the noise (docs/theory.md).
 template <class System>
 double ExactSolver<System>::first_turn(Entry& e, double limit) {
-    if constexpr (requires { e.regime.drivers; }) {
+    if constexpr (requires { e.regime->drivers; }) {
         int level = first_level;
         double ticks = 1.0;
         Coupled forced{};
@@ -41,7 +41,7 @@ double ExactSolver<System>::first_turn(Entry& e, double limit) {
                 store<D>(e.propagator.level(level).exponential_bound * (absolute(at.fourth_derivative()) + h * forced),
                          fourth);
             double step = std::min(h, limit - at.time()), longest = step;
-            for (const auto& driver : e.regime.drivers) {
+            for (const auto& driver : e.regime->drivers) {
                 const LinearForm& torque = driver.torque;
                 const double a = along.rate(torque, 2), b = along.rate(torque, 3);
                 const double noise = along.noise(along.rate_magnitude(torque, 1), a);
@@ -49,7 +49,7 @@ double ExactSolver<System>::first_turn(Entry& e, double limit) {
                 if (v < 0.0) return at.time();
                 double bound = 0.0;
                 each_state_of<D>(torque, [&](int k, double c) { bound += std::fabs(c) * fourth[k]; });
-                each_input_of<D>(torque, [&](int i, double c) { bound += std::fabs(c) * input_bound_[i]; });
+                for (const auto& [i, c] : torque.of_inputs()) bound += std::fabs(c) * input_bound_[i];
                 const double K = std::fmax(0.0, -b) + bound * h / 3.0;
                 if (v == 0.0 && a == 0.0 && K > 0.0) {
                     // b s^2/2 - bound s^3/6 at least; without b as well, a torque that changes within rounding so soon.
@@ -109,7 +109,7 @@ inline auto ExactSolver<System>::first_crossing(Entry& e, const Memory& memory, 
         if (s < best) {
             best = s;
             std::swap(there_, trial_);
-            fired = &e.regime.guards[g];
+            fired = &e.regime->guards[g];
         }
     }
 }
@@ -138,7 +138,7 @@ inline auto ExactSolver<System>::first_return(const LinearForm& form, const Curs
 template <class System>
 inline auto ExactSolver<System>::find_zero(Entry& e, int g, const Memory& memory, const Cursor& cursor,
                                            bool starts_on_zero, double estimate, double h) -> double {
-    const LinearForm& form = e.regime.guards[g].form;
+    const LinearForm& form = e.regime->guards[g].form;
     const double base = e.propagator.length(0);
     double low = 0.0, high = h, s = estimate;
     if (starts_on_zero) {

@@ -46,7 +46,6 @@ class ExactSolver {
     using Coupled = CoupledOf<D>;
     using Lanes = LanesOf<D>;
     using Matrix = MatrixOf<D>;
-    using LinearForm = LinearFormOf<D>;
     using Signals = SignalsOf<D>;
     using Course = CourseOf<D>;
     using Cursor = lostmotion::Cursor<D>;
@@ -309,14 +308,14 @@ Status ExactSolver<System>::advance(double t_end, Observer& observer) {
             system_, entry, *begin_, time_, t_end, true, now_.memory, entry.rates.constant(now_.memory), now_.x};
         begin_->place(entry.propagator, segment.constant, now_.x, course_.rate_known ? &course_.rate : nullptr);
         if (begin_->constant_inputs()) {
-            if (has_settled(entry.regime, begin_->rate())) begin_->settle();
+            if (has_settled(*entry.regime, begin_->rate())) begin_->settle();
         } else if (rest_unforced(entry, begin_->rate())) {
             segment.x_end = now_.x;
             begin_->place(entry.propagator, segment.constant, now_.x);
         }
         if (!(time_ < breakpoint_)) breakpoint_ = next_breakpoint(signals_, time_);
         double limit = std::min(t_end, breakpoint_);
-        if (const Regime& r = entry.regime; r.driving_input >= 0) [[unlikely]]
+        if (const Regime& r = *entry.regime; r.driving_input >= 0) [[unlikely]]
             limit = begin_->input().turning(r.driving_input, r.driving_way, limit, interruption);
         else if (follows_inputs(r)) [[unlikely]]
             limit = first_turn(entry, limit);

@@ -8,6 +8,7 @@
 #include <new>
 #include <vector>
 
+#include "../base/key_table.hpp"
 #include "../kernel/bit_set.hpp"
 #include "../kernel/propagator.hpp"
 
@@ -20,7 +21,6 @@ class RegimeCache {
     using Regime = typename System::Regime;
     using Key = typename System::Key;
     using Guard = typename System::Guard;
-    using LinearForm = LinearFormOf<D>;
     using GuardTable = FormTable<D, D::guards>;
     using State = StateOf<D>;
     using Guards = BitSet<D::guards>;
@@ -31,9 +31,10 @@ class RegimeCache {
         Entry(const Entry&) = delete;
         Entry& operator=(const Entry&) = delete;
 
-        Regime regime;
+        std::unique_ptr<const Regime> regime;
         LinearRatesOf<D> rates;
         GuardTable guards;
+        int n_guards;                        // as many as there is room for
         ListOf<D, int, D::contacts> speeds;  // the guards of speeds of contacts
         int n_speeds;
         Guards contacts;  // those that say whether a contact goes on in its mode
@@ -59,19 +60,20 @@ class RegimeCache {
         ListOf<D, Entry*, D::guards> neighbour;  // what lies beyond each guard, as far as it is known
 
         void set(const System& system, const Key& key) {
-            system.build(key, regime);
-            const Regime& r = regime;
+            regime = system.build(key);
+            const Regime& r = *regime;
             std::destroy_at(&rates);
-            std::construct_at(&rates, system.counts(), r.rate);
-            if constexpr (requires { r.given; }) rates.given = r.given.empty() ? nullptr : &r.given;
+            std::construct_at(&rates, system.counts(), r.rate, r.angle_rate);
+            rates.given = r.given.empty() ? nullptr : &r.given;
             guards.clear();
             guards.set_counts(rates.n);
             neighbour = {};
             n_speeds = 0;
             contacts = behind = {};
             unreached_known_ = false;
-            for (int g = 0; g < r.n_guards; ++g) {
-                const Guard& guard = r.guards[g];
+            n_guards = static_cast<int>(std::min(r.guards.size(), static_cast<std::size_t>(D::guards)));
+            for (int g = 0; g < n_guards; ++g) {
+                const Guard& guard = r.guards[static_cast<std::size_t>(g)];
                 guards.set(g, guard.form);
                 if (guard.kind == Guard::speed) speeds[n_speeds++] = g;
                 if (guard.is_of_contact()) contacts.set(g);
@@ -79,22 +81,13 @@ class RegimeCache {
             }
             followed = std::ranges::find(r.following, true) != r.following.end();
             find_twists(system);
-            if constexpr (requires { system.near_event(guards, near_event); }) system.near_event(guards, near_event);
+            clear(near_event, guards.rows());
+            std::copy_n(r.near_event.begin(), n_guards, near_event.begin());
             propagator.reset();
         }
 
         // About what it takes without matrices, of a train of any size.
-        std::size_t bytes() const {
-            std::size_t terms = 0;
-            const auto count = [&](const auto& forms) {
-                for (const auto& f : forms) terms += f.c.terms().size();
-            };
-            for (const auto* forms : {&regime.output_torque, &regime.input_torque, &regime.mesh_loss,
-                                      &regime.contact_torque, &regime.rate.coupled})
-                count(*forms);
-            for (const Guard& g : regime.guards) terms += 2 * g.form.c.terms().size();  // also in the table
-            return sizeof *this + 2 * sizeof(AnyForm::Term) * terms + sizeof(Guard) * regime.guards.size();
-        }
+        std::size_t bytes() const { return sizeof *this + regime->bytes() + guards.bytes(); }
         // How many times the rate of a twist a guard is; factor 0 if of none.
         TwistSpeed twist_speed(int guard) const {
             for (int k = 0; k < n_twist_speeds; ++k)
@@ -141,11 +134,12 @@ class RegimeCache {
                 Twist& twist = twists[n_twists];
                 twist = {system.twist_state(t), -1};
                 bool moves = false;
-                for (int g = 0; g < regime.n_guards; ++g) {
-                    if (regime.guards[g].kind != Guard::speed) continue;
-                    const double factor = times_rate(regime.guards[g].form, regime.rate[twist.state]);
+                for (int g = 0; g < n_guards; ++g) {
+                    const Guard& guard = regime->guards[static_cast<std::size_t>(g)];
+                    if (guard.kind != Guard::speed) continue;
+                    const double factor = times_rate(guard.form, regime->rate[static_cast<std::size_t>(twist.state)]);
                     if (factor != 0.0) twist_speeds[n_twist_speeds++] = {g, n_twists, factor};
-                    if (factor != 0.0 && regime.guards[g].by_grazing) twist.grazing_guard = g;
+                    if (factor != 0.0 && guard.by_grazing) twist.grazing_guard = g;
                     moves = moves || factor != 0.0;
                 }
                 may_graze |= twist.grazing_guard >= 0;
@@ -154,30 +148,19 @@ class RegimeCache {
         }
         // How many times the rate of a twist a speed is, or 0; the speeds at rest are left out.
         double times_rate(const LinearForm& speed, const LinearForm& rate) const {
-            if constexpr (std::same_as<D, Any>) {
-                const auto next = [this](const AnyForm::Term*& t, const AnyForm::Term* end) {
-                    while (t != end && (t->factor == 0.0 || regime.resting[t->place])) ++t;
-                };
-                auto [a, end_a] = speed.c.part(AnyForm::of_coupled);
-                auto [b, end_b] = rate.c.part(AnyForm::of_coupled);
-                double first_a = 0.0, first_b = 0.0;
-                for (next(a, end_a), next(b, end_b); a != end_a || b != end_b; next(a, end_a), next(b, end_b)) {
-                    if (a == end_a || b == end_b || a->place != b->place) return 0.0;
-                    if (first_b == 0.0) first_a = a->factor, first_b = b->factor;
-                    if (first_a * b->factor != first_b * a->factor) return 0.0;
-                    ++a, ++b;
-                }
-                return first_b == 0.0 ? 0.0 : first_a / first_b;
-            } else {
-                const auto moving = [this](const LinearForm& f, int k) { return regime.resting[k] ? 0.0 : f.c[k]; };
-                int first = 0;
-                while (first < D::coupled && moving(rate, first) == 0.0) ++first;
-                if (first == D::coupled) return 0.0;
-                const double a = moving(speed, first), b = moving(rate, first);
-                for (int k = 0; k < D::coupled; ++k)
-                    if (a * moving(rate, k) != b * moving(speed, k)) return 0.0;
-                return a / b;
+            const auto next = [this](const LinearForm::Term*& t, const LinearForm::Term* end) {
+                while (t != end && regime->resting[t->place]) ++t;
+            };
+            const LinearForm::Term *a = speed.begin, *b = rate.begin, *end_a = a + speed.coupled,
+                                   *end_b = b + rate.coupled;
+            double first_a = 0.0, first_b = 0.0;
+            for (next(a, end_a), next(b, end_b); a != end_a || b != end_b; next(a, end_a), next(b, end_b)) {
+                if (a == end_a || b == end_b || a->place != b->place) return 0.0;
+                if (first_b == 0.0) first_a = a->factor, first_b = b->factor;
+                if (first_a * b->factor != first_b * a->factor) return 0.0;
+                ++a, ++b;
             }
+            return first_b == 0.0 ? 0.0 : first_a / first_b;
         }
 
         States unreached_;
@@ -189,9 +172,9 @@ class RegimeCache {
     RegimeCache(const RegimeCache&) = delete;
     RegimeCache& operator=(const RegimeCache&) = delete;
 
-    const Regime& regime(const Key& key) { return entry(key).regime; }
+    const Regime& regime(const Key& key) { return *entry(key).regime; }
 
-    Entry& entry(const Key& key) { return last_ != nullptr && key == last_->regime.key ? *last_ : find(key); }
+    Entry& entry(const Key& key) { return last_ != nullptr && key == last_->regime->key ? *last_ : find(key); }
     // What lies beyond a guard of another regime; its key is asked for the first time only.
     template <class Key>
     Entry& beyond(Entry& from, int guard, Key&& key) {
@@ -223,12 +206,8 @@ class RegimeCache {
 
     // Forgets all regimes, since the system has changed. The memory of so many is kept for others.
     void forget(std::size_t kept = max_kept) {
-        left_ = std::max(left_, used_);
-        if (left_ > kept) {
-            blocks_.resize(kept / per_block);
-            left_ = per_block * blocks_.size();
-        }
-        std::ranges::fill(slots_, nullptr);
+        blocks_.resize(std::min(blocks_.size(), kept / per_block));
+        table_.clear();
         used_ = 0;
         bytes_ = 0;
         last_ = nullptr;
@@ -250,31 +229,17 @@ class RegimeCache {
     // Matrices of trains of any size, and how many regimes observers may still read.
     static constexpr std::size_t most_bytes = std::size_t{256} << 20, in_use = 8;
 
+    struct KeyOf {
+        const Key& operator()(const Entry& e) const { return e.regime->key; }
+    };
     [[gnu::noinline]] Entry& find(const Key& key) {
-        std::size_t k = slot(key);
-        if (slots_[k] == nullptr) {
-            if (2 * (used_ + 1) > slots_.size()) k = grow(key);
-            if (used_ == per_block * blocks_.size())
-                blocks_.push_back(std::make_unique_for_overwrite<Entry[]>(per_block));
-            if (used_ < left_) entry(used_).regime = {};
-            slots_[k] = &entry(used_++);
-            slots_[k]->set(system_, key);
-            if constexpr (std::same_as<D, Any>) bytes_ += slots_[k]->bytes();
-        }
-        return *(last_ = slots_[k]);
-    }
-    // Slot of the regime, or the free slot where it has to go.
-    std::size_t slot(const Key& key) const {
-        const std::size_t mask = slots_.size() - 1;
-        std::size_t k = key.hash() & mask;
-        while (slots_[k] != nullptr && !(slots_[k]->regime.key == key)) k = (k + 1) & mask;
-        return k;
-    }
-    // Makes room for more; returns the slot of a key anew.
-    std::size_t grow(const Key& key) {
-        slots_.assign(2 * slots_.size(), nullptr);
-        for (std::size_t n = 0; n < used_; ++n) slots_[slot(entry(n).regime.key)] = &entry(n);
-        return slot(key);
+        if (Entry* known = table_[key]) return *(last_ = known);
+        if (used_ == per_block * blocks_.size()) blocks_.push_back(std::make_unique_for_overwrite<Entry[]>(per_block));
+        Entry& made = entry(used_++);
+        made.set(system_, key);
+        table_.add(made);
+        if constexpr (std::same_as<D, Any>) bytes_ += made.bytes();
+        return *(last_ = &made);
     }
 
     // In the order in which they were made.
@@ -287,9 +252,9 @@ class RegimeCache {
     std::vector<Entry*> followed_;  // with matrices, in the order of their last preparation; only of trains of any size
     Entry* last_ = nullptr;         // the one asked for last
     std::vector<std::unique_ptr<Entry[]>> blocks_;
-    std::size_t bytes_ = 0;            // of the regimes in use, without matrices; only of trains of any size
-    std::size_t used_ = 0, left_ = 0;  // those in use come first, then those that `forget` has left
-    std::vector<Entry*> slots_ = std::vector<Entry*>(256, nullptr);  // a power of two, by hash, at most half full
+    std::size_t bytes_ = 0;  // of the regimes in use, without matrices; only of trains of any size
+    std::size_t used_ = 0;   // they come first, then those that `forget` has left
+    KeyTable<Entry, KeyOf> table_;
 };
 
 }  // namespace lostmotion

@@ -47,10 +47,7 @@ void see_inputs(const System& system, const InputState<D>& input, double time, I
 // Does an input take the torque of a contact at its limit along in this regime?
 template <class Regime>
 bool follows_inputs(const Regime& r) {
-    if constexpr (requires { r.drivers; })
-        return !r.drivers.empty();
-    else
-        return r.driving_input >= 0;
+    return !r.drivers.empty();
 }
 
 // Completes a switching with what there is after it, and shows it.

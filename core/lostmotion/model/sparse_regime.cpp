@@ -1,0 +1,163 @@
+#include "sparse_regime.hpp"
+
+#include "power.hpp"
+#include "scales.hpp"
+
+namespace lostmotion::model {
+
+namespace {
+
+// The speeds that are given, and those that follow these alone.
+std::vector<GivenState> given_states(const Regime& r, const Places& places) {
+    std::vector<GivenState> out;
+    if (places.driven.empty()) return out;
+    const auto is_driven = [&](int s) { return std::ranges::binary_search(places.driven, s); };
+    for (int s = 0; s < static_cast<int>(places.shafts.size()); ++s) {
+        const bool follows =
+            r.ties.follows(s) && std::ranges::all_of(r.ties.of[static_cast<std::size_t>(s)], is_driven, &Share::shaft);
+        if (r.ties.at_rest[s] || !(follows || is_driven(s))) continue;
+        GivenState& given = out.emplace_back(GivenState{places.shafts[s].speed, {}});
+        const auto add = [&](int k, double share) {
+            given.shares.push_back({places.shafts[k].given_speed, places.shafts[k].given_acceleration, share});
+        };
+        if (follows)
+            r.ties.each_share(s, add);
+        else
+            add(s, 1.0);
+    }
+    return out;
+}
+
+}  // namespace
+
+SparseRegime::SparseRegime(const Regime& r, const Assembly& a, std::span<const double> near_state,
+                           std::span<const double> near_input)
+    : key(r.key),
+      given(given_states(r, a.places())),
+      at_rest(r.at_rest),
+      redundant(r.ties.redundant),
+      solvable(r.solvable),
+      in_data(r.in_data),
+      driving_input(r.driving_input),
+      driving_way(r.driving_way) {
+    const Layout& n = a.layout();
+    const std::size_t gears = r.output_torque.size();
+    std::vector<Row> lost;
+    for (std::size_t g = 0; g < gears; ++g) {
+        const Gear& gear = a.train().gears[g];
+        lost.push_back(gear.sense() * (gear.law.ratio * r.input_torque[g] - r.output_torque[g]));
+    }
+    // The forms refer to the block, which must not grow.
+    std::size_t terms = 0, forms = 0;
+    const auto count = [&](const Row& f) { terms += terms_of(f); };
+    const auto each_list = [&](auto&& use) {
+        for (const auto* rows : {&r.output_torque, &r.input_torque, &r.contact_torque, &r.motor_torque, &r.drive_torque,
+                                 &std::as_const(lost)})
+            use(*rows);
+    };
+    for (const Row& f : r.rate) count(f);
+    each_list([&](const std::vector<Row>& rows) {
+        for (const Row& f : rows) count(f);
+        forms += rows.size();
+    });
+    for (const MasslessSpeed& m : r.massless) count(m.form);
+    for (const model::Guard& g : r.guards) count(g.form);
+    for (const Driver<Row>& d : r.drivers) count(d.torque), count(d.rate);
+    for (const LockedTorque<Row>& l : r.locked) count(l.low), count(l.high), count(l.needs), count(l.friction);
+    block_.reserve(terms);
+    const std::size_t coupled = (static_cast<std::size_t>(n.coupled) + 3) / 4 * 4;
+    forms_.reserve(coupled + static_cast<std::size_t>(n.angles) + forms + r.massless.size() + 1);
+
+    const auto sparse = [&](const Row& f) { return linear_form(f, n, block_); };
+    const auto all = [&](const auto& rows, auto&& row) {
+        const LinearForm* first = forms_.data() + forms_.size();
+        for (const auto& f : rows) forms_.push_back(sparse(row(f)));
+        return Forms(first, rows.size());
+    };
+    const auto itself = [](const Row& f) -> const Row& { return f; };
+    all(std::span(r.rate).first(static_cast<std::size_t>(n.coupled)), itself);
+    forms_.resize(coupled);
+    rate = forms_;
+    angle_rate = all(std::span(r.rate).subspan(static_cast<std::size_t>(n.coupled)), itself);
+    output_torque = all(r.output_torque, itself);
+    if (gears == 0) output_torque = Forms(&forms_.emplace_back(), 1);
+    input_torque = all(r.input_torque, itself);
+    mesh_loss = all(lost, itself);
+    contact_torque = all(r.contact_torque, itself);
+    motor_torque = all(r.motor_torque, itself);
+    drive_torque = all(r.drive_torque, itself);
+    massless_speed = all(r.massless, [](const MasslessSpeed& m) -> const Row& { return m.form; });
+
+    guards.reserve(r.guards.size());
+    near_event.reserve(r.guards.size());
+    for (const model::Guard& g : r.guards) {
+        const LinearForm& f = guards.emplace_back(g.with(sparse(g.form))).form;
+        double near = 0.0;
+        for (const auto& [k, factor] : f.of_coupled())
+            near += std::fabs(factor) * near_state[static_cast<std::size_t>(k)];
+        for (const auto& [i, factor] : f.of_inputs())
+            near += std::fabs(factor) * near_input[static_cast<std::size_t>(i)];
+        near_event.push_back(near);
+    }
+    for (const Driver<Row>& d : r.drivers) drivers.push_back({d.contact, sparse(d.torque), sparse(d.rate)});
+    for (const LockedTorque<Row>& l : r.locked) locked.push_back(l.with(sparse));
+    const auto& shafts = a.places().shafts;
+    for (std::size_t s = 0; s < shafts.size(); ++s) {
+        if (r.ties.at_rest[s]) resting[shafts[s].speed] = true;
+        if (r.ties.follows(static_cast<int>(s))) following[shafts[s].speed] = true;
+    }
+}
+
+SparseRegimes::SparseRegimes(const Assembly& assembly) : assembly_(assembly) {
+    const Layout& n = assembly.layout();
+    near_state_.resize(static_cast<std::size_t>(n.states));
+    near_input_.assign(static_cast<std::size_t>(n.inputs), far_from_event);
+    rated_scale(assembly, near_state_);
+    for (double& x : near_state_) x *= far_from_event;
+    for (int a = 0; a < n.angles; ++a) near_state_[static_cast<std::size_t>(n.coupled + a)] = far_from_event;
+    for (std::size_t s = 0; s < assembly.train().shafts.size(); ++s)
+        if (const int load = assembly.places().shafts[s].load; load != nowhere)
+            near_input_[static_cast<std::size_t>(load)] =
+                far_from_event * rated_torque(assembly.train(), static_cast<int>(s));
+}
+
+const SparseRegime& SparseRegimes::operator[](const Key& key) {
+    if (const SparseRegime* known = table_[key]) return *known;
+    const SparseRegime& made = *known_.emplace_back(make(key));
+    table_.add(made);
+    bytes_ += made.bytes();
+    return made;
+}
+
+void SparseRegimes::make_room() {
+    if (bytes_ <= most_bytes) return;
+    known_.clear();
+    table_.clear();
+    bytes_ = 0;
+}
+
+std::unique_ptr<const SparseRegime> SparseRegimes::make(const Key& key) {
+    return std::make_unique<const SparseRegime>(composed(key), assembly_, near_state_, near_input_);
+}
+
+const std::vector<SparseRegime::Flow>& SparseRegimes::flows(const SparseRegime& r) {
+    if (r.flows == nullptr) {
+        auto flows = std::make_unique<SparseRegime::Flows>();
+        const std::vector<NumberedPower> powers = power_flows(assembly_, composed(r.key));
+        std::size_t terms = 0;
+        for (const NumberedPower& f : powers) terms += terms_of(f.power.torque) + terms_of(f.power.speed);
+        flows->block.reserve(terms);
+        const auto sparse = [&](const Row& f) { return linear_form(f, assembly_.layout(), flows->block); };
+        for (const NumberedPower& f : powers)
+            flows->all.push_back({f.flow, sparse(f.power.torque), sparse(f.power.speed)});
+        r.flows = std::move(flows);
+    }
+    return r.flows->all;
+}
+
+const Regime& SparseRegimes::composed(const Key& key) {
+    if (composed_.rate.empty() || !(composed_.key == key)) assembly_.build(key, composed_);
+    return composed_;
+}
+
+}  // namespace lostmotion::model
