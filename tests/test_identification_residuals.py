@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from conftest import some
 from lostmotion import Simulation, load
 from lostmotion.identification.engine import Engine, Point
 from lostmotion.identification.fit import Fit, Problem
@@ -105,7 +106,7 @@ def test_backlash_is_found_from_other_starts_by_default(tmp_path: Path, start: f
     assert not result.warnings()
 
 
-@pytest.mark.parametrize(("truth", "start"), [("linear", 6e-3), ("hold", 0.8e-3)])
+@pytest.mark.parametrize(("truth", "start"), [("hold", 0.8e-3), ("linear", 6e-3)][: some(2, 1)])
 def test_interpolation_and_backlash_are_found_together_from_far_starts(
     tmp_path: Path, truth: str, start: float
 ) -> None:
