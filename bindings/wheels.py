@@ -26,6 +26,8 @@ from c.build import CORE_FLAGS, KERNELS, PLATFORMS, ROOT, fmu, objects, room, zi
 HERE = Path(__file__).resolve().parent
 BUILD = ROOT / "build" / "wheels"
 MODEL = room("analysis", "control", "elements", "model", "scenario", "simulation")
+ANALYSES = ROOT / "core" / "kernels" / "analyses.cpp"
+BATCH = room("batch")
 MODULE = [HERE / f"{name}.cpp" for name in ("module", "described", "elementary")]
 LIBRARIES = ROOT / "src" / "lostmotion" / "fmu_libraries"
 PAGES = [ROOT / "src" / "lostmotion" / name for name in ("live_page/page.html", "reports/report.js")]
@@ -179,10 +181,10 @@ def extensions(platform: Platform, python: Python, to: Path) -> None:
     extension(platform, python, "_instruction_set", [*chooser, *nano], to)
     for build, cpu in BUILDS[platform.processor].items():
         name = f"_core_{build}"
-        analyses = [kernel.with_name(f"{kernel.stem}_analysis.cpp") for kernel in KERNELS.values()]
         kernels = compiled(list(KERNELS.values()), "-O3", platform, cpu, Path(build))
+        kernels += compiled(BATCH, "-O3", platform, cpu, Path(build) / "batch")
         kernels += compiled(MODEL, "-O2", platform, cpu, Path(build) / "model")
-        kernels += compiled(analyses, "-Os", platform, cpu, Path(build))
+        kernels += compiled([ANALYSES], "-Os", platform, cpu, Path(build))
         own = compiled(MODULE, "-Os", platform, cpu, Path(python.tag) / build, *flags, f"-DCORE_MODULE={name}")
         extension(platform, python, name, [*own, *kernels, *nano], to)
 

@@ -1,6 +1,4 @@
-// What analyses runs in a kernel, compiled for the dimensions D.
-#pragma once
-
+// What is not called at each event, for 4 and any number of coupled states: adaptive solver, responses, sensitivities.
 #include "lostmotion/analysis/analyses.hpp"
 #include "lostmotion/analysis/sensitive_solving.hpp"
 #include "lostmotion/analysis/train_response.hpp"
@@ -27,4 +25,12 @@ class AnalysesIn final : public Analyses {
     }
 };
 
+LOSTMOTION_SOLVING(extern template, model::Least)
+LOSTMOTION_SOLVING(extern template, Any)
+namespace {
+const AdaptiveKernelIn<model::Least> adaptive_of_drives("drive");
+const AdaptiveKernelIn<Any> adaptive("any");
+const AnalysesIn<model::Least> analyses_of_drives("drive");
+const AnalysesIn<Any> analyses("any");
+}  // namespace
 }  // namespace lostmotion

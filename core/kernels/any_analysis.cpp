@@ -1,9 +1,0 @@
-#include "analyses.hpp"
-
-namespace lostmotion {
-LOSTMOTION_SOLVING(extern template, Any)
-namespace {
-const AdaptiveKernelIn<Any> adaptive("any");
-const AnalysesIn<Any> analyses("any");
-}  // namespace
-}  // namespace lostmotion
