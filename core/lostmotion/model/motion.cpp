@@ -67,24 +67,6 @@ double evaluate(const LinearForm& f, const Instant& now) {
     return (constant + input) + state;
 }
 
-Sized sized(const LinearForm& f, const Instant& now) {
-    const double* x = now.x.data();
-    Sized out{f.one, std::fabs(f.one)};
-    const auto add = [&](double term, double size) {
-        out.value += term;
-        out.size += size;
-    };
-    for (const auto& [k, factor] : f.of_coupled()) add(factor * x[k], std::fabs(factor * x[k]));
-    for (const auto& [k, factor] : f.of_angles())
-        add(factor * x[now.coupled + k], std::fabs(factor * x[now.coupled + k]));
-    for (const auto& [k, factor] : f.of_memory())
-        add(factor * now.memory.data()[k], std::fabs(factor * now.memory.data()[k]));
-    for (const auto& [i, factor] : f.of_inputs()) {
-        const double u = now.input[0].data()[i];
-        add(factor * u, std::fabs(factor) * std::fmax(std::fabs(u), now.input_magnitudes.data()[i]));
-    }
-    return out;
-}
 double magnitude(const LinearForm& f, const Instant& now) { return sized(f, now).size; }
 
 SparseFlow::SparseFlow(std::span<const LinearForm> rate, const Instant& now, Room& room)

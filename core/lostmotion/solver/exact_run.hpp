@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <optional>
+#include <utility>
 
 #include "../base/interruption.hpp"
 #include "../kernel/cursor.hpp"
@@ -348,13 +350,13 @@ Status ExactSolver<System>::change_regime(const Guard* fired, Observer& observer
             for (const GivenState& g : *given)
                 now_.x[static_cast<std::size_t>(g.state)] = begin_->input().given_at(g, time_);
     }
-    const Key before = key_;
-    const State x_before = now_.x;
+    std::optional<std::pair<Key, State>> before;
+    if (fired == nullptr) before.emplace(key_, now_.x);
     const Status status = switch_regime(system_, cache_, begin_->inputs(), time_, fired, now_, key_, observer);
     if (fired != nullptr) stopped_at_ = fired->subject();
     if (status != Status::done) return status;
-    if (fired == nullptr)
-        follow_inputs(before, x_before);
+    if (before)
+        follow_inputs(before->first, before->second);
     else
         course_.forget();
     ++switchings_;
