@@ -17,6 +17,7 @@ from conftest import ROOT
 from lostmotion.cli.terminal import announce_parameters, announce_response
 from lostmotion.live_page.description import describe
 from lostmotion.model import LinearStiffness, Rigid, TorsionCurve
+from lostmotion.reports.run import summary
 from lostmotion.simulation.sensitivities import run_sensitivities
 
 # Of the first three modes of the thruster [Hz], with rigid bevel gears: openTorsion 0.3.2, Assembly.modal_analysis().
@@ -262,6 +263,21 @@ def test_what_takes_long_says_so_before_it_starts(capsys: pytest.CaptureFixture[
     announce_response(RUBBING.train(), 60)
     said = capsys.readouterr().err.splitlines()
     assert [line.partition(":")[0] for line in said] == ["Finding out what its parameters change", "Response"]
+
+
+@pytest.mark.parametrize("count", [12, 64])
+def test_the_summary_of_a_large_train_has_what_moves_most_and_counts_the_others(count: int) -> None:
+    result = lm.simulate(chain(count, friction=0.05))
+    lines = summary(result).splitlines()
+    assert len(lines) < 40 and max(map(len, lines)) < 400
+    peaks = {f"m{k}": float(np.abs(result[f"m{k}_speed"]).max()) for k in range(count)}
+    named = [match[1] for line in lines if (match := re.match(r"  shaft (m\d+): .* rad/s, peak", line))]
+    if count == 12:
+        assert named == list(peaks)
+        return
+    assert sorted(named) == sorted(sorted(peaks, key=peaks.__getitem__)[-6:])
+    seventh = sorted(peaks.values())[-7]
+    assert f"  58 other shafts: peaks up to {seventh:.4g} rad/s" in lines
 
 
 @pytest.mark.parametrize("scenario", [LOOSE, RUBBING], ids=["24 masses", "40 masses with friction"])

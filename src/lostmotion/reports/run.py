@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
     from .page import Report, Table
 
+# Of more elements than `MANY`, a summary shows those that move, carry or lose most; the page has all.
+MANY, SHOWN = 12, 6
+
 
 def summary(result: xarray.Dataset | RunArrays) -> str:
     """A run in a few lines: the end, the extremes, the contacts, the energy."""
@@ -88,8 +91,11 @@ def contact_lines(result: xarray.Dataset | RunArrays) -> list[str]:
         }
         parts = [f"{what} {n}" for what, rows in counts.items() if (n := int(rows.sum()))]
         if parts:
-            found.append(f"{name.removesuffix('_contact').replace('_', ' ')} {', '.join(parts)}")
-    return [f"  contacts [times]: {'; '.join(found)}"] if found else []
+            times = float(sum(rows.sum() for rows in counts.values()))
+            found.append((times, f"{name.removesuffix('_contact').replace('_', ' ')} {', '.join(parts)}"))
+    shown, others = _most(found)
+    more = [f"{counted(len(others), 'other')}, each up to {counted(int(max(others)), 'time')}"] if others else []
+    return [f"  contacts [times]: {'; '.join([*shown, *more])}"] if found else []
 
 
 def mesh_lines(result: xarray.Dataset | RunArrays) -> list[str]:
@@ -134,24 +140,42 @@ def train_summary(result: xarray.Dataset | RunArrays) -> str:
     for name in train.motors:
         unit = train.torque_unit(train.motors[name].shaft)
         lines.append(f"  motor {name}: {end_and_peak(train.motor_torque_of(name), unit)}")
+    alike: dict[tuple[str, str], list[tuple[float, str]]] = {}  # lines of elements by kind and unit
+
+    def element(kind: str, name: str, variable: str, unit: str, more: str) -> None:
+        peak = float(np.max(np.abs(np.asarray(result[variable]))))
+        line = f"  {kind} {name}: {end_and_peak(variable, unit)}{more}"
+        alike.setdefault((kind, unit), []).append((peak, line))
+
     for name in train.shafts:
         angle, (unit, factor) = train.angle_of(name), charted(train.angle_unit(name))
         at = f"; at {factor * float(np.asarray(result[angle])[-1]):.4g} {unit}" if angle in result else ""
-        kind = "slide" if train.is_slide(name) else "shaft"
-        lines.append(f"  {kind} {name}: {end_and_peak(f'{name}_speed', train.speed_unit(name))}{at}")
+        element("slide" if train.is_slide(name) else "shaft", name, f"{name}_speed", train.speed_unit(name), at)
     for name, gear in train.gears.items():
-        twist, unit, of = train.twist_of(name), train.angle_unit(gear.output), scenario.kind_of(name)
+        twist, unit = train.twist_of(name), train.angle_unit(gear.output)
         bends = twist.removeprefix(f"{name}_")
         bent = "" if gear.stiffness.kind == "rigid" else f"; {bends} {end_and_peak(twist, unit, small=True)}"
-        lines.append(
-            f"  {of} {name}: {end_and_peak(train.output_torque_of(name), train.torque_unit(gear.output))}{bent}"
-        )
+        element(scenario.kind_of(name), name, train.output_torque_of(name), train.torque_unit(gear.output), bent)
+    for (kind, unit), rows in alike.items():
+        shown, others = _most(rows)
+        lines += shown
+        if others:
+            name, factor = charted(unit)
+            lines.append(f"  {counted(len(others), f'other {kind}')}: peaks up to {factor * max(others):.4g} {name}")
     if "energy" in result.attrs:
         e = energy_of(result)
         apart = ("residual", "turned_over")
-        parts = ", ".join(f"{name} {value:.4g}" for name, value in e.items() if value != 0.0 and name not in apart)
-        lines.append(f"  energy [J]: {parts or 'none'}")
+        found = [(abs(v), f"{name} {v:.4g}") for name, v in e.items() if v != 0.0 and name not in apart]
+        parts, others = _most(found)
+        parts += [f"{counted(len(others), 'other')} of up to {max(others):.4g} each"] if others else []
+        lines.append(f"  energy [J]: {', '.join(parts) or 'none'}")
     return "\n".join([*lines, *_last_lines(result)])
+
+
+def _most(rows: list[tuple[float, str]]) -> tuple[list[str], list[float]]:
+    """Texts in their order, of too many those of the largest values; and the values of the others."""
+    least = sorted(rows)[: -SHOWN if len(rows) > MANY else 0]
+    return [text for value, text in rows if (value, text) not in least], [value for value, _ in least]
 
 
 def _end(values: np.ndarray) -> float:
