@@ -406,7 +406,7 @@ def test_explanations_and_events_name_flanks_and_impacts() -> None:
     assert "mesh_twist_contact: the flanks touch and press with 2.4 N·m" in str(lm.explain(scenario, 0.3))
     events = lm.switchings_of(lm.simulate(scenario))["cause"]
     names = dict(zip(events.attrs["flag_values"], events.attrs["flag_meanings"].split(), strict=True))
-    assert {names[cause] for cause in events.values.tolist()} == {"flanks_struck"}
+    assert {names[cause] for cause in events.values.tolist()} == {"struck"}
 
 
 def test_functions_without_impacts_say_so() -> None:

@@ -348,10 +348,9 @@ def test_parts_of_slides_and_linear_motors_have_their_keys():
     stops = {"lower": "-0.1 m", "upper": "0.1 m", "stiffness": "1 kN/mm"}
     coil = {"slide": "table", "rated_force": "200 N", "cogging_force": "8 N", "pole_pitch": "24 mm"}
     moved = screw(**{"slides.table.end_stops": stops, "linear_motors.coil": coil})
-    assert moved.key_of("springs", "table_end_stops") == "slides.table.end_stops"
+    assert moved.key_of("end_stops", "table_end_stop") == "slides.table.end_stops"
     assert moved.key_of("angle_torques", "coil_cogging") == "linear_motors.coil.cogging_force"
     assert moved.key_of("gears", "screw") == "screws.screw"
-    assert moved.key_of("springs", "other_end_stops") == "springs.other_end_stops"
 
 
 def test_start_of_a_slide_is_given_in_units_of_translation():

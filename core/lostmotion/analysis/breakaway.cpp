@@ -52,7 +52,7 @@ double Breakaway::acting(int shaft) const {
 
 double Breakaway::passed_on(const model::CouplingElement& c, int shaft) const {
     if (c.input != shaft && c.output != shaft) return 0.0;
-    const double torque = model::evaluate(assembly_.layout(), c.torque(assembly_.between(c, ties_), key_), now_);
+    const double torque = model::evaluate(assembly_.layout(), c.torque(assembly_.between(c, ties_, key_), key_), now_);
     return c.output == shaft ? torque : -torque;
 }
 
@@ -119,7 +119,8 @@ double Breakaway::to_drive_back(int g, int s) {
 double Breakaway::to_carry(const model::CouplingElement& c, bool from_input, int s) {
     const int other = from_input ? c.output : c.input;
     if (reaches_a_loop(other)) return 0.0;
-    const model::CouplingInstant now = assembly_.places().instant_of(c, now_);
+    model::CouplingInstant now = assembly_.places().instant_of(c, now_);
+    if (c.branch != model::nowhere) now.mode = key_.branch[static_cast<std::size_t>(c.branch)];
     const double way = from_input ? 1.0 : -1.0;
     const double torque = way * to_turn(other, s, &c);  // that it has to pass on
     return way * std::clamp(torque, -c.capacity(-1, now, true), c.capacity(+1, now, true));

@@ -217,7 +217,7 @@ class ShootingOf {
         // What is at rest at the end of the period is at rest at its beginning, to the last bit.
         y.key = image.end.key;
         auto at_rest = cache_.regime(y.key).at_rest;
-        system_.stop(y.x, at_rest);
+        system_.stop(y, at_rest);
         laws_.direct(y.x, y.key);
         return true;
     }

@@ -36,7 +36,7 @@ std::vector<NamedComponent> train_components(const model::Assembly& a) {
         if (c.kind != model::ContactPlace::shaft)
             add(c.kind == model::ContactPlace::gear
                     ? model::gear_name(t, static_cast<std::size_t>(c.element), "locked_torque")
-                    : p.couplings[c.element]->name + "_locked_torque",
+                    : p.name_of(c) + "_locked_torque",
                 c.locked);
     return out;
 }

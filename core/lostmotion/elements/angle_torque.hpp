@@ -35,7 +35,7 @@ class AngleTorqueOnShaft final : public ShaftElement {
 
     Row torque(const Site& on, const Key& key) const override;
     double torque(const ShaftInstant& now) const override { return curve_(now.angle); }
-    int locate(const ShaftInstant& now) const override { return curve_.piece(now.angle - now.turn); }
+    int next(int, const ShaftInstant& now) const override { return curve_.piece(now.angle - now.turn); }
     void add_guards(const Site& on, const Key& key, bool turns, std::vector<Guard>& guards) const override {
         if (turns) add_piece_guards(on.terms, on.angle(), curve_, turn, branch, key, guards);
     }

@@ -42,7 +42,7 @@ class BrakeOnShaft final : public ShaftElement {
     double friction(const ShaftInstant& now, bool at_rest) const override {
         return (at_rest ? law_.holding() : law_.torque) * std::clamp(now.command, 0.0, 1.0);
     }
-    int locate(const ShaftInstant& now) const override { return side_of(now.command, 0.0, 1.0); }
+    int next(int, const ShaftInstant& now) const override { return side_of(now.command, 0.0, 1.0); }
     int locate_steady(double) const override { return -1; }
     void add_guards(const Site& on, const Key& key, bool, std::vector<Guard>& guards) const override;
 

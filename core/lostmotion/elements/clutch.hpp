@@ -43,7 +43,7 @@ class ClutchBetweenShafts final : public CouplingElement {
     double capacity(int, const CouplingInstant& now, bool at_rest) const override {
         return (at_rest ? law_.holding() : law_.torque) * (has_command() ? std::clamp(now.command, 0.0, 1.0) : 1.0);
     }
-    int locate(const CouplingInstant& now) const override { return side_of(now.command, 0.0, 1.0); }
+    int next(int, const CouplingInstant& now) const override { return side_of(now.command, 0.0, 1.0); }
     void add_guards(const Between& shafts, const Key& key, bool, std::vector<Guard>& guards) const override;
 
  private:

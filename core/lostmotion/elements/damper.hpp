@@ -13,6 +13,7 @@
 namespace lostmotion::model {
 
 struct Damper {
+    static constexpr const char* part = "Damper";
     std::string name;
     int input = 0, output = 0;      // shafts
     double viscous_friction = 0.0;  // [N m s/rad]
@@ -38,7 +39,7 @@ class DamperBetweenShafts final : public CouplingElement {
     Row torque(const Between& shafts, const Key& key) const override {
         return law_.viscous_friction * shafts.slip + on_piece(shafts.terms, shafts.slip, law_.drag, piece(key));
     }
-    int locate(const CouplingInstant& now) const override { return law_.drag.locate(now.slip); }
+    int next(int, const CouplingInstant& now) const override { return law_.drag.locate(now.slip); }
     int locate_steady(double slip) const override { return law_.drag.locate(slip); }
     void add_guards(const Between& shafts, const Key& key, bool slips, std::vector<Guard>& guards) const override {
         if (slips) add_piece_guards(shafts.terms, shafts.slip, law_.drag, branch, key, guards);

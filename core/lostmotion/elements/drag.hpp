@@ -26,7 +26,7 @@ class DragOnShaft final : public ShaftElement {
         return -on_piece(on.terms, on.speed(), curve_, piece(key));
     }
     double torque(const ShaftInstant& now) const override { return -curve_.torque(now.speed); }
-    int locate(const ShaftInstant& now) const override { return curve_.locate(now.speed); }
+    int next(int, const ShaftInstant& now) const override { return curve_.locate(now.speed); }
     int locate_steady(double speed) const override { return curve_.locate(speed); }
     void add_guards(const Site& on, const Key& key, bool turns, std::vector<Guard>& guards) const override {
         if (turns) add_piece_guards(on.terms, on.speed(), curve_, branch, key, guards);

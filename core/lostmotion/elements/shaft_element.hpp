@@ -52,6 +52,7 @@ class ShaftElement {
     int command = nowhere;    // input
     int branch = nowhere;     // of its piecewise law
     int turn = nowhere;       // memory: the angle at which the present turn of a periodic law began
+    int contact = nowhere;    // of what strikes
     int remainder = nowhere;  // input of the adaptive solver: what straight lines leave of a smooth law
 
     // What it has.
@@ -62,6 +63,9 @@ class ShaftElement {
     virtual double period() const { return 0.0; }  // [rad] of a law over the angle; 0: it has none
     virtual bool is_smooth() const { return false; }
     virtual bool drives() const { return false; }  // it may set a train in motion
+    // The angles at which the shaft strikes something rigid; and whether what it is pressed against is a result.
+    virtual const Ends* strikes() const { return nullptr; }
+    virtual bool is_pressed() const { return false; }
 
     // Torque on the shaft in the direction of its motion, beside what is dry [N m].
     virtual bool acts_at_rest() const { return true; }
@@ -77,8 +81,9 @@ class ShaftElement {
     virtual Row friction(const Site&, const Key&, bool /*at_rest*/) const { return Row{}; }
     virtual double friction(const ShaftInstant&, bool /*at_rest*/) const { return 0.0; }
 
-    // The branch at an instant, and in steady motion with the commands of what it holds at 0; what ends the regime.
-    virtual int locate(const ShaftInstant&) const { return 0; }
+    // The branch that follows `mode` at an instant, which a law without a memory finds from that alone; in steady
+    // motion with the commands of what it holds at 0; what ends the regime.
+    virtual int next(int mode, const ShaftInstant&) const { return mode; }
     virtual int locate_steady(double /*speed*/) const { return 0; }
     virtual void add_guards(const Site&, const Key&, bool /*turns*/, std::vector<Guard>&) const {}
 

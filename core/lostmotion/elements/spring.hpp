@@ -13,6 +13,7 @@ namespace lostmotion::model {
 
 // Torque -P(phi - rest_angle). A first piece of slope 0 leaves the shaft free between two end stops.
 struct Spring {
+    static constexpr const char* part = "Spring";
     std::string name;
     int shaft = 0;
     TorsionCurve curve;       // P [N m] over the angle [rad]
@@ -41,7 +42,7 @@ class SpringOnShaft final : public ShaftElement {
         return -on_piece(on.terms, extension(on), law_.curve, piece(key));
     }
     double torque(const ShaftInstant& now) const override { return -law_.curve.torque(now.angle - law_.rest_angle); }
-    int locate(const ShaftInstant& now) const override { return law_.curve.locate(now.angle - law_.rest_angle); }
+    int next(int, const ShaftInstant& now) const override { return law_.curve.locate(now.angle - law_.rest_angle); }
     void add_guards(const Site& on, const Key& key, bool turns, std::vector<Guard>& guards) const override {
         if (turns) add_piece_guards(on.terms, extension(on), law_.curve, branch, key, guards);
     }

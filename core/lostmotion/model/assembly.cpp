@@ -7,7 +7,7 @@ void Assembly::build(const Key& key, Regime& r) const {
     r.key = key;
     r.ties = places().ties(key.modes.data());
     for (int c = 0; c < layout().contacts; ++c)
-        r.at_rest[c] = (places().contacts[c].flanks == nowhere || key.modes[c] == 0) &&
+        r.at_rest[c] = (!places().contacts[c].gap.present() || key.modes[c] == 0) &&
                        (r.ties.redundant[c] || kept_at_rest(places().contacts[c], r.ties));
 
     equations_.compose(key, r);

@@ -40,13 +40,14 @@ std::vector<CapacityShare> contact_capacity(const Assembly& a, int contact, cons
         }
         return shares;
     }
-    if (c.kind == ContactPlace::gear) {
-        const double h = c.bilateral || c.flanks != nowhere ? std::numeric_limits<double>::infinity()
-                                                            : now.memory[a.places().gears[k].hysteresis];
-        return {{a.train().gears[k].name, h, h}};
+    if (c.kind == ContactPlace::gear || c.kind == ContactPlace::stop) {
+        const double h = c.bilateral || c.gap.present() ? std::numeric_limits<double>::infinity()
+                                                        : now.memory[a.places().gears[k].hysteresis];
+        return {{c.kind == ContactPlace::gear ? a.train().gears[k].name : a.places().name_of(c), h, h}};
     }
     const CouplingElement& law = *a.places().couplings[k];
-    const CouplingInstant here = a.places().instant_of(law, now);
+    CouplingInstant here = a.places().instant_of(law, now);
+    if (law.branch != nowhere) here.mode = r.key.branch[law.branch];
     return {{law.name, law.capacity(+1, here, r.at_rest[contact]), law.capacity(-1, here, r.at_rest[contact])}};
 }
 

@@ -9,9 +9,9 @@ namespace lostmotion::model {
 std::string Fault::sentence() const { return kind.empty() ? reason : element() + ' ' + reason; }
 
 Fault TrainCheck::operator()() const {
-    for (const auto check :
-         {&TrainCheck::shafts_exist, &TrainCheck::mass_matrices, &TrainCheck::controllers, &TrainCheck::elements,
-          &TrainCheck::inertias, &TrainCheck::rigid_loops, &TrainCheck::turned, &TrainCheck::massless})
+    for (const auto check : {&TrainCheck::shafts_exist, &TrainCheck::mass_matrices, &TrainCheck::controllers,
+                             &TrainCheck::elements, &TrainCheck::inertias, &TrainCheck::rigid_loops,
+                             &TrainCheck::turned, &TrainCheck::massless, &TrainCheck::what_strikes})
         if (Fault error = (this->*check)(); !error.empty()) return error;
     return {};
 }
@@ -155,27 +155,57 @@ Fault TrainCheck::mesh_stiffness(const Gear& g, const Fault& name) const {
 
 Fault TrainCheck::flanks(const Gear& g, const Fault& name) const {
     if (!g.strikes()) return {};
-    const auto lossless = [](const Gear& o) {
-        return !o.has_dry_losses() && o.law.losses == Gearbox::constant_efficiency && o.law.efficiency == 1.0;
-    };
     if (g.law.compliance != Gearbox::rigid) return name + "has rigid flanks and a stiffness; leave one of them out";
-    if (!(g.restitution >= 0.0 && g.restitution <= 1.0))
-        return name + "has a restitution of " + std::to_string(g.restitution) + "; it must lie from 0 to 1";
     if (g.mesh_damping > 0.0 || g.transmission_error.present())
         return name + "has rigid flanks with " + (g.mesh_damping > 0.0 ? "mesh damping" : "a transmission error") +
                "; leave that out, or give a stiffness";
+    return impacts(name, "has rigid flanks", "the gear", g.restitution);
+}
+
+// Impulses pass through all that is rigid: nothing there may lose energy, be given, or hold one way.
+Fault TrainCheck::impacts(const Fault& name, const std::string& rigid, const std::string& it,
+                          double restitution) const {
+    const auto lossless = [](const Gear& o) {
+        return !o.has_dry_losses() && o.law.losses == Gearbox::constant_efficiency && o.law.efficiency == 1.0;
+    };
+    if (!(restitution >= 0.0 && restitution <= 1.0))
+        return name + rigid + " and a restitution of " + std::to_string(restitution) + "; it must lie from 0 to 1";
     for (std::size_t k = 0; k < train_.gears.size(); ++k)
         if (const Gear& o = train_.gears[k]; (o.rigid() || o.strikes()) && !lossless(o))
             return named("gears", "gear", o.name, k) + "is rigid and has losses, which impacts in " + name +
                    " would depend on; give it a stiffness or no losses";
     for (std::size_t s = 0; s < train_.shafts.size(); ++s)
         if (train_.shafts[s].given_motion)
-            return name + "has rigid flanks, and the motion of " + shaft(static_cast<int>(s)) +
-                   " is given; give the gear a stiffness, or a torque in place of the motion";
+            return name + rigid + ", and the motion of " + shaft(static_cast<int>(s)) + " is given; give " + it +
+                   " a stiffness, or a torque in place of the motion";
     for (const auto& c : coupling_elements(train_))
-        if (c->is_one_way())
-            return name + "has rigid flanks beside the freewheel '" + c->name + "'; give the gear a stiffness";
+        if (c->is_one_way() && c->strikes() == nullptr)
+            return name + rigid + " beside the freewheel '" + c->name + "'; give " + it + " a stiffness";
     return {};
+}
+
+Fault TrainCheck::what_strikes() const {
+    const Places places(train_);
+    for (std::size_t k = 0; k < train_.end_stops.size(); ++k) {
+        const EndStops& e = train_.end_stops[k];
+        const Fault name = named("end_stops", "end stops", e.name, k);
+        if (!(e.upper > e.lower))
+            return name + "have their upper stop at " + std::to_string(e.upper) + ", not above the lower one at " +
+                   std::to_string(e.lower) + "; exchange them";
+        if (e.stiffness == 0.0)
+            if (Fault error = impacts(name, "are rigid", "them", e.restitution); !error.empty()) return error;
+        if (e.damping > 0.0 && places.shafts[static_cast<std::size_t>(e.shaft)].massless != nowhere)
+            return name + "have damping, and " + shaft(e.shaft) + "has no " + inertia(e.shaft) + "; give it one (" +
+                   harmless_inertia(e.shaft) + " is harmless beside its neighbours)";
+    }
+    Fault error;
+    Train::each_coupling_kind(train_, [&](const char* table, const char* kind, const auto& elements) {
+        for (std::size_t k = 0; k < elements.size() && error.empty(); ++k)
+            if (const auto e = between_shafts(elements[k]); e->strikes() != nullptr)
+                error = impacts(named(table, kind, elements[k].name, k), "has teeth that strike", "what is beside it",
+                                e->strikes()->restitution);
+    });
+    return error;
 }
 
 Fault TrainCheck::mass_matrices() const {

@@ -60,8 +60,11 @@ class TrainCheck {
     // Mass matrices: their shafts, sizes, symmetry and eigenvalues.
     Fault mass_matrices() const;
     Fault mesh_stiffness(const Gear& g, const Fault& name) const;
-    // Rigid flanks with backlash, and what there may be beside them.
     Fault flanks(const Gear& g, const Fault& name) const;
+    // What there may be beside what is rigid and strikes; rigid, it: what it has, and its word, in a sentence.
+    Fault impacts(const Fault& name, const std::string& rigid, const std::string& it, double restitution) const;
+    // End stops, and couplings with teeth.
+    Fault what_strikes() const;
     Fault inertias() const;
 
     // Shafts without inertia that no rigid gear ties to others.

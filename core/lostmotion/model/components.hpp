@@ -28,7 +28,7 @@ class ComponentLaws<model::TrainSystem<D>> {
             if (const int h = gears()[g].hysteresis; h != model::nowhere)
                 set_torque(h, assembly_.train().gears[g].law.rated_output_torque);
         for (const model::ContactPlace& c : contacts())
-            if (c.locked != model::nowhere) set_torque(c.locked, model::rated_torque(assembly_.train(), c.b));
+            if (c.locked != model::nowhere) set_torque(c.locked, model::rated_torque(assembly_.train(), c.turned()));
     }
 
     // The turns of angles follow from these.

@@ -104,15 +104,15 @@ auto ElementForms::held_friction(int shaft, const Key& key) const -> Row {
     return F;
 }
 
-auto ElementForms::between(const CouplingElement& c, const Ties& ties) const -> Between {
-    Between shafts{terms_, {}};
+auto ElementForms::between(const CouplingElement& c, const Ties& ties, const Key& key) const -> Between {
+    Between shafts{terms_, {}, c.contact == nowhere ? 0 : mode(key, c.contact)};
     for (const Share& k : tied_speed(coupling_place(c, nowhere), ties))
         shafts.slip.c[places_.shafts[k.shaft].speed] = k.share;
     return shafts;
 }
 
 auto ElementForms::coupling_torque(const CouplingElement& c, const Regime& r) const -> Row {
-    const Row torque = c.torque(between(c, r.ties), r.key);
+    const Row torque = c.torque(between(c, r.ties, r.key), r.key);
     return c.contact == nowhere ? torque : r.contact_torque[c.contact] + torque;
 }
 

@@ -68,16 +68,21 @@ class ElementForms {
     // What a shaft holds at rest, without gears.
     Row held_friction(int shaft, const Key& key) const;
     // The shafts that a coupling joins; its slip as tied_speed() has it.
-    Between between(const CouplingElement& c, const Ties& ties) const;
+    Between between(const CouplingElement& c, const Ties& ties, const Key& key) const;
     // What its dry contact takes while it slips, or holds at rest.
     Row coupling_capacity(const CouplingElement& c, const Regime& r, bool at_rest) const {
-        return c.capacity(between(c, r.ties), r.key, at_rest);
+        return c.capacity(between(c, r.ties, r.key), r.key, at_rest);
     }
     // What a coupling passes on from its input to its output, by its contact and beside it.
     Row coupling_torque(const CouplingElement& c, const Regime& r) const;
     // What a dry element takes of a shaft that slips.
     Row dry_torque(const ShaftElement& e, const Key& key) const {
         return static_cast<double>(mode(key, places_.shafts[e.shaft].contact)) * e.friction(site(e.shaft), key, false);
+    }
+    // What the shaft of an element presses on it with.
+    Row pressing_torque(int element, const Key& key) const {
+        const ShaftElement& e = *places_.acting[element];
+        return -e.torque(site(e.shaft), key);
     }
     // Is the rate of the twist kept at zero?
     bool twist_rests(int gear, const Regime& r) const;

@@ -14,6 +14,8 @@ void Equations::compose(const Key& key, Regime& r) const {
     for (std::size_t g = 0; g < gears; ++g) compose_gear(static_cast<int>(g), key, r);
     for (const auto& c : places_.couplings)
         if (c->is_dry()) compose_coupling(*c, key, r);
+    for (const auto& e : places_.acting)
+        if (e->contact != nowhere && mode(key, e->contact) == 0) r.contact_torque[e->contact] = held(e->contact, r);
     for (std::size_t s = 0; s < train_.shafts.size(); ++s) {
         const int c = places_.shafts[s].contact;
         if (c != nowhere) r.contact_torque[c] = shaft_friction(static_cast<int>(s), key, r);
@@ -129,6 +131,8 @@ Row Equations::net_torque(int shaft, const Key& key, const Regime& r) const {
             sum += e->torque(forms_.site(shaft), key);
     if (p.load != nowhere) sum -= terms_.input(p.load);
     if (p.contact != nowhere) sum -= r.contact_torque[p.contact];
+    for (const auto& e : places_.acting)
+        if (e->contact != nowhere && e->shaft == shaft) sum -= r.contact_torque[e->contact];
     for (std::size_t g = 0; g < train_.gears.size(); ++g)
         if (train_.gears[g].input == shaft) sum -= r.input_torque[g];
     for (const auto& c : places_.couplings)
@@ -156,32 +160,31 @@ LockedTorque<Row> Equations::locked_torque(int contact, const Key& key, const Re
         locked.low = low;
         locked.high = high;
     };
-    if (c.kind == ContactPlace::gear) {
-        const Row P = forms_.spring_torque(c.element, key);
-        if (c.flanks != nowhere) {
-            (key.branch[places_.gears[c.element].side] > 0 ? locked.has_low : locked.has_high) = true;
-        } else if (!c.bilateral) {
-            const Row h = terms_.memory(places_.gears[c.element].hysteresis);
-            between(P - h, P + h);
-        }
+    if (c.gap.present()) {
+        (key.branch[c.gap.side] > 0 ? locked.has_low : locked.has_high) = true;
+    } else if (c.kind == ContactPlace::gear && !c.bilateral) {
+        const Row P = forms_.spring_torque(c.element, key), h = terms_.memory(places_.gears[c.element].hysteresis);
+        between(P - h, P + h);
     } else if (c.one_way) {
         locked.has_low = true;
-    } else {
+    } else if (c.kind == ContactPlace::coupling) {
         const Row most = forms_.coupling_capacity(*places_.couplings[c.element], r, true);
         between(-most, most);
     }
-    const int on = places_.shafts[c.b].contact;
+    const int turned = c.turned(), on = places_.shafts[turned].contact;
     const bool lossy = std::any_of(train_.gears.begin(), train_.gears.end(),
-                                   [&](const Gear& g) { return g.input == c.b && g.has_dry_losses(); });
-    if (on != nowhere && mode(key, on) == 0 && !r.ties.redundant[on] && !lossy) add_held_shaft(c.b, key, r, locked);
+                                   [&](const Gear& g) { return g.input == turned && g.has_dry_losses(); });
+    if (on != nowhere && mode(key, on) == 0 && !r.ties.redundant[on] && !lossy) add_held_shaft(c, key, r, locked);
     return locked;
 }
 
 // All that turns a shaft at rest but its friction and this torque.
-void Equations::add_held_shaft(int shaft, const Key& key, const Regime& r, LockedTorque<Row>& locked) const {
+void Equations::add_held_shaft(const ContactPlace& at, const Key& key, const Regime& r,
+                               LockedTorque<Row>& locked) const {
+    const int shaft = at.turned();
     locked.on_held_shaft = true;
     locked.friction = forms_.held_friction(shaft, key);
-    locked.needs = -net_torque(shaft, key, r);
+    locked.needs = -at.turns() * net_torque(shaft, key, r);
     locked.needs.c[layout_.first_memory + locked.memory] = 0.0;
     for (int c = 0; c < layout_.contacts; ++c) {
         const double share = std::exchange(locked.needs.c[layout_.terms + c], 0.0);
@@ -193,14 +196,14 @@ void Equations::add_held_shaft(int shaft, const Key& key, const Regime& r, Locke
 }
 
 void Equations::add_coupled_inertias(Regime& r) const {
-    const auto add = [&](int shaft, Row& torque) {
+    const auto add = [&](int shaft, Row& torque, double way = 1.0) {
         places_.each_coupled_inertia(
-            shaft, [&](int other, double inertia) { torque += inertia * r.rate[places_.shafts[other].speed]; });
+            shaft, [&](int other, double inertia) { torque += way * inertia * r.rate[places_.shafts[other].speed]; });
     };
     for (std::size_t k = 0; k < places_.driven.size(); ++k) add(places_.driven[k], r.drive_torque[k]);
     for (LockedTorque<Row>& l : r.locked) {
         if (!l.on_held_shaft) continue;
-        add(places_.contacts[l.contact].b, l.needs);
+        add(places_.contacts[l.contact].turned(), l.needs, places_.contacts[l.contact].turns());
         l.needs.c[layout_.first_memory + l.memory] = 0.0;
     }
 }
@@ -228,8 +231,11 @@ void Equations::set_rates(const Key& key, Regime& r) const {
         const GearPlace& p = places_.gears[g];
         if (p.twist != nowhere && !forms_.twist_rests(static_cast<int>(g), r))
             r.rate[p.twist] = forms_.twist_rate(static_cast<int>(g), key);
-        if (p.side != nowhere && std::abs(key.branch[p.side]) == 2) r.rate[p.clock] = terms_.one(-1.0);
     }
+    for (const auto& c : places_.couplings)
+        if (c->twist != nowhere) r.rate[c->twist] = forms_.between(*c, r.ties, key).slip;
+    for (const ContactPlace& c : places_.contacts)
+        if (c.gap.present() && std::abs(key.branch[c.gap.side]) == 2) r.rate[c.gap.clock] = terms_.one(-1.0);
     for (std::size_t s = 0; s < train_.shafts.size(); ++s)
         if (places_.shafts[s].angle != nowhere && !r.ties.at_rest[s])
             r.rate[places_.shafts[s].angle] = terms_.state(places_.shafts[s].speed);

@@ -43,7 +43,7 @@ class Equations {
     Row shaft_friction(int shaft, const Key& key, const Regime& r) const;
     Row net_torque(int shaft, const Key& key, const Regime& r) const;
     LockedTorque<Row> locked_torque(int contact, const Key& key, const Regime& r) const;
-    void add_held_shaft(int shaft, const Key& key, const Regime& r, LockedTorque<Row>& locked) const;
+    void add_held_shaft(const ContactPlace& at, const Key& key, const Regime& r, LockedTorque<Row>& locked) const;
 
     int mode(const Key& key, int contact) const { return key.modes[contact]; }
     // What a stuck contact takes: found from its rest, or, where the motion does not determine it, as it was. The

@@ -18,7 +18,7 @@ void RegimeGuards::add_all() {
     add_coupling_capacities();
     for (int s = static_cast<int>(train_.shafts.size()) - 1; s >= 0; --s) add_shaft_guards(s);
     add_turning();
-    add_flanks();
+    add_gaps();
     for (std::size_t g = 0; g < train_.gears.size(); ++g) add_twist_pieces(static_cast<int>(g));
     for (std::size_t s = 0; s < train_.shafts.size(); ++s) add_speed_pieces(static_cast<int>(s));
     add_input_limits();
@@ -39,7 +39,7 @@ void RegimeGuards::add_speed_guards() {
     for (int c = 0; c < layout_.contacts; ++c) {
         const int mode = regime_.key.modes[c];
         if (mode == 0 && regime_.ties.redundant[c]) add_given_speed(c);
-        if (mode == 0 || held_in_motion(c) || places_.contacts[c].flanks != nowhere) continue;
+        if (mode == 0 || held_in_motion(c) || places_.contacts[c].gap.present()) continue;
         // (16) sets the hysteresis anew whenever the twist rate reaches zero, whether it then changes sign or not.
         add(static_cast<double>(mode) * forms_.contact_speed(c), Guard::speed, c, nowhere, 0).by_grazing =
             places_.contacts[c].kind == ContactPlace::gear;
@@ -63,29 +63,33 @@ void RegimeGuards::add_gear_capacities() {
     }
 }
 
-// Rigid flanks strike at the ends of the gap. Those that touch part where they would pull; while impacts accumulate,
-// they do so until the clock has run down.
-void RegimeGuards::add_flanks() {
-    for (std::size_t g = 0; g < train_.gears.size(); ++g) {
-        const GearPlace& p = places_.gears[g];
-        if (p.side == nowhere) continue;
-        const int side = regime_.key.branch[p.side];
-        if (regime_.key.modes[p.contact] != 0) {
-            if (forms_.twist_rests(static_cast<int>(g), regime_)) continue;
-            const double reach = places_.contacts[p.contact].reach;
-            add(terms_.one(reach) - terms_.state(p.twist), Guard::impact, p.contact, nowhere, 0);
-            add(terms_.one(reach) + terms_.state(p.twist), Guard::impact, p.contact, nowhere, 0);
-            continue;
+// What is rigid strikes at the ends of its gap. What touches parts where it would pull; while impacts accumulate, it
+// does so until the clock has run down.
+void RegimeGuards::add_gaps() {
+    places_.each_striking([&](const ContactPlace& c, int contact) {
+        const Gap& gap = c.gap;
+        const int side = regime_.key.branch[gap.side];
+        if (regime_.key.modes[contact] != 0) {
+            if (kept_at_rest(c, regime_.ties)) return;
+            const Row at = gap.turn == nowhere ? terms_.state(gap.at) : terms_.state(gap.at) - terms_.memory(gap.turn);
+            add(terms_.one(gap.high) - at, Guard::impact, contact, nowhere, 0);
+            Guard& low = add(terms_.one(-gap.low) + at, gap.passes ? Guard::edge : Guard::impact, contact, nowhere, 0);
+            if (gap.passes) {
+                low.branch = gap.side;
+                low.memory = gap.turn;
+                low.shift = gap.low - gap.high;
+            }
+            return;
         }
-        if (!regime_.ties.redundant[p.contact])
-            add((side > 0 ? 1.0 : -1.0) * regime_.output_torque[g], Guard::capacity, p.contact, nowhere, -1);
-        if (std::abs(side) == 2) add(terms_.state(p.clock), Guard::impact, p.contact, p.side, side / 2);
-    }
+        if (!regime_.ties.redundant[contact])
+            add((side > 0 ? 1.0 : -1.0) * regime_.contact_torque[contact], Guard::capacity, contact, nowhere, -1);
+        if (std::abs(side) == 2) add(terms_.state(gap.clock), Guard::impact, contact, gap.side, side / 2);
+    });
 }
 
 void RegimeGuards::add_coupling_capacities() {
     for (const auto& c : places_.couplings) {
-        if (!c->is_dry() || regime_.key.modes[c->contact] != 0) continue;
+        if (!c->is_dry() || c->strikes() != nullptr || regime_.key.modes[c->contact] != 0) continue;
         const Row& torque = regime_.contact_torque[c->contact];
         const Row capacity = forms_.coupling_capacity(*c, regime_, true);
         if (!c->is_one_way()) add(capacity - torque, Guard::capacity, c->contact, nowhere, +1);
@@ -284,7 +288,7 @@ void RegimeGuards::add_input_limits() {
 // Limits of their commands, pieces of their laws over the slip.
 void RegimeGuards::add_coupling_pieces() {
     for (const auto& c : places_.couplings) {
-        const Between shafts = forms_.between(*c, regime_.ties);
+        const Between shafts = forms_.between(*c, regime_.ties, regime_.key);
         const bool slips = std::any_of(shafts.slip.c.begin(), shafts.slip.c.end(), [](double v) { return v != 0.0; });
         c->add_guards(shafts, regime_.key, slips, regime_.guards);
     }

@@ -27,7 +27,7 @@ class RegimeGuards {
     void add_speed_guards();
     void add_given_speed(int contact);
     void add_gear_capacities();
-    void add_flanks();
+    void add_gaps();
     void add_coupling_capacities();
     void add_shaft_guards(int shaft);
     void add_loss_cells(int gear, int s, Row& capacity);

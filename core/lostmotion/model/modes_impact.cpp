@@ -16,8 +16,7 @@ namespace lostmotion::model {
 // Flanks have a gap if it is more than rounding makes of it, in space or in time.
 bool SwitchedTrain::has_gap(int contact, const Instant& now) const {
     const ContactPlace& p = places().contacts[contact];
-    return p.reach - std::fabs(now.x[p.flanks]) >
-           rounding * 2.0 * p.reach + time_rounding * std::fabs(now.time * speed_of(contact, now));
+    return p.gap.left(now) > rounding * p.gap.size() + time_rounding * std::fabs(now.time * speed_of(contact, now));
 }
 
 // Do flanks close their gap, by more than rounding?
@@ -27,8 +26,7 @@ bool SwitchedTrain::approach(int contact, const Instant& now) const {
         speed += per * now.x[places().shafts[s].speed];
         size += std::fabs(per * now.x[places().shafts[s].speed]);
     });
-    const double side = now.x[places().contacts[contact].flanks] > 0.0 ? 1.0 : -1.0;
-    return side * speed > 8.0 * std::numeric_limits<double>::epsilon() * size;
+    return places().contacts[contact].gap.side_of(now) * speed > 8.0 * std::numeric_limits<double>::epsilon() * size;
 }
 
 double SwitchedTrain::speed_of(int contact, const Instant& now) const {
@@ -45,15 +43,13 @@ Impulses SwitchedTrain::impulses(const Instant& now, const Key& key) const {
     std::vector<Flank> flanks;
     for (int c = 0; c < contacts(); ++c) {
         const ContactPlace& p = places().contacts[c];
-        if (p.flanks == nowhere) continue;
+        if (!p.gap.present()) continue;
         const bool apart = has_gap(c, now);
-        if (apart && p.reach - std::fabs(now.x[p.flanks]) > least_flight_ * 2.0 * p.reach) continue;
-        const auto gear = static_cast<std::size_t>(p.element);
+        if (apart && p.gap.left(now) > least_flight_ * p.gap.size()) continue;
         // While impacts accumulate flanks count as touching, but have a gap. Where others keep them at rest, it is open
         // whether they press.
-        const bool touches =
-            !(now.x[places().gears[gear].clock] > 0.0) && (key.modes[c] == 0 || (!apart && kept_at_rest(p, ties)));
-        flanks.push_back({c, now.x[p.flanks] > 0.0 ? 1.0 : -1.0, train().gears[gear].restitution, apart, touches});
+        const bool touches = !(now.x[p.gap.clock] > 0.0) && (key.modes[c] == 0 || (!apart && kept_at_rest(p, ties)));
+        flanks.push_back({c, p.gap.side_of(now), p.gap.restitution, apart, touches});
     }
     return Impulses(places(), std::move(flanks), speeds);
 }
@@ -69,11 +65,10 @@ Found SwitchedTrain::land(Instant& now, const Impulses& after, Event event, cons
     }
     for (const Flank& f : after.flanks) {
         const ContactPlace& p = places().contacts[f.contact];
-        const GearPlace& gear = places().gears[static_cast<std::size_t>(p.element)];
-        if (f.struck) now.x[p.flanks] = f.side * p.reach;
-        event.at_rest[f.contact] = f.touches || (f.speed == 0.0 && p.may_rest(now.x));
-        if (f.struck || !event.at_rest[f.contact]) now.x[gear.clock] = f.accumulates ? 1.0 : 0.0;
-        now.memory[gear.impact_loss] += f.loss;
+        if (f.struck) now.x[p.gap.at] = p.gap.end(f.side, now);
+        event.at_rest[f.contact] = f.touches || (f.speed == 0.0 && p.may_rest(now));
+        if (f.struck || !event.at_rest[f.contact]) now.x[p.gap.clock] = f.accumulates ? 1.0 : 0.0;
+        now.memory[p.gap.impact_loss] += f.loss;
         if (!event.at_rest[f.contact] || !before[f.contact]) key.modes[f.contact] = -1;
     }
     return find_after(now, moved, event, before, past, key);
@@ -86,7 +81,7 @@ Found SwitchedTrain::find_after(Instant& now, const MovedShafts& moved, Event ev
     constexpr double few_roundings = 8.0 * std::numeric_limits<double>::epsilon();
     for (int c = 0; c < contacts(); ++c) {
         const ContactPlace& p = places().contacts[c];
-        if (p.bilateral || p.flanks != nowhere) continue;
+        if (p.bilateral || p.gap.present()) continue;
         bool moves = false;
         double speed = 0.0, size = 0.0;
         p.each_shaft([&](int shaft, double per) {
@@ -107,7 +102,7 @@ Found SwitchedTrain::find_after(Instant& now, const MovedShafts& moved, Event ev
                 train().gears[static_cast<std::size_t>(p.element)].law.hysteresis_capacity(now.x[gear->twist]);
         if (!same || !before[c]) key.modes[c] = static_cast<std::int8_t>(mode);
     }
-    stop(now.x, event.at_rest);
+    stop(now, event.at_rest);
     for (int c = 0; c < contacts(); ++c) event.stopped[c] = event.at_rest[c] && !before[c];
     const auto on_the_way = [&, x = now.x, memory = now.memory] {
         Instant out = past;
@@ -123,8 +118,7 @@ Found SwitchedTrain::find_after(Instant& now, const MovedShafts& moved, Event ev
 double SwitchedTrain::time_to_rest(const SparseRegime& r, const Instant& now, int contact) {
     constexpr double epsilon = std::numeric_limits<double>::epsilon();
     const ContactPlace& p = places().contacts[contact];
-    const double restitution = train().gears[static_cast<std::size_t>(p.element)].restitution;
-    const double side = now.x[p.flanks] > 0.0 ? 1.0 : -1.0;
+    const double restitution = p.gap.restitution, side = p.gap.side_of(now);
     double v = -side * speed_of(contact, now);
     if (!(v > 0.0)) return -1.0;
     Row row;
@@ -135,7 +129,7 @@ double SwitchedTrain::time_to_rest(const SparseRegime& r, const Instant& now, in
     if (!(a0 > rounding * along.rate_magnitude(approach, 1))) return -1.0;
     const bool elastic = !(restitution < 1.0);
     const double first = 2.0 * v / a0, all = elastic ? first : first / (1.0 - restitution);
-    const bool small = 0.5 * v * v <= least_flight_ * 2.0 * p.reach * a0;
+    const bool small = 0.5 * v * v <= least_flight_ * p.gap.size() * a0;
     const bool even = std::fabs(a1) * all <= 1e-4 * a0 && std::fabs(a2) * all * all <= 1e-8 * a0;
     if (!(small && even) && first > unresolved * std::fabs(now.time)) return -1.0;
     if (elastic) return for_ever;
@@ -167,11 +161,11 @@ double SwitchedTrain::time_to_rest(const SparseRegime& r, const Instant& now, co
         const Flank& flank = joined.flanks[f];
         if (!flank.accumulates && !(flank.struck && flank.touches)) continue;
         const ContactPlace& p = places().contacts[flank.contact];
-        const auto& form = r.output_torque[static_cast<std::size_t>(p.element)];
+        const auto& form = r.contact_torque[static_cast<std::size_t>(flank.contact)];
         const double torque = flank.side * evaluate(form, now);
         if (!(torque > rounding * magnitude(form, now))) return -1.0;
-        energy += torque * (p.reach - std::fabs(before.x[p.flanks]));
-        all.push_back({torque, along.rate(form, 1), least_flight_ * 2.0 * p.reach,
+        energy += torque * p.gap.left(before);
+        all.push_back({torque, along.rate(form, 1), least_flight_ * p.gap.size(),
                        2.0 * std::sqrt(2.0 * joined.inertia(f)) / torque, 1.0 / (1.0 - flank.restitution)});
     }
     double time = 0.0;
@@ -191,16 +185,17 @@ double SwitchedTrain::time_to_rest(const SparseRegime& r, const Instant& now, co
 Found SwitchedTrain::strikes(Instant& now, const Guard& fired, Key& key) {
     const int contact = fired.contact;
     const ContactPlace& p = places().contacts[contact];
-    now.x[places().gears[static_cast<std::size_t>(p.element)].clock] = 0.0;
+    now.x[p.gap.clock] = 0.0;
     if (fired.branch != nowhere) {
         cross(fired, key);
         return Found::yes;
     }
-    now.x[p.flanks] = std::copysign(p.reach, now.x[p.flanks]);
+    now.x[p.gap.at] = p.gap.end(p.gap.side_of(now), now);
     double first = 0.0;
     for (int round = 0;; ++round) {
         const auto& old = regimes_[key];
         Event event;
+        event.from = key;
         for (std::size_t g = 0; g < train().gears.size(); ++g) event.gear[g] = evaluate(old.output_torque[g], now);
         each_coupling_contact([&](int c) { event.coupling[c] = evaluate(old.contact_torque[c], now); });
         for (int c = 0; c < contacts(); ++c) event.at_rest[c] = old.at_rest[c];
@@ -240,8 +235,7 @@ bool SwitchedTrain::close(Instant& now, const Impulses& struck, int contact, con
         const double time = rests ? left(energy) : -1.0;
         if (!(time >= 0.0)) return false;
         for (const Flank& f : joined.flanks)
-            if (f.accumulates)
-                now.x[places().gears[static_cast<std::size_t>(places().contacts[f.contact].element)].clock] = time;
+            if (f.accumulates) now.x[places().contacts[f.contact].gap.clock] = time;
         return true;
     };
     std::vector<bool> set(m);
@@ -327,7 +321,7 @@ bool SwitchedTrain::locks_in_motion(const Instant& now, const Event& event, cons
             const bool slips = !places().contacts[c].bilateral && from.modes[c] == 0;
             trial.modes[c] = slips ? std::int8_t{-1} : from.modes[c];
         }
-        locate(now, trial);
+        locate(now, from, trial);
         Torques T_2 = event.gear;
         T_2[gear] = driven * way * g.sense() * g.rated_torque();
         locate_losses(now, T_2, trial);

@@ -9,7 +9,7 @@ bool SwitchedTrain::conditions(Instant now, const Key& modes, const Event& event
     ++searches.trials;
     Key trial;
     trial.modes = modes.modes;
-    locate(now, trial);
+    locate(now, event.from, trial);
     locate_losses(now, event.gear, trial);
     if (some_redundant_) hold(regimes_[trial], now, event);
     trial = branches_at(regimes_[trial], trial, now);

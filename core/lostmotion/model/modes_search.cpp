@@ -5,10 +5,13 @@
 namespace lostmotion::model {
 
 SwitchedTrain::SwitchedTrain(const Assembly& assembly) : assembly_(assembly), regimes_(assembly) {
-    const auto strike =
-        std::count_if(train().gears.begin(), train().gears.end(), [](const Gear& g) { return g.strikes(); });
-    has_flanks_ = strike > 0;
-    least_flight_ = strike > 1 ? flight_among_others : one_flight;
+    int gears = 0, all = 0;
+    places().each_striking([&](const ContactPlace& c, int) {
+        ++all;
+        gears += c.kind == ContactPlace::gear ? 1 : 0;
+    });
+    has_impacts_ = all > 0;
+    least_flight_ = gears == 1 && all == 1 ? one_flight : flight_among_others;
     for (int c = 0; c < contacts(); ++c) {
         some_redundant_ = some_redundant_ || places().contacts[c].locked != nowhere;
         holds_more_[c] = !places().contacts[c].bilateral && holds_more(places().contacts[c]);
@@ -20,7 +23,7 @@ Key SwitchedTrain::branches_at(const SparseRegime& other, const Key& modes, cons
     key.modes = modes.modes;
     Torques T_2{};
     for (std::size_t g = 0; g < train().gears.size(); ++g) T_2[g] = evaluate(other.output_torque[g], now);
-    locate(now, key);
+    locate(now, other.key, key);
     locate_losses(now, T_2, key);
     return key;
 }
@@ -42,6 +45,8 @@ Found SwitchedTrain::start(Instant& now, Key& key) {
     Event event;
     Rest given_rest{};
     now.reach(assembly_.layout());
+    for (const auto& c : places().couplings)
+        if (c->turn != nowhere) now.memory[c->turn] = c->turn_at(now.x[c->twist]);
     follow_given(now.x, now.input[0], key, given_rest);
     bool snap = !places().driven.empty();
     for (int c = 0; c < contacts(); ++c) {
@@ -55,12 +60,12 @@ Found SwitchedTrain::start(Instant& now, Key& key) {
         // Speeds that differ by rounding are the same: a state that a run has ended with may be that of the next. A
         // speed that has passed through zero there has the rounding of what it was before.
         const bool same = std::fabs(speed) <= few_roundings * size;
-        if (p.one_way && p.flanks == nowhere && speed > 0.0 && !same) return Found::inconsistent;
+        if (p.one_way && !p.gap.present() && speed > 0.0 && !same) return Found::inconsistent;
         key.modes[c] = p.one_way || speed < 0.0 ? -1 : +1;
-        event.at_rest[c] = (p.bilateral || same) && p.may_rest(now.x);
+        event.at_rest[c] = (p.bilateral || same) && p.may_rest(now);
         snap = snap || (same && !p.bilateral && speed != 0.0);
     }
-    if (snap) stop(now.x, event.at_rest);
+    if (snap) stop(now, event.at_rest);
     // As if nothing had acted on the train, with brakes and clutches as they are commanded.
     Instant before = now.at_rest();
     const auto keep = [&](const auto& e) {
@@ -109,7 +114,7 @@ Found SwitchedTrain::next(Instant& now, int fired_number, Key& key, const Inputs
     const Guard* fired = fired_number == nowhere ? nullptr : &old.guards[static_cast<std::size_t>(fired_number)];
     if (fired != nullptr && fired->kind == Guard::impact) return strikes(now, *fired, key);
     Event event;
-    event.before = key;
+    event.before = event.from = key;
     Inputs left = input;
     left.reach(static_cast<std::size_t>(assembly_.layout().inputs));
     std::swap(left, now.input[0]);
@@ -125,12 +130,13 @@ Found SwitchedTrain::next(Instant& now, int fired_number, Key& key, const Inputs
         event.neighbour = fired->neighbour;
         event.memory = fired->memory;
         event.shift = fired->shift;
+        if (fired->is_edge()) cross(*fired, event.from);
     }
     Rest before{};
     for (int c = 0; c < contacts(); ++c) before[c] = old.at_rest[c];
     for (int c = 0; c < contacts(); ++c) event.at_rest[c] = before[c] || given_rest[c];
     if (fired != nullptr && fired->kind == Guard::speed) event.at_rest[fired->contact] = true;
-    stop(now.x, event.at_rest);
+    stop(now, event.at_rest);
     for (int c = 0; c < contacts(); ++c) event.stopped[c] = event.at_rest[c] && !before[c];
     if (fired != nullptr && fired->kind == Guard::capacity) {
         margin_size = magnitude(fired->form, now);
@@ -166,6 +172,7 @@ bool SwitchedTrain::breaks_away(Instant& now, const Event& event, double margin_
     Event slipping;
     slipping.at_rest = event.at_rest;
     slipping.at_rest[event.contact] = false;
+    slipping.from = event.from;
     slipping.gear = event.gear;
     slipping.coupling = event.coupling;
     const auto memory = now.memory;
@@ -203,24 +210,17 @@ Found SwitchedTrain::find(Instant& now, const std::function<Instant()>& before, 
     const auto search = [&] {
         return tries_all ? enumerate(now, event, from, key) : pivot(now, event, path, from, key);
     };
-    // Flanks without a gap that approach each other strike next: until then their ends are not to be seen.
-    std::vector<std::pair<int, double>> hidden;
-    for (int c = 0; c < contacts() && has_flanks_; ++c) {
-        const ContactPlace& p = places().contacts[c];
-        if (p.flanks == nowhere || event.at_rest[c] || has_gap(c, now) || !approach(c, now)) continue;
-        hidden.emplace_back(p.flanks, std::exchange(now.x[p.flanks], 0.0));
-    }
-    const Found found = [&] {
-        const Found first = search();
-        if (first == Found::yes) return first;
-        event.from_each_load =
-            std::any_of(train().gears.begin(), train().gears.end(), [](const Gear& g) { return g.has_dry_losses(); });
-        if (event.from_each_load && search() == Found::yes) return Found::yes;
-        event.closest = true;
-        return search() == Found::yes ? Found::yes : first;
-    }();
-    for (const auto& [twist, value] : hidden) now.x[twist] = value;
-    return found;
+    // What approaches without a gap strikes next.
+    for (int c = 0; c < contacts() && has_impacts_; ++c)
+        event.strikes[c] =
+            places().contacts[c].gap.present() && !event.at_rest[c] && !has_gap(c, now) && approach(c, now);
+    const Found first = search();
+    if (first == Found::yes) return first;
+    event.from_each_load =
+        std::any_of(train().gears.begin(), train().gears.end(), [](const Gear& g) { return g.has_dry_losses(); });
+    if (event.from_each_load && search() == Found::yes) return Found::yes;
+    event.closest = true;
+    return search() == Found::yes ? Found::yes : first;
 }
 
 bool SwitchedTrain::at_its_limit(const Key& key) const {
@@ -238,7 +238,7 @@ bool SwitchedTrain::pushes_against_rest(const Key& key) const {
     const Ties ties = places().ties(key.modes.data());
     std::vector<int> direction(train().shafts.size());  // of each free shaft
     for (std::size_t k = 0; k < all.size(); ++k) {
-        if (key.modes[k] == 0 || all[k].flanks != nowhere) continue;
+        if (key.modes[k] == 0 || all[k].gap.present()) continue;
         const ContactPlace& c = all[k];
         const Shares free = tied_speed(c, ties);
         if (free.empty()) return true;
@@ -451,7 +451,7 @@ Found SwitchedTrain::pivot(Instant& now, const Event& event, Key modes, const Ke
 }
 
 bool SwitchedTrain::holds_more(const ContactPlace& c) const {
-    if (c.kind == ContactPlace::gear) return false;
+    if (c.kind == ContactPlace::gear || c.kind == ContactPlace::stop) return false;
     const auto element = static_cast<std::size_t>(c.element);
     if (c.kind == ContactPlace::coupling) return places().couplings[element]->holds_more();
     const DryFriction& friction = train().shafts[element].friction;

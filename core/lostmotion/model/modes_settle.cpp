@@ -12,8 +12,8 @@ double SwitchedTrain::value_of(const Instant& now, const Row& v) const {
     return sum;
 }
 
-// The branches that the state and the inputs give alone.
-void SwitchedTrain::locate(const Instant& now, Key& trial) const {
+// The branches that the state and the inputs give, and what laws remember of those before.
+void SwitchedTrain::locate(const Instant& now, const Key& from, Key& trial) const {
     const auto set = [&trial](int branch, int value) {
         if (branch != nowhere) trial.branch[branch] = static_cast<std::int16_t>(value);
     };
@@ -23,9 +23,13 @@ void SwitchedTrain::locate(const Instant& now, Key& trial) const {
             set(p.branch, side_of(now.input[0][p.command], -most, most));
     }
     for (const auto& c : places().couplings)
-        if (c->branch != nowhere) set(c->branch, c->locate(places().instant_of(*c, now)));
+        if (c->branch != nowhere) {
+            CouplingInstant here = places().instant_of(*c, now);
+            here.sticks = c->contact != nowhere && trial.modes[c->contact] == 0;
+            set(c->branch, c->next(from.branch[c->branch], here));
+        }
     for (const auto& e : places().acting)
-        if (e->branch != nowhere) set(e->branch, e->locate(places().instant_of(*e, now)));
+        if (e->branch != nowhere) set(e->branch, e->next(from.branch[e->branch], places().instant_of(*e, now)));
     for (std::size_t s = 0; s < train().shafts.size(); ++s) {
         const ShaftPlace& p = places().shafts[s];
         const double w = now.x[p.speed];
@@ -38,10 +42,6 @@ void SwitchedTrain::locate(const Instant& now, Key& trial) const {
         p.each_over_angle(gear, [&](const PeriodicCurve& curve, const OverAngle& law) {
             set(law.piece, curve.piece(assembly_.angle_of_input(g, now.x) - now.memory[law.turn]));
         });
-        if (p.side != nowhere) {
-            const int side = now.x[p.twist] > 0.0 ? 1 : -1;
-            set(p.side, trial.modes[p.contact] != 0 ? 0 : now.x[p.clock] > 0.0 ? 2 * side : side);
-        }
         if (p.piece == nowhere) continue;
         const double d = now.x[p.twist];
         const int piece = gear.law.curve.locate(d);
@@ -54,6 +54,10 @@ void SwitchedTrain::locate(const Instant& now, Key& trial) const {
         const double P = assembly_.stiffness_factor(static_cast<int>(g), trial) * gear.law.curve.torque(d);
         set(p.flanks, piece == 0 ? Gear::touching : gear.flanks(piece, P, gear.mesh_damping * rate));
     }
+    places().each_striking([&](const ContactPlace& c, int contact) {
+        const int side = static_cast<int>(c.gap.side_of(now));
+        set(c.gap.side, trial.modes[contact] != 0 ? 0 : now.x[c.gap.clock] > 0.0 ? 2 * side : side);
+    });
     for (std::size_t k = 0; k < train().controllers.size(); ++k) {
         const auto [branch, piece] = std::pair(places().controllers[k].branch, places().controllers[k].piece);
         const LinearController& c = train().controllers[k];
@@ -100,7 +104,7 @@ auto SwitchedTrain::settle(Instant& now, const Key& modes, const Event& event, K
     ++searches.trials;
     Key trial;
     trial.modes = modes.modes;
-    locate(now, trial);
+    locate(now, event.from, trial);
     Torques T_2 = event.gear;
     for (std::size_t g = 0; g < train().gears.size(); ++g) {
         const GearPlace& p = places().gears[g];

@@ -74,10 +74,13 @@ std::vector<std::string> state_names(const Assembly& a) {
         set(p.shafts[k].speed, t.shafts[k].name + "_speed");
         set(p.shafts[k].angle, angle_of(t, k));
     }
-    for (std::size_t k = 0; k < t.gears.size(); ++k) {
-        set(p.gears[k].twist, gear_result(t, k, "twist"));
-        set(p.gears[k].clock, gear_result(t, k, "impacts_left"));
-    }
+    for (std::size_t k = 0; k < t.gears.size(); ++k) set(p.gears[k].twist, gear_result(t, k, "twist"));
+    for (const auto& c : p.couplings) set(c->twist, c->name + "_twist");
+    p.each_striking([&](const ContactPlace& c, int) {
+        set(c.gap.clock, c.kind == ContactPlace::gear
+                             ? gear_result(t, static_cast<std::size_t>(c.element), "impacts_left")
+                             : p.name_of(c) + "_impacts_left");
+    });
     for (std::size_t k = 0; k < t.controllers.size(); ++k)
         for (std::size_t j = 0; j < t.controllers[k].states.size(); ++j)
             set(p.controllers[k].first_state + static_cast<int>(j),
@@ -133,7 +136,7 @@ std::string contact_name(const Assembly& a, int contact) {
     switch (c.kind) {
         case ContactPlace::shaft: return shown_name(a.train(), a.train().shafts[k].name + "_contact");
         case ContactPlace::gear: return gear_result(a.train(), k, "twist_contact");
-        default: return a.places().couplings[k]->name + "_contact";
+        default: return a.places().name_of(c) + "_contact";
     }
 }
 
@@ -143,6 +146,7 @@ int contact_shaft(const Assembly& a, int contact) {
     switch (c.kind) {
         case ContactPlace::shaft: return c.element;
         case ContactPlace::gear: return a.train().gears[k].output;
+        case ContactPlace::stop: return c.a;
         default: return a.places().couplings[k]->input;
     }
 }

@@ -1,5 +1,7 @@
 #include "places.hpp"
 
+#include <functional>
+
 namespace lostmotion::model {
 
 ContactPlace twist_place(const Gear& g, int gear) {
@@ -7,7 +9,6 @@ ContactPlace twist_place(const Gear& g, int gear) {
     c.housing = g.housing;
     if (g.housing != nowhere) c.per_housing = g.per_housing();
     c.one_way = g.strikes();
-    c.reach = 0.5 * g.flank_backlash;
     return c;
 }
 
@@ -73,8 +74,13 @@ void Places::place_states(const Train& train) {
     for (ShaftPlace& s : shafts) s.speed = next++;
     for (std::size_t g = 0; g < gears.size(); ++g)
         if (all || !train.gears[g].rigid()) gears[g].twist = next++;
-    for (std::size_t g = 0; g < gears.size(); ++g)
-        if (train.gears[g].strikes()) gears[g].clock = next++;
+    for (const auto& c : couplings)
+        if (c->pitch() > 0.0) c->twist = next++;
+    first_clock_ = next;
+    const auto strikes = [](const auto& e) { return e->strikes() != nullptr; };
+    next += static_cast<int>(std::count_if(train.gears.begin(), train.gears.end(), std::mem_fn(&Gear::strikes)) +
+                             std::count_if(couplings.begin(), couplings.end(), strikes) +
+                             std::count_if(acting.begin(), acting.end(), strikes));
     for (std::size_t s = 0; s < shafts.size(); ++s)
         if (by_angle[s]) shafts[s].angle = next++;
     for (std::size_t k = 0; k < controllers.size(); ++k) {
@@ -118,14 +124,28 @@ void Places::place_contacts(const Train& train) {
             if (g.input != static_cast<int>(s) || !(g.rigid() || g.strikes() || g.law.has_hysteresis())) continue;
             gears[k].contact = static_cast<int>(contacts.size());
             contacts.push_back(twist_place(g, static_cast<int>(k)));
-            if (g.strikes()) contacts.back().flanks = gears[k].twist;
+            if (g.strikes())
+                contacts.back().gap = {{-0.5 * g.flank_backlash, 0.5 * g.flank_backlash, g.restitution},
+                                       gears[k].twist};
         }
     }
     for (std::size_t k = 0; k < couplings.size(); ++k) {
         if (!couplings[k]->is_dry()) continue;
         couplings[k]->contact = static_cast<int>(contacts.size());
         contacts.push_back(coupling_place(*couplings[k], static_cast<int>(k)));
+        if (const Ends* ends = couplings[k]->strikes()) contacts.back().gap = {*ends, couplings[k]->twist};
     }
+    for (std::size_t k = 0; k < acting.size(); ++k) {
+        const Ends* ends = acting[k]->strikes();
+        if (ends == nullptr) continue;
+        acting[k]->contact = static_cast<int>(contacts.size());
+        ContactPlace& c =
+            contacts.emplace_back(ContactPlace{ContactPlace::stop, static_cast<int>(k), acting[k]->shaft});
+        c.one_way = true;
+        c.gap = {*ends, shafts[acting[k]->shaft].angle};
+    }
+    int clock = first_clock_;
+    each_striking([&](const ContactPlace&, int c) { contacts[c].gap.clock = clock++; });
     layout.contacts = static_cast<int>(contacts.size());
 }
 
@@ -177,8 +197,16 @@ void Places::place_memory_and_branches(const Train& train) {
     for (std::size_t k = 0; k < gears.size(); ++k)
         if (train.gears[k].law.has_hysteresis())
             gears[k].hysteresis = layout.memory++;
-        else if (train.gears[k].strikes() || train.gears[k].may_lock())
+        else if (train.gears[k].strikes())
+            contacts[gears[k].contact].gap.impact_loss = layout.memory++;
+        else if (train.gears[k].may_lock())
             gears[k].impact_loss = layout.memory++;
+    for (ContactPlace& c : contacts)
+        if (c.gap.present() && c.kind != ContactPlace::gear) c.gap.impact_loss = layout.memory++;
+    for (const auto& c : couplings) {
+        if (c->pitch() > 0.0) c->turn = layout.memory++;
+        if (c->strikes() != nullptr) contacts[c->contact].gap.turn = c->turn;
+    }
     // What is redundant while some contacts are stuck is so while all are.
     const std::vector<std::int8_t> all_stuck(contacts.size(), 0);
     const Ties stuck = ties(all_stuck.data());
@@ -193,7 +221,7 @@ void Places::place_memory_and_branches(const Train& train) {
     for (std::size_t k = 0; k < gears.size(); ++k) {
         const Gear& g = train.gears[k];
         if (g.strikes())
-            gears[k].side = next++;
+            contacts[gears[k].contact].gap.side = next++;
         else if (!g.rigid())
             gears[k].piece = next++;
         if (g.has_dry_losses()) {
@@ -218,6 +246,8 @@ void Places::place_memory_and_branches(const Train& train) {
         if (e->piecewise_law() != nullptr) e->branch = next++;
         if (e->period() > 0.0) e->turn = layout.memory++;
     }
+    for (ContactPlace& c : contacts)
+        if (c.gap.present() && c.kind != ContactPlace::gear) c.gap.side = next++;
     for (std::size_t k = 0; k < controllers.size(); ++k) {
         if (train.controllers[k].limited()) controllers[k].branch = next++;
         if (train.controllers[k].curved) controllers[k].piece = next++;

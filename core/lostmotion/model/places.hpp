@@ -36,9 +36,7 @@ struct GearPlace {
     int twist = nowhere, contact = nowhere;
     int hysteresis = nowhere;                                                    // memory
     int piece = nowhere, cell = nowhere, cell_back = nowhere, flanks = nowhere;  // branches
-    int side = nowhere;   // branch of rigid flanks: +1, -1 where they touch, +2, -2 while impacts accumulate, 0 apart
-    int clock = nowhere;  // state: the time left until impacts have accumulated [s]
-    int impact_loss = nowhere;      // memory: the energy that impulses have taken [J]
+    int impact_loss = nowhere;      // memory: the energy that a lock in motion has taken [J]
     int parametric_work = nowhere;  // memory: the energy that steps of the stiffness have given [J]
     OverAngle error, mesh;
 
@@ -90,6 +88,22 @@ struct Places {
             gears.size() + acting.size() + couplings.size() + motors.size() + controllers.size();
         return 4 * (layout.contacts + layout.branches + static_cast<int>(elements));
     }
+    // Of a coupling or an end stop.
+    const std::string& name_of(const ContactPlace& c) const {
+        return c.kind == ContactPlace::stop ? acting[c.element]->name : couplings[c.element]->name;
+    }
+    // Calls use(contact, its number) for each contact that strikes: flanks of gears, then others.
+    template <class Use>
+    void each_striking(Use&& use) const {
+        for (std::size_t g = 0; g < gears.size(); ++g)
+            if (const int c = gears[g].contact; c != nowhere && contacts[c].gap.present()) use(contacts[c], c);
+        const auto each = [&](const auto& elements) {
+            for (const auto& e : elements)
+                if (e->strikes() != nullptr) use(contacts[e->contact], e->contact);
+        };
+        each(couplings);
+        each(acting);
+    }
     // Does nothing that moves with a free shaft have an inertia?
     bool moves_no_inertia(int shaft, const Ties& t) const;
 
@@ -118,6 +132,7 @@ struct Places {
     // The smallest kernel. A train that fits into it has a place for the torque of each motor and the twist of each
     // gear, whether they move or not: one motor, two shafts and a gear are always in the same order.
     static constexpr int smallest = 4;
+    int first_clock_ = nowhere;  // state
 
     void place_states(const Train& train);
     void place_contacts(const Train& train);

@@ -36,6 +36,9 @@ void each_flow(const Assembly& a, Use&& use) {
             if (lossy(e) && !e->is_dry())
                 use(PowerFlow::loss, e->name, e->loss(),
                     [&](const Regime& r) -> Flow { return {{-e->torque(a.site(shaft), r.key), speed(shaft)}}; });
+        for (const auto& e : places.acting)
+            if (e->contact != nowhere && e->shaft == shaft)
+                use(PowerFlow::loss, e->name, "impacts", [](const Regime&) -> Flow { return {}; });
         if (p.load != nowhere)
             use(PowerFlow::output, name, "load",
                 [&](const Regime&) -> Flow { return {{terms.input(p.load), speed(shaft)}}; });
@@ -77,9 +80,11 @@ void each_flow(const Assembly& a, Use&& use) {
                      a.twist_rate(g, r.key)}};
         });
     }
-    for (const auto& c : places.couplings)
+    for (const auto& c : places.couplings) {
+        if (c->strikes() != nullptr) use(PowerFlow::loss, c->name, "impacts", [](const Regime&) -> Flow { return {}; });
         use(PowerFlow::loss, c->name, c->loss(),
             [&](const Regime& r) -> Flow { return {{a.coupling_torque(*c, r), speed(c->input) - speed(c->output)}}; });
+    }
 }
 
 }  // namespace

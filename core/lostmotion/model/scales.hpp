@@ -54,6 +54,8 @@ void rated_scale(const Assembly& a, State& s) {
                    : gear.strikes() ? gear.flank_backlash
                                     : gear.law.rated_output_torque / gear.law.curve.max_slope();
     }
+    for (const auto& c : a.places().couplings)
+        if (c->twist != nowhere) s[c->twist] = c->pitch();
     for (std::size_t k = 0; k < train.controllers.size(); ++k) controller_scale(a, static_cast<int>(k), 1.0, s);
 }
 
@@ -98,6 +100,8 @@ void balanced_scale(const Assembly& a, State& s, int first_angle) {
         for (int part = 0; part < a.layout().angles; ++part)
             if (p.last_shaft[part] == gear.output) s[first_angle + part] = twist;
     }
+    for (const auto& c : p.couplings)
+        if (c->twist != nowhere) s[c->twist] = s[p.shafts[c->output].speed];
     for (std::size_t n = 0; n < train.shafts.size(); ++n)
         if (p.shafts[n].angle != nowhere) s[p.shafts[n].angle] = s[p.shafts[n].speed];
     for (std::size_t k = 0; k < train.controllers.size(); ++k) {

@@ -60,8 +60,8 @@ class SwitchedTrain {
     bool follow_given(X& x, const Input& input, const Key& key, Rest& rests) const;
 
     // Sets the speeds of contacts at rest to what they are, to the last bit, and marks those that this implies.
-    template <class X, class AtRest>
-    void stop(X& x, AtRest& at_rest) const;
+    template <class Now, class AtRest>
+    void stop(Now& now, AtRest& at_rest) const;
     template <class X>
     void set_tied_speeds(X& x, const Ties& ties) const;
 
@@ -83,9 +83,11 @@ class SwitchedTrain {
         int contact = nowhere, branch = nowhere, neighbour = 0, memory = nowhere;
         double shift = 0.0;
         Key before{};
+        Key from{};                   // with the branch beyond the edge that has ended it: what laws remember
         bool from_each_load = false;  // begin the search for the cell of a loss law from each load
         bool by_value = false;        // a guard that is zero to rounding holds, whatever its derivatives
         bool closest = false;         // take the combination that violates its guards least
+        Rest strikes{};               // those without a gap that approach it: their ends are not to be seen
 
         // The margins of a contact that has just come to a stop are zero by chance only.
         bool by_value_alone(const Guard& g) const {
@@ -110,7 +112,7 @@ class SwitchedTrain {
     template <class Use>
     void each_coupling_contact(Use&& use) const {
         for (int c = 0; c < contacts(); ++c)
-            if (places().contacts[c].kind == ContactPlace::coupling) use(c);
+            if (places().contacts[c].has_own_torque()) use(c);
     }
 
     // What contacts at rest make of the speeds: found once for each set.
@@ -164,7 +166,7 @@ class SwitchedTrain {
     Trial walk(Instant& now, const Event& event, Key trial, Key& key, Violated violated = {});
     bool breaks_away(Instant& now, const Event& event, double margin_size, double near, Key& key);
     bool turns_the_other_way(const SparseRegime& e, const Instant& now, const Event& event);
-    void locate(const Instant& now, Key& trial) const;
+    void locate(const Instant& now, const Key& from, Key& trial) const;
     void locate_losses(const Instant& now, const Torques& T_2, Key& trial) const;
     void hold(const SparseRegime& r, Instant& now, const Event& event) const;
     double value_of(const Instant& now, const Row& v) const;
@@ -185,16 +187,18 @@ class SwitchedTrain {
 
     const Guard* first_left(const SparseRegime& r, const Instant& now, const std::vector<std::size_t>& ignored,
                             const Event& event, Violated& of_contacts);
-    // Is a guard the speed of a contact that moves? Its mode was chosen by that speed.
+    // Is a guard the speed of a contact that moves, whose mode was chosen by that speed, or the end that it is about to
+    // strike?
     static bool is_of_moving(const Guard& g, const Event& event) {
-        return g.kind == Guard::speed && !event.at_rest[g.contact];
+        return (g.kind == Guard::speed && !event.at_rest[g.contact]) ||
+               (g.kind == Guard::impact && g.branch == nowhere && event.strikes[g.contact]);
     }
 
     const Assembly& assembly_;
     SparseRegimes regimes_;
     SparseFlow::Room room_;
     Rest holds_more_{};  // contacts that hold more than they take while they slip
-    bool has_flanks_ = false;
+    bool has_impacts_ = false;
     double least_flight_ = one_flight;
     bool some_redundant_ = false;  // while all contacts are at rest; else no one keeps another at rest
     // What has been found of sets of contacts and of modes, by their hash.
@@ -207,13 +211,14 @@ class SwitchedTrain {
     std::vector<int> slips_of_;  // how many contacts slip in each combination; its memory is used again
 };
 
-template <class X, class AtRest>
-void SwitchedTrain::stop(X& x, AtRest& at_rest) const {
-    Rest now;
+template <class Now, class AtRest>
+void SwitchedTrain::stop(Now& now, AtRest& at_rest) const {
+    Rest here;
     for (int c = 0; c < contacts(); ++c)
-        if (at_rest[c]) now[c] = true;
-    const Stopped& all = stopped(now);
-    for (int c = 0; c < contacts(); ++c) at_rest[c] = all.kept[c] && places().contacts[c].may_rest(x);
+        if (at_rest[c]) here[c] = true;
+    const Stopped& all = stopped(here);
+    auto& x = now.x;
+    for (int c = 0; c < contacts(); ++c) at_rest[c] = all.kept[c] && places().contacts[c].may_rest(now);
     if (places().driven.empty()) {
         set_tied_speeds(x, all.ties);
     } else {  // whose speeds stay what they are, to the last bit

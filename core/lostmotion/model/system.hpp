@@ -84,9 +84,9 @@ class TrainSystem {
         if (before) add_parametric_work(*before, key, now);
         return certain(found);
     }
-    template <class X, class AtRest>
-    void stop(X& x, AtRest& at_rest) const {
-        search_.stop(x, at_rest);
+    template <class Now, class AtRest>
+    void stop(Now& now, AtRest& at_rest) const {
+        search_.stop(now, at_rest);
     }
     // Inputs that depend on the state: what straight lines leave of smooth laws.
     void set_remainders(const Key& key, const State& x, const typename D::Memory& memory, InputsOf<D>& u,
@@ -105,7 +105,7 @@ class TrainSystem {
             if (e->remainder == nowhere) continue;
             ShaftInstant here = assembly_.places().instant_of(*e, now);
             here.turn = e->turn_at(here.angle);
-            const auto rest = e->remainder_at(here, e->locate(here));
+            const auto rest = e->remainder_at(here, e->next(0, here));
             now.input[0][e->remainder] = rest.value;
             now.input[1][e->remainder] = rest.rate;
             now.input_magnitudes[e->remainder] = rest.magnitude;

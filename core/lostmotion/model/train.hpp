@@ -9,6 +9,7 @@
 #include "../elements/clutch.hpp"
 #include "../elements/damper.hpp"
 #include "../elements/drag.hpp"
+#include "../elements/end_stops.hpp"
 #include "../elements/freewheel.hpp"
 #include "../elements/spring.hpp"
 #include "../parts/gear.hpp"
@@ -40,6 +41,7 @@ struct Train {
     std::vector<Brake> brakes;
     std::vector<AngleTorque> angle_torques;
     std::vector<Spring> springs;
+    std::vector<EndStops> end_stops;
 
     // Calls use(table, one of them, elements) for each kind of what acts on one shaft, in the order of the equations.
     template <class Self, class Use>
@@ -47,6 +49,7 @@ struct Train {
         use("brakes", "brake", train.brakes);
         use("angle_torques", "angle torque", train.angle_torques);
         use("springs", "spring", train.springs);
+        use("end_stops", "end stops", train.end_stops);
     }
     // The same for each kind of what joins two shafts.
     template <class Self, class Use>

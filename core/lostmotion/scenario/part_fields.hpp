@@ -224,8 +224,15 @@ void each_table(Use&& use) {
     });
     use("Commanded", [](auto& f) { Brake().describe(f); });
     use("TorsionCurve", [](auto& f) { StiffnessCurve().describe(f); });
-    use("Damper", [](auto& f) { Damper().describe(f); });
-    use("Spring", [](auto& f) { Spring().describe(f); });
+    const auto add = [&](const char*, const char*, const auto& elements) {
+        using Element = std::decay_t<decltype(elements)>::value_type;
+        if constexpr (requires { Element::part; }) use(Element::part, [](auto& f) { Element().describe(f); });
+    };
+    const Train none;
+    Train::each_coupling_kind(none, add);
+    Train::each_kind(none, add);
+    use("ShaftEndStops", [](auto& f) { EndStops().describe(f); });
+    use("EndStops", [](auto& f) { EndStops().describe(f, "m", "N/m", "N*s/m"); });
 }
 
 }  // namespace model

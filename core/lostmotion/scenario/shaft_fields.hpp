@@ -122,10 +122,8 @@ void each_drag(Use&& use) {
 
 template <class Use>
 void each_slide(Use&& use) {
-    use("EndStops", [](auto& f) {
-        f.number({"lower", "", "m", any, needed, "position of the lower stop"});
-        f.number({"upper", "", "m", any, needed, "position of the upper stop"});
-        f.number({"stiffness", "k", "N/m", positive, needed, "of each stop"});
+    use("Stopped", [](auto& f) {
+        f.table({"end_stops", "", "", any, may_be_left_out, "stops at both ends of the travel"}, "ShaftEndStops");
     });
     use("Slide", [](auto& f) {
         constexpr double upright = 0.5 * std::numbers::pi;
@@ -135,7 +133,7 @@ void each_slide(Use&& use) {
                   "inclination of the positive direction above the horizontal; 90 deg: vertical, positive upwards. The "
                   "weight's share along the slide acts against it"},
                  0.0, -upright, upright);
-        f.table({"end_stops", "", "", any, may_be_left_out, "elastic stops at both ends of the travel"}, "EndStops");
+        f.table({"end_stops", "", "", any, may_be_left_out, "stops at both ends of the travel"}, "EndStops");
     });
     use("Load", [](auto& f) {
         f.number({"inertia", "J_Z", "kg*m^2", positive, needed, "J_Z"});

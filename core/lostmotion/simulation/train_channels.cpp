@@ -114,9 +114,19 @@ std::vector<TrainChannel> train_channels(const model::Assembly& a) {
             continue;
         }
         const int shaft = model::contact_shaft(a, c.contact);
-        add({C::contact_torque, c.contact, c.name + "_" + model::torque_word(t, shaft), model::torque_unit(t, shaft),
-             "what the dry contact takes"});
+        if (c.kind != model::ContactPlace::stop)
+            add({C::contact_torque, c.contact, c.name + "_" + model::torque_word(t, shaft),
+                 model::torque_unit(t, shaft), "what the dry contact takes"});
         out.push_back({C::contact_mode, c.contact, c.name, "1", meaning});
+    }
+    for (std::size_t k = 0; k < p.acting.size(); ++k) {
+        const model::ShaftElement& e = *p.acting[k];
+        if (!e.is_pressed()) continue;
+        const bool rigid = e.contact != model::nowhere;
+        const std::string word = model::torque_word(t, e.shaft);
+        out.push_back({rigid ? C::contact_torque : C::pressing_torque, rigid ? e.contact : static_cast<int>(k),
+                       e.name + '_' + word, model::torque_unit(t, e.shaft),
+                       word + " on the end stop, positive on the upper one"});
     }
     model::as_in_tables(t, out, &TrainChannel::name);
     return out;

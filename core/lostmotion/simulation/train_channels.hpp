@@ -24,9 +24,11 @@ struct TrainChannel {
         shaft_sign,  // of the speed: what shows how a contact slips that the train does not have
         twist_sign,
         output,
-        error
+        error,
+        pressing_torque
     } kind;
-    int index;  // of the input, state, motor, gear, contact, given motion, shaft without inertia, shaft or controller
+    // Of the input, state, motor, gear, contact, given motion, shaft without inertia, shaft, controller or element.
+    int index;
     std::string name, unit, meaning, symbol = {};
 };
 

@@ -52,6 +52,9 @@ class TrainReader {
                 return;
             case TrainChannel::output: form(row(model_.assembly.controller_command(c.index, regime_.key))); return;
             case TrainChannel::error: form(row(model_.assembly.controller_error(c.index))); return;
+            case TrainChannel::pressing_torque:
+                form(row(model_.assembly.pressing_torque(c.index, regime_.key)));
+                return;
             case TrainChannel::drive_torque: form(regime_.drive_torque[index]); return;
             case TrainChannel::massless_speed: form(regime_.massless_speed[index]); return;
             case TrainChannel::contact_torque: form(regime_.contact_torque[index]); return;

@@ -63,7 +63,7 @@ std::vector<SwitchingCause> switching_causes() {
             {turned, "driving torque turned"},
             {mesh_step, "step of the mesh stiffness"},
             {set_off, "given motion began"},
-            {impact, "flanks struck"},
+            {impact, "struck"},
             {law, "piece of a law"}};
 }
 
@@ -162,11 +162,12 @@ NamedInOrder named_end(const TrainReport& report, const model::Assembly& a) {
     NamedInOrder end;
     const std::vector<std::string> states = model::state_names(a);
     for (std::size_t k = 0; k < states.size(); ++k) {
-        // An angle that something depends on is integrated once more.
+        // An angle that something depends on is integrated once more, and is at an end stop to the last bit.
         const auto known = std::ranges::find(end, states[k], &NamedInOrder::value_type::first);
+        const auto strikes_at = [&](const model::ContactPlace& c) { return c.gap.at == known - end.begin(); };
         if (known == end.end())
             end.emplace_back(states[k], report.x[k]);
-        else
+        else if (!std::ranges::any_of(a.places().contacts, strikes_at))
             known->second = report.x[k];
     }
     for (auto& capacity : capacities_at(a, report.memory.data())) end.push_back(std::move(capacity));

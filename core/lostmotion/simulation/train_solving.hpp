@@ -94,6 +94,12 @@ struct PackedRun {
             if (p.parametric_work != model::nowhere)
                 report.add(name + ": parametric work", model::PowerFlow::source, remembered(p.parametric_work));
         }
+        assembly.places().each_striking([&](const model::ContactPlace& c, int) {
+            const auto& name = c.kind == model::ContactPlace::gear
+                                   ? assembly.train().gears[static_cast<std::size_t>(c.element)].name
+                                   : assembly.places().name_of(c);
+            report.add(name + ": impacts", model::PowerFlow::loss, remembered(c.gap.impact_loss));
+        });
     }
 
     const model::Assembly& assembly;

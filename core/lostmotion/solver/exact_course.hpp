@@ -116,9 +116,9 @@ inline auto ExactSolver<System>::rest(const Segment<System>& segment, const Curs
 template <class System>
 inline auto ExactSolver<System>::keep_course(const Entry& e, const Cursor& at) -> void {
     // Carried on for long, the speeds that a stuck twist ties together drift apart by rounding.
-    if constexpr (requires(decltype(e.regime->at_rest) at_rest) { system_.stop(now_.x, at_rest); }) {
+    if constexpr (requires(decltype(e.regime->at_rest) at_rest) { system_.stop(now_, at_rest); }) {
         auto at_rest = e.regime->at_rest;
-        if (at.carries_rate() && e.followed) system_.stop(now_.x, at_rest);
+        if (at.carries_rate() && e.followed) system_.stop(now_, at_rest);
     }
     course_.rate = at.rate();
     course_.rate_known = at.carries_rate();

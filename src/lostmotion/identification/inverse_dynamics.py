@@ -101,6 +101,9 @@ def missing_torque(rig: Rig, s: Stretch, known: Mapping[str, Any], rung: int, sh
         dry += abs(n) * np.interp(np.abs(n * s.speed), law["speeds"] or [0.0], law["torques"] or [law["torque"]])
         if name in scenario.loads():
             other += n * _acting(rig, s, known, scenario, train.load_torque_of(name))
+        if (stops := shaft.end_stops) is not None:
+            motion = zip((n * s.angle).tolist(), (n * s.speed).tolist(), strict=True)
+            other -= n * np.array([stops.torque(phi, w) for phi, w in motion])
     for one, other_shaft, coupling in train.inertia_couplings():
         inertia += 2.0 * ratios[one] * ratios[other_shaft] * coupling
     for gear in train.gears.values():
@@ -137,12 +140,10 @@ def _over_angle(t: Gravity | AngleTorque | PositionHarmonic, angle: np.ndarray) 
 
 def _check(scenario: Scenario) -> None:
     """Whether its torques are those of the formula above."""
-    for table in ("clutches", "freewheels", "brakes"):
-        if names := list(getattr(scenario, table)):
-            raise InputError(
-                f"{table}.{names[0]} has a torque that depends on the contact state; this is not supported"
-            )
     train = scenario.train()
+    holding = [key for key, coupling in train.couplings() if coupling.holds]
+    if holding := [*holding, *(f"brakes.{name}" for name in train.brakes)]:
+        raise InputError(f"{holding[0]} has a torque that depends on the contact state; this is not supported")
     for name, gear in train.gears.items():
         losses = gear.losses
         lossless = (isinstance(losses, ConstantEfficiency) and losses.efficiency == 1.0) or (

@@ -59,7 +59,8 @@ def shown_motion(rig: Rig) -> Shown:
 
 def depends_on_angle(train: DriveTrain) -> bool:
     """Whether a torque of a train depends on an angle."""
-    by_angle = bool(train.gravity or train.angle_torques or train.springs)
+    stopped = any(shaft.end_stops is not None for shaft in train.shafts.values())
+    by_angle = bool(train.gravity or train.angle_torques or train.springs or stopped)
     gears = train.gears.values()
     return by_angle or any(gear.transmission_error is not None or gear.mesh_stiffness is not None for gear in gears)
 
@@ -102,7 +103,7 @@ def _in_windows(rig: Rig, log: Prepared, point: Point, rung: int, length: float,
     known = {**log.facts, **point.of(log)}
     built = rig.built(rig.changes(known, rung, log.segments[0].phase))
     scenario = built.scenario
-    if scenario.axes() or built.remembers or scenario.clutches or scenario.freewheels or scenario.dampers:
+    if scenario.axes() or built.remembers or any(scenario.train().couplings()):
         raise InputError(
             "the rig has a controller with states of its own, a clutch or a damper, whose state no channel shows; "
             "leave fit.horizon out",

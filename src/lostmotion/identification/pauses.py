@@ -121,10 +121,9 @@ def shown_by(rig: Rig, log: Prepared, known: Mapping[str, Any]) -> Restart:
     if scenario.axes() or built.remembers:
         raise InputError("no channel shows the states of its controller")
     refuse_given_motion(scenario)
-    for table in ("clutches", "freewheels", "dampers"):
-        if names := list(getattr(scenario, table)):
-            raise InputError(f"no channel shows the state of {table}.{names[0]}")
     train = scenario.train()
+    if coupling := next((key for key, _ in train.couplings()), None):
+        raise InputError(f"no channel shows the state of {coupling}")
     for name, gear in train.gears.items():
         if not isinstance(gear.stiffness, Rigid):
             raise InputError(f"no channel shows the twist of gears.{name}")

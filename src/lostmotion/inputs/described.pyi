@@ -4,9 +4,10 @@ from typing import Any, ClassVar, Generic, Literal, TypeVar
 from ..control.references import PositionReference, Series, SlideReference
 from ..control.satellites import Satellite
 from ..control.targets import Circle, FlyBy, Star, Track, Weave
+from ..model.end_stops import EndStops, ShaftEndStops
 from ..model.shaft import DragCurve, EddyCurrentDrag, FrictionCurve, QuadraticDrag
 from ..model.signals import Chirp, ForceSignal, Ramp, Samples, Sine, SlideSpeedSignal, SpeedSignal, Step, TorqueSignal
-from ..model.slide import EndStops, ForceCurve
+from ..model.slide import ForceCurve
 from ..model.wind import Davenport, Kaimal, VonKarman, WindOfTable
 from .part import Part
 
@@ -62,6 +63,20 @@ class DamperFields(Described):
 
 class SpringFields(Described):
     rest_angle: float = ...
+
+class ShaftEndStopsFields(Described):
+    lower: float
+    upper: float
+    stiffness: float | None = ...
+    damping: float = ...
+    restitution: float | None = ...
+
+class EndStopsFields(Described):
+    lower: float
+    upper: float
+    stiffness: float | None = ...
+    damping: float = ...
+    restitution: float | None = ...
 
 class PositionLoopFields(Described):
     gain: float
@@ -339,10 +354,8 @@ class EddyCurrentDragFields(Described):
 class DragFields(Described):
     drag: DragCurve | QuadraticDrag | EddyCurrentDrag | None = ...
 
-class EndStopsFields(Described):
-    lower: float
-    upper: float
-    stiffness: float
+class StoppedFields(Described):
+    end_stops: ShaftEndStops | None = ...
 
 class SlideFields(Described):
     mass: float = ...

@@ -11,6 +11,7 @@ from typing import Any
 
 from ..inputs.quantities import Limit
 from ..model.signals import TimeFunction
+from ..model.train import COUPLINGS
 from ..units.practical import ARCMIN
 
 Place = list[str | int]
@@ -141,8 +142,7 @@ TABLES = (
     "load",
     "shafts",
     "brakes",
-    "clutches",
-    "dampers",
+    *COUPLINGS,
     "springs",
     "controller",
     "controllers",

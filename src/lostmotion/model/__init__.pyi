@@ -3,6 +3,8 @@ from .angle_torques import ErrorHarmonic as ErrorHarmonic
 from .angle_torques import Gravity as Gravity
 from .angle_torques import TorqueCurve as TorqueCurve
 from .angle_torques import TorqueHarmonic as TorqueHarmonic
+from .end_stops import EndStops as EndStops
+from .end_stops import ShaftEndStops as ShaftEndStops
 from .gearbox import GearboxLimits as GearboxLimits
 from .linear import PitchCurve as PitchCurve
 from .linear import PitchHarmonic as PitchHarmonic
@@ -25,7 +27,6 @@ from .shaft import EddyCurrentDrag as EddyCurrentDrag
 from .shaft import FrictionCurve as FrictionCurve
 from .shaft import QuadraticDrag as QuadraticDrag
 from .signals import ForceSignal as ForceSignal
-from .slide import EndStops as EndStops
 from .slide import ForceCurve as ForceCurve
 from .synchronous_motor import PhaseValues as PhaseValues
 from .synchronous_motor import Winding as Winding

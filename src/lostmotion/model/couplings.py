@@ -1,6 +1,6 @@
-"""Elements that hold a shaft or join two at the same speed: brakes, clutches, freewheels."""
+"""Elements that hold a shaft or join two at the same speed: brakes, clutches, freewheels, torque limiters, ratchets."""
 
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import model_validator
 
@@ -16,6 +16,10 @@ FULL_COMMAND = 1.0 + 1e-9
 class BetweenShafts(Part):
     """Base of the elements that join two shafts."""
 
+    holds: ClassVar[bool] = True
+    """whether it may hold them at one speed"""
+    strikes: ClassVar[bool] = False
+    """whether its parts strike each other"""
     input: str
     """shaft"""
     output: str
@@ -90,7 +94,7 @@ class Clutch(Commanded, BetweenShafts):
         return super().core_fields() | {"safety": self.kind == "safety"}
 
 
-class Freewheel(Part):
+class Freewheel(BetweenShafts):
     """A one-way clutch: it drives the output forward and never backward.
 
     Examples
@@ -100,8 +104,6 @@ class Freewheel(Part):
     'motor'
     """
 
-    input: str
-    """shaft"""
     output: str
     """shaft, which may run ahead"""
 

@@ -1,6 +1,6 @@
 """Dampers between two shafts: viscous and fluid couplings, eddy-current couplings, torsional vibration dampers."""
 
-from typing import Self
+from typing import ClassVar, Self
 
 from pydantic import model_validator
 
@@ -19,6 +19,8 @@ class Damper(WithDrag, DamperFields, BetweenShafts):
     >>> lm.Damper(input="motor", output="ring", viscous_friction="0.1 N*m*s").viscous_friction
     0.1
     """
+
+    holds: ClassVar[bool] = False
 
     @model_validator(mode="after")
     def _has_a_torque(self) -> Self:

@@ -18,7 +18,6 @@ from .train import TrainElements
 
 # Tables of what joins a shaft and a slide.
 LINEAR_DRIVES = ("screws", "racks", "belts")
-END_STOPS = "_end_stops"  # behind the name of a slide: the spring that they are
 COGGING = "_cogging"  # behind the name of a linear motor
 
 
@@ -40,10 +39,8 @@ class LinearElements(TrainElements):
 
     def key_of(self, table: str, name: str) -> str:
         """Key in a file of an element that the core has under this name in one of its tables."""
-        for suffix, key in ((END_STOPS, "slides.{}.end_stops"), (COGGING, "linear_motors.{}.cogging_force")):
-            whole = name.removesuffix(suffix)
-            if whole != name and whole in getattr(self, key.partition(".")[0], ()):
-                return key.format(whole)
+        if (motor := name.removesuffix(COGGING)) != name and motor in self.linear_motors:
+            return f"linear_motors.{motor}.cogging_force"
         sources = {"shafts": ("slides",), "gears": LINEAR_DRIVES, "motors": ("linear_motors",)}.get(table, ())
         found = (source for source in sources if name in getattr(self, source, ()))
         return next((f"{source}.{name}" for source in found), super().key_of(table, name))
@@ -81,7 +78,7 @@ class LinearElements(TrainElements):
                 }.get(table, "put it on a shaft")
                 raise InputError(f"{shown(shaft)} is a slide, and this acts on shafts, in N*m; {remedy}", key)
 
-    def plain_elements(self, slides: Mapping[str, Any]) -> dict[str, Any]:
+    def plain_elements(self) -> dict[str, Any]:
         """Tables of the drive train without its shafts: screws, racks and belts as gears, linear motors as sources of torque."""
         tables: dict[str, dict[str, Any]] = {table: dict(getattr(self, table)) for table in TrainElements.model_fields}
         gears: dict[str, Gear] = tables["gears"]
@@ -93,9 +90,6 @@ class LinearElements(TrainElements):
             motors[name] = motor.motor()
             if (cogging := motor.cogging()) is not None:
                 tables["angle_torques"][name + COGGING] = cogging
-        for name, slide in slides.items():
-            if slide.end_stops is not None:
-                tables["springs"][name + END_STOPS] = slide.end_stops.spring(name)
         return {table: Named(elements) for table, elements in tables.items()}
 
     def with_drag(self, shafts: Mapping[str, Shaft]) -> dict[str, Shaft]:

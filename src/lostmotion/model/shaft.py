@@ -9,6 +9,7 @@ from pydantic import model_validator
 from .. import _core
 from ..inputs import described
 from ..inputs.breakpoints import check_apart
+from .end_stops import ShaftEndStops  # noqa: F401
 
 SHARE = _core.USUAL_ERROR
 
@@ -162,7 +163,7 @@ class WithDrag(described.DragFields):
         return super().core_fields() | ({} if self.drag is None else {"drag": self.drag.core()})
 
 
-class Shaft(WithDrag, described.DryFrictionFields, described.ShaftFields):
+class Shaft(WithDrag, described.DryFrictionFields, described.StoppedFields, described.ShaftFields):
     """A shaft of a drive train. Rotors of motors and inertias of gears on it are added to it.
 
     Examples

@@ -1,4 +1,4 @@
-"""Slides: parts that move along a straight line, their friction and end stops."""
+"""Slides: parts that move along a straight line, and their friction."""
 
 from typing import Self
 
@@ -7,9 +7,8 @@ from pydantic import model_validator
 from ..inputs import described
 from ..reproducible import sin
 from .angle_torques import STANDARD_GRAVITY
+from .end_stops import EndStops  # noqa: F401
 from .shaft import FrictionCurve, Shaft, check_friction, check_points
-from .springs import Spring
-from .torsion import TorsionCurve
 
 
 class ForceCurve(described.ForceCurveFields):
@@ -19,21 +18,6 @@ class ForceCurve(described.ForceCurveFields):
     def _is_a_curve(self) -> Self:
         check_points(self.speeds, self.forces, "forces")
         return self
-
-
-class EndStops(described.EndStopsFields):
-    """Elastic stops at both ends of the travel: free between them, a spring beyond."""
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        if self.upper <= self.lower:
-            raise ValueError(f"has upper = {self.upper} m, which is not above lower = {self.lower} m; exchange them")
-        return self
-
-    def spring(self, slide: str) -> Spring:
-        """The same as a spring on the slide."""
-        curve = TorsionCurve(slopes=(self.stiffness,), backlash=self.upper - self.lower)
-        return Spring(shaft=slide, stiffness=curve, rest_angle=0.5 * (self.lower + self.upper))
 
 
 class Slide(described.SlideFrictionFields, described.SlideFields):
@@ -70,4 +54,5 @@ class Slide(described.SlideFrictionFields, described.SlideFields):
             stribeck_speed=self.stribeck_speed,
             friction_error=self.friction_error,
             friction_curve=None if curve is None else FrictionCurve(speeds=curve.speeds, torques=curve.forces),
+            end_stops=None if self.end_stops is None else self.end_stops.of_shaft(),
         )

@@ -11,8 +11,9 @@ from ..inputs.named import Elements, nothing
 from ..inputs.part import Part
 from ..inputs.validation import did_you_mean, shown
 from .angle_torques import AngleTorque, Gravity
-from .couplings import Brake, Clutch, Freewheel
+from .couplings import BetweenShafts, Brake, Clutch, Freewheel
 from .dampers import Damper
+from .end_stops import END_STOP
 from .gear import Gear
 from .mass_matrix import MassMatrix
 from .motor import MotorLaw, ShaftMotor
@@ -36,6 +37,8 @@ class TrainElements(Part):
 
     def key_of(self, table: str, name: str) -> str:
         """Key in a file of an element that the core has under this name in one of its tables."""
+        if table == "end_stops":
+            return f"{self.key_of('shafts', name.removesuffix(END_STOP))}.end_stops"
         written = (t for t, of_core in ON_SHAFTS.items() if of_core == table and name in getattr(self, t))
         return f"{next(written, table)}.{name}"
 
@@ -61,8 +64,13 @@ class TrainElements(Part):
         return {name: gear for name, gear in self.gears.items() if gear.housing is None}
 
     def held_together(self) -> list[tuple[str, str, float]]:
-        """(input, output, 1) of what may hold two shafts at one speed: clutches and freewheels."""
-        return [(c.input, c.output, 1.0) for table in (self.clutches, self.freewheels) for c in table.values()]
+        """(input, output, 1) of what may hold two shafts at one speed, such as clutches and freewheels."""
+        return [(c.input, c.output, 1.0) for _, c in self.couplings() if c.holds]
+
+    def couplings(self) -> Iterator[tuple[str, BetweenShafts]]:
+        """Key and element of all that joins two shafts and is no gear."""
+        for table in COUPLINGS:
+            yield from ((f"{table}.{name}", element) for name, element in getattr(self, table).items())
 
     def references(self) -> Iterator[tuple[str, str]]:
         """Each key that names a shaft, and the name."""
@@ -266,4 +274,7 @@ class DriveTrain(TrainElements):
         for table, kind in ON_SHAFTS.items():
             for name, element in getattr(self, table).items():
                 train.add(kind, name, shaft=element.shaft, fields=element.core_fields())
+        for name, s in self.shafts.items():
+            if s.end_stops is not None:
+                train.add("end_stops", name + END_STOP, shaft=name, fields=s.end_stops.core_fields())
         return train

@@ -351,6 +351,7 @@ def _why_several_regimes(train: DriveTrain, core: _core.Train) -> str:
         "drag over speed": any(s.drag is not None for s in shafts)
         or any(d.drag is not None for d in train.dampers.values()),
         "a torque over an angle": bool(train.gravity or train.angle_torques),
+        "end stops": any(s.end_stops is not None for s in shafts),
         "a spring of several pieces": any(not s.stiffness.is_linear for s in train.springs.values()),
         "a transmission error": any(g.transmission_error is not None for g in gears),
         "a mesh stiffness over the angle": any(g.mesh_stiffness is not None for g in gears),

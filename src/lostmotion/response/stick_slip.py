@@ -163,6 +163,8 @@ def others(train: DriveTrain) -> Iterator[str]:
             yield f"friction of {name} that varies with speed"
         if shaft.drag is not None:
             yield f"drag of {name}"
+        if shaft.end_stops is not None:
+            yield f"end stops of {name}"
     for name, gear in train.gears.items():
         if isinstance(gear.stiffness, Rigid):
             if gear.stiffness.strikes:

@@ -1,4 +1,4 @@
-"""The short form of a drive with what only drive trains have: continuous controllers, given motion, flanks that strike."""
+"""The short form of a drive with what only drive trains have: continuous controllers, given motion, end stops, flanks that strike."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from ..errors import InputError
 from .aliases import GEARBOX, LOAD, MOTOR
 from .drive_tables import DriveTables
 
-GIVEN = ("speed", "motion")
+OF_SHAFT = ("speed", "motion", "end_stops")
+"""of the load, which drive trains alone have"""
 
 
 def is_short(tables: Mapping[str, Any]) -> bool:
     """Whether the short form suffices for such tables."""
-    return not (_continuous(tables) or _given(tables) or _strikes(tables))
+    return not (_continuous(tables) or _of_shaft(tables) or _strikes(tables))
 
 
 def long_form(tables: Mapping[str, Any]) -> dict[str, Any]:
@@ -26,19 +27,19 @@ def long_form(tables: Mapping[str, Any]) -> dict[str, Any]:
     InputError
         A value cannot be used.
     """
-    continuous, given, strikes = _continuous(tables), _given(tables), _strikes(tables)
+    continuous, of_shaft, strikes = _continuous(tables), _of_shaft(tables), _strikes(tables)
     if continuous:
         _check_continuous(tables)
     plain = {key: value for key, value in tables.items() if key != "controller" or not continuous}
-    if given:
-        plain[LOAD] = {key: value for key, value in _table(tables, LOAD).items() if key not in GIVEN}
+    if of_shaft:
+        plain[LOAD] = {key: value for key, value in _table(tables, LOAD).items() if key not in OF_SHAFT}
     if strikes:
         plain[GEARBOX] = {**_table(tables, GEARBOX), "stiffness": {"kind": "rigid"}}
     drive = dict(DriveTables(**plain).long())
     if continuous:
         drive |= {"command": {}, "controllers": {MOTOR: tables["controller"]}}
-    if given:
-        drive["shafts"] = {**drive["shafts"], LOAD: {**dict(drive["shafts"][LOAD]), **given}}
+    if of_shaft:
+        drive["shafts"] = {**drive["shafts"], LOAD: {**dict(drive["shafts"][LOAD]), **of_shaft}}
     if strikes:
         drive["gears"] = {GEARBOX: {**dict(drive["gears"][GEARBOX]), "stiffness": _table(tables, GEARBOX)["stiffness"]}}
     return drive
@@ -49,9 +50,9 @@ def _continuous(tables: Mapping[str, Any]) -> bool:
     return isinstance(controller, ContinuousController) or _table(tables, "controller").get("kind") == "continuous"
 
 
-def _given(tables: Mapping[str, Any]) -> dict[str, Any]:
+def _of_shaft(tables: Mapping[str, Any]) -> dict[str, Any]:
     load = _table(tables, LOAD)
-    return {key: load[key] for key in GIVEN if load.get(key) is not None}
+    return {key: load[key] for key in OF_SHAFT if load.get(key) is not None}
 
 
 def _strikes(tables: Mapping[str, Any]) -> bool:

@@ -11,6 +11,7 @@ from .. import _core
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Time
+from ..model.end_stops import END_STOP
 from ..model.self_locking import SelfLocking, self_locking
 from ..model.signals import core_signal
 from ..model.torsion import Rigid
@@ -35,9 +36,9 @@ class ContactState:
     shares: dict[str, tuple[float, float]] = field(default_factory=dict)  # of a train: of the capacities, by element
     slides: bool = False  # along a straight line: [m/s] and [N] in place of [rad/s] and [N·m]
     reach: float | None = None
-    """half the backlash of rigid flanks that strike, at the output; None of other contacts"""
+    """half the gap of what strikes: the backlash of rigid flanks, at the output, or the travel between end stops; None of other contacts"""
     twist: float = 0.0
-    """twist of these flanks, from minus `reach` to `reach`"""
+    """twist of these flanks, or place between the stops, from minus `reach` to `reach`"""
 
     @property
     def to_free_forward(self) -> float:
@@ -53,7 +54,8 @@ class ContactState:
         unit = "N" if self.slides else "N·m"
         if self.reach is not None:
             if self.mode == 0:
-                return f"{self.name}: the flanks touch and press with {abs(self.torque):.4g} {unit}"
+                what = "pressed with" if END_STOP in self.name else "the flanks touch and press with"
+                return f"{self.name}: {what} {abs(self.torque):.4g} {unit}"
             of, per_second = ("m", "m/s") if self.slides else ("rad", "rad/s")
             return (
                 f"{self.name}: in the gap, at {_shown(self.twist, of)} of -{_shown(self.reach, of)} to {_shown(self.reach, of)}, "
@@ -242,6 +244,11 @@ def _explanation(
         for n, gear in train.gears.items()
         if isinstance(gear.stiffness, Rigid) and gear.stiffness.strikes
     }
+    for name, shaft in train.shafts.items():
+        if (stops := shaft.end_stops) is not None and stops.stiffness is None:
+            middle = 0.5 * (stops.lower + stops.upper)
+            flanks[f"{name}{END_STOP}_contact"] = (stops.upper - middle, named[train.angle_of(name)] - middle)
+    sliding |= {f"{name}{END_STOP}_contact" for name in slides}
     states = []
     for contact in contacts:
         reach, twist = flanks.get(contact["name"], (None, 0.0))

@@ -85,8 +85,9 @@ class JointDrive:
         return {name: turns(self.train, name, self.shaft) or 0.0 for name in self.train.shafts}
 
     def own_torque(self, angle: float) -> float:
-        """Torque [N·m] of the drive's springs and of its torques over the angle [rad] on the joint."""
-        total = 0.0
+        """Torque [N·m] of the drive's springs and end stops and of its torques over the angle [rad] on the joint."""
+        stops = self.train.shafts[self.shaft].end_stops
+        total = 0.0 if stops is None else stops.torque(angle)
         for spring in self.train.springs.values():
             if spring.shaft == self.shaft:
                 total -= spring.stiffness.core().torque(angle - spring.rest_angle)

@@ -26,7 +26,7 @@ def need_open_loop(scenario: Scenario, function: str) -> None:
 
 
 def need_no_impacts(scenario: Scenario | DriveTrain, function: str) -> None:
-    """Refuses a train with rigid flanks that strike, for what takes motions without impacts.
+    """Refuses a train with rigid flanks or end stops that strike, for what takes motions without impacts.
 
     Raises
     ------
@@ -42,6 +42,15 @@ def need_no_impacts(scenario: Scenario | DriveTrain, function: str) -> None:
                 f"{function}: {key}.stiffness has rigid flanks with backlash, and this takes no impacts; give a stiffness to the "
                 'backlash, kind = "curve"'
             )
+    train = scenario.train() if isinstance(scenario, Scenario) else scenario
+    for key, coupling in train.couplings():
+        if coupling.strikes:
+            raise InputError(f"{function}: {key} strikes, and this takes no impacts; take a freewheel in its place")
+    for name, shaft in train.shafts.items():
+        if shaft.end_stops is not None and shaft.end_stops.stiffness is None:
+            key = f"{'slides' if train.is_slide(name) else 'shafts'}.{name}.end_stops"
+            key = scenario.key_in_file(key) if isinstance(scenario, Scenario) else key
+            raise InputError(f"{function}: {key} are rigid, and this takes no impacts; give them a stiffness")
 
 
 def need_free_motion(scenario: Scenario, function: str) -> None:

@@ -53,10 +53,10 @@ def start_values(
         _refuse_contradiction(train, initial.of_all("speeds"))
         raise InputError(problem, "initial.speeds")
     _check_flanks(train, speeds, twists)
+    angles = angles_at_start(train, initial.of_all("angles"), twists, driven)
+    _check_end_stops(train, speeds, angles)
     values = {f"{name}_speed": v for name, v in speeds.items()}
-    values |= {
-        train.angle_of(s): v for s, v in angles_at_start(train, initial.of_all("angles"), twists, driven).items()
-    }
+    values |= {train.angle_of(s): v for s, v in angles.items()}
     values |= {train.twist_of(name): v for name, v in twists.items()}
     values |= {train.motor_torque_of(name): v for name, v in initial.motor_torques.items()}
     return values
@@ -96,6 +96,21 @@ def _check_flanks(train: DriveTrain, speeds: Mapping[str, float], twists: Mappin
                 f"their gap, {reach:g} rad; give a twist inside it",
                 f"initial.twists.{name}",
             )
+
+
+def _check_end_stops(train: DriveTrain, speeds: Mapping[str, float], angles: Mapping[str, float]) -> None:
+    """Refuses a shaft that begins beyond its rigid stops, or at one with a speed into it."""
+    for name, shaft in train.shafts.items():
+        stops, angle, speed = shaft.end_stops, angles.get(name, 0.0), speeds.get(name, 0.0)
+        if stops is None or stops.stiffness is not None:
+            continue
+        beyond = not stops.lower <= angle <= stops.upper
+        if beyond or (angle == stops.lower and speed < 0.0) or (angle == stops.upper and speed > 0.0):
+            what = "beyond its rigid stops" if beyond else "with an impact on its stop"
+            key = f"initial.{'positions' if train.is_slide(name) else 'angles'}.{name}"
+            unit = train.angle_unit(name)
+            reason = f"{angle:g} {unit} is {what} at {stops.lower:g} and {stops.upper:g} {unit}; begin between them"
+            raise InputError(reason, key)
 
 
 def _check(key: str, given: Iterable[str], known: Iterable[str], what: str) -> None:

@@ -111,7 +111,7 @@ class TrainTables(ScenarioTables, LinearElements):
 
     def elements(self) -> dict[str, Any]:
         """The tables of all else that makes the train."""
-        return self.plain_elements(self.slides)
+        return self.plain_elements()
 
     def movers(self) -> dict[str, ShaftTable | SlideTable]:
         """Shafts and slides."""

@@ -97,7 +97,7 @@ def _loaded(still: Scenario, shaft: str, load: Mapping[str, Any]) -> dict[str, A
     if shaft in still.slides:
         slide = still.slides[shaft].unchecked(force=ForceSignal(**load), inclination=0.0, end_stops=None)
         return {"slides": Named({**still.slides, shaft: slide})}
-    turned = still.shafts[shaft].unchecked(torque=TorqueSignal(**load))
+    turned = still.shafts[shaft].unchecked(torque=TorqueSignal(**load), end_stops=None)
     return {"shafts": Named({**still.shafts, shaft: turned})}
 
 
