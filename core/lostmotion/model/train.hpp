@@ -12,6 +12,7 @@
 #include "../elements/end_stops.hpp"
 #include "../elements/freewheel.hpp"
 #include "../elements/spring.hpp"
+#include "../elements/torque_limiter.hpp"
 #include "../parts/gear.hpp"
 #include "../parts/linear_controller.hpp"
 #include "../parts/mass_matrix.hpp"
@@ -37,6 +38,7 @@ struct Train {
     std::vector<Clutch> clutches;
     std::vector<Freewheel> freewheels;
     std::vector<Damper> dampers;
+    std::vector<TorqueLimiter> torque_limiters;
     // What acts on one shaft.
     std::vector<Brake> brakes;
     std::vector<AngleTorque> angle_torques;
@@ -57,6 +59,7 @@ struct Train {
         use("clutches", "clutch", train.clutches);
         use("freewheels", "freewheel", train.freewheels);
         use("dampers", "damper", train.dampers);
+        use("torque_limiters", "torque limiter", train.torque_limiters);
     }
 };
 

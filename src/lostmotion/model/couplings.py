@@ -110,3 +110,26 @@ class Freewheel(BetweenShafts):
     def core_fields(self) -> dict[str, Any]:
         """Fields for the core: none."""
         return {}
+
+
+class TorqueLimiter(described.TorqueLimiterFields, BetweenShafts):
+    """Holds two shafts together up to `release_torque`, then slips at `slip_torque` until it engages again.
+
+    It engages where it slips slower than `engaging_speed`: at once or, with `pockets`, at the next of these.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> limiter = lm.TorqueLimiter(input="motor", output="drum", release_torque="30 N*m", slip_torque="5 N*m")
+    >>> limiter.release_torque
+    30.0
+    """
+
+    @model_validator(mode="after")
+    def _slips_at_less(self) -> Self:
+        if self.slip_torque > self.release_torque:
+            raise ValueError(
+                f"has slip_torque = {self.slip_torque} N*m, more than release_torque = {self.release_torque} N*m; "
+                "give at most that"
+            )
+        return self
