@@ -11,6 +11,7 @@
 #include "../elements/drag.hpp"
 #include "../elements/end_stops.hpp"
 #include "../elements/freewheel.hpp"
+#include "../elements/ratchet.hpp"
 #include "../elements/spring.hpp"
 #include "../elements/torque_limiter.hpp"
 #include "../parts/gear.hpp"
@@ -39,6 +40,7 @@ struct Train {
     std::vector<Freewheel> freewheels;
     std::vector<Damper> dampers;
     std::vector<TorqueLimiter> torque_limiters;
+    std::vector<Ratchet> ratchets;
     // What acts on one shaft.
     std::vector<Brake> brakes;
     std::vector<AngleTorque> angle_torques;
@@ -60,6 +62,7 @@ struct Train {
         use("freewheels", "freewheel", train.freewheels);
         use("dampers", "damper", train.dampers);
         use("torque_limiters", "torque limiter", train.torque_limiters);
+        use("ratchets", "ratchet", train.ratchets);
     }
 };
 

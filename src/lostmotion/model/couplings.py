@@ -133,3 +133,16 @@ class TorqueLimiter(described.TorqueLimiterFields, BetweenShafts):
                 "give at most that"
             )
         return self
+
+
+class Ratchet(described.RatchetFields, BetweenShafts):
+    """Drives the output forward by the teeth of a wheel; backward it runs free, and holds again at the next tooth.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> lm.Ratchet(input="handle", output="drum", teeth=24).teeth
+    24
+    """
+
+    strikes: ClassVar[bool] = True

@@ -11,7 +11,7 @@ from ..inputs.named import Elements, nothing
 from ..inputs.part import Part
 from ..inputs.validation import did_you_mean, shown
 from .angle_torques import AngleTorque, Gravity
-from .couplings import BetweenShafts, Brake, Clutch, Freewheel, TorqueLimiter
+from .couplings import BetweenShafts, Brake, Clutch, Freewheel, Ratchet, TorqueLimiter
 from .dampers import Damper
 from .end_stops import END_STOP
 from .gear import Gear
@@ -32,6 +32,7 @@ class TrainElements(Part):
     freewheels: Elements[Freewheel] = Field(default_factory=nothing)
     dampers: Elements[Damper] = Field(default_factory=nothing)
     torque_limiters: Elements[TorqueLimiter] = Field(default_factory=nothing)
+    ratchets: Elements[Ratchet] = Field(default_factory=nothing)
     gravity: Elements[Gravity] = Field(default_factory=nothing)
     angle_torques: Elements[AngleTorque] = Field(default_factory=nothing)
     springs: Elements[Spring] = Field(default_factory=nothing)
