@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
 from typing import Any
 
 from pydantic import ConfigDict
 
-from ..control.axis import check_torques
 from ..control.controller import Controller
 from ..data_sheets.components import Conditions
 from ..errors import InputError
@@ -15,16 +13,13 @@ from ..inputs import described
 from ..inputs.kept import kept
 from ..inputs.named import Named
 from ..model.drive import Drive
-from ..model.gearbox import Gearbox, Transmission
+from ..model.gearbox import Gearbox
 from ..model.load import Load
 from ..model.motor import Motor
-from ..model.signals import CommandSignal, TorqueSignal, constant_or
+from ..model.signals import CommandSignal, TorqueSignal
 from ..model.task import Task
-from ..model.torsion import Rigid
-from ..model.train import DriveTrain
-from .aliases import DRIVE, GEARBOX, LOAD, MOTOR
-from .keys import renamed
-from .tables import BASE, RECORD_NAME, ScenarioTables, SimulationTable, Whole, check_on_reference, with_accessories
+from .aliases import GEARBOX, LOAD, MOTOR
+from .tables import BASE, RECORD_NAME, ScenarioTables, SimulationTable, with_accessories
 from .train_tables import ShaftTable, TrainInitial, TrainTables
 
 
@@ -108,12 +103,18 @@ class DriveTables(ScenarioTables):
         """The drive without its surroundings."""
         return Drive.of_parts(motor=self.motor, gearbox=self.gearbox, load=Load.like(self.load))
 
-    def train(self) -> DriveTrain:
-        return self.drive().named_train()
-
     @kept
     def long(self) -> TrainTables:
-        train = self.train()  # whose parts are checked
+        """The same in the long form.
+
+        Raises
+        ------
+        InputError
+            A motor, a gearbox and a load of these values cannot move, or two of them turn the motor.
+        """
+        if self.controller is not None and self.command != CommandSignal():
+            raise InputError("both turn the motor; leave one of them out", "command", "controller")
+        train = self.drive().train()  # whose parts are checked
         load = ShaftTable.like(train.shafts[LOAD], torque=self.load.torque)
         return TrainTables.like(
             train,
@@ -126,98 +127,22 @@ class DriveTables(ScenarioTables):
             simulation=self.simulation,
         )
 
-    def prefix(self, motor: str) -> str:  # noqa: ARG002
-        return ""
-
-    def gears_by_key(self) -> Mapping[str, Transmission]:
-        return {GEARBOX: self.gearbox}
-
-    def own_key(self, key: str) -> str:
-        return renamed(key, DRIVE)
-
-    def input_key(self, name: str) -> str:
-        return {"load_torque": "load.torque", "reference": "controller.reference"}.get(name, name)
-
-    def input_keys(self) -> dict[str, str]:
-        return {"command": "command", "load_torque": "load.torque"}
-
-    def record_keys(self) -> Iterator[str]:
-        yield from ("gearbox", "motor", *(f"gearbox.{name}" for name in Conditions.model_fields))
-
-    def note(self) -> str:
-        return " ".join(filter(None, map(str, (self.gearbox.note, self.motor.note))))
-
-    def attributes(self) -> dict[str, float]:
-        return {"gear_ratio": self.gearbox.ratio}
-
-    def alone(self) -> Drive:
-        return self.drive()
-
-    def of_inertia(self, shaft: str, inertia: float) -> dict[str, Any]:
-        return {shaft: getattr(self, shaft).model_copy(update={"inertia": inertia})}
-
-    def of_axes(self, axes: Mapping[str, Controller]) -> dict[str, Any]:
-        return {"controller": axes[MOTOR], "command": CommandSignal()}
-
-    def of_gears(self, gears: Mapping[str, Transmission]) -> dict[str, Any]:
-        return dict(gears)
-
-    def of_inputs(self, given: Mapping[str, Any]) -> dict[str, Any]:
-        return of_inputs(self.load, self.simulation, given)
-
-    def open_loop(self) -> dict[str, Any]:
-        return {"controller": None}
-
-    def told(self) -> str:
-        return repr(self.drive())
+    @classmethod
+    def of_long(cls, tables: TrainTables) -> DriveTables:
+        """The tables of a motor, a gearbox and a load that are written in the long form, with the names that `long` gives."""
+        return cls.like(
+            tables,
+            motor=Motor.like(tables.motors[MOTOR]),
+            gearbox=Gearbox.like(tables.gears[GEARBOX]),
+            load=LoadTable.like(tables.shafts[LOAD], torque=tables.shafts[LOAD].torque or TorqueSignal()),
+            command=tables.command.get(MOTOR, CommandSignal()),
+            controller=tables.controllers.get(MOTOR),
+            initial=Initial.of_state(tables.initial),
+        )
 
     @classmethod
     def _described_by(cls) -> dict[str, Any]:
         return drive_schema()
-
-
-def check_drive(scenario: Whole, written: DriveTables) -> None:
-    """Refuse what contradicts itself in the tables of a scenario in the short form.
-
-    Raises
-    ------
-    InputError, ValueError
-    """
-    written.drive()
-    check_on_reference(written.initial, scenario.axes(), ("load_angle", "load_speed", "motor_speed"))
-    speeds, motor = scenario.begin().speeds, written.motor
-    if isinstance(written.gearbox.stiffness, Rigid):
-        if written.initial.twist != 0.0:
-            raise ValueError(f"has initial.twist = {written.initial.twist} rad, but the gearbox is rigid; leave it out")
-        speed, load_speed = (speeds.get(name) for name in (MOTOR, LOAD))  # one alone says the other
-        if None not in (speed, load_speed) and abs(speed / written.gearbox.ratio - load_speed) > 1e-12 * abs(
-            load_speed
-        ):
-            raise ValueError(
-                f"has initial.motor_speed = {speed} rad/s and initial.load_speed = {load_speed} rad/s, but the gearbox is "
-                "rigid; their quotient must be its ratio"
-            )
-    if motor.kind == "torque_source" and written.initial.motor_torque != 0.0:
-        raise ValueError("has initial.motor_torque, but a torque source has no such state; use command")
-    if written.controller is not None and written.command != CommandSignal():
-        raise InputError("both turn the motor; leave one of them out", "command", "controller")
-    check_torques(scenario.axes(), {MOTOR: written.initial.motor_torque}, "initial.motor_torque")
-    scenario.control()
-
-
-def of_inputs(load: Load, simulation: SimulationTable | None, given: Mapping[str, Any]) -> dict[str, Any]:
-    """The tables that change where `simulate` is given inputs and times."""
-    changes: dict[str, Any] = {}
-    if "initial" in given:
-        start = given["initial"]
-        changes["initial"] = start if isinstance(start, Initial) else Initial.of_state(start)
-    if times := {key: given[key] for key in SimulationTable.model_fields if key in given}:
-        changes["simulation"] = SimulationTable(**dict(simulation or ()) | times)
-    if "command" in given:
-        changes["command"] = constant_or(given["command"], CommandSignal)
-    if "load_torque" in given:
-        changes["load"] = LoadTable(**dict(load) | {"torque": constant_or(given["load_torque"], TorqueSignal)})
-    return changes
 
 
 def drive_schema() -> dict[str, Any]:

@@ -140,7 +140,7 @@ def joint_drive(name: str, drive: Driven, inertia: float, step: float) -> JointD
         raise InputError(
             f"joint {name!r}: mass_matrices.{mass} has the inertia of {shaft!r}, which comes from the robot; leave it out"
         )
-    changed = scenario.model_copy(update=scenario.of_inertia(shaft, inertia))
+    changed = scenario.with_inertia(shaft, inertia)
     simulation = Simulation(changed, step=step, loaded=None if changed.loaded() == [shaft] else [shaft])
     command, scale = _command(changed, simulation._core_train.input_names())
     return JointDrive(name, changed, simulation, changed.train(), shaft, command, scale)

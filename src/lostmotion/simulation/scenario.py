@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from functools import partial
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -24,17 +23,18 @@ from ..inputs.doubts import doubt_all
 from ..inputs.kept import kept, kept_while_used
 from ..inputs.named import Named
 from ..inputs.validation import did_you_mean, shown
-from ..model.drive import Drive
-from ..model.gearbox import Gearbox, Transmission
+from ..model.drive import Drive, DriveOfOneGear
+from ..model.gear import Gear
+from ..model.gearbox import Gearbox
 from ..model.linear_train import LinearElements
 from ..model.motor import Motor
 from ..model.signals import Signal
 from ..model.train import DriveTrain
 from . import axis_form, drive_form
-from .aliases import AXIS, DRIVE, of_axis
-from .drive_tables import DriveTables, Initial, LoadTable, check_drive, of_inputs
-from .keys import renamed, set_values
-from .tables import ScenarioTables, SimulationTable
+from .aliases import AXIS, DRIVE, TRAIN, Form
+from .drive_tables import DriveTables, Initial, LoadTable
+from .keys import set_values
+from .tables import SimulationTable
 from .train_checks import check_train
 from .train_state import angles_at_start, given_speeds, start_values
 from .train_tables import LINEAR_INITIAL, ShaftTable, TrainInitial, TrainTables, core_train
@@ -70,12 +70,12 @@ class Scenario:
     ['first_motor', 'second_motor']
     """
 
-    __slots__ = ("__weakref__", "_made", "is_axis", "written")
+    __slots__ = ("__weakref__", "_made", "form", "tables")
 
-    written: DriveTables | TrainTables
-    """the tables in the form in which they are written, that of an axis in the long one"""
-    is_axis: bool
-    """whether it was written in the short form of a linear axis"""
+    tables: TrainTables
+    """the tables in the long form"""
+    form: Form
+    """names of their keys in its file"""
 
     # Attributes of the tables, found by `__getattr__`.
     title: str
@@ -94,22 +94,21 @@ class Scenario:
         if nameless:
             raise InputError(f"the scenario takes its values by name, such as title=...; not {shown(nameless[0])}")
         if axis_form.is_axis(tables):
-            written = partial(renamed, names=AXIS)
-            with _in_keys(written):
-                self._set(_in_long_form(axis_form.long_form(tables), written), is_axis=True)
+            with _in_keys(AXIS.in_file):
+                self._set(_in_long_form(axis_form.long_form(tables), AXIS.in_file), AXIS)
         elif is_train(tables):
-            self._set(_in_long_form(tables))
+            self._set(_in_long_form(tables), TRAIN)
         else:
             data = dict(tables)
             use_records(data)
             if drive_form.is_short(data):
-                self._set(DriveTables(**data))
+                self._set(DriveTables(**data).long(), DRIVE)
             else:
-                with _in_keys(partial(renamed, names=DRIVE)):
-                    self._set(TrainTables(**drive_form.long_form(data)))
+                with _in_keys(DRIVE.in_file):
+                    self._set(TrainTables(**drive_form.long_form(data)), TRAIN)
 
-    def _set(self, written: DriveTables | TrainTables, *, is_axis: bool = False, checked: bool = True) -> None:
-        for name, value in (("written", written), ("is_axis", is_axis), ("_made", {})):
+    def _set(self, tables: TrainTables, form: Form, *, checked: bool = True) -> None:
+        for name, value in (("tables", tables), ("form", form), ("_made", {})):
             object.__setattr__(self, name, value)
         if checked:
             self.check()
@@ -122,9 +121,7 @@ class Scenario:
         InputError
         """
         try:
-            if isinstance(self.written, DriveTables):
-                check_drive(self, self.written)
-            else:
+            with _in_keys(self.key_in_file):
                 check_train(self)
         except InputError:
             raise
@@ -132,7 +129,7 @@ class Scenario:
             raise InputError(f"the scenario {problem}") from None
 
     @classmethod
-    def of(cls, written: ScenarioTables, *, is_axis: bool = False, checked: bool = True) -> Self:
+    def of(cls, written: DriveTables | TrainTables, form: Form = TRAIN, *, checked: bool = True) -> Self:
         """The scenario of its tables.
 
         Parameters
@@ -141,8 +138,17 @@ class Scenario:
             Whether to refuse tables that contradict each other, which has not been done yet.
         """
         made = cls.__new__(cls)
-        made._set(written, is_axis=is_axis, checked=checked)  # type: ignore[arg-type]
+        if isinstance(written, DriveTables):
+            made._set(written.long(), DRIVE, checked=checked)
+        else:
+            made._set(written, form, checked=checked)
         return made
+
+    def _with(self, tables: Mapping[str, Any]) -> Self:
+        """The same scenario with other tables of the long form, checked anew."""
+        with _in_keys(self.key_in_file):
+            changed = self.tables.model_copy(update=tables)
+        return self.of(changed, self.form)
 
     @classmethod
     def of_drive(cls, drive: Drive, **given: Any) -> Self:
@@ -155,9 +161,10 @@ class Scenario:
         """
         if given.get("duration") is None or given.get("sample_interval") is None:
             raise InputError("a drive alone needs duration and sample_interval [s]")
-        tables = {"motor": drive.motor, "gearbox": drive.gearbox, "load": LoadTable(**dict(drive.load))}
-        changes = of_inputs(drive.load, None, {name: value for name, value in given.items() if value is not None})
-        return cls.of(DriveTables(**tables | changes))
+        times = SimulationTable(**{name: given.pop(name) for name in SimulationTable.model_fields})
+        load = LoadTable(**dict(drive.load))
+        tables = DriveTables(motor=drive.motor, gearbox=drive.gearbox, load=load, simulation=times)
+        return cls.of(tables).with_inputs(**given)
 
     @classmethod
     def of_any(cls, what: Drive | DriveTrain | Scenario) -> Scenario:
@@ -193,9 +200,13 @@ class Scenario:
         return axis_form.file_schema()
 
     @property
-    def tables(self) -> TrainTables:
-        """The tables in the long form."""
-        return self.written.long()
+    def written(self) -> DriveTables | TrainTables:
+        """The tables as files have them, those of an axis in the long form."""
+        return self._written()
+
+    @kept
+    def _written(self) -> DriveTables | TrainTables:
+        return DriveTables.of_long(self.tables) if self.is_drive else self.tables
 
     def __getattr__(self, name: str) -> Any:
         for tables in () if name.startswith("_") else (self.written, self.tables):
@@ -210,18 +221,19 @@ class Scenario:
         return iter(self.written)
 
     def __eq__(self, other: object) -> bool:
-        return self.written == other.written if isinstance(other, Scenario) else NotImplemented
+        same = isinstance(other, Scenario) and self.tables == other.tables and self.is_drive == other.is_drive
+        return same if isinstance(other, Scenario) else NotImplemented
 
     def __hash__(self) -> int:
-        return hash(self.written)
+        return hash(self.tables)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _made_again, (self.written, self.is_axis)
+        return _made_again, (self.tables, self.form)
 
     def __repr__(self) -> str:
         title = f"{self.title!r}, " if self.title else ""
         time = f"{self.simulation.duration:.4g} s, {self.simulation.samples} samples"
-        return f"Scenario({title}{self.written.told()}, {time})"
+        return f"Scenario({title}{self.alone()!r}, {time})"
 
     def _repr_html_(self) -> str:
         """All values with their units, for notebooks."""
@@ -251,11 +263,11 @@ class Scenario:
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A copy with other tables, which are checked as in the constructor."""
-        return self.of(self.written.model_copy(update=update, deep=deep), is_axis=self.is_axis, checked=bool(update))
+        return self.of(self.written.model_copy(update=update, deep=deep), self.form, checked=bool(update))
 
     def unchecked(self, **tables: Any) -> Self:
         """The same with other tables, which `check` has still to see."""
-        return self.of(self.written.unchecked(**tables), is_axis=self.is_axis, checked=False)
+        return self.of(self.written.unchecked(**tables), self.form, checked=False)
 
     def replace(self, **changes: Any) -> Self:
         """The same scenario with changes by dotted key, such as ``**{"load.inertia": 0.1}``, checked anew.
@@ -267,37 +279,98 @@ class Scenario:
         set_values(data, [(self.key_of_tables(key), value) for key, value in changes.items()])
         with _in_keys(self.key_in_file):
             made = type(self)(**data)
-        return self.of(made.written, is_axis=True, checked=False) if self.is_axis else made
+        return self.of(made.tables, self.form, checked=False) if self.form == AXIS else made
 
     def with_inputs(self, **changes: Any) -> Self:
         """The same scenario with the inputs and times that `simulate` is given; None leaves a value as it is."""
         given = {name: value for name, value in changes.items() if value is not None}
-        return self.model_copy(update=self.written.of_inputs(given)) if given else self
+        return self._with(self.tables.of_inputs(given)) if given else self
 
-    def with_gears(self, gears: Mapping[str, Transmission]) -> Self:
+    def with_gears(self, gears: Mapping[str, Gear]) -> Self:
         """The same scenario with other gears, by their keys."""
-        return self.model_copy(update=self.written.of_gears(gears))
+        names = {self.gear_key(name): name for name in self.tables.gears}
+        return self._with({"gears": {**self.tables.gears, **{names[key]: gear for key, gear in gears.items()}}})
 
     def with_axes(self, axes: Mapping[str, Controller]) -> Self:
         """The same scenario with other sampled controllers, by the names of their motors, which have no command then; the others stay."""
-        return self.model_copy(update=self.written.of_axes(axes))
+        return self._with(self.tables.of_axes(axes))
+
+    def with_inertia(self, shaft: str, inertia: float) -> Self:
+        """The same scenario with another inertia of a shaft."""
+        return self._with(self.tables.of_inertia(shaft, inertia))
 
     def without_controllers(self) -> Self:
         """The same scenario with the motors of its controllers turned by commands of 0."""
-        return self.replace(**self.written.open_loop())
+        return self._with(self.tables.open_loop())
 
     def key_in_file(self, key: str) -> str:
         """A dotted key of the long form as the file of the scenario has it."""
-        return renamed(key, AXIS) if self.is_axis else self.own_key(key)
+        return self.form.in_file(key)
 
     def key_of_tables(self, key: str) -> str:
         """A dotted key of the file or of the long form as the tables that are kept have it."""
-        return of_axis(key) if self.is_axis else self.own_key(key)
+        return self.form.in_tables(key)
+
+    def own_key(self, key: str) -> str:
+        """A key of the long form as the tables that are kept have it."""
+        return self.form.in_file(key) if self.is_drive else key
+
+    def controller_key(self, motor: str) -> str:
+        """Key of the table of a motor's controller."""
+        return self.own_key(f"controllers.{motor}")
+
+    def gears_by_key(self) -> dict[str, Gear]:
+        """The gears by the keys of their tables."""
+        return {self.gear_key(name): gear for name, gear in self.train().gears.items()}
+
+    def gear_key(self, name: str) -> str:
+        """Key of the table of a gear."""
+        return self.own_key(self.tables.key_of("gears", name))
+
+    def motor_key(self, name: str) -> str:
+        """Key of the table of a motor."""
+        return self.own_key(self.tables.key_of("motors", name))
+
+    def record_keys(self) -> Iterator[str]:
+        """Keys that take names of records, and the conditions of their use."""
+        return map(self.own_key, self.tables.record_keys())
+
+    def input_key(self, name: str) -> str:
+        """Key of the signal or reference that an input stands for."""
+        for motor in self.tables.controllers:
+            if name == f"{self.prefix(motor)}reference":
+                return f"{self.controller_key(motor)}.reference"
+        long = next((long for long, shown in self.train().aliases.items() if shown == name), name)
+        return self.own_key(self.tables.input_key(long))
+
+    def input_keys(self) -> dict[str, str]:
+        """Keys of the signals of its inputs, by their names."""
+        train, movers = self.train(), self.tables.movers()
+        keys = {train.command_of(name): f"command.{name}" for name in train.commanded()}
+        keys |= {
+            train.load_torque_of(name): f"slides.{name}.force" if train.is_slide(name) else f"shafts.{name}.torque"
+            for name in movers
+        }
+        return {name: self.own_key(key) for name, key in keys.items()}
+
+    def prefix(self, motor: str) -> str:
+        """Prefix of the names of the variables of a motor's controller."""
+        return self.train().shown(f"{motor}_")
+
+    def alone(self) -> Drive | DriveTrain:
+        """The drive or the train without its surroundings."""
+        written = self.written
+        return written.drive() if isinstance(written, DriveTables) else self.train()
+
+    def attributes(self) -> dict[str, float]:
+        """Attributes of what is computed of it, beside those of a run."""
+        gears = [gear for gear in self.train().gears.values() if not self.train().is_slide(gear.output)]
+        return {"gear_ratio": gears[0].ratio} if len(gears) == 1 else {}
 
     @property
     def is_drive(self) -> bool:
-        """Whether it is one motor, one gearbox and one load in the short form."""
-        return isinstance(self.written, DriveTables)
+        """Whether its file has the tables `motor`, `gearbox` and `load`."""
+        return self.form == DRIVE
 
     @kept
     def long(self) -> Scenario:
@@ -306,7 +379,11 @@ class Scenario:
 
     def train(self) -> DriveTrain:
         """The drive train without its surroundings, with the names that variables have in results of this scenario."""
-        return self.written.train()
+        return self._drive_of_one_gear() if self.is_drive else self.tables.train()
+
+    @kept
+    def _drive_of_one_gear(self) -> DriveOfOneGear:
+        return DriveOfOneGear.like(self.tables.train())
 
     def commanded(self) -> list[str]:
         """Names of what has a command: motors, brakes and friction clutches."""
@@ -335,13 +412,13 @@ class Scenario:
 
     def by_prefix(self) -> dict[str, Controller]:
         """The sampled controllers, by what the names of their variables begin with."""
-        return {self.written.prefix(name): c for name, c in self.axes().items()}
+        return {self.prefix(name): c for name, c in self.axes().items()}
 
     def sliding(self) -> dict[str, tuple[bool, bool]]:
         """Whether the motor of a controller moves a slide, and whether its position is that of one, by the prefix of its variables."""
         train, tables = self.train(), self.tables
         return {
-            self.written.prefix(name): (
+            self.prefix(name): (
                 train.is_slide(train.motors[name].shaft),
                 train.is_slide(tables.controlled(name)),
             )
@@ -394,7 +471,7 @@ class Scenario:
         return self._bound(NO_LAWS)
 
     def _bound(self, laws: Mapping[str, Law]) -> Bound:
-        with _in_keys(self.written.own_key):
+        with _in_keys(self.own_key):
             return core_control(self.train(), self.axes(), laws)
 
     def signals(self) -> dict[str, Signal[Any]]:
@@ -488,8 +565,8 @@ def _in_long_form(tables: Mapping[str, Any], written: Any = str) -> TrainTables:
     return TrainTables(**data)
 
 
-def _made_again(written: DriveTables | TrainTables, is_axis: bool) -> Scenario:
-    return Scenario.of(written, is_axis=is_axis, checked=False)
+def _made_again(tables: TrainTables, form: Form) -> Scenario:
+    return Scenario.of(tables, form, checked=False)
 
 
 def is_train(tables: Mapping[str, Any]) -> bool:

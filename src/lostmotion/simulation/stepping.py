@@ -102,7 +102,7 @@ class Simulation(SimulationAnswers):
         if not MIN_INTERVAL <= step <= MAX_INTERVAL:
             raise InputError(f"step {step} s must lie between {MIN_INTERVAL:g} s and {MAX_INTERVAL:g} s")
         scenario, core, self._loaded, self._given = parts(drive, loaded, given)
-        self._drive = drive.written.alone() if isinstance(drive, Scenario) else drive
+        self._drive = drive.alone() if isinstance(drive, Scenario) else drive
         self._scenario, self._train, self._core_train = scenario, scenario.train(), core
         self._initial = scenario.begin()
         self._controllers = dict(scenario.axes())

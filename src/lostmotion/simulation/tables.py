@@ -1,8 +1,8 @@
-"""Base of the tables of scenarios in their forms."""
+"""Common parts of the tables of scenarios, however these are written."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Protocol, Self
 
 import numpy as np
@@ -14,8 +14,6 @@ from ..control.controller import Controller
 from ..data_sheets.components import ACCESSORIES
 from ..inputs.part import Part
 from ..inputs.quantities import Positive, Time
-from ..model.drive import Drive
-from ..model.gearbox import Transmission
 from ..model.train import DriveTrain
 
 MAX_SAMPLES = 100_000_000
@@ -95,7 +93,7 @@ class Whole(Protocol):
 
 
 class ScenarioTables(Part):
-    """Tables of a scenario in one of its forms: its parts as they are written, and what they and their variables are called."""
+    """Tables of a scenario."""
 
     if TYPE_CHECKING:
         title: str
@@ -106,83 +104,3 @@ class ScenarioTables(Part):
     @classmethod
     def _subject(cls) -> str:
         return "the scenario"
-
-    def train(self) -> DriveTrain:
-        """The drive train without its surroundings; its variables have the names that results of these tables have."""
-        raise NotImplementedError
-
-    def long(self) -> Any:
-        """The same in the long form."""
-        raise NotImplementedError
-
-    def prefix(self, motor: str) -> str:
-        """Prefix of the names of the variables of a motor's controller."""
-        raise NotImplementedError
-
-    def own_key(self, key: str) -> str:
-        """A key of the long form as these tables have it."""
-        return key
-
-    def controller_key(self, motor: str) -> str:
-        """Key of the table of a motor's controller."""
-        return self.own_key(f"controllers.{motor}")
-
-    def gears_by_key(self) -> Mapping[str, Transmission]:
-        """The gears by the keys of their tables."""
-        return {self.gear_key(name): gear for name, gear in self.train().gears.items()}
-
-    def gear_key(self, name: str) -> str:
-        """Key of the table of a gear."""
-        return self.own_key(self.long().key_of("gears", name))
-
-    def motor_key(self, name: str) -> str:
-        """Key of the table of a motor."""
-        return self.own_key(self.long().key_of("motors", name))
-
-    def input_key(self, name: str) -> str:
-        """Key of the signal or reference that an input of the core stands for."""
-        raise NotImplementedError
-
-    def input_keys(self) -> dict[str, str]:
-        """Keys of the signals of its inputs, by their names."""
-        raise NotImplementedError
-
-    def record_keys(self) -> Iterator[str]:
-        """Keys that take names of records, and the conditions of their use."""
-        raise NotImplementedError
-
-    def note(self) -> str:
-        """Notes of the sheets of gears and motors."""
-        raise NotImplementedError
-
-    def attributes(self) -> dict[str, float]:
-        """Attributes of what is computed of it, beside those of a run."""
-        return {}
-
-    def alone(self) -> Drive | DriveTrain:
-        """The drive or the train without its surroundings."""
-        raise NotImplementedError
-
-    def of_inertia(self, shaft: str, inertia: float) -> dict[str, Any]:
-        """The tables that change with another inertia of a shaft of the load."""
-        raise NotImplementedError
-
-    def of_axes(self, axes: Mapping[str, Controller]) -> dict[str, Any]:
-        """The tables that change with other sampled controllers, by the names of their motors."""
-        raise NotImplementedError
-
-    def of_gears(self, gears: Mapping[str, Transmission]) -> dict[str, Any]:
-        """The tables that change with other gears, by their keys."""
-        raise NotImplementedError
-
-    def of_inputs(self, given: Mapping[str, Any]) -> dict[str, Any]:
-        """The tables that change where `simulate` is given inputs and times."""
-        raise NotImplementedError
-
-    def open_loop(self) -> dict[str, Any]:
-        """The values by key that change where commands of 0 take the place of all controllers."""
-        raise NotImplementedError
-
-    def told(self) -> str:
-        """Its drive, in one line."""
-        raise NotImplementedError

@@ -18,7 +18,6 @@ from ..errors import inside
 from ..inputs import described
 from ..inputs.kept import kept
 from ..inputs.named import Elements, Named, nothing
-from ..model.gearbox import Transmission
 from ..model.linear_train import LinearElements
 from ..model.motor import MotorLaw
 from ..model.shaft import Shaft
@@ -98,9 +97,6 @@ class TrainTables(ScenarioTables, LinearElements):
     def train(self) -> DriveTrain:
         return DriveTrain.of_tables(shafts=Named(self.plain_shafts()), **self.elements())
 
-    def long(self) -> TrainTables:
-        return self
-
     def own_shafts(self) -> dict[str, Shaft]:
         """The shafts as they are written, without the torques on them."""
         return {name: Shaft.like(shaft) for name, shaft in self.shafts.items()}
@@ -167,10 +163,8 @@ class TrainTables(ScenarioTables, LinearElements):
         element = self.brakes.get(name) or self.clutches.get(name)
         return command if element is None else element.acting(command)
 
-    def prefix(self, motor: str) -> str:
-        return f"{motor}_"
-
     def input_key(self, name: str) -> str:
+        """Key of the signal or reference that an input of the core stands for."""
         if name.endswith("_load_force"):
             slide = name.removesuffix("_load_force")
             inclined = self.slides[slide].weight(1.0) != 0.0
@@ -186,40 +180,32 @@ class TrainTables(ScenarioTables, LinearElements):
                 return key.format(name.removesuffix(suffix))
         return f"command.{name.removesuffix('_command')}"
 
-    def input_keys(self) -> dict[str, str]:
-        train = self.train()
-        keys = {train.command_of(name): f"command.{name}" for name in train.commanded()}
-        return keys | {
-            train.load_torque_of(name): f"slides.{name}.force" if train.is_slide(name) else f"shafts.{name}.torque"
-            for name in train.shafts
-        }
-
     def record_keys(self) -> Iterator[str]:
+        """Keys that take names of records, and the conditions of their use."""
         for table, (key, _) in RECORDS.items():
             beside = CONDITIONS[table].model_fields if table in CONDITIONS else ()
             for name in getattr(self, table):
                 yield from (f"{table}.{name}.{key}" for key in (key, *beside))
 
     def note(self) -> str:
+        """Notes of the sheets of gears and motors."""
         notes = {name: part.note for name, part in self.train().gears.items()}
         notes |= {name: part.note for name, part in self.motors.items()}
         notes |= {name: part.note for name, part in self.linear_motors.items()}
-        return " ".join(f"{name}: {note}" for name, note in notes.items() if note)
-
-    def alone(self) -> DriveTrain:
-        return self.train()
+        told = {name: note for name, note in notes.items() if note}
+        return " ".join(f"{name}: {note}" if len(told) > 1 else str(note) for name, note in told.items())
 
     def of_inertia(self, shaft: str, inertia: float) -> dict[str, Any]:
+        """The tables that change with another inertia of a shaft."""
         return {"shafts": {**self.shafts, shaft: self.shafts[shaft].model_copy(update={"inertia": inertia})}}
 
     def of_axes(self, axes: Mapping[str, Controller]) -> dict[str, Any]:
+        """The tables that change with other sampled controllers, by the names of their motors."""
         command = {name: signal for name, signal in self.command.items() if name not in axes}
         return {"controllers": {**self.controllers, **axes}, "command": command}
 
-    def of_gears(self, gears: Mapping[str, Transmission]) -> dict[str, Any]:
-        return {"gears": {**self.gears, **{key.removeprefix("gears."): gear for key, gear in gears.items()}}}
-
     def of_inputs(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        """The tables that change where `simulate` is given inputs and times."""
         times = {name: value for name, value in given.items() if name in SimulationTable.model_fields}
         changes: dict[str, Any] = {"simulation": SimulationTable(**{**dict(self.simulation), **times})}
         if "initial" in given:
@@ -240,11 +226,9 @@ class TrainTables(ScenarioTables, LinearElements):
         return changes
 
     def open_loop(self) -> dict[str, Any]:
+        """The tables that change where commands of 0 take the place of all controllers."""
         commands = {name: CommandSignal() for name in self.controllers}
         return {"controllers": {}, "command": {**self.command, **commands}}
-
-    def told(self) -> str:
-        return repr(self.train())
 
     @classmethod
     def _described_by(cls) -> dict[str, Any]:
