@@ -59,16 +59,22 @@ def model_description(model: Model) -> bytes:
     outputs = [places[v.name] for v in model.outputs]
     states = [places[f"state.{v.name}"] for v in model.states]
     derivatives = [places[f"der(state.{v.name})"] for v in model.states]
+    known = {v.name: places[v.name] for v in model.inputs} | {v.name: places[f"state.{v.name}"] for v in model.states}
+    of_outputs = dict(zip(outputs, (v.name for v in model.outputs), strict=True))
+    of_derivatives = dict(zip(derivatives, (f"der({v.name})" for v in model.states), strict=True))
     for name, listed in (
-        ("Outputs", outputs),
-        ("Derivatives", derivatives),
-        ("InitialUnknowns", [*outputs, *states, *derivatives]),
+        ("Outputs", of_outputs),
+        ("Derivatives", of_derivatives),
+        ("InitialUnknowns", dict.fromkeys([*outputs, *states, *derivatives], "")),
     ):
         if not listed:
             continue
         element = ET.SubElement(structure, name)
-        for index in listed:
-            ET.SubElement(element, "Unknown", index=index)
+        for index, unknown in listed.items():
+            needed = [known[n] for n in model.known(unknown) if n in known] if unknown else None
+            ET.SubElement(
+                element, "Unknown", {"index": index} | ({} if needed is None else {"dependencies": " ".join(needed)})
+            )
     return document(root)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import repeat
 from xml.etree import ElementTree as ET
 
 from .fmu_model import (
@@ -48,24 +49,39 @@ def model_description(model: Model) -> bytes:
     add_log_categories(root)
     add_default_experiment(root, model)
     _add_variables(ET.SubElement(root, "ModelVariables"), model)
-    structure = ET.SubElement(root, "ModelStructure")
+    _add_structure(ET.SubElement(root, "ModelStructure"), model)
+    return document(root)
+
+
+def _add_structure(structure: ET.Element, model: Model) -> None:
     outputs = [FIRST_OUTPUT + k for k in range(len(model.outputs))]
     states = [FIRST_STATE + k for k in range(len(model.states))]
     derivatives = [FIRST_DERIVATIVE + k for k in range(len(model.states))]
     indicators = [FIRST_INDICATOR + k for k in range(model.indicators if model.states else 0)]
-    # Which regime holds decides what depends on what: on all of them, over a whole motion. Signals of the scenario depend on time.
-    known = [0, *(FIRST_INPUT + k for k in range(len(model.inputs))), *states]
+    # Inputs that are not set follow signals of the scenario, which depend on time.
+    places = {v.name: FIRST_INPUT + k for k, v in enumerate(model.inputs)}
+    on_inputs = frozenset(places)
+    places |= {v.name: FIRST_STATE + k for k, v in enumerate(model.states)}
+
+    def needed(unknown: str) -> list[int]:
+        names = model.known(unknown)
+        return ([0] if on_inputs & {*names} else []) + [places[name] for name in names if name in places]
+
+    known = [0, *places.values()]
     start = [*known[: 1 + len(model.inputs)], *(FIRST_PARAMETER + k for k in range(len(model.parameters)))]
+    of_outputs, of_derivatives = (
+        [needed(v.name) for v in model.outputs],
+        [needed(f"der({v.name})") for v in model.states],
+    )
     for name, listed, dependencies in (
-        ("Output", outputs, known),
-        ("ContinuousStateDerivative", derivatives, known),
-        ("InitialUnknown", [*outputs, *states, *derivatives], start),
-        ("EventIndicator", indicators, known),
+        ("Output", outputs, of_outputs),
+        ("ContinuousStateDerivative", derivatives, of_derivatives),
+        ("InitialUnknown", [*outputs, *states, *derivatives], repeat(start)),
+        ("EventIndicator", indicators, repeat(known)),
     ):
-        text = " ".join(map(str, dependencies))
-        for reference in listed:
+        for reference, those in zip(listed, dependencies, strict=False):
+            text = " ".join(map(str, those))
             ET.SubElement(structure, name, valueReference=str(reference), dependencies=text)
-    return document(root)
 
 
 def _add_variables(variables: ET.Element, model: Model) -> None:

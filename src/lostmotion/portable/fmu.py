@@ -28,6 +28,7 @@ from ..simulation.scenario import Scenario
 from ..simulation.train_variables import axis_variables
 from . import fmi2, fmi3
 from .checkout import made_here
+from .dependencies import dependencies_of
 from .descriptions import kernel_of, numbers_of, written
 from .fmu_model import Declared, Model, page
 from .fmu_sources import source_files
@@ -298,6 +299,7 @@ def _model(
         parameters=list(parameters),
         references_given=references_given,
         positions=positions,
+        dependencies=dependencies_of(scenario, states, inputs),
         note=scenario.note(),
     )
 

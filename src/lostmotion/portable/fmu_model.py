@@ -104,6 +104,8 @@ class Model:
     """whether the references of sampled controllers are inputs"""
     positions: Mapping[str, str]
     """shafts whose position is an input, the last of these, with its variable"""
+    dependencies: Mapping[str, list[str]]
+    """inputs and states that outputs and derivatives, as ``der(NAME)``, depend on at once; what is left out may depend on all"""
     note: str
     identifier: str = "lostmotion"
     """model identifier"""
@@ -117,6 +119,10 @@ class Model:
         lines += [f"output {v.name}" for v in self.outputs]
         text = "\n".join([*lines, *(f"state {v.name} {v.decade}" for v in self.states)]) + "\n"
         return f"{text}checksum {zlib.crc32(text.encode())}\n"
+
+    def known(self, unknown: str) -> list[str]:
+        """Inputs and states that an output or a derivative depends on at once."""
+        return self.dependencies.get(unknown, [v.name for v in (*self.inputs, *self.states)])
 
 
 def rate_unit(unit: str) -> str:

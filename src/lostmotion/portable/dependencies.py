@@ -1,0 +1,98 @@
+"""Structure of the equations of an FMU: inputs and states on which outputs and derivatives depend at once, in any regime."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+
+from ..model.train import COUPLINGS, ON_SHAFTS, DriveTrain
+from ..simulation.scenario import Scenario
+
+
+def dependencies_of(scenario: Scenario, states: Collection[str], inputs: Collection[str]) -> dict[str, list[str]]:
+    """Inputs and states by the names of outputs, and of derivatives as ``der(NAME)``; what is not among them may depend on all.
+
+    A state as an output has none: it depends on no input at once, and no other state. Shafts that something may join
+    rigidly, such as a stuck contact, accelerate together.
+    """
+    if scenario.continuous() or scenario.given():
+        return {}
+    train = scenario.train()
+    equations = _Equations(scenario, train, states)
+    known = [*inputs, *states]
+    found: dict[str, set[str]] = {name: set() for name in states}
+    angles = {name for shaft in train.shafts if (name := train.angle_of(shaft)) in states}
+    twists = {train.twist_of(gear) for gear in train.gears}
+    for shaft in train.shafts:
+        angle = train.angle_of(shaft)
+        found |= {f"der({angle})": {train.speed_of(shaft)}, f"der({train.speed_of(shaft)})": equations.of([shaft])}
+        found.setdefault(angle, angles | twists)
+        found.setdefault(train.speed_of(shaft), equations.of([shaft]))
+        found[f"{train.contact_of(shaft)}_{train.torque_word(shaft)}"] = equations.of([shaft])
+    for name, motor in train.motors.items():
+        torque, of_motor = train.motor_torque_of(name), {train.command_of(name), train.speed_of(motor.shaft)}
+        found[f"der({torque})"] = of_motor | {torque}
+        found.setdefault(torque, of_motor)
+    for name, gear in train.gears.items():
+        ends = [gear.input, gear.output, *filter(None, [gear.housing])]
+        found[f"der({train.twist_of(name)})"] = set().union(*(equations.speeds(shaft) for shaft in ends))
+        found[train.output_torque_of(name)] = found[train.input_torque_of(name)] = equations.of(ends)
+    return {name: [k for k in known if k in needed] for name, needed in found.items()}
+
+
+class _Equations:
+    """Which numbers decide the acceleration of a shaft."""
+
+    def __init__(self, scenario: Scenario, train: DriveTrain, states: Collection[str]) -> None:
+        self._train, self._states = train, states
+        self._massless = set(scenario.core().massless_shafts())
+        self._group = {shaft: {shaft} for shaft in train.shafts}
+        contacts = scenario.core().contact_names()
+        for name, gear in train.gears.items():
+            twist = train.twist_of(name)
+            if twist not in states or f"{twist}_contact" in contacts:
+                self._join(gear.input, gear.output, *filter(None, [gear.housing]))
+        for one, other, _ in (*train.held_together(), *train.inertia_couplings()):
+            self._join(one, other)
+        for shafts in self._beside():
+            if not self._massless.isdisjoint(shafts):
+                self._join(*shafts)
+
+    def _beside(self) -> Iterator[list[str]]:
+        """Shafts between which a torque acts."""
+        for table in ("gears", *COUPLINGS):
+            for element in getattr(self._train, table).values():
+                yield [element.input, element.output, *filter(None, [getattr(element, "housing", None)])]
+
+    def _join(self, *shafts: str) -> None:
+        together = set().union(*(self._group[shaft] for shaft in shafts))
+        self._group |= dict.fromkeys(together, together)
+
+    def speeds(self, shaft: str) -> set[str]:
+        """What the speed of a shaft depends on: itself, or without inertia the balance of torques."""
+        return {self._train.speed_of(shaft)} if self._train.speed_of(shaft) in self._states else self.of([shaft])
+
+    def of(self, shafts: Collection[str]) -> set[str]:
+        """All that acts on these shafts, and on those that move with them."""
+        train, group = self._train, set().union(*(self._group[shaft] for shaft in shafts))
+        found = {train.load_torque_of(shaft) for shaft in group}
+        for others in self._beside():
+            if not group.isdisjoint(others):
+                found |= {train.speed_of(shaft) for shaft in others}
+        found |= {train.speed_of(shaft) for shaft in group}
+        for name, motor in train.motors.items():
+            if motor.shaft in group:
+                torque = train.motor_torque_of(name)
+                found |= {torque} if torque in self._states else {train.command_of(name)}
+        for name, gear in train.gears.items():
+            if not group.isdisjoint([gear.input, gear.output, gear.housing]):
+                found |= {train.twist_of(name), train.angle_of(gear.input)}
+                found |= set() if gear.housing is None else {train.angle_of(gear.housing)}
+        for table in ON_SHAFTS:
+            on_shafts: Mapping[str, object] = getattr(train, table)
+            for name, element in on_shafts.items():
+                if (shaft := str(getattr(element, "shaft", ""))) in group:
+                    found |= {train.angle_of(shaft), train.command_of(name)}
+        for name, clutch in train.clutches.items():
+            if not group.isdisjoint([clutch.input, clutch.output]):
+                found.add(train.command_of(name))
+        return found
