@@ -40,7 +40,7 @@ def dependencies_of(scenario: Scenario, states: Collection[str], inputs: Collect
 
 
 class _Equations:
-    """Which numbers decide the acceleration of a shaft."""
+    """Numbers that decide the accelerations of shafts."""
 
     def __init__(self, scenario: Scenario, train: DriveTrain, states: Collection[str]) -> None:
         self._train, self._states = train, states
@@ -68,7 +68,7 @@ class _Equations:
         self._group |= dict.fromkeys(together, together)
 
     def speeds(self, shaft: str) -> set[str]:
-        """What the speed of a shaft depends on: itself, or without inertia the balance of torques."""
+        """Numbers that the speed of a shaft depends on: itself, or without inertia the balance of torques."""
         return {self._train.speed_of(shaft)} if self._train.speed_of(shaft) in self._states else self.of([shaft])
 
     def of(self, shafts: Collection[str]) -> set[str]:
