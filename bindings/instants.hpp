@@ -16,6 +16,7 @@ inline Record explain_point(const model::Assembly& a, const TrainPoint& p) {
         for (const model::CapacityShare& s : c.shares)
             shares[s.element.c_str()] = nb::make_tuple(s.forward, s.backward);
         one["name"] = c.name, one["mode"] = c.mode, one["speed"] = c.speed, one["torque"] = c.torque;
+        one["determined"] = c.determined;
         one["capacity_forward"] = c.capacity_forward, one["capacity_backward"] = c.capacity_backward;
         one["shares"] = shares;
         contacts.append(one);

@@ -594,3 +594,27 @@ def test_one_speed_of_a_rigid_drive_says_the_other():
         assert float(result["motor_speed"][0]) == drive.gearbox.ratio * float(result["load_speed"][0])
     with pytest.raises(lm.InputError, match=r"6.*7"):
         drive.replace(**{"initial.motor_speed": 7.0, "initial.load_speed": 6.0})
+
+
+@pytest.mark.parametrize("stiffness", [None, "100 N/um"])
+def test_a_share_that_statics_leave_open_is_said_to_be_so(stiffness: str | None) -> None:
+    """Two equal screws hold one slide, each by the friction of its shaft: soft ones the same each, rigid ones any share."""
+    screws = {
+        name: {"input": f"m_{name}", "output": "ram", "lead": "10 mm"} | ({"stiffness": stiffness} if stiffness else {})
+        for name in ("left", "right")
+    }
+    scenario = lm.Scenario(
+        shafts={f"m_{name}": {"inertia": 1e-3, "friction_torque": 5.0} for name in screws},
+        slides={"ram": {"mass": 100.0, "inclination": "90 deg"}},
+        screws=screws,
+        simulation={"duration": 0.1, "sample_interval": 0.01},
+    )
+    explanation = lm.explain(scenario, 0.05)
+    assert {contact.determined for contact in explanation.contacts} == {stiffness is not None}
+    assert ("not determined" in str(explanation)) is (stiffness is None)
+    result = lm.simulate(scenario)
+    forces = [float(result[f"{name}_output_force"][-1]) for name in screws]
+    if stiffness is None:
+        assert sum(forces) == pytest.approx(980.665, rel=1e-12)
+    else:
+        assert forces[0] == pytest.approx(forces[1], rel=1e-12)

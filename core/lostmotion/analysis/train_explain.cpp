@@ -13,6 +13,12 @@ std::vector<ContactReport> explain_contacts(const model::Assembly& a, const Trai
         report.mode = r.at_rest[c] ? 0 : r.key.modes[c];
         report.speed = r.at_rest[c] ? 0.0 : model::evaluate(a.layout(), a.contact_speed(c), p.now);
         report.torque = model::evaluate(a.layout(), r.contact_torque[c], p.now);
+        for (const auto& l : r.locked) {
+            const model::ContactPlace& open = a.places().contacts[static_cast<std::size_t>(l.contact)];
+            const bool springs = open.kind == model::ContactPlace::gear && !open.bilateral && !open.gap.present();
+            if (!springs && std::as_const(r.contact_torque[c].c)[a.layout().first_memory + l.memory] != 0.0)
+                report.determined = false;
+        }
         report.shares = model::contact_capacity(a, c, r, p.now, T_2.data());
         for (const model::CapacityShare& s : report.shares) {
             report.capacity_forward += s.forward;

@@ -18,6 +18,7 @@ struct ContactReport {
     double capacity_forward = 0.0;             // largest torque it holds before it slips forward [N m]
     double capacity_backward = 0.0;            // ... and backward, as a magnitude [N m]
     std::vector<model::CapacityShare> shares;  // of its capacities, by element
+    bool determined = true;                    // false: rest leaves open what it and others that are rigid hold each
 };
 
 std::vector<ContactReport> explain_contacts(const model::Assembly& a, const TrainPoint& p);

@@ -34,6 +34,8 @@ class ContactState:
     capacity_forward: float  # it holds torques up to this before it slips forward
     capacity_backward: float  # and down to minus this before it slips in reverse
     shares: dict[str, tuple[float, float]] = field(default_factory=dict)  # of a train: of the capacities, by element
+    determined: bool = True
+    """False: rest leaves open how much of a load it holds and how much others that are rigid do; `torque` is one such share"""
     slides: bool = False  # along a straight line: [m/s] and [N] in place of [rad/s] and [N·m]
     reach: float | None = None
     """half the gap of what strikes: the backlash of rigid flanks, at the output, or the travel between end stops; None of other contacts"""
@@ -51,6 +53,11 @@ class ContactState:
         return self.capacity_backward + self.torque
 
     def __str__(self) -> str:
+        if self.determined or self.mode != 0:
+            return self._told()
+        return f"{self._told()} (not determined: others hold with it; give what is rigid a stiffness)"
+
+    def _told(self) -> str:
         unit = "N" if self.slides else "N·m"
         if self.reach is not None:
             if self.mode == 0:
