@@ -1,4 +1,4 @@
-"""Values of controllers that are given for slides: with units of length and force where a shaft has units of angle and torque."""
+"""Values of controllers and tasks that are given for slides: with units of length and force where a shaft has those of angle and torque."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from ..errors import InputError
+from ..inputs.quantities import argument
 from ..inputs.schema import follow, unit_in_schema
 from ..inputs.validation import shown
 from ..units.conversion import Unit
@@ -20,6 +21,7 @@ OF_REFERENCE = (
     ("inverse_model", "twist_rate"),
 )
 ENCODERS = ("encoder", "position_encoder")
+LOST_MOTION = "max_lost_motion"
 
 
 def in_si(data: Mapping[str, Any], schema: Callable[[], Mapping[str, Any]]) -> dict[str, Any]:
@@ -40,6 +42,8 @@ def in_si(data: Mapping[str, Any], schema: Callable[[], Mapping[str, Any]]) -> d
         return dict(data)
     if isinstance(masses := data.get("mass_matrices"), Mapping):
         data = {**data, "mass_matrices": {name: _masses_in_si(name, mass, slides) for name, mass in masses.items()}}
+    if isinstance(task := data.get("task"), Mapping) and isinstance(lost := task.get(LOST_MOTION), str):
+        data = {**data, "task": {**task, LOST_MOTION: argument(f"task.{LOST_MOTION}", lost, "m")}}
     if not isinstance(controllers, Mapping):
         return dict(data)
     of_slides: dict[str, Any] = {}
@@ -79,7 +83,7 @@ def _unit_of_mass(shafts: Sequence[str], a: int, b: int, slides: Mapping[str, An
 
 
 def unit_of_slides(data: Mapping[str, Any], key: str, unit: str) -> str:
-    """The unit of a key of a controller, for the slides of the tables of a train.
+    """The unit of a key for the slides of the tables of a train.
 
     Parameters
     ----------
@@ -89,6 +93,8 @@ def unit_of_slides(data: Mapping[str, Any], key: str, unit: str) -> str:
         That it has for shafts.
     """
     table, _, rest = key.partition(".")
+    if data.get("slides") and key == f"task.{LOST_MOTION}":
+        return "m"
     if table == "mass_matrices" and ".matrix." in rest and data.get("slides"):
         name, _, a, b = rest.split(".")
         return _unit_of_mass(data[table][name]["shafts"], int(a), int(b), data["slides"]) or unit

@@ -1,19 +1,21 @@
-"""Rules for a train that is one axis: a motor and a gear with a load; or a screw, a rack or a belt that moves one slide."""
+"""Rules for a train that is one axis: a motor that moves one load, through gears, a screw, a rack or a belt in a chain."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
 
+from ..control.turning import turns
+from ..model.gear import Gear
 from ..model.gearbox import Gearbox
-from ..model.losses import ConstantEfficiency
+from ..model.torsion import Rigid
+from ..model.train import DriveTrain
 from ..simulation.explanation import smallest_commands
 from ..simulation.results import RunArrays
 from ..simulation.scenario import Scenario
 from .finding import Finding
 from .gearbox_check import lost_motion
 from .motion_check import inertia_ratio, resonance
-from .stages import DIRECT, together
+from .stages import DIRECT, in_series
 
 
 @dataclass(frozen=True)
@@ -22,84 +24,89 @@ class OneAxis:
 
     motor: str
     whole: Gearbox
-    """gearbox, shafts and stage as one gear"""
+    """all gears and shafts between the motor and the load as one gear"""
     load: float
     """inertia of the load [kg·m²], or mass of the slide [kg]"""
     slides: bool
-    rated: bool
-    """whether a torque at the load is known, to which its lost motion is a share"""
 
     @classmethod
     def of(cls, scenario: Scenario) -> OneAxis | str:
         """The axis of a train, or why it is none."""
-        train, stages = scenario.train(), scenario.linear_drives()
-        between = [name for name in train.gears if name not in stages]
-        if not stages and not scenario.slides:
-            return cls._turning(scenario)
-        if len(train.motors) != 1 or len(stages) != 1 or len(between) > 1 or len(scenario.slides) != 1:
-            return "it needs one motor, at most one gear, and one screw, rack or belt that moves one slide"
-        ((name, motor),), ((stage_name, stage),) = train.motors.items(), stages.items()
-        gear = train.gears[between[0]] if between else None
-        first = train.gears[stage_name].input if gear is None else gear.input
-        chained = gear is None or (gear.housing is None and gear.output == train.gears[stage_name].input)
-        if motor.shaft != first or not chained or not train.is_slide(train.gears[stage_name].output):
-            return "the motor, the gear and what moves the slide must follow each other in a chain"
-        if len(train.shafts) != 2 + len(between) or scenario.mass_matrices:
-            return "further shafts or masses move with the slide; linearize the train"
-        g = DIRECT.model_copy(update={"rated_output_torque": motor.rated_torque}) if gear is None else _gearbox(gear)
-        inertia = g.inertia + train.shafts[first].inertia
-        if gear is not None:
-            inertia += train.shafts[gear.output].inertia / gear.ratio**2
-        whole = together(g.model_copy(update={"inertia": inertia}), stage)
-        return cls(name, whole, next(iter(scenario.slides.values())).mass, True, True)
-
-    @classmethod
-    def _turning(cls, scenario: Scenario) -> OneAxis | str:
         train = scenario.train()
-        if len(train.motors) != 1 or len(train.gears) != 1 or len(train.shafts) != 2 or scenario.mass_matrices:
-            return "it needs one motor and one gear between two shafts, or a screw, rack or belt that moves one slide"
-        ((name, motor),), (gear,) = train.motors.items(), train.gears.values()
-        if motor.shaft != gear.input or gear.housing is not None or not train.shafts[gear.output].inertia > 0.0:
-            return "the motor must turn a load with an inertia through the gear"
-        g = _gearbox(gear)
-        whole = g.model_copy(update={"inertia": g.inertia + train.shafts[gear.input].inertia})
-        return cls(name, whole, train.shafts[gear.output].inertia, False, gear.rated_output_torque is not None)
+        if len(train.motors) != 1:
+            return f"{len(train.motors) or 'no'} motors turn it"
+        ((name, motor),) = train.motors.items()
+        if (tied := tied_together(train)) is not None:
+            return tied
+        whole, shaft, rated = DIRECT, motor.shaft, motor.rated_torque
+        left, inertia = dict(train.gears), train.shafts[shaft].inertia
+        while following := [key for key, gear in left.items() if gear.input == shaft]:
+            gear = left.pop(following[0])
+            whole, rated = _in_chain(whole, inertia, gear), gear.rated_output_torque or rated * abs(gear.ratio)
+            shaft = gear.output
+            inertia = train.shafts[shaft].inertia
+        if left or len(train.shafts) != len(train.gears) + 1:
+            return "its shafts are no chain from the motor to one load"
+        if not inertia > 0.0 and train.gears:
+            return f"the load {shaft} has no inertia"
+        return cls(name, whole.model_copy(update={"rated_output_torque": rated}), inertia, train.is_slide(shaft))
 
 
-def _gearbox(gear: Any) -> Gearbox:
-    """A gear of a train as a gearbox without losses; one without a rated torque has the rated torque of `DIRECT`."""
-    known = {key: value for key in Gearbox.model_fields if (value := getattr(gear, key, None)) is not None}
-    own = DIRECT.model_dump(include={"rated_input_speed", "rated_output_torque"})
-    lossless = {"losses": ConstantEfficiency(efficiency=1.0), "loss_range": None}
-    return Gearbox(**{**own, **known, **lossless})
+def tied_together(train: DriveTrain) -> str | None:
+    """Reason why not all shafts of a train turn in fixed ratios to each other, each with an inertia of its own."""
+    if train.mass_matrices:
+        return f"{', '.join(next(iter(train.mass_matrices.values())).shafts)} move with a mass matrix; linearize the train"
+    first, *others = train.shafts
+    loose = next((shaft for shaft in others if turns(train, shaft, first) is None), None)
+    return None if loose is None else f"no fixed ratio leads from {first} to {loose}"
+
+
+def _in_chain(before: Gearbox, inertia: float, gear: Gear) -> Gearbox:
+    """Gears and the next one behind them, with the inertia of the shaft between, as one gear without losses."""
+    whole = before.model_copy(
+        update={
+            "ratio": before.ratio * abs(gear.ratio),
+            "inertia": before.inertia + (inertia + gear.inertia) / before.ratio**2,
+            "stiffness": gear.stiffness if before.stiffness == Rigid() else in_series(before, gear.stiffness, abs(gear.ratio)),
+            "mesh_damping": gear.mesh_damping,
+            "hysteresis": gear.hysteresis or before.hysteresis,
+        }
+    )
+    return Gearbox.model_validate(whole.model_dump())
 
 
 def axis_rules(scenario: Scenario, axis: OneAxis | str, result: RunArrays) -> list[Finding]:
-    """Ratio of inertias, resonance, dead zone and lost motion of a train that is one axis; of another the reason why not."""
+    """Ratio of inertias, resonance, dead zone and lost motion; of a train that has none of them the reason why."""
+    train, found = scenario.train(), list[Finding]()
+    if not isinstance(axis, str) and train.is_slide(train.motors[axis.motor].shaft):
+        return [dead_zone(scenario, result)]  # a linear motor has neither a ratio of inertias nor a gear
     if isinstance(axis, str):
-        found = [not_judged(rule, axis) for rule in ("inertia_ratio", "resonance", "lost_motion")]
+        found = [not_judged(rule, axis) for rule in ("resonance", "lost_motion")]
     else:
-        motor = scenario.train().motors[axis.motor]
+        motor = train.motors[axis.motor]
         found = [
-            inertia_ratio(motor, axis.whole, axis.load),
             *resonance(motor, axis.whole, axis.load, scenario.tables.command.get(axis.motor)),
-            _lost_motion(axis, scenario.task.max_lost_motion),
+            lost_motion(axis.whole, scenario.task.max_lost_motion, slides=axis.slides),
         ]
-    return [*found, dead_zone(scenario, result)]
+    return [_inertias(train), *found, dead_zone(scenario, result)]
+
+
+def _inertias(train: DriveTrain) -> Finding:
+    """Ratio of the inertia of all that moves with the one motor to that of its rotor."""
+    why = f"{len(train.motors) or 'no'} motors turn it" if len(train.motors) != 1 else tied_together(train)
+    if why is not None:
+        return not_judged("inertia_ratio", why)
+    (motor,) = train.motors.values()
+    if not motor.rotor_inertia > 0.0:
+        return not_judged("inertia_ratio", "the motor has no rotor_inertia")
+    of_shafts = (shaft.inertia * (turns(train, name, motor.shaft) or 0.0) ** 2 for name, shaft in train.shafts.items())
+    of_gears = (gear.inertia * (turns(train, gear.input, motor.shaft) or 0.0) ** 2 for gear in train.gears.values())
+    return inertia_ratio(motor, DIRECT, sum(of_shafts) + sum(of_gears))
 
 
 def not_judged(rule: str, why: str) -> Finding:
     """A rule that a train gives no answer to."""
     return Finding(rule, rule.replace("_", " "), "not judged", "unknown", why)
-
-
-def _lost_motion(axis: OneAxis, limit: float | None) -> Finding:
-    if not axis.rated:
-        return not_judged("lost_motion", "the gear has no rated_output_torque")
-    if axis.slides and limit is not None:
-        return not_judged("lost_motion", "task.max_lost_motion is an angle, and that of a slide is a length")
-    found = lost_motion(axis.whole, limit, slides=axis.slides)
-    return replace(found, remark="there is no limit for that of a slide") if axis.slides else found
 
 
 def depends_on_angles(scenario: Scenario) -> bool:

@@ -134,7 +134,7 @@ def together(g: Gearbox, stage: LinearDrive) -> Gearbox:
         viscous_friction=g.viscous_friction + own.viscous_friction / g.ratio**2,
         rated_input_speed=g.rated_input_speed,
         rated_output_torque=g.rated_output_torque * ratio,
-        stiffness=_in_series(g, own.stiffness, ratio),
+        stiffness=in_series(g, own.stiffness, ratio),
         mesh_damping=_damping(g, own, ratio),
         hysteresis=own.hysteresis or (None if isinstance(g.stiffness, Rigid) else _hysteresis(g.hysteresis)),
         losses=_losses(g, forward, back, drag),
@@ -198,7 +198,7 @@ def _beyond(x: float, loads: list[float], values: list[list[float]]) -> list[flo
     return [p + share * (q - p) for p, q in zip(values[a], values[b], strict=True)]
 
 
-def _in_series(g: Gearbox, own: Any, ratio: float) -> TorsionCurve | LinearStiffness | Rigid:
+def in_series(g: Gearbox, own: Any, ratio: float) -> TorsionCurve | LinearStiffness | Rigid:
     """Force over deflection at the slide: the deflections of both at the same force add up."""
     curves = [
         [(b / scale, k * scale**2) for b, k in zip([*breaks, math.inf], slopes, strict=True)]
