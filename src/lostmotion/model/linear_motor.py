@@ -7,7 +7,7 @@ from pydantic import field_validator, model_validator
 
 from ..inputs import described
 from .angle_torques import PositionHarmonic
-from .motor import ShaftMotor
+from .motor import MotorLimits, ShaftMotor
 from .notes import NO_NOTE, Note, note_is_about
 
 
@@ -72,13 +72,15 @@ class LinearMotor(LinearMotorData):
     def motor(self) -> ShaftMotor:
         """The source of torque with the same equations."""
         rated, peak = self.forces()
+        limit = None if math.isinf(peak) else peak
         return ShaftMotor(
             kind="torque_source",
             shaft=self.slide,
             rotor_inertia=self.mass,
             friction_torque=self.friction_force,
             rated_torque=rated,
-            torque_limit=None if math.isinf(peak) else peak,
+            torque_limit=limit,
+            limits=MotorLimits(continuous_torque=rated, peak_torque=limit),
         )
 
     def cogging(self) -> PositionHarmonic | None:

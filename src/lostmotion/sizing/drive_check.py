@@ -29,6 +29,7 @@ from .supply import amplifier_of_a_run, bus_findings, power_in_run
 POINTS = 40  # samples to a period of the fastest resonance, so that no peak is missed
 SAMPLES = (2_000, 200_000)  # the fewest of a run, and the most at the finest interval
 ON_BUS = 20_000  # the fewest where the energy of braking is summed, since the power jumps with the torque, or resonances are not known
+OF_LINEAR_MOTORS = "the table of a linear motor has no such limit; compare with its data sheet"
 
 MEANS = ("average_output_torque", "average_input_speed", "motor_torque", "winding_temperature")
 
@@ -190,6 +191,8 @@ def _motor(scenario: Scenario, name: str, result: RunArrays) -> tuple[list[Findi
         current(motor, T, where),
     ]
     findings = [_with_sinking(scenario, f, result, cycle) if f.rule in MEANS else f for f in findings]
+    if slides:
+        findings = [replace(f, remark=OF_LINEAR_MOTORS) if f.verdict == "unknown" else f for f in findings]
     return findings, power_in_run(motor, result, command, torque, speed, key)
 
 
