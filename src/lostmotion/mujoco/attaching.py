@@ -49,7 +49,7 @@ def drive_of_joint(joint: str, given: Any, controller: Controller | None) -> Sce
     if own := list(scenario.tables.controllers):
         raise InputError(f"joint {joint!r}: a controller of its own turns the motor {own[0]}; leave one of them out")
     if len(motors := scenario.train().motors) != 1:
-        raise InputError(f"joint {joint!r}: its train has {len(motors)} motors; a joint is turned by one")
+        raise InputError(f"joint {joint!r}: {len(motors) or 'no'} motors turn it, and a joint is turned by one")
     return scenario.with_axes(dict.fromkeys(motors, controller))
 
 

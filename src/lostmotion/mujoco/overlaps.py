@@ -40,7 +40,7 @@ def without_weight(name: str, drive: Scenario, *, replace: bool, weighs: bool) -
         The drive has such, and it is not to be replaced.
     """
     weights = _weights(name, drive) if weighs else []
-    keys = [*loads_of(drive), *map(".".join, weights)]
+    keys = [*loads_of(drive), *(weights_of(name, drive) if weighs else [])]
     if keys and not replace:
         raise InputError(
             "would count twice: load and weight of the joint come from the robot; give replace=True, or leave it out",
@@ -64,6 +64,11 @@ def loads_of(drive: Scenario) -> list[str]:
         for shaft, signal in drive.tables.loads().items()
         if signal != type(signal)()
     ]
+
+
+def weights_of(name: str, drive: Scenario) -> list[str]:
+    """Keys of what may be a weight on the shaft of the joint."""
+    return [".".join(key) for key in _weights(name, drive)]
 
 
 def _weights(name: str, drive: Scenario) -> list[tuple[str, str]]:

@@ -9,15 +9,15 @@ import numpy as np
 
 from ..errors import InputError
 from ..inputs.arguments import checked
+from ..inputs.named import Named
 from ..inputs.quantities import Angle, Frequency, Torque
 from ..inputs.validation import shown
 from ..model.drive import Drive
-from ..model.motor import Motor
-from ..simulation.joint_trains import joint_drive
-from ..simulation.one_gear import drive_of
+from ..model.motor import ShaftMotor
+from ..model.train import DriveTrain
+from ..simulation.joint_trains import joint_drive, output_of
 from ..simulation.scenario import Scenario
-from ..simulation.stepping import Simulation
-from .overlaps import loads_of
+from .overlaps import loads_of, weights_of, without_weight
 
 STEPS_PER_PERIOD = 2000
 FASTEST_SHARE = 0.1
@@ -64,7 +64,7 @@ class Reduction:
 
 @checked
 def reduce(
-    drive: Drive | Scenario,
+    drive: Drive | DriveTrain | Scenario,
     amplitude: Angle,
     frequency: Frequency,
     load_torque: Torque = 0.0,
@@ -78,7 +78,7 @@ def reduce(
     Parameters
     ----------
     drive
-        With the inertia of its load, and a motor of any kind, which is taken as a torque source.
+        With the inertia of its load, and one motor of any kind, which is taken as a torque source.
     amplitude
         Of the joint [rad].
     frequency
@@ -94,8 +94,10 @@ def reduce(
     Raises
     ------
     InputError
-        The drive does not follow the motion, its gearbox swings too slowly for it, or a scenario has a load torque and `load_torque`
-        is left out.
+        The drive does not follow the motion, its gears swing too slowly for it, or a scenario has a load torque or a weight and
+        `load_torque` is left out.
+    SolverError
+        The motion has no continuation, such as that of a worm that locks.
 
     Examples
     --------
@@ -108,33 +110,52 @@ def reduce(
     for name, value in (("amplitude", amplitude), ("frequency", frequency)):
         if not value > 0.0:
             raise InputError(f"{name}: {shown(value)} must be positive")
-    if load_torque == 0.0 and (loads := loads_of(Scenario.of_any(drive))):
+    scenario = Scenario.of_any(drive)
+    if load_torque == 0.0 and (loads := loads_of(scenario) + weights_of("joint", scenario)):
         raise InputError("is not taken over; give load_torque, or leave the key out", *loads)
-    drive = drive_of(drive)
-    columns, target = _along_sines(drive, amplitude, frequency, load_torque)
+    source = _torque_source(without_weight("joint", scenario, replace=True, weighs=True).long().train())
+    columns, target, ratio = _along_sines(source, amplitude, frequency, load_torque)
     if load_torque == 0.0:
         # Without a load torque only the product of gear and motor torque counts: the gear is its ratio.
-        ratio = drive.gearbox.ratio
         values = np.array([ratio, *_not_negative(columns[:, 1:], target - ratio * columns[:, 0])])
     else:
-        values = _not_negative(columns, target)
+        sign = np.array([math.copysign(1.0, ratio), 1.0, 1.0, 1.0])
+        values = sign * _not_negative(sign * columns, target)
     left = target - columns @ values
     gear, armature, damping, loss = map(float, values)
     rms = [float(np.sqrt(np.mean(x * x))) for x in (left, target)]
     return Reduction(armature, damping, loss, gear, *rms)
 
 
-def _along_sines(drive: Drive, amplitude: float, frequency: float, load_torque: float) -> tuple[np.ndarray, np.ndarray]:
-    """Motor torque, acceleration, speed and its sign (the last three negative), and the torque on the joint, over two periods."""
-    motor = Motor(
-        kind="torque_source",
-        rotor_inertia=drive.motor.rotor_inertia,
-        friction_torque=drive.motor.friction_torque,
-    )
-    source = Drive(motor=motor, gearbox=drive.gearbox, load=drive.load)
+def _torque_source(train: DriveTrain) -> DriveTrain:
+    """The train with a source of torque in place of its motor."""
+    turned = {
+        name: ShaftMotor(
+            kind="torque_source",
+            shaft=motor.shaft,
+            rotor_inertia=motor.rotor_inertia,
+            friction_torque=motor.friction_torque,
+        )
+        for name, motor in train.motors.items()
+    }
+    return train.model_copy(update={"motors": Named(turned)})
+
+
+def _along_sines(
+    train: DriveTrain, amplitude: float, frequency: float, load_torque: float
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Motor torque, acceleration, speed and its sign (the last three negative), the torque on the joint, over two periods, and the
+    ratio of the motor to the joint."""
     step = 1.0 / (STEPS_PER_PERIOD * frequency)
-    simulation = Simulation(source, step=step)
-    made = joint_drive("joint", source, drive.load.inertia, step)
+    joint = output_of("joint", train)
+    inertia = train.inertia_of(joint)
+    made = joint_drive("joint", train, inertia, step)
+    simulation, ratios = made.simulation, made.ratios()
+    ((name, motor),) = train.motors.items()
+    ratio, command, load = ratios[motor.shaft], train.command_of(name), train.load_torque_of(joint)
+    if ratio == 0.0:
+        raise InputError(f"no fixed ratio leads from the motor {name} to the shaft {joint}; join them by gears")
+    motor_angle, motor_turns = f"{motor.shaft}_angle", f"{motor.shaft}_speed"
     omega = 2.0 * math.pi * frequency
     bandwidth = 20.0 * omega
     if made.mesh_frequency > 0.0:
@@ -143,9 +164,9 @@ def _along_sines(drive: Drive, amplitude: float, frequency: float, load_torque: 
         raise InputError(
             f"frequency {frequency:g} Hz: is too fast for a mesh that swings at {made.mesh_frequency / (2.0 * math.pi):.4g} Hz; give a lower one"
         )
-    ratio, inertia = drive.gearbox.ratio, drive.load.inertia
     whole = inertia + made.reflected_inertia
-    friction = drive.load.friction_torque + abs(ratio) * drive.motor.friction_torque
+    friction = abs(ratio) * motor.friction_torque
+    friction += sum(abs(ratios[key]) * shaft.friction_torque for key, shaft in train.shafts.items())
     rows: list[tuple[float, float, float, float]] = []
     targets: list[float] = []
     for k in range(4 * STEPS_PER_PERIOD):
@@ -156,21 +177,21 @@ def _along_sines(drive: Drive, amplitude: float, frequency: float, load_torque: 
             v += size * w * math.sin(w * t)
             a += size * w * w * math.cos(w * t)
         # By the motor's own angle and speed, which holds a compliant gear in check.
-        angle, motor_speed = simulation["load_angle"] + simulation["twist"], simulation["motor_speed"] / ratio
-        speed = simulation["load_speed"]
+        angle, motor_speed = simulation[motor_angle] / ratio, simulation[motor_turns] / ratio
+        speed = simulation[f"{joint}_speed"]
         wanted = whole * (a + 2.0 * bandwidth * (v - motor_speed) + bandwidth * bandwidth * (q - angle))
         torque = (wanted + load_torque + math.copysign(friction, v)) / ratio
-        simulation.advance(step, command=torque, load_torque=load_torque)
-        after = simulation["load_speed"]
+        simulation.advance(step, **{command: torque / motor.rated_torque, load: load_torque})
+        after = simulation[f"{joint}_speed"]
         if k >= 2 * STEPS_PER_PERIOD:
             mean, acceleration = 0.5 * (speed + after), (after - speed) / step
             rows.append((torque, -acceleration, -mean, -float(np.sign(mean))))
             targets.append(inertia * acceleration + load_torque)
-    if abs(simulation["load_angle"] - q) > 0.5 * amplitude:
+    if abs(simulation[f"{joint}_angle"] - q) > 0.5 * amplitude:
         raise InputError(
-            "the drive does not follow the motion; give a larger amplitude, or a load torque that it can move"
+            "the joint does not follow the motion; give a larger amplitude, or a load torque that it can move"
         )
-    return np.array(rows), np.array(targets)
+    return np.array(rows), np.array(targets), ratio
 
 
 def _not_negative(columns: np.ndarray, target: np.ndarray) -> np.ndarray:

@@ -50,6 +50,10 @@ class JointDrive:
             inertia[motor.shaft] += motor.rotor_inertia
         for gear in self.train.gears.values():
             inertia[gear.input] += gear.inertia
+        rigid = [gear for gear in self.train.gears.values() if not isinstance(gear.stiffness, Elastic)]
+        for gear in (*rigid, *reversed(rigid)):  # a shaft without inertia moves with its rigid neighbour
+            inertia[gear.output] = inertia[gear.output] or inertia[gear.input] * gear.ratio * gear.ratio
+            inertia[gear.input] = inertia[gear.input] or inertia[gear.output] / (gear.ratio * gear.ratio)
         square = 0.0
         for gear in self.train.gears.values():
             if isinstance(gear.stiffness, Elastic):
@@ -163,7 +167,7 @@ def _check_commands(name: str, scenario: Scenario) -> None:
     """Refuse what `step` cannot command: all but one motor, or the reference of its controller."""
     train = scenario.train()
     if len(train.motors) != 1:
-        raise InputError(f"joint {name!r}: its train has {len(train.motors)} motors; a joint is turned by one")
+        raise InputError(f"joint {name!r}: {len(train.motors) or 'no'} motors turn it, and a joint is turned by one")
     others = [key for key in train.commanded() if key not in train.motors]
     if others:
         table = "brakes" if others[0] in train.brakes else "clutches"
@@ -187,11 +191,11 @@ def output_of(name: str, train: DriveTrain) -> str:
     found = {other for _, other in joined if other not in inner}
     if len(found) != 1:
         raise InputError(
-            f"joint {name!r}: the train must have one shaft that gears turn and that turns none, and has {len(found)}"
+            f"joint {name!r}: {len(found) or 'no'} shafts are turned by gears and turn none themselves, and the joint is one of them"
         )
     (shaft,) = found
     if train.is_slide(shaft):
-        raise InputError(f"joint {name!r}: is a hinge, and {shaft!r} is a slide; give a drive that turns a shaft")
+        raise InputError(f"joint {name!r}: is a hinge, and {shaft!r} is a slide; a hinge needs a shaft that turns")
     return shaft
 
 

@@ -20,7 +20,7 @@ def need_open_loop(scenario: Scenario, function: str) -> None:
         none = "None" if table == "controller" else "{}"
         has = f"a {table}" if table == "controller" else table
         raise InputError(
-            f"{function}: the scenario has {has}, and this takes a drive whose commands are given; for the drive without, give "
+            f"{function}: the scenario has {has}, and commands are to be given here; without controllers it is "
             f"scenario.replace({table}={none}), or in a file [command] over its base"
         )
 
@@ -63,6 +63,5 @@ def need_free_motion(scenario: Scenario, function: str) -> None:
     need_no_impacts(scenario, function)
     if given := scenario.given():
         raise InputError(
-            f"{function}: key {scenario.given_key(given[0])} gives the motion of a shaft, and this takes a train that torques "
-            "alone move; leave it out"
+            f"{function}: key {scenario.given_key(given[0])} gives the motion of a shaft, which torques are to move here; leave it out"
         )
