@@ -79,15 +79,14 @@ def write_servo_logs(directory: Path, values: dict[str, float], *, rung: int, se
 
 
 AXIS = """
-[shafts.carriage]
+[slides.carriage]
 viscous_friction = 200.0
-friction_torque = 20.0
-torque = { mean = 0.0 }
-[motors.drive]
-shaft = "carriage"
-kind = "torque_source"
-rated_torque = 1.0
-rotor_inertia = "95 kg*m^2"
+friction_force = 20.0
+force = { mean = 0.0 }
+[linear_motors.drive]
+slide = "carriage"
+rated_force = 1.0
+mass = "95 kg"
 [simulation]
 duration = "1 s"
 sample_interval = "1 ms"

@@ -27,7 +27,7 @@ def folders(tmp_path: Path) -> Path:
             rows = "\n".join(
                 f"{t!r},{x!r}" for t, x in zip(TIME.tolist(), released(TIME, BEGIN, mass).tolist(), strict=True)
             )
-            (tmp_path / folder / name).write_text(f"# arm: {arm}\ntime [s],pos [m]\n{rows}\n")
+            (tmp_path / folder / name).write_text(f"# arm: {arm}\ntime [s],pos [rad]\n{rows}\n")
     return tmp_path
 
 
@@ -79,7 +79,7 @@ def test_the_error_of_a_condition_left_out_is_that_of_the_closed_form(folders: P
     lines = [line for line in result.lines() if "when fitted without them" in line]
     assert (
         len(lines) == 4
-        and f"folder = heavy (2 logs): mean absolute error {found['folder = heavy'].fitted:.4g} m" in lines[0]
+        and f"folder = heavy (2 logs): mean absolute error {found['folder = heavy'].fitted:.4g} rad" in lines[0]
     )
     table = next(part for part in identification_report("x", result).parts if "Leave one" in getattr(part, "title", ""))
     assert [row[0] for row in table.rows] == list(found)

@@ -12,6 +12,8 @@ from typer.testing import CliRunner
 import lostmotion as lm
 from identification_logs import AXIS
 from lostmotion.cli import app
+from lostmotion.identification.prepare import prepared
+from lostmotion.identification.rig import Rig
 
 TIME = np.arange(0.0, 2.0, 0.01)
 FORCE, MASS, VISCOUS = 400.0, 80.0, 150.0  # N, kg, N*s/m
@@ -29,8 +31,8 @@ def logs(tmp_path: Path) -> Path:
         rows = "\n".join(
             f"{t!r},{share * FORCE!r},{share * v!r}" for t, v in zip(TIME.tolist(), speed(TIME).tolist(), strict=True)
         )
-        (tmp_path / name).write_text(f"# share: {share}\ntime [s],force [N],carriage speed [rad/s]\n{rows}\n")
-    (tmp_path / "rig.toml").write_text(AXIS.replace("friction_torque = 20.0\n", ""))
+        (tmp_path / name).write_text(f"# share: {share}\ntime [s],force [N],carriage speed [m/s]\n{rows}\n")
+    (tmp_path / "rig.toml").write_text(AXIS.replace("friction_force = 20.0\n", ""))
     return tmp_path
 
 
@@ -43,12 +45,12 @@ def invoke(*words: str) -> tuple[int, str]:
 def test_the_command_reads_the_file_with_a_rig_and_finds_the_truth(logs: Path, rated: float) -> None:
     """The command of a motor of 250 N is force/250 N."""
     rig = (logs / "rig.toml").read_text()
-    (logs / "rig.toml").write_text(rig.replace("rated_torque = 1.0", f"rated_torque = {rated}"))
+    (logs / "rig.toml").write_text(rig.replace("rated_force = 1.0", f"rated_force = {rated}"))
     code, said = invoke("identify", "new", str(logs), "--rig", str(logs / "rig.toml"))
     assert code == 0, said
     assert f"written to {logs / 'identify.toml'}" in said
     result = lm.identify(logs / "identify.toml")
-    assert result.values["drive_rotor_inertia"] == pytest.approx(MASS, rel=1e-3)
+    assert result.values["drive_mass"] == pytest.approx(MASS, rel=1e-3)
     assert result.values["carriage_viscous_friction"] == pytest.approx(VISCOUS, rel=1e-3)
 
 
@@ -61,8 +63,8 @@ def test_without_a_rig_the_file_is_whole_but_for_the_rig(logs: Path) -> None:
     with pytest.raises(lm.InputError, match=r"RIG\.toml"):
         lm.identify(logs / "identify.toml")
     text = (logs / "identify.toml").read_text()
-    text = text.replace("RIG.toml", "rig.toml").replace("MOTOR_", "drive_").replace("SHAFT", "carriage")
-    text = text.replace("friction_torque", "viscous_friction").replace("max = 100.0", "max = 1000.0")
+    text = text.replace("RIG.toml", "rig.toml").replace("MOTOR_", "drive_").replace("SLIDE", "carriage")
+    text = text.replace("friction_force", "viscous_friction").replace("max = 100.0", "max = 1000.0")
     (logs / "identify.toml").write_text(text)
     assert lm.identify(logs / "identify.toml").values  # the mass of the rig is not that of the logs
 
@@ -85,7 +87,7 @@ def test_what_is_in_doubt_is_said(logs: Path) -> None:
     text = lm.identification.first_task(logs)
     data = tomllib.loads(text)
     assert data["logs"] == {"files": ["*.csv", "more/*.txt"], "decimal": ","}
-    assert data["measured"] == {"carriage_speed": {"channel": "carriage speed", "variable": "SHAFT_speed"}}
+    assert data["measured"] == {"carriage_speed": {"channel": "carriage speed", "variable": "SLIDE_speed"}}
     for line in (
         "# Sample time: 10 to 20 ms; logs last 1.98 to 1.99 s.",
         "# Header: share is 1, 0.5 (in 2 of 3 logs)",
@@ -119,3 +121,70 @@ def test_wrong_calls_end_in_one_line(
     (tmp_path / "bad" / "log.csv").write_text("nothing")
     found, text = invoke("identify", *words)
     assert found == code and said in text.replace("\n", " "), text
+
+
+SCREW = """
+[axis.motor]
+kind = "torque_source"
+rotor_inertia = "1 kg cm^2"
+rated_torque = "1 N m"
+[axis.screw]
+lead = "10 mm"
+efficiency = 0.9
+[axis.slide]
+mass = "20 kg"
+[command]
+[simulation]
+duration = "1 s"
+sample_interval = "1 ms"
+"""
+
+
+def test_a_length_is_that_of_a_slide_and_an_angle_that_of_a_shaft(tmp_path: Path) -> None:
+    (tmp_path / "rig.toml").write_text(SCREW)
+    rows = "\n".join(f"{t:.2f},{t},{36.0 * t},{t}" for t in TIME)
+    (tmp_path / "a.csv").write_text(f"time [s],pos [mm],theta [deg],torque [N*m]\n{rows}\n")
+    text = lm.identification.first_task(tmp_path, rig=tmp_path / "rig.toml")
+    measured = tomllib.loads(text)["measured"]
+    assert {m["channel"]: m["variable"] for m in measured.values()} == {
+        "pos": "slide_position",
+        "theta": "motor_angle",
+    }
+    assert "Doubt: it is in" not in text
+
+
+@pytest.mark.parametrize(
+    ("variable", "unit", "other"),
+    [("slide_position", "mm", "deg"), ("slide_speed", "mm/s", "rpm"), ("motor_angle", "deg", "mm")],
+)
+def test_no_length_is_fitted_to_an_angle_without_a_factor(tmp_path: Path, variable: str, unit: str, other: str) -> None:
+    (tmp_path / "rig.toml").write_text(SCREW)
+    for name in (unit, other):
+        rows = "\n".join(f"{t:.2f},{t},0.1" for t in TIME)
+        (tmp_path / "a.csv").write_text(f"time [s],x [{name}],u [N*m]\n{rows}\n")
+        data = {
+            "scenario": "rig.toml",
+            "logs": {"files": ["a.csv"]},
+            "inputs": {"motor_command": {"channel": "u"}},
+            "measured": {"x": {"channel": "x", "variable": variable}},
+            "set": {"axis.slide.mass": "mass"},
+            "parameters": {"mass": {"start": 20.0}},
+        }
+        task = lm.identification.Identification(**data)
+        rig = Rig(task, tmp_path)
+        log = lm.identification.read_log(tmp_path / "a.csv")
+        if name == unit:
+            assert list(prepared(task, log, rig.units).measured) == ["x"]
+            continue
+        with pytest.raises(lm.InputError, match="give a scale that turns one into the other, such as a radius"):
+            prepared(task, log, rig.units)
+        data["measured"] = {"x": {"channel": "x", "variable": variable, "scale": 0.1}}
+        assert prepared(lm.identification.Identification(**data), log, rig.units).measured
+
+
+def test_a_first_file_doubts_an_angle_of_a_rig_that_slides(logs: Path) -> None:
+    rows = "\n".join(f"{t:.2f},{t}" for t in TIME)
+    (logs / "a.csv").write_text(f"time [s],theta [deg]\n{rows}\n")
+    (logs / "b.csv").unlink()
+    text = lm.identification.first_task(logs, rig=logs / "rig.toml")
+    assert "# Doubt: it is in rad, and carriage_position is in m" in text

@@ -20,7 +20,7 @@ from lostmotion.identification.rig import Rig
 from lostmotion.identification.task import Identification
 
 
-@pytest.mark.parametrize(("unit", "factor"), [("m", 1.0), ("mm", 1e3), ("um", 1e6)])
+@pytest.mark.parametrize(("unit", "factor"), [("rad", 1.0), ("mrad", 1e3), ("deg", 180.0 / np.pi)])
 def test_a_log_in_another_unit_gives_the_same_mass(tmp_path: Path, unit: str, factor: float) -> None:
     """The first value of the channel is where the run begins."""
     time = np.arange(0.0, 3.0, 2e-3)
@@ -36,7 +36,7 @@ def test_first_values_means_and_conditions_are_in_si(tmp_path: Path) -> None:
     task = spring_task(tmp_path, logs={"files": ["*.csv"], "weight": "1 + 9*(speed > 1)", "stated": {"vin": "volts"}})
     time = np.arange(20) * 0.01
     channels = {
-        "pos": Channel(100.0 + np.arange(20.0), "mm"),
+        "pos": Channel(100.0 + np.arange(20.0), "mrad"),
         "speed": Channel(np.repeat([5.0, 20.0], 10), "rpm"),
         "volts": Channel(np.full(20, 12e3), "mV"),
         "raw": Channel(np.arange(20.0), "counts"),
@@ -58,6 +58,7 @@ def test_a_formula_with_a_channel_of_an_unknown_unit_is_refused(tmp_path: Path) 
 
 TRUTH = {"mass": 95.0, "viscous_friction": 200.0, "coulomb_friction": 20.0}
 INTERVAL = 2e-3  # s
+VARIABLES = {"angle": "position", "speed": "speed"}  # of the slide, by the names in the logs
 
 
 def axis_task(directory: Path, variables: tuple[str, ...] = ("angle", "speed"), **more: Any) -> Identification:
@@ -68,11 +69,13 @@ def axis_task(directory: Path, variables: tuple[str, ...] = ("angle", "speed"), 
         "scenario": "axis.toml",
         "logs": {"files": ["*.csv"]},
         "inputs": {"drive_command": {"channel": "force", "interpolation": "hold"}},
-        "measured": {v: {"channel": v, "variable": f"carriage_{v}", "deviation": deviations[v]} for v in variables},
+        "measured": {
+            v: {"channel": v, "variable": f"carriage_{VARIABLES[v]}", "deviation": deviations[v]} for v in variables
+        },
         "set": {
-            "motors.drive.rotor_inertia": "mass",
-            "shafts.carriage.viscous_friction": "viscous_friction",
-            "shafts.carriage.friction_torque": "coulomb_friction",
+            "linear_motors.drive.mass": "mass",
+            "slides.carriage.viscous_friction": "viscous_friction",
+            "slides.carriage.friction_force": "coulomb_friction",
         },
         "parameters": {name: {"start": start, "min": 1.0, "max": 500.0} for name, start in names.items()},
         "fit": {"regression": False, "iterations": 15},
@@ -173,8 +176,8 @@ def test_a_pause_under_dead_time_and_a_late_channel_does_not_change_the_mass(tmp
     data["inputs"]["drive_command"]["delay"] = dead * INTERVAL
     data["measured"]["angle"]["delay"] = "late"
     data["parameters"]["late"] = {"start": "8 ms", "max": "50 ms", "unit": "s", "scale": "5 ms"}
-    data["set"]["initial.angles.carriage"] = "begin"
-    data["set"]["initial.speeds.carriage"] = "begin_speed"
+    data["set"]["initial.positions.carriage"] = "begin"
+    data["set"]["initial.slide_speeds.carriage"] = "begin_speed"
     data["nuisance"] = {
         n: {"start": 0.0, "min": -1.0, "tolerance": 0.5, "scale": 0.01} for n in ("begin", "begin_speed")
     }
@@ -201,7 +204,7 @@ def test_a_log_whose_first_value_is_missing_begins_where_it_is_measured(tmp_path
     table["angle"][:40] = np.nan
     (tmp_path / "log.csv").write_text(csv_of(table, ALL[500:]))
     data = axis_task(tmp_path, ("angle",)).model_dump()
-    data["set"]["initial.angles.carriage"] = "first_angle"
+    data["set"]["initial.positions.carriage"] = "first_angle"
     result = identify_task(Identification(**data), tmp_path, threads=1)
     assert result.values["mass"] == pytest.approx(95.0, rel=1e-3)
     assert result.error("angle")[1] == pytest.approx(POSITION_NOISE, rel=0.05)

@@ -101,7 +101,7 @@ def test_two_pairs_are_not_mixed(tmp_path: Path) -> None:
     """All directions of an eigenspace are alike to its decomposition; a pair has no part in the other."""
     values = {"a": 1.1, "b": 0.9, "own": 110.0, "guide": 90.0}
     result = identified(
-        tmp_path, values, input={"scale": "a*b"}, set={"shafts.carriage.viscous_friction": "own + guide"}
+        tmp_path, values, input={"scale": "a*b"}, set={"slides.carriage.viscous_friction": "own + guide"}
     )
     said = {u.text.partition(" is determined")[0] for u in result.undetermined}
     assert len(said) == 2
@@ -111,7 +111,7 @@ def test_two_pairs_are_not_mixed(tmp_path: Path) -> None:
 
 def test_a_weighted_sum_is_neither_a_sum_nor_a_product(tmp_path: Path) -> None:
     values = {"own": 60.0, "guide": 80.0}
-    result = identified(tmp_path, values, set={"shafts.carriage.viscous_friction": "2*own + guide"})
+    result = identified(tmp_path, values, set={"slides.carriage.viscous_friction": "2*own + guide"})
     (said,) = result.undetermined
     assert said.text.startswith("the logs stay the same if these change together: guide +10 %, own -")
     assert said.changes["own"] == pytest.approx(-80.0 / 120.0, rel=0.01)
@@ -120,7 +120,7 @@ def test_a_weighted_sum_is_neither_a_sum_nor_a_product(tmp_path: Path) -> None:
 def test_advice_does_not_ask_for_what_the_log_has(tmp_path: Path) -> None:
     """Where the force is the input and is known, no log of it is missing; without a controller there is no reference."""
     values = {"own": 120.0, "guide": 80.0}
-    result = identified(tmp_path, values, set={"shafts.carriage.viscous_friction": "own + guide"})
+    result = identified(tmp_path, values, set={"slides.carriage.viscous_friction": "own + guide"})
     (said,) = [u.text for u in result.undetermined]
     assert "only the sum" in said and "coasts" in said
     assert "torque or current" not in said and "stall" not in said and "reference" not in said

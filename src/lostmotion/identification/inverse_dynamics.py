@@ -167,7 +167,7 @@ def _motor_torque(
             there = np.isfinite(torque)
             return np.asarray(np.interp(s.time, at[there], torque[there]))
     if name in scenario.controllers:
-        raise InputError(f"motors.{name} is under its controller, and no channel shows its torque")
+        raise InputError(f"{scenario.motor_key(name)} is under its controller, and no channel shows its torque")
     if motor.kind != "torque_source":
         raise InputError(f"motors.{name} has a voltage as its command, and no channel shows its torque")
     torque = motor.rated_torque * _acting(rig, s, known, scenario, f"{name}_command")

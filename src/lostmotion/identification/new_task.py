@@ -6,7 +6,7 @@ import json
 import math
 import os
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,8 +19,9 @@ from ..inputs.validation import listed
 from ..simulation.scenario import Scenario
 from ..simulation.scenario_files import find_scenario, load
 from .logs import Log
-from .prepare import SAME, alike, channel_unit
+from .prepare import alike, channel_unit
 from .readers import ENDINGS, read_log
+from .rig import units_of
 from .screening import screened
 
 MOST_LOGS = 2000
@@ -38,6 +39,7 @@ QUANTITIES = {
     "N": ("force",),
 }
 PLACEHOLDER = "RIG.toml"
+NAMELESS = {"shafts": "SHAFT", "slides": "SLIDE"}
 SOUGHT = (
     "inertia",
     "rotor_inertia",
@@ -45,7 +47,7 @@ SOUGHT = (
     "viscous_friction",
     "friction_torque",
     "friction_force",
-)  # of shafts, slides, motors
+)  # of shafts, slides, motors, linear motors
 
 
 @dataclass
@@ -165,7 +167,7 @@ def first_task(
             "",
             *_input_lines(inputs, scenario),
             *_measured_lines(measured, scenario),
-            *_parameter_lines(scenario),
+            *_parameter_lines(scenario, linear=any(_bodies(None, c)[0] == "slides" for c in measured)),
             "",
         ]
     )
@@ -283,7 +285,7 @@ def _rig_lines(rig: str) -> list[str]:
         return [f"scenario = {_text(rig)}"]
     return [
         f"scenario = {_text(PLACEHOLDER)}",
-        "# Doubt: name the rig in place of RIG.toml, and its variables below in place of SHAFT and MOTOR; or delete this file, and",
+        "# Doubt: name the rig in place of RIG.toml, and its variables below in place of SHAFT, SLIDE, MOTOR; or delete this file, and",
         "# `lostmotion identify new DIR --rig RIG.toml` writes these names.",
     ]
 
@@ -354,6 +356,7 @@ def _input_lines(inputs: Sequence[_Seen], scenario: Scenario | None) -> list[str
         ]
     kinds = dict.fromkeys(MOTIONS, "_reference")
     free = _signals(scenario)
+    units = {} if scenario is None else units_of(scenario)
     lines: list[str] = []
     for k, c in enumerate(inputs):
         wanted = kinds.get(c.quantity, "_command")
@@ -362,12 +365,13 @@ def _input_lines(inputs: Sequence[_Seen], scenario: Scenario | None) -> list[str
             or [name for name in free if name.endswith("_command")]
             or free
         )
+        fits = [n for n in fits if units.get(n) == c.quantity] + [n for n in fits if units.get(n) != c.quantity]
         if scenario is not None and not fits:
             lines += [_comment(f"Doubt: nothing is left on the rig that channel {c.name} could act on"), ""]
             continue
         name = fits[0] if fits else f"MOTOR{k + 1 if k else ''}{wanted}"
         lines += [f"[inputs.{name}]", f"channel = {_text(c.name)}", *_about_unit(c)]
-        lines += _scale_lines(name, c.quantity, scenario)
+        lines += _scale_lines(name, c.quantity, scenario) + _about_kind(c, name, units)
         if len(fits) > 1:
             lines.append(_comment(f"Doubt: it may act as {listed(fits[1:])} just as well"))
         lines.append("")
@@ -383,7 +387,8 @@ def _scale_lines(name: str, quantity: str, scenario: Scenario | None) -> list[st
     if quantity in ("N*m", "N") and (motor is None or motor.kind == "torque_source"):
         rated = 1.0 if motor is None else motor.rated_torque
         return [] if rated == 1.0 else [f"scale = {1.0 / rated!r}  # a command is a multiple of {rated:g} {quantity}"]
-    what, factor = ("voltage", "1/rated_voltage") if quantity == "V" else ("torque", "torque_constant")
+    voltage = quantity == "V" or (motor is not None and motor.kind != "torque_source")
+    what, factor = ("voltage", "1/rated_voltage") if voltage else ("torque", "torque_constant")
     text = f"it is in {quantity}, and a command is a multiple of the rated {what}"
     return [f'# Doubt: {text}; give scale = "...", such as {factor}']
 
@@ -394,15 +399,25 @@ def _signals(scenario: Scenario | None) -> list[str]:
     return [*scenario.signals(), *(f"{name}_reference" for name in scenario.axes())]
 
 
+def _about_kind(c: _Seen, variable: str, units: Mapping[str, str]) -> list[str]:
+    """Doubt about a length that stands for an angle, or an angle for a length."""
+    kind, wanted = MOTIONS.get(c.quantity), units.get(variable, "")
+    if kind is None or wanted not in MOTIONS or c.quantity == wanted:
+        return []
+    return [_comment(f'Doubt: it is in {c.quantity}, and {variable} is in {wanted}; give scale = "..." between both')]
+
+
 def _measured_lines(measured: Sequence[_Seen], scenario: Scenario | None) -> list[str]:
     lines: list[str] = []
+    units = {} if scenario is None else units_of(scenario)
     for c, key in zip(measured, _keyed(c.name for c in measured), strict=True):
         table, bodies = _bodies(scenario, c)
         named = [body for body in bodies if body.lower() in c.words]
-        body = (named or bodies[-1:] or ["SHAFT"])[0]
-        kind = MOTIONS.get(c.quantity if SAME.get(c.quantity, c.quantity) == "rad/s" else "", "angle")
-        kind = "position" if table == "slides" and kind == "angle" else kind
-        lines += [f"[measured.{key}]", f"channel = {_text(c.name)}", f'variable = "{body}_{kind}"', *_about_unit(c)]
+        body = (named or bodies[-1:] or [NAMELESS[table]])[0]
+        rest = "position" if table == "slides" else "angle"
+        variable = f"{body}_{'speed' if c.quantity in ('rad/s', 'm/s') else rest}"
+        lines += [f"[measured.{key}]", f"channel = {_text(c.name)}", f'variable = "{variable}"', *_about_unit(c)]
+        lines += _about_kind(c, variable, units)
         if c.quantity not in MOTIONS:
             lines.append("# Doubt: neither its name nor its unit says that it is an angle or a speed")
         if len(bodies) > 1 and not named:
@@ -421,10 +436,11 @@ def _measured_lines(measured: Sequence[_Seen], scenario: Scenario | None) -> lis
 
 def _bodies(scenario: Scenario | None, c: _Seen) -> tuple[str, list[str]]:
     """(table, its names) of what a channel may show the motion of: slides if it is in metres, or named as one of them."""
+    linear = c.quantity in ("m", "m/s")
     if scenario is None:
-        return "shafts", []
+        return "slides" if linear else "shafts", []
     slides, shafts = list(scenario.slides), list(scenario.shafts)
-    linear = c.quantity in ("m", "m/s") or any(name.lower() in c.words for name in slides)
+    linear = linear or (c.quantity not in MOTIONS and any(name.lower() in c.words for name in slides))
     return ("slides", slides) if slides and (linear or not shafts) else ("shafts", shafts)
 
 
@@ -435,16 +451,17 @@ def _factor(unit: str) -> float:
         return 1.0
 
 
-def _parameter_lines(scenario: Scenario | None) -> list[str]:
+def _parameter_lines(scenario: Scenario | None, *, linear: bool) -> list[str]:
     found: dict[str, float] = {}
-    for table in ("shafts", "slides", "motors") if scenario is not None else ():
+    for table in ("shafts", "slides", "motors", "linear_motors") if scenario is not None else ():
         for name, part in getattr(scenario, table).items():
             for key in SOUGHT:
                 value = getattr(part, key, None)
                 if isinstance(value, float) and value > 0.0:
                     found[f"{table}.{name}.{key}"] = value
     if not found:
-        found = {"shafts.SHAFT.friction_torque": 1.0} if scenario is None else {}
+        nameless = "slides.SLIDE.friction_force" if linear else "shafts.SHAFT.friction_torque"
+        found = {nameless: 1.0} if scenario is None else {}
     names = _keyed("_".join(key.split(".")[1:]) for key in found)
     if not found:
         return ["# Doubt: the rig states no inertia and no friction; name what is sought", "[set]", "", "[parameters]"]

@@ -23,7 +23,8 @@ from .task import FormulaText, Identification, InputChannel, MeasuredChannel
 DEFAULT = "taken from logs.header: "  # how a note on such a value begins
 NUMBER = re.compile(r"-?\d[\d.e+-]*%?")
 KINDS = ("rad", "rad/s", "N*m", "A", "V", "N", "m", "m/s", "s", "K", "rad/s^2", "m/s^2", "W", "Pa")
-SAME = {"m": "rad", "m/s": "rad/s", "N": "N*m"}  # a linear axis may be written with shafts
+
+TRANSLATED = {"m": "rad", "m/s": "rad/s", "N": "N*m"}  # of a slide, and of a shaft
 
 
 @dataclass(frozen=True)
@@ -275,16 +276,14 @@ def _refuse_other_kinds(
     both += [("measured", n, m.variable, m) for n, m in task.measured.items()]
     for table, name, variable, entry in both:
         unit, wanted = known[entry.channel][1], units.get(variable, "")
-        if (
-            unit
-            and wanted
-            and SAME.get(unit, unit) != SAME.get(wanted, wanted)
-            and "scale" not in entry.model_fields_set
-        ):
+        if unit and wanted and unit != wanted and "scale" not in entry.model_fields_set:
             of_rig = "a multiple of the rated torque or voltage" if wanted == "1" else f"in {wanted}"
+            such = 'such as 1/rated_torque of a torque, or "torque_constant" of a current'
+            if TRANSLATED.get(unit, unit) == TRANSLATED.get(wanted, wanted):
+                such = "such as a radius, or compare it with a slide"
             raise InputError(
                 f"{table}.{name}: channel {entry.channel} is in {unit}, and {variable} is {of_rig}; give a scale that "
-                f'turns one into the other, such as 1/rated_torque of a torque, or "torque_constant" of a current',
+                f"turns one into the other, {such}",
                 where=log.name,
             )
 

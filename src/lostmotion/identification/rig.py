@@ -95,7 +95,7 @@ class Rig:
         self._variants = Variants(self.scenario)
         self._built: dict[Any, Built] = {}
         self._with_given: dict[Any, dict[str, float]] = {}
-        self.units = self._units()
+        self.units = units_of(self.scenario)
         for name, channel in task.inputs.items():
             if name.endswith("_given_acceleration") and name in self._signals():
                 raise InputError("follows from the given speed; give that alone", f"inputs.{name}")
@@ -152,27 +152,6 @@ class Rig:
 
     def _signals(self) -> list[str]:
         return [*self.scenario.signals(), *(f"{name}_reference" for name in self.scenario.axes())]
-
-    def _units(self) -> dict[str, str]:
-        units = {str(name): str(unit) for name, _, unit, _ in self.scenario.core().channels()}
-        train, kinds = self.scenario.train(), {"position": "rad", "speed": "rad/s", "torque": "N*m"}
-        units |= {
-            train.angle_of(name): train.angle_unit(name)
-            for name in train.shafts
-            if angle_terms(self.scenario, name, units)
-        }
-        for name in self.scenario.signals():
-            if name.endswith("_given_speed"):
-                units[name] = units[name.replace("_given_speed", "_speed")]
-        for name, m in self.scenario.motors.items():
-            units.setdefault(f"{name}_command", "1")
-            if m.kind == "torque_source" and m.rated_torque == 1.0:  # a torque is its own multiple of 1 N m
-                units[f"{name}_command"] = units.get(f"{name}_torque", "N*m")
-        for name, c in self.scenario.axes().items():
-            motor, position = self.scenario.sliding()[self.scenario.prefix(name)]
-            slides = position and c.reference.kind != "torque"
-            units[f"{name}_reference"] = of_slides(kinds[c.reference.kind], positions=slides, forces=motor)
-        return units
 
     def formulas(self, rung: int, phase: int) -> dict[str, Any]:
         """Formulas of the values of the scenario, by dotted key."""
@@ -271,6 +250,27 @@ class Rig:
         """The scenario of the first phase of a log, without its signals, checked as any other."""
         found = self.built(self.changes({**log.facts, **values}, rung, log.segments[0].phase)).scenario
         return found.replace()
+
+
+def units_of(scenario: Scenario) -> dict[str, str]:
+    """SI units of its result variables, and of what acts on it."""
+    units = {str(name): str(unit) for name, _, unit, _ in scenario.core().channels()}
+    train, kinds = scenario.train(), {"position": "rad", "speed": "rad/s", "torque": "N*m"}
+    units |= {
+        train.angle_of(name): train.angle_unit(name) for name in train.shafts if angle_terms(scenario, name, units)
+    }
+    for name in scenario.signals():
+        if name.endswith("_given_speed"):
+            units[name] = units[name.replace("_given_speed", "_speed")]
+    for name, m in train.motors.items():
+        units.setdefault(f"{name}_command", "1")
+        if m.kind == "torque_source" and m.rated_torque == 1.0:  # a torque is its own multiple of 1 N m
+            units[f"{name}_command"] = units.get(train.motor_torque_of(name), "N*m")
+    for name, c in scenario.axes().items():
+        motor, position = scenario.sliding()[scenario.prefix(name)]
+        slides = position and c.reference.kind != "torque"
+        units[f"{name}_reference"] = of_slides(kinds[c.reference.kind], positions=slides, forces=motor)
+    return units
 
 
 def names_of(node: Any) -> frozenset[str]:

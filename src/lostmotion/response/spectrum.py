@@ -239,7 +239,8 @@ def _over_whole_turns(
 def _motor(train: DriveTrain, motor: str | None) -> str:
     if motor is None:
         if len(train.motors) != 1:
-            raise InputError(f"motor: there are {len(train.motors)}; name one of {', '.join(train.motors)}")
+            several = f"{len(train.motors)} motors turn it; name one of {', '.join(train.motors)}"
+            raise InputError(f"motor: {several if train.motors else 'no motor turns it'}")
         motor = next(iter(train.motors))
     if motor not in train.motors:
         meant = did_you_mean(motor, train.motors, f"the motors are {', '.join(train.motors)}")

@@ -232,7 +232,7 @@ def _motor_of(result: xarray.Dataset, name: str | None) -> tuple[Motor, str, lis
         name = next(iter(motors))
     if name is None or name not in motors:
         one = f"the one motor is {next(iter(motors), '')}; leave its name out"
-        listed = one if len(motors) == 1 else f"the motors are {', '.join(motors) or 'none'}"
+        listed = one if len(motors) == 1 else f"the motors are {', '.join(motors)}" if motors else "no motor turns it"
         hint = listed if name is None else did_you_mean(name, motors, listed)
         raise InputError(f"motor {name!r}: {hint}" if name is not None else f"motor is missing; {hint}")
     m = motors[name]

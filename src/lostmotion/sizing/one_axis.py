@@ -55,7 +55,9 @@ class OneAxis:
 def tied_together(train: DriveTrain) -> str | None:
     """Reason why not all shafts of a train turn in fixed ratios to each other, each with an inertia of its own."""
     if train.mass_matrices:
-        return f"{', '.join(next(iter(train.mass_matrices.values())).shafts)} move with a mass matrix; linearize the train"
+        return (
+            f"{', '.join(next(iter(train.mass_matrices.values())).shafts)} move with a mass matrix; linearize the train"
+        )
     first, *others = train.shafts
     loose = next((shaft for shaft in others if turns(train, shaft, first) is None), None)
     return None if loose is None else f"no fixed ratio leads from {first} to {loose}"
@@ -67,7 +69,9 @@ def _in_chain(before: Gearbox, inertia: float, gear: Gear) -> Gearbox:
         update={
             "ratio": before.ratio * abs(gear.ratio),
             "inertia": before.inertia + (inertia + gear.inertia) / before.ratio**2,
-            "stiffness": gear.stiffness if before.stiffness == Rigid() else in_series(before, gear.stiffness, abs(gear.ratio)),
+            "stiffness": gear.stiffness
+            if before.stiffness == Rigid()
+            else in_series(before, gear.stiffness, abs(gear.ratio)),
             "mesh_damping": gear.mesh_damping,
             "hysteresis": gear.hysteresis or before.hysteresis,
         }
