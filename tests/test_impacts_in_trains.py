@@ -275,6 +275,67 @@ def test_a_gear_that_locks_as_its_inputs_jump_goes_on_from_rest_until_it_locks_a
     assert abs(energy["residual"]) < 1e-12 * energy["turned_over"]
 
 
+def self_locking_chain(draw: np.random.Generator) -> tuple[lm.Scenario, float, float, float, float]:
+    """2 to 4 gears in a row without friction, whose motor turns round at 0.1 s: scenario, its torque, inertias at the motor.
+
+    These are the one that drives, and that of a motion which slows down; a negative one allows none.
+    """
+    n = int(draw.integers(2, 5))
+    J = [float(10.0 ** draw.uniform(-4, k - 2)) for k in range(n + 1)]
+    ratio = [float(draw.uniform(0.5, 5.0) * draw.choice([-1, 1])) for _ in range(n)]
+    drive = [float(draw.uniform(0.3, 0.9)) for _ in range(n)]
+    back = [float(draw.choice([-0.8, -0.3, -0.05, 0.5])) * d for d in drive]
+    driving = slowing = J[n]
+    for k in range(n - 1, -1, -1):
+        driving = J[k] + driving / (ratio[k] ** 2 * drive[k])
+        slowing = J[k] + slowing / ratio[k] ** 2 * (back[k] if slowing > 0.0 else 1.0 / drive[k])
+    torque = driving * 10.0
+    scenario = lm.Scenario(
+        shafts={f"s{k}": {"inertia": J[k]} for k in range(n + 1)},
+        motors={"m": {"shaft": "s0", "kind": "torque_source", "rotor_inertia": 0.0}},
+        gears={
+            f"g{k}": {
+                "input": f"s{k}",
+                "output": f"s{k + 1}",
+                "ratio": ratio[k],
+                "stiffness": {"kind": "rigid"},
+                "losses": {
+                    "kind": "mesh_efficiency",
+                    "drive_efficiency": drive[k],
+                    "backdrive_efficiency": back[k],
+                },
+            }
+            for k in range(n)
+        },
+        command={"m": {"mean": torque, "steps": [{"time": 0.1, "height": -2.0 * torque}]}},
+        simulation={"duration": 0.3, "sample_interval": 0.013},
+    )
+    return scenario, torque, driving, slowing, sum(J[k] / np.prod(ratio[:k]) ** 2 for k in range(n + 1))
+
+
+def test_gears_in_a_row_lock_together_where_no_motion_slows_them_down() -> None:
+    """The torque of each mesh is that which accelerates all behind it: it tells whether the gear drives or is driven."""
+    draw = np.random.default_rng(7)
+    locked = 0
+    for case in range(60):
+        scenario, torque, driving, slowing, inertia = self_locking_chain(draw)
+        result = lm.simulate(scenario)
+        t, first = result["time"].values, torque / driving * 0.1
+        rests = 0.1 + (first * slowing / torque if slowing > 0.0 else 0.0)
+        expected = np.where(
+            t < 0.1,
+            torque / driving * t,
+            np.where(t < rests, first - torque / slowing * (t - 0.1), -torque / driving * (t - rests)),
+        )
+        np.testing.assert_allclose(result["s0_speed"].values, expected, rtol=1e-9, atol=1e-9 * first, err_msg=str(case))
+        energy = lm.energy_of(result)
+        impacts = sum(energy[name] for name in energy if str(name).endswith(": impacts"))
+        assert impacts == pytest.approx(0.5 * inertia * first**2 if slowing < 0.0 else 0.0, rel=1e-9), case
+        assert abs(energy["residual"]) < 1e-11 * energy["turned_over"], case
+        locked += slowing < 0.0
+    assert locked >= 20
+
+
 def test_a_gear_that_does_not_lock_goes_on() -> None:
     """|eta_b| J_2 < J_1 i^2: it slows down by (J_1 + eta_b J_2/i^2) a = -eta_b M/i with the load of -20 N m."""
     result = lm.simulate(worm(None, mass=0.5))

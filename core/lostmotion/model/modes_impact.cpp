@@ -8,6 +8,8 @@
 // Flanks of several gears strike in turn. Let K be the kinetic energy of their approach speeds u, delta their gaps,
 // lambda the torques that would press them if all touched. K + sum lambda delta is constant in flight and falls with
 // each impact, so that no later gap of a gear exceeds (K + sum lambda delta)/lambda.
+#include <bit>
+
 #include "impulses.hpp"
 #include "switched_train.hpp"
 
@@ -284,50 +286,70 @@ bool SwitchedTrain::close(Instant& now, const Impulses& struck, int contact, con
 Found SwitchedTrain::locks(Instant& now, const Event& event, const Instant& past, Key& key) {
     const Instant moving = now;
     const Key from = key;
-    Instant stopped = now;
-    Key stopped_key = key;
-    bool some = false;
-    for (std::size_t g = 0; g < train().gears.size(); ++g) {
-        if (!train().gears[g].may_lock() || !locks_in_motion(moving, event, from, g)) continue;
-        now = moving;
-        key = from;
-        MovedShafts moved{};
-        double& lost = now.memory[places().gears[g].impact_loss];
-        if (!stop_with(now, g, moved, lost)) continue;
-        const Found found = find_after(now, moved, event, event.at_rest, past, key);
-        if (found != Found::yes) continue;
-        // Of two that may lock, it is only known where both stop the same.
-        if (some && !(key == stopped_key && now.x == stopped.x)) {
-            some = false;
-            break;
+    Event after = event;
+    after.with_guard = false;  // the regime that has ended may follow from rest
+    constexpr std::size_t most_at_once = 6;
+    std::vector<std::size_t> may;
+    for (std::size_t g = 0; g < train().gears.size() && may.size() < most_at_once; ++g)
+        if (train().gears[g].may_lock() && locks_in_motion(moving, event, from, g)) may.push_back(g);
+    // As few as can be. Of several ways it is only known where they end the same.
+    for (std::size_t many = 1; many <= may.size(); ++many) {
+        Instant stopped = now;
+        Key stopped_key = key;
+        bool some = false, differ = false;
+        for (std::size_t set = 1; set < std::size_t{1} << may.size(); ++set) {
+            if (static_cast<std::size_t>(std::popcount(set)) != many) continue;
+            now = moving;
+            key = from;
+            MovedShafts moved{};
+            bool stops = true;
+            for (std::size_t k = 0; k < may.size() && stops; ++k)
+                if ((set >> k & 1) != 0)
+                    stops = stop_with(now, may[k], moved, now.memory[places().gears[may[k]].impact_loss]);
+            if (!stops || find_after(now, moved, after, event.at_rest, past, key) != Found::yes) continue;
+            differ = differ || (some && !(key == stopped_key && now.x == stopped.x));
+            if (!some) stopped = now, stopped_key = key;
+            some = true;
         }
-        if (!some) stopped = now, stopped_key = key;
-        some = true;
+        now = some && !differ ? stopped : moving;
+        key = some && !differ ? stopped_key : from;
+        if (some) return differ ? Found::inconsistent : Found::yes;
     }
-    now = some ? stopped : moving;
-    key = some ? stopped_key : from;
-    return some ? Found::yes : Found::inconsistent;
+    return Found::inconsistent;
 }
 
-// Is the effective inertia of all that the input of a gear moves negative under a torque by which its output drives it,
-// and positive under the opposite one, while all contacts of limited torque slip?
+// Is the effective inertia of all that rigid gears tie to the input of a gear negative, while all contacts of limited
+// torque slip, if some of these gears drive and others are driven?
 bool SwitchedTrain::locks_in_motion(const Instant& now, const Event& event, const Key& from, std::size_t gear) {
-    const Gear& g = train().gears[gear];
-    const int contact = places().shafts[g.input].contact, way = from.modes[contact];
-    if (way == 0 || event.at_rest[contact]) return false;
-    const auto moves = [&](double driven) {
-        Key trial;
-        for (int c = 0; c < contacts(); ++c) {
-            const bool slips = !places().contacts[c].bilateral && from.modes[c] == 0;
-            trial.modes[c] = slips ? std::int8_t{-1} : from.modes[c];
+    const auto slips = [&](int contact) { return from.modes[contact] != 0 && !event.at_rest[contact]; };
+    const auto input_of = [&](std::size_t g) { return places().shafts[train().gears[g].input].contact; };
+    if (!slips(input_of(gear))) return false;
+    Key moving;
+    for (int c = 0; c < contacts(); ++c) {
+        const bool rests = !places().contacts[c].bilateral && from.modes[c] == 0;
+        moving.modes[c] = rests ? std::int8_t{-1} : from.modes[c];
+    }
+    locate(now, from, moving);
+    const std::vector<int> part = parts(places(), moving);
+    std::vector<std::size_t> tied;
+    for (std::size_t g = 0; g < train().gears.size(); ++g) {
+        const Gear& other = train().gears[g];
+        const bool with_it = part[other.input] == part[train().gears[gear].input];
+        if (other.rigid() && other.has_dry_losses() && with_it && slips(input_of(g))) tied.push_back(g);
+    }
+    constexpr std::size_t most_at_once = 6;
+    if (tied.size() > most_at_once) return false;
+    Torques T_2 = event.gear;
+    for (std::size_t loads = 0; loads < std::size_t{1} << tied.size(); ++loads) {
+        for (std::size_t k = 0; k < tied.size(); ++k) {
+            const double torque = train().gears[tied[k]].rated_torque();
+            T_2[tied[k]] = (loads >> k & 1) != 0 ? torque : -torque;
         }
-        locate(now, from, trial);
-        Torques T_2 = event.gear;
-        T_2[gear] = driven * way * g.sense() * g.rated_torque();
+        Key trial = moving;
         locate_losses(now, T_2, trial);
-        return regimes_[trial].solvable;
-    };
-    return moves(+1.0) && !moves(-1.0);
+        if (!regimes_[trial].solvable) return true;
+    }
+    return false;
 }
 
 // Stops the input of a gear and all that rigid gears tie to it. False if that leaves a part of it in motion, or would

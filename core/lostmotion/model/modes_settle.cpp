@@ -121,11 +121,13 @@ auto SwitchedTrain::settle(Instant& now, const Key& modes, const Event& event, K
     if (result.found == Found::inconsistent && settle_on_corner(now, event, trial, key)) result.found = Found::yes;
     if (result.found != Found::inconsistent || !event.from_each_load) return result;
     // The torque that keeps a twist at rest depends on the cell, and the cell on the torque.
+    std::vector<std::size_t> at_rest;
     for (std::size_t g = 0; g < train().gears.size(); ++g) {
         const Gear& gear = train().gears[g];
         if (!gear.has_dry_losses() || places().gears[g].contact == nowhere) continue;
         if (trial.modes[places().shafts[gear.input].contact] == 0 || trial.modes[places().gears[g].contact] != 0)
             continue;
+        at_rest.push_back(g);
         const double v = std::fabs(now.x[places().shafts[gear.input].speed]) / gear.law.rated_input_speed;
         for (int j = 0; j < gear.load_intervals(); ++j) {
             const double low = gear.load_lower(j), high = gear.load_upper(j);
@@ -138,6 +140,19 @@ auto SwitchedTrain::settle(Instant& now, const Key& modes, const Event& event, K
                 if (again.found == Found::yes) return again;
             }
         }
+    }
+    // Those of several gears depend on one another: each drives or is driven.
+    constexpr std::size_t most_at_once = 6;
+    if (at_rest.size() < 2 || at_rest.size() > most_at_once) return result;
+    for (std::size_t loads = 0; loads < std::size_t{1} << at_rest.size(); ++loads) {
+        for (std::size_t k = 0; k < at_rest.size(); ++k) {
+            const double torque = train().gears[at_rest[k]].rated_torque();
+            T_2[at_rest[k]] = (loads >> k & 1) != 0 ? torque : -torque;
+        }
+        Key other = trial;
+        locate_losses(now, T_2, other);
+        const Trial again = walk(now, event, other, key);
+        if (again.found == Found::yes) return again;
     }
     return result;
 }
@@ -178,7 +193,7 @@ bool SwitchedTrain::settle_on_corner(Instant& now, const Event& event, const Key
 }
 
 // Is this combination, in which a contact is at its limit, consistent, or, if what drives it there turns back, does
-// everything rest at those torques?
+// everything rest at those torques, or all whose limits turn back?
 Found SwitchedTrain::settle_at_limit(Instant& now, const Key& modes, const Event& event, Key& key) {
     Event thorough = event;
     thorough.from_each_load = true;
@@ -190,10 +205,14 @@ Found SwitchedTrain::settle_at_limit(Instant& now, const Key& modes, const Event
     Event standing = event;
     for (std::size_t g = 0; g < train().gears.size(); ++g) standing.gear[g] = evaluate(r.output_torque[g], now);
     each_coupling_contact([&](int c) { standing.coupling[c] = evaluate(r.contact_torque[c], now); });
-    Key stuck = modes;
+    Key stuck = modes, some_stuck = modes;
     for (int c = 0; c < contacts(); ++c)
         if (r.at_rest[c]) stuck.modes[c] = 0;
-    return settle(now, stuck, standing, key).found;
+    SparseFlow along(r.rate, now, room_);
+    for (const auto& driver : r.drivers)
+        if (turns_back(along, driver.torque)) some_stuck.modes[driver.contact] = 0;
+    if (const Found all = settle(now, stuck, standing, key).found; all != Found::inconsistent) return all;
+    return settle(now, some_stuck, standing, key).found;
 }
 
 // From a piece and a cell across each of their edges that is violated, until none is: do the contacts hold there?
