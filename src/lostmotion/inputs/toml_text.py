@@ -24,11 +24,11 @@ def toml_text(tables: Mapping[str, Any], comment: str = "") -> str:
 
 def _write(tables: Mapping[str, Any], where: tuple[str, ...], lines: list[str]) -> None:
     for name, value in tables.items():
-        if not isinstance(value, Mapping) or not value:
+        if not isinstance(value, Mapping):
             continue
         path = (*where, name)
         plain = {k: v for k, v in value.items() if v is not None and not isinstance(v, Mapping)}
-        if plain:
+        if plain or not value:  # a shaft may have no key
             lines += ["", f"[{'.'.join(map(_key, path))}]", *(f"{_key(k)} = {_value(v)}" for k, v in plain.items())]
         _write(value, path, lines)
 
