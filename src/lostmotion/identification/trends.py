@@ -235,7 +235,7 @@ def _against_limits(name: str, p: FreeParameter, watch: Watch, levels: list[Inte
             words += f"; beyond {shown}"
         elif inside:
             states.append(False)
-            words += f"; within {shown}"
+            words += f"; {'above' if sign < 0.0 else 'below'} {shown}"
         else:
             states.append(None)
             one = f": one log is, {CONFIRMED} in a row are needed" if past[0] else ""
