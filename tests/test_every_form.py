@@ -17,7 +17,7 @@ from test_random_axes import random_axis
 
 LARGE = ("conveyor-start", "gantry-two-screws", "thruster-in-ice")  # which only take longer
 NAMES_A_FORM = re.compile(
-    r"\[shafts\]|\[axis\]|short form|long form|is a (drive )?train|are for (drives|trains)|must be a Drive|give an Initial",
+    r"\[shafts\]|\[axis\]|short form|long form|is a (drive )?train|are for (drives|trains)|must be a Drive|give an Initial|takes a (drive|train)|is no (drive|train)",
     re.I,
 )
 HINGE = '<mujoco><worldbody><body><joint name="j" axis="0 0 1"/><geom type="box" size=".1 .2 .3" mass="1"/></body></worldbody></mujoco>'
@@ -44,7 +44,6 @@ def studied(scenario: lm.Scenario, path: Path) -> None:
         scenario=scenario,
         vary=[vary],
         keep={"largest": f"peak({scenario.variables()[0].name})"},
-        select={"drive_check": True},
     )
     lm.study(what, path / "study", threads=1)
 
@@ -71,6 +70,9 @@ FUNCTIONS: dict[str, Callable[[lm.Scenario, Path], Any]] = {
     "attach": attached,
     "write_drive": lambda s, path: lm.mujoco.write_drive(s, path / "x.drive"),
     "rigid_constants": lambda s, _: lm.response.rigid_constants(s),
+    "reduce": lambda s, _: lm.mujoco.reduce(s, 0.5, 1.0),
+    "frequency_response": lambda s, _: lm.frequency_response(s, [2.0], 0.2),
+    "pointing_budget": lambda s, _: lm.pointing_budget(s, after=0.0, robustness=False),
 }
 
 
