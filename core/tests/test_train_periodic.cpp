@@ -108,7 +108,11 @@ TEST_SUITE("train_periodic") {
                 ComponentsOf<D> direction{};
                 direction[by.place] = 1.0;
                 auto at_rest = regime.at_rest;
-                if (by.place < D::coupled) c.system.stop(direction, at_rest);
+                struct {
+                    ComponentsOf<D>& x;
+                    typename D::Memory& memory;
+                } disturbed{direction, memory};
+                if (by.place < D::coupled) c.system.stop(disturbed, at_rest);
                 const double h = 1e-4;
                 if (by.name.ends_with("_hysteresis_capacity") &&
                     memory[static_cast<std::size_t>(by.place - D::states)] < h)
