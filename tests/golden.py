@@ -22,6 +22,7 @@ import numpy as np
 import pyarrow.parquet as pq
 
 import lostmotion as lm
+from chains import chain
 
 ROOT = Path(__file__).parent.parent
 FILE = Path(__file__).with_name("golden.toml")
@@ -42,6 +43,7 @@ TOLERANCE = 1e-7
 BLOCKS = 64
 MANY = 100  # variables of a run: the series of a larger train are held as one
 
+MASSES = 8, 20, 30, 64  # of chains with friction on each and a gap at every third
 STEADY = ("load_speed", "twist", "output_torque")
 STEPPED = ("paper-2dof-nl-small", "step-to-standstill")
 FREQUENCIES, AMPLITUDES = (0.5, 2.0, 10.0, 40.0), (0.025, 0.3)  # Hz, relative voltage
@@ -70,6 +72,9 @@ def compute() -> Groups:
     linear = lm.load(ROOT / "scenarios/paper-2dof-l-large.toml", ["motor.friction_torque=0"])
     long = of_run(linear.replace(**{"simulation.duration": 1e9, "simulation.sample_interval": 1e7}))
     groups |= {f"a-billion-seconds.{what}": values for what, values in long.items()}
+    for n in MASSES:
+        loose = chain(n, friction=0.02, gaps=tuple(range(1, n - 1, 3)))
+        groups |= {f"chain-of-{n}.{what}": values for what, values in of_run(loose).items()}
     return groups
 
 

@@ -149,7 +149,7 @@ def _now_and_then(what: str) -> Callable[[str], None]:
 MAX_LINE = 300  # characters of an error
 SILENCE = 0.5  # [s] after which something must be seen
 LONG = 60.0  # [s] from which on work is said to take long
-MANY_CONTACTS = 24  # with which a response takes seconds a point
+MANY_SHAFTS = 12  # with dry friction or play among which a response takes up to minutes a point
 SLOW = 10.0  # [s] from which on work whose length is known is announced
 EVERY = 30.0  # [s] between lines where there is no terminal
 REFRESH = 0.2  # [s]
@@ -233,11 +233,15 @@ def simulating(what: str, scenario: Any, tolerance: float = 0.0) -> Iterator[Cal
 
 
 def announce_response(train: Any, points: int) -> None:
-    """Say on stderr before it starts that the response of a large train with dry contacts takes long."""
+    """Say on stderr before it starts that the response of a large train with dry contacts or play takes long."""
+    from ..model import TorsionCurve
+
     sticking = sum(shaft.friction_torque > 0.0 or shaft.friction_curve is not None for shaft in train.shafts.values())
-    if sticking > MANY_CONTACTS:
+    bent = sum(isinstance(gear.stiffness, TorsionCurve) for gear in train.gears.values())
+    if len(train.shafts) > MANY_SHAFTS and sticking + bent > 0:
         print(
-            f"Response: {sticking} shafts have dry friction; each of the {points} points takes up to a minute",
+            f"Response: {len(train.shafts)} shafts, {sticking} of them with dry friction, and {bent} torsion curves; "
+            f"each of the {points} points takes up to minutes",
             file=sys.stderr,
         )
 
