@@ -16,8 +16,7 @@ class Few {
  public:
     static_assert(std::is_trivially_copyable_v<T> && few % 4 == 0);
 
-    Few() : few_{} {}
-    // What a copy has in place need not be zero before.
+    Few() = default;
     Few(const Few& o) { *this = o; }
     Few(Few&& o) noexcept { *this = std::move(o); }
     Few& operator=(const Few& o) {
@@ -87,7 +86,7 @@ class Few {
         size_ = size;
     }
 
-    T few_[few];                 // where there are not many
+    T few_[few]{};               // where there are not many
     std::unique_ptr<T[]> many_;  // as far as size_
     std::size_t size_ = 0, room_ = 0;
 };
