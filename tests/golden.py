@@ -74,8 +74,7 @@ def compute() -> Groups:
     groups |= {f"a-billion-seconds.{what}": values for what, values in long.items()}
     for n in MASSES:
         loose = chain(n, friction=0.02, gaps=tuple(range(1, n - 1, 3)))
-        of_chain = {what: values for what, values in of_run(loose).items() if what != "energy"}
-        groups |= {f"chain-of-{n}.{what}": values for what, values in of_chain.items()}
+        groups |= {f"chain-of-{n}.{what}": values for what, values in of_run(loose).items()}
     return groups
 
 

@@ -27,7 +27,7 @@ void FormTangent::add_term(const model::Row& f, int at, int term, const double* 
         add_scaled(to, factor * c, derivative + at * P, P);
 }
 
-void ResetTangent::tied_speeds(const std::int8_t* modes, const double* x, double* to) const {
+void ResetTangent::tied_speeds(std::span<const std::int8_t> modes, const double* x, double* to) const {
     const model::Assembly& a = trains_.base();
     const model::Ties ties = tie(a, modes);
     for (const VariedTrain::Beside& b : trains_.beside()) {

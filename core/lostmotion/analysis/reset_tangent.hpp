@@ -48,7 +48,7 @@ class ResetTangent {
         : trains_(trains), form_(form), parameters_(parameters) {}
 
     // Speeds that the contacts at rest tie to others. x: of before.
-    void tied_speeds(const std::int8_t* modes, const double* x, double* to) const;
+    void tied_speeds(std::span<const std::int8_t> modes, const double* x, double* to) const;
     // At a turning point of the twist of a gear.
     void capacity(std::size_t gear, double twist, const model::Key& key, double* to) const;
     // Where an angle begins another turn.
@@ -63,7 +63,9 @@ class ResetTangent {
  private:
     void add_now(const VariedForm& f, const double* w, const double* derivative, double factor, const double* to,
                  double* sum) const;
-    static model::Ties tie(const model::Assembly& a, const std::int8_t* modes) { return a.places().ties(modes); }
+    static model::Ties tie(const model::Assembly& a, std::span<const std::int8_t> modes) {
+        return a.places().ties(modes);
+    }
 
     const VariedTrain& trains_;
     const FormTangent& form_;

@@ -268,8 +268,8 @@ class TrainSensitivity final : public TrainWatcher<D> {
         std::vector<std::int8_t> modes(static_cast<std::size_t>(n_.contacts));
         for (int c = 0; c < n_.contacts; ++c) modes[static_cast<std::size_t>(c)] = r.before.at_rest[c] ? 0 : 1;
         if (w.guard >= 0 && w.kind == model::Guard::speed) modes[static_cast<std::size_t>(w.contact)] = 0;
-        resets_.tied_speeds(modes.data(), left_w, to);
-        const model::Ties now = a.places().ties(modes.data());
+        resets_.tied_speeds(modes, left_w, to);
+        const model::Ties now = a.places().ties(modes);
         for (std::size_t g = 0; g < a.places().gears.size(); ++g) {
             const model::GearPlace& p = a.places().gears[g];
             if (p.hysteresis == model::nowhere || r.before.at_rest[p.contact]) continue;

@@ -86,7 +86,7 @@ void set_stops(const model::Assembly& a, const model::SparseRegime& r, RegimeDet
         if (r.at_rest[c]) continue;
         std::vector<std::int8_t> modes(contacts.size());
         for (std::size_t k = 0; k < contacts.size(); ++k) modes[k] = r.at_rest[k] || k == c ? 0 : 1;
-        const model::Ties ties = a.places().ties(modes.data(), nullptr, true);
+        const model::Ties ties = a.places().ties(modes, nullptr, true);
         out.stops_alone[c] = true;
         for (std::size_t k = 0; k < contacts.size(); ++k)
             if (modes[k] != 0 && kept_at_rest(contacts[k], ties)) out.stops_alone[c] = false;

@@ -5,7 +5,7 @@ namespace lostmotion::model {
 void Assembly::build(const Key& key, Regime& r) const {
     r.clear();
     r.key = key;
-    r.ties = places().ties(key.modes.data());
+    r.ties = places().ties(key.modes);
     for (int c = 0; c < layout().contacts; ++c)
         r.at_rest[c] = (!places().contacts[c].gap.present() || key.modes[c] == 0) &&
                        (r.ties.redundant[c] || kept_at_rest(places().contacts[c], r.ties));

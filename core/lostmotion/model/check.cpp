@@ -281,7 +281,7 @@ Fault TrainCheck::massless() const {
     std::vector<std::int8_t> rigid(places.contacts.size(), 1);
     for (std::size_t c = 0; c < places.contacts.size(); ++c)
         if (places.contacts[c].bilateral) rigid[c] = 0;
-    const Ties tied = places.ties(rigid.data());
+    const Ties tied = places.ties(rigid);
     for (std::size_t c = 0; c < places.contacts.size(); ++c) {
         const Shares moves = rigid[c] == 0 ? Shares{} : tied_speed(places.contacts[c], tied);
         for (const int s : places.massless)
@@ -339,7 +339,7 @@ Fault TrainCheck::rigid_loops() const {
     std::vector<std::int8_t> modes(rigid.size(), 1);
     for (std::size_t k = 0; k < rigid.size(); ++k) {
         modes[k] = 0;
-        const Ties ties = tie(rigid, shafts, modes.data());
+        const Ties ties = model::tie(rigid, shafts, modes);
         if (!ties.redundant[k] && !ties.at_rest[rigid[k].a]) continue;
         const auto gear = static_cast<std::size_t>(rigid[k].element);
         return named("gears", "gear", train_.gears[gear].name, gear) + "closes a loop of rigid gears with " +
@@ -355,7 +355,7 @@ Fault TrainCheck::given_motions(const std::vector<ContactPlace>& rigid) const {
     for (std::size_t s = 0; s < train_.shafts.size(); ++s)
         if (train_.shafts[s].given_motion) given.push_back(static_cast<int>(s));
     const std::vector<std::int8_t> stuck(rigid.size(), 0);
-    const Ties ties = tie(rigid, static_cast<int>(train_.shafts.size()), stuck.data(), nullptr, {given});
+    const Ties ties = model::tie(rigid, static_cast<int>(train_.shafts.size()), stuck, nullptr, {given});
     for (std::size_t k = 0; k < rigid.size(); ++k)
         if (const auto gear = static_cast<std::size_t>(rigid[k].element); ties.redundant[k])
             return named("gears", "gear", train_.gears[gear].name, gear) +

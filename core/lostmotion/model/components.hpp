@@ -117,7 +117,7 @@ class ComponentLaws<model::TrainSystem<D>> {
     const std::vector<model::GearPlace>& gears() const { return assembly_.places().gears; }
     template <class Modes>
     model::Ties ties(const Modes& modes) const {
-        return assembly_.places().ties(modes.data());
+        return assembly_.places().ties(modes);
     }
     void set_torque(int memory, double magnitude) {
         neutral_[D::states + memory] = false;

@@ -181,7 +181,7 @@ void RegimeGuards::add_driver(int contact) {
     Regime stuck;
     stuck.key = regime_.key;
     stuck.key.modes[contact] = 0;
-    stuck.ties = places_.ties(stuck.key.modes.data());
+    stuck.ties = places_.ties(stuck.key.modes);
     equations_.compose(stuck.key, stuck);
     Row& overcome = stuck.contact_torque[contact];
     if (!Statics(places_, stuck.key, stuck.ties, stuck.motion).solve({{&overcome, 1}})) return;

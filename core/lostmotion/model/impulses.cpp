@@ -26,7 +26,7 @@ Impulses::Impulses(const Places& places, std::vector<Flank> all, const std::vect
     : flanks(std::move(all)), shafts_(places.shafts.size()) {
     std::vector<std::int8_t> modes(places.contacts.size());
     for (std::size_t c = 0; c < places.contacts.size(); ++c) modes[c] = places.contacts[c].bilateral ? 0 : 1;
-    const Ties ties = places.ties(modes.data());
+    const Ties ties = places.ties(modes);
     std::vector<int> free;
     for (std::size_t s = 0; s < shafts_; ++s)
         if (ties.is_free(static_cast<int>(s)) && !places.moves_no_inertia(static_cast<int>(s), ties))

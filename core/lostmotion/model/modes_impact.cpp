@@ -41,7 +41,7 @@ double SwitchedTrain::speed_of(int contact, const Instant& now) const {
 Impulses SwitchedTrain::impulses(const Instant& now, const Key& key) const {
     std::vector<double> speeds(train().shafts.size());
     for (std::size_t s = 0; s < train().shafts.size(); ++s) speeds[s] = now.x[places().shafts[s].speed];
-    const Ties ties = places().ties(key.modes.data());
+    const Ties ties = places().ties(key.modes);
     std::vector<Flank> flanks;
     for (int c = 0; c < contacts(); ++c) {
         const ContactPlace& p = places().contacts[c];
@@ -359,7 +359,7 @@ bool SwitchedTrain::stop_with(Instant& now, std::size_t gear, MovedShafts& moved
     Key together;
     for (int c = 0; c < contacts(); ++c)
         together.modes[c] = places().contacts[c].bilateral || c == contact ? std::int8_t{0} : std::int8_t{1};
-    const Ties ties = places().ties(together.modes.data());
+    const Ties ties = places().ties(together.modes);
     const std::vector<int> part = parts(places(), together);
     const std::size_t shafts = train().shafts.size();
     for (std::size_t s = 0; s < shafts; ++s) {

@@ -33,7 +33,7 @@ auto SwitchedTrain::stopped(const Rest& at_rest) const -> const Stopped& {
     if (known != nullptr && known->at_rest == at_rest) return *known;
     std::vector<std::int8_t> modes;
     for (int c = 0; c < contacts(); ++c) modes.push_back(at_rest[c] ? 0 : 1);
-    known = std::make_unique<Stopped>(Stopped{at_rest, {}, places().ties(modes.data(), nullptr, true)});
+    known = std::make_unique<Stopped>(Stopped{at_rest, {}, places().ties(modes, nullptr, true)});
     for (int c = 0; c < contacts(); ++c)
         if (kept_at_rest(places().contacts[c], known->ties)) known->kept[c] = true;
     return *known;
@@ -235,7 +235,7 @@ bool SwitchedTrain::at_its_limit(const Key& key) const {
 // that.
 bool SwitchedTrain::pushes_against_rest(const Key& key) const {
     const std::vector<ContactPlace>& all = places().contacts;
-    const Ties ties = places().ties(key.modes.data());
+    const Ties ties = places().ties(key.modes);
     std::vector<int> direction(train().shafts.size());  // of each free shaft
     for (std::size_t k = 0; k < all.size(); ++k) {
         if (key.modes[k] == 0 || all[k].gap.present()) continue;

@@ -163,7 +163,7 @@ void Places::find_massless() {
     for (std::size_t c = 0; c < contacts.size(); ++c)
         if (contacts[c].bilateral) rigid[c] = 0;
     for (const ShaftPlace& s : shafts) inertia.push_back(s.inertia);
-    const Ties tied = ties(rigid.data(), inertia.data());
+    const Ties tied = ties(rigid, inertia.data());
     for (std::size_t s = 0; s < shafts.size(); ++s) {
         bool follows = false;
         tied.each_share(static_cast<int>(s), [&](int k, double) { follows = follows || moves_no_inertia(k, tied); });
@@ -209,7 +209,7 @@ void Places::place_memory_and_branches(const Train& train) {
     }
     // What is redundant while some contacts are stuck is so while all are.
     const std::vector<std::int8_t> all_stuck(contacts.size(), 0);
-    const Ties stuck = ties(all_stuck.data());
+    const Ties stuck = ties(all_stuck);
     for (std::size_t c = 0; c < contacts.size(); ++c)
         if (stuck.redundant[c] && contacts[c].kind != ContactPlace::shaft) contacts[c].locked = layout.memory++;
 

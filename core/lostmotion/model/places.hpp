@@ -78,8 +78,11 @@ struct Places {
     // with_remainders: what piecewise-linear laws leave of smooth ones enters as further inputs.
     explicit Places(const Train& train, bool with_remainders = false);
 
-    Ties ties(const std::int8_t* modes, const double* inertia = nullptr, bool given_speeds_follow = false) const {
-        return tie(contacts, static_cast<int>(shafts.size()), modes, inertia, {driven, given_speeds_follow, massless});
+    // modes: of the contacts; those beyond its end are stuck.
+    template <class Modes>
+    Ties ties(const Modes& modes, const double* inertia = nullptr, bool given_speeds_follow = false) const {
+        return tie(contacts, static_cast<int>(shafts.size()), {modes.data(), modes.size()}, inertia,
+                   {driven, given_speeds_follow, massless});
     }
     // How many conditions may end a regime: both ends of each piecewise law and each cell, what the contacts hold to
     // both sides with the cells of their losses, limits of commands, and what rest leaves open.

@@ -196,7 +196,7 @@ void Statics::follow(Row& f, const Ties& heavy) const {
 
 bool Statics::solve_balances(const std::vector<int>& of, Forms forms) {
     const int all = static_cast<int>(shafts());
-    const Ties heavy = places_.ties(key_.modes.data(), inertia_.data());
+    const Ties heavy = places_.ties(key_.modes, inertia_.data());
     const int columns = layout_.terms + layout_.contacts;  // accelerations come behind them
     // Accelerations first, each from the balance of a heavy shaft: what reactions are then is the share of the light
     // shafts, and no difference of two torques on the heavy one.

@@ -224,7 +224,7 @@ void SwitchedTrain::stop(Now& now, AtRest& at_rest) const {
     } else {  // whose speeds stay what they are, to the last bit
         std::vector<std::int8_t> modes;
         for (int c = 0; c < contacts(); ++c) modes.push_back(at_rest[c] ? 0 : 1);
-        set_tied_speeds(x, places().ties(modes.data()));
+        set_tied_speeds(x, places().ties(modes));
     }
 }
 
@@ -242,7 +242,7 @@ template <class X, class Input>
 bool SwitchedTrain::follow_given(X& x, const Input& input, const Key& key, Rest& rests) const {
     if (places().driven.empty()) return false;
     for (const int s : places().driven) x[places().shafts[s].speed] = input[places().shafts[s].given_speed];
-    const Ties ties = places().ties(key.modes.data());
+    const Ties ties = places().ties(key.modes);
     bool some = false;
     for (int c = 0; c < contacts(); ++c) {
         if (key.modes[c] == 0) continue;

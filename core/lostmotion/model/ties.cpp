@@ -72,8 +72,8 @@ bool stop_contact(const ContactPlace& c, Ties& t, const double* inertia, const G
     return true;
 }
 
-Ties tie(const std::vector<ContactPlace>& contacts, int shafts, const std::int8_t* modes, const double* inertia,
-         GivenShafts given) {
+Ties tie(const std::vector<ContactPlace>& contacts, int shafts, std::span<const std::int8_t> modes,
+         const double* inertia, GivenShafts given) {
     Ties t;
     t.of.resize(static_cast<std::size_t>(shafts));
     for (int s = 0; s < shafts; ++s) t.of[static_cast<std::size_t>(s)].set(s, 1.0);
@@ -83,7 +83,7 @@ Ties tie(const std::vector<ContactPlace>& contacts, int shafts, const std::int8_
     };
     for (const auto now : {rigid, frame, other})
         for (std::size_t k = 0; k < contacts.size(); ++k)
-            if (modes[k] == 0 && turn(contacts[k]) == now)
+            if ((k >= modes.size() || modes[k] == 0) && turn(contacts[k]) == now)
                 t.redundant[k] = !stop_contact(contacts[k], t, inertia, given);
     for (std::size_t s = 0; s < t.of.size(); ++s)
         if (t.of[s].empty()) t.at_rest[s] = true;

@@ -33,9 +33,9 @@ Shares tied_speed(const ContactPlace& c, const Ties& t);
 // speed is zero, or if its speed is given.
 bool stop_contact(const ContactPlace& c, Ties& t, const double* inertia = nullptr, const GivenShafts& given = {});
 
-// stuck: a contact is at rest where this is 0. Frame contacts come first, so that it is a gear or coupling whose
-// torque is redundant where a shaft is held twice. With given motions, rigid gears come before them.
-Ties tie(const std::vector<ContactPlace>& contacts, int shafts, const std::int8_t* modes,
+// A contact is at rest where its mode is 0 or there is none. Frame contacts come first, so that it is a gear or
+// coupling whose torque is redundant where a shaft is held twice. With given motions, rigid gears come before them.
+Ties tie(const std::vector<ContactPlace>& contacts, int shafts, std::span<const std::int8_t> modes,
          const double* inertia = nullptr, GivenShafts given = {});
 
 // Is the speed of a contact kept at zero by these ties?
