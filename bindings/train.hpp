@@ -181,6 +181,16 @@ class TrainDescription : public model::TrainDescription {
             names.push_back(train.shafts[static_cast<std::size_t>(s)].name);
         return names;
     }
+    // Of the states those that move: a kernel may have a place for others.
+    std::vector<std::string> moving_states() const {
+        const model::Assembly a(train);
+        const std::vector<std::string> states = model::state_names(a);
+        const std::vector<bool> moves = model::moved_states(a);
+        std::vector<std::string> names;
+        for (std::size_t k = 0; k < states.size(); ++k)
+            if (moves[k]) names.push_back(states[k]);
+        return names;
+    }
     std::string check_start(const std::vector<double>& speeds) const { return model::check_start(train, speeds); }
     // The train must have passed the check.
     std::vector<ChannelRow> channels() const { return channel_rows(run()->channels()); }
@@ -450,6 +460,7 @@ inline void bind_train(nb::module_& m) {
             "guards", [](const TrainDescription& t) { return t.run()->kernel().sizes().guards; },
             "How many guards its kernel has room for.")
         .def("massless_shafts", &TrainDescription::massless_shafts)
+        .def("moving_states", &TrainDescription::moving_states, "States that are not constant by the equations.")
         .def("check_start", &TrainDescription::check_start, "speeds"_a)
         .def("channels", &TrainDescription::channels, "Name, symbol, unit, meaning.")
         .def("variables", &TrainDescription::variables, "Name, symbol, unit, meaning, whether it is derived.")

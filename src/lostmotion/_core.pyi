@@ -265,6 +265,9 @@ class Train:
 
     def massless_shafts(self) -> list[str]: ...
 
+    def moving_states(self) -> list[str]:
+        """States that are not constant by the equations."""
+
     def check_start(self, speeds: Sequence[float]) -> str: ...
 
     def channels(self) -> list[tuple[str, str, str, str]]:

@@ -171,8 +171,7 @@ NamedInOrder named_end(const TrainReport& report, const model::Assembly& a) {
             known->second = report.x[k];
     }
     for (auto& capacity : capacities_at(a, report.memory.data())) end.push_back(std::move(capacity));
-    std::ranges::sort(end);
-    model::as_in_tables(a.train(), end, &NamedInOrder::value_type::first);
+    if (a.train().aliases.empty()) std::ranges::sort(end);
     return end;
 }
 

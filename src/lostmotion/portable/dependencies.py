@@ -17,9 +17,9 @@ def dependencies_of(scenario: Scenario, states: Collection[str], inputs: Collect
     if scenario.continuous() or scenario.given():
         return {}
     train = scenario.train()
-    equations = _Equations(scenario, train, states)
+    equations = _Equations(scenario, train)
     known = [*inputs, *states]
-    found: dict[str, set[str]] = {name: set() for name in states}
+    found: dict[str, set[str]] = {name: set() for name in equations.moving}
     angles = {name for shaft in train.shafts if (name := train.angle_of(shaft)) in states}
     twists = {train.twist_of(gear) for gear in train.gears}
     for shaft in train.shafts:
@@ -42,14 +42,14 @@ def dependencies_of(scenario: Scenario, states: Collection[str], inputs: Collect
 class _Equations:
     """Numbers that decide the accelerations of shafts."""
 
-    def __init__(self, scenario: Scenario, train: DriveTrain, states: Collection[str]) -> None:
-        self._train, self._states = train, states
+    def __init__(self, scenario: Scenario, train: DriveTrain) -> None:
+        self._train, self.moving = train, set(scenario.core().moving_states())
         self._massless = set(scenario.core().massless_shafts())
         self._group = {shaft: {shaft} for shaft in train.shafts}
         contacts = scenario.core().contact_names()
         for name, gear in train.gears.items():
             twist = train.twist_of(name)
-            if twist not in states or f"{twist}_contact" in contacts:
+            if twist not in self.moving or f"{twist}_contact" in contacts:
                 self._join(gear.input, gear.output, *filter(None, [gear.housing]))
         for one, other, _ in (*train.held_together(), *train.inertia_couplings()):
             self._join(one, other)
@@ -69,7 +69,7 @@ class _Equations:
 
     def speeds(self, shaft: str) -> set[str]:
         """Numbers that the speed of a shaft depends on: itself, or without inertia the balance of torques."""
-        return {self._train.speed_of(shaft)} if self._train.speed_of(shaft) in self._states else self.of([shaft])
+        return {self._train.speed_of(shaft)} if self._train.speed_of(shaft) in self.moving else self.of([shaft])
 
     def of(self, shafts: Collection[str]) -> set[str]:
         """All that acts on these shafts, and on those that move with them."""
@@ -82,7 +82,7 @@ class _Equations:
         for name, motor in train.motors.items():
             if motor.shaft in group:
                 torque = train.motor_torque_of(name)
-                found |= {torque} if torque in self._states else {train.command_of(name)}
+                found |= {torque} if torque in self.moving else {train.command_of(name)}
         for name, gear in train.gears.items():
             if not group.isdisjoint([gear.input, gear.output, gear.housing]):
                 found |= {train.twist_of(name), train.angle_of(gear.input)}
