@@ -39,12 +39,10 @@ class Initial(described.InitialFields):
 
     @kept
     def of_train(self) -> TrainInitial:
-        """The same state of the drive as a train; what follows from a reference, or is 0, is left out."""
-        of_shafts = {
+        """The same state of the drive as a train; what is 0 is left out."""
+        values = {
             "speeds": {MOTOR: self.motor_speed, LOAD: self.load_speed},
             "angles": {LOAD: self.load_angle},
-        }
-        values = ({} if self.on_reference else of_shafts) | {
             "twists": {GEARBOX: self.twist},
             "motor_torques": {MOTOR: self.motor_torque},
             "hysteresis_capacities": {GEARBOX: self.hysteresis_capacity},

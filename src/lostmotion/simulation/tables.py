@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Protocol, Self
 
 import numpy as np
@@ -30,23 +29,6 @@ def with_accessories(schema: dict[str, Any]) -> dict[str, Any]:
     for key in ACCESSORIES:
         properties[key]["anyOf"] += [RECORD_NAME, from_record]
     return schema
-
-
-def check_on_reference(initial: Any, controllers: Mapping[str, Controller], keys: Sequence[str]) -> None:
-    """Refuses `on_reference` where no reference says where an axis is, or where one of the keys says so, too.
-
-    Raises
-    ------
-    ValueError
-    """
-    if not initial.on_reference:
-        return
-    if not any(c.reference.kind == "position" for c in controllers.values()):
-        raise ValueError("has initial.on_reference but no controller with a reference of the position; leave it out")
-    if given := [key for key in keys if getattr(initial, key)]:
-        raise ValueError(
-            f"has initial.on_reference and initial.{given[0]}, which follows from it; leave one of them out"
-        )
 
 
 class SimulationTable(Part):
@@ -82,6 +64,7 @@ class Whole(Protocol):
 
     @property
     def tables(self) -> Any: ...
+    def own_key(self, key: str) -> str: ...
     def train(self) -> DriveTrain: ...
     def commanded(self) -> list[str]: ...
     def axes(self) -> dict[str, Controller]: ...

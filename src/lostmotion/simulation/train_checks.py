@@ -8,7 +8,7 @@ from ..control.axis import check_torques
 from ..errors import InputError
 from ..inputs.validation import did_you_mean, shown
 from .given_motion import check_continuous
-from .tables import Whole, check_on_reference
+from .tables import Whole
 from .train_tables import LINEAR_INITIAL
 from .train_variables import check_names
 
@@ -29,7 +29,7 @@ def check_train(scenario: Whole) -> None:
     tables.check(train.core(tables.loaded(), given=tables.given()))
     _check_given(tables)
     _check_controllers(scenario)
-    check_on_reference(tables.initial, scenario.axes(), ("angles", "speeds", "positions", "slide_speeds"))
+    _check_on_reference(scenario)
     core = scenario.core()
     _check_massless(scenario)
     if scenario.continuous():
@@ -66,6 +66,19 @@ def _check_shafts(tables: TrainTables) -> None:
                 if (name in of_slides) == (given == key):
                     what = "moves along a straight line" if given == key else "is none that moves along a straight line"
                     raise InputError(f"{shown(name)} {what}; give initial.{other}.{name}", f"initial.{given}.{name}")
+
+
+def _check_on_reference(scenario: Whole) -> None:
+    """Refuses `initial.on_reference` where no reference says where an axis is, or where another key says so, too."""
+    initial = scenario.tables.initial
+    if not initial.on_reference:
+        return
+    if not any(c.reference.kind == "position" for c in scenario.axes().values()):
+        raise ValueError("has initial.on_reference but no controller with a reference of the position; leave it out")
+    for table in ("angles", "speeds", "positions", "slide_speeds"):
+        for name in getattr(initial, table):
+            key = scenario.own_key(f"initial.{table}.{name}")
+            raise ValueError(f"has initial.on_reference and {key}, which follows from it; leave one of them out")
 
 
 def _check_given(tables: TrainTables) -> None:
