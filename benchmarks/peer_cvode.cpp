@@ -167,7 +167,7 @@ class Cvode {
             if (status == CV_ROOT_RETURN) {
                 CVodeGetRootInfo(memory_, found.data());
                 const auto& old = task_.cache.regime(key_);
-                for (int k = 0; k < old.n_guards; ++k)
+                for (std::size_t k = 0; k < old.guards.size(); ++k)
                     if (found[k] < 0) fired = &old.guards[k];
                 if (fired == nullptr) continue;  // a guard that rises from zero, where the regime began
             } else if (time_ < limit_) {

@@ -28,8 +28,6 @@ from .live_page.notebook import live as live
 from .model.couplings import Brake as Brake
 from .model.couplings import Clutch as Clutch
 from .model.couplings import Freewheel as Freewheel
-from .model.couplings import Ratchet as Ratchet
-from .model.couplings import TorqueLimiter as TorqueLimiter
 from .model.dampers import Damper as Damper
 from .model.drive import Drive as Drive
 from .model.gear import Gear as Gear

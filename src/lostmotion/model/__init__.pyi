@@ -3,6 +3,8 @@ from .angle_torques import ErrorHarmonic as ErrorHarmonic
 from .angle_torques import Gravity as Gravity
 from .angle_torques import TorqueCurve as TorqueCurve
 from .angle_torques import TorqueHarmonic as TorqueHarmonic
+from .couplings import Ratchet as Ratchet
+from .couplings import TorqueLimiter as TorqueLimiter
 from .end_stops import EndStops as EndStops
 from .end_stops import ShaftEndStops as ShaftEndStops
 from .gearbox import GearboxLimits as GearboxLimits

@@ -120,7 +120,7 @@ class TorqueLimiter(described.TorqueLimiterFields, BetweenShafts):
     Examples
     --------
     >>> import lostmotion as lm
-    >>> limiter = lm.TorqueLimiter(input="motor", output="drum", release_torque="30 N*m", slip_torque="5 N*m")
+    >>> limiter = lm.model.TorqueLimiter(input="motor", output="drum", release_torque="30 N*m", slip_torque="5 N*m")
     >>> limiter.release_torque
     30.0
     """
@@ -141,7 +141,7 @@ class Ratchet(described.RatchetFields, BetweenShafts):
     Examples
     --------
     >>> import lostmotion as lm
-    >>> lm.Ratchet(input="handle", output="drum", teeth=24).teeth
+    >>> lm.model.Ratchet(input="handle", output="drum", teeth=24).teeth
     24
     """
 
