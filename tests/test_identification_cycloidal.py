@@ -42,7 +42,7 @@ def baseline() -> lm.identification.IdentificationResult:
 
 @pytest.fixture(scope="module")
 def split() -> lm.identification.IdentificationResult:
-    """Of the shipped file and logs of the split pin wheel, from the start values alone: the baseline is sought from others, too."""
+    """The shipped file and logs of the split pin wheel, identified from the start values alone; the baseline is sought from others, too."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(ladder, "_other_minima", lambda *arguments: (arguments[5], []))
         return lm.identify(EXAMPLE / "split-pinwheel.toml")

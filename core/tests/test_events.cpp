@@ -37,7 +37,7 @@ struct BouncingBall {
     using Key = model::Key;
     using Guard = model::SparseRegime::Guard;
     enum { height, speed };  // its states
-    // What the solver asks of a regime.
+    // A regime, as far as the solver asks.
     struct Regime {
         model::Key key;
         std::array<LinearForm, Dims::coupled> rate{};

@@ -38,7 +38,7 @@ struct Gap : Ends {
         const double side = side_of(now);
         return side > 0.0 ? end(side, now) - now.x[at] : now.x[at] - end(side, now);
     }
-    // Of the ends.
+    // Sum of the magnitudes of both ends.
     double size() const { return std::fabs(low) + std::fabs(high); }
 };
 
@@ -56,7 +56,7 @@ struct ContactPlace {
     double per_housing = 0.0;
     Gap gap{};
 
-    // Where its torque is a torque of its own: not of a gear, nor friction of a shaft.
+    // Couplings and end stops have a torque that is neither that of a gear nor friction of a shaft.
     bool has_own_torque() const { return kind == coupling || kind == stop; }
     // The shaft that its torque turns, and which way.
     int turned() const { return b == nowhere ? a : b; }

@@ -88,7 +88,7 @@ class CouplingElement {
         guard.neighbour = neighbour;
         return guard;
     }
-    // Where it is in step again, behind or ahead by the way: there its place moves on.
+    // The guard of being in step again, behind or ahead by the way: there the place of the coupling moves on.
     Guard in_step(const Terms& terms, int way, int neighbour) const {
         Guard guard = edge(-way * (terms.state(twist) - terms.memory(turn)) + terms.one(pitch()), neighbour);
         guard.memory = turn;

@@ -45,7 +45,7 @@ class EndStopsOfShaft final : public ShaftElement {
     bool drives() const override { return true; }
     const char* piecewise_law() const override { return strikes() != nullptr ? nullptr : "pressed stop"; }
     bool over_angle() const override { return true; }
-    // Of a damped one, what it has stored counts as lost until it gives it back.
+    // What a damped stop has stored counts as lost until it gives it back.
     const char* source() const override { return law_.stiffness > 0.0 && law_.damping == 0.0 ? "end stop" : nullptr; }
     const char* loss() const override { return law_.damping > 0.0 ? "end stop" : nullptr; }
 

@@ -79,7 +79,7 @@ class ElementForms {
     Row dry_torque(const ShaftElement& e, const Key& key) const {
         return static_cast<double>(mode(key, places_.shafts[e.shaft].contact)) * e.friction(site(e.shaft), key, false);
     }
-    // What the shaft of an element presses on it with.
+    // The torque with which a shaft presses on an element.
     Row pressing_torque(int element, const Key& key) const {
         const ShaftElement& e = *places_.acting[element];
         return -e.torque(site(e.shaft), key);

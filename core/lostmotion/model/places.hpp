@@ -91,7 +91,7 @@ struct Places {
             gears.size() + acting.size() + couplings.size() + motors.size() + controllers.size();
         return 4 * (layout.contacts + layout.branches + static_cast<int>(elements));
     }
-    // Of a coupling or an end stop.
+    // The name of a coupling or an end stop.
     const std::string& name_of(const ContactPlace& c) const {
         return c.kind == ContactPlace::stop ? acting[c.element]->name : couplings[c.element]->name;
     }

@@ -1,6 +1,7 @@
 // A train as the solvers see it: a switched linear system of compile-time dimensions.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -151,7 +152,7 @@ class TrainSystem {
         make_room(now.memory, n.memory);
         std::copy_n(at.memory.data(), n.memory, now.memory.data());
     }
-    // Of a train of any size, those that have not been asked for are zero.
+    // Numbers that a train of any size has not been asked for are zero.
     template <class From, class To>
     static void copy_numbers(const From& from, int count, To& to) {
         to.reach(static_cast<std::size_t>(count));

@@ -27,7 +27,8 @@ struct TrainChannel {
         error,
         pressing_torque
     } kind;
-    // Of the input, state, motor, gear, contact, given motion, shaft without inertia, shaft, controller or element.
+    // The number of the input, state, motor, gear, contact, given motion, shaft, controller or element; of a shaft
+    // without inertia, that among these.
     int index;
     std::string name, unit, meaning, symbol = {};
 };

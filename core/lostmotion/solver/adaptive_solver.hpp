@@ -326,23 +326,21 @@ class AdaptiveSolver {
     // that instant there.
     bool first_turn(const typename Cache::Entry& entry, const DenseStep& dense, double end, double& t_event) {
         bool turned = false;
-        if constexpr (requires { entry.regime->drivers; })
-            for (const auto& driver : entry.regime->drivers) {
-                if (entry.regime->driving_input >= 0) break;  // the limit of the step
-                const auto rate = [&](double t) {
-                    const State x = dense(t);
-                    const Inputs u = input_at(t, x), u_rate = input_.template jet<2>()[1];
-                    double sum = evaluate<D>(driver.rate, x, now_.memory, u),
-                           size =
-                               solution_error(driver.rate, x) + rounding * magnitude<D>(driver.rate, x, now_.memory, u);
-                    for (const auto& [i, c] : driver.torque.of_inputs()) {
-                        sum += c * u_rate[i];
-                        size += rounding * std::fabs(c * u_rate[i]);
-                    }
-                    return sum + 2.0 * size;
-                };
-                turned = first_fall(rate, 0.0, dense, end, false, t_event) || turned;
-            }
+        for (const auto& driver : entry.regime->drivers) {
+            if (entry.regime->driving_input >= 0) break;  // the limit of the step
+            const auto rate = [&](double t) {
+                const State x = dense(t);
+                const Inputs u = input_at(t, x), u_rate = input_.template jet<2>()[1];
+                double sum = evaluate<D>(driver.rate, x, now_.memory, u),
+                       size = solution_error(driver.rate, x) + rounding * magnitude<D>(driver.rate, x, now_.memory, u);
+                for (const auto& [i, c] : driver.torque.of_inputs()) {
+                    sum += c * u_rate[i];
+                    size += rounding * std::fabs(c * u_rate[i]);
+                }
+                return sum + 2.0 * size;
+            };
+            turned = first_fall(rate, 0.0, dense, end, false, t_event) || turned;
+        }
         return turned;
     }
 

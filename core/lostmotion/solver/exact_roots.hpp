@@ -15,69 +15,67 @@ namespace lostmotion {
 // what would change the state: then the steps grow, up to where the bound is below zero by the noise (docs/theory.md).
 template <class System>
 double ExactSolver<System>::first_turn(Entry& e, double limit) {
-    if constexpr (requires { e.regime->drivers; }) {
-        int level = first_level;
-        double ticks = 1.0;
-        Coupled forced{};
-        for (int i = 0; i < e.rates.n.inputs; ++i)
-            forced = forced + input_bound_[i] * absolute(load(e.rates.input_column[i]));
-        Cursor at = *begin_;
-        while (at.time() < limit && !interruption()) {
-            // A motion that grows without bound is followed to no end: a guard ends the regime before.
-            if (!moderate(at.rate())) return at.time();
-            level = e.propagator.by_series() ? std::min(level, e.propagator.longest_level())
-                                             : e.propagator.bounded_level(level);
-            const double h = e.propagator.length(level);
-            const InstantOf<D> now{at.time(), at.x(), now_.memory, at.input().jet(), at.input().magnitudes()};
-            Flow<D> along(e.rates, now);
-            State fourth{};
-            if constexpr (std::same_as<D, Any>) {
-                if (e.propagator.by_series()) {
-                    e.propagator.series().expand(e.rates, load(at.rate()), at.input(), h, e.propagator.theta(h));
-                    fourth.coupled = e.propagator.series().fourth_bound();
-                }
+    int level = first_level;
+    double ticks = 1.0;
+    Coupled forced{};
+    for (int i = 0; i < e.rates.n.inputs; ++i)
+        forced = forced + input_bound_[i] * absolute(load(e.rates.input_column[i]));
+    Cursor at = *begin_;
+    while (at.time() < limit && !interruption()) {
+        // A motion that grows without bound is followed to no end: a guard ends the regime before.
+        if (!moderate(at.rate())) return at.time();
+        level = e.propagator.by_series() ? std::min(level, e.propagator.longest_level())
+                                         : e.propagator.bounded_level(level);
+        const double h = e.propagator.length(level);
+        const InstantOf<D> now{at.time(), at.x(), now_.memory, at.input().jet(), at.input().magnitudes()};
+        Flow<D> along(e.rates, now);
+        State fourth{};
+        if constexpr (std::same_as<D, Any>) {
+            if (e.propagator.by_series()) {
+                e.propagator.series().expand(e.rates, load(at.rate()), at.input(), h, e.propagator.theta(h));
+                fourth.coupled = e.propagator.series().fourth_bound();
             }
-            if (!e.propagator.by_series())
-                store<D>(e.propagator.level(level).exponential_bound * (absolute(at.fourth_derivative()) + h * forced),
-                         fourth);
-            double step = std::min(h, limit - at.time()), longest = step;
-            for (const auto& driver : e.regime->drivers) {
-                const LinearForm& torque = driver.torque;
-                const double a = along.rate(torque, 2), b = along.rate(torque, 3);
-                const double noise = along.noise(along.rate_magnitude(torque, 1), a);
-                const double v = along.rate(torque, 1) + 2.0 * noise;
-                if (v < 0.0) return at.time();
-                double bound = 0.0;
-                each_state_of<D>(torque, [&](int k, double c) { bound += std::fabs(c) * fourth[k]; });
-                for (const auto& [i, c] : torque.of_inputs()) bound += std::fabs(c) * input_bound_[i];
-                const double K = std::fmax(0.0, -b) + bound * h / 3.0;
-                if (v == 0.0 && a == 0.0 && K > 0.0) {
-                    // b s^2/2 - bound s^3/6 at least; without b as well, a torque that changes within rounding so soon.
-                    if (b < 0.0) return at.time();
-                    step = longest = std::min(step, b > 0.0 ? 3.0 * b / bound : 0x1p-12 * h);
-                    continue;
-                }
-                // Up to where the bound falls to zero from `above`.
-                const auto shorten = [&](double& s, double above) {
-                    if (above + s * (a - 0.5 * K * s) >= 0.0) return;
-                    const double root = std::sqrt(a * a + 2.0 * K * above);
-                    s = a > 0.0 ? (a + root) / K : 2.0 * above / (root - a);
-                };
-                shorten(step, v);
-                shorten(longest, v + noise);
-            }
-            const double tick = std::nextafter(at.time(), limit) - at.time();
-            if (step < 0.5 * longest) {
-                step = std::fmax(step, std::fmin(longest, ticks * tick));
-                ticks *= 2.0;
-            } else {
-                ticks = 1.0;
-                // What is fast dies out: as in an event check, a step with room is followed by one of twice the length.
-                if (step == h && e.propagator.can_double(level, limit - at.time())) ++level;
-            }
-            at.advance(std::fmax(step, tick));
-            at.anchor(std::fmin(at.time(), limit));
         }
+        if (!e.propagator.by_series())
+            store<D>(e.propagator.level(level).exponential_bound * (absolute(at.fourth_derivative()) + h * forced),
+                     fourth);
+        double step = std::min(h, limit - at.time()), longest = step;
+        for (const auto& driver : e.regime->drivers) {
+            const LinearForm& torque = driver.torque;
+            const double a = along.rate(torque, 2), b = along.rate(torque, 3);
+            const double noise = along.noise(along.rate_magnitude(torque, 1), a);
+            const double v = along.rate(torque, 1) + 2.0 * noise;
+            if (v < 0.0) return at.time();
+            double bound = 0.0;
+            each_state_of<D>(torque, [&](int k, double c) { bound += std::fabs(c) * fourth[k]; });
+            for (const auto& [i, c] : torque.of_inputs()) bound += std::fabs(c) * input_bound_[i];
+            const double K = std::fmax(0.0, -b) + bound * h / 3.0;
+            if (v == 0.0 && a == 0.0 && K > 0.0) {
+                // b s^2/2 - bound s^3/6 at least; without b as well, a torque that changes within rounding so soon.
+                if (b < 0.0) return at.time();
+                step = longest = std::min(step, b > 0.0 ? 3.0 * b / bound : 0x1p-12 * h);
+                continue;
+            }
+            // Up to where the bound falls to zero from `above`.
+            const auto shorten = [&](double& s, double above) {
+                if (above + s * (a - 0.5 * K * s) >= 0.0) return;
+                const double root = std::sqrt(a * a + 2.0 * K * above);
+                s = a > 0.0 ? (a + root) / K : 2.0 * above / (root - a);
+            };
+            shorten(step, v);
+            shorten(longest, v + noise);
+        }
+        const double tick = std::nextafter(at.time(), limit) - at.time();
+        if (step < 0.5 * longest) {
+            step = std::fmax(step, std::fmin(longest, ticks * tick));
+            ticks *= 2.0;
+        } else {
+            ticks = 1.0;
+            // What is fast dies out: as in an event check, a step with room is followed by one of twice the length.
+            if (step == h && e.propagator.can_double(level, limit - at.time())) ++level;
+        }
+        at.advance(std::fmax(step, tick));
+        at.anchor(std::fmin(at.time(), limit));
     }
     return limit;
 }
