@@ -90,14 +90,14 @@ test("why it stands still is told for the instant shown, and follows a slider", 
   const answer = page.locator(".stand .answer");
   await time.fill("25");
   await page.waitForFunction(() => /^Stuck at 0.05 s: /.test(document.querySelector(".stand .answer")!.textContent!));
-  expect(await answer.textContent()).toBe("Stuck at 0.05 s: input shaft, twist of the gear.");
+  expect(await answer.textContent()).toBe("Stuck at 0.05 s: motor, gearbox twist.");
   expect(await page.locator(".stand li").first().textContent()).toMatch(
-    /^input shaft: stuck, holds .* mN·m more frees it forward, .* backward$/,
+    /^motor: stuck, holds .* mN·m more frees it forward, .* backward$/,
   );
   const field = page.getByRole("textbox", { name: "friction torque, mN·m" }).first();
   await field.fill("0");
   await field.press("Enter");
-  await page.waitForFunction(() => !/input shaft/.test(document.querySelector(".stand .answer")!.textContent!));
+  await page.waitForFunction(() => !/motor/.test(document.querySelector(".stand .answer")!.textContent!));
   expect(seen).toEqual([]);
   await page.close();
 });
