@@ -60,6 +60,13 @@ def test_the_window_with_a_scale_on_the_slide() -> None:
     assert default_window(axis_of(slide_axis(SCREW, position_encoder=scale))) == pytest.approx(4.0 * 5e-6, rel=1e-12)
 
 
+@pytest.mark.parametrize("key", ["controller.position_encoder", "controller.position_encoder.resolution"])
+def test_a_position_encoder_that_replaces_none_is_on_the_slide_too(key: str) -> None:
+    """As in a file: 2 um of the slide, not 2 urad of the motor."""
+    value = "2 um" if key.endswith("resolution") else {"resolution": "2 um"}
+    assert default_window(axis_of(slide_axis(SCREW).replace(**{key: value}))) == pytest.approx(8e-6, rel=1e-12)
+
+
 @pytest.mark.parametrize(("shaft", "turns"), [("motor", 90.0), ("load", 1.0)])
 def test_the_window_of_a_shaft_is_four_steps_through_the_gear_ratio(shaft: str, turns: float) -> None:
     own = {"controller.position_encoder": {"shaft": shaft, "bits": 8}}

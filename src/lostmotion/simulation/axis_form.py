@@ -52,7 +52,8 @@ def long_form(tables: Mapping[str, Any]) -> dict[str, Any]:
     long[DRIVES[kind]] = {kind: {"input": shaft, "output": SLIDE, **table[kind]}}
     for short, in_long in (("controller", "controllers"), ("command", "command")):
         if short in tables:
-            long[in_long] = {MOTOR: _on_slide(tables[short]) if short == "controller" else tables[short]}
+            long[in_long] = {MOTOR: tables[short]}
+    on_slide(long)
     if BRAKE in table:
         if "command" in table[BRAKE]:
             long["command"] = {**long.get("command", {}), BRAKE: table[BRAKE].pop("command")}
@@ -124,12 +125,13 @@ def _carrying(slide: dict[str, Any], payload: dict[str, Any] | None) -> dict[str
     return {**slide, "mass": sum(masses)}
 
 
-def _on_slide(controller: Any) -> Any:
-    """The controller with its position encoder on the slide, unless it says where that is."""
+def on_slide(tables: dict[str, Any]) -> None:
+    """Put the position encoder of the axis on the slide, unless the encoder says where it is; the tables are of the long form."""
+    given = tables.get("controllers")
+    controller = given.get(MOTOR) if isinstance(given, Mapping) else None
     encoder = controller.get("position_encoder") if isinstance(controller, Mapping) else None
-    if not isinstance(encoder, Mapping) or "shaft" in encoder:
-        return controller
-    return {**controller, "position_encoder": {"shaft": SLIDE, **encoder}}
+    if isinstance(encoder, Mapping) and encoder.get("shaft") is None:
+        tables["controllers"] = {MOTOR: {**controller, "position_encoder": {**encoder, "shaft": SLIDE}}}
 
 
 def axis_schema() -> dict[str, Any]:

@@ -277,6 +277,8 @@ class Scenario:
         doubt_all(changes, "replace")
         data = self.written.model_dump()
         set_values(data, [(self.key_of_tables(key), value) for key, value in changes.items()])
+        if self.form == AXIS:
+            axis_form.on_slide(data)
         with _in_keys(self.key_in_file):
             made = type(self)(**data)
         return self.of(made.tables, self.form, checked=False) if self.form == AXIS else made
