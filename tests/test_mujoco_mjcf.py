@@ -238,7 +238,7 @@ def test_an_actuator_on_a_tendon_of_the_joint_is_refused_by_name() -> None:
 def test_a_second_actuator_and_a_disabled_one_are_refused() -> None:
     made = spec("motor")
     made.add_actuator(name="other", target="arm", trntype=mujoco.mjtTrn.mjTRN_JOINT)
-    with pytest.raises(lm.InputError, match="has the actuators 'servo' and 'other'; leave one of them"):
+    with pytest.raises(lm.InputError, match="has the actuator 'servo' and the actuator 'other'; leave one of them"):
         lm.mujoco.from_mjcf(made, "arm")
     model = spec("motor").compile()
     model.opt.disableactuator = 1

@@ -177,6 +177,17 @@ def test_nothing_of_an_actuator_stays_beside_its_drive(kind: str) -> None:
     assert arm.data.qpos.tolist() == plain.data.qpos.tolist()
 
 
+def test_an_actuator_without_a_name_is_named_by_its_number() -> None:
+    motor = '<motor joint="arm"/>'
+    unnamed = model(actuator=f"<actuator>{motor}{motor}</actuator>")
+    for refused in (
+        lambda: lm.mujoco.attach(unnamed, {"arm": scenario()}),
+        lambda: lm.mujoco.from_mjcf(unnamed, "arm"),
+    ):
+        with pytest.raises(lm.InputError, match=r"\(number 1 of 2\) and the actuator without a name \(number 2 of 2\)"):
+            refused()
+
+
 def test_what_cannot_be_taken_off_is_refused() -> None:
     with pytest.raises(lm.InputError, match="actuatorgravcomp"):
         lm.mujoco.attach(model(body='gravcomp="1"', joint='actuatorgravcomp="true"'), {"arm": scenario()}, replace=True)

@@ -69,6 +69,12 @@ def actuators_of(model: mujoco.MjModel, joint: int) -> list[int]:
     return [k for k in range(model.nactuator) if moves(k)]
 
 
+def actuator_name(model: mujoco.MjModel, k: int) -> str:
+    """An actuator as messages name it: by its name, or by its place among those of the model."""
+    name = model.actuator(k).name
+    return f"actuator {name!r}" if name else f"actuator without a name (number {k + 1} of {model.nactuator})"
+
+
 def acts(model: mujoco.MjModel, flag: str) -> bool:
     """Whether a part of the physics, such as ``"GRAVITY"``, is not disabled by option.flag."""
     import mujoco

@@ -22,7 +22,7 @@ from ..model.springs import Spring
 from ..model.torsion import LinearStiffness, Rigid
 from ..simulation.joint_trains import Driven
 from ..simulation.scenario import Scenario
-from .joints import acts, actuators_of, compiled, joint_id
+from .joints import acts, actuator_name, actuators_of, compiled, joint_id
 
 if TYPE_CHECKING:
     import mujoco
@@ -120,8 +120,8 @@ def from_mjcf(
     dof = model.jnt_dofadr[number]
     actuators = actuators_of(model, number)
     if len(actuators) > 1:
-        names = " and ".join(repr(model.actuator(k).name) for k in actuators)
-        raise InputError(f"joint {joint!r}: has the actuators {names}; leave one of them")
+        names = " and the ".join(actuator_name(model, k) for k in actuators)
+        raise InputError(f"joint {joint!r}: has the {names}; leave one of them")
     if not actuators and ratio is None:
         raise InputError(f"joint {joint!r}: has no actuator that says the gear; give ratio=")
     law = _law(model, joint, actuators[0]) if actuators else _Law(gear=ratio or 0.0)
@@ -173,12 +173,10 @@ def _law(model: mujoco.MjModel, joint: str, k: int) -> _Law:
     """
     import mujoco
 
-    name = model.actuator(k).name
-
     def refuse(attribute: str, value: Any) -> InputError:
         shown = ", ".join(f"{x:g}" for x in np.ravel(np.asarray(value, float)))
         return InputError(
-            f"{shown} of the actuator {name!r} is not taken over; give a motor, or a servo of position or speed, without it",
+            f"{shown} of the {actuator_name(model, k)} is not taken over; give a motor, or a servo of position or speed, without it",
             attribute,
             where=f"joint {joint!r}",
         )

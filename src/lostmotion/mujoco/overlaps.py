@@ -11,7 +11,7 @@ from ..inputs.named import Named
 from ..model.angle_torques import PeriodicTorque
 from ..simulation.joint_trains import output_of
 from ..simulation.scenario import Scenario
-from .joints import actuators_of, joint_id
+from .joints import actuator_name, actuators_of, joint_id
 
 if TYPE_CHECKING:
     import mujoco
@@ -117,7 +117,7 @@ def clear(model: mujoco.MjModel, name: str, drive: Scenario, *, replace: bool) -
     if _has_spring(name, drive):
         values["stiffness"] = [(array, joint) for array in (model.jnt_stiffness, model.jnt_stiffnesspoly)]
     own = [key for key, places in values.items() if any((array[k] != 0).any() for array, k in places)]
-    own += [f"the actuator {model.actuator(k).name!r}" for k in actuators]
+    own += [f"the {actuator_name(model, k)}" for k in actuators]
     if own and not replace:
         raise InputError(
             f"joint {name!r}: has {' and '.join(own)}, which would count twice beside its drive; give replace=True, or take it off the model"
@@ -125,7 +125,7 @@ def clear(model: mujoco.MjModel, name: str, drive: Scenario, *, replace: bool) -
     for k in actuators:
         if model.actuator_plugin[k] >= 0:
             raise InputError(
-                f"joint {name!r}: the actuator {model.actuator(k).name!r} is a plugin, which would act beside its drive; take it off the model"
+                f"joint {name!r}: the {actuator_name(model, k)} is a plugin, which would act beside its drive; take it off the model"
             )
     if model.jnt_actgravcomp[joint] and model.ngravcomp:
         raise InputError(
