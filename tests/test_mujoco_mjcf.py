@@ -84,6 +84,18 @@ def test_a_servo_moves_as_that_of_mujoco(name: str) -> None:
     assert exactly(made, control, ratio=80.0) == pytest.approx(right, abs=ACCURACY)
 
 
+def simple(joint: Any, _actuator: Any) -> None:
+    """Body whose centre of mass is on its joint: MuJoCo takes its inertia, armature included, from the compiled model."""
+    joint.parent.ipos = [0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize("kind", ["position", "velocity", "motor"])
+def test_the_armature_of_a_simple_body_counts_once(kind: str) -> None:
+    made = spec(kind, simple)
+    assert made.compile().body_simple[1]
+    assert exactly(made, 0.4) == pytest.approx(moved(made, 0.4), abs=ACCURACY)
+
+
 def limited(key: str, low: float, high: float) -> Callable[[Any, Any], None]:
     def change(joint: Any, actuator: Any) -> None:
         part = joint if key == "actfrc" else actuator

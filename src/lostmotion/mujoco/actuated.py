@@ -74,6 +74,7 @@ class Actuated:
         self._dofs = np.array([model.jnt_dofadr[j] for j in ids])
         self._addresses = np.array([model.jnt_qposadr[j] for j in ids])
         step = float(model.opt.timestep)
+        mujoco.mj_setConst(model, self.data)  # the inertia of simple bodies has the armature that was taken off
         mujoco.mj_forward(model, self.data)
         mass = np.zeros((model.nv, model.nv))
         mujoco.mj_fullM(model, self.data, mass)
