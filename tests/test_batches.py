@@ -270,7 +270,10 @@ def test_equal_drives_share_their_tables() -> None:
         (lambda d: lm.SimulationBatch(d, STEP, count=2, vary={"load.inertia": [1, 2, 3]}), "3 values for 2 drives"),
         (lambda d: lm.SimulationBatch(d, STEP, vary={"load.inertja": np.ones(2)}), "load.inertia"),
         (lambda d: lm.SimulationBatch(d, STEP, vary={"load.inertia": np.array([1.0, -1.0])}), "inertia"),
-        (lambda d: lm.SimulationBatch(d, STEP, vary={"motor.rated_speed": np.ones(2)}), "has no such number"),
+        (
+            lambda d: lm.SimulationBatch(d, STEP, vary={"motor.rated_speed": np.ones(2)}),
+            "motor.rated_speed: the scenario has nothing of that name",
+        ),
         (lambda d: lm.SimulationBatch([d, d], STEP, count=2), "are for one drive"),
         (lambda d: lm.SimulationBatch(d, STEP, count=2).step([1.0, 2.0, 3.0]), "command: .* an array of 2 numbers"),
         (lambda d: lm.SimulationBatch(d, STEP, count=2).step([1.0, np.nan]), "command: has numbers that are not"),
@@ -286,11 +289,84 @@ def test_bad_use_ends_in_one_clear_line(make: object, message: str) -> None:
     assert len(str(raised.value)) <= 200
 
 
-def test_gears_that_a_batch_does_not_step_are_refused() -> None:
-    one = simple_drive()
-    damped = one.model_copy(update={"gearbox": one.gearbox.model_copy(update={"mesh_damping": 5.0})})
-    with pytest.raises(lm.InputError, match=r"use lm\.Simulation"):
-        lm.SimulationBatch(damped, STEP, count=2)
+AXIS = {
+    "axis": {
+        "motor": {"kind": "torque_source", "rotor_inertia": 1e-4, "rated_torque": 2.0},
+        "screw": {"lead": 0.01, "efficiency": 0.9, "stiffness": 5e7, "backlash": 1e-5},
+        "slide": {"mass": 20.0, "friction_force": 30.0},
+        "brake": {"torque": 3.0, "command": 0.0},
+    },
+    "simulation": {"duration": 0.1, "sample_interval": 0.01},
+}
+
+
+@pytest.mark.parametrize(
+    ("scenario", "key"),
+    [
+        (lm.load("two-motors-one-ring"), "shafts.ring.inertia"),
+        (lm.load("worm-lowering"), "shafts.drum.inertia"),
+        (lm.load("two-link-arm-frozen"), "mass_matrices.arm.matrix.0.0"),
+        (lm.load("direction-finder"), "shafts.traverse.inertia"),
+        (lm.load("hunting-with-static-friction"), "shafts.table.inertia"),
+        (lm.Scenario(**AXIS), "axis.slide.mass"),
+        (lm.load("lossy-rigid-gear").replace(**{"gearbox.mesh_damping": 0.0}), "gearbox.ratio"),
+    ],
+)
+def test_trains_of_any_kind_move_as_alone(scenario: lm.Scenario, key: str) -> None:
+    value = lm.simulation.sensitivities.value_at(scenario, key)
+    values = np.array([1.0, 1.2]) * value
+    batch = lm.SimulationBatch(scenario, STEP, vary={key: values})
+    given = {name: 0.4 for name in batch.inputs if not name.endswith(("_load_torque", "_load_force"))}
+    for _ in range(20):
+        batch.step(**given)
+    for k, x in enumerate(values[: 1 if scenario.axes() else 2].tolist()):  # controllers are tuned to the first
+        changed = scenario.replace(**{key: x})
+        if scenario.axes():
+            held = {
+                m: c.model_copy(update={"reference": type(c.reference)(mean=0.4)}) for m, c in scenario.axes().items()
+            }
+            changed = changed.with_axes(held)
+        alone = lm.Simulation(changed, step=STEP, initial=scenario.begin())
+        for _ in range(20):
+            alone.advance(STEP, **{name: u for name, u in given.items() if name in alone.inputs})
+        for name in (changed.train().speed_of(shaft) for shaft in changed.train().shafts):
+            assert batch[name][k] == pytest.approx(alone[name], rel=1e-9, abs=1e-9), name
+    assert batch.counts["steps"] == 40
+
+
+def test_a_train_of_one_gear_is_stepped_by_tables_under_its_own_names() -> None:
+    scenario = lm.load("catalogue-robot-joint")
+    tables = scenario.long().model_dump(exclude_none=True)
+    renamed = {"motor": "rotor", "load": "arm"}
+    tables["shafts"] = {renamed[name]: shaft for name, shaft in tables["shafts"].items()}
+    tables["motors"]["motor"]["shaft"] = "rotor"
+    tables["gears"]["gearbox"] |= {"input": "rotor", "output": "arm"}
+    short, long = (lm.SimulationBatch(one, STEP, count=2) for one in (scenario, lm.Scenario(**tables)))
+    for batch in (short, long):
+        for k in range(100):
+            batch.step([0.3, -0.1] if k < 50 else 0.0)
+    for name, own in (("load_angle", "arm_angle"), ("motor_speed", "rotor_speed"), ("twist", "gearbox_twist")):
+        assert np.array_equal(short[name], long[own])
+    assert np.array_equal(short["input_contact"], long["rotor_contact"])
+    assert short.counts == long.counts
+    assert long.counts["general"] < long.counts["steps"]
+
+
+@pytest.mark.parametrize(
+    ("use", "message"),
+    [
+        (lambda: lm.SimulationBatch(lm.load("given-motion"), STEP, count=2), "gives the motion of a shaft"),
+        (lambda: lm.SimulationBatch(lm.load("worm-lowering"), STEP, count=2, given_motion=True), "the shaft called load"),
+        (lambda: lm.SimulationBatch(lm.load("two-motors-one-ring"), STEP, count=2).step(0.1), "command: there are several"),
+        (lambda: lm.SimulationBatch(lm.load("two-motors-one-ring"), STEP, count=2).step(first_motor_command=0.1), "second_motor_command: missing"),
+        (lambda: lm.SimulationBatch([lm.load("worm-lowering"), lm.load("speed-axis")], STEP), "different inputs"),
+        (lambda: lm.SimulationBatch(lm.load("two-motors-one-ring"), STEP, count=2, controllers=lm.load("speed-axis").controller), "one motor"),
+    ],
+)  # fmt: skip
+def test_trains_that_a_batch_does_not_step_are_refused(use: object, message: str) -> None:
+    with pytest.raises(lm.InputError, match=message) as raised:
+        use()  # type: ignore[operator]
+    assert "\n" not in str(raised.value)
 
 
 def test_a_drive_that_cannot_go_on_stays_and_is_named() -> None:

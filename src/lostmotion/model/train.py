@@ -183,6 +183,10 @@ class DriveTrain(TrainElements):
         """NAME_twist of a gear, NAME_deflection of what moves a slide."""
         return self._named(gear, "twist", self.gears[gear].output)
 
+    def twist_contact_of(self, gear: str) -> str:
+        """NAME_twist_contact of a gear with hysteresis or damping."""
+        return self._named(gear, "twist_contact", self.gears[gear].output)
+
     def capacity_of(self, gear: str) -> str:
         """NAME_hysteresis_capacity of a gear."""
         return self._named(gear, "hysteresis_capacity", self.gears[gear].output)

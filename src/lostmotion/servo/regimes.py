@@ -65,7 +65,7 @@ class Axis:
         train = self.train
         return {
             "torque": (train.motor_torque_of(self.motor), printed(train.torque_unit(self.motor_shaft))),
-            "speed": (f"{self.motor_shaft}_speed", train.speed_unit(self.motor_shaft)),
+            "speed": (train.speed_of(self.motor_shaft), train.speed_unit(self.motor_shaft)),
             "position": (train.angle_of(self.shaft), train.angle_unit(self.shaft)),
         }
 
@@ -251,7 +251,7 @@ def _points(axis: Axis) -> Iterator[tuple[str, str, TrainInitial, dict[str, int]
             "twist stuck",
             f"hysteresis holds the {bends} of {main}, {moving}",
             state,
-            {f"{train.twist_of(main)}_contact": 0},
+            {train.twist_contact_of(main): 0},
         )
     output = train.gears[main].output
     if train.shafts[output].friction_torque > 0.0:

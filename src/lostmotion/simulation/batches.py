@@ -9,39 +9,24 @@ from typing import Any
 
 import numpy as np
 
-from .. import _core
 from ..control.controller import Controller
 from ..errors import InputError
 from ..inputs.arguments import checked
+from ..inputs.doubts import trusted
 from ..inputs.limits import check_free
 from ..inputs.quantities import Count, Time
 from ..inputs.validation import did_you_mean, listed, shown
 from ..model.drive import Drive
-from ..model.torsion import Rigid, TorsionCurve
 from ..model.train import DriveTrain
 from .exact_batches import ExactBatch
 from .given_motion import check_motion
-from .keys import renamed
-from .one_gear import as_drive, drive_keys, drive_of
 from .scenario import Scenario
-from .stepping_parts import MAX_INTERVAL, MIN_INTERVAL
-from .variables import STATES
+from .sensitivities import value_at
+from .stepping_parts import MAX_INTERVAL, MIN_INTERVAL, no_input
+from .train_variables import only_input
+from .walked_batches import WalkedBatch
 
-DRIVE_BYTES = 150.0  # memory that a drive of a batch takes at least
-
-BACKLASH = "gearbox.stiffness.backlash"
-KEYS = (
-    *(
-        key
-        for key in _core.batch_fields()
-        if key.startswith(("motor.", "gearbox.", "load."))
-        and not key.startswith("load.torque.")
-        and key != "gearbox.stiffness.slopes"
-    ),
-    BACKLASH,
-)
-"""what may differ from drive to drive, by its key in a scenario file"""
-_READERS = ("motor_torque", "output_torque", "input_contact", "twist_contact")
+TRAIN_BYTES = 150.0  # memory that a train of a batch takes at least
 
 
 @dataclass(frozen=True)
@@ -59,9 +44,8 @@ class SimulationBatch:
     Parameters
     ----------
     drives
-        A drive, or a scenario or a train of a motor, a gearbox and a load, for all; or one for each. A scenario also gives the
-        controller and the state at t = 0; its commands and load torques are not used. Drives with mesh damping in a gear with
-        backlash are for `Simulation`.
+        A drive, a train or a scenario for all; or one for each, with the same inputs. A scenario also gives the controllers and the
+        state at t = 0; its commands and load torques are not used.
     step
         Step [s]; commands and load torques are constant over it.
     count
@@ -75,10 +59,10 @@ class SimulationBatch:
     threads
         Number of threads; default: one for each processor. Results do not depend on it.
     controllers
-        A sampled controller for all motors, or one for each, which runs at its own sample instants within the steps. It
-        is tuned to the drives of `drives`, not to what varies.
+        A sampled controller for the one motor of all drives, or one for each, which runs at its own sample instants within the
+        steps. It is tuned to the drives of `drives`, not to what varies.
     given_motion
-        Whether the motion of the loads is given to `step`, as by a multibody engine.
+        Whether the motion of the shafts called ``load`` is given to `step`, as by a multibody engine.
 
     Raises
     ------
@@ -102,8 +86,8 @@ class SimulationBatch:
     Notes
     -----
     Each step is exact, whatever its length: `switchings` within it are located to rounding. A drive does not know of the
-    others, so its results do not depend on their number, on their order or on `threads`, to the last bit. Drives with
-    controllers or a given motion are stepped by the solver of `Simulation`.
+    others, so its results do not depend on their number, on their order or on `threads`, to the last bit. A motor, a gear and a
+    load without controllers are stepped by tables, all others by the solver of `Simulation`.
     """
 
     @checked
@@ -126,66 +110,29 @@ class SimulationBatch:
         self._step = step
         self._threads = threads or os.cpu_count() or 1
         if isinstance(drives, Drive | Scenario | DriveTrain):
-            one, several = drive_of(drives, "SimulationBatch"), None
-            vary = {renamed(key, drive_keys(drives)): values for key, values in (vary or {}).items()}
+            scenarios = [_stepped(drives)]
+            self._count = _count_of(count, vary or {})
         elif not drives:
             raise InputError("drives: there is none; give a Drive, or a list of them")
-        else:
-            several = [drive_of(drive, "SimulationBatch") for drive in drives]
-            one = several[0]
-        scenarios = [s for s in ([drives] if several is None else drives) if isinstance(s, Scenario)]
-        controllers, initial = _of_scenarios(scenarios, controllers, 1 if several is None else len(several))
-        if several is not None and (count is not None or vary):
+        elif count is not None or vary:
             raise InputError("count and vary: are for one drive; in a list each drive has its own parameters")
-        if several is None:
-            self._count = _count_of(count, vary or {})
-            check_free(DRIVE_BYTES * self._count, f"count: {self._count:.3g} drives", "take several batches")
         else:
-            self._count = len(several)
-        generator = np.random.default_rng(seed)
-        self._core: Any
-        self._exact: ExactBatch | None = None
-        self._controlled, self._given = controllers is not None, given_motion
-        if self._controlled or given_motion:
-            each = several or _each_drive(one, vary or {}, self._count, generator)
-            pairs = None if controllers is None else _pairs(controllers, several or [one] * self._count)
-            self._exact = self._core = ExactBatch(each, pairs, given_motion, step)
-            bases, self._states = each, self._exact.variables
+            scenarios = [_stepped(one) for one in drives]
+            self._count = len(scenarios)
+        check_free(TRAIN_BYTES * self._count, f"count: {self._count:.3g} drives", "take several batches")
+        scenarios, initial = _under(controllers, scenarios, self._count), _starts(scenarios, self._count)
+        columns = _columns(scenarios[0], vary or {}, self._count, np.random.default_rng(seed))
+        self._given = given_motion
+        self._core: ExactBatch | WalkedBatch
+        if not given_motion and WalkedBatch.takes(scenarios, columns):
+            self._core = WalkedBatch(scenarios, columns, self._count, step)
         else:
-            bases = self._tabulate([one] if several is None else several, vary or {}, generator)
-            self._states = dict(zip(STATES, self._core.states, strict=True))
-        self._rigid = any(isinstance(drive.gearbox.stiffness, Rigid) for drive in bases)
-        self._time = np.zeros(self._count)
-        if initial:
-            self.reset(initial=initial)
-
-    def _tabulate(self, drives: list[Drive], vary: Mapping[str, Any], generator: np.random.Generator) -> list[Drive]:
-        """Make the core that steps by tables; the drives that differ."""
-        own = _Own([], np.zeros((1, 0)), -1)
-        if vary or len(drives) != self._count:
-            own = _own_parameters(drives[0], vary, self._count, generator)
-            bases, models, values = drives, np.zeros(self._count, dtype=int), own.values
-            if own.keys or own.breaks >= 0:
-                values, models = np.unique(own.values, axis=0, return_inverse=True)
-            base = [0] * len(values)
-        else:
-            numbers: dict[Drive, int] = {}
-            models = np.array([numbers.setdefault(drive, len(numbers)) for drive in drives])
-            bases, base, values = list(numbers), list(range(len(numbers))), np.zeros((len(numbers), 0))
-        cores = [drive.core() for drive in bases]
-        for core in cores:
-            if problem := _core.DriveBatch.error(core):
-                raise InputError(f"drives: one {problem}; use lm.Simulation for it")
-        self._core = _core.DriveBatch(
-            cores,
-            base=base,
-            keys=own.keys,
-            curve_breaks=own.breaks,
-            values=np.ascontiguousarray(values),
-            model_of=models.reshape(-1).tolist(),
-            step=self._step,
-        )
-        return bases
+            tuned = scenarios * (self._count // len(scenarios))
+            self._core = ExactBatch(_each(tuned, columns), tuned, given_motion, step)
+        self._train, self._time = scenarios[0].train(), np.zeros(self._count)
+        loads = {self._train.load_torque_of(shaft) for shaft in self._train.shafts}
+        self._required = {name for name in self._core.inputs if name not in loads}
+        self.reset(initial={name: value for name, value in initial.items() if name in self._core.states})
 
     def __len__(self) -> int:
         return self._count
@@ -213,39 +160,63 @@ class SimulationBatch:
         """
         return dict(zip(("steps", "with_events", "general", "switchings"), self._core.counts, strict=True))
 
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of what is given to `step`."""
+        return self._core.inputs
+
     @checked
-    def step(self, command: Any, load_torque: Any = 0.0, *, motion: Mapping[str, Any] | None = None) -> None:
+    def step(
+        self, command: Any = None, load_torque: Any = 0.0, *, motion: Mapping[str, Any] | None = None, **inputs: Any
+    ) -> None:
         """Advance all drives by one step.
 
         Parameters
         ----------
         command
-            Command of the motor, as of `simulate`: share of the rated voltage, or of a torque source of its rated torque; a number, or an
-            array with a number for each drive. With `controllers` their reference: position [rad], speed [rad/s] or torque [N·m].
+            Where there is one command or reference: a number, or an array with a number for each drive. Of a motor the share of the
+            rated voltage, of a torque source of its rated torque, as of `simulate`; of a controller its reference: position [rad], speed
+            [rad/s] or torque [N·m].
         load_torque
-            Torque [N·m] that the load takes, in the same way.
+            Where there is one load: the torque [N·m] or force [N] that it takes, in the same way.
         motion
             With `given_motion`, of the loads at the end of the step: ``speed`` [rad/s], and if wanted ``angle`` [rad] and ``acceleration``
             [rad/s²], each a number or an array. The course within the step is that of `Simulation.advance`. The torque
             that this takes is the variable ``load_drive_torque``.
+        inputs
+            The same by the names in `inputs`, such as ``first_motor_command=0.2``. All commands are to be given; a load that is left out
+            is 0.
 
         Raises
         ------
         InputError
-            An argument has another shape, or is not finite; the motion is missing, or not to be given.
+            An argument has another shape, or is not finite; an input is missing or unknown; the motion is missing, or not to be given.
         SolverError
             The motion of a drive has no continuation. That drive stays where it was; all others are advanced.
         """
-        inputs = _numbers("command", command, self._count), _numbers("load_torque", load_torque, self._count)
-        if self._exact is None:
-            if motion is not None:
-                raise InputError("motion: is for a batch with given_motion=True")
-            self._core.step(*inputs, self._threads)
+        for word, value in (("command", command), ("load_torque", load_torque)):
+            if value is not None and (word == "command" or np.any(value)):
+                inputs[self._the_only(word)] = value
+        values = {name: _numbers(name, value, self._count) for name, value in inputs.items()}
+        for name in values:
+            if name not in self.inputs:
+                raise no_input(self._train, self.inputs, name)
+        if missing := self._required - values.keys():
+            raise InputError(f"{', '.join(sorted(missing))}: missing; all commands and references are to be given")
+        course = self._motion_of(motion)
+        if isinstance(self._core, ExactBatch):
+            self._core.step(values, course, self._threads)
         else:
-            self._exact.step(*inputs, self._motion_of(motion, inputs[1]), self._threads)
+            self._core.step(values, self._threads)
         self._time += self._step
 
-    def _motion_of(self, motion: Mapping[str, Any] | None, load_torque: np.ndarray) -> dict[str, np.ndarray]:
+    def _the_only(self, word: str) -> str:
+        """Name of the one input that `step` calls a command or a load torque."""
+        if word == "load_torque" and self._given and self._required == set(self.inputs):
+            raise InputError("load_torque: does not act on a load whose motion is given; leave it out")
+        return only_input(self._train, word, self.inputs)
+
+    def _motion_of(self, motion: Mapping[str, Any] | None) -> dict[str, np.ndarray]:
         """The given motion, checked."""
         if not self._given:
             if motion is not None:
@@ -253,8 +224,6 @@ class SimulationBatch:
             return {}
         if motion is None:
             raise InputError('motion: is missing; give the speed at the end of the step, motion={"speed": ...}')
-        if load_torque.any():
-            raise InputError("load_torque: does not act on a load whose motion is given; leave it out")
         check_motion("motion", motion)
         return {key: _numbers(f"motion.{key}", value, self._count) for key, value in motion.items()}
 
@@ -267,8 +236,9 @@ class SimulationBatch:
         which
             Array of Booleans with the drives that are meant; default all.
         initial
-            States at t = 0 by name, each a number or an array with one for each drive; those left out are 0. The names are ``motor_torque``, ``motor_speed``,
-            ``load_speed``, ``twist`` and ``load_angle``, in SI units.
+            States at t = 0 by the names of their variables, in SI units, each a number or an array with one for each drive; those left
+            out are 0. Of a motor, a gearbox and a load they are ``motor_torque``, ``motor_speed``, ``load_speed``, ``twist`` and
+            ``load_angle``.
 
         Raises
         ------
@@ -285,34 +255,24 @@ class SimulationBatch:
             mask = np.ascontiguousarray(mask)
         values = {}
         for name, value in (initial or {}).items():
-            if name not in STATES:
-                known = f"the states are {listed(STATES)}"
-                raise InputError(f"initial.{name}: is no state; {did_you_mean(name, STATES, known)}")
+            if name not in self._core.states:
+                known = f"the states are {listed(self._core.states)}"
+                raise InputError(f"initial.{name}: is no state; {did_you_mean(name, self._core.states, known)}")
             values[name] = np.broadcast_to(_numbers(f"initial.{name}", value, self._count), (self._count,))
-            if self._rigid and name != "load_angle" and values[name].any():
-                raise InputError(f"initial.{name}: a rigid gearbox begins at rest in a batch; give load_angle alone")
-        if self._exact is not None:
-            self._exact.reset(mask, values)
-        else:
-            zero = np.zeros(self._count)
-            start = np.column_stack([values.get(name, zero) for name in STATES]) if values else None
-            self._core.reset(mask, start)
+        self._core.reset(mask, values)
         self._time[slice(None) if mask is None else mask] = 0.0
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Values of a variable (SI), one for each drive.
 
-        The states ``motor_speed``, ``load_speed``, ``twist`` and ``load_angle`` are the memory that each step writes anew; it
-        exports DLPack, so that ``torch.from_dlpack(batch["twist"])`` copies nothing. Copy it to keep it. ``motor_torque``,
-        ``output_torque``, ``input_contact`` and ``twist_contact`` are new arrays. With controllers or a given motion all
-        result variables are such memory, among them what the controllers show.
+        Of a motor, a gearbox and a load without controllers, the states ``motor_speed``, ``load_speed``, ``twist`` and ``load_angle`` are
+        the memory that each step writes anew. It exports DLPack, so that ``torch.from_dlpack(batch["twist"])`` copies nothing. Copy it
+        to keep it. ``motor_torque``, ``output_torque``, ``input_contact`` and ``twist_contact`` are new arrays. Of other trains all result
+        variables are such memory, among them what the controllers show.
         """
-        if self._exact is None and name in _READERS:
-            return getattr(self._core, name)()  # type: ignore[no-any-return]
-        if name in self._states:
-            return self._states[name]
-        known = listed(dict.fromkeys((*self._states, *_READERS)))
-        raise InputError(f"{shown(name)} is no variable of a batch; the variables are {known}")
+        if name in self._core.variables:
+            return self._core.read(name)
+        raise InputError(f"{shown(name)} is no variable of a batch; the variables are {listed(self._core.variables)}")
 
     def snapshot(self) -> BatchState:
         """State of all drives, contacts and hysteresis included; `restore` returns to it."""
@@ -334,65 +294,71 @@ class SimulationBatch:
         self._time[:] = state.time
 
 
-def _of_scenarios(
-    scenarios: Sequence[Scenario], controllers: Controller | Sequence[Controller] | None, count: int
-) -> tuple[Controller | Sequence[Controller] | None, dict[str, Any]]:
-    """Controllers, and the state at t = 0 by name.
-
-    Raises
-    ------
-    InputError
-        Only some have one, or a state has what a batch begins without.
-    """
-    drives = [as_drive(scenario, "SimulationBatch") for scenario in scenarios]
-    own = [drive.controller for drive in drives if drive.controller is not None]
-    if own and controllers is not None:
-        raise InputError("controllers: a controller of the scenario turns the motor; leave one of them out")
-    if own and len(own) != count:
-        raise InputError("drives: some have controllers; give all of them one")
-    starts = [drive.start() for drive in drives]
-    if any(drive.capacities() for drive in drives):
-        raise InputError("a batch begins without hysteresis; leave it out", "initial.hysteresis_capacity")
-    initial = {name: [start.get(name, 0.0) for start in starts] for name in STATES}
-    moved = {name: values[0] if count == 1 else np.array(values) for name, values in initial.items() if any(values)}
-    if moved and len(drives) != count:
-        raise InputError("drives: some have a state at t = 0; give it by reset")
-    return own[0] if len(own) == 1 and count == 1 else own or controllers, moved
+def _stepped(drive: Drive | Scenario | DriveTrain) -> Scenario:
+    """Scenario of what is stepped. On a train alone a load torque may act on all shafts."""
+    scenario = Scenario.of_any(drive)
+    if isinstance(drive, DriveTrain):
+        loads: dict[str, Any] = {
+            f"shafts.{name}.torque": {} for name in scenario.tables.shafts if name not in scenario.loaded()
+        }
+        scenario = scenario.replace(**loads)
+    if scenario.given():
+        key = scenario.given_key(scenario.given()[0])
+        raise InputError(f"drives: key {key} gives the motion of a shaft; leave it out, or step it by lm.Simulation")
+    return scenario
 
 
-@dataclass(frozen=True)
-class _Own:
-    """Parameters of their own, one row for each drive: by key, then the breaks and the slopes of the torsion curve."""
-
-    keys: list[str]
-    values: np.ndarray
-    breaks: int
-    """breaks of each torsion curve; -1: it does not vary"""
-
-
-def _each_drive(drive: Drive, vary: Mapping[str, Any], count: int, generator: np.random.Generator) -> list[Drive]:
-    """The drives of a batch one by one."""
-    if not vary:
-        return [drive] * count
-    columns = _columns(drive, vary, count, generator)
-    return [_changed(drive, {key: float(column[k]) for key, column in columns.items()}) for k in range(count)]
-
-
-def _pairs(controllers: Controller | Sequence[Controller], drives: Sequence[Drive]) -> list[tuple[Drive, Controller]]:
-    """Each controller with the drive that it is bound to.
+def _under(
+    controllers: Controller | Sequence[Controller] | None, scenarios: list[Scenario], count: int
+) -> list[Scenario]:
+    """The scenarios, their one motor under the controllers that are given.
 
     Raises
     ------
     InputError
         There are others than drives, or one calls functions of the user's own.
     """
-    each = [controllers] * len(drives) if isinstance(controllers, Controller) else list(controllers)
-    if len(each) != len(drives):
-        raise InputError(f"controllers: there are {len(each)} for {len(drives)} drives; give one for all, or for each")
-    for one in each:
-        if one.law:
-            raise InputError("controllers: a law of your own is for lm.Simulation; give position and speed loops")
-    return list(zip(drives, each, strict=True))
+    if controllers is not None:
+        each = [controllers] * len(scenarios) if isinstance(controllers, Controller) else list(controllers)
+        if len(each) != count and not isinstance(controllers, Controller):
+            raise InputError(f"controllers: there are {len(each)} for {count} drives; give one for all, or for each")
+        if any(scenario.tables.controllers for scenario in scenarios):
+            raise InputError("controllers: a controller of the scenario turns the motor; leave one of them out")
+        if any(len(scenario.train().motors) != 1 for scenario in scenarios):
+            raise InputError("controllers: are for trains with one motor; give scenarios with controllers of their own")
+        scenarios = scenarios * (len(each) // len(scenarios))
+        scenarios = [
+            one.with_axes(dict.fromkeys(one.train().motors, each[k % len(each)])) for k, one in enumerate(scenarios)
+        ]
+    if any(controller.law for scenario in scenarios for controller in scenario.axes().values()):
+        raise InputError("controllers: a law of your own is for lm.Simulation; give position and speed loops")
+    if len({(tuple(one.core().input_names()), tuple(one.axes())) for one in scenarios}) > 1:
+        raise InputError("drives: have different inputs; take a batch for each kind")
+    return scenarios
+
+
+def _starts(scenarios: Sequence[Scenario], count: int) -> dict[str, Any]:
+    """The state at t = 0 by name, as far as it is not rest.
+
+    Raises
+    ------
+    InputError
+        It has a hysteresis.
+    """
+    if any(scenario.capacities() for scenario in scenarios):
+        raise InputError("a batch begins without hysteresis; leave it out", "initial.hysteresis_capacity")
+    starts = [scenario.start() for scenario in scenarios]
+    initial = {name: np.array([start.get(name, 0.0) for start in starts]) for name in starts[0]}
+    return {name: x if len(x) == count else x[0] for name, x in initial.items() if x.any()}
+
+
+def _each(scenarios: Sequence[Scenario], columns: Mapping[str, np.ndarray]) -> list[Scenario]:
+    """The scenarios of a batch one by one."""
+    if not columns:
+        return list(scenarios)
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    with trusted():
+        return [one.replace(**dict(zip(columns, row, strict=True))) for one, row in zip(scenarios, rows, strict=True)]
 
 
 def _count_of(count: int | None, vary: Mapping[str, Any]) -> int:
@@ -409,61 +375,18 @@ def _count_of(count: int | None, vary: Mapping[str, Any]) -> int:
 
 
 def _columns(
-    drive: Drive, vary: Mapping[str, Any], count: int, generator: np.random.Generator
+    scenario: Scenario, vary: Mapping[str, Any], count: int, generator: np.random.Generator
 ) -> dict[str, np.ndarray]:
     """The values of what varies by key, checked."""
     columns = {}
     for key, value in vary.items():
-        if key not in KEYS:
-            known = f"such as {listed(KEYS[:3])}"
-            raise InputError(f"vary.{key}: cannot vary in a batch; {did_you_mean(key, KEYS, known)}")
-        if key.startswith("motor.") and drive.motor.kind == "synchronous":
-            raise InputError(
-                f"vary.{key}: the numbers of a synchronous motor follow from one another; give a list of drives"
-            )
+        value_at(scenario, key, "vary")
         column = value(generator, count) if callable(value) else value
         columns[key] = np.broadcast_to(_numbers(f"vary.{key}", column, count), (count,))
-    for pick in (np.min, np.max):
-        _changed(drive, {key: float(pick(column)) for key, column in columns.items()})
+    with trusted():
+        for pick in (np.min, np.max) if columns else ():  # the range of each number is an interval
+            scenario.replace(**{key: float(pick(column)) for key, column in columns.items()})
     return columns
-
-
-def _own_parameters(drive: Drive, vary: Mapping[str, Any], count: int, generator: np.random.Generator) -> _Own:
-    """Values of what varies, as the core takes them."""
-    columns = _columns(drive, vary, count, generator)
-    own = [column for key, column in columns.items() if key != BACKLASH]
-    breaks = -1
-    if BACKLASH in columns:
-        curve = drive.gearbox.stiffness
-        assert isinstance(curve, TorsionCurve)
-        if columns[BACKLASH].min() <= 0.0:
-            raise InputError(f"vary.{BACKLASH}: {columns[BACKLASH].min():g} rad must be above 0, for each drive")
-        curve.pieces()  # both directions are the same
-        half = 0.5 * columns[BACKLASH]
-        own += [half, *(half + b for b in curve.breaks), *(np.full(count, s) for s in (0.0, *curve.slopes))]
-        breaks = 1 + len(curve.breaks)
-    table = np.column_stack(own) if own else np.zeros((1, 0))
-    return _Own([key for key in columns if key != BACKLASH], table, breaks)
-
-
-def _changed(drive: Drive, values: Mapping[str, float]) -> Drive:
-    """The drive with other numbers.
-
-    Raises
-    ------
-    InputError
-        The drive does not have one of them, or its value is out of range.
-    """
-    parts = drive.model_dump()
-    for key, value in values.items():
-        *path, name = key.split(".")
-        table: Any = parts
-        for part in path:
-            table = (table or {}).get(part)
-        if not isinstance(table, dict) or table.get(name) is None:
-            raise InputError(f"vary.{key}: this drive has no such number; give it in the drive first")
-        table[name] = value
-    return Drive(**parts)
 
 
 def _numbers(name: str, value: Any, count: int) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Drives of a batch that the general solver steps: those under controllers, and those whose load has a given motion."""
+"""Trains of a batch that the general solver steps, each by itself."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..control.axis import OPEN_LOOP, driven
-from ..control.controller import Controller
+from ..control.axis import OPEN_LOOP
 from ..errors import InputError
 from ..inputs.validation import shown
-from ..model.drive import Drive, DriveOfOneGear
+from ..model.drive import DriveOfOneGear
 from .scenario import Scenario
+
+JOINT = "load"  # the shaft whose motion is given
 
 
 class ExactBatch:
@@ -21,43 +22,45 @@ class ExactBatch:
 
     Parameters
     ----------
-    drives
-        One for each.
-    controllers
-        One for each, or None, with the drive that it is bound to.
+    scenarios
+        One for each train.
+    tuned
+        Of each the scenario that its controllers are bound to.
     given
-        Whether the motion of the loads is given.
+        Whether the motion of the shaft `load` is given.
     step
         [s]
     """
 
-    def __init__(
-        self, drives: Sequence[Drive], controllers: Sequence[tuple[Drive, Controller]] | None, given: bool, step: float
-    ) -> None:
+    def __init__(self, scenarios: Sequence[Scenario], tuned: Sequence[Scenario], given: bool, step: float) -> None:
         kinds: dict[Any, int] = {}
         trains, controls, kind_of = [], [], []
-        bound: dict[Any, Any] = {}
-        for k, drive in enumerate(drives):
-            pair = None if controllers is None else controllers[k]
-            key = drive, *(() if pair is None else (pair[0], id(pair[1])))
+        for one, base in zip(scenarios, tuned, strict=True):
+            key = one, base
             if key not in kinds:
                 kinds[key] = len(kinds)
-                law = None if pair is None else driven(pair[1])
-                shafts: tuple[tuple[str, ...], tuple[str, ...]] = ((), ("load",)) if given else (("load",), ())
-                train = drive.train() if given else drive.named_train()
-                core = train.core(shafts[0], {"motor": law}, shafts[1])
-                trains.append(core)
-                if pair is not None and key[1:] not in bound:
-                    bound[key[1:]] = Scenario.of_any(pair[0]).with_axes({"motor": pair[1]}).control()
-                controls.append(OPEN_LOOP if pair is None else bound[key[1:]])
+                trains.append(_with_given_load(one) if given else one.core())
+                controls.append(base.control() if base.axes() else OPEN_LOOP)
             kind_of.append(kinds[key])
         self._core = _core.ExactBatch(trains, controls=controls, kind_of=kind_of, step=step)
         self._given, self._count, self._steps = given, len(kind_of), 0
-        self._long = {short: long for long, short in DriveOfOneGear.aliases.items() if given and short}
+        shorter = DriveOfOneGear.aliases.items() if given and scenarios[0].is_drive else ()
+        self._long = {short: long for long, short in shorter if short}
         rows = self._core.values
-        self.variables: dict[str, np.ndarray] = dict(zip(self._core.variables, rows, strict=True))
-        self.variables |= {name: self.variables[long] for name, long in self._long.items() if long in self.variables}
+        self._variables: dict[str, np.ndarray] = dict(zip(self._core.variables, rows, strict=True))
+        self._variables |= {name: self._variables[long] for name, long in self._long.items() if long in self._variables}
+        moved = (f"{JOINT}_given_speed", f"{JOINT}_given_acceleration") if given else ()
+        self.inputs = tuple(name for name in self._core.inputs if name not in moved)
         self.reset(None, {})
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """Names of its variables."""
+        return tuple(self._variables)
+
+    def read(self, name: str) -> np.ndarray:
+        """Values of a variable, which each step writes anew."""
+        return self._variables[name]
 
     @property
     def counts(self) -> tuple[int, int, int, int]:
@@ -69,35 +72,62 @@ class ExactBatch:
         """Memory [bytes], without what the solvers keep of regimes."""
         return int(self._core.memory)
 
-    def step(self, command: np.ndarray, load_torque: np.ndarray, motion: dict[str, np.ndarray], threads: int) -> None:
-        """Advance all drives; `command` is the reference where controllers act."""
+    def step(self, values: Mapping[str, np.ndarray], motion: Mapping[str, np.ndarray], threads: int) -> None:
+        """Advance all trains with these inputs."""
         zero = np.zeros(1)
-        given = {"command": command, "reference": command, "load_torque": load_torque}
-        given |= {"motor_command": command, "motor_reference": command}
-        self._core.step([given.get(name, zero) for name in self._core.inputs], **motion, threads=threads)
+        self._core.step([values.get(name, zero) for name in self._core.inputs], **motion, threads=threads)
         self._steps += self._count
 
     def reset(self, which: np.ndarray | None, initial: Mapping[str, np.ndarray]) -> None:
-        """Take drives back to t = 0."""
+        """Take trains back to t = 0."""
         states = self._core.states
         start = np.zeros((self._count, len(states) + 1))
+        speed = f"{JOINT}_speed" if self._given else ""
         for name, values in initial.items():
             place = self._long.get(name, name)
-            if place in states:
-                start[:, states.index(place)] = values
-            elif values.any():
-                raise InputError(f"initial.{name}: {shown(values.max())} is no state of these drives; leave it out")
-        if self._given and "load_speed" in initial:
-            start[:, -1] = initial["load_speed"]
+            columns = [
+                k for k, state in enumerate(states) if state == place
+            ]  # several, if several parts have that state
+            if columns:
+                start[:, columns] = values[:, None]
+            elif place != speed and values.any():
+                raise InputError(f"initial.{name}: {shown(values.max())} is no state of these trains; leave it out")
+        if speed in initial:
+            start[:, -1] = initial[speed]
         try:
             self._core.reset(which, start)
         except ValueError as problem:
             raise InputError(f"initial: {problem}") from None
 
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the state at t = 0."""
+        moved = (f"{JOINT}_speed",) if self._given else ()
+        return tuple(
+            dict.fromkeys(
+                (*(s for s, long in self._long.items() if long in self._core.states), *self._core.states, *moved)
+            )
+        )
+
     def snapshot(self) -> Any:
-        """State of all drives."""
+        """State of all trains."""
         return self._core.snapshot()
 
     def restore(self, snapshot: Any) -> None:
         """Return to a snapshot."""
         self._core.restore(snapshot)
+
+
+def _with_given_load(scenario: Scenario) -> _core.Train:
+    """The solver's train, its load moved from outside.
+
+    Raises
+    ------
+    InputError
+        No shaft is called `load`.
+    """
+    if JOINT not in scenario.tables.shafts:
+        known = ", ".join(scenario.tables.shafts)
+        raise InputError(f"given_motion: is that of the shaft called {JOINT}, and the shafts are {known}; rename one")
+    loaded = [name for name in scenario.loaded() if name != JOINT]
+    return scenario.long().core(loaded=loaded, given=(JOINT,))

@@ -49,8 +49,13 @@ class Neighbour:
     scenario: Scenario
 
 
-def value_at(scenario: Scenario, key: str) -> float:
+def value_at(scenario: Scenario, key: str, function: str = "sensitivities") -> float:
     """The number under a dotted key; 0 where a start or a command is left out.
+
+    Parameters
+    ----------
+    function
+        That needs it, for messages.
 
     Raises
     ------
@@ -62,10 +67,10 @@ def value_at(scenario: Scenario, key: str) -> float:
         return 0.0
     if not _is_a_number(value):
         near = near_key(scenario, key) if value is None else ""
-        has = "nothing of that name" if value is None else f"{shown(value)} there, and a derivative needs a number"
+        has = "nothing of that name" if value is None else f"{shown(value)} there, and a number is needed"
         meant = near if near and _is_a_number(_entry_at(scenario, near)) else ""
         remedy = f"did you mean {meant}?" if meant else "give the key of a number"
-        raise InputError(f"{shortened(key)}: the scenario has {has}; {remedy}", where="sensitivities")
+        raise InputError(f"{shortened(key)}: the scenario has {has}; {remedy}", where=function)
     return float(value)
 
 
