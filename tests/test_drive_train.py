@@ -351,10 +351,8 @@ def test_shipped_trains_load_and_survive_json(path: Path) -> None:
     assert lm.load(path.stem) == scenario
 
 
-def test_what_takes_a_drive_alone_says_so() -> None:
-    with pytest.raises(
-        lm.InputError, match=r"drive: is for one motor that turns one load through one gearbox, and here brakes\.hold"
-    ):
+def test_what_takes_one_gear_or_linear_friction_alone_says_so() -> None:
+    with pytest.raises(lm.InputError, match=r"brakes\.hold.* acts too, and the closed form has inertia and viscous"):
         lm.response.rigid_constants(train())
     with pytest.raises(
         lm.InputError, match=r"gearbox: .* the test rig measures one gear; give one, such as scenario.gears"

@@ -59,6 +59,35 @@ def test_rigid_drive_follows_the_closed_form_over_four_decades():
     assert np.max(np.abs(response / closed - 1.0)) < 1e-10
 
 
+def test_rigid_trains_follow_the_closed_form_too():
+    """Two gears in line and a branch: J = J_M + J_1 + (J_2 + J_4/(25 0.7))/(4 0.95) + J_3/(4 900 0.95 0.8), and b alike."""
+    lossy = {"stiffness": {"kind": "rigid"}}
+    scenario = lm.Scenario(
+        shafts={
+            "rotor": {"inertia": 1e-6},
+            "middle": {"inertia": 3e-5, "viscous_friction": 1e-4},
+            "arm": {"inertia": 0.4, "viscous_friction": 0.2},
+            "fan": {"inertia": 2e-5},
+        },
+        motors={"m": {"shaft": "rotor", **frictionless("1-DOF-L").motor.model_dump(exclude_none=True)}},
+        gears={
+            "belt": lossy | {"input": "rotor", "output": "middle", "ratio": 2.0, "losses": {"kind": "constant_efficiency", "efficiency": 0.95}},
+            "box": lossy | {"input": "middle", "output": "arm", "ratio": -30.0, "losses": {"kind": "constant_efficiency", "efficiency": 0.8}},
+            "side": lossy | {"input": "middle", "output": "fan", "ratio": 5.0, "losses": {"kind": "constant_efficiency", "efficiency": 0.7}},
+        },
+        command={"m": {"amplitude": 0.1, "frequency": 1.0}},
+        simulation={"duration": 0.1, "sample_interval": 0.01},
+    )  # fmt: skip
+    closed = rigid_constants(scenario)
+    rotor = scenario.train().motors["m"].rotor_inertia
+    wanted = rotor + 1e-6 + (3e-5 + 2e-5 / (25 * 0.7)) / (4 * 0.95) + 0.4 / (4 * 900 * 0.95 * 0.8)
+    assert closed.inertia == pytest.approx(wanted, rel=1e-12)
+    assert closed.viscous_friction == pytest.approx(1e-4 / (4 * 0.95) + 0.2 / (3600 * 0.95 * 0.8), rel=1e-12)
+    frequencies = np.geomspace(0.1, 1000.0, 9)
+    response = lm.frequency_response(scenario, frequencies, 0.5)["response"].sel(output="arm_speed", amplitude=0.5)
+    assert np.max(np.abs(response.values / closed.response(frequencies, -60.0) - 1.0)) < 1e-10
+
+
 def test_linear_presets_follow_python_control_over_four_decades():
     frequencies = np.geomspace(0.1, 1000.0, 9)
     for model in ("1-DOF-L", "2-DOF-L"):

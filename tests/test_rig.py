@@ -80,6 +80,13 @@ def test_what_nothing_holds_starts_at_once(stiffness: dict):
         assert rig.starting_torque() == 0.0 and rig.backdriving_torque() == torque
 
 
+@pytest.mark.parametrize("name", ["paper-1dof-l-large", "paper-2dof-l-large", "hunting-with-static-friction"])
+def test_a_gear_without_friction_at_rest_starts_at_once(name: str):
+    (gear,) = lm.load(name).train().gears.values()
+    rig = TestRig(gear)
+    assert rig.starting_torque() == 0.0 and rig.backdriving_torque() == 0.0
+
+
 def test_inner_loops_remember_their_own_turning_point():
     rig = TestRig(gearbox_of(sheet(hysteresis_efficiency=0.9)))
     outer, inner = rig.loop(50.0), rig.loop(20.0)

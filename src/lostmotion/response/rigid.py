@@ -11,9 +11,14 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Time
 from ..model.drive import Drive
-from ..model.losses import ConstantEfficiency
-from ..simulation.one_gear import drive_of
+from ..model.gear import Gear
+from ..model.losses import ConstantEfficiency, TwoEfficiencies
+from ..model.motor import ShaftMotor
+from ..model.train import DriveTrain, TrainElements
+from ..simulation.needs import need_free_motion
 from ..simulation.scenario import Scenario
+
+OTHERS = tuple(table for table in TrainElements.model_fields if table not in ("motors", "gears"))
 
 
 @dataclass(frozen=True)
@@ -38,14 +43,14 @@ class RigidConstants:
 
 @checked
 def rigid_constants(
-    drive: Drive | Scenario, *, motor_time_constant: Time | None = None, time_constant: Time | None = None
+    drive: Drive | DriveTrain | Scenario, *, motor_time_constant: Time | None = None, time_constant: Time | None = None
 ) -> RigidConstants:
     """Return the constants of (8) to (11) of a rigid drive.
 
     Parameters
     ----------
-    drive : Drive or Scenario
-        A drive with a DC motor and a constant efficiency.
+    drive : Drive, DriveTrain or Scenario
+        A DC motor that turns loads through any number of gears of constant efficiency.
     motor_time_constant, time_constant : float, optional
         Time constants [s] that replace computed ones.
 
@@ -57,7 +62,7 @@ def rigid_constants(
     Raises
     ------
     InputError
-        The drive has a torque source, or no constant efficiency.
+        The motor is a torque source, a gear has no constant efficiency, or something else acts.
 
     Examples
     --------
@@ -65,18 +70,18 @@ def rigid_constants(
     >>> f"{lm.response.rigid_constants(lm.load('paper-1dof-l-large')).bandwidth:.3f} Hz"
     '2.451 Hz'
     """
-    drive = drive_of(drive)
+    scenario = Scenario.of_any(drive)
     for name, value in (("motor_time_constant", motor_time_constant), ("time_constant", time_constant)):
         if value is not None and not value > 0.0:
             raise InputError(f"{name}: {value:g} s must be greater than 0")
-    m, g, load = drive.motor.as_dc(), drive.gearbox, drive.load
+    motor, J, b = _at_motor(scenario)
+    m = motor.as_dc()
     if m.rated_speed is None or m.electrical_time_constant is None or m.armature_voltage_constant is None:
         raise InputError("the closed form needs a DC or a synchronous motor")
-    if not isinstance(g.losses, ConstantEfficiency):
-        raise InputError("the closed form needs gearbox.losses of kind constant_efficiency")
-    reflect = 1.0 / (g.ratio**2 * g.losses.efficiency)
-    J = m.rotor_inertia + g.inertia + load.inertia * reflect
-    b = g.viscous_friction + load.viscous_friction * reflect
+    if not m.rotor_inertia > 0.0:
+        raise InputError(
+            "the closed form needs the rotor_inertia of the motor, whose time constant is one of its numbers"
+        )
     k_N, tau = m.armature_voltage_constant, m.electrical_time_constant
     T_RC = (J / b if b > 0.0 else math.inf) if time_constant is None else time_constant
     if motor_time_constant is None:
@@ -99,3 +104,56 @@ def rigid_constants(
         rated_speed=k_N / (k_N - 1.0) * m.rated_speed * T_mc / back_emf,
         bandwidth=x * natural / (2.0 * math.pi),
     )
+
+
+def _at_motor(scenario: Scenario) -> tuple[ShaftMotor, float, float]:
+    """The one motor, inertia [kg·m²] and viscous friction [N·m·s/rad] at its shaft, all gears rigid.
+
+    Raises
+    ------
+    InputError
+        They are not constant.
+    """
+    need_free_motion(scenario, "rigid_constants")
+    train = scenario.train()
+    if len(train.motors) != 1:
+        raise InputError(f"the closed form is for one motor, and {len(train.motors) or 'no'} motors turn it")
+    if others := [f"{table}.{name}" for table in OTHERS for name in getattr(train, table)]:
+        raise InputError(
+            "acts too, and the closed form has inertia and viscous friction alone; leave it out", others[0]
+        )
+    (motor,) = train.motors.values()
+    shares, waiting = {motor.shaft: 1.0}, [motor.shaft]  # of each shaft's values at the motor
+    while waiting:
+        shaft = waiting.pop()
+        for name, gear in train.gears.items():
+            if gear.input == shaft and gear.output not in shares:
+                ratio = gear.ratio * gear.ratio
+                shares[gear.output] = shares[shaft] / (ratio * _efficiency(scenario.gear_key(name), gear))
+                waiting.append(gear.output)
+    if len(train.gears) != len(train.shafts) - 1 or len(shares) != len(train.shafts):
+        raise InputError(
+            "the closed form is for gears that branch out from the motor, and here some join or drive back"
+        )
+    shafts, gears = train.shafts.items(), train.gears.values()
+    J = sum(s.inertia * shares[name] for name, s in shafts) + sum(g.inertia * shares[g.input] for g in gears)
+    b = sum(s.viscous_friction * shares[name] for name, s in shafts)
+    return motor, J + motor.rotor_inertia, b + sum(g.viscous_friction * shares[g.input] for g in gears)
+
+
+def _efficiency(key: str, gear: Gear) -> float:
+    """Efficiency of a gear that drives.
+
+    Raises
+    ------
+    InputError
+        It is not constant, or its housing turns.
+    """
+    if gear.housing is not None:
+        raise InputError("turns, and the closed form is for gears whose housing stands", f"{key}.housing")
+    losses = gear.losses
+    if isinstance(losses, ConstantEfficiency):
+        return losses.efficiency
+    if isinstance(losses, TwoEfficiencies):
+        return losses.efficiencies()[0]
+    raise InputError("the closed form needs a constant efficiency", f"{key}.losses")

@@ -272,9 +272,8 @@ class TestRig:
     @staticmethod
     def _break_away(result: RunArrays) -> tuple[float, float]:
         """(instant [s], output torque [N·m]) at which the input shaft first starts to turn: at once where nothing holds it."""
-        if result["input_contact"][0] != 0:
-            return 0.0, float(result["output_torque"][0])
-        found = break_away(result)
-        if found is None:
+        if (found := break_away(result)) is not None and result["input_contact"][0] == 0:
+            return found["instant"], found["output_torque_before"]
+        if result["input_contact"][-1] == 0:  # it rests, and has never switched
             raise RigError("the input shaft never started to turn")
-        return found["instant"], found["output_torque_before"]
+        return 0.0, float(result["output_torque"][0])
