@@ -93,7 +93,7 @@ def test_attraction_on_a_guide_of_unknown_friction_is_not_judged():
 
 def test_a_payload_presses_on_the_guide():
     study = task_of(changed(task={"payload": [{"begin": "0.4 s", "end": "1 s", "mass": "2 kg"}]}))
-    assert study.drive.load.friction_torque == pytest.approx(0.01 * 7.0 * G)
+    assert study.scenario.load.friction_torque == pytest.approx(0.01 * 7.0 * G)
     tilted = task_of(changed(slide={"inclination": "60 deg"}, task={"hold_without_power": False}))
     assert tilted.drive.load.friction_torque == pytest.approx(0.01 * 5.0 * G * 0.5)
 

@@ -66,7 +66,7 @@ def test_a_run_that_goes_on_is_a_run_of_its_own(name: str, least: float, monkeyp
 def test_a_spline_through_more_cycles_is_another_one():
     for name, alike in (("samples", True), ("a spline", False)):
         study = task_of(TASKS[name])
-        two, four = (cycles_of(study.drive, study.axis, count) for count in (2, 4))
+        two, four = (cycles_of(study.scenario, study.axis, count) for count in (2, 4))
         assert begins_alike(two, four) == alike
 
 

@@ -246,17 +246,35 @@ def test_what_cannot_vary_ends_in_one_clear_line(tmp_path: Path, text: str, sent
         ("peak(load_speed)", "'load_speed' in 'peak(load_speed)' is neither a result variable nor one of"),
         ("peak(joint_sped)", "did you mean joint_speed?"),
         ("energy.gear_losses", "energy.gear_losses is none of servo_motor, "),
-        (
-            "bandwidth()",
-            "bandwidth in 'bandwidth()' is of one motor that turns one load through one gearbox",
-        ),
-        ("peak(ideal_speed)", "ideal_speed in 'peak(ideal_speed)' is of one motor"),
     ],
 )
 def test_what_a_train_does_not_have_cannot_be_kept(expression: str, sentence: str):
     with pytest.raises(lm.InputError, match=r"keep\.x: ") as caught:
         make(keep={"x": expression})
     assert sentence in str(caught.value)
+
+
+def test_a_train_of_one_motor_has_an_ideal_speed_and_a_bandwidth(tmp_path: Path):
+    """Of a belt of 1.5 before a gear of 100: the unloaded motor turns 150 times as fast as the load."""
+    vary = [{"key": "shafts.joint.inertia", "values": [1.0, 2.0]}]
+    keep = {"ideal": "peak(ideal_speed)", "band": "bandwidth(0.2)"}
+    study = make(vary=vary, keep=keep, design="grid", runs=None, seed=0)
+    rows = rows_of(study, tmp_path / "s")
+    for run in (0, 1):
+        scenario = scenario_of_run(study, run)
+        command = float(np.abs(lm.simulate(scenario)["servo_command"]).max())
+        unloaded = scenario.train().motors["servo"].unloaded_speed
+        assert rows["ideal"][run] == pytest.approx(command * unloaded / 150.0, rel=1e-12)
+        assert rows["band"][run] == pytest.approx(lm.response.bandwidth(scenario, 0.2), rel=1e-9)
+
+
+@pytest.mark.parametrize("expression", ["bandwidth()", "peak(ideal_speed)"])
+@pytest.mark.parametrize("name", ["two-motors-one-ring", "two-link-arm-frozen"])
+def test_trains_without_one_way_from_motor_to_last_shaft_have_neither(name: str, expression: str):
+    scenario = lm.load(name)
+    with pytest.raises(lm.InputError, match=r"keep\.x: .* is of one commanded motor that turns the last shaft"):
+        vary = [{"key": f"motors.{next(iter(scenario.motors))}.rotor_inertia", "relative": True, "values": [1.0]}]
+        make(scenario=scenario, vary=vary, keep={"x": expression}, design="grid", runs=None, seed=0)
 
 
 def test_a_motor_named_as_a_key_of_the_short_form_is_not_mistaken():

@@ -77,7 +77,8 @@ def drive_keys(what: Drive | DriveTrain | Scenario) -> dict[str, str]:
         return {}
     train = what if isinstance(what, DriveTrain) else what.train()
     ((motor, _),), ((gear, between),) = train.motors.items(), train.gears.items()
-    return {f"shafts.{between.output}": LOAD, f"gears.{gear}": GEARBOX, f"motors.{motor}": MOTOR}
+    found = {f"shafts.{between.output}": LOAD, f"gears.{gear}": GEARBOX, f"motors.{motor}": MOTOR}
+    return found | {f"command.{motor}": "command"}
 
 
 def is_drive(scenario: Scenario) -> bool:

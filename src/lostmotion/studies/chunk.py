@@ -11,11 +11,11 @@ from ..simulation.scenario import Scenario
 from .axis_rows import run_axes
 from .columns import tabulate, units_of
 from .file import from_json
-from .in_core import core_can, run_in_core
-from .row_by_row import run_each, run_trains, together
+from .in_core import core_can, run_in_core, together
+from .row_by_row import run_each
 from .runs import Runs
 from .study import Study
-from .wanted import SOURCES, channels, needed, reductions
+from .wanted import channels, needed, reductions
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -49,12 +49,9 @@ def pieces(study: Study, first: int, last: int) -> list[tuple[int, int]]:
 
 def _arrays(study: Study) -> int:
     """Number of variables of each run that are held at once."""
-    wanted = needed(study)
     if together(study):
         return 0 if reductions(study) else len(channels(study))
-    if core_can(study) and reductions(study):
-        return 0
-    return len(study.vocabulary.channels) if wanted & SOURCES.keys() else len(wanted)
+    return len(needed(study))
 
 
 @lru_cache(maxsize=8)
@@ -73,9 +70,7 @@ def run_piece(study: Study, first: int, last: int, threads: int) -> Runs:
     parameters = study.parameters(first, last)
     if study.axis is not None:
         return run_axes(study, parameters, threads)
-    if together(study):
-        return run_trains(study, parameters, threads)
-    return (run_in_core if core_can(study) else run_each)(study, parameters, threads)
+    return (run_in_core if together(study) else run_each)(study, parameters, threads)
 
 
 def as_table(text: str, first: int, last: int, runs: Runs, threads: int) -> pa.Table:

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import _core
+from ..control.turning import turns
 from ..response.crossovers import bandwidth
 from ..simulation.scenario import Scenario
-from ..simulation.variables import CHANNEL_NAMES, gear_efficiency
 from ..worker_threads import thread_pool
 from .records import kind_of_record
 from .runs import Runs
 from .select import TASK_SHARES, USE
 from .study import Study
-from .wanted import asks_for, needed, used
+from .wanted import asks_for, used
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -31,8 +31,7 @@ def tabulate(study: Study, units: dict[str, str], first: int, last: int, runs: R
     for k, v in enumerate(study.vary):
         numbers = runs.parameters[:, k]
         columns[v.title] = pa.array(numbers if v.names is None else [v.value(x) for x in numbers])
-    data = {} if runs.kept else _with_derived(study, runs)
-    names = _names(study, data, runs, threads)
+    names = _names(study, runs, threads)
     kept_values = runs.kept | {
         name: e.values(names, last - first) for name, e in study.expressions.items() if name not in runs.kept
     }
@@ -41,7 +40,7 @@ def tabulate(study: Study, units: dict[str, str], first: int, last: int, runs: R
         columns[name] = pa.array(np.where(bad, np.nan, kept_values[name]))
     if study.trajectories is not None:
         for name in study.trajectories.variables:
-            kept = data[name][:, :: study.trajectories.every]
+            kept = runs.samples[name][:, :: study.trajectories.every]
             columns[f"{name} over time"] = pa.array([None if b else row for b, row in zip(bad, kept, strict=True)])
     columns |= {name: pa.array(values) for name, values in runs.checks.items()}
     columns["switchings"] = pa.array(runs.switchings.astype(np.int64))
@@ -58,17 +57,6 @@ def units_of(study: Study) -> dict[str, str]:
     return units | {f"{n} over time": of[n] for n in (study.trajectories.variables if study.trajectories else ())}
 
 
-def _with_derived(study: Study, runs: Runs) -> dict[str, np.ndarray]:
-    wanted = needed(study)
-    if wanted <= runs.samples.keys():
-        return runs.samples
-    samples = study.scenario.simulation.samples
-    whole = runs.samples | {c: runs.samples.get(c, np.zeros((len(runs.errors), samples))) for c in CHANNEL_NAMES}
-    whole["efficiency"] = gear_efficiency(whole, runs.ratio[:, None])
-    whole["motor_power"] = whole["motor_torque"] * whole["motor_speed"]
-    return {name: whole[name] for name in wanted | set(runs.samples)}
-
-
 @lru_cache(maxsize=4)
 def _instants(duration: float, interval: float) -> Any:
     """The coordinate of the samples; making its index takes longer than many a reduction."""
@@ -77,7 +65,7 @@ def _instants(duration: float, interval: float) -> Any:
     return xr.Coordinates({"time": _core.sample_times(duration, interval)})
 
 
-def _names(study: Study, data: dict[str, np.ndarray], runs: Runs, threads: int) -> dict[str, Any]:
+def _names(study: Study, runs: Runs, threads: int) -> dict[str, Any]:
     """All that the study's expressions may use, over all runs of a piece."""
     import xarray as xr
 
@@ -86,7 +74,7 @@ def _names(study: Study, data: dict[str, np.ndarray], runs: Runs, threads: int) 
 
     instants = _instants(study.scenario.simulation.duration, study.scenario.simulation.sample_interval)
     names: dict[str, Any] = {
-        name: xr.DataArray(data[name], instants, ("run", "time")) for name in used(study) & data.keys()
+        name: xr.DataArray(runs.samples[name], instants, ("run", "time")) for name in used(study) & runs.samples.keys()
     }
     names["time"] = xr.DataArray(instants["time"], instants)
     if asks_for(study, "energy"):
@@ -101,14 +89,17 @@ def _ideal_speeds(study: Study, runs: Runs) -> np.ndarray:
     """Load speed [rad/s] at command 1 of a rigid drive without inertia, friction and load, for each run."""
 
     def of(scenario: Scenario) -> float:
-        return scenario.motor.unloaded_speed / scenario.gearbox.ratio
+        train = scenario.train()
+        (motor,) = train.motors.values()
+        ratio = turns(train, motor.shaft, list(train.shafts)[-1])
+        return motor.unloaded_speed / (ratio or math.nan)
 
-    base = study.drive
+    base = study.scenario
     keys = {key for v in study.vary for key in v.all_keys}
     if not any(key.startswith("motor") or key.endswith(".ratio") or kind_of_record(key) for key in keys):
         return np.full(len(runs.errors), of(base))
     rows = zip(runs.parameters, runs.errors, strict=True)
-    return np.array([math.nan if error else of(study.drive_at(row)) for row, error in rows])
+    return np.array([math.nan if error else of(study.scenario_at(row)) for row, error in rows])
 
 
 def _bandwidths(study: Study, runs: Runs, amplitude: Any, threads: int) -> np.ndarray:
@@ -121,14 +112,10 @@ def _bandwidths(study: Study, runs: Runs, amplitude: Any, threads: int) -> np.nd
     def find(k: int) -> float:
         if runs.errors[k]:
             return math.nan
-        scenario = study.drive_at(runs.parameters[k])
+        scenario = study.scenario_at(runs.parameters[k])
+        own = next((signal.amplitude for signal in scenario.tables.command.values()), 0.0) or 0.0
         try:
-            return bandwidth(
-                scenario.drive(),
-                float(amplitudes[k]) if amplitude is not None else scenario.command.amplitude or 0.0,
-                mean_command=scenario.command.mean,
-                mean_load_torque=scenario.load.torque.mean,
-            )
+            return bandwidth(scenario, own if amplitude is None else float(amplitudes[k]))
         except (RuntimeError, ValueError) as error:
             runs.errors[k] = str(error)
             return math.nan

@@ -109,7 +109,7 @@ def read_expression(text: str, vocabulary: Vocabulary = OF_DRIVES) -> Expression
 
 def _unknown(name: str, text: str, vocabulary: Vocabulary) -> ValueError:
     if name in OF_THE_RUN:
-        return ValueError(f"{name} in {text!r} is of one motor that turns one load through one gearbox")
+        return ValueError(f"{name} in {text!r} is of one commanded motor that turns the last shaft through gears")
     choice = listed((*FUNCTIONS, *vocabulary.of_the_run))
     near = nearest(name, [v for v, _ in vocabulary.variables])
     hint = f"; did you mean {near}?" if near else ""

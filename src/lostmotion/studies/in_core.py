@@ -1,4 +1,4 @@
-"""Runs of a drive in which nothing but plain numbers varies: all in one call of the core, which writes them into the drive."""
+"""Runs of trains without sampled controllers: all in one call of the core, which writes plain numbers that vary into the train."""
 
 from __future__ import annotations
 
@@ -10,14 +10,18 @@ from .. import _core
 from ..errors import InputError
 from ..model.torsion import Rigid
 from ..simulation.core_runs import core_case
-from ..simulation.results import ENERGY
+from ..simulation.keys import renamed
+from ..simulation.one_gear import drive_keys, is_drive
+from ..simulation.scenario import Scenario
+from ..simulation.train_parts import parts_of
+from .check import COLUMNS, check_columns
 from .functions import REDUCTIONS
 from .runs import Runs, spread
 from .study import Study
-from .vary import base_value
-from .wanted import asks_for, channels, checks_drives, reductions
+from .vary import Vary, base_value
+from .wanted import asks_for, channels, checks_drives, needed, reductions
 
-SLOPES = "gearbox.stiffness.slopes"
+RATIO, SLOPES = "gearbox.ratio", "gearbox.stiffness.slopes"
 
 
 @lru_cache(maxsize=1)
@@ -25,71 +29,131 @@ def _fields() -> dict[str, int]:
     return {key: k for k, key in enumerate(_core.batch_fields())}
 
 
+def together(study: Study) -> bool:
+    """Whether its runs are of trains that the core can take at once."""
+    return not study.scenario.axes() and len(parts_of(study.scenario)) == 1
+
+
 def core_can(study: Study) -> bool:
-    """Whether all that varies is a plain number of the core, and the runs are all that is wanted."""
+    """Whether all that varies is a plain number that the core changes by itself, and the runs are all that is wanted."""
     s = study.scenario
-    if checks_drives(study) or not s.is_drive or s.controller is not None:
+    if checks_drives(study) or not together(study) or not is_drive(s):
         return False
-    rigid = isinstance(s.gearbox.stiffness, Rigid)
-    for v in study.vary:
-        for key in v.all_keys:
-            if key not in _fields() or base_value(s, key) is None or rigid:
+    ((_, motor),), ((_, gear),) = s.train().motors.items(), s.train().gears.items()
+    rigid = isinstance(gear.stiffness, Rigid)
+    signals = [*s.tables.command.values(), *s.loads().values()]
+    for key, own, v in _keys(study):
+        if own not in _fields() or base_value(s, key) is None or rigid:
+            return False
+        if own.startswith("motor.") and motor.kind == "synchronous":
+            return False  # numbers of the core follow from it
+        if own == SLOPES and (not v.relative or gear.stiffness.preload > 0.0):  # type: ignore[union-attr]
+            return False
+        if own.startswith(("command.", "load.torque.")):
+            parts = ("sines", "steps", "ramps", "chirp", "samples", "wind")
+            if any(getattr(signal, part, None) for signal in signals for part in parts):
                 return False
-            if key.startswith("motor.") and s.motor.kind == "synchronous":
-                return False  # numbers of the core follow from it
-            if key == SLOPES and (not v.relative or s.gearbox.stiffness.preload > 0.0):  # type: ignore[union-attr]
-                return False
-            if key.startswith(("command.", "load.torque.")):
-                signal = s.command if key.startswith("command.") else s.load.torque
-                plain = not (
-                    signal.sines
-                    or signal.steps
-                    or signal.ramps
-                    or signal.chirp
-                    or signal.samples
-                    or getattr(signal, "wind", None)
-                )
-                if not plain:
-                    return False
     return True
+
+
+def _keys(study: Study) -> list[tuple[str, str, Vary]]:
+    """Each key that varies, as it is in the tables and as the core has it."""
+    names = drive_keys(study.scenario)
+    return [(key, renamed(key, names), v) for v in study.vary for key in v.all_keys]
 
 
 def run_in_core(study: Study, parameters: np.ndarray, threads: int) -> Runs:
     """All runs in one call, the GIL released."""
-    s = study.drive
-    sampled, reduced = channels(study), reductions(study)
-    keys = [(key, v, k) for k, v in enumerate(study.vary) for key in v.all_keys]
-    values = np.empty((len(parameters), len(keys)))
-    for j, (key, v, k) in enumerate(keys):
-        values[:, j] = parameters[:, k]
-        if v.relative and key != SLOPES:  # of the slopes the core takes the factor
-            values[:, j] *= float(base_value(s, key))
-    errors = _out_of_range(study, parameters)
-    where = np.flatnonzero([e == "" for e in errors])
+    n, sampled, reduced = len(parameters), channels(study), reductions(study)
+    entries = study.vocabulary.energies if asks_for(study, "energy") else ()
+    errors, cases, fields, values = (_by_numbers if core_can(study) else _one_by_one)(study, parameters)
+    where = np.array([k for k, error in enumerate(errors) if not error], dtype=int)
     found = _core.run_batch(
-        [core_case(s)],
-        fields=[_fields()[key] for key, _, _ in keys],
-        values=np.ascontiguousarray(values[where]),
-        **s.simulation.grid(),
-        energies=ENERGY if asks_for(study, "energy") else (),
+        [core_case(scenario) for scenario in cases],
+        fields=fields,
+        values=values,
+        **study.scenario.simulation.grid(),
+        energies=[entry for _, entry in entries],
         channels=sampled,
         kept=[(sampled.index(variable), REDUCTIONS.index(how)) for how, variable in reduced.values()],
         threads=threads,
     )
-    n, made, energies = len(parameters), found["values"], found["energies"]
-    for row, text in zip(where.tolist(), found["errors"], strict=True):
-        errors[row] = text
-    ratio = next((values[:, j] for j, (key, _, _) in enumerate(keys) if key == "gearbox.ratio"), None)
+    made, energies = found["values"], found["energies"]
+    for k, text in zip(where.tolist(), found["errors"], strict=True):
+        errors[k] = text
+    checks = _checks_of(dict(zip(where.tolist(), cases, strict=True)), errors) if checks_drives(study) else {}
+    rows = {} if reduced else {name: spread(made[:, k], where, n) for k, name in enumerate(sampled)}
     return Runs(
         parameters=parameters,
-        samples={} if reduced else {c: spread(made[:, k], where, n) for k, c in enumerate(sampled)},
+        samples=_with_derived(study, rows, parameters, errors),
         kept={name: spread(made[:, k], where, n) for k, name in enumerate(reduced)},
-        energy={e: spread(energies[:, k], where, n) for k, e in enumerate(ENERGY)} if energies.shape[1] else {},
-        checks={},
+        energy={name: spread(energies[:, k], where, n) for k, (name, _) in enumerate(entries)},
+        checks=checks,
         switchings=np.nan_to_num(spread(found["switchings"], where, n)),
         errors=errors,
-        ratio=np.full(n, s.gearbox.ratio) if ratio is None else ratio,
     )
+
+
+Wanted = tuple[list[str], list[Scenario], list[int], np.ndarray]
+"""of each run why there is none; the scenarios, or the one in which numbers vary; these, and their values of each run that there is"""
+
+
+def _by_numbers(study: Study, parameters: np.ndarray) -> Wanted:
+    errors, keys = _out_of_range(study, parameters), _keys(study)
+    there = parameters[[not error for error in errors]]
+    values = np.empty((len(there), len(keys)))
+    for j, (key, own, v) in enumerate(keys):
+        values[:, j] = there[:, study.vary.index(v)]
+        if v.relative and own != SLOPES:  # of the slopes the core takes the factor
+            values[:, j] *= float(base_value(study.scenario, key))
+    return errors, [study.scenario], [_fields()[own] for _, own, _ in keys], values
+
+
+def _one_by_one(study: Study, parameters: np.ndarray) -> Wanted:
+    scenarios, errors = [], [""] * len(parameters)
+    for k, row in enumerate(parameters):
+        try:
+            scenarios.append(study.scenario_at(row))
+        except InputError as error:
+            errors[k] = str(error)
+    return errors, scenarios, [], np.empty((0, 0))
+
+
+def _checks_of(trains: dict[int, Scenario], errors: list[str]) -> dict[str, list[float | str]]:
+    """The drive check of each run; where there is none, the run's error says why."""
+    checks = {name: [empty] * len(errors) for name, empty in COLUMNS.items()}
+    for k, scenario in trains.items():
+        if errors[k]:
+            continue
+        try:
+            found = check_columns(scenario)
+        except (RuntimeError, ValueError) as error:
+            errors[k] = str(error)
+            continue
+        for name, value in found.items():
+            checks[name][k] = value
+    return checks
+
+
+def _with_derived(
+    study: Study, rows: dict[str, np.ndarray], parameters: np.ndarray, errors: list[str]
+) -> dict[str, np.ndarray]:
+    """The needed variables (runs x samples), what follows from the channels included."""
+    wanted = needed(study)
+    if not rows or wanted <= rows.keys():
+        return rows
+    table = study.scenario.simulation
+    time = table.instants()
+    out = {name: np.full((len(errors), table.samples), np.nan) for name in wanted}
+    changed = not core_can(study) or any(own == RATIO for _, own, _ in _keys(study))  # and nothing else matters
+    for k, row in enumerate(parameters):
+        if errors[k]:
+            continue
+        data = {name: values[k] for name, values in rows.items()}
+        (study.scenario_at(row) if changed else study.scenario).derive(data, time)
+        for name in wanted:
+            out[name][k] = data[name]
+    return out
 
 
 def _out_of_range(study: Study, parameters: np.ndarray) -> list[str]:

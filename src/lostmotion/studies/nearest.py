@@ -87,7 +87,7 @@ def slowed(study: Study, factor: float) -> Study:
     InputError
         The motion has parts that cannot be stretched, such as a target in space.
     """
-    task, base = study.axis, study.drive
+    task, base = study.axis, study.scenario
     assert task is not None
     assert base.controller is not None
     reference = _slowed_reference(reference_of(base), factor)
@@ -208,7 +208,7 @@ def _said(study: Study, slower: Study, row: np.ndarray, factor: float) -> str:
     before, after = study.axis, slower.axis
     assert before is not None
     assert after is not None
-    moves = reference_of(study.drive).intervals()
+    moves = reference_of(study.scenario).intervals()
     longest = max((b - a for a, b in moves), default=0.0)
     slow, now = told_apart(factor * longest, longest)
     what = f", its longest move {slow} s instead of {now} s" if longest else ""

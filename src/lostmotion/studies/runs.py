@@ -9,8 +9,8 @@ import numpy as np
 
 class Runs(SimpleNamespace):
     """Results of a chunk: parameters (runs x parameters), samples (variable -> runs x samples) or their reductions by
-    the core (column -> runs), energy (entry -> runs). Further columns are those of the drive check, switchings,
-    errors, and the ratio (runs) of drives that the core varies."""
+    the core (column -> runs), energy (entry -> runs). Further columns are those of the drive check, switchings
+    and errors."""
 
     parameters: np.ndarray
     samples: dict[str, np.ndarray]
@@ -19,7 +19,6 @@ class Runs(SimpleNamespace):
     checks: dict[str, list[float | str]]
     switchings: np.ndarray
     errors: list[str]
-    ratio: np.ndarray
 
 
 def spread(values: np.ndarray, where: np.ndarray, runs: int) -> np.ndarray:

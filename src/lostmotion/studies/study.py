@@ -16,7 +16,6 @@ from ..inputs.quantities import Whole
 from ..inputs.validation import did_you_mean, listed
 from ..model.duty import HoldingBrake
 from ..model.motor import Motor
-from ..simulation.one_gear import as_drive
 from ..simulation.scenario import Scenario
 from ..simulation.units_of_keys import unit_in, unit_of_key
 from ..sizing.stages import stage_of, together
@@ -120,7 +119,7 @@ class Study(Part):
     def _check_axis(self, task: AxisTask) -> None:
         if self.keep or self.trajectories is not None:
             raise ValueError("has keep or trajectories, but a task keeps columns of its own; leave them out")
-        task.check(self.drive)
+        task.check(self.scenario)
 
     def _is_own(self, key: str) -> bool:
         """Whether it is a key of a task, and none of its motor or gearbox."""
@@ -197,7 +196,7 @@ class Study(Part):
         if "ideal_speed" not in expression.names:  # which expressions of trains do not know
             return
         motor_varies = any(kind_of_record(key) == "motor" for v in self.vary for key in v.all_keys)
-        if self.drive.motor.kind == "torque_source" and not motor_varies:
+        if any(m.kind == "torque_source" for m in self.scenario.train().motors.values()) and not motor_varies:
             raise ValueError(
                 "ideal_speed needs a motor of kind dc or synchronous; a torque source has no speed of its own"
             )
@@ -253,7 +252,7 @@ class Study(Part):
                 raise InputError(f"{column!r} is no column of numbers; {near}", "select")
         check_bounds(select, units)
         if self.axis is not None:
-            reference = reference_of(self.drive)
+            reference = reference_of(self.scenario)
             if "reversal_error" in select.named() and not turns_back(reference):
                 raise InputError(f"reversal_error {ONE_WAY}; leave it out", "select")
             if "settling_time" in select.named() and (self.axis.settling_window is None or not reference.moves):
@@ -265,11 +264,6 @@ class Study(Part):
     def tables(self) -> dict[str, Any]:
         """The base as tables of a scenario file."""
         return self.written or self.scenario.model_dump()
-
-    @property
-    def drive(self) -> Scenario:
-        """The base of a task, or of a study of a drive."""
-        return as_drive(self.scenario, "study")
 
     @property
     def vocabulary(self) -> Vocabulary:
@@ -308,12 +302,12 @@ class Study(Part):
     def base_of(self, row: np.ndarray) -> Scenario:
         """The base of a row of a task: of a linear motor with the scale alone, and the weight of its coils on the guide."""
         if not self.slides_itself(row):
-            return self.drive
+            return self.scenario
         key = ("base", self.part_key("motor", row))
         if key not in self.kept:
             assert self.axis is not None
             assert self.axis.linear is not None
-            base, coils = with_scale_alone(self.drive), float(self.part("motor", row).rotor_inertia)
+            base, coils = with_scale_alone(self.scenario), float(self.part("motor", row).rotor_inertia)
             self.kept[key] = base.model_copy(update={"load": self.axis.linear.carrying(base.load, coils)})
         return self.kept[key]  # type: ignore[no-any-return]
 
@@ -402,7 +396,7 @@ class Study(Part):
         """
         if task.current is not None and motor.kind != "torque_source":
             values = {"motor": motor.model_dump(), "controller.current": task.current.model_dump()}
-            self.drive.replace(**values)
+            self.scenario.replace(**values)
         return task.fed(motor, brake)
 
     def records(self, row: np.ndarray) -> dict[str, Sheet]:
@@ -447,10 +441,6 @@ class Study(Part):
             if key not in records
         }
         return base.replace(**changes) if changes else base
-
-    def drive_at(self, row: np.ndarray) -> Scenario:
-        """The same, of a study of a drive."""
-        return as_drive(self.scenario_at(row), "study")
 
     def _with_records(self, records: dict[str, Any]) -> Scenario:
         """The base with other records; the last ones are kept, since other parameters may vary beside them."""

@@ -98,7 +98,7 @@ def load_task(path: str | Path) -> Study:
         study = task_of(tables, path.parent)
         assert study.axis is not None
         study.axis.doubt_window(
-            reference_of(study.drive), study.kept_units["rest_error"], f"{path}: key task.settling_window"
+            reference_of(study.scenario), study.kept_units["rest_error"], f"{path}: key task.settling_window"
         )
         return study
     except InputError as error:

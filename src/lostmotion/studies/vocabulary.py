@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from ..simulation.one_gear import is_drive
+from ..control.turning import turns
 from ..simulation.pointing_error import pointing_names
 from ..simulation.results import ENERGY
 from ..simulation.scenario import Scenario
@@ -57,11 +57,20 @@ def vocabulary_of(scenario: Scenario) -> Vocabulary:
 
     An entry of a train's ledger, such as ``first_gear: mesh``, is called ``first_gear_mesh``.
     """
-    variables = scenario.variables()
+    variables, own = scenario.variables(), _commands(scenario)
     return Vocabulary(
         (*((v.name, v.unit) for v in variables), *_controlled(scenario)),
         tuple(v.name for v in variables if not v.derived),
         tuple((entry.replace(": ", "_").replace(" ", "_"), entry) for entry in scenario.core().ledger_names()),
-        OF_THE_RUN if is_drive(scenario) else OF_TRAINS,
-        *(scenario.train().command_of(motor) for motor in scenario.train().motors if is_drive(scenario)),
+        OF_THE_RUN if own else OF_TRAINS,
+        *own,
     )
+
+
+def _commands(scenario: Scenario) -> list[str]:
+    """The command of the one motor that turns the last shaft through gears; of other trains none."""
+    train = scenario.train()
+    last, motors = list(train.shafts)[-1], scenario.train().motors
+    if len(motors) != 1 or scenario.tables.controllers or scenario.given():
+        return []
+    return [train.command_of(name) for name, motor in motors.items() if turns(train, motor.shaft, last) is not None]

@@ -4,12 +4,6 @@ from __future__ import annotations
 
 from .study import Study
 
-SOURCES = {
-    "efficiency": ("output_torque", "input_torque", "motor_speed"),
-    "motor_power": ("motor_torque", "motor_speed"),
-}
-"""channels that the derived variables of a drive are made of"""
-
 
 def asks_for(study: Study, name: str) -> bool:
     """Whether an expression uses a name that is no result variable."""
@@ -35,14 +29,9 @@ def reductions(study: Study) -> dict[str, tuple[str, str]]:
 
 
 def channels(study: Study) -> list[str]:
-    """The channels of the core that the needed variables are made of."""
-    wanted = needed(study)
-    given = study.vocabulary.channels
-    found = {channel for name in wanted for channel in SOURCES.get(name, (name,))}
-    if found <= set(given):
-        return sorted(found)
-    # Angles that follow do so through the gears, from angle to angle.
-    return [name for name in given if name in wanted or name.endswith(("_angle", "_twist"))]
+    """The channels of the core that the needed variables are made of: all, if one follows from others."""
+    wanted, given = needed(study), study.vocabulary.channels
+    return sorted(wanted) if wanted <= set(given) else list(given)
 
 
 def checks_drives(study: Study) -> bool:
