@@ -47,6 +47,19 @@ def test_an_unstable_axis_says_that_it_swings_and_by_how_much_it_leaves_its_refe
     assert swing == pytest.approx(math.degrees(0.5 * np.ptp(late)), rel=0.1)
 
 
+@pytest.mark.parametrize("name", ["ball-screw-axis", "rack-axis-with-play"])
+def test_a_motor_that_swings_within_its_backlash_is_unstable_though_its_slide_rests(name: str) -> None:
+    """20 times the gain of the speed loop: the friction of the guide holds the slide, while the motor swings at its torque limit."""
+    scenario = lm.load(name)
+    result = lm.simulate(scenario.replace(**{"controller.speed.gain": 20.0 * scenario.controllers["motor"].speed.gain}))
+    (errors,) = loop_errors(result)
+    assert (errors.swing, errors.grows) == (0.0, False)
+    verdict = verdict_of(result)
+    assert verdict is not None
+    assert verdict.state == "does not fit"
+    assert "caused by the speed loop" in verdict.lines[0]
+
+
 def test_a_limit_cycle_of_a_stable_loop_is_a_reservation_however_large() -> None:
     """Static friction under integral action swings on between break-aways. No requirement is missed by a run that shows it."""
     scenario = lm.load("hunting-with-static-friction")

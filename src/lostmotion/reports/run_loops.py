@@ -59,7 +59,7 @@ class LoopErrors:
     grows: bool
     """whether that swing grows, or the error diverges"""
     pole: str
-    """pole outside the unit circle of the sampled loops of an axis that swings; empty if there is none, or none is known"""
+    """pole outside the unit circle of the sampled loops of the axis; empty if there is none, or none is known"""
 
     def lines(self) -> Iterator[str]:
         """Lines of a summary."""
@@ -73,7 +73,10 @@ class LoopErrors:
             yield f"{of} leaves the range of its reference by {beyond}"
 
     def points(self) -> Iterator[Point]:
-        """Answer to whether the loop is stable, if it is not, or if it swings. A swing that lasts by itself misses no requirement."""
+        """Answer to whether the loop is stable, if it is not, or if it swings. A swing that lasts by itself misses no requirement.
+
+        The motor of an unstable axis may swing within its backlash, while friction holds what the error is of.
+        """
         of = f"the {self.quantity} error{f' of {self.name}' if self.name else ''}"
         if self.grows and self.swing == 0.0:
             yield Point("does not fit", f"unstable: {of} diverges, up to {_shown(_peak(self.true), self.unit, 3)}")
@@ -85,6 +88,8 @@ class LoopErrors:
                 f"{'unstable: ' if unstable else ''}{of} swings by {swing} at the end, which {how}"
                 f"{f'; {self.pole}' if self.pole else ''}",
             )
+        elif self.pole:
+            yield Point("does not fit", f"unstable: {f'{self.name}, ' if self.name else ''}{self.pole}")
 
 
 def _shown(value: float, unit: str, digits: int) -> str:
@@ -131,7 +136,7 @@ def _of_axis(result: Any, scenario: Scenario, motor: str) -> LoopErrors | None:
     begin = c.reference.duration if sampled else _last_change(time, reference)
     begin = max([begin, *(signal.breakpoint_list()[-1][0] for signal in scenario.signals().values())])
     swing, frequency, grows = _swings(time, error, begin, float(high - low))
-    pole = _pole(scenario, motor) if sampled and swing > 0.0 else ""
+    pole = _pole(scenario, motor) if sampled else ""
     if not grows and not pole and moving_input(scenario):
         swing = 0.0  # of the input, which never comes to rest
     measured = np.asarray(result[names[0]]) - np.asarray(result[names[1]]) if sampled else None
