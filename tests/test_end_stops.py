@@ -12,6 +12,9 @@ from scipy.integrate import solve_ivp
 
 import lostmotion as lm
 from lostmotion.errors import InputError
+from lostmotion.reports.panels import Contacts
+from lostmotion.reports.run import summary
+from lostmotion.reports.run_charts import run_charts
 
 G = 9.80665
 
@@ -285,3 +288,34 @@ def test_what_takes_no_impacts_says_so() -> None:
     for call in (lm.linearize, lambda s: lm.simulate(s, sensitivities=["slides.ball.mass"])):
         with pytest.raises(InputError, match=r"slides\.ball\.end_stops"):
             call(scenario)
+
+
+# --- figures and summary ---
+
+
+def test_figures_show_where_the_stops_are_and_what_presses_on_them() -> None:
+    result = lm.simulate(ball({"restitution": 0.3}, duration=4.0))
+    panels = {chart.title: chart for chart in run_charts(result)}
+    position, force = panels["Position of ball"], panels["Force on end stops: ball"]
+    assert [curve.label for curve in position.curves] == ["ball", "lower stop"]  # the upper one is 90 m away
+    assert np.array_equal(position.curves[0].y, 1e3 * result["ball_position"].values)
+    assert position.curves[1].y.tolist() == [0.0, 0.0]
+    assert force.curves[0].y[-1] == pytest.approx(-G, rel=1e-12)
+    assert "Contacts" not in panels  # the ball touches or parts, and has no friction that sticks or slips
+
+
+def test_a_summary_says_what_presses_on_a_stop_and_how_often_it_is_touched() -> None:
+    rigid, elastic = (summary(lm.simulate(ball(s, duration=4.0))) for s in ({"restitution": 0.3}, {"stiffness": 1e6}))
+    assert f"  end stop ball: {-G:.4g} N, peak {G:.4g}; between impacts" in rigid
+    assert "ball end stop touches 1" in rigid
+    assert "stuck" not in rigid + elastic and "sticks" not in rigid + elastic
+    peak = float(np.abs(lm.simulate(ball({"stiffness": 1e6}, duration=4.0))["ball_end_stop_force"]).max())
+    assert f"  end stop ball: 0 N, peak {peak:.4g}" in elastic
+
+
+def test_labels_of_figures_fit_beside_their_axes() -> None:
+    """An axis of 2.7 inch has room for 24 letters beside it."""
+    stops = {"lower": -1.0, "upper": 1.0, "stiffness": 1e6}
+    scenario = lm.load("rack-axis-with-play").replace(**{"slides.slide.end_stops": stops})
+    for chart in run_charts(lm.simulate(scenario, duration=0.1)):
+        assert isinstance(chart, Contacts) or len(chart.y_label) <= 24

@@ -19,6 +19,7 @@ from .mass_matrix import MassMatrix
 from .motor import MotorLaw, ShaftMotor
 from .shaft import Shaft
 from .springs import Spring
+from .torsion import Rigid
 
 
 class TrainElements(Part):
@@ -198,6 +199,22 @@ class DriveTrain(TrainElements):
     def input_torque_of(self, gear: str) -> str:
         """NAME_input_torque of a gear."""
         return self._named(gear, "input_torque", self.gears[gear].input)
+
+    def stop_torque_of(self, shaft: str) -> str:
+        """NAME_end_stop_torque of a shaft with end stops, NAME_end_stop_force of a slide."""
+        return _core.result_name(shaft + END_STOP, "torque", self.is_slide(shaft))
+
+    def flanks(self) -> dict[str, tuple[str, float, float]]:
+        """Contacts that touch or part, where others stick or slip: what moves between them, and its least and largest value."""
+        found = {
+            f"{self.twist_of(name)}_contact": (self.twist_of(name), -0.5 * law.backlash, 0.5 * law.backlash)
+            for name, law in ((name, gear.stiffness) for name, gear in self.gears.items())
+            if isinstance(law, Rigid) and law.strikes
+        }
+        for name, shaft in self.shafts.items():
+            if (stops := shaft.end_stops) is not None and stops.stiffness is None:
+                found[f"{name}{END_STOP}_contact"] = (self.angle_of(name), stops.lower, stops.upper)
+        return found
 
     def torque_word(self, shaft: str) -> str:
         """Torque or force."""

@@ -81,12 +81,14 @@ def contact_lines(result: xarray.Dataset | RunArrays) -> list[str]:
         return []
     names = names_in(result.attrs)
     modes = unpacked(result.attrs)
+    flanks = Scenario.from_json(result.attrs["scenario"]).train().flanks() if "scenario" in result.attrs else {}
     found = []
     for name in (n.removesuffix("_before") for n in names if n.endswith("_contact_before")):
         before, after = (modes[:, names.index(f"{name}_{when}")] for when in ("before", "after"))
+        begins, ends = ("touches", "parts") if name in flanks else ("sticks", "slips")
         counts = {
-            "sticks": (before != 0) & (after == 0),
-            "slips": (before == 0) & (after != 0),
+            begins: (before != 0) & (after == 0),
+            ends: (before == 0) & (after != 0),
             "turns around": (before != 0) & (after == -before),
         }
         parts = [f"{what} {n}" for what, rows in counts.items() if (n := int(rows.sum()))]
@@ -156,6 +158,10 @@ def train_summary(result: xarray.Dataset | RunArrays) -> str:
         bends = twist.removeprefix(f"{name}_")
         bent = "" if gear.stiffness.kind == "rigid" else f"; {bends} {end_and_peak(twist, unit, small=True)}"
         element(scenario.kind_of(name), name, train.output_torque_of(name), train.torque_unit(gear.output), bent)
+    for name, shaft in train.shafts.items():
+        if (stops := shaft.end_stops) is not None:
+            more = "" if stops.stiffness is not None else "; between impacts"
+            element("end stop", name, train.stop_torque_of(name), train.torque_unit(name), more)
     for (kind, unit), rows in alike.items():
         shown, others = _most(rows)
         lines += shown
@@ -240,12 +246,13 @@ def verdict_of(result: xarray.Dataset | RunArrays) -> Verdict | None:
 
 def _motion_lines(result: xarray.Dataset) -> list[str]:
     """Errors of controlled axes, and which contacts are stuck."""
+    flanks = Scenario.from_json(result.attrs["scenario"]).train().flanks()
     errors = [line for found in loop_errors(result) for line in found.lines()]
     share = weights(result["time"].values)
     stuck = [
         f"{name.removesuffix('_contact').replace('_', ' ')} {100.0 * float(np.average(result[name].values == 0, weights=share)):.0f} %"
         for name in map(str, result)
-        if name.endswith("_contact")
+        if name.endswith("_contact") and name not in flanks
     ]
     lines = [f"{'; '.join(errors)}."] if errors else []
     return lines + ([f"Share of the time in which contacts are stuck: {', '.join(stuck)}."] if stuck else [])

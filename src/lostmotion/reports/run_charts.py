@@ -37,6 +37,7 @@ OVERVIEW = (
     "input_contact",
     "twist_contact",
 )
+NEAR = 0.25  # of the range of a motion: the distance of end stops that are drawn
 FIGURES = ("motion", "losses", "contacts", "energy")
 CONTACTS = {"input_contact": "input shaft", "twist_contact": "gearbox twist", "load_contact": "load"}
 
@@ -116,6 +117,10 @@ def _panel(result: xarray.Dataset, title: str, label: str, series: list[Series])
     curves = tuple(
         Curve(text, time, factor * result[name].values, look(k)) for k, (name, text, factor) in enumerate(there)
     )
+    if len(curves) == 1 and title.endswith(
+        "s"
+    ):  # of several elements, of which there is one: a single curve has no legend
+        title = f"{title}: {curves[0].label}"
     return Panel(title, "time [s]", label, curves)
 
 
@@ -157,24 +162,22 @@ def _train(result: xarray.Dataset) -> Iterator[Chart]:
     outputs = [(train.output_torque_of(name), name, gear.output) for name, gear in train.gears.items()]
     motors = [(train.motor_torque_of(name), name, motor.shaft) for name, motor in train.motors.items()]
     twists = [(train.twist_of(n), n, g.output) for n, g in train.gears.items() if g.stiffness.kind != "rigid"]
+    stops = [(train.stop_torque_of(name), name, name) for name, shaft in train.shafts.items() if shaft.end_stops]
     wanted: list[tuple[str, str, list[Series]]] = [
         ("Command", "command [-]", [(f"{name}_command", name, 1.0) for name in scenario.commanded()]),
-        *_by_domain(train, "{Torque} of motors", "{torque} of motor [{unit}]", "torque", motors),
+        *_by_domain(train, "{Torque} of motors", "{torque} [{unit}]", "torque", motors),
         *(_speeds(part.train()) for part in parts_of(scenario)),
-        *_by_domain(
-            train,
-            "{Torque} at outputs and loads",
-            "{torque} at output of gear, of load [{unit}]",
-            "torque",
-            outputs + loads,
-        ),
+        *_by_domain(train, "{Torque} at outputs and loads", "{torque} [{unit}]", "torque", outputs + loads),
+        *_by_domain(train, "{Torque} on end stops", "{torque} [{unit}]", "torque", stops),
         *_by_domain(train, "{Twist}", "{twist} [{unit}]", "twist", twists),
     ]
     for title, label, series in wanted:
         panel = _panel(result, title, label, series)
         if panel.curves:
             yield panel
-    contacts = [str(name) for name in result if str(name).endswith("_contact")]
+    yield from (_between_stops(result, train, name) for _, name, _ in stops)
+    flanks = train.flanks()
+    contacts = [str(name) for name in result if str(name).endswith("_contact") and name not in flanks]
     if contacts:
         yield _contacts(result, {name: name.removesuffix("_contact").replace("_", " ") for name in contacts})
 
@@ -197,6 +200,24 @@ def _by_domain(
         yield title.format(**words), label.format(**words), [(name, text, factor) for name, text, _ in chosen]
 
 
+def _between_stops(result: xarray.Dataset, train: DriveTrain, name: str) -> Panel:
+    """Position of a slide, or angle of a shaft, with those of its end stops that it comes near."""
+    unit, factor = charted(train.angle_unit(name))
+    time, values = result["time"].values, factor * result[train.angle_of(name)].values
+    low, high = float(values.min()), float(values.max())
+    stops: Any = train.shafts[name].end_stops
+    near = {
+        end: limit
+        for end in ("lower", "upper")
+        if low - NEAR * (high - low) <= (limit := factor * getattr(stops, end)) <= high + NEAR * (high - low)
+    }
+    lines = [Curve(f"{end} stop", time[[0, -1]], np.full(2, limit), FAINT) for end, limit in near.items()]
+    word = "position" if train.is_slide(name) else "angle"
+    return Panel(
+        f"{word.capitalize()} of {name}", "time [s]", f"{word} [{unit}]", (Curve(name, time, values, look(0)), *lines)
+    )
+
+
 def _speeds(train: DriveTrain) -> tuple[str, str, list[Series]]:
     """Speeds of a train that hangs together, all in terms of its last shaft."""
     last = list(train.shafts)[-1]
@@ -205,7 +226,7 @@ def _speeds(train: DriveTrain) -> tuple[str, str, list[Series]]:
         (f"{name}_speed", _in_terms_of(train, name, last, ratio), factor / ratio)
         for name, ratio in ratios_to(train, last).items()
     ]
-    return f"Speed of {last}", f"speed at {last} [{unit}]", series
+    return f"Speed of {last}", f"speed [{unit}]", series
 
 
 def _in_terms_of(train: DriveTrain, name: str, last: str, ratio: float) -> str:

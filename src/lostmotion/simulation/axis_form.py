@@ -130,7 +130,7 @@ def on_slide(tables: dict[str, Any]) -> None:
     given = tables.get("controllers")
     controller = given.get(MOTOR) if isinstance(given, Mapping) else None
     encoder = controller.get("position_encoder") if isinstance(controller, Mapping) else None
-    if isinstance(encoder, Mapping) and encoder.get("shaft") is None:
+    if isinstance(controller, Mapping) and isinstance(encoder, Mapping) and encoder.get("shaft") is None:
         tables["controllers"] = {MOTOR: {**controller, "position_encoder": {**encoder, "shaft": SLIDE}}}
 
 

@@ -14,7 +14,6 @@ from ..inputs.quantities import Time
 from ..model.end_stops import END_STOP
 from ..model.self_locking import SelfLocking, self_locking
 from ..model.signals import core_signal
-from ..model.torsion import Rigid
 from ..model.train import DriveTrain
 from ..units.practical import charted
 from .core_runs import core_case
@@ -246,28 +245,22 @@ def _explanation(
     slides = tuple(name for name in train.shafts if train.is_slide(name))
     sliding = {f"{name}_contact" for name in slides}
     sliding |= {f"{train.twist_of(n)}_contact" for n, gear in train.gears.items() if train.is_slide(gear.output)}
-    flanks = {
-        f"{train.twist_of(n)}_contact": (0.5 * gear.stiffness.backlash, named[train.twist_of(n)])
-        for n, gear in train.gears.items()
-        if isinstance(gear.stiffness, Rigid) and gear.stiffness.strikes
-    }
-    for name, shaft in train.shafts.items():
-        if (stops := shaft.end_stops) is not None and stops.stiffness is None:
-            middle = 0.5 * (stops.lower + stops.upper)
-            flanks[f"{name}{END_STOP}_contact"] = (stops.upper - middle, named[train.angle_of(name)] - middle)
     sliding |= {f"{name}{END_STOP}_contact" for name in slides}
-    states = []
+    flanks, states = train.flanks(), []
     for contact in contacts:
-        reach, twist = flanks.get(contact["name"], (None, 0.0))
-        states.append(ContactState(**contact, slides=contact["name"] in sliding, reach=reach, twist=twist))
+        own: dict[str, Any] = {"slides": contact["name"] in sliding, "reach": None, "twist": 0.0}
+        if contact["name"] in flanks:
+            between, low, high = flanks[contact["name"]]
+            own |= {"reach": 0.5 * (high - low), "twist": named[between] - 0.5 * (low + high)}
+        states.append(ContactState(**contact, **own))
     turned = []
     for commands in motors:
         name, motor = commands["name"], train.motors[commands["name"]]
         limits = (motor.command_limit, None if motor.torque_limit is None else motor.torque_limit / motor.rated_torque)
         limit = min(limit for limit in (*limits, math.inf) if limit is not None)
         command, torque = named[train.command_of(name)], named[train.motor_torque_of(name)]
-        own: dict[str, Any] = {"command_limit": limit, "slides": train.is_slide(motor.shaft)}
-        turned.append(MotorState(**commands, **own, command=command, torque=torque))
+        given: dict[str, Any] = {"command_limit": limit, "slides": train.is_slide(motor.shaft)}
+        turned.append(MotorState(**commands, **given, command=command, torque=torque))
     locking = tuple(_verdicts(train, named))
     return Explanation(time, named, tuple(states), tuple(turned), tuple(train.shafts), locking, slides)
 
