@@ -7,12 +7,17 @@
 #include "guards_after.hpp"
 #include "pack.hpp"
 #include "sparse_regime.hpp"
+#include "switched_train.hpp"
 
 namespace lostmotion::model {
 
-// Do all guards of a regime of a kernel hold just after now, but for those that are ignored?
+// Which guards of a regime of a kernel do not hold just after now, but for those that are ignored: some of a law or an
+// input, or else of contacts?
+struct Broken {
+    bool of_laws = false, of_contacts = false;
+};
 template <class D, class E, class ByValue>
-bool all_hold(const E& e, const InstantOf<D>& now, const BitSet<D::guards>& ignored, ByValue&& by_value_alone) {
+Broken broken(const E& e, const InstantOf<D>& now, const BitSet<D::guards>& ignored, ByValue&& by_value_alone) {
     const auto each_near_zero = [&](auto&& use) {
         typename std::decay_t<decltype(e.guards)>::Values constant, value, size;
         e.guards.constants(now.memory, constant);
@@ -28,16 +33,29 @@ bool all_hold(const E& e, const InstantOf<D>& now, const BitSet<D::guards>& igno
         });
     };
     Violated of_contacts;
-    return first_left<LinearForm>(Flow<D>(e.rates, now), e.regime->drivers, each_near_zero, by_value_alone,
-                                  of_contacts) == nullptr &&
-           !of_contacts.any;
+    const auto* left =
+        first_left<LinearForm>(Flow<D>(e.rates, now), e.regime->drivers, each_near_zero, by_value_alone, of_contacts);
+    return {left != nullptr, of_contacts.any};
+}
+template <class D, class E, class ByValue>
+bool all_hold(const E& e, const InstantOf<D>& now, const BitSet<D::guards>& ignored, ByValue&& by_value_alone) {
+    const Broken b = broken<D>(e, now, ignored, by_value_alone);
+    return !b.of_laws && !b.of_contacts;
+}
+
+// The guards of speeds of contacts that move: their modes were chosen by these speeds.
+template <class D, class E, class AtRest>
+BitSet<D::guards> moving(const E& e, const AtRest& at_rest) {
+    BitSet<D::guards> out;
+    for (int k = 0; k < e.n_speeds; ++k)
+        if (!at_rest[e.regime->guards[e.speeds[k]].contact]) out.set(e.speeds[k]);
+    return out;
 }
 
 // Across an edge of a law or a limit the motion is smooth enough for every contact to go on as it was; if that is
 // consistent there is nothing to search.
 template <class D, class Regimes>
 bool goes_on(Regimes& regimes, InstantOf<D>& now, const SparseRegime::Guard& fired, Key& key) {
-    if (!fired.is_edge()) return false;
     auto& from = regimes.entry(key);
     const auto& e = regimes.beyond(from, static_cast<int>(&fired - from.regime->guards.data()), [&] {
         Key beyond = key;
@@ -55,6 +73,72 @@ bool goes_on(Regimes& regimes, InstantOf<D>& now, const SparseRegime::Guard& fir
     return false;
 }
 
+// A contact has come to rest or to its limit, in a regime where it has done so before: if all regimes that the search
+// has tried then turn out as they did, so would the search.
+template <class D, class Regimes>
+bool goes_as_before(SwitchedTrain& search, Regimes& regimes, InstantOf<D>& now, const SparseRegime::Guard& fired,
+                    Key& key) {
+    auto& from = regimes.entry(key);
+    const auto g = static_cast<int>(&fired - from.regime->guards.data());
+    const auto known = std::ranges::find(from.tried, g, [](const auto& t) { return t.guard; });
+    if (known == from.tried.end() || known->regimes.empty()) return false;
+    const bool comes_to_rest = fired.kind == GuardKinds::speed;
+    if (!comes_to_rest && magnitude<D>(fired.form, now.x, now.memory, now.input_magnitudes) <= from.near_event[g])
+        return false;
+    const auto x = now.x;
+    const auto memory = now.memory;
+    Flags at_rest = from.regime->at_rest;
+    if (comes_to_rest) at_rest[fired.contact] = true;
+    search.stop(now, at_rest);
+    search.turn(now, at_rest, from.regime->at_rest, key);
+    // The margins of a contact that has just come to a stop are zero by chance only.
+    const auto by_value_alone = [&](const SparseRegime::Guard& guard) {
+        return comes_to_rest && guard.kind == GuardKinds::capacity && guard.contact == fired.contact;
+    };
+    const auto turns_the_other_way = [&](const auto& e) {
+        Flow<D> along(e.rates, now);
+        const LinearForm& speed = search.speed(fired.contact);
+        const auto after = sign_after(along, speed, evaluate<D>(speed, now.x, now.memory, now.input[0]),
+                                      magnitude<D>(speed, now.x, now.memory, now.input_magnitudes));
+        return SwitchedTrain::turns_the_other_way(fired.neighbour, after);
+    };
+    const auto turns_out_as_before = [&](std::size_t k) {
+        const auto& e = *known->regimes[k];
+        const bool holds = k + 1 == known->regimes.size(), breaks_away = !comes_to_rest && k == 0;
+        if (breaks_away) at_rest[fired.contact] = false;
+        const Broken b = broken<D>(e, now, moving<D>(e, at_rest), by_value_alone);
+        if (breaks_away) at_rest[fired.contact] = true;
+        if (b.of_laws) return false;
+        if (!holds) return b.of_contacts || (&e == &from && !comes_to_rest);
+        return !b.of_contacts && !(breaks_away && turns_the_other_way(e));
+    };
+    for (std::size_t k = 0; k < known->regimes.size(); ++k) {
+        if (turns_out_as_before(k)) continue;
+        now.x = x;
+        now.memory = memory;
+        return false;
+    }
+    search.searches.trials += static_cast<long>(known->regimes.size());
+    key = known->regimes.back()->regime->key;
+    return true;
+}
+// What the search has tried, so that it need not be done again: where an event comes for the second time, since most
+// come once.
+template <class D, class Regimes>
+void remember(const SwitchedTrain& search, Regimes& regimes, const SparseRegime::Guard& fired, const Key& before) {
+    constexpr std::size_t most = 9;
+    if (search.tried().empty() || search.tried().size() > most) return;
+    auto& from = regimes.entry(before);
+    const auto g = static_cast<int>(&fired - from.regime->guards.data());
+    const auto known = std::ranges::find(from.tried, g, [](const auto& t) { return t.guard; });
+    if (known == from.tried.end()) {
+        from.tried.push_back({g, {}});
+        return;
+    }
+    known->regimes.clear();
+    for (const SparseRegime* r : search.tried()) known->regimes.push_back(&regimes.entry(r->key));
+}
+
 // An input has changed: does the regime go on? The contacts that move keep their direction. A guard that is zero to
 // rounding has not ended it; the solver finds it if it goes on to fall.
 // input: the inputs up to this instant.
@@ -70,10 +154,8 @@ bool stays(const E& e, const InstantOf<D>& now, const InputsOf<D>& input) {
         }
         if (change < -rounding * size) return false;
     }
-    BitSet<D::guards> moving;  // the modes of contacts that move were chosen by their speeds
-    for (int k = 0; k < e.n_speeds; ++k)
-        if (!e.regime->at_rest[e.regime->guards[e.speeds[k]].contact]) moving.set(e.speeds[k]);
-    return all_hold<D>(e, now, moving, [](const SparseRegime::Guard& g) { return g.kind != GuardKinds::set_off; });
+    return all_hold<D>(e, now, moving<D>(e, e.regime->at_rest),
+                       [](const SparseRegime::Guard& g) { return g.kind != GuardKinds::set_off; });
 }
 
 }  // namespace lostmotion::model

@@ -14,7 +14,11 @@ SwitchedTrain::SwitchedTrain(const Assembly& assembly) : assembly_(assembly), re
     least_flight_ = gears == 1 && all == 1 ? one_flight : flight_among_others;
     for (int c = 0; c < contacts(); ++c) {
         some_redundant_ = some_redundant_ || places().contacts[c].locked != nowhere;
-        holds_more_[c] = !places().contacts[c].bilateral && holds_more(places().contacts[c]);
+        const ContactPlace& p = places().contacts[c];
+        holds_more_[c] = !p.bilateral && holds_more(p);
+        Row row;
+        p.each_shaft([&](int s, double per) { row.c[places().shafts[s].speed] += per; });
+        speeds_.emplace_back(row, assembly.layout());
     }
 }
 
@@ -108,6 +112,7 @@ Found SwitchedTrain::start(Instant& now, Key& key) {
 }
 
 Found SwitchedTrain::next(Instant& now, int fired_number, Key& key, const Inputs& input, const Rest& given_rest) {
+    tried_.clear();
     now.reach(assembly_.layout());
     regimes_.make_room();
     const SparseRegime& old = regimes_[key];
@@ -143,12 +148,9 @@ Found SwitchedTrain::next(Instant& now, int fired_number, Key& key, const Inputs
         near = old.near_event[static_cast<std::size_t>(fired_number)];
     }
     const auto memory = now.memory;
-    for (std::size_t g = 0; g < train().gears.size(); ++g) {
-        const GearPlace& p = places().gears[g];
-        if (p.hysteresis != nowhere && event.at_rest[p.contact] && !before[p.contact])
-            now.memory[p.hysteresis] = assembly_.stiffness_factor(static_cast<int>(g), key) *
-                                       train().gears[g].law.hysteresis_capacity(now.x[p.twist]);
-    }
+    turn(now, event.at_rest, before, key);
+    by_trials_ = event.with_guard && (event.kind == Guard::capacity || event.kind == Guard::speed) &&
+                 !some_redundant_ && !has_impacts_ && places().driven.empty();
     if (event.with_guard && event.kind == Guard::capacity && breaks_away(now, event, margin_size, near, key))
         return Found::yes;
     const auto past = [&] {
@@ -157,7 +159,11 @@ Found SwitchedTrain::next(Instant& now, int fired_number, Key& key, const Inputs
         out.input[0] = left;
         return out;
     };
+    const bool by_trials =
+        event.with_guard && event.kind == Guard::speed && !some_redundant_ && !has_impacts_ && places().driven.empty();
+    tried_.clear();
     const Found found = find(now, past, event, key);
+    if (!by_trials || found != Found::yes || tried_.empty() || !(tried_.back()->key == key)) tried_.clear();
     return found == Found::inconsistent ? locks(now, event, past(), key) : found;
 }
 
@@ -165,10 +171,12 @@ Found SwitchedTrain::next(Instant& now, int fired_number, Key& key, const Inputs
 // all others go on as they were. If the capacity itself has gone with its margin, as where a load that alone holds a
 // self-locking gear reverses, the contact may as well stay stuck.
 bool SwitchedTrain::breaks_away(Instant& now, const Event& event, double margin_size, double near, Key& key) {
-    if (margin_size <= near) return false;
     Key modes = key;
     modes.modes[event.contact] = static_cast<std::int8_t>(event.neighbour);
-    if (at_its_limit(modes)) return false;
+    if (margin_size <= near || at_its_limit(modes)) {
+        by_trials_ = false;
+        return false;
+    }
     Event slipping;
     slipping.at_rest = event.at_rest;
     slipping.at_rest[event.contact] = false;
@@ -177,25 +185,27 @@ bool SwitchedTrain::breaks_away(Instant& now, const Event& event, double margin_
     slipping.coupling = event.coupling;
     const auto memory = now.memory;
     Key slips;
-    if (settle(now, modes, slipping, slips).found == Found::yes) {
+    if (const Trial trial = settle(now, modes, slipping, slips); trial.found == Found::yes) {
         // With a self-locking gear more torque may turn it the other way; by rounding it only seems to.
-        if (!turns_the_other_way(regimes_[slips], now, event)) {
+        SparseFlow along(regimes_[slips].rate, now, room_);
+        const LinearForm& of = speed(event.contact);
+        const Sign after = sign_after(along, of, evaluate(of, now), magnitude(of, now));
+        if (!turns_the_other_way(event.neighbour, after)) {
+            note(trial);
             key = slips;
             return true;
         }
+        by_trials_ = false;
+    } else {
+        note(trial);
     }
     now.memory = memory;
     return false;
 }
 
-// Does a contact that is to slip turn against that just after now, by more than rounding may make?
-bool SwitchedTrain::turns_the_other_way(const SparseRegime& r, const Instant& now, const Event& event) {
-    const ContactPlace& c = places().contacts[event.contact];
-    Row row;
-    c.each_shaft([&](int s, double per) { row.c[places().shafts[s].speed] += event.neighbour * per; });
-    const OwnForm speed(row, assembly_.layout());
-    SparseFlow along(r.rate, now, room_);
-    return sign_after(along, speed, evaluate(speed, now), magnitude(speed, now)).relative < -max_violation;
+void SwitchedTrain::note(const Trial& trial) {
+    by_trials_ = by_trials_ && trial.end != nullptr;
+    if (by_trials_) tried_.push_back(trial.end);
 }
 
 // Tries the combinations of modes. Usually pieces and cells are found by a walk from those before. If the guards that
@@ -216,6 +226,7 @@ Found SwitchedTrain::find(Instant& now, const std::function<Instant()>& before, 
             places().contacts[c].gap.present() && !event.at_rest[c] && !has_gap(c, now) && approach(c, now);
     const Found first = search();
     if (first == Found::yes) return first;
+    by_trials_ = false;
     event.from_each_load =
         std::any_of(train().gears.begin(), train().gears.end(), [](const Gear& g) { return g.has_dry_losses(); });
     if (event.from_each_load && search() == Found::yes) return Found::yes;
@@ -320,8 +331,14 @@ Found SwitchedTrain::enumerate(Instant& now, const Event& event, const Key& from
     Found worst = Found::inconsistent;
     numbered_combination(0, event, from, modes);  // that with most contacts stuck
     const bool tried = !event.closest && !at_its_limit(modes);
+    by_trials_ = by_trials_ && tried;
+    const auto settled = [&] {
+        const Trial trial = settle(now, modes, event, key);
+        note(trial);
+        return trial.found;
+    };
     if (tried) {
-        worst = settle(now, modes, event, key).found;
+        worst = settled();
         if (worst == Found::yes) return worst;
     }
     slips_of_.resize(static_cast<std::size_t>(combinations(event)));
@@ -339,8 +356,7 @@ Found SwitchedTrain::enumerate(Instant& now, const Event& event, const Key& from
                 numbered_combination(number, event, from, modes);
                 if (at_its_limit(modes) != at_limit) continue;
                 now.memory = before;
-                const Found found =
-                    at_limit ? settle_at_limit(now, modes, event, key) : settle(now, modes, event, key).found;
+                const Found found = at_limit ? settle_at_limit(now, modes, event, key) : settled();
                 if (found == Found::yes && !event.closest && !at_limit) return found;
                 if (found == Found::outside) worst = found;
                 if (found != Found::yes) continue;
@@ -363,6 +379,7 @@ Found SwitchedTrain::enumerate(Instant& now, const Event& event, const Key& from
 }
 
 Found SwitchedTrain::pivot(Instant& now, const Event& event, Key modes, const Key& from, Key& key) {
+    by_trials_ = false;
     const auto before = now.memory;
     struct Tried {
         Key modes;

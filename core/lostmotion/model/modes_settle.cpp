@@ -118,7 +118,10 @@ auto SwitchedTrain::settle(Instant& now, const Key& modes, const Event& event, K
     locate_losses(now, T_2, trial);
     if (some_redundant_) hold(regimes_[trial], now, event);
     Trial result = walk(now, event, trial, key, violated);
-    if (result.found == Found::inconsistent && settle_on_corner(now, event, trial, key)) result.found = Found::yes;
+    if (result.found == Found::inconsistent && settle_on_corner(now, event, trial, key)) {
+        result.found = Found::yes;
+        result.end = nullptr;
+    }
     if (result.found != Found::inconsistent || !event.from_each_load) return result;
     // The torque that keeps a twist at rest depends on the cell, and the cell on the torque.
     std::vector<std::size_t> at_rest;
@@ -220,6 +223,7 @@ auto SwitchedTrain::walk(Instant& now, const Event& event, Key trial, Key& key, 
     constexpr int longest_walk = 400;
     Key previous = trial;
     std::vector<std::size_t> along;  // edges that lead back to where the walk came from: the motion goes along them
+    bool plain = !event.closest;
     Trial result;
     for (int step = 0; step < longest_walk; ++step) {
         const SparseRegime& r = regimes_[trial];
@@ -233,16 +237,19 @@ auto SwitchedTrain::walk(Instant& now, const Event& event, Key trial, Key& key, 
         if (left == nullptr) {
             if (violated.any && !event.closest) {
                 result.turns_back = violated.only_turning;
+                if (plain && along.empty()) result.end = &r;
                 return result;
             }
             if (event.has_ended(trial) && !event.closest) {
                 if (event.kind != Guard::edge && event.kind != Guard::input_limit) {
                     violated.add({event.contact, event.neighbour, n_derivatives, 0.0});
+                    if (plain && along.empty()) result.end = &r;
                     return result;
                 }
                 trial.branch[event.branch] = static_cast<std::int16_t>(event.neighbour);
                 if (event.memory != nowhere) now.memory[event.memory] += event.shift;
             }
+            if (plain && along.empty() && trial == r.key) result.end = &r;
             key = trial;
             result.found = Found::yes;
             return result;
@@ -254,6 +261,7 @@ auto SwitchedTrain::walk(Instant& now, const Event& event, Key trial, Key& key, 
             continue;
         }
         shift(*left, now.memory);
+        plain = plain && left->memory == nowhere;
         previous = std::exchange(trial, next);
         along.clear();
     }

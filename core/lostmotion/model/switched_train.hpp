@@ -65,6 +65,18 @@ class SwitchedTrain {
     template <class X>
     void set_tied_speeds(X& x, const Ties& ties) const;
 
+    // The regimes that the last call of `next` has tried, after a contact has come to rest or to its limit: all but the
+    // last do not hold, by a guard of a contact alone, or are the one that has ended. Of a contact at its limit, the
+    // first is that in which it slips and all others go on. Empty where more was needed.
+    const std::vector<const SparseRegime*>& tried() const { return tried_; }
+    // A twist that has come to rest has turned: that sets the hysteresis capacity anew (16).
+    template <class Now>
+    void turn(Now& now, const Rest& at_rest, const Flags& before, const Key& key) const;
+    // The speed of a contact.
+    const LinearForm& speed(int contact) const { return speeds_[static_cast<std::size_t>(contact)]; }
+    // Does a contact that is to slip turn against that, by more than rounding may make? after: its speed's sign.
+    static bool turns_the_other_way(int slip, const Sign& after) { return slip * after.relative < -max_violation; }
+
     // The key in these modes, at the instant and the torques of another regime.
     Key branches_at(const SparseRegime& other, const Key& modes, const Instant& now) const;
 
@@ -103,6 +115,7 @@ class SwitchedTrain {
     struct Trial {
         Found found = Found::inconsistent;
         bool turns_back = false;  // all that is violated is that what drives a contact to its limit turns back
+        const SparseRegime* end = nullptr;  // where the walk has ended, if that is all it has come to
     };
 
     int contacts() const { return assembly_.layout().contacts; }
@@ -165,7 +178,7 @@ class SwitchedTrain {
     Found settle_at_limit(Instant& now, const Key& modes, const Event& event, Key& key);
     Trial walk(Instant& now, const Event& event, Key trial, Key& key, Violated violated = {});
     bool breaks_away(Instant& now, const Event& event, double margin_size, double near, Key& key);
-    bool turns_the_other_way(const SparseRegime& e, const Instant& now, const Event& event);
+    void note(const Trial& trial);
     void locate(const Instant& now, const Key& from, Key& trial) const;
     void locate_losses(const Instant& now, const Torques& T_2, Key& trial) const;
     void hold(const SparseRegime& r, Instant& now, const Event& event) const;
@@ -209,7 +222,20 @@ class SwitchedTrain {
     };
     mutable std::array<Limit, 64> limits_;
     std::vector<int> slips_of_;  // how many contacts slip in each combination; its memory is used again
+    std::vector<OwnForm> speeds_;
+    std::vector<const SparseRegime*> tried_;
+    bool by_trials_ = false;  // all that the search has done so far
 };
+
+template <class Now>
+void SwitchedTrain::turn(Now& now, const Rest& at_rest, const Flags& before, const Key& key) const {
+    for (std::size_t g = 0; g < train().gears.size(); ++g) {
+        const GearPlace& p = places().gears[g];
+        if (p.hysteresis != nowhere && at_rest[p.contact] && !before[p.contact])
+            now.memory[p.hysteresis] = assembly_.stiffness_factor(static_cast<int>(g), key) *
+                                       train().gears[g].law.hysteresis_capacity(now.x[p.twist]);
+    }
+}
 
 template <class Now, class AtRest>
 void SwitchedTrain::stop(Now& now, AtRest& at_rest) const {

@@ -73,14 +73,20 @@ class TrainSystem {
         Flags given_rest{};
         const bool comes_to_rest = fired == nullptr && search_.follow_given(now.x, now.input[0], key, given_rest);
         Found found = Found::yes;
-        if (!(fired != nullptr ? goes_on<D>(cache, now, *fired, key)
-                               : !comes_to_rest && stays<D>(cache.entry(key), now, input))) {
+        const auto without_search = [&] {
+            if (fired == nullptr) return !comes_to_rest && stays<D>(cache.entry(key), now, input);
+            return fired->is_edge() ? goes_on<D>(cache, now, *fired, key)
+                                    : goes_as_before<D>(search_, cache, now, *fired, key);
+        };
+        if (!without_search()) {
             const auto number = fired == nullptr ? nowhere : fired - cache.regime(key).guards.data();
             Instant& at = by_layout(now);
             SwitchedTrain::Inputs left;
             copy_numbers(input, assembly_.layout().inputs, left);
+            const Key from = key;
             found = search_.next(at, static_cast<int>(number), key, left, given_rest);
             take(at, now);
+            if (fired != nullptr && found == Found::yes) remember<D>(search_, cache, *fired, from);
         }
         if (before) add_parametric_work(*before, key, now);
         return certain(found);

@@ -58,6 +58,12 @@ class RegimeCache {
         typename GuardTable::Values near_event;  // what each guard exceeds where it is far from an event
         Propagator<D> propagator;
         ListOf<D, Entry*, D::guards> neighbour;  // what lies beyond each guard, as far as it is known
+        // The regimes that have been tried where a contact comes to rest or to its limit; the last one holds.
+        struct Tried {
+            int guard;
+            std::vector<Entry*> regimes;
+        };
+        std::vector<Tried> tried;
 
         void set(const System& system, const Key& key) {
             regime = system.build(key);
@@ -68,6 +74,7 @@ class RegimeCache {
             guards.clear();
             guards.set_counts(rates.n);
             neighbour = {};
+            tried.clear();
             n_speeds = 0;
             contacts = behind = {};
             unreached_known_ = false;
