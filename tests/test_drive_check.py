@@ -230,13 +230,20 @@ OTHERWISE = {
 
 @pytest.mark.parametrize("rule", OTHERWISE)
 def test_no_verdict_is_the_same_for_every_drive(rule: str):
-    base = {"gearbox.stiffness": {"kind": "linear", "stiffness": 2e4}} if rule == "resonance" else {}
-    first, second = (by_rule(s)[rule] for s in (move(**base), move(**base, **OTHERWISE[rule])))
+    of_twist = rule in ("resonance", "lost_motion")
+    base = {"gearbox.stiffness": {"kind": "linear", "stiffness": 2e4}} if of_twist else {}
+    first, second = (by_rule(s)[rule] for s in (move(**base), move(**base | OTHERWISE[rule])))
     beyond = "caution" if rule in OF_THUMB else "warning"
     assert {first.verdict, second.verdict} == {"ok", beyond}
     if first.use is not None and second.use is not None:
         assert (first.use > 1.0) == (first.verdict == beyond)
         assert (second.use > 1.0) == (second.verdict == beyond)
+
+
+def test_the_lost_motion_of_what_is_taken_as_rigid_is_not_known():
+    """A record without stiffness is rigid, and so are actuators of the catalogue: 0 arcmin would be the model's, not the drive's."""
+    found = by_rule(move(**{"gearbox.stiffness": {"kind": "rigid"}}))["lost_motion"]
+    assert (found.verdict, found.use, found.value) == ("unknown", None, "not known")
 
 
 def test_the_page_on_the_drive_check_names_every_rule():

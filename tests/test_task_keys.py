@@ -73,9 +73,16 @@ FORMS: dict[str, dict[str, Any]] = {
     "screw": {**SLIDE, "screw": SCREW, "motor": MOTOR},
     "screw behind gearbox": {**SLIDE, "screw": SCREW, "motor": MOTOR, "gearbox": GEARBOX},
     "rack behind gearbox": {**SLIDE, "rack": RACK, "motor": MOTOR, "gearbox": GEARBOX},
+    "rack": {**SLIDE, "rack": RACK, "motor": MOTOR},
     "belt": {**SLIDE, "belt": BELT, "motor": MOTOR},
+    "belt behind gearbox": {**SLIDE, "belt": BELT, "motor": MOTOR, "gearbox": GEARBOX},
     "linear motor": {**SLIDE, "candidates": {"linear_motor": ["own.toml"]}},
 }
+FORMS["actuator"] = {
+    **{key: table for key, table in FORMS["gearbox"].items() if key not in ("motor", "gearbox")},
+    "candidates": {"actuator": ["t-motor-ak80-6"]},
+}
+OF_SHAFTS = ("gearbox", "actuator")
 SHEET = """
 [[linear_motor]]
 name = "own"
@@ -135,6 +142,10 @@ def texts(findings: list[Any] | lm.InputError) -> set[tuple[str, ...]]:
     return {(f.rule, f.what, f.value, f.remark) for f in findings}
 
 
+def found_of(findings: list[Any], rule: str) -> Any:
+    return next(f for f in findings if f.rule == rule)
+
+
 def test_every_key_of_a_task_is_covered_here() -> None:
     assert set(AxisTask.model_fields) == {*RULE_OF, *COLUMN_OF, *ELSEWHERE}
 
@@ -143,14 +154,15 @@ def test_every_key_of_a_task_is_covered_here() -> None:
 @pytest.mark.parametrize("key", RULE_OF)
 def test_a_key_of_a_task_is_judged_or_named(key: str, form: str) -> None:
     value, rules = RULE_OF[key]
-    if form == "gearbox" and key == "emergency_stop":
+    if form in OF_SHAFTS and key == "emergency_stop":
         value = "50 rad/s^2"
-    if form != "gearbox" and key == "max_lost_motion":
+    if form not in OF_SHAFTS and key == "max_lost_motion":
         value = "1 um"
     found = judged(form, **{key: value})
     if isinstance(found, lm.InputError):  # a record lacks what the key needs
         assert f"task.{key}" in str(found)
         return
+    assert key != "max_lost_motion" or form not in OF_SHAFTS or found_of(found, "lost_motion").value == "not known"
     findings = [f for f in found if f.rule in rules.split()]
     assert findings, "neither judged nor named"
     for f in findings:
@@ -162,8 +174,8 @@ def test_a_key_of_a_task_is_judged_or_named(key: str, form: str) -> None:
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("key", COLUMN_OF)
 def test_a_key_of_the_run_limits_a_column(key: str, form: str) -> None:
-    value = "1 s" if key == "max_settling_time" else "1 arcmin" if form == "gearbox" else "1 um"
-    window = {"settling_window": "1 arcmin" if form == "gearbox" else "1 um"} if key == "max_settling_time" else {}
+    value = "1 s" if key == "max_settling_time" else "1 arcmin" if form in OF_SHAFTS else "1 um"
+    window = {"settling_window": "1 arcmin" if form in OF_SHAFTS else "1 um"} if key == "max_settling_time" else {}
     study = task_of(changed(form, task={key: value, **window}))
     assert study.select is not None
     assert COLUMN_OF[key] in study.select.limits
@@ -360,7 +372,7 @@ def test_own_keys_vary_beside_each_other_and_relative() -> None:
     for k in range(12):
         row = study.parameters(k, k + 1)[0]
         one, own = study.at(row)
-        assert one.drive.load.inertia == pytest.approx(100.0 * row[0])
+        assert one.scenario.load.inertia == pytest.approx(100.0 * row[0])
         assert one.part("stage", own).travel() == pytest.approx(row[1])
         assert study.axis_at(row, 2).motor.rotor_inertia == pytest.approx(row[2])
 

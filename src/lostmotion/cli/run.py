@@ -69,7 +69,7 @@ def run(
     """Run a scenario: print, save, draw, report, explain.
 
     With a controller the summary has the following error, true and as it is measured. A loop does not fit if it is
-    unstable: its error grows, or swings at the end with a pole outside the unit circle. Other swings are a reservation.
+    unstable: its error grows, or it has a pole outside the unit circle. Swings of a stable loop are a reservation.
 
     \b
     lostmotion run drive.toml

@@ -104,9 +104,12 @@ def locks(train: DriveTrain, gear: str, torques: Collection[float]) -> list[Find
 
 
 def lost_motion(g: Gearbox, limit: float | None, *, slides: bool = False) -> Finding:
-    """limit: of the task [rad], of a slide [m]."""
-    lost = 0.0 if isinstance(g.stiffness, Rigid) else TestRig(g).lost_motion()
+    """limit: of the task [rad], of a slide [m]. What is taken as rigid has none, which says nothing of what is built."""
     what = f"lost motion at ±{100.0 * LOST_MOTION_LOAD:.0f} % of rated torque"
+    if isinstance(g.stiffness, Rigid):
+        why = f"{'the axis' if slides else 'the gearbox'} is taken as rigid, without backlash; give a stiffness"
+        return Finding("lost_motion", what, "not known", "unknown", why)
+    lost = TestRig(g).lost_motion()
     factor, unit = (1e6, "um") if slides else (ARCMIN, "arcmin")
     maximum = None if limit is None else factor * limit
     return within("lost_motion", what, factor * lost, maximum, unit, "limit of the task", key="task.max_lost_motion")
