@@ -1,7 +1,7 @@
 // A servo cascade on the paper's drive: current and speed loop every 125 us, position loop every 1 ms.
 #pragma once
 
-#include "lostmotion/simulation/closed_loop.hpp"
+#include "kernels/closed_loop.hpp"
 #include "paper_run.hpp"
 
 namespace lostmotion {

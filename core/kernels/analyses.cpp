@@ -1,10 +1,10 @@
 // What is not called at each event, for 4 and any number of coupled states: adaptive solver, responses, sensitivities.
 #include "lostmotion/analysis/analyses.hpp"
 
-#include "lostmotion/analysis/sensitive_solving.hpp"
-#include "lostmotion/analysis/train_response.hpp"
-#include "lostmotion/simulation/train_adaptive.hpp"
+#include "sensitive_solving.hpp"
 #include "solving.hpp"
+#include "train_adaptive.hpp"
+#include "train_response.hpp"
 
 namespace lostmotion {
 

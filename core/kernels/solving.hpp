@@ -1,7 +1,7 @@
 // A kernel: what is called at each event, compiled for the dimensions D and registered under a name.
 #pragma once
 
-#include "lostmotion/simulation/train_solving.hpp"
+#include "train_solving.hpp"
 
 // TEMPLATE: `template` to compile, `extern template` where another file compiles it.
 #define LOSTMOTION_SOLVING(TEMPLATE, D)                                                                            \

@@ -2,9 +2,9 @@
 #include <doctest/doctest.h>
 
 #include "drive_runs.hpp"
+#include "kernels/pack.hpp"
 #include "lostmotion/model/check.hpp"
 #include "lostmotion/model/names.hpp"
-#include "lostmotion/model/pack.hpp"
 #include "lostmotion/model/scales.hpp"
 #include "lostmotion/simulation/train_status.hpp"
 #include "random_trains.hpp"

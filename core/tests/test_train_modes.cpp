@@ -2,8 +2,8 @@
 #include <doctest/doctest.h>
 
 #include "gauss_principle.hpp"
+#include "kernels/system.hpp"
 #include "lostmotion/model/check.hpp"
-#include "lostmotion/model/system.hpp"
 #include "lostmotion/solver/regime_cache.hpp"
 #include "random_trains.hpp"
 #include "referee_polynomial.hpp"

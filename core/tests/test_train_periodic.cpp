@@ -3,7 +3,7 @@
 
 #include <cstdio>
 
-#include "lostmotion/analysis/train_response.hpp"
+#include "kernels/train_response.hpp"
 #include "lostmotion/model/check.hpp"
 #include "random_trains.hpp"
 

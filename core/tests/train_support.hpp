@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "lostmotion/model/pack.hpp"
+#include "kernels/pack.hpp"
 #include "lostmotion/model/power.hpp"
 #include "lostmotion/model/switched_train.hpp"
 #include "support.hpp"

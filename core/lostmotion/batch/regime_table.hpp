@@ -17,8 +17,8 @@
 #include <new>
 #include <vector>
 
-#include "../model/pack.hpp"
-#include "../model/system.hpp"
+#include "kernels/pack.hpp"
+#include "kernels/system.hpp"
 
 namespace lostmotion::batch {
 

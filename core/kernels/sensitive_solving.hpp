@@ -1,10 +1,10 @@
 // Runs of trains in one kernel with their derivatives. Only core/kernels takes it.
 #pragma once
 
-#include "../simulation/train_solving.hpp"
-#include "sensitive_run.hpp"
-#include "train_batch.hpp"
+#include "lostmotion/analysis/sensitive_run.hpp"
+#include "lostmotion/analysis/train_batch.hpp"
 #include "train_sensitivity.hpp"
+#include "train_solving.hpp"
 
 namespace lostmotion {
 

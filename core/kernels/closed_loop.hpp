@@ -6,10 +6,10 @@
 #include <span>
 #include <vector>
 
-#include "../model/pack.hpp"
-#include "../solver/components.hpp"
-#include "../solver/exact_solver.hpp"
-#include "train_control.hpp"
+#include "lostmotion/simulation/train_control.hpp"
+#include "lostmotion/solver/components.hpp"
+#include "lostmotion/solver/exact_solver.hpp"
+#include "pack.hpp"
 #include "winding_coupling.hpp"
 
 namespace lostmotion {

@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
-#include "../kernel/inputs.hpp"
-#include "../solver/components.hpp"
-#include "assembly.hpp"
+#include "lostmotion/kernel/inputs.hpp"
+#include "lostmotion/model/assembly.hpp"
+#include "lostmotion/solver/components.hpp"
 
 namespace lostmotion::model {
 

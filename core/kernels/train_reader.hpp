@@ -5,9 +5,9 @@
 #include <array>
 #include <vector>
 
-#include "../kernel/stride.hpp"
-#include "../model/system.hpp"
-#include "train_point.hpp"
+#include "lostmotion/kernel/stride.hpp"
+#include "lostmotion/simulation/train_point.hpp"
+#include "system.hpp"
 
 namespace lostmotion {
 

@@ -13,8 +13,8 @@
 #include <cstdint>
 #include <optional>
 
-#include "../model/components.hpp"
-#include "../solver/exact_solver.hpp"
+#include "components.hpp"
+#include "lostmotion/solver/exact_solver.hpp"
 
 namespace lostmotion {
 

@@ -14,12 +14,12 @@
 #include <memory>
 #include <string>
 
-#include "../model/pack.hpp"
-#include "harmonics.hpp"
+#include "lostmotion/analysis/harmonics.hpp"
+#include "lostmotion/analysis/power_channels.hpp"
+#include "lostmotion/analysis/respond.hpp"
+#include "lostmotion/analysis/workers.hpp"
+#include "pack.hpp"
 #include "periodic.hpp"
-#include "power_channels.hpp"
-#include "respond.hpp"
-#include "workers.hpp"
 
 namespace lostmotion {
 

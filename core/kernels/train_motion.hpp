@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "hybrid.hpp"
-#include "kernel.hpp"
+#include "lostmotion/simulation/kernel.hpp"
 #include "stepping.hpp"
 #include "torque_response.hpp"
 #include "train_reader.hpp"

@@ -9,10 +9,10 @@
 #include <span>
 #include <utility>
 
-#include "../kernel/stride.hpp"
-#include "../solver/exact_solver.hpp"
-#include "sample_times.hpp"
-#include "train_channels.hpp"
+#include "lostmotion/kernel/stride.hpp"
+#include "lostmotion/simulation/sample_times.hpp"
+#include "lostmotion/simulation/train_channels.hpp"
+#include "lostmotion/solver/exact_solver.hpp"
 
 namespace lostmotion {
 

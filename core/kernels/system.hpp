@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "going_on.hpp"
+#include "lostmotion/model/scales.hpp"
+#include "lostmotion/model/switched_train.hpp"
 #include "pack.hpp"
-#include "scales.hpp"
-#include "switched_train.hpp"
 
 namespace lostmotion::model {
 

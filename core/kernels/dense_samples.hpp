@@ -3,8 +3,8 @@
 
 #include <cstddef>
 
-#include "../solver/adaptive_solver.hpp"
-#include "sample_times.hpp"
+#include "lostmotion/simulation/sample_times.hpp"
+#include "lostmotion/solver/adaptive_solver.hpp"
 
 namespace lostmotion {
 

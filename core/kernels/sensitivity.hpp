@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <optional>
 
-#include "../solver/components.hpp"
-#include "../solver/exact_solver.hpp"
+#include "lostmotion/solver/components.hpp"
+#include "lostmotion/solver/exact_solver.hpp"
 
 namespace lostmotion {
 

@@ -10,11 +10,12 @@
 #include <string>
 #include <vector>
 
-#include "reset_tangent.hpp"
-#include "sample_tangent.hpp"
-#include "sensitive_run.hpp"
-#include "start_tangent.hpp"
-#include "tick_tangent.hpp"
+#include "lostmotion/analysis/reset_tangent.hpp"
+#include "lostmotion/analysis/sample_tangent.hpp"
+#include "lostmotion/analysis/sensitive_run.hpp"
+#include "lostmotion/analysis/start_tangent.hpp"
+#include "lostmotion/analysis/tick_tangent.hpp"
+#include "train_solving.hpp"
 
 namespace lostmotion {
 

@@ -15,8 +15,8 @@
 #include <limits>
 #include <optional>
 
-#include "../solver/exact_solver.hpp"
-#include "quadrature.hpp"
+#include "lostmotion/simulation/quadrature.hpp"
+#include "lostmotion/solver/exact_solver.hpp"
 
 namespace lostmotion {
 

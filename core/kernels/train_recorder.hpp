@@ -8,10 +8,10 @@
 #include <vector>
 
 #include "dense_samples.hpp"
+#include "lostmotion/simulation/train_report.hpp"
 #include "power_integral.hpp"
 #include "sampler.hpp"
 #include "train_reader.hpp"
-#include "train_report.hpp"
 
 namespace lostmotion {
 

@@ -14,10 +14,10 @@
 #include <span>
 #include <vector>
 
-#include "../base/status.hpp"
-#include "../control/axis.hpp"
-#include "../kernel/form.hpp"
-#include "../model/motion.hpp"
+#include "lostmotion/base/status.hpp"
+#include "lostmotion/control/axis.hpp"
+#include "lostmotion/kernel/form.hpp"
+#include "lostmotion/model/motion.hpp"
 
 namespace lostmotion {
 

@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <optional>
 
-#include "../solver/exact_solver.hpp"
 #include "closed_loop.hpp"
+#include "lostmotion/solver/exact_solver.hpp"
 
 namespace lostmotion {
 

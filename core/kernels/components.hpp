@@ -1,9 +1,9 @@
 // The components of a train's motion, and how those that a switching sets anew depend on the ones before.
 #pragma once
 
-#include "../solver/components.hpp"
 #include "locked_torques.hpp"
-#include "periodic_angles.hpp"
+#include "lostmotion/model/periodic_angles.hpp"
+#include "lostmotion/solver/components.hpp"
 #include "system.hpp"
 
 namespace lostmotion {

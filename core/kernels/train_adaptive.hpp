@@ -1,7 +1,7 @@
 // Runs of a train in one kernel by the adaptive solver. Only core/kernels takes it.
 #pragma once
 
-#include "../solver/adaptive_solver.hpp"
+#include "lostmotion/solver/adaptive_solver.hpp"
 #include "train_solving.hpp"
 
 namespace lostmotion {

@@ -1,11 +1,11 @@
 // Periodic motions and responses of a train.
 #pragma once
 
-#include "../model/components.hpp"
-#include "../simulation/sampler.hpp"
-#include "../simulation/train_solving.hpp"
-#include "../simulation/train_status.hpp"
+#include "components.hpp"
+#include "lostmotion/simulation/train_status.hpp"
 #include "response.hpp"
+#include "sampler.hpp"
+#include "train_solving.hpp"
 
 namespace lostmotion {
 

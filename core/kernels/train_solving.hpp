@@ -3,9 +3,9 @@
 
 #include <memory>
 
+#include "lostmotion/simulation/train_run.hpp"
 #include "train_motion.hpp"
 #include "train_recorder.hpp"
-#include "train_run.hpp"
 
 namespace lostmotion {
 

@@ -8,8 +8,8 @@
 #include <optional>
 #include <vector>
 
-#include "../solver/components.hpp"
-#include "held_torque.hpp"
+#include "lostmotion/model/held_torque.hpp"
+#include "lostmotion/solver/components.hpp"
 #include "system.hpp"
 
 namespace lostmotion {

@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-#include "rank_solve.hpp"
+#include "lostmotion/analysis/rank_solve.hpp"
 #include "sensitivity.hpp"
 
 namespace lostmotion {

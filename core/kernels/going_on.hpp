@@ -2,12 +2,12 @@
 // to search.
 #pragma once
 
-#include "../kernel/bit_set.hpp"
-#include "../kernel/flow.hpp"
-#include "guards_after.hpp"
+#include "lostmotion/kernel/bit_set.hpp"
+#include "lostmotion/kernel/flow.hpp"
+#include "lostmotion/model/guards_after.hpp"
+#include "lostmotion/model/sparse_regime.hpp"
+#include "lostmotion/model/switched_train.hpp"
 #include "pack.hpp"
-#include "sparse_regime.hpp"
-#include "switched_train.hpp"
 
 namespace lostmotion::model {
 
