@@ -13,10 +13,10 @@ from ..inputs.validation import shown
 from ..live_page.drawn import axis_figures
 from ..model.losses import LossMap
 from ..model.train import DriveTrain
-from ..simulation.results import energy_of, is_train_result, scenario_of
+from ..simulation.results import energy_of, scenario_of
 from ..simulation.train_parts import parts_of
 from ..units.practical import charted
-from .looks import FAINT, look
+from .looks import look
 from .panels import Chart, Contacts, Curve, Flows, Ground, Panel
 
 if TYPE_CHECKING:
@@ -24,22 +24,8 @@ if TYPE_CHECKING:
 
 Series = tuple[str, str, float]
 """variable, label, factor"""
-# The result variables that are shown of a run in the short form.
-OVERVIEW = (
-    "command",
-    "motor_torque",
-    "motor_speed",
-    "load_speed",
-    "input_torque",
-    "output_torque",
-    "load_torque",
-    "twist",
-    "input_contact",
-    "twist_contact",
-)
 NEAR = 0.25  # of the range of a motion: the distance of end stops that are drawn
 FIGURES = ("motion", "losses", "contacts", "energy")
-CONTACTS = {"input_contact": "input shaft", "twist_contact": "gearbox twist", "load_contact": "load"}
 
 
 def run_charts(result: xarray.Dataset) -> list[Chart]:
@@ -50,14 +36,9 @@ def run_charts(result: xarray.Dataset) -> list[Chart]:
     InputError
         The dataset lacks what is shown.
     """
-    if is_train_result(result):
-        return [*_axes(result), *_train(result)]
-    lacking = [name for name in OVERVIEW if name not in result]
-    if len(lacking) == len(OVERVIEW):
+    if "scenario" not in result.attrs:
         raise InputError("this dataset is neither a run nor a frequency response; there is no figure of it")
-    if lacking:
-        raise InputError(f"this dataset lacks {', '.join(lacking)}, which the figure of a run shows")
-    return [*_axes(result), *_drive(result)]
+    return [*_axes(result), *_elements(result)]
 
 
 def figure_charts(result: xarray.Dataset, figure: str) -> list[Chart]:
@@ -90,8 +71,6 @@ def figure_charts(result: xarray.Dataset, figure: str) -> list[Chart]:
 
 def _axes(result: xarray.Dataset) -> Iterator[Panel]:
     """Reference, measured value and following error of each controlled axis."""
-    if "scenario" not in result.attrs:  # a periodic motion, which knows its drive only
-        return
     scenario = scenario_of(result)
     time = result["time"].values
     sliding = scenario.sliding()
@@ -112,51 +91,24 @@ def _axes(result: xarray.Dataset) -> Iterator[Panel]:
 
 
 def _panel(result: xarray.Dataset, title: str, label: str, series: list[Series]) -> Panel:
+    if lacking := [name for name, _, _ in series if name not in result]:
+        raise InputError(f"this dataset lacks {', '.join(lacking)}, which the figure of a run shows")
     time = result["time"].values
-    there = [entry for entry in series if entry[0] in result]
     curves = tuple(
-        Curve(text, time, factor * result[name].values, look(k)) for k, (name, text, factor) in enumerate(there)
+        Curve(text, time, factor * result[name].values, look(k)) for k, (name, text, factor) in enumerate(series)
     )
-    if len(curves) == 1 and title.endswith(
-        "s"
-    ):  # of several elements, of which there is one: a single curve has no legend
+    if len(curves) == 1 and title.endswith("s"):  # of several elements, of which there is one, and so no legend
         title = f"{title}: {curves[0].label}"
     return Panel(title, "time [s]", label, curves)
-
-
-def _drive(result: xarray.Dataset) -> Iterator[Chart]:
-    """Charts of a drive in the short form."""
-    time, ratio = result["time"].values, _ratio(result)
-
-    def curve(name: str, style: Mapping[str, Any], factor: float = 1.0, label: str = "") -> Curve:
-        return Curve(label or name.replace("_", " "), time, factor * result[name].values, style)
-
-    def panel(title: str, label: str, *curves: Curve) -> Panel:
-        return Panel(title, "time [s]", label, curves)
-
-    yield panel("Command", "command [-]", curve("command", look(0)))
-    yield panel("Motor torque", "motor torque [N·m]", curve("motor_torque", look(0)))
-    speed = curve("motor_speed", look(1), 1.0 / ratio, "motor speed / ratio")
-    yield panel("Speed", "speed at the load [rad/s]", speed, curve("load_speed", look(0)))
-    torque = curve("input_torque", look(1), ratio, "input torque × ratio")
-    yield panel("Torque", "torque [N·m]", torque, curve("output_torque", look(0)), curve("load_torque", FAINT))
-    yield panel("Twist", "twist [mrad]", curve("twist", look(0), 1e3))
-    yield _contacts(result, {name: label for name, label in CONTACTS.items() if name in result})
-
-
-def _ratio(result: xarray.Dataset) -> float:
-    if "gear_ratio" in result.attrs:
-        return float(result.attrs["gear_ratio"])
-    return float(scenario_of(result).gearbox.ratio)
 
 
 def _contacts(result: xarray.Dataset, names: Mapping[str, str]) -> Contacts:
     return Contacts("Contacts", result["time"].values, {label: result[name].values for name, label in names.items()})
 
 
-def _train(result: xarray.Dataset) -> Iterator[Chart]:
-    """Charts of a drive train: commands, speeds, torques, twists and contacts of all elements."""
-    scenario = scenario_of(result).long()
+def _elements(result: xarray.Dataset) -> Iterator[Chart]:
+    """Commands, speeds, torques, twists and contacts of all elements."""
+    scenario = scenario_of(result)
     train = scenario.train()
     loads = [(train.load_torque_of(name), f"load on {name}", name) for name in scenario.loaded()]
     outputs = [(train.output_torque_of(name), name, gear.output) for name, gear in train.gears.items()]
@@ -164,7 +116,7 @@ def _train(result: xarray.Dataset) -> Iterator[Chart]:
     twists = [(train.twist_of(n), n, g.output) for n, g in train.gears.items() if g.stiffness.kind != "rigid"]
     stops = [(train.stop_torque_of(name), name, name) for name, shaft in train.shafts.items() if shaft.end_stops]
     wanted: list[tuple[str, str, list[Series]]] = [
-        ("Command", "command [-]", [(f"{name}_command", name, 1.0) for name in scenario.commanded()]),
+        ("Command", "command [-]", [(train.command_of(name), name, 1.0) for name in scenario.commanded()]),
         *_by_domain(train, "{Torque} of motors", "{torque} [{unit}]", "torque", motors),
         *(_speeds(part.train()) for part in parts_of(scenario)),
         *_by_domain(train, "{Torque} at outputs and loads", "{torque} [{unit}]", "torque", outputs + loads),
@@ -223,7 +175,7 @@ def _speeds(train: DriveTrain) -> tuple[str, str, list[Series]]:
     last = list(train.shafts)[-1]
     unit, factor = charted(train.speed_unit(last))
     series = [
-        (f"{name}_speed", _in_terms_of(train, name, last, ratio), factor / ratio)
+        (train.speed_of(name), _in_terms_of(train, name, last, ratio), factor / ratio)
         for name, ratio in ratios_to(train, last).items()
     ]
     return f"Speed of {last}", f"speed [{unit}]", series

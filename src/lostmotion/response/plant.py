@@ -48,7 +48,7 @@ class Plant:
     """angle whose advance over a period is reported: that of the load"""
     floors: Mapping[str, float]
     """rated magnitudes of the variables by which motions are compared"""
-    attributes: Mapping[str, float]
+    scenario: Scenario
     closed: Scenario | None = None
     """the scenario, if it has controllers"""
 
@@ -190,7 +190,7 @@ def _plant_of(scenario: Scenario) -> Plant:
         output=train.speed_of(last),
         angle=train.angle_of(last),
         floors=floors,
-        attributes=scenario.attributes(),
+        scenario=scenario,
     )
 
 

@@ -139,7 +139,7 @@ def periodic_motion(
         The result variables over one period, and the ``jacobian`` of the map. Attributes: ``residual`` (largest change of a state over
         the period divided by its largest magnitude), ``angle_advance`` of the load or last shaft [rad], ``multipliers_real`` and
         ``multipliers_imag`` (Floquet), ``stable``, ``smooth`` (true if the multipliers are exact: no switching grazes), ``periods``
-        followed, ``newton_steps``, ``start_<component>``, ``period`` [s], and ``gear_ratio`` of a drive.
+        followed, ``newton_steps``, ``start_<component>``, ``period`` [s] and ``scenario``.
 
     Raises
     ------
@@ -195,7 +195,7 @@ def motion_of(r: dict[str, Any], plant: Plant, period: float) -> xarray.Dataset:
         },
         attrs={
             "period": period,
-            **plant.attributes,
+            "scenario": plant.scenario.to_json(),
             "residual": float(r["residual"][0]),
             "angle_advance": float(r["advance"][0][r["components"].index(plant.angle)]),
             "multipliers_real": multipliers.real.tolist(),

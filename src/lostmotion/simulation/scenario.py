@@ -364,11 +364,6 @@ class Scenario:
         written = self.written
         return written.drive() if isinstance(written, DriveTables) else self.train()
 
-    def attributes(self) -> dict[str, float]:
-        """Attributes of what is computed of it, beside those of a run."""
-        gears = [gear for gear in self.train().gears.values() if not self.train().is_slide(gear.output)]
-        return {"gear_ratio": gears[0].ratio} if len(gears) == 1 else {}
-
     @property
     def is_drive(self) -> bool:
         """Whether its file has the tables `motor`, `gearbox` and `load`."""
