@@ -18,7 +18,7 @@ from scipy.signal import savgol_filter
 
 from ..control.turning import turns
 from ..errors import InputError
-from ..model.angle_torques import STANDARD_GRAVITY, AngleTorque, Gravity, PositionHarmonic, TorqueHarmonic
+from ..model.angle_torques import STANDARD_GRAVITY, Gravity, PositionHarmonic, TorqueHarmonic
 from ..model.losses import ConstantEfficiency, MeshEfficiency
 from ..model.motor import ShaftMotor
 from ..simulation.scenario import Scenario
@@ -109,24 +109,21 @@ def missing_torque(rig: Rig, s: Stretch, known: Mapping[str, Any], rung: int, sh
     for gear in train.gears.values():
         n = ratios[gear.input]
         inertia, viscous = inertia + n**2 * gear.inertia, viscous + n**2 * gear.viscous_friction
-    for damper in scenario.dampers.values():
-        viscous += (ratios[damper.input] - ratios[damper.output]) ** 2 * damper.viscous_friction
+    for _, damper in train.couplings():  # those that hold are refused
+        viscous += (ratios[damper.input] - ratios[damper.output]) ** 2 * damper.viscous_friction  # type: ignore[attr-defined]
     for name, motor in train.motors.items():
         n = ratios[motor.shaft]
         inertia += n**2 * motor.rotor_inertia
         dry += abs(n) * motor.friction_torque
         other -= n * _motor_torque(rig, s, known, scenario, name, motor)
-    for t in (*train.gravity.values(), *train.angle_torques.values()):
-        n = ratios[t.shaft]
-        other -= n * _over_angle(t, n * s.angle)
-    for spring in train.springs.values():
-        n, spring_curve = ratios[spring.shaft], spring.stiffness.core()
-        other += n * np.array([spring_curve.torque(phi - spring.rest_angle) for phi in (n * s.angle).tolist()])
+    for _, element in train.on_shafts():
+        n = ratios[element.shaft]
+        other -= n * _over_angle(element, n * s.angle)
     r = inertia * s.acceleration + viscous * s.speed + dry * np.sign(s.speed) + other
     return np.asarray(r[s.blocks].mean(axis=1))
 
 
-def _over_angle(t: Gravity | AngleTorque | PositionHarmonic, angle: np.ndarray) -> np.ndarray:
+def _over_angle(t: Any, angle: np.ndarray) -> np.ndarray:
     """A torque over the angle; sines as such, since the number of their straight lines may depend on the parameters."""
     if isinstance(t, Gravity):
         return np.asarray(-t.mass * STANDARD_GRAVITY * t.radius * np.sin(angle + t.angle))
@@ -134,7 +131,7 @@ def _over_angle(t: Gravity | AngleTorque | PositionHarmonic, angle: np.ndarray) 
         return np.asarray(t.amplitude * np.sin(t.order * angle + t.phase))
     if isinstance(t, PositionHarmonic):
         return np.asarray(t.amplitude * np.sin(2.0 * np.pi / t.period * angle))
-    curve = t.core()
+    curve = t.over_angle()
     return np.array([curve(phi) for phi in angle.tolist()])
 
 
@@ -142,7 +139,7 @@ def _check(scenario: Scenario) -> None:
     """Whether its torques are those of the formula above."""
     train = scenario.train()
     holding = [key for key, coupling in train.couplings() if coupling.holds]
-    if holding := [*holding, *(f"brakes.{name}" for name in train.brakes)]:
+    if holding := [*holding, *(key for key, element in train.on_shafts() if not hasattr(element, "over_angle"))]:
         raise InputError(f"{holding[0]} has a torque that depends on the contact state; this is not supported")
     for name, gear in train.gears.items():
         losses = gear.losses
@@ -151,10 +148,10 @@ def _check(scenario: Scenario) -> None:
         )
         if not lossless or gear.transmission_error is not None:
             raise InputError(f"{scenario.kind_of(name)}s.{name} has losses over the load or a transmission error")
-    for table in ("shafts", "dampers"):
-        for name, element in getattr(train, table).items():
-            if element.drag is not None:
-                raise InputError(f"{table}.{name} has a drag over the speed")
+    shafts = ((f"shafts.{name}", shaft) for name, shaft in train.shafts.items())
+    for key, part in (*shafts, *train.couplings()):
+        if getattr(part, "drag", None) is not None:
+            raise InputError(f"{key} has a drag over the speed")
 
 
 def _motor_torque(

@@ -48,7 +48,7 @@ def shown_motion(rig: Rig) -> Shown:
     for name, variable in plain.items():
         if variable in by_variable:
             return Shown(name, by_variable[variable], is_speed=False)
-    by_speed = {f"{s}_speed": s for s in train.shafts}
+    by_speed = {train.speed_of(s): s for s in train.shafts}
     for name, variable in plain.items():
         if variable in by_speed and not depends_on_angle(train):
             return Shown(name, by_speed[variable], is_speed=True)
@@ -60,9 +60,13 @@ def shown_motion(rig: Rig) -> Shown:
 def depends_on_angle(train: DriveTrain) -> bool:
     """Whether a torque of a train depends on an angle."""
     stopped = any(shaft.end_stops is not None for shaft in train.shafts.values())
-    by_angle = bool(train.gravity or train.angle_torques or train.springs or stopped)
+    by_angle = any(hasattr(element, "over_angle") for _, element in train.on_shafts())
     gears = train.gears.values()
-    return by_angle or any(gear.transmission_error is not None or gear.mesh_stiffness is not None for gear in gears)
+    return (
+        stopped
+        or by_angle
+        or any(gear.transmission_error is not None or gear.mesh_stiffness is not None for gear in gears)
+    )
 
 
 def measured_course(rig: Rig, log: Prepared, channel: str, known: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..inputs.quantities import Limit
+from ..model.linear_train import LINEAR_DRIVES, LinearElements
 from ..model.signals import TimeFunction
-from ..model.train import COUPLINGS
 from ..units.practical import ARCMIN
 
 Place = list[str | int]
@@ -132,21 +132,8 @@ LINEAR_LABELS: dict[str, tuple[str, float | None]] = {
 }
 ON_SLIDES = {"N": ("torque", "force"), "kg": ("inertia", "mass")}
 """words of a label that change where a motor moves a slide, by the unit"""
-LINEAR_TABLES = ("slides", "screws", "racks", "belts")
-TABLES = (
-    *LINEAR_TABLES,
-    "motor",
-    "motors",
-    "gearbox",
-    "gears",
-    "load",
-    "shafts",
-    "brakes",
-    *COUPLINGS,
-    "springs",
-    "controller",
-    "controllers",
-)
+LINEAR_TABLES = ("slides", *LINEAR_DRIVES)
+TABLES = ("motor", "gearbox", "load", "controller", "controllers", "shafts", "slides", *LinearElements.model_fields)
 
 
 def of_parameters(
@@ -263,24 +250,13 @@ def duration(value: float, sample_interval: float) -> Slider:
     return Slider("simulation.duration", "Run", "duration", "s", value, reach, "duration")
 
 
-# A motor and its shaft may have one name.
-KINDS = {
-    "motors": "motor",
-    "shafts": "shaft",
-    "slides": "slide",
-    "gears": "gear",
-    "brakes": "brake",
-    "clutches": "clutch",
-}
-
-
 def told_apart(found: list[Slider]) -> list[Slider]:
     """The sliders, those of equal labels in one group with the kind of their elements."""
     labels = Counter((s.group, s.label) for s in found)
 
     def kind(slider: Slider) -> str:
-        table, *_ = slider.key.split(".")
-        return KINDS.get(table, table.removesuffix("s"))
+        table = slider.key.partition(".")[0]  # a motor and its shaft may have one name
+        return table.removesuffix("es" if table.endswith("ches") else "s")
 
     return [replace(s, label=f"{s.label}, {kind(s)}") if labels[s.group, s.label] > 1 else s for s in found]
 

@@ -1,6 +1,7 @@
 """Elements that depend on the angle of a shaft: gravity, cogging, ripple, and the transmission error of a gear."""
 
 import itertools
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
@@ -66,6 +67,10 @@ class PeriodicTorque:
     if TYPE_CHECKING:
 
         def core(self) -> _core.PeriodicCurve: ...
+
+    def over_angle(self) -> Callable[[float], float]:
+        """Its torque [N·m] on the shaft over the angle [rad], as the solver has it."""
+        return self.core()
 
     def core_fields(self) -> dict[str, Any]:
         """Fields for the core, in SI units."""

@@ -22,6 +22,11 @@ class Damper(WithDrag, DamperFields, BetweenShafts):
 
     holds: ClassVar[bool] = False
 
+    @property
+    def is_linear(self) -> bool:
+        """Whether it has one linear regime."""
+        return self.drag is None
+
     @model_validator(mode="after")
     def _has_a_torque(self) -> Self:
         if self.drag is None and not self.viscous_friction:

@@ -1,5 +1,6 @@
 """Springs between a shaft and the frame: counterbalances, flexure pivots, cables that are wound up, end stops."""
 
+from collections.abc import Callable
 from typing import Annotated, Any
 
 from pydantic import Field
@@ -24,6 +25,16 @@ class Spring(SpringFields):
     """on which it acts"""
     stiffness: Annotated[TorsionCurve | LinearStiffness, Field(discriminator="kind")]
     """P over the angle from the rest angle on"""
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether it has one linear regime."""
+        return self.stiffness.is_linear
+
+    def over_angle(self) -> Callable[[float], float]:
+        """Its torque [N·m] on the shaft over the angle [rad]."""
+        curve, rest = self.stiffness.core(), self.rest_angle
+        return lambda angle: -curve.torque(angle - rest)
 
     def core_fields(self) -> dict[str, Any]:
         """Fields for the core, in SI units."""

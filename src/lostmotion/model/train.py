@@ -75,6 +75,11 @@ class TrainElements(Part):
         for table in COUPLINGS:
             yield from ((f"{table}.{name}", element) for name, element in getattr(self, table).items())
 
+    def on_shafts(self) -> Iterator[tuple[str, Any]]:
+        """Key and element of all that acts on one shaft and is no motor."""
+        for table in ON_SHAFTS:
+            yield from ((f"{table}.{name}", element) for name, element in getattr(self, table).items())
+
     def references(self) -> Iterator[tuple[str, str]]:
         """Each key that names a shaft, and the name."""
         for name, mass in self.mass_matrices.items():

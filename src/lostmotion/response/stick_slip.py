@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from ..model.train import DriveTrain
 
 SLIP_SPEED = 1e-9  # [rad/s] or [m/s], at which the matrices of the slip are taken
-LINEAR = ("shafts", "motors", "gears", "springs", "dampers", "mass_matrices")
-"""tables of a train whose elements have one linear regime, but for what is named apart"""
 NONE = 1e-9  # of the largest singular value, below which one is none
 ILL = 1e9  # condition number of the modes, above which rounding is not small
 
@@ -175,15 +173,9 @@ def others(train: DriveTrain) -> Iterator[str]:
             yield f"the housing of {name}, which turns"
         if gear.transmission_error is not None:
             yield f"transmission error of {name}"
-    for name, spring in train.springs.items():
-        if not spring.stiffness.is_linear:
-            yield f"several segments of {name}"
-    for name, damper in train.dampers.items():
-        if damper.drag is not None:
-            yield f"drag of {name}"
-    for table in type(train).model_fields:
-        if table not in LINEAR and getattr(train, table):
-            yield table
+    for key, element in (*train.on_shafts(), *train.couplings()):
+        if not getattr(element, "is_linear", False):
+            yield key
 
 
 def _model(loop: Loop, shaft: str, speed: float) -> LinearModel:

@@ -92,12 +92,9 @@ class JointDrive:
         """Torque [N·m] of the drive's springs and end stops and of its torques over the angle [rad] on the joint."""
         stops = self.train.shafts[self.shaft].end_stops
         total = 0.0 if stops is None else stops.torque(angle)
-        for spring in self.train.springs.values():
-            if spring.shaft == self.shaft:
-                total -= spring.stiffness.core().torque(angle - spring.rest_angle)
-        for torque in (*self.train.gravity.values(), *self.train.angle_torques.values()):
-            if torque.shaft == self.shaft:
-                total += torque.core()(angle)
+        for _, element in self.train.on_shafts():
+            if element.shaft == self.shaft and hasattr(element, "over_angle"):
+                total += element.over_angle()(angle)
         return total
 
     def twists_under(self, torque: float) -> tuple[dict[str, float], dict[str, float]]:
