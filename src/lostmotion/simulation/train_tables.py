@@ -91,7 +91,7 @@ class TrainTables(ScenarioTables, LinearElements):
     @model_validator(mode="before")
     @classmethod
     def _units_of_slides(cls, data: Any) -> Any:
-        return in_si(data, train_schema) if isinstance(data, Mapping) else data
+        return in_si(data, _train_schema) if isinstance(data, Mapping) else data
 
     @kept
     def train(self) -> DriveTrain:
@@ -251,18 +251,14 @@ def core_train(
     return core
 
 
-@cache
-def _train_schema() -> str:
-    return json.dumps(_make_train_schema())
-
-
 def train_schema() -> dict[str, Any]:
     """JSON Schema of scenario files in the long form, for editors."""
-    schema: dict[str, Any] = json.loads(_train_schema())
+    schema: dict[str, Any] = json.loads(json.dumps(_train_schema()))  # which others change
     return schema
 
 
-def _make_train_schema() -> dict[str, Any]:
+@cache
+def _train_schema() -> dict[str, Any]:
     schema = with_accessories(TrainTables.model_json_schema())
     schema["properties"] = {key: schema["properties"][key] for key in ("title", "shafts", "slides")} | schema[
         "properties"
