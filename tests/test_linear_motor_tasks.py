@@ -95,7 +95,7 @@ def test_a_payload_presses_on_the_guide():
     study = task_of(changed(task={"payload": [{"begin": "0.4 s", "end": "1 s", "mass": "2 kg"}]}))
     assert study.scenario.load.friction_torque == pytest.approx(0.01 * 7.0 * G)
     tilted = task_of(changed(slide={"inclination": "60 deg"}, task={"hold_without_power": False}))
-    assert tilted.drive.load.friction_torque == pytest.approx(0.01 * 5.0 * G * 0.5)
+    assert tilted.scenario.load.friction_torque == pytest.approx(0.01 * 5.0 * G * 0.5)
 
 
 @pytest.mark.parametrize("slope", [0.0, 30.0, 90.0])
