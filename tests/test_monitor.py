@@ -15,6 +15,7 @@ import lostmotion as lm
 from conftest import some
 from lostmotion.cli.entry import app
 from lostmotion.identification.changes import SIZES, _log_factors, find_change
+from lostmotion.identification.monitor import LogEstimate, _in_units_of_baseline
 
 JOINT = """
 [shafts.motor]
@@ -103,6 +104,13 @@ def write_task(directory: Path, task: dict[str, Any]) -> Path:
             table(key, value)
     (directory / "task.toml").write_text("\n".join(lines))
     return directory / "task.toml"
+
+
+def test_logs_without_any_residual_are_not_odd() -> None:
+    exact, off = (LogEstimate(str(r), 0.0, {}, {}, {}, r) for r in (0.0, 1e-3))
+    found = _in_units_of_baseline([exact] * 5 + [off], 5)
+    assert [e.residual for e in found] == [1.0] * 5 + [np.inf]
+    assert [bool(e.why) for e in found] == [False] * 5 + [True]
 
 
 # --- a drive ---

@@ -117,6 +117,14 @@ def test_a_wrong_configuration_ends_in_one_clear_line(options: dict[str, Any], m
     assert "\n" not in str(raised.value).strip()
 
 
+def test_loads_and_weights_of_a_scenario_are_taken_off_where_the_robot_has_them(tmp_path: Path) -> None:
+    loaded = lm.load("lossy-rigid-gear")
+    with pytest.raises(lm.InputError, match=r"load\.torque: would count twice"):
+        lm.mujoco.write_drive(loaded, tmp_path / "one")
+    without = loaded.replace(**{"load.torque": {}})
+    assert lm.mujoco.write_drive(loaded, tmp_path / "x", replace=True) == lm.mujoco.write_drive(without, tmp_path / "x")
+
+
 def test_controls_are_limited_and_found_behind_an_actuator_of_two(tmp_path: Path) -> None:
     limited = arm(1e-3, drive(), tmp_path, actuator='ctrlrange="-0.1 0.1"')
     behind = arm(1e-3, drive(), tmp_path, before='<pid name="first" joint="elbow" kp="0" kv="0" input="pos vel"/>')

@@ -191,6 +191,14 @@ def test_what_is_not_decided_of_a_sampled_axis_is_named(changes: dict[str, Any],
     assert reason in certificate.reason
 
 
+def test_of_several_axes_the_one_that_is_named_is_certified() -> None:
+    scenario = lm.load("direction-finder")
+    with pytest.raises(lm.InputError, match="motor: there are several controllers"):
+        lm.hunting_certificate(scenario)
+    for motor in scenario.axes():
+        assert lm.hunting_certificate(scenario, motor=motor).verdict == "not decided"
+
+
 def test_the_report_of_an_axis_has_the_certificate() -> None:
     report = lm.commission(rotor(3.0, 1e-5, **{"simulation/duration": 2.0}))
     assert report.certificate is not None

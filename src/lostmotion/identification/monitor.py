@@ -391,7 +391,7 @@ def _in_units_of_baseline(estimates: list[LogEstimate], baseline: int) -> list[L
     usual = float(np.median(sizes))
     found = []
     for e in estimates:
-        ratio = e.residual / usual
+        ratio = e.residual / usual if usual > 0.0 else math.inf if e.residual > 0.0 else 1.0  # of exact logs it is 0
         odd = not e.why and ratio > ODD
         why = f"residuals are {ratio:.3g} times those of the baseline" if odd else e.why
         found.append(replace(e, residual=ratio, why=why))

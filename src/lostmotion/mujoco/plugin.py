@@ -52,7 +52,7 @@ def load_plugin() -> Path:
 
 
 @checked
-def write_drive(drive: Any, path: str | Path, *, controller: Controller | None = None) -> str:
+def write_drive(drive: Any, path: str | Path, *, controller: Controller | None = None, replace: bool = False) -> str:
     """Write a drive to a file for the plugin, and return the MJCF that uses it.
 
     Parameters
@@ -64,6 +64,8 @@ def write_drive(drive: Any, path: str | Path, *, controller: Controller | None =
         Of the file.
     controller
         A sampled controller of the motor.
+    replace
+        Take loads and weights off the drive, which the robot has, as `attach` does.
 
     Returns
     -------
@@ -85,7 +87,7 @@ def write_drive(drive: Any, path: str | Path, *, controller: Controller | None =
     <plugin joint="JOINT" plugin="lostmotion.drive"><config key="scenario" value=".../elbow.drive"/></plugin>
     """
     given = drive_of_joint(str(path), drive, controller)
-    without_weight(str(path), given, replace=False, weighs=True)
+    given = without_weight(str(path), given, replace=replace, weighs=True)
     scenario = as_drive(given, "drive")
     armature = joint_drive(str(path), scenario, scenario.load.inertia, 1e-3).reflected_inertia
     numbers = description(scenario, parameters=False)

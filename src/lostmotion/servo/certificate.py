@@ -100,7 +100,9 @@ def certified_in_words(certificate: HuntingCertificate) -> str:
 
 
 @checked
-def hunting_certificate(scenario: Scenario, *, largest_error: float | str | None = None) -> HuntingCertificate:
+def hunting_certificate(
+    scenario: Scenario, *, motor: str | None = None, largest_error: float | str | None = None
+) -> HuntingCertificate:
     """Decide by proof whether a stuck contact under integral action hunts.
 
     While the contact is stuck, the integrator winds up in proportion to the error until the contact breaks away; the
@@ -119,6 +121,8 @@ def hunting_certificate(scenario: Scenario, *, largest_error: float | str | None
         With one position controller, one dry contact with a constant friction in motion, and no other contacts or
         segments. A sampled controller needs rigid gears, one encoder, and a current loop of kind ideal or first_order.
         Its inputs must come to rest.
+    motor : str, optional
+        Name of the motor whose sampled controller is examined. Default: the only one.
     largest_error : float or str, optional
         Largest starting error [rad] or [m] that is examined. Default: the travel of the reference.
 
@@ -148,7 +152,7 @@ def hunting_certificate(scenario: Scenario, *, largest_error: float | str | None
     if not train.continuous():
         if not train.axes():
             raise InputError("hunting_certificate: the scenario has no controller; add one with a position loop")
-        axis = axis_of(train)
+        axis = axis_of(train, motor)
         return certified(axis, lambda: at_rest(axis).verdict == "at rest", largest_error)
     loop = Loop.of(train)
     try:
