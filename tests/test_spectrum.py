@@ -153,7 +153,7 @@ def test_each_figure_shows_its_subject(figure: str) -> None:
     run = lm.simulate(lm.load("paper-2dof-nl-small"))
     titles = [chart.title for chart in figure_charts(run, figure)]
     expected = {
-        "motion": ["Command", "Torque of motors", "Speed of load", "Torque at outputs and loads", "Twist"],
+        "motion": ["Command", "Torque of motors: motor", "Speed of load", "Torque at outputs and loads", "Twist"],
         "losses": ["Torsion and hysteresis of gearbox", "Loss map of gearbox"],
         "contacts": ["Contacts"],
         "energy": ["Energy of the whole run"],

@@ -212,7 +212,7 @@ class DriveTrain(TrainElements):
     def flanks(self) -> dict[str, tuple[str, float, float]]:
         """Contacts that touch or part, where others stick or slip: what moves between them, and its least and largest value."""
         found = {
-            f"{self.twist_of(name)}_contact": (self.twist_of(name), -0.5 * law.backlash, 0.5 * law.backlash)
+            self.twist_contact_of(name): (self.twist_of(name), -0.5 * law.backlash, 0.5 * law.backlash)
             for name, law in ((name, gear.stiffness) for name, gear in self.gears.items())
             if isinstance(law, Rigid) and law.strikes
         }

@@ -16,7 +16,7 @@ from ..model.train import DriveTrain
 from ..simulation.results import energy_of, scenario_of
 from ..simulation.train_parts import parts_of
 from ..units.practical import charted
-from .looks import look
+from .looks import FAINT, look
 from .panels import Chart, Contacts, Curve, Flows, Ground, Panel
 
 if TYPE_CHECKING:

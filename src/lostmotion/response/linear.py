@@ -340,7 +340,7 @@ def train_model(
 def _why_several_regimes(train: DriveTrain, core: _core.Train) -> str:
     """Reason for more than one regime of a train; empty if it has one."""
     gears, motors, shafts = train.gears.values(), train.motors.values(), train.shafts.values()
-    rigid = {f"{train.twist_of(name)}_contact" for name, g in train.gears.items() if isinstance(g.stiffness, Rigid)}
+    rigid = {train.twist_contact_of(name) for name, g in train.gears.items() if isinstance(g.stiffness, Rigid)}
     dry = [name for name in core.contact_names() if name not in rigid]
     limits = any(m.command_limit is not None or m.torque_limit is not None for m in motors)
     curves = any(not isinstance(g.stiffness, Rigid) and not g.stiffness.is_linear for g in gears)
