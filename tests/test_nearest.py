@@ -20,6 +20,7 @@ from lostmotion.studies.study import Study
 from lostmotion.studies.table import read_table
 from lostmotion.studies.task_file import load_task, task_of
 from test_axis_tasks import ARM, GEARBOX, MOTOR
+from test_task_keys import FORMS
 
 EXCESS = 0.44
 """by which the current is beyond its limit: a cycle so much longer that 1/s^2 makes up for it takes 1.2 times as long"""
@@ -133,6 +134,25 @@ def test_a_loop_by_rule_that_is_unstable_is_the_reason_before_the_limits_that_it
         assert candidate.fits != candidate.open
     (miss,) = misses(feed, candidates(rows, feed), 1)
     assert str(miss).startswith(f"{UNSTABLE}, with average_output_torque")
+
+
+def test_an_unstable_loop_by_rule_that_keeps_all_limits_is_a_reservation():
+    """A light slide on a screw with little damping: the speed loop has a pole outside the unit circle, and friction hides it."""
+    tables = FORMS["screw"]
+    soft = {
+        **tables,
+        "slide": {"mass": "10 kg"},
+        "screw": tables["screw"] | {"damping": "50 N s/m"},
+        "controller": tables["controller"] | {"sample_time": "250 us"},
+    }
+    task = task_of(soft)
+    axis = task.axis_at(task.parameters(0, 1)[0], 2)
+    assert not lm.commission(axis).stable
+    columns, _ = Axes(task).measured(task.parameters(0, 1)[0])
+    assert columns["violated"] == ""
+    assert "stability" in str(columns["not judged"]).split()
+    damped = task_of({**soft, "screw": tables["screw"]})
+    assert "stability" not in str(Axes(damped).measured(damped.parameters(0, 1)[0])[0]["not judged"]).split()
 
 
 def test_a_candidate_whose_run_violates_a_limit_is_run_in_slower_cycles(tmp_path: Path):

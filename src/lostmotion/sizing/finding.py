@@ -57,6 +57,7 @@ TASK_RULES = {
     "amplifier_voltage": "the data sheet of the amplifier",
     "bus_voltage": "energy balance of the capacitors: HIWIN MM99TE07-1701, p. 118",
     "brake_resistor": "energy beyond the capacitors: HIWIN MM99TE07-1701, p. 118",
+    "stability": "poles of the loops with gains by rule, as lostmotion servo finds them",
     "mass": "total_mass in the data sheets of the parts",
     "length": "overall_length in the data sheets of motor and gearbox, in line",
     "price": "price in the data sheets of the parts",

@@ -369,10 +369,14 @@ class Axes:
         """
         made = until_it_repeats(self.study, row)
         columns = row_of(made, slides=self.study.slides_itself(row))
-        found = self._after_run(row, made, columns["winding_temperature"])
-        whole = columns_of(found, CHECKS) | columns | self._without_run(row)
-        if self.over(whole) and (pole := unstable_pole(axis_of(made.scenario))):
-            whole["why"] = "; ".join(filter(None, [f"{UNSTABLE}: {pole}", str(whole["why"])]))
+        found, more = self._after_run(row, made, columns["winding_temperature"]), columns | self._without_run(row)
+        whole = columns_of(found, CHECKS) | more
+        if pole := unstable_pole(axis_of(made.scenario)):
+            why = f"{UNSTABLE}: {pole}"
+            if self.over(whole):
+                whole["why"] = "; ".join(filter(None, [why, str(whole["why"])]))
+            else:  # friction may hold what the loop would swing
+                whole = columns_of([*found, Finding("stability", "loops", "not judged", "unknown", why)], CHECKS) | more
         return whole, int(made.result.attrs["switching_count"])
 
     def _after_run(self, row: np.ndarray, made: Repeated, winding: float) -> list[Finding]:
