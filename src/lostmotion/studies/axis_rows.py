@@ -369,7 +369,8 @@ class Axes:
         """
         made = until_it_repeats(self.study, row)
         columns = row_of(made, slides=self.study.slides_itself(row))
-        found, more = self._after_run(row, made, columns["winding_temperature"]), columns | self._without_run(row)
+        found = self._after_run(row, made, columns["winding_temperature"])
+        more: Row = {**columns, **self._without_run(row)}
         whole = columns_of(found, CHECKS) | more
         if pole := unstable_pole(axis_of(made.scenario)):
             why = f"{UNSTABLE}: {pole}"
