@@ -452,6 +452,39 @@ def test_an_inertia_ratio_is_a_reservation_by_the_rule_of_thumb_and_a_failure_by
     assert states == {None: ("caution", 0, True), 20.0: ("warning", 1, True), 40.0: ("ok", 0, False)}
 
 
+ROTOR = {"kind": "torque_source", "rotor_inertia": 2e-4, "rated_torque": 2.0}
+TRAVEL = 0.2 / (2.0 * math.pi)  # of a slide for a radian
+
+
+@pytest.mark.parametrize(
+    ("parts", "inertia"),
+    [
+        ({"rack": {"travel_per_turn": 0.2, "inertia": 1e-3}, "slide": {"mass": 50.0}, "gearbox": {"ratio": 5.0, "inertia": 1e-5}}, 1e-5 + (1e-3 + 50.0 * TRAVEL**2) / 25.0),
+        ({"belt": {"travel_per_turn": 0.2, "inertia": 2e-4}, "slide": {"mass": 10.0}, "payload": {"mass": 5.0}}, 2e-4 + 15.0 * TRAVEL**2),
+        ({"screw": {"lead": 0.2, "inertia": 5e-4, "efficiency": 0.9}, "slide": {"mass": 4.0}, "gearbox": {"ratio": 3.0, "inertia": 1e-5}}, 1e-5 + (5e-4 + 4.0 * TRAVEL**2) / 9.0),
+    ],
+)  # fmt: skip
+def test_the_inertia_of_an_axis_is_all_that_its_rotor_moves(parts: dict, inertia: float) -> None:
+    axis = lm.Scenario(
+        axis={"motor": ROTOR, **parts}, command={"mean": 0.2}, simulation={"duration": 0.1, "sample_interval": 0.01}
+    )
+    ratio = next(f for f in lm.check_drive(axis) if f.rule == "inertia_ratio")
+    assert ratio.use == pytest.approx(inertia / 2e-4 / 10.0, rel=1e-9)
+    assert ratio.verdict == "ok" or "axis.motor.limits.max_inertia_ratio states" in ratio.remark
+
+
+def test_the_inertia_of_two_stages_is_referred_through_both() -> None:
+    train = lm.Scenario(
+        shafts={"a": {}, "b": {"inertia": 2e-4}, "c": {"inertia": 1.5}},
+        motors={"m": {"shaft": "a", **ROTOR}},
+        gears={"g": {"input": "a", "output": "b", "ratio": 4.0, "inertia": 3e-5}, "h": {"input": "b", "output": "c", "ratio": 10.0, "inertia": 1e-4}},
+        command={"m": 0.2},
+        simulation={"duration": 0.1, "sample_interval": 0.01},
+    )  # fmt: skip
+    ratio = next(f for f in lm.check_drive(train) if f.rule == "inertia_ratio")
+    assert ratio.use == pytest.approx((3e-5 + (2e-4 + 1e-4 + 1.5 / 100.0) / 16.0) / 2e-4 / 10.0, rel=1e-9)
+
+
 @pytest.mark.parametrize("name", ["position-axis", "catalogue-robot-joint", "paper-1dof-l-small", "lossy-rigid-gear"])
 def test_a_drive_in_the_long_form_gets_the_judgements_of_the_short_one(name: str) -> None:
     scenario = lm.load(name)

@@ -108,6 +108,7 @@ def write_task(directory: Path, task: dict[str, Any]) -> Path:
 
 def test_logs_without_any_residual_are_not_odd() -> None:
     exact, off = (LogEstimate(str(r), 0.0, {}, {}, {}, r) for r in (0.0, 1e-3))
+    assert _in_units_of_baseline([off] * 5 + [exact], 5)[-1].residual > 0.0
     found = _in_units_of_baseline([exact] * 5 + [off], 5)
     assert [e.residual for e in found] == [1.0] * 5 + [np.inf]
     assert [bool(e.why) for e in found] == [False] * 5 + [True]

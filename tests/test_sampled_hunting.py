@@ -191,6 +191,25 @@ def test_what_is_not_decided_of_a_sampled_axis_is_named(changes: dict[str, Any],
     assert reason in certificate.reason
 
 
+def test_losses_that_grow_with_the_load_alone_are_no_constant_friction() -> None:
+    axis = {
+        "motor": {"kind": "torque_source", "rotor_inertia": 2e-4, "rated_torque": 3.0},
+        "belt": {"travel_per_turn": 0.07, "efficiency": 0.8, "stiffness": 1e6, "damping": 1e3},
+        "slide": {"mass": 40.0},
+    }
+    controller = {
+        "sample_time": 5e-4,
+        "encoder": {"bits": 20},
+        "reference": {"kind": "position", "speed": 0.2, "acceleration": 2.0, "moves": [{"to": 0.005}]},
+        "position": {"gain": 20.0},
+        "speed": {"gain": 0.05, "integral_time": 0.05},
+    }
+    scenario = lm.Scenario(axis=axis, controller=controller, simulation={"duration": 0.1, "sample_interval": 0.01})
+    certificate = lm.hunting_certificate(scenario)
+    assert certificate.verdict == "not decided"
+    assert "motor_contact grows with the load alone" in certificate.reason
+
+
 def test_of_several_axes_the_one_that_is_named_is_certified() -> None:
     scenario = lm.load("direction-finder")
     with pytest.raises(lm.InputError, match="motor: there are several controllers"):

@@ -132,6 +132,9 @@ class MonitorResult:
         return [*found, *(f"  {text}" for text in [*(w.text for w in self.watched.values()), *noise, *self.inputs])]
 
 
+LEAST = 1e-9  # residual in those of the baseline: less is rounding, and the trend is that of logarithms
+
+
 @checked
 def monitor(
     source: str | Path,
@@ -392,6 +395,7 @@ def _in_units_of_baseline(estimates: list[LogEstimate], baseline: int) -> list[L
     found = []
     for e in estimates:
         ratio = e.residual / usual if usual > 0.0 else math.inf if e.residual > 0.0 else 1.0  # of exact logs it is 0
+        ratio = max(ratio, LEAST)
         odd = not e.why and ratio > ODD
         why = f"residuals are {ratio:.3g} times those of the baseline" if odd else e.why
         found.append(replace(e, residual=ratio, why=why))

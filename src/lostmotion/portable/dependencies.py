@@ -49,7 +49,7 @@ class _Equations:
         contacts = scenario.core().contact_names()
         for name, gear in train.gears.items():
             twist = train.twist_of(name)
-            if twist not in self.moving or f"{twist}_contact" in contacts:
+            if twist not in self.moving or train.twist_contact_of(name) in contacts:
                 self._join(gear.input, gear.output, *filter(None, [gear.housing]))
         for one, other, _ in (*train.held_together(), *train.inertia_couplings()):
             self._join(one, other)

@@ -195,7 +195,7 @@ def _with_given(scenario: Scenario, names: Sequence[str]) -> Scenario:
         if name in scenario.given():
             continue
         table = "slides" if name in scenario.slides else "shafts"
-        changes[f"{table}.{name}.speed"] = {"mean": start.get(f"{name}_speed", 0.0)}
+        changes[f"{table}.{name}.speed"] = {"mean": start.get(scenario.train().speed_of(name), 0.0)}
         for key in ("speeds", "slide_speeds"):
             own = changes.get(f"initial.{key}", getattr(scenario.initial, key))
             changes[f"initial.{key}"] = {shaft: speed for shaft, speed in own.items() if shaft != name}

@@ -152,7 +152,7 @@ def train_summary(result: xarray.Dataset | RunArrays) -> str:
     for name in train.shafts:
         angle, (unit, factor) = train.angle_of(name), charted(train.angle_unit(name))
         at = f"; at {factor * float(np.asarray(result[angle])[-1]):.4g} {unit}" if angle in result else ""
-        element("slide" if train.is_slide(name) else "shaft", name, f"{name}_speed", train.speed_unit(name), at)
+        element("slide" if train.is_slide(name) else "shaft", name, train.speed_of(name), train.speed_unit(name), at)
     for name, gear in train.gears.items():
         twist, unit = train.twist_of(name), train.angle_unit(gear.output)
         bends = twist.removeprefix(f"{name}_")

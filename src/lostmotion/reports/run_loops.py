@@ -119,7 +119,7 @@ def _of_axis(result: Any, scenario: Scenario, motor: str) -> LoopErrors | None:
     sampled = scenario.axes().get(motor)
     c: Any = sampled or scenario.continuous()[motor]
     shaft, kind = c.shaft or list(train.shafts)[-1], c.reference.kind
-    value = train.angle_of(shaft) if kind == "position" else f"{shaft}_speed"
+    value = train.angle_of(shaft) if kind == "position" else train.speed_of(shaft)
     prefix = scenario.prefix(motor)
     names = [f"{prefix}{kind}_reference", f"{prefix}measured_{kind}"] if sampled else [f"{motor}_reference"]
     if kind == "torque" or any(name not in result for name in (value, *names)):

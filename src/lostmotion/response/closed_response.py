@@ -163,12 +163,12 @@ def _powers(plant: Plant, samples: np.ndarray) -> dict[str, float]:
 
 def _of_train(train: DriveTrain) -> tuple[list[tuple[str, str]], list[tuple[tuple[str, str], tuple[str, str], bool]]]:
     """Torque and speed of the motors, and of the gears at input and output, with whether the output turns no other gear."""
-    motors = [(train.motor_torque_of(name), f"{motor.shaft}_speed") for name, motor in train.motors.items()]
+    motors = [(train.motor_torque_of(name), train.speed_of(motor.shaft)) for name, motor in train.motors.items()]
     driving = {gear.input for gear in train.gears.values()}
     gears = [
         (
-            (train.input_torque_of(name), f"{g.input}_speed"),
-            (train.output_torque_of(name), f"{g.output}_speed"),
+            (train.input_torque_of(name), train.speed_of(g.input)),
+            (train.output_torque_of(name), train.speed_of(g.output)),
             g.output not in driving,
         )
         for name, g in train.gears.items()

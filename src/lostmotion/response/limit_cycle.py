@@ -88,7 +88,7 @@ class Loop:
             settled = max(settled, time)
             constants.append(core_signal([(0.0, value, 0.0)]))
         controlled, last = scenario.continuous(), list(scenario.train().shafts)[-1]
-        watched = f"{next(iter(controlled))}_error" if controlled else f"{last}_speed"
+        watched = f"{next(iter(controlled))}_error" if controlled else scenario.train().speed_of(last)
         channels = tuple(name for name, *_ in core.channels())
         return cls(core, core_case(scenario), constants, settled, watched, channels, scenario)
 

@@ -254,7 +254,7 @@ def _motor(train: DriveTrain, motor: str | None) -> str:
 
 def _of(data: xarray.Dataset, train: DriveTrain, shaft: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Time, angle and speed of a shaft, or position and speed of a slide."""
-    return data["time"].values, data[train.angle_of(shaft)].values, data[f"{shaft}_speed"].values
+    return data["time"].values, data[train.angle_of(shaft)].values, data[train.speed_of(shaft)].values
 
 
 def _window(long: Scenario, train: DriveTrain, over: str, start: float | None) -> tuple[float, float]:

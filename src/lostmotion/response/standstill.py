@@ -101,7 +101,7 @@ class Watch:
         self.frame = self.tick * ticks
         self._running = list(running_slots(self.simulation._control))
         self.noise = np.array([_noise(scenario, name) for name in self.names])
-        self._speeds = tuple(f"{name}_speed" for name in (*scenario.shafts, *scenario.slides))
+        self._speeds = tuple(map(scenario.train().speed_of, scenario.train().shafts))
         self.skipped = 0.0
         """time that was extrapolated, not run [s]"""
         self.times = np.zeros(0)

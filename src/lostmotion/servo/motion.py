@@ -184,7 +184,7 @@ def limited(axis: Axis, loop: str, data: RunArrays) -> dict[str, float]:
         most = c.position.speed_limit * abs(axis.ratio)
         found.append(("position.speed_limit", data[f"{axis.motor}_speed_reference"], most))
     if motor.command_limit is not None and isinstance(c.current, CurrentLoop):
-        found.append(("limit of the motor's voltage", data[f"{axis.motor}_command"], motor.command_limit))
+        found.append(("limit of the motor's voltage", data[axis.train.command_of(axis.motor)], motor.command_limit))
     if motor.torque_limit is not None:
         found.append(("limit of the motor's torque", data[axis.train.motor_torque_of(axis.motor)], motor.torque_limit))
     if isinstance(c.current, FieldOriented) and motor.winding is not None and motor.winding.max_current is not None:
@@ -224,7 +224,7 @@ def following(axis: Axis) -> Following:
     wanted = reference.at(time)[0]
     name, unit = axis.measured[reference.kind]
     if reference.kind == "speed":
-        name, unit = f"{axis.shaft}_speed", axis.train.speed_unit(axis.shaft)
+        name, unit = axis.train.speed_of(axis.shaft), axis.train.speed_unit(axis.shaft)
     error = wanted - data[name]
     rms = math.sqrt(float(np.average(error**2, weights=weights(time))))
     unseen = errors_of(axis, data)[1] if reference.kind == "position" else np.zeros_like(error)

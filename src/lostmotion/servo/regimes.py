@@ -185,7 +185,7 @@ class Regime:
 
         n = len(model.states)
         block = np.zeros((n + 1, n + 1))
-        block[:n, :n], block[:n, n] = model.A, model.B[:, model.inputs.index(f"{axis.motor}_command")]
+        block[:n, :n], block[:n, n] = model.A, model.B[:, model.inputs.index(axis.train.command_of(axis.motor))]
         over_tick = expm(block * axis.controller.sample_time)[:n]
         winding, law = None, axis.law[0]
         if law.is_oriented:
@@ -260,7 +260,7 @@ def _points(axis: Axis) -> Iterator[tuple[str, str, TrainInitial, dict[str, int]
             0.5 * (edges[first + 1] - edges[first]), 0.5 * train.shafts[output].friction_torque / slopes[first]
         )
         state = TrainInitial(speeds=held, twists=twists | {main: near})
-        yield "load stuck", f"{output} sticks, the motor turns", state, {f"{output}_contact": 0}
+        yield "load stuck", f"{output} sticks, the motor turns", state, {train.contact_of(output): 0}
 
 
 def _text(value: float, si: str) -> str:

@@ -109,7 +109,7 @@ class SampledLoop:
         sampled = (
             train.angle_of(position_shaft),
             train.angle_of(speed_shaft),
-            f"{speed_shaft}_speed",
+            train.speed_of(speed_shaft),
             train.motor_torque_of(motor),
         )
         # What a controller does not read need not follow from the states.

@@ -223,7 +223,7 @@ class _Plant:
         )
         if not np.allclose(forward.A, reverse.A, rtol=NONE, atol=0.0):
             raise UndecidableError("it slips forward otherwise than in reverse")
-        row = np.eye(len(forward.states))[forward.states.index(f"{shaft}_speed")]
+        row = np.eye(len(forward.states))[forward.states.index(train.speed_of(shaft))]
         friction = 0.5 * (forward.rate - reverse.rate)
         along = friction / (row @ friction)
         viscous = float(row @ forward.A @ along)
@@ -244,7 +244,7 @@ def _torque(
     axis: Axis, still: LinearModel, forward: LinearModel, speed: np.ndarray, contact: int
 ) -> tuple[float, float, float]:
     """Torque at the contact and acceleration of its shaft for a command of 1, and the time constant of the torque."""
-    u, current = forward.inputs.index(f"{axis.motor}_command"), axis.controller.current
+    u, current = forward.inputs.index(axis.train.command_of(axis.motor)), axis.controller.current
     if not isinstance(current, FirstOrderCurrent):
         return float(still.D[contact, u]), float(speed @ forward.B[:, u]), 0.0
     m = forward.states.index(axis.train.motor_torque_of(axis.motor))

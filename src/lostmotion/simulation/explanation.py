@@ -243,8 +243,8 @@ def _explanation(
 ) -> Explanation:
     named = dict(zip((name for name, *_ in core.channels()), values, strict=True))
     slides = tuple(name for name in train.shafts if train.is_slide(name))
-    sliding = {f"{name}_contact" for name in slides}
-    sliding |= {f"{train.twist_of(n)}_contact" for n, gear in train.gears.items() if train.is_slide(gear.output)}
+    sliding = {train.contact_of(name) for name in slides}
+    sliding |= {train.twist_contact_of(n) for n, gear in train.gears.items() if train.is_slide(gear.output)}
     sliding |= {f"{name}{END_STOP}_contact" for name in slides}
     flanks, states = train.flanks(), []
     for contact in contacts:

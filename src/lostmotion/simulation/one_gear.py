@@ -6,29 +6,17 @@ from typing import Any
 
 from ..control.controller import Controller
 from ..errors import InputError
-from ..model.drive import Drive
 from ..model.gear import Gear
 from ..model.gearbox import Gearbox
 from ..model.motor import Motor
 from ..model.shaft import Shaft
 from ..model.signals import TorqueSignal
-from ..model.train import DriveTrain, TrainElements
+from ..model.train import TrainElements
 from .aliases import GEARBOX, LOAD, MOTOR
 from .drive_tables import DriveTables, Initial, LoadTable
 from .scenario import Scenario
 
 OTHERS = tuple(table for table in TrainElements.model_fields if table not in ("motors", "gears"))
-
-
-def drive_of(what: Drive | DriveTrain | Scenario, function: str = "drive") -> Drive:
-    """The drive of a scenario or a train, or a drive as it is.
-
-    Raises
-    ------
-    InputError
-        It is more than one motor, one gearbox and one load.
-    """
-    return what if isinstance(what, Drive) else as_drive(Scenario.of_any(what), function).drive()
 
 
 def as_drive(scenario: Scenario, function: str) -> Scenario:
@@ -71,11 +59,9 @@ def as_drive(scenario: Scenario, function: str) -> Scenario:
     )
 
 
-def drive_keys(what: Drive | DriveTrain | Scenario) -> dict[str, str]:
+def drive_keys(scenario: Scenario) -> dict[str, str]:
     """Keys of a motor, a gear and its output shaft in the long form, and what a drive calls them."""
-    if isinstance(what, Drive):
-        return {}
-    train = what if isinstance(what, DriveTrain) else what.train()
+    train = scenario.train()
     ((motor, _),), ((gear, between),) = train.motors.items(), train.gears.items()
     found = {f"shafts.{between.output}": LOAD, f"gears.{gear}": GEARBOX, f"motors.{motor}": MOTOR}
     return found | {f"command.{motor}": "command"}

@@ -118,7 +118,9 @@ class Simulation(SimulationAnswers):
         self._channel = {name: k for k, (name, *_) in enumerate(channels)}
         self._input_units = {name: unit.removeprefix("1") for name, _, unit, _ in channels}
         # Inputs that are commands of brakes and clutches.
-        self._shares = {f"{name}_command" for name in self._train.commanded() if name not in self._train.motors}
+        self._shares = {
+            self._train.command_of(name) for name in self._train.commanded() if name not in self._train.motors
+        }
         self._variables: tuple[Variable, ...] = variables_of_core(core.variables())
         following = (v.name for v in self._variables if v.derived)
         self._derived: dict[str, Derived] = {name: self._following(k) for k, name in enumerate(following)}

@@ -63,7 +63,12 @@ def bounded(scenario: Scenario) -> dict[str, str]:
     names: dict[str, str] = {}
     for prefix, shaft, _ in oriented(scenario):
         across, torque = f"{prefix}quadrature_current", f"{prefix or 'motor_'}torque"
-        names |= {f"{prefix}direct_current": across, across: across, torque: torque, f"{shaft}_speed": torque}
+        names |= {
+            f"{prefix}direct_current": across,
+            across: across,
+            torque: torque,
+            scenario.train().speed_of(shaft): torque,
+        }
     return names
 
 
@@ -91,7 +96,7 @@ def too_slow(scenario: Scenario, values: Mapping[str, Any]) -> str:
     for prefix, shaft, phase in oriented(scenario):
         motor = prefix.removesuffix("_") or "motor"
         controller = scenario.axes()[motor]
-        speed, time = float(np.max(np.abs(values[f"{shaft}_speed"]))), controller.loop_time("current")
+        speed, time = float(np.max(np.abs(values[scenario.train().speed_of(shaft)]))), controller.loop_time("current")
         turn = 2.0 * math.pi / (phase.pole_pairs * speed) if speed > 0.0 else math.inf
         if time * FEWEST > turn:
             found.append(

@@ -106,7 +106,7 @@ def _amplifier(scenario: Scenario, result: RunArrays) -> list[Finding]:
         remark = f"one amplifier feeds one motor, and this train has {len(train.motors)}; check each axis on its own"
         return [Finding("amplifier_current", "amplifier", "not judged", "unknown", remark)]
     ((name, motor),) = train.motors.items()
-    torque, speed = result[train.motor_torque_of(name)], result[f"{motor.shaft}_speed"]
+    torque, speed = result[train.motor_torque_of(name)], result[train.speed_of(motor.shaft)]
     where = scenario.key_in_file(scenario.motor_key(name))
     return amplifier_of_a_run(result, motor, torque, speed, scenario.task, where)
 
@@ -118,7 +118,7 @@ def _gear(scenario: Scenario, name: str, result: RunArrays) -> list[Finding]:
     cycle = duty_cycle(
         result,
         scenario.task.cycle,
-        speed=f"{gear.input}_speed",
+        speed=train.speed_of(gear.input),
         motor_torque=train.input_torque_of(name),
         output_torque=torque,
     )
@@ -177,7 +177,7 @@ def _motor(scenario: Scenario, name: str, result: RunArrays) -> tuple[list[Findi
     train = scenario.train()
     motor, key = train.motors[name], scenario.motor_key(name)
     where = scenario.key_in_file(key)
-    torque, speed = train.motor_torque_of(name), f"{motor.shaft}_speed"
+    torque, speed = train.motor_torque_of(name), train.speed_of(motor.shaft)
     cycle = duty_cycle(result, scenario.task.cycle, speed=speed, motor_torque=torque, output_torque=torque)
     command, T, w = (result[key] for key in (train.command_of(name), torque, speed))
     command = command_of_run(motor, scenario.controllers.get(name), command, T, w)

@@ -23,10 +23,12 @@ def ratio_of_inertias(motor: Motor, gearbox: Gearbox, load_inertia: float) -> fl
     return (load_inertia / gearbox.ratio**2 + gearbox.inertia) / motor.rotor_inertia
 
 
-def inertia_ratio(motor: Motor, gearbox: Gearbox, load_inertia: float, wanted: float | None = None) -> Finding:
+def inertia_ratio(
+    motor: Motor, gearbox: Gearbox, load_inertia: float, wanted: float | None = None, key: str = "motor"
+) -> Finding:
     """The same, of parts, with the largest permissible ratio: the one that is wanted, and the limit of the manufacturer.
 
-    Without either, 10 is the rule of thumb, and beyond it is a reservation.
+    Without either, 10 is the rule of thumb, and beyond it is a reservation. `key` is that of the motor's table.
     """
     ratio = ratio_of_inertias(motor, gearbox, load_inertia)
     printed = None if motor.limits is None else motor.limits.max_inertia_ratio
@@ -39,7 +41,7 @@ def inertia_ratio(motor: Motor, gearbox: Gearbox, load_inertia: float, wanted: f
     elif stated:
         remark = f"above {largest:g} the load is hard to control from the motor"
     else:
-        remark = f"above {largest:g} a load is usually hard to control; motor.limits.max_inertia_ratio states the motor's own limit"
+        remark = f"above {largest:g} a load is usually hard to control; {key}.limits.max_inertia_ratio states the motor's own limit"
     return Finding(
         "inertia_ratio",
         "inertia of load and gearbox / of the rotor",

@@ -92,20 +92,22 @@ def axis_rules(scenario: Scenario, axis: OneAxis | str, result: RunArrays) -> li
             *resonance(motor, axis.whole, axis.load, scenario.tables.command.get(axis.motor)),
             lost_motion(axis.whole, scenario.task.max_lost_motion, slides=axis.slides),
         ]
-    return [_inertias(train), *found, dead_zone(scenario, result)]
+    return [_inertias(scenario), *found, dead_zone(scenario, result)]
 
 
-def _inertias(train: DriveTrain) -> Finding:
+def _inertias(scenario: Scenario) -> Finding:
     """Ratio of the inertia of all that moves with the one motor to that of its rotor."""
+    train = scenario.train()
     why = f"{len(train.motors) or 'no'} motors turn it" if len(train.motors) != 1 else tied_together(train)
     if why is not None:
         return not_judged("inertia_ratio", why)
-    (motor,) = train.motors.values()
+    ((name, motor),) = train.motors.items()
     if not motor.rotor_inertia > 0.0:
         return not_judged("inertia_ratio", "the motor has no rotor_inertia")
     of_shafts = (shaft.inertia * (turns(train, name, motor.shaft) or 0.0) ** 2 for name, shaft in train.shafts.items())
     of_gears = (gear.inertia * (turns(train, gear.input, motor.shaft) or 0.0) ** 2 for gear in train.gears.values())
-    return inertia_ratio(motor, DIRECT, sum(of_shafts) + sum(of_gears))
+    key = scenario.key_in_file(scenario.motor_key(name))
+    return inertia_ratio(motor, DIRECT, sum(of_shafts) + sum(of_gears), key=key)
 
 
 def not_judged(rule: str, why: str) -> Finding:
@@ -134,7 +136,7 @@ def dead_zone(scenario: Scenario, result: RunArrays) -> Finding:
     others = {n: float(result[n][0]) for n in inputs if n != train.command_of(name)}
     forward, backward = smallest_commands(scenario, others)
     peak = float(abs(result[train.command_of(name)]).max())
-    value = f"the load moves above a command of {forward:.4g} and below {backward:.4g}"
+    value = f"the load moves above a command of {forward + 0.0:.4g} and below {backward + 0.0:.4g}"  # where it is -0.0
     moves = bool((result[train.speed_of(motor.shaft)] != 0.0).any())
     if peak == 0.0:
         return Finding("dead_zone", "dead zone", value, "ok", "the command is 0 throughout")
