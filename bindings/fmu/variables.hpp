@@ -22,7 +22,7 @@ enum Reference : unsigned {
     first_state = 5000,
     first_derivative = 6000,
     first_guard = 7000,
-    first_parameter = 10000
+    first_parameter = 1000000
 };
 
 struct Variables {
