@@ -180,11 +180,11 @@ inline void bind_control(nb::module_& m) {
     m.def(
         "discrete_filter",
         [](const Record& fields, double sample_time) {
-            Filter f = described<Filter>(fields);
-            f.discretise(sample_time);
-            const DiscreteSystem s = f.system();
+            const FilterLaw law{described<Filter>(fields), sample_time};
+            const Filter f = law.in_z();
+            const DiscreteSystem s = made_by(law);
             Record out;
-            out["A"] = s.A, out["B"] = s.B, out["C"] = s.C, out["D"] = s.D;
+            out["A"] = s.A, out["B"] = s.B, out["C"] = s.C, out["D"] = s.D, out["filter"] = s.origin.numbers;
             return std::tuple(f.numerator, f.denominator, out);
         },
         "fields"_a, "sample_time"_a,

@@ -17,7 +17,7 @@ inline void bind_curves(nb::module_& m) {
         .def(
             "__init__",
             [](TorsionCurve* self, const Record& stiffness) {
-                new (self) TorsionCurve(described<StiffnessCurve>(stiffness).curve());
+                new (self) TorsionCurve(made_by(described<StiffnessCurve>(stiffness)));
             },
             "stiffness"_a)
         .def_prop_ro("odd", &TorsionCurve::odd)

@@ -31,16 +31,20 @@ inline std::vector<double> describe(const Case& one, const std::string& title, d
     return scenario_numbers(std::move(s));
 }
 
-inline std::vector<double> write_description(const std::vector<double>& scenario,
-                                             const std::vector<Record>& parameters) {
+inline std::vector<double> write_description(const std::vector<double>& scenario, const std::vector<Record>& parameters,
+                                             const Record& derivation) {
     std::vector<ScenarioParameter> all;
     for (const Record& fields : parameters) all.push_back(described<ScenarioParameter>(fields));
-    return ScenarioDescription::write(scenario, std::move(all));
+    Derivation of;
+    NamedFields f(derivation);
+    of.describe(f, 0, 0);
+    f.refuse_unknown();
+    return ScenarioDescription::write(scenario, std::move(all), std::move(of));
 }
 
 inline void bind_descriptions(nb::module_& m) {
     m.def("describe", &describe, "case"_a, nb::kw_only(), "title"_a, "duration"_a, "sample_interval"_a, "control"_a);
-    m.def("write_description", &write_description, "scenario"_a, "parameters"_a);
+    m.def("write_description", &write_description, "scenario"_a, "parameters"_a, "derivation"_a);
 }
 
 }  // namespace lostmotion::binding

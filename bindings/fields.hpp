@@ -18,7 +18,7 @@ namespace lostmotion::binding {
 // Sets what a dict has, by name; the rest stays as it is. None stands for a key that is left out.
 class NamedFields {
  public:
-    static constexpr bool reads = true;
+    static constexpr bool reads = true, by_name = true;
     using Range = lostmotion::Range;
 
     explicit NamedFields(nb::dict values) : values_(std::move(values)) {}

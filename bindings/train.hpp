@@ -422,10 +422,10 @@ inline void bind_train(nb::module_& m) {
             return std::make_pair(mesh.driving(), mesh.overrunning());
         },
         "lead_angle"_a, "friction_angle"_a);
-    m.attr("USUAL_ERROR") = signals::usual_error;
-    m.def("harmonic", [](const Record& fields) { return described<tables::HarmonicLaw>(fields).curve(); }, "fields"_a);
+    m.attr("USUAL_ERROR") = usual_error;
+    m.def("harmonic", [](const Record& fields) { return made_by(described<HarmonicLaw>(fields)); }, "fields"_a);
     m.def(
-        "quadratic_drag", [](const Record& fields) { return described<signals::QuadraticDrag>(fields).curve(); },
+        "quadratic_drag", [](const Record& fields) { return made_by(described<QuadraticDrag>(fields)); },
         "fields"_a);
     m.def(
         "dry_friction",
@@ -434,6 +434,7 @@ inline void bind_train(nb::module_& m) {
             Record out;
             out["torque"] = f.torque, out["breakaway_torque"] = f.breakaway_torque;
             out["speeds"] = f.speeds, out["torques"] = f.torques;
+            out["stribeck"] = f.origin.numbers;
             return out;
         },
         "fields"_a, "By its fields in the core; the lists are empty where there is no curve.");

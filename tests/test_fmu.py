@@ -13,7 +13,6 @@ import pytest
 import lostmotion as lm
 from conftest import ALL_SCENARIOS, ROOT, jamming
 from lostmotion.portable import fmu as exporting
-from lostmotion.portable.parameters import Parameters
 
 fmpy: Any = pytest.importorskip("fmpy", reason="FMPy is missing: .venv/bin/pip install --group portable")
 pytestmark = pytest.mark.skipif(
@@ -97,23 +96,16 @@ def drive(paper: Path, tmp_path: Path) -> Iterator[Slave]:
     slave.close()
 
 
-def without_parameters(monkeypatch: Any) -> None:
-    monkeypatch.setattr(exporting, "parameters_of", lambda *_: Parameters((), {}))
-
-
-def exported(path: Path, to: Path, monkeypatch: Any) -> Path:
-    """Without parameters: to find them takes seconds."""
-    without_parameters(monkeypatch)
+def exported(path: Path, to: Path) -> Path:
     out = to / f"{path.stem}.fmu"
     lm.export_fmu(lm.load(path), out)
     return out
 
 
 @pytest.mark.parametrize("path", ALL_SCENARIOS, ids=lambda p: p.stem)
-def test_the_description_of_every_scenario_is_valid(path: Path, tmp_path: Path, monkeypatch: Any) -> None:
+def test_the_description_of_every_scenario_is_valid(path: Path, tmp_path: Path) -> None:
     from fmpy.validation import validate_fmu
 
-    without_parameters(monkeypatch)
     platform = next(exporting.LIBRARIES.glob("*/all.*")).relative_to(exporting.LIBRARIES)
     (tmp_path / platform).parent.mkdir()
     (tmp_path / platform).write_bytes(b"")  # the library takes the longest to pack
@@ -174,11 +166,11 @@ def test_steps_have_the_bits_of_python(steps: list[float], drive: Slave) -> None
 
 
 @pytest.mark.parametrize("name", ["position-axis", "hunting-with-backlash", "two-motors-one-ring", "field-weakening"])
-def test_trains_and_controllers_have_the_bits_of_python(name: str, tmp_path: Path, monkeypatch: Any) -> None:
+def test_trains_and_controllers_have_the_bits_of_python(name: str, tmp_path: Path) -> None:
     scenario = lm.load(name)
     interval = scenario.simulation.sample_interval
     python = lm.Simulation(scenario, step=interval)
-    slave = Slave(exported(ROOT / "scenarios" / f"{name}.toml", tmp_path, monkeypatch), tmp_path / "open")
+    slave = Slave(exported(ROOT / "scenarios" / f"{name}.toml", tmp_path), tmp_path / "open")
     inputs = dict.fromkeys(python.inputs, (0.05, 0.05))
     for _ in range(150):
         slave.step(interval, **inputs)
@@ -314,10 +306,9 @@ def test_damaged_resources_are_refused_and_never_crash(paper: Path, tmp_path: Pa
     assert unnoticed == 0
 
 
-def test_a_jam_ends_in_an_error_with_the_sentence_of_python(tmp_path: Path, monkeypatch: Any) -> None:
+def test_a_jam_ends_in_an_error_with_the_sentence_of_python(tmp_path: Path) -> None:
     from fmpy.fmi1 import FMICallException
 
-    without_parameters(monkeypatch)
     scenario = jamming()
     with pytest.raises(lm.SolverError) as jammed:
         lm.simulate(scenario)
@@ -334,14 +325,12 @@ def test_a_jam_ends_in_an_error_with_the_sentence_of_python(tmp_path: Path, monk
     ("arguments", "said"),
     [(("drive.zip",), "must end in .fmu"), (("nowhere/drive.fmu",), "its directory does not exist")],
 )
-def test_a_path_that_cannot_be_written_is_refused(arguments: Any, said: str, tmp_path: Path, monkeypatch: Any) -> None:
-    without_parameters(monkeypatch)
+def test_a_path_that_cannot_be_written_is_refused(arguments: Any, said: str, tmp_path: Path) -> None:
     with pytest.raises(lm.InputError, match=said):
         lm.export_fmu(lm.load("paper-2dof-nl-small"), tmp_path / arguments[0])
 
 
-def test_without_a_library_there_is_no_fmu(tmp_path: Path, monkeypatch: Any) -> None:
-    without_parameters(monkeypatch)
+def test_without_a_library_there_is_no_fmu(tmp_path: Path) -> None:
     with pytest.raises(
         lm.InputError,
         match="has no library of an FMU; install a wheel, or build it in a checkout by `make fmu-library`",
@@ -349,8 +338,7 @@ def test_without_a_library_there_is_no_fmu(tmp_path: Path, monkeypatch: Any) -> 
         lm.export_fmu(lm.load("paper-2dof-nl-small"), tmp_path / "drive.fmu", libraries=tmp_path)
 
 
-def test_without_its_controller_the_motor_is_turned_by_an_input(tmp_path: Path, monkeypatch: Any) -> None:
-    without_parameters(monkeypatch)
+def test_without_its_controller_the_motor_is_turned_by_an_input(tmp_path: Path) -> None:
     path = tmp_path / "plant.fmu"
     lm.export_fmu(lm.load("position-axis"), path, controllers=False)
     inputs = [v.name for v in fmpy.read_model_description(str(path)).modelVariables if v.causality == "input"]

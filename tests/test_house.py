@@ -25,7 +25,8 @@ PACKAGE = ROOT / "src" / "lostmotion"
 LAYERS = [
     {"errors", "namespace", "verdict", "version", "_instruction_set"},
     {"_core", "atomic_writer"},
-    {"reproducible", "worker_threads"},
+    {"recorded", "worker_threads"},
+    {"reproducible"},
     {"units"},
     {"inputs"},
     {"model"},

@@ -14,8 +14,8 @@ from conftest import ROOT
 from lostmotion.inputs.schema import unit_in_schema
 from lostmotion.live_page.description import describe
 from lostmotion.portable import fmi2, fmi3, fmu
+from lostmotion.portable.derivation import derivation_of
 from lostmotion.portable.descriptions import numbers_of
-from lostmotion.portable.parameters import parameters_of
 from lostmotion.reports.page import render
 from lostmotion.reports.run import summary
 from lostmotion.reports.servo import servo_report
@@ -491,7 +491,7 @@ def test_no_output_has_a_unit_of_rotation_on_a_slide(tmp_path):
 
 def test_no_unit_of_rotation_on_a_slide_in_an_fmu_or_the_live_page():
     scenario = lm.load("ball-screw-axis").replace(**{"simulation.duration": 0.2})
-    parameters = parameters_of(scenario, numbers_of).parameters
+    parameters = derivation_of(scenario, numbers_of).parameters
     turning = ("inertia", "drag_torque", "screw.viscous_friction")
     of_slides = [f"{p.key} {p.unit}" for p in parameters if p.key.startswith(("slides", "screws"))]
     assert [line for line in rotary(of_slides, ("",)) if not any(key in line for key in turning)] == []

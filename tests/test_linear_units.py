@@ -17,8 +17,8 @@ import lostmotion as lm
 from lostmotion.cli import app
 from lostmotion.errors import InputError
 from lostmotion.live_page.description import describe
+from lostmotion.portable.derivation import derivation_of
 from lostmotion.portable.descriptions import numbers_of
-from lostmotion.portable.parameters import parameters_of
 from lostmotion.simulation.keys import set_values
 
 AXIS = """title = "A slide with a linear motor"
@@ -147,7 +147,7 @@ def strings(node: Any, key: str = "") -> Iterator[tuple[str, str]]:
 def test_what_a_description_for_other_programs_names_has_none() -> None:
     """The C interface lists variables, and keys that it can change: both have units of translation."""
     scenario = lm.Scenario.model_validate(tomllib.loads(AXIS + COMMAND + RUN))
-    parameters = parameters_of(scenario, numbers_of).parameters
+    parameters = derivation_of(scenario, numbers_of).parameters
     assert len(parameters) > 5
     assert rotary_in("\n".join(f"{p.key} {p.unit}" for p in parameters if "phase" not in p.key)) == []
     channels = scenario.core().channels()

@@ -5,8 +5,9 @@ import math
 import pickle
 import re
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,8 +17,8 @@ from hypothesis import strategies as st
 
 import lostmotion as lm
 from conftest import ROOT
+from lostmotion.control import profiles
 from lostmotion.control.controller import AnyReference
-from lostmotion.control.profiles import segment_durations, segments
 from lostmotion.inputs.part import Part
 from lostmotion.model.signals import taylor
 from lostmotion.simulation import scenario_files
@@ -33,8 +34,18 @@ def random_moves(count: int, decades: float) -> tuple[np.ndarray, ...]:
     return distance * rng.choice([-1.0, 1.0], count), speed, acceleration, jerk
 
 
-MOVES = random_moves(100_000, 2.0)
-WIDE = random_moves(10_000, 6.0)
+def each(moves: tuple[Any, ...]) -> Iterator[tuple[Any, ...]]:
+    return zip(*np.broadcast_arrays(*map(np.atleast_1d, moves)), strict=True)
+
+
+def segments(*moves: Any) -> np.ndarray:
+    """Time, position, speed, acceleration and jerk at the beginning of each segment, of moves or of arrays of them."""
+    found = [profiles.segments(*map(float, move)) for move in each(moves)]
+    return np.array(found if np.ndim(moves[0]) else found[0]).T
+
+
+MOVES = random_moves(20_000, 2.0)
+WIDE = random_moves(5_000, 6.0)
 
 
 @pytest.mark.parametrize("moves", [MOVES, WIDE, (*MOVES[:3], np.inf)], ids=["moves", "wide", "trapezoidal"])
@@ -55,7 +66,7 @@ def test_random_moves_keep_their_limits_and_hit_their_ends(moves: tuple[np.ndarr
 
 @pytest.mark.parametrize("moves", [MOVES, WIDE, (*MOVES[:3], np.inf)], ids=["moves", "wide", "trapezoidal"])
 def test_position_speed_and_acceleration_are_continuous_in_random_moves(moves: tuple[np.ndarray, ...]) -> None:
-    t, c, s, _ = segment_durations(*moves)
+    t, c, s, _ = np.array([profiles.segment_durations(*map(float, move)) for move in each(moves)]).T
     durations = np.array([t, c, t, s, t, c, t])
     _, *states = segments(*moves)
     ends = taylor([x[:-1] for x in states], durations)

@@ -100,8 +100,12 @@ int lm_add_shaft(lm_train* train, const char* name, double inertia, double visco
         lm::model::Shaft s;
         const std::string what = "shaft '" + text(name) + "'";
         const NumberLists own = NumberLists().number(inertia).number(viscous_friction);
-        const NumberLists friction =
-            NumberLists().number(friction_torque).number(breakaway_torque).list(nullptr, 0).list(nullptr, 0);
+        const NumberLists friction = NumberLists()
+                                         .number(0.0)
+                                         .number(friction_torque)
+                                         .number(breakaway_torque)
+                                         .list(nullptr, 0)
+                                         .list(nullptr, 0);
         if (wrong.empty()) wrong = own.read(s, what);
         if (wrong.empty()) wrong = friction.read(s.friction, what + ": friction");
         if (wrong.empty() && drag != nullptr) wrong = NumberLists().curve(drag).read(s.drag, what + ": drag");

@@ -62,12 +62,14 @@ class NumberLists {
     // The same in both directions. NULL: missing.
     NumberLists& curve(const lm_curve* c) {
         missing_ = missing_ || c == nullptr;
+        number(0.0);
         for (int side = 0; side < 2 && c != nullptr; ++side)
             list(c->breaks, c->n_breaks).list(c->slopes, c->n_breaks + 1);
         return *this;
     }
     NumberLists& curve(const lm_periodic_curve* c) {
         missing_ = missing_ || c == nullptr;
+        number(0.0);
         if (c != nullptr) number(c->period).list(c->angles, c->n).list(c->values, c->n);
         return number(0.0).number(1.0).number(0.0);  // of no sine
     }

@@ -59,14 +59,13 @@ bool same(const std::vector<double>& a, const std::vector<double>& b) {
     return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;
 }
 
-ScenarioParameter load_inertia(const std::vector<double>& numbers, double inertia) {
-    ScenarioParameter p{"load.inertia", "kg*m^2", inertia, {}};
-    for (std::size_t k = ScenarioDescription::head; k < numbers.size(); ++k)
-        if (numbers[k] == inertia) {
-            p.effects = {{static_cast<int>(k - ScenarioDescription::head), Effect::proportional, 0.0, 1.0}};
-            break;
-        }
-    return p;
+const ScenarioParameter load_inertia{"load.inertia", "kg*m^2", 2.125};
+
+// The first number of a description that is a value follows from a parameter.
+Derivation follows(const std::vector<double>& numbers, double value) {
+    const auto place = std::find(numbers.begin() + ScenarioDescription::head, numbers.end(), value) - numbers.begin();
+    using Formula = Derivation::Formula;
+    return {{{Formula::parameter}}, {}, {{static_cast<int>(place) - static_cast<int>(ScenarioDescription::head), 0}}};
 }
 
 // Numbers that are likely to be taken for something.
@@ -101,7 +100,7 @@ TEST_SUITE("description") {
         Scenario s = paper_scenario();
         s.train.shafts[1].inertia = 2.125;  // no other number is the same
         const std::vector<double> plain = ScenarioDescription::write(s);
-        ScenarioDescription d(ScenarioDescription::write(s, {load_inertia(plain, 2.125)}));
+        ScenarioDescription d(ScenarioDescription::write(s, {load_inertia}, follows(plain, 2.125)));
         REQUIRE(d.error() == "");
         CHECK(d.set(0, 3.5) == "");
         Scenario changed = s;
@@ -115,9 +114,9 @@ TEST_SUITE("description") {
     TEST_CASE("a parameter keeps to its range") {
         Scenario s = paper_scenario();
         s.train.shafts[1].inertia = 2.125;  // no other number is the same
-        ScenarioParameter p = load_inertia(ScenarioDescription::write(s), 2.125);
+        ScenarioParameter p = load_inertia;
         p.range = {1e-3, 0.5, 8.0};
-        ScenarioDescription d(ScenarioDescription::write(s, {p}));
+        ScenarioDescription d(ScenarioDescription::write(s, {p}, follows(ScenarioDescription::write(s), 2.125)));
         REQUIRE(d.error() == "");
         CHECK(d.set(0, 1e-3) == "parameter load.inertia: 0.001 must be greater than 0.001");
         CHECK(d.set(0, 0.4) == "parameter load.inertia: 0.4 must be at least 0.5");

@@ -21,6 +21,7 @@ from typing import Any, overload
 import numpy as np
 
 from . import _core
+from .recorded import Recorded, of_function
 
 Numbers = float | np.ndarray
 
@@ -28,12 +29,16 @@ FARTHEST = 2.0**42  # [rad] up to which the core's sine reduces its argument
 
 
 def _of_one(function: Callable[[np.ndarray], np.ndarray], x: Any) -> Any:
+    if isinstance(x, Recorded):
+        return of_function(function.__name__, lambda value: _of_one(function, value), x)
     values = np.ascontiguousarray(x, dtype=float)
     out = function(values)
     return out if np.ndim(x) else float(out.reshape(-1)[0])
 
 
 def _of_two(function: Callable[[np.ndarray, np.ndarray], np.ndarray], a: Any, b: Any) -> Any:
+    if isinstance(a, Recorded) and b == 1.0:
+        return of_function(function.__name__, lambda value: _of_two(function, value, b), a)
     first, second = np.broadcast_arrays(np.asarray(a, float), np.asarray(b, float))
     out = function(np.ascontiguousarray(first), np.ascontiguousarray(second))
     return out if first.ndim else float(out.reshape(-1)[0])
@@ -41,6 +46,8 @@ def _of_two(function: Callable[[np.ndarray, np.ndarray], np.ndarray], a: Any, b:
 
 def _within_reach(x: Any) -> Any:
     """The remainder of a turn where an angle is so large that its last digit is a thousandth of a radian."""
+    if isinstance(x, Recorded):
+        return x
     angle = np.asarray(x, float)
     far = np.isfinite(angle) & (np.abs(angle) >= FARTHEST)
     return np.where(far, np.fmod(angle, 2.0 * math.pi), angle) if np.any(far) else x
@@ -112,6 +119,11 @@ def log(x: np.ndarray) -> np.ndarray: ...
 def log(x: Any) -> Any:
     """Natural logarithm, to 2 units in the last place; nan below 0."""
     return _of_one(_core.logarithm, x)
+
+
+def sqrt(x: float) -> float:
+    """Square root, correctly rounded."""
+    return of_function("root", math.sqrt, x)
 
 
 def log10(x: float) -> float:

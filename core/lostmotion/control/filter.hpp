@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "../parts/field.hpp"
+#include "../parts/origin.hpp"
 #include "slots.hpp"
 
 namespace lostmotion::control {
@@ -13,6 +14,7 @@ namespace lostmotion::control {
 struct DiscreteSystem {
     std::vector<double> A, B, C;  // row by row
     double D = 1.0;
+    Origin origin = {};
 
     static constexpr int max_order = 16;
     int order() const { return static_cast<int>(B.size()); }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "../base/powers.hpp"
+#include "origin.hpp"
 
 namespace lostmotion::model {
 
@@ -14,6 +15,7 @@ struct DryFriction {
     double breakaway_torque = 0.0;  // T_S [N m]; what lies below the torque at speed 0 means that torque
     // Curve of the torque over |w|: speeds [rad/s] rising from 0, torques [N m] >= 0; constant beyond the last.
     std::vector<double> speeds, torques;
+    Origin origin = {};
 
     bool present() const {
         return holding() > 0.0 || std::any_of(torques.begin(), torques.end(), [](double t) { return t > 0.0; });

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "../base/sine.hpp"
+#include "origin.hpp"
 
 namespace lostmotion::model {
 
@@ -20,6 +21,8 @@ struct SineOfAngle {
 
 class PeriodicCurve {
  public:
+    Origin origin;
+
     PeriodicCurve() = default;
     // angles: [rad], rising from 0 or above and below the period; values there. The last piece leads back to the first
     // value, a period after the first angle.

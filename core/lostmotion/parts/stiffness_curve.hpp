@@ -2,6 +2,7 @@
 #pragma once
 
 #include <limits>
+#include <string>
 #include <vector>
 
 #include "field.hpp"
@@ -10,6 +11,7 @@
 namespace lostmotion {
 
 struct StiffnessCurve {
+    static constexpr int number = 1;
     std::vector<double> slopes, breaks;
     double backlash = 0.0, preload = 0.0, backward = 1.0;
 
@@ -32,6 +34,16 @@ struct StiffnessCurve {
                  backward);
     }
 
+    std::string wrong() const {
+        if (slopes.size() != breaks.size() + 1) return "must have one slope more than breaks";
+        double before = 0.0;
+        for (const double b : breaks) {
+            if (!(b > before)) return "must have breaks that rise";
+            before = b;
+        }
+        if (!(slopes.back() > 0.0)) return "must end with a slope > 0";
+        return backlash > 0.0 && preload > 0.0 ? "has backlash and preload, which removes it" : "";
+    }
     TorsionCurve curve() const {
         std::vector<double> backwards = slopes;
         for (double& k : backwards) k *= backward;

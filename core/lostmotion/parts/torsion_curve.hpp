@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "origin.hpp"
+
 namespace lostmotion {
 
 class TorsionCurve {
@@ -17,6 +19,8 @@ class TorsionCurve {
 
         friend bool operator==(const Side&, const Side&) = default;
     };
+
+    Origin origin;
 
     TorsionCurve() : TorsionCurve({}, {1.0}) {}
     TorsionCurve(std::vector<double> breaks, std::vector<double> slopes)
@@ -37,6 +41,7 @@ class TorsionCurve {
     // The same breaks, all slopes times `factor`.
     TorsionCurve scaled(double factor) const {
         TorsionCurve out = *this;
+        out.origin = {};
         for (double& k : out.slopes_) k *= factor;
         out.join();
         return out;

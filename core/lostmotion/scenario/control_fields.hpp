@@ -61,8 +61,35 @@ void describe(F& f, InverseModel& m) {
     f.present("twist", m.through_gear, [&] { f.curve("curve", m.curve); });
 }
 
+// A filter of a file, in a loop of this sample time.
+struct FilterLaw {
+    static constexpr int number = 1;
+    Filter filter = {};
+    double loop_time = 0.0;
+
+    template <class F>
+    void describe(F& f) {
+        filter.describe(f);
+        f.number("loop_time", loop_time, Range::positive);
+    }
+    std::string wrong() const {
+        if (filter.kind != Filter::transfer_function)
+            return filter.frequency * loop_time < 0.5 ? ""
+                                                      : "has a frequency above half that of the samples of its loop";
+        const bool fits = !filter.numerator.empty() && filter.numerator.size() <= filter.denominator.size() &&
+                          filter.denominator.size() <= DiscreteSystem::max_order + 1 && filter.denominator[0] != 0.0;
+        return fits ? "" : "has a numerator that does not fit its denominator";
+    }
+    Filter in_z() const {
+        Filter f = filter;
+        f.discretise(loop_time);
+        return f;
+    }
+    DiscreteSystem curve() const { return in_z().system(); }
+};
+
 template <class F>
-void describe(F& f, DiscreteSystem& s) {
+void describe_matrices(F& f, DiscreteSystem& s) {
     f.list("A", s.A);
     f.list("B", s.B);
     f.list("C", s.C);
@@ -72,6 +99,12 @@ void describe(F& f, DiscreteSystem& s) {
                          s.A.size() != s.B.size() * s.B.size()))
             f.wrong("A", "does not fit B and C, or the order is above " + std::to_string(DiscreteSystem::max_order));
     }
+}
+
+template <class F>
+void describe(F& f, DiscreteSystem& s) {
+    const auto matrices = [&] { describe_matrices(f, s); };
+    describe_made<FilterLaw>(f, s, "filter", matrices);
 }
 
 template <class F>

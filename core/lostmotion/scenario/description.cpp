@@ -1,5 +1,9 @@
 #include "description.hpp"
 
+#include "../base/arctangent.hpp"
+#include "../base/powers.hpp"
+#include "../base/sine.hpp"
+
 namespace lostmotion {
 
 namespace {
@@ -56,18 +60,60 @@ std::string ParameterRange::refuses(double v) const {
                               : "";
 }
 
-std::vector<double> ScenarioDescription::write(Scenario scenario, std::vector<ScenarioParameter> parameters) {
+namespace {
+
+// As Python has it, also far out.
+SineCosine turned(double angle) {
+    constexpr double farthest = 0x1p42, turn = 2.0 * std::numbers::pi;
+    if (!std::isfinite(angle)) return {std::nan(""), std::nan("")};
+    return sine_cosine(std::fabs(angle) < farthest ? angle : std::fmod(angle, turn));
+}
+
+}  // namespace
+
+std::optional<std::vector<double>> Derivation::values(std::span<const double> parameters) const {
+    std::vector<double> v;
+    v.reserve(formulas.size());
+    for (const Formula& f : formulas) {
+        const auto k = static_cast<std::size_t>(f.one), n = static_cast<std::size_t>(f.other);
+        switch (f.law) {
+            case Formula::parameter: v.push_back(parameters[k]); break;
+            case Formula::constant: v.push_back(f.value); break;
+            case Formula::sum: v.push_back(v[k] + v[n]); break;
+            case Formula::difference: v.push_back(v[k] - v[n]); break;
+            case Formula::product: v.push_back(v[k] * v[n]); break;
+            case Formula::quotient: v.push_back(v[k] / v[n]); break;
+            case Formula::root: v.push_back(std::sqrt(v[k])); break;
+            case Formula::sine: v.push_back(turned(v[k]).sin); break;
+            case Formula::cosine: v.push_back(turned(v[k]).cos); break;
+            case Formula::arctangent: v.push_back(arctangent(v[k], 1.0)); break;
+            case Formula::cube_root: v.push_back(cube_root(v[k])); break;
+            case Formula::worm_driving: v.push_back(model::MeshEfficiency::worm(v[k], v[n]).driving()); break;
+            case Formula::worm_overrunning: v.push_back(model::MeshEfficiency::worm(v[k], v[n]).overrunning()); break;
+        }
+    }
+    const auto met = [&v](const Condition& c) {
+        const double a = v[static_cast<std::size_t>(c.one)], b = v[static_cast<std::size_t>(c.other)];
+        const bool so = c.comparison == Condition::less ? a < b : c.comparison == Condition::at_most ? a <= b : a == b;
+        return so == c.holds;
+    };
+    if (!std::all_of(conditions.begin(), conditions.end(), met)) return {};
+    return v;
+}
+
+std::vector<double> ScenarioDescription::write(Scenario scenario, std::vector<ScenarioParameter> parameters,
+                                               Derivation derivation) {
     FieldWriter body;
     describe(body, scenario);
-    return write(body.numbers, std::move(parameters));
+    return write(body.numbers, std::move(parameters), std::move(derivation));
 }
 
 std::vector<double> ScenarioDescription::write(const std::vector<double>& body,
-                                               std::vector<ScenarioParameter> parameters) {
+                                               std::vector<ScenarioParameter> parameters, Derivation derivation) {
     FieldWriter f;
     f.numbers = {mark, version(), 0.0, static_cast<double>(body.size())};
     f.numbers.insert(f.numbers.end(), body.begin(), body.end());
-    describe(f, parameters, body.size());
+    describe(f, parameters, derivation, body.size());
     f.numbers[2] = checksum(f.numbers);
     return std::move(f.numbers);
 }
@@ -155,15 +201,10 @@ std::string ScenarioDescription::read(std::span<const double> numbers) {
     const auto n = static_cast<std::size_t>(count);
     body_.assign(numbers.begin() + head, numbers.begin() + static_cast<std::ptrdiff_t>(head + n));
     FieldReader f(numbers.subspan(head + n));
-    describe(f, parameters_, n);
+    describe(f, parameters_, derivation_, n);
     if (!f.well()) return f.error();
     if (f.left() != 0) return "the description goes on beyond its end";
-    if (std::string error = read_scenario(body_); !error.empty()) return error;
-    for (std::size_t k = 0; k < parameters_.size(); ++k) {
-        initial_.push_back(parameters_[k].value);
-        for (const Effect& e : parameters_[k].effects) effects_[e.place].emplace_back(k, e);
-    }
-    return {};
+    return read_scenario(body_);
 }
 
 std::string ScenarioDescription::read_scenario(std::span<const double> body) {
@@ -188,27 +229,11 @@ void ScenarioDescription::use_given() {
 }
 
 std::string ScenarioDescription::apply() {
+    const std::optional<std::vector<double>> values = derivation_.values(values_of_parameters());
+    if (!values) return "changes what the scenario consists of; make it anew with this value";
     std::vector<double> body = body_;
-    for (const auto& [place, effects] : effects_) {
-        double& entry = body[static_cast<std::size_t>(place)];
-        const bool product =
-            effects.size() > 1 && entry != 0.0 &&
-            std::all_of(effects.begin(), effects.end(), [](const auto& of) { return of.second.offset == 0.0; });
-        double sum = 0.0, factor = 1.0;
-        const Effect* only = nullptr;
-        int changed = 0;
-        for (const auto& [k, effect] : effects) {
-            const double now = parameters_[k].value, before = initial_[k];
-            if (now == before) continue;
-            ++changed;
-            only = &effect;
-            sum += effect(now) - effect(before);
-            factor *= effect(now) / effect(before);
-            if (changed == 1 && effects.size() == 1) entry = effect(now);
-        }
-        if (changed == 0 || (only != nullptr && effects.size() == 1)) continue;
-        entry = product ? entry * factor : entry + sum;
-    }
+    for (const Derivation::Result& r : derivation_.results)
+        body[static_cast<std::size_t>(r.place)] = (*values)[static_cast<std::size_t>(r.formula)];
     return read_scenario(body);
 }
 

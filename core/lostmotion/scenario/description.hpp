@@ -4,9 +4,9 @@
 //   parameters
 //
 // A parameter is a number of the scenario in the words of its file, such as "load.inertia", with the range that it has
-// there, and says which numbers follow from it: each is offset + slope v, or offset + slope/v. A number that follows
-// from several is their product, in terms of its present value, if that is not 0 and all of them are without an offset,
-// else the sum of their changes.
+// there. How the numbers of the scenario follow from the parameters is a derivation: formulas, each of those before it,
+// the comparisons on which it depends, and the places of its results. So a changed scenario has the same bits as one
+// that is made anew of its file.
 #pragma once
 
 #include <algorithm>
@@ -26,12 +26,73 @@
 
 namespace lostmotion {
 
-struct Effect {
-    int place = 0;  // among the numbers of the scenario
-    enum Law { proportional, reciprocal } law = proportional;
-    double offset = 0.0, slope = 0.0;
+// How numbers follow from parameters.
+struct Derivation {
+    struct Formula {
+        enum Law {
+            parameter,
+            constant,
+            sum,
+            difference,
+            product,
+            quotient,
+            root,
+            sine,
+            cosine,
+            arctangent,
+            cube_root,
+            worm_driving,
+            worm_overrunning
+        };
+        Law law = constant;
+        int one = 0, other = 0;  // formulas before this one, or the number of a parameter
+        double value = 0.0;      // of a constant
+    };
+    // What the formulas hold for: the comparison of two of them turns out so.
+    struct Condition {
+        enum Comparison { less, at_most, equal } comparison = less;
+        int one = 0, other = 0;
+        bool holds = true;
+    };
+    struct Result {
+        int place = 0, formula = 0;  // place: among the numbers of the scenario
+    };
+    static constexpr std::initializer_list<const char*> laws = {
+        "parameter", "constant", "sum",        "difference", "product",      "quotient",        "root",
+        "sine",      "cosine",   "arctangent", "cube_root",  "worm_driving", "worm_overrunning"};
+    static constexpr std::initializer_list<const char*> comparisons = {"less", "at_most", "equal"};
 
-    double operator()(double v) const { return offset + (law == proportional ? slope * v : slope / v); }
+    std::vector<Formula> formulas;
+    std::vector<Condition> conditions;
+    std::vector<Result> results;
+
+    // The values of all formulas, or nothing where a condition is not met.
+    std::optional<std::vector<double>> values(std::span<const double> parameters) const;
+
+    template <class F>
+    void describe(F& f, std::size_t parameters, std::size_t places) {
+        long before = 0;
+        f.each("formulas", formulas, [&](Formula& formula) {
+            f.choice("law", formula.law, laws);
+            const long most = formula.law == Formula::parameter  ? static_cast<long>(parameters) - 1
+                              : formula.law == Formula::constant ? 0
+                                                                 : before - 1;
+            f.integer("one", formula.one, 0, most);
+            f.integer("other", formula.other, 0, most);
+            f.number("value", formula.value, Range::bound);
+            ++before;
+        });
+        f.each("conditions", conditions, [&](Condition& c) {
+            f.choice("comparison", c.comparison, comparisons);
+            f.integer("one", c.one, 0, before - 1);
+            f.integer("other", c.other, 0, before - 1);
+            f.flag("holds", c.holds);
+        });
+        f.each("results", results, [&](Result& r) {
+            f.integer("place", r.place, 0, static_cast<long>(places) - 1);
+            f.integer("formula", r.formula, 0, before - 1);
+        });
+    }
 };
 
 // What a value may be; infinite where there is no limit.
@@ -45,23 +106,16 @@ struct ParameterRange {
 struct ScenarioParameter {
     std::string key, unit;
     double value = 0.0;  // SI
-    std::vector<Effect> effects;
     ParameterRange range = {};
 
     template <class F>
-    void describe(F& f, long last_place = 1L << 30) {
+    void describe(F& f) {
         f.text("key", key);
         f.text("unit", unit);
         f.number("value", value);
         f.number("above", range.above, Range::bound);
         f.number("at_least", range.at_least, Range::bound);
         f.number("at_most", range.at_most, Range::bound);
-        f.each("effects", effects, [&](Effect& e) {
-            f.integer("place", e.place, 0, last_place);
-            f.choice("law", e.law, {"proportional", "reciprocal"});
-            f.number("offset", e.offset);
-            f.number("slope", e.slope);
-        });
     }
 };
 
@@ -72,9 +126,11 @@ class ScenarioDescription {
     static double version();
     static constexpr std::size_t head = 4;
 
-    static std::vector<double> write(Scenario scenario, std::vector<ScenarioParameter> parameters = {});
+    static std::vector<double> write(Scenario scenario, std::vector<ScenarioParameter> parameters = {},
+                                     Derivation derivation = {});
     // The numbers of a scenario with its parameters.
-    static std::vector<double> write(const std::vector<double>& body, std::vector<ScenarioParameter> parameters);
+    static std::vector<double> write(const std::vector<double>& body, std::vector<ScenarioParameter> parameters,
+                                     Derivation derivation);
     // Of a description, of at least its head.
     static double checksum(std::span<const double> numbers);
 
@@ -99,11 +155,12 @@ class ScenarioDescription {
     void play(std::vector<bool> played);
 
  private:
-    static constexpr unsigned char layout = 13;
+    static constexpr unsigned char layout = 14;
 
     template <class F>
-    static void describe(F& f, std::vector<ScenarioParameter>& parameters, std::size_t places) {
-        f.each("parameters", parameters, [&](ScenarioParameter& p) { p.describe(f, static_cast<long>(places) - 1); });
+    static void describe(F& f, std::vector<ScenarioParameter>& parameters, Derivation& derivation, std::size_t places) {
+        f.each("parameters", parameters, [&](ScenarioParameter& p) { p.describe(f); });
+        derivation.describe(f, parameters.size(), places);
     }
     template <class F>
     static void describe(F& f, Scenario& s) {
@@ -123,8 +180,7 @@ class ScenarioDescription {
     std::vector<bool> played_;
     std::vector<double> body_;  // as it was given
     std::vector<ScenarioParameter> parameters_;
-    std::vector<double> initial_;  // values of the parameters that belong to it
-    std::map<int, std::vector<std::pair<std::size_t, Effect>>> effects_;
+    Derivation derivation_;
     std::optional<std::pair<double, double>> times_;
     std::map<std::size_t, Signal> inputs_;
     std::map<std::size_t, control::Reference> references_;

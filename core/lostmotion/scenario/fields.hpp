@@ -86,6 +86,7 @@ class FieldWriter {
         each(name, v, [&](std::vector<double>& row) { list(name, row); });
     }
     void list(const Field& field, const std::vector<double>& v) { list(field.key, v); }
+    void list(const Field& field, const std::vector<double>& v, Entries) { list(field.key, v); }
     template <class T, class Use>
     void each(const char*, std::vector<T>& v, Use&& use) {
         numbers.push_back(static_cast<double>(v.size()));
@@ -171,6 +172,7 @@ class FieldReader {
         each(name, v, [&](std::vector<double>& row) { list("", row); });
     }
     void list(const Field& field, std::vector<double>& v) { list(field.key, v, field.range); }
+    void list(const Field& field, std::vector<double>& v, Entries) { list(field, v); }
     template <class T, class Use>
     void each(const char* name, std::vector<T>& v, Use&& use) {
         const std::size_t n = length(name);

@@ -93,36 +93,6 @@ void each_motor(Use&& use) {
     });
 }
 
-// amplitude * sin(order * phi + phase) over the angle phi of a shaft.
-struct HarmonicLaw {
-    double amplitude = 0.0, phase = 0.0, error = 0.0, period = 0.0;  // period: in place of order
-    int order = 1;
-
-    template <class F>
-    void describe_angle(F& f) {
-        f.integer({"order", "n", "", any, has_default, "periods in one turn of the shaft"}, order, 1, 10000);
-        f.number({"phase", "", "rad", any, has_default, "phase at angle 0"}, phase);
-    }
-    template <class F>
-    void describe_size(F& f, const char* unit, const char* meaning) {
-        f.number({"amplitude", "", unit, positive, needed, meaning}, amplitude);
-        f.number({"error", "", unit, positive, may_be_left_out,
-                  "by which the straight lines depart from the sine at most; left out, 0.1 % of the amplitude"},
-                 error);
-    }
-    template <class F>
-    void describe(F& f) {
-        describe_angle(f);
-        describe_size(f, "", "");
-        f.number("period", period);
-    }
-    model::PeriodicCurve curve() const {
-        const double usual = signals::usual_error * std::fabs(amplitude);
-        const double n = period > 0.0 ? 2.0 * std::numbers::pi / period : order;
-        return model::PeriodicCurve::sine(amplitude, n, phase, error > 0.0 ? error : usual);
-    }
-};
-
 template <class Use>
 void each_gear(Use&& use) {
     use("LinearStiffness",

@@ -3,8 +3,7 @@
 
 #include "../base/signal.hpp"
 #include "../model/train.hpp"
-#include "../parts/stiffness_curve.hpp"
-#include "fields.hpp"
+#include "curve_laws.hpp"
 
 namespace lostmotion {
 
@@ -13,7 +12,7 @@ using model::max_pieces;
 bool rising(const std::vector<double>& v);
 
 template <class F>
-void describe(F& f, TorsionCurve& curve) {
+void describe_sides(F& f, TorsionCurve& curve) {
     TorsionCurve::Side forward = curve.forward(), backward = curve.backward();
     for (TorsionCurve::Side* side : {&forward, &backward}) {
         f.list("breaks", side->breaks, Range::positive);
@@ -27,6 +26,13 @@ void describe(F& f, TorsionCurve& curve) {
     }
     if constexpr (F::reads)
         if (f.well()) curve = TorsionCurve(forward, backward);
+}
+
+template <class F>
+void describe(F& f, TorsionCurve& curve) {
+    describe_curve<StiffnessCurve, QuadraticDrag>(f, curve, [&] { describe_sides(f, curve); });
+    if constexpr (F::reads)
+        if (f.well() && curve.pieces() > 2 * max_pieces + 1) f.wrong("breaks", "are too many");
 }
 
 // As it was given, without what extends it.
@@ -56,7 +62,7 @@ void describe(F& f, LossMap& map) {
 namespace model {
 
 template <class F>
-void describe(F& f, PeriodicCurve& curve) {
+void describe_points(F& f, PeriodicCurve& curve) {
     double period = curve.period();
     std::vector<double> angles, values;
     for (int k = 0; k < curve.pieces(); ++k) {
@@ -78,6 +84,13 @@ void describe(F& f, PeriodicCurve& curve) {
             return f.wrong("angles", "must rise and lie below the period");
         curve = PeriodicCurve(period, std::move(angles), std::move(values), sine);
     }
+}
+
+template <class F>
+void describe(F& f, PeriodicCurve& curve) {
+    describe_curve<HarmonicLaw>(f, curve, [&] { describe_points(f, curve); });
+    if constexpr (F::reads)
+        if (f.well() && curve.pieces() > max_pieces) f.wrong("angles", "are too many");
 }
 
 }  // namespace model
@@ -115,11 +128,16 @@ namespace model {
 inline constexpr long max_number = 1000;  // of a shaft or motor
 
 template <class F>
-void describe(F& f, DryFriction& d) {
+void describe_points(F& f, DryFriction& d) {
     f.number("torque", d.torque, Range::not_negative);
     f.number("breakaway_torque", d.breakaway_torque, Range::not_negative);
     f.list("speeds", d.speeds, Range::not_negative);
     f.list("torques", d.torques, Range::not_negative);
+}
+
+template <class F>
+void describe(F& f, DryFriction& d) {
+    describe_made<StribeckLaw>(f, d, "stribeck", [&] { describe_points(f, d); });
     if constexpr (F::reads) {
         if (f.well() && d.speeds.size() > max_pieces) f.wrong("speeds", "are too many");
     }

@@ -7,9 +7,6 @@
 
 namespace lostmotion::signals {
 
-// Straight lines depart from a smooth law by this share of its largest value at most, where no error is given.
-inline constexpr double usual_error = 1e-3;
-
 // Names and units of one kind of motion.
 struct Motion {
     const char *load, *curve, *slipping, *at_rest, *forces, *force, *speed, *sliding, *stuck, *law, *error;
@@ -65,8 +62,7 @@ struct FrictionTable {
     model::DryFriction law() const {
         if (!speeds.empty()) return {0.0, at_rest, speeds, forces};
         if (stribeck_speed == 0.0) return {slipping, at_rest, {}, {}};
-        return model::DryFriction::stribeck(slipping, at_rest, stribeck_speed,
-                                            error > 0.0 ? error : usual_error * (at_rest - slipping));
+        return made_by(StribeckLaw{slipping, at_rest, stribeck_speed, error});
     }
 };
 
@@ -75,25 +71,6 @@ void each_friction(Use&& use, const Motion& m) {
     use(m.curve, [&](auto& f) { FrictionTable{&m}.describe_curve(f); });
     use(m.load, [&](auto& f) { FrictionTable{&m}.describe(f); });
 }
-
-struct QuadraticDrag {
-    double coefficient = 0.0, max_speed = 0.0, error = 0.0;
-
-    template <class F>
-    void describe(F& f) {
-        f.number({"coefficient", "c", "N*m*s^2/rad^2", positive, needed, "c of the torque c w |w|"}, coefficient);
-        f.number({"max_speed", "", "rad/s", positive, needed, "up to which the straight lines follow the law"},
-                 max_speed);
-        f.number({"error", "", "N*m", positive, may_be_left_out,
-                  "by which the straight lines depart from the parabola at most; left out, 0.1 % of the torque at "
-                  "max_speed"},
-                 error);
-    }
-    TorsionCurve curve() const {
-        const double usual = usual_error * (coefficient * max_speed * max_speed);
-        return model::Shaft::quadratic_drag(coefficient, max_speed, error > 0.0 ? error : usual);
-    }
-};
 
 template <class Use>
 void each_drag(Use&& use) {

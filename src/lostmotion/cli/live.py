@@ -9,7 +9,7 @@ import typer
 
 from .arguments import Overrides, SourceArgument, load_scenario
 from .targets import try_file
-from .terminal import about, announce_parameters, busy
+from .terminal import about, busy
 
 
 def live(
@@ -36,8 +36,6 @@ def live(
         raise InputError(f"{path}: the ending {path.suffix or '(none)'} is not known; it must be .html")
     try_file(path)
     loaded = load_scenario(scenario, overrides)
-    with about(scenario):
-        announce_parameters(loaded)
     with about(scenario), busy("Writing"):
         write_page(path, loaded)
     print(f"Page written to {path}")

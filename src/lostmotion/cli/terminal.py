@@ -150,7 +150,6 @@ MAX_LINE = 300  # characters of an error
 SILENCE = 0.5  # [s] after which something must be seen
 LONG = 60.0  # [s] from which on work is said to take long
 MANY_SHAFTS = 12  # with dry friction or play among which a response takes up to minutes a point
-SLOW = 10.0  # [s] from which on work whose length is known is announced
 EVERY = 30.0  # [s] between lines where there is no terminal
 REFRESH = 0.2  # [s]
 
@@ -243,17 +242,6 @@ def announce_response(train: Any, points: int) -> None:
             f"Response: {len(train.shafts)} shafts, {sticking} of them with dry friction, and {bent} torsion curves; "
             f"each of the {points} points takes up to minutes",
             file=sys.stderr,
-        )
-
-
-def announce_parameters(scenario: Any) -> None:
-    """Say on stderr before it starts that the search for what each value of a large train changes takes long."""
-    from ..portable.descriptions import numbers_of
-    from ..portable.parameters import seconds_for
-
-    if (seconds := seconds_for(scenario, numbers_of)) > SLOW:
-        print(
-            f"Finding out what its parameters change: takes {_span(seconds)} by estimate", file=sys.stderr, flush=True
         )
 
 

@@ -23,6 +23,7 @@ from ..inputs.validation import did_you_mean, shown
 from ..model.motor import Motor
 from ..model.signals import CommandSignal, Signal, Step
 from ..model.train import DriveTrain
+from ..recorded import numbers
 from ..reproducible import sin
 from .firmware import Firmware
 from .loops import FirstOrderCurrent, IdealCurrent, VoltageCommand
@@ -93,9 +94,9 @@ class _PID(described.PIDFields):
         elif k_d > 0.0:
             direct |= {"measured_rate": -k_d} | ({"reference_rate": c * k_d} if c > 0.0 else {})
         A = np.diag([-1.0 / tau if name == "filter" else 0.0 for name in rows])
-        B = np.array([[by.get(y, 0.0) for y in direct] for by, _, _ in rows.values()]).reshape(len(rows), len(direct))
-        C, back_calculation = (np.array([row[k] for row in rows.values()]) for k in (1, 2))
-        return LinearSystem(tuple(direct), tuple(rows), A, B, C, np.array(list(direct.values())), back_calculation)
+        B = numbers([[by.get(y, 0.0) for y in direct] for by, _, _ in rows.values()]).reshape(len(rows), len(direct))
+        C, back_calculation = (numbers([row[k] for row in rows.values()]) for k in (1, 2))
+        return LinearSystem(tuple(direct), tuple(rows), A, B, C, numbers(list(direct.values())), back_calculation)
 
 
 class PositionPID(described.PositionPIDFields, _PID):
@@ -308,9 +309,9 @@ class ContinuousController(described.ContinuousControllerFields):
             "states": list(system.states),
             "A": system.A.tolist(),
             "B": system.B.tolist(),
-            "C": (per_unit * system.C).tolist(),
-            "D": (per_unit * system.D).tolist(),
-            "back_calculation": (system.back / per_unit).tolist(),
+            "C": [per_unit * c for c in system.C],
+            "D": [per_unit * d for d in system.D],
+            "back_calculation": [back / per_unit for back in system.back],
             "limit": limit,
             "curve": curve,
             "droop": droop,

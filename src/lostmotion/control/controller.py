@@ -7,6 +7,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from ..inputs import described
 from ..inputs.described import ReferenceBlocks
+from ..recorded import real
 from .camera import Camera, Tracker
 from .continuous import ContinuousController
 from .encoder import Encoder
@@ -155,7 +156,7 @@ class Controller(described.ControllerFields, ReferenceBlocks):
     def loop_time(self, loop: str) -> float:
         """Sample time of a loop [s]."""
         own = getattr(getattr(self, loop), "sample_time", None)
-        return self.sample_time if own is None else float(own)
+        return self.sample_time if own is None else real(own)
 
 
 def _kind(value: Any) -> str:

@@ -24,8 +24,9 @@ from ..inputs.quantities import (
 )
 from ..inputs.validation import shown
 from ..model.signals import Breakpoint, Samples, TimeFunction, taylor
+from ..recorded import real
 from ..reproducible import cos, cubic_spline, sin
-from .profiles import segments
+from .profiles import Segment, segments
 from .satellites import Satellite  # noqa: F401
 
 SHORTEST = 1e-6  # share of a move that the rounding of its instants may be
@@ -191,30 +192,31 @@ class MovesReference(described.MovesReferenceFields[V, S, A, J, M], Reference[V]
         own = getattr(move, key)
         return getattr(self, key) if own is None else own
 
-    def _segments(self) -> np.ndarray:
-        """(time, position, speed, acceleration, jerk) at the beginning of each segment of each move."""
+    def _segments(self) -> list[list[Segment]]:
+        """The segments of each move."""
+        found: list[list[Segment]] = []
         moves: tuple[Any, ...] = self.moves
-        columns = ([self._of(move, key) for move in moves] for key in ("speed", "acceleration", "jerk", "dwell"))
-        speed, acceleration, jerk, dwell = columns
-        ends = np.array([move.to for move in moves])
-        origins = np.array([self.start, *ends[:-1]])
-        with np.errstate(over="ignore", invalid="ignore"):  # refused when the reference is made
-            found = segments(ends - origins, speed, acceleration, [math.inf if j is None else j for j in jerk])
-            found[0] += list(itertools.accumulate(found[0, -1, :-1] + dwell[:-1], initial=self.begin))
-            found[1] += origins
-        found[1, -1] = ends
+        time, origin = self.begin, real(self.start)
+        for move in moves:
+            speed, acceleration, jerk, dwell = (
+                self._of(move, key) for key in ("speed", "acceleration", "jerk", "dwell")
+            )
+            own = segments(move.to - origin, speed, acceleration, math.inf if jerk is None else jerk)
+            found.append([(time + t, origin + position, *of_it) for t, position, *of_it in own])  # type: ignore[misc]
+            found[-1][-1] = (found[-1][-1][0], move.to, *found[-1][-1][2:])
+            time, origin = time + (own[-1][0] + dwell), move.to
         return found
 
     def _pieces(self) -> list[list[Breakpoint]]:
         if not self.moves:
             return super()._pieces()
-        points = self._segments().T.reshape(-1, 5).tolist()
-        lasting = [tuple(p) for p, q in itertools.pairwise(points) if p[0] < q[0]]
-        return [*super()._pieces(), [(0.0, self.start), *lasting, tuple(points[-1])]]
+        points = list(itertools.chain(*self._segments()))
+        lasting = [p for p, q in itertools.pairwise(points) if p[0] < q[0]]
+        return [*super()._pieces(), [(0.0, real(self.start)), *lasting, points[-1]]]
 
     def intervals(self) -> list[tuple[float, float]]:
         """(begin, end) of each move, without its dwell [s]."""
-        return [(times[0], times[-1]) for times in self._segments()[0].T.tolist()] if self.moves else []
+        return [(own[0][0], own[-1][0]) for own in self._segments()]
 
     @property
     def duration(self) -> float:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from ..errors import InputError
 
 MAX_SAMPLES = 1_000_000  # of the shortest sample time in another
@@ -18,7 +16,7 @@ def whole_multiple(time: float, base: float, key: str) -> int:
         It is no whole multiple.
     """
     samples = round(time / base)
-    if samples < 1 or samples > MAX_SAMPLES or not math.isclose(samples * base, time, rel_tol=1e-9):
+    if samples < 1 or samples > MAX_SAMPLES or not abs(samples * base - time) <= 1e-9 * time:
         near = max(1, min(samples, MAX_SAMPLES)) * base
         raise InputError(
             f"{time:g} s is no whole multiple of the sample time {base:g} s; take {near:g} s, or another sample time",

@@ -10,14 +10,13 @@ from typing import Annotated, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from .. import _core
 from ..errors import InputError
 from ..inputs import described
 from ..inputs.part import Part
 from ..reproducible import arctan
 from .angle_torques import AngleCurve, ErrorCurve, ErrorHarmonic, Harmonic
 from .gear import Gear
-from .losses import ConstantEfficiency, MeshEfficiency
+from .losses import ConstantEfficiency, MeshEfficiency, worm_efficiencies
 from .notes import NO_NOTE, Note, note_is_about
 from .torsion import Hysteresis, LinearStiffness, Rigid, TorsionCurve, check_segments
 
@@ -134,7 +133,8 @@ class LinearDrive(described.LinearDriveFields):
             stiffness = TorsionCurve(slopes=(k,), backlash=self.backlash)
         elif k is not None:
             stiffness = LinearStiffness(stiffness=k)
-        return Gear(
+        return Gear.model_construct(
+            None,
             input=input,
             output=output,
             ratio=self.ratio(),
@@ -233,7 +233,7 @@ class ScrewData(described.ScrewDataFields, LinearDrive):
     def efficiencies(self) -> tuple[float, float] | None:
         if self.mean_diameter is None:
             return super().efficiencies()
-        eta_f, eta_b = _core.worm_efficiencies(*self.angles())
+        eta_f, eta_b = worm_efficiencies(*self.angles())
         return eta_f, eta_b if self.backdriving_efficiency is None else self.backdriving_efficiency
 
     def _stiffness(self) -> float | None:

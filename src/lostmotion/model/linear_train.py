@@ -8,6 +8,7 @@ from pydantic import Field
 from ..errors import InputError
 from ..inputs.named import Elements, Named, nothing
 from ..inputs.validation import did_you_mean, shown
+from ..recorded import may_differ
 from .gear import Gear
 from .linear import LinearDrive, Screw
 from .linear_motor import LinearMotor
@@ -96,7 +97,7 @@ class LinearElements(TrainElements):
         """Shafts with the drag torque of the screws, racks and belts that they drive."""
         found = dict(shafts)
         for drive in self.linear_drives().values():
-            if drive.drag_torque > 0.0:
+            if may_differ(drive.drag_torque):
                 found[drive.input] = _with_friction(found[drive.input], drive.drag_torque)  # type: ignore[attr-defined]
         return found
 

@@ -10,6 +10,7 @@ from .. import _core
 from ..inputs import described
 from ..inputs.breakpoints import check_apart
 from ..inputs.part import Part
+from ..recorded import of_function
 from ..reproducible import arctan
 
 
@@ -95,6 +96,17 @@ def efficiency_map(eta_f: float, eta_b: float) -> LossMap:
     return LossMap(speeds=(0.0, 1.0), loads=(-1.0, 0.0, 1.0), values=values)
 
 
+def worm_efficiencies(lead_angle: float, friction_angle: float) -> tuple[float, float]:
+    """(eta_f, eta_b) of a worm or a screw."""
+    driving, overrunning = (
+        of_function(
+            f"worm_{name}", lambda *angles, k=k: _core.worm_efficiencies(*angles)[k], lead_angle, friction_angle
+        )
+        for k, name in enumerate(("driving", "overrunning"))
+    )
+    return driving, overrunning
+
+
 class TwoEfficiencies(Part):
     """Losses with an efficiency for each direction of power flow."""
 
@@ -157,4 +169,4 @@ class WormMesh(TwoEfficiencies, described.WormMeshFields):
 
     def efficiencies(self) -> tuple[float, float]:
         """(eta_f, eta_b)."""
-        return _core.worm_efficiencies(*self.angles())
+        return worm_efficiencies(*self.angles())

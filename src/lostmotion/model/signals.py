@@ -23,6 +23,7 @@ from ..inputs.quantities import (
     Speed,
     Torque,
 )
+from ..recorded import real
 from ..reproducible import sin, total
 from ..units.scalars import is_number, scalar
 from .wind import Wind  # noqa: F401
@@ -41,14 +42,14 @@ class Step(described.StepFields[V], Generic[V]):
     """Adds `height` from `time` on."""
 
     def breakpoints(self) -> list[Breakpoint]:
-        return [(self.time, float(self.height), 0.0)]  # type: ignore[arg-type]
+        return [(self.time, real(self.height), 0.0)]
 
 
 class Ramp(described.RampFields[V], Generic[V]):
     """Rises by `rise` in a straight line within `duration`, from `begin` on, and stays there."""
 
     def breakpoints(self) -> list[Breakpoint]:
-        rise = float(self.rise)  # type: ignore[arg-type]
+        rise = real(self.rise)
         return [(self.begin, 0.0, rise / self.duration), (self.begin + self.duration, rise, 0.0)]
 
 
@@ -63,7 +64,7 @@ class Chirp(described.ChirpFields[V], Generic[V]):
         fastest = max(self.begin_frequency, self.end_frequency)
         n = max(2, math.ceil(self.duration * fastest * self.points_per_period))
         rate = (self.end_frequency - self.begin_frequency) / self.duration
-        amplitude = float(self.amplitude)  # type: ignore[arg-type]
+        amplitude = real(self.amplitude)
         times = [self.duration * k / n for k in range(n + 1)]
         values = [amplitude * sin(2.0 * math.pi * (self.begin_frequency + 0.5 * rate * t) * t) for t in times]
         lines = _polyline([self.begin + t for t in times], values)
@@ -129,7 +130,7 @@ class TimeFunction(described.TimeFunctionFields[V], Generic[V]):
         """All but the sines, from t = 0 on."""
         pieces = self._pieces()
         orders = range(1, self.derivatives + 1)
-        mean = float(self.mean)  # type: ignore[arg-type]
+        mean = real(self.mean)
         breakpoints = []
         waiting = deque(sorted(pieces, key=lambda piece: piece[0][0]))
         active: list[list[Breakpoint]] = []
@@ -178,7 +179,7 @@ class Signal(described.SignalFields[V], TimeFunction[V], Generic[V]):
             raise ValueError("is not made of steps; with an engagement or release delay, give mean and steps alone")
         heights: dict[float, float] = {}
         for step in sorted(self.steps, key=lambda step: step.time):
-            heights[step.time] = heights.get(step.time, 0.0) + float(step.height)  # type: ignore[arg-type]
+            heights[step.time] = heights.get(step.time, 0.0) + real(step.height)
         steps = [Step[V](time=t, height=h) for t, h in heights.items()]  # type: ignore[arg-type]
         later = [Step[V](time=t + (up if h > 0.0 else down), height=h) for t, h in heights.items()]  # type: ignore[arg-type]
         for (a, b), (first, second) in zip(itertools.pairwise(steps), itertools.pairwise(later), strict=True):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from .. import _core
@@ -12,7 +10,7 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..simulation.core_runs import core_case
 from ..simulation.scenario import Scenario
-from .parameters import Parameter, parameters_of
+from .derivation import Derivation, derivation_of
 
 
 def kernel_of(scenario: Scenario) -> str:
@@ -30,7 +28,7 @@ def description(scenario: Scenario, *, parameters: bool = True) -> np.ndarray:
         The scenario with its signals, controllers and references, its state at t = 0, duration and sample interval.
     parameters : bool
         Whether the numbers also state how they follow from the values of the scenario, so that these can be changed without
-        Python. For this the scenario is made anew some hundred times, which takes seconds.
+        Python.
 
     Returns
     -------
@@ -48,7 +46,7 @@ def description(scenario: Scenario, *, parameters: bool = True) -> np.ndarray:
     >>> lm.portable.description(lm.load("paper-1dof-l-small"), parameters=False).dtype
     dtype('float64')
     """
-    return described(scenario)[0] if parameters else written(scenario, ())
+    return described(scenario)[0] if parameters else written(scenario, Derivation())
 
 
 def described(scenario: Scenario) -> tuple[np.ndarray, list[tuple[str, float]]]:
@@ -58,13 +56,17 @@ def described(scenario: Scenario) -> tuple[np.ndarray, list[tuple[str, float]]]:
     ------
     InputError
     """
-    found = parameters_of(scenario, numbers_of).parameters
-    return written(scenario, found), [(p.key, p.value) for p in found]
+    found = derivation_of(scenario, numbers_of)
+    return written(scenario, found), [(p.key, p.value) for p in found.parameters]
 
 
-def written(scenario: Scenario, parameters: Sequence[Parameter]) -> np.ndarray:
+def written(scenario: Scenario, derivation: Derivation) -> np.ndarray:
     """The description with these parameters."""
-    return np.array(_core.write_description(numbers_of(scenario).tolist(), [p.core() for p in parameters]))
+    return np.array(
+        _core.write_description(
+            numbers_of(scenario).tolist(), [p.core() for p in derivation.parameters], derivation.core()
+        )
+    )
 
 
 def numbers_of(scenario: Scenario) -> np.ndarray:
@@ -79,7 +81,7 @@ def numbers_of(scenario: Scenario) -> np.ndarray:
             f"controller of {own[0]}: has a law of your own, which only Python can call; describe the scenario without it, and turn "
             "the motor by its command"
         )
-    table = scenario.simulation
+    table = scenario.tables.simulation
     times = {"duration": table.duration, "sample_interval": table.sample_interval}
     control = scenario.control() if scenario.axes() else OPEN_LOOP
-    return np.array(_core.describe(core_case(scenario), title=scenario.title, **times, control=control))
+    return np.array(_core.describe(core_case(scenario), title=scenario.tables.title, **times, control=control))

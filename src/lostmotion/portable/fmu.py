@@ -29,10 +29,10 @@ from ..simulation.train_variables import axis_variables
 from . import fmi2, fmi3
 from .checkout import made_here
 from .dependencies import dependencies_of
+from .derivation import Parameter, derivation_of
 from .descriptions import kernel_of, numbers_of, written
 from .fmu_model import Declared, Model, page
 from .fmu_sources import source_files
-from .parameters import Parameter, parameters_of
 
 # Directories and extensions of the libraries in an FMU, by the names that the builds have here.
 # FMI 2.0 leaves those beside x86-64 to the tools; these are the names of FMI 3.0.
@@ -138,12 +138,12 @@ def export_fmu(
     identifier = re.sub(r"\W", "_", f"_{path.stem}" if path.stem[:1].isdigit() else path.stem, flags=re.ASCII)
     identifier = identifier if source else "lostmotion"
     binaries = _libraries(directory, PLATFORMS[fmi], kernel, identifier)
-    parameters = tuple(
-        p for p in parameters_of(scenario, numbers_of).parameters if not _of_signals(scenario, p.key, references)
-    )
-    description = written(scenario, parameters)
+    derivation = derivation_of(scenario, numbers_of, lambda key: _of_signals(scenario, key, references))
+    description = written(scenario, derivation)
     resource = description.astype("<f8").tobytes()
-    model = _model(scenario, parameters, hashlib.sha256(resource).hexdigest()[:32], references, motion_inputs)
+    model = _model(
+        scenario, derivation.parameters, hashlib.sha256(resource).hexdigest()[:32], references, motion_inputs
+    )
     model = replace(model, identifier=identifier, has_sources=source)
     sources: dict[str, str] = {}
     if source:

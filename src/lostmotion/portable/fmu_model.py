@@ -11,7 +11,7 @@ from xml.etree import ElementTree as ET
 
 from ..simulation.results import installed_version
 from ..units.grammar import read_unit
-from .parameters import Parameter
+from .derivation import Parameter
 
 # bindings/fmu/variables.hpp has the same.
 FIRST_INPUT, FIRST_INPUT_RATE, FIRST_OUTPUT, FIRST_STATE, FIRST_DERIVATIVE, FIRST_INDICATOR, FIRST_PARAMETER = (

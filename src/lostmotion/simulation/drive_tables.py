@@ -18,6 +18,7 @@ from ..model.load import Load
 from ..model.motor import Motor
 from ..model.signals import CommandSignal, TorqueSignal
 from ..model.task import Task
+from ..recorded import may_differ
 from .aliases import GEARBOX, LOAD, MOTOR
 from .tables import BASE, RECORD_NAME, ScenarioTables, SimulationTable, with_accessories
 from .train_tables import ShaftTable, TrainInitial, TrainTables
@@ -47,8 +48,9 @@ class Initial(described.InitialFields):
             "motor_torques": {MOTOR: self.motor_torque},
             "hysteresis_capacities": {GEARBOX: self.hysteresis_capacity},
         }
-        found = {key: {name: x for name, x in named.items() if x} for key, named in values.items()}
-        return TrainInitial(**found, on_reference=self.on_reference)
+        found = {key: Named({name: x for name, x in named.items() if may_differ(x)}) for key, named in values.items()}
+        made: TrainInitial = TrainInitial(on_reference=self.on_reference).unchecked(**found)
+        return made
 
     @classmethod
     def of_state(

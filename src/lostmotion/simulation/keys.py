@@ -50,6 +50,8 @@ _FIRST = tuple(
         r"(motor|motors\.[^.]+)\.rated_voltage",
     )
 )
+CHANGES_OTHERS = _FIRST[-1]
+"""of these a number, with which other values change"""
 _SIGNALS = re.compile(r"command|load\.torque")
 _OFF_DIAGONAL = re.compile(r"(mass_matrices\.[^.]+\.matrix)\.(\d+)\.(\d+)")
 _TRAIN_SIGNALS = re.compile(r"command\.[^.]+|shafts\.[^.]+\.torque|slides\.[^.]+\.force")

@@ -30,6 +30,7 @@ from ..model.linear_train import LinearElements
 from ..model.motor import Motor
 from ..model.signals import Signal
 from ..model.train import DriveTrain
+from ..recorded import may_differ
 from . import axis_form, drive_form
 from .aliases import AXIS, DRIVE, TRAIN, Form
 from .drive_tables import DriveTables, Initial, LoadTable
@@ -544,7 +545,7 @@ class Scenario:
     def capacities(self, initial: Initial | TrainInitial | None = None) -> dict[str, float]:
         """Hysteresis capacities at t = 0 [N·m] by gear; what is not among them is 0."""
         state = self.tables.initial if initial is None else initial.of_train()
-        return {name: h for name, h in state.of_all("hysteresis_capacities").items() if h}
+        return {name: h for name, h in state.of_all("hysteresis_capacities").items() if may_differ(h)}
 
 
 @contextmanager

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -12,12 +11,18 @@ from ..inputs.validation import did_you_mean
 from ..model.signals import Signal
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
+from ..recorded import may_be_left_out, real, value_of
 from .train_variables import angle_through
 
 if TYPE_CHECKING:
     from .train_tables import TrainInitial
 
 ROUNDING = 1e-12  # relative, between values that belong together
+
+
+def agree(a: float, b: float) -> bool:
+    """Whether two values say the same, up to rounding."""
+    return abs(a - b) <= ROUNDING * max(abs(a), abs(b), 1.0)
 
 
 def start_values(
@@ -49,7 +54,7 @@ def start_values(
     _check("motor_torques", initial.motor_torques, electric, 'motor of kind "dc" or "synchronous"')
     _check("hysteresis_capacities", initial.hysteresis_capacities, lossy, "gear with hysteresis")
     _check("hysteresis_forces", initial.hysteresis_forces, lossy, "screw, rack or belt with hysteresis")
-    if problem := (core or train.core(())).check_start([speeds.get(name, 0.0) for name in train.shafts]):
+    if problem := (core or train.core(())).check_start([value_of(speeds.get(name, 0.0)) for name in train.shafts]):
         _refuse_contradiction(train, initial.of_all("speeds"))
         raise InputError(problem, "initial.speeds")
     _check_flanks(train, speeds, twists)
@@ -67,7 +72,7 @@ def _refuse_contradiction(train: DriveTrain, given: Mapping[str, float]) -> None
     for one, speed in given.items():
         tied = tied_speeds(train, {one: speed})
         for other in (name for name in given if name in tied and name != one):
-            if math.isclose(given[other], tied[other], rel_tol=ROUNDING, abs_tol=ROUNDING):
+            if agree(given[other], tied[other]):
                 continue
             a, wanted = (f"{x:.10g} {_speed_unit(train, other)}" for x in (given[other], tied[other]))
             b = f"{speed:.10g} {_speed_unit(train, one)}"
@@ -152,13 +157,11 @@ def angles_at_start(
             if shaft not in (gear.input, gear.output):
                 continue
             other = gear.output if shaft == gear.input else gear.input
-            angle = float(angle_through(gear, angles[shaft], twists.get(name, 0.0), forward=shaft == gear.input))
+            angle = real(angle_through(gear, angles[shaft], twists.get(name, 0.0), forward=shaft == gear.input))
             if other not in angles:
                 angles[other], origin[other] = angle, origin[shaft]
                 waiting.append(other)
-            elif origin[other] != origin[shaft] and not math.isclose(
-                angles[other], angle, rel_tol=ROUNDING, abs_tol=ROUNDING
-            ):
+            elif origin[other] != origin[shaft] and not agree(angles[other], angle):
                 one, two = origin[other], origin[shaft]
                 key = "positions" if train.is_slide(two) else "angles"
                 a, b = (f"{given[s]} {train.angle_unit(s)}" for s in (two, one))
@@ -179,8 +182,16 @@ def tied_speeds(train: DriveTrain, given: Mapping[str, float]) -> dict[str, floa
     gears = train.fixed_gears().values()
     tied = [g for g in gears if isinstance(g.stiffness, Rigid) and not g.stiffness.strikes]
     rigid = [(g.input, g.output, g.ratio) for g in tied]
-    speeds, waiting = dict(given), list(given)
-    while waiting:
+    speeds = {name: speed for name, speed in given.items() if not may_be_left_out(speed)}
+    left, waiting = {name: speed for name, speed in given.items() if name not in speeds}, list(speeds)
+    while waiting or left:
+        if not waiting:
+            shaft = next(iter(left))
+            speed = left.pop(shaft)
+            if shaft not in speeds:
+                speeds[shaft] = speed
+                waiting.append(shaft)
+            continue
         shaft = waiting.pop()
         for one, other, ratio in rigid:
             found = {one: (other, 1.0 / ratio), other: (one, ratio)}.get(shaft)
