@@ -485,6 +485,42 @@ def test_the_inertia_of_two_stages_is_referred_through_both() -> None:
     assert ratio.use == pytest.approx((3e-5 + (2e-4 + 1e-4 + 1.5 / 100.0) / 16.0) / 2e-4 / 10.0, rel=1e-9)
 
 
+def test_lost_motion_and_resonance_of_two_stages_are_those_of_springs_and_gaps_in_series() -> None:
+    """The first gear twists under a tenth of the torque, and the load sees a tenth of that; the rotor's inertia counts 1600 times."""
+    k1, k2, gap1, gap2 = 500.0, 2e4, 2e-3, 1e-3
+    first = {"ratio": 4.0, "stiffness": {"kind": "curve", "backlash": gap1, "slopes": [k1]}}
+    second = {"ratio": 10.0, "stiffness": {"kind": "curve", "backlash": gap2, "slopes": [k2]}}
+    train = lm.Scenario(
+        shafts={"a": {}, "b": {"inertia": 1e-9}, "c": {"inertia": 1.5}},
+        motors={"m": {"shaft": "a", **ROTOR}},
+        gears={"g": {"input": "a", "output": "b", **first}, "h": {"input": "b", "output": "c", **second, "rated_output_torque": 100.0, "rated_input_speed": 100.0}},
+        command={"m": 0.2},
+        task={"max_lost_motion": 0.01},
+        simulation={"duration": 0.1, "sample_interval": 0.01},
+    )  # fmt: skip
+    found = {f.rule: f for f in lm.check_drive(train)}
+    softness = 1.0 / k2 + 1.0 / (100.0 * k1)
+    lost = gap2 + gap1 / 10.0 + 2.0 * 3.0 * softness
+    assert found["lost_motion"].use == pytest.approx(lost / 0.01, rel=1e-4)  # measured by a ramp
+    swing, hold = (math.sqrt(x / softness) / (2.0 * math.pi) for x in (1.0 / (2e-4 * 1600.0) + 1.0 / 1.5, 1.0 / 1.5))
+    assert found["resonance"].value == f"{swing:.4g} Hz, anti-resonance {hold:.4g} Hz"
+
+
+def test_the_force_of_a_linear_motor_is_judged_by_its_peak_and_its_rated_force() -> None:
+    """A force of 80 N + 90 N sin: 170 N at most, and sqrt(80^2 + 90^2/2) N in the mean."""
+    scenario = lm.Scenario(
+        slides={"table": {"mass": 8.0, "viscous_friction": 100.0}},
+        linear_motors={"m": {"slide": "table", "rated_force": 100.0, "mass": 2.0, "peak_force": 250.0}},
+        command={"m": {"mean": 0.8, "amplitude": 0.9, "frequency": 5.0}},
+        simulation={"duration": 1.0, "sample_interval": 1e-3},
+    )
+    found = {f.rule: f for f in lm.check_drive(scenario)}
+    assert found["motor_torque"].use == pytest.approx(math.sqrt(80.0**2 + 90.0**2 / 2.0) / 100.0, rel=1e-6)
+    assert found["motor_torque"].verdict == "warning"
+    assert found["motor_peak_torque"].use == pytest.approx(170.0 / 250.0, rel=1e-9)
+    assert found["motor_peak_torque"].verdict == "ok"
+
+
 @pytest.mark.parametrize("name", ["position-axis", "catalogue-robot-joint", "paper-1dof-l-small", "lossy-rigid-gear"])
 def test_a_drive_in_the_long_form_gets_the_judgements_of_the_short_one(name: str) -> None:
     scenario = lm.load(name)

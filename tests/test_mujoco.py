@@ -317,6 +317,30 @@ def test_a_drive_without_what_a_reduction_lacks_is_described_whole(load_torque: 
     assert f'friction="{found.frictionloss:.6g}"' in found.urdf("elbow")
 
 
+def test_a_train_of_two_stages_is_described_by_what_all_its_parts_are_at_the_joint() -> None:
+    """Armature: 400 times the rotor and 100 times the middle shaft; damping and friction of that shaft 100 and 10 times."""
+    lossless = {"kind": "constant_efficiency", "efficiency": 1.0}
+    train = lm.Scenario(
+        shafts={
+            "rotor": {},
+            "middle": {"inertia": 1e-3, "viscous_friction": 4e-3, "friction_torque": 0.05},
+            "arm": {"inertia": 0.5},
+        },
+        motors={"m": {"shaft": "rotor", "kind": "torque_source", "rated_torque": 1.0, "rotor_inertia": 2e-4}},
+        gears={
+            "first": {"input": "rotor", "output": "middle", "ratio": -2.0, "losses": lossless},
+            "second": {"input": "middle", "output": "arm", "ratio": 10.0, "losses": lossless},
+        },
+        command={"m": 0.0},
+        simulation={"duration": 0.1, "sample_interval": 0.01},
+    )
+    found = lm.mujoco.reduce(train, 0.5, 1.0)
+    assert found.gear == pytest.approx(-20.0, rel=1e-3)
+    assert found.armature == pytest.approx(400.0 * 2e-4 + 100.0 * 1e-3, rel=1e-2)
+    assert found.damping == pytest.approx(100.0 * 4e-3, rel=1e-2)
+    assert found.frictionloss == pytest.approx(10.0 * 0.05, rel=1e-2)
+
+
 def test_the_load_torque_of_a_scenario_is_not_dropped_from_a_reduction() -> None:
     joint = lm.load("catalogue-robot-joint")
     with pytest.raises(lm.InputError) as caught:
