@@ -8,13 +8,10 @@ from xml.etree import ElementTree as ET
 import pytest
 
 import lostmotion as lm
-from test_fmu import Slave, pytestmark, without_parameters
+from test_fmu import Slave, pytestmark
 
 fmpy: Any = pytest.importorskip("fmpy", reason="FMPy is missing: .venv/bin/pip install --group portable")
 __all__ = ["pytestmark"]
-
-
-small_files = pytest.fixture(autouse=True)(without_parameters)
 
 
 class Slave3:

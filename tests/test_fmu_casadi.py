@@ -8,13 +8,10 @@ import pytest
 
 import lostmotion as lm
 from test_examples import example
-from test_fmu import pytestmark, without_parameters
+from test_fmu import pytestmark
 
 ca: Any = pytest.importorskip("casadi", reason="CasADi is missing: .venv/bin/pip install --group examples")
 __all__ = ["pytestmark"]
-
-
-small_files = pytest.fixture(autouse=True)(without_parameters)
 
 
 class Rates:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
-from test_fmu import pytestmark, without_parameters
+from test_fmu import pytestmark
 
 fmpy: Any = pytest.importorskip("fmpy", reason="FMPy is missing: .venv/bin/pip install --group portable")
 __all__ = ["pytestmark"]
@@ -19,9 +19,6 @@ TOLERANCE = 1e-8
 # CVODE keeps the error of a step below its tolerance; over some thousand steps and tens of events, each found to 1e-9 of
 # the natural magnitudes, that adds up to some 1e-6 of the largest values.
 ACCURACY = 2e-5
-
-
-small_files = pytest.fixture(autouse=True)(without_parameters)
 
 
 @pytest.fixture

@@ -10,16 +10,13 @@ from typer.testing import CliRunner
 
 import lostmotion as lm
 from lostmotion.cli import app
-from test_fmu import Slave, pytestmark, without_parameters
+from test_fmu import Slave, pytestmark
 from test_fmu3 import Slave3
 from test_fmu_exchange import Model
 
 fmpy: Any = pytest.importorskip("fmpy", reason="FMPy is missing: .venv/bin/pip install --group portable")
 fmi2: Any = pytest.importorskip("fmpy.fmi2")
 __all__ = ["pytestmark"]
-
-
-small_files = pytest.fixture(autouse=True)(without_parameters)
 
 
 def largest_error(got: Any, exact: Any, variable: str) -> float:
