@@ -13,6 +13,7 @@ import lostmotion as lm
 from conftest import ROOT, lostmotion
 from lostmotion.cli import app
 from lostmotion.inputs.doubts import LARGEST, ValueWarning, doubt_all
+from lostmotion.simulation.units_of_keys import unit_for
 
 JOINT = "catalogue-robot-joint"
 
@@ -104,6 +105,27 @@ def test_options_print_bare_numbers_back_with_their_unit() -> None:
     assert "--explain: 0.5 s; a bare number is read in SI units" in said
     quiet = run(app, ["run", JOINT, "--set", "load.inertia=2 kg*m^2", "--explain", "500 ms"]).output
     assert "bare number" not in quiet
+
+
+@pytest.mark.parametrize(
+    ("name", "key", "unit"),
+    [
+        ("position-axis", "controller.reference.speed", "rad/s"),
+        ("position-axis", "controller.reference.moves.0.to", "rad"),
+        ("speed-axis", "controller.reference.mean", "rad/s"),
+        ("speed-axis", "controller.reference.steps.0.height", "rad/s"),
+        ("ball-screw-axis", "controller.reference.speed", "m/s"),
+        ("gantry-two-screws", "controllers.left_servo.reference.moves.0.to", "m"),
+    ],
+)
+def test_the_unit_of_a_reference_is_that_of_its_kind(name: str, key: str, unit: str) -> None:
+    """`mean` is an angle or a speed, and `speed` a number of moves or a reference itself."""
+    assert unit_for(lm.load(name), key) == unit
+
+
+def test_an_inclination_of_90_is_refused_with_its_unit() -> None:
+    with pytest.raises(lm.InputError, match=r'1\.5708 rad; write "90 deg"'):
+        lm.load("vertical-axis-with-brake", ["slides.head.inclination=90"])
 
 
 def test_a_command_prints_a_warning_as_one_line_without_the_place_in_the_code(tmp_path: Path) -> None:

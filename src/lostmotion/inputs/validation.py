@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError, Problem
 from ..units.scalars import scalar
-from .schema import follow, keys_within
+from .schema import follow, keys_within, unit_in_schema
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
@@ -259,6 +259,8 @@ class _Problem:
                 text = f"must be at most {c['le']:g}"
                 if c["le"] == 1 and isinstance(self.value, int | float) and 1.0 < self.value <= 100.0:
                     text += f'; write {self.value / 100.0:g}, or "{self.value:g} %"'
+                elif isinstance(self.value, int | float) and any(unit_in_schema(n) == "rad" for n in self.nodes):
+                    text += f' rad; write "{self.value:g} deg" if degrees are meant'
                 return text
             case "finite_number":
                 return "must be a finite number"

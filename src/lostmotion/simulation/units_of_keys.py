@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -17,6 +17,9 @@ from .scenario import Scenario
 from .tables import ScenarioTables
 from .train_tables import TrainTables
 
+Place = tuple[int | str, ...]
+"""parts of a dotted key"""
+
 
 def unit_of_key(key: str) -> str | None:
     """SI unit of a dotted key of a scenario; empty for a plain number, None if it is no quantity or not known.
@@ -29,13 +32,13 @@ def unit_of_key(key: str) -> str | None:
 
 def unit_in(form: type[ScenarioTables], key: str) -> str | None:
     """The same, of a key of the short or of the long form."""
-    return _unit(key, form)
+    return _unit(_place(key), form)
 
 
 def unit_for(scenario: Scenario, key: str) -> str | None:
-    """SI unit of a dotted key of a scenario, where its controllers move slides in units of translation."""
+    """SI unit of a dotted key of a scenario, by the kinds of its tables; its controllers move slides in units of translation."""
     key = scenario.key_of_tables(key)
-    unit = unit_in(type(scenario.written), key)
+    unit = _unit(_place(key), type(scenario.written), _with_kinds(scenario.written, key))
     if not unit or not key.startswith("controllers."):
         return unit
     return unit_of_slides(scenario.model_dump(), key, unit)
@@ -43,7 +46,7 @@ def unit_for(scenario: Scenario, key: str) -> str | None:
 
 def limit_in(form: type[ScenarioTables], key: str) -> Limit:
     """The range that a value of the short or of the long form may have, whatever the others are."""
-    nodes = _nodes(key, form)
+    nodes = _nodes(_place(key), form)
     numbers = [node for node in nodes if node.get("type") == "number"]
 
     def bound(name: str, widest: Callable[[list[float]], float]) -> float | None:
@@ -55,22 +58,40 @@ def limit_in(form: type[ScenarioTables], key: str) -> Limit:
 
 def meaning_in(form: type[ScenarioTables], key: str) -> str:
     """Meaning of a key of the short or of the long form; empty where nothing says it."""
-    return next((str(node["description"]) for node in _nodes(key, form) if "description" in node), "")
+    return next((str(node["description"]) for node in _nodes(_place(key), form) if "description" in node), "")
 
 
 @cache
-def _unit(key: str, form: type[ScenarioTables]) -> str | None:
-    return next((unit for node in _nodes(key, form) if (unit := unit_in_schema(node)) is not None), None)
+def _unit(place: Place, form: type[ScenarioTables], kinds: Place = ()) -> str | None:
+    return next((unit for node in _nodes(place, form, kinds) if (unit := unit_in_schema(node)) is not None), None)
 
 
-def _nodes(key: str, form: type[ScenarioTables]) -> list[Mapping[str, Any]]:
-    """Nodes of a dotted key in the JSON Schema; none if it is unknown."""
-    place = tuple(int(part) if part.isdecimal() else part for part in key.split("."))
-    found, nodes = follow(_made(form), place)
+def _place(key: str) -> Place:
+    return tuple(int(part) if part.isdecimal() else part for part in key.split("."))
+
+
+def _with_kinds(tables: Any, key: str) -> Place:
+    """A dotted key with the kind of each table on the way, since keys of two kinds may have one name and two units."""
+    found: list[int | str] = []
+    for part in _place(key):
+        if isinstance(part, int):
+            tables = tables[part] if isinstance(tables, Sequence) and part < len(tables) else None
+        else:
+            tables = tables.get(part) if isinstance(tables, Mapping) else getattr(tables, part, None)
+        kind = getattr(tables, "kind", None)
+        found += [part, kind] if isinstance(kind, str) else [part]
+    return tuple(found)
+
+
+def _nodes(place: Place, form: type[ScenarioTables], kinds: Place = ()) -> list[Mapping[str, Any]]:
+    """Nodes of a key in the JSON Schema, perhaps of the same with the kinds of its tables; none if the key is unknown."""
+    found, nodes = follow(_made(form), kinds or place)
     if found != place:
         return []
     if any({"mean", "sines"} <= node.get("properties", {}).keys() for node in nodes):
-        return _nodes(f"{key}.mean", form)  # a signal, which one value makes constant
+        return _nodes(
+            (*place, "mean"), form, (*kinds, "mean") if kinds else ()
+        )  # a signal, which one value makes constant
     return nodes
 
 
