@@ -38,6 +38,7 @@ class SamplerOf : public Observer<System> {
             std::optional<Piece>& room = pieces_[n_pieces_++];
             Piece& p = room ? *room : room.emplace(s.at);
             p.entry = &s.entry;
+            ++p.entry->readers;
             p.memory = s.memory;
             p.constant = s.constant;
             p.first = next_;
@@ -61,9 +62,12 @@ class SamplerOf : public Observer<System> {
         // Every piece is a chain of steps that wait for one another, so it pays to have several at hand.
         const std::span pieces(pieces_.data(), std::exchange(n_pieces_, 0));
         for (auto& p : pieces) p->cursor.taylor_step(p->rest);
-        for (auto& p : pieces)
-            if (!write(*p)) return false;
-        return true;
+        bool written = true;
+        for (auto& p : pieces) {
+            written = written && write(*p);
+            --p->entry->readers;
+        }
+        return written;
     }
 
  private:

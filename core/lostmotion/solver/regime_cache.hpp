@@ -57,6 +57,7 @@ class RegimeCache {
         bool followed;                           // does the speed of a state follow another?
         typename GuardTable::Values near_event;  // what each guard exceeds where it is far from an event
         Propagator<D> propagator;
+        int readers;  // observers that are still to read the motion along it: its matrices are not given up
         ListOf<D, Entry*, D::guards> neighbour;  // what lies beyond each guard, as far as it is known
         // The regimes that have been tried where a contact comes to rest or to its limit; the last one holds.
         struct Tried {
@@ -91,6 +92,7 @@ class RegimeCache {
             clear(near_event, guards.rows());
             std::copy_n(r.near_event.begin(), n_guards, near_event.begin());
             propagator.reset();
+            readers = 0;
         }
 
         // About what it takes without matrices, of a train of any size.
@@ -199,8 +201,12 @@ class RegimeCache {
             for (std::size_t k = followed_.size(); k-- > 0;) {
                 bytes += followed_[k]->propagator.bytes();
                 if (bytes <= most_bytes || followed_.size() - k <= in_use) continue;
-                for (std::size_t old = 0; old <= k; ++old) followed_[old]->propagator.release();
-                followed_.erase(followed_.begin(), followed_.begin() + static_cast<std::ptrdiff_t>(k) + 1);
+                const auto end = followed_.begin() + static_cast<std::ptrdiff_t>(k) + 1;
+                const auto given_up = std::stable_partition(followed_.begin(), end, [](Entry* old) {
+                    if (old->readers == 0) old->propagator.release();
+                    return old->readers == 0;
+                });
+                followed_.erase(followed_.begin(), given_up);
                 break;
             }
         }
@@ -224,6 +230,7 @@ class RegimeCache {
     // Makes ready for runs with this unit of length and these inputs; propagators for others are forgotten.
     PhaseRotations& serve(double unit, std::vector<InputBasis> basis) {
         if (used_ > max_kept) forget();
+        for (Entry* e : followed_) e->readers = 0;  // of a run that has been broken off
         if (!rotations_ || unit != rotations_->unit() || basis != rotations_->basis()) {
             for (std::size_t k = 0; k < used_; ++k) entry(k).propagator.reset();
             rotations_ = std::make_unique<PhaseRotations>(unit, std::move(basis));
@@ -233,7 +240,7 @@ class RegimeCache {
 
  private:
     static constexpr std::size_t max_kept = 4000;  // from run to run; each of a drive takes about 12 kilobytes
-    // Matrices of trains of any size, and how many regimes observers may still read.
+    // Matrices of trains of any size, and how many regimes keep them whatever they take.
     static constexpr std::size_t most_bytes = std::size_t{256} << 20, in_use = 8;
 
     struct KeyOf {
