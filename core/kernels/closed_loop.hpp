@@ -211,7 +211,7 @@ class ClosedLoopRun {
 template <class Solver, class MakeLoop>
 Status run_recorded(Solver& solver, const StartOf<typename Solver::D>& start, const RunRequest& request,
                     typename Solver::Observer& observer, MakeLoop&& make_loop) {
-    solver.interruption = {request.interrupted, request.interrupted_context};
+    solver.set_interruption({request.interrupted, request.interrupted_context});
     if (!request.control.present()) {
         const Status begun = solver.begin(0.0, start.x, start.memory);
         return begun == Status::done && request.duration > 0.0 ? solver.advance(request.duration, observer) : begun;

@@ -63,7 +63,7 @@ class ShootingOf {
           period_(options.period),
           input_(constants(signals)),
           solver_(system_, signals, unit, workspace.balanced_scale(), &cache_) {
-        solver_.interruption = {options.interrupted, options.interrupted_context};
+        solver_.set_interruption({options.interrupted, options.interrupted_context});
     }
 
     Motion solve(const StartOf<D>& start) {

@@ -56,7 +56,7 @@ class SimulationOf {
     // At the present instant, sines included.
     Inputs inputs() const;
     void restore(const Snapshot& s) { now_ = s; }
-    void set_interrupt(bool (*poll)(void*), void* context) { solver_.interruption = {poll, context}; }
+    void set_interrupt(bool (*poll)(void*), void* context) { solver_.set_interruption({poll, context}); }
 
     // Advances by `interval` [s] with each input running in a straight line from its first to its second value; those
     // that a controller gives are not looked at. On any status but done the state is left as it was.

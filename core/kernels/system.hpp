@@ -140,7 +140,9 @@ class TrainSystem {
     }
 
  private:
-    Found certain(Found found) const { return overflowed_ ? Found::outside : found; }
+    Found certain(Found found) const {
+        return search_.interruption.requested() ? Found::interrupted : overflowed_ ? Found::outside : found;
+    }
     // An instant as the search has it, and what this has changed of it.
     Instant& by_layout(const InstantOf<D>& now) const {
         const Layout& n = assembly_.layout();

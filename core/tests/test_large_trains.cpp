@@ -260,6 +260,20 @@ TEST_CASE(
     CHECK(segments > 10 * share(300));
 }
 
+TEST_CASE("an interruption ends the search of modes itself") {
+    TimedTrain t = chain_of({64, 1, 3});
+    for (int g = 0; g < 63; ++g) t.twists.emplace_back(g, g % 2 == 0 ? 0.01 : -0.01);  // all shafts break away at once
+    const TrainIn<Any> in(t);
+    ExactSolver<System> solver(in.system, in.signals, 1e-3, in.system.balanced_scale());
+    int asked = 0;
+    const auto yes = [](void* count) { return ++*static_cast<int*>(count) > 0; };
+    solver.set_interruption({yes, &asked});
+    CHECK(solver.begin(0.0, in.start, {}) == Status::interrupted);
+    CHECK(asked == 1);
+    solver.set_interruption({});
+    CHECK(solver.begin(0.0, in.start, {}) == Status::done);
+}
+
 TEST_CASE("exact and adaptive solver agree on random trains of 9 to 40 shafts with all elements") {
     RandomTrains random(91);
     SolverTally tally;

@@ -4,7 +4,7 @@
 namespace lostmotion {
 
 // Of the search for the regime that follows at an event.
-enum class Found { yes, inconsistent, outside };
+enum class Found { yes, inconsistent, outside, interrupted };
 
 // Of the searches of a run.
 struct SearchCounts {
@@ -23,8 +23,12 @@ enum class Status {
 };
 
 inline Status status_of(Found found) {
-    if (found == Found::yes) return Status::done;
-    return found == Found::outside ? Status::outside : Status::jammed;
+    switch (found) {
+        case Found::yes: return Status::done;
+        case Found::outside: return Status::outside;
+        case Found::interrupted: return Status::interrupted;
+        default: return Status::jammed;
+    }
 }
 
 }  // namespace lostmotion

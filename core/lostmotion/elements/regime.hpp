@@ -60,6 +60,8 @@ struct GuardOf {
     GuardOf<Other> with(Other other) const {
         return {std::move(other), kind, contact, branch, neighbour, by_grazing, memory, shift, behind};
     }
+    // Its value is known to a rounding of this, however small its terms: that of an angle where a turn ends.
+    double size_at_least() const { return shift < 0.0 ? -2.0 * shift : 2.0 * shift; }
     // Edge of a law or limit of an input, with a neighbour beyond.
     bool is_edge() const { return kind == edge || kind == input_limit; }
     // Says whether a contact goes on in its mode.

@@ -300,13 +300,23 @@ Found SwitchedTrain::locks(Instant& now, const Event& event, const Instant& past
         for (std::size_t set = 1; set < std::size_t{1} << may.size(); ++set) {
             if (static_cast<std::size_t>(std::popcount(set)) != many) continue;
             now = moving;
-            key = from;
             MovedShafts moved{};
-            bool stops = true;
-            for (std::size_t k = 0; k < may.size() && stops; ++k)
-                if ((set >> k & 1) != 0)
-                    stops = stop_with(now, may[k], moved, now.memory[places().gears[may[k]].impact_loss]);
-            if (!stops || find_after(now, moved, after, event.at_rest, past, key) != Found::yes) continue;
+            std::vector<Flags> joined(may.size());
+            Slowed slowed = Slowed::joined;
+            bool goes_on = false;
+            while (slowed == Slowed::joined && !goes_on) {
+                slowed = Slowed::stopped;
+                for (std::size_t k = 0; k < may.size() && slowed != Slowed::impossible; ++k)
+                    if ((set >> k & 1) != 0) slowed = std::max(slowed, slow_down(now, may[k], joined[k], moved));
+                if (slowed == Slowed::impossible) break;
+                const Instant there = now;
+                key = from;
+                goes_on = find_after(now, moved, after, event.at_rest, past, key) == Found::yes;
+                if (!goes_on) now = there;
+            }
+            // With what has joined it need not stop; how fast it goes on then depends on impulses within the meshes.
+            goes_on = goes_on && slowed == Slowed::stopped;
+            if (!goes_on) continue;
             differ = differ || (some && !(key == stopped_key && now.x == stopped.x));
             if (!some) stopped = now, stopped_key = key;
             some = true;
@@ -316,6 +326,18 @@ Found SwitchedTrain::locks(Instant& now, const Event& event, const Instant& past
         if (some) return differ ? Found::inconsistent : Found::yes;
     }
     return Found::inconsistent;
+}
+
+// The contact of the gear that is to be named where no combination of modes is consistent: a given motion drives it
+// against its locking, or it might lock in motion, but the rule above does not apply.
+int SwitchedTrain::jams(const Instant& now, const Event& event, const Key& from) {
+    const auto first = [&](auto&& is) {
+        for (std::size_t g = 0; g < train().gears.size(); ++g)
+            if (train().gears[g].may_lock() && is(g)) return places().gears[g].contact;
+        return nowhere;
+    };
+    const int driven = first([&](std::size_t g) { return given_behind(places(), train(), g) != nowhere; });
+    return driven != nowhere ? driven : first([&](std::size_t g) { return locks_in_motion(now, event, from, g); });
 }
 
 // Is the effective inertia of all that rigid gears tie to the input of a gear negative, while all contacts of limited
@@ -352,31 +374,60 @@ bool SwitchedTrain::locks_in_motion(const Instant& now, const Event& event, cons
     return false;
 }
 
-// Stops the input of a gear and all that rigid gears tie to it. False if that leaves a part of it in motion, or would
-// move others.
-bool SwitchedTrain::stop_with(Instant& now, std::size_t gear, MovedShafts& moved, double& lost) const {
-    const int contact = places().shafts[train().gears[gear].input].contact;
+// Slows the input of a gear down with all that is tied to it, until it stops or a one-way contact takes hold, which has
+// no limit either: what lies behind that has joined it from then on. Impossible if a part of all that could move by
+// itself, or if flanks would approach without a gap.
+auto SwitchedTrain::slow_down(Instant& now, std::size_t gear, Flags& joined, MovedShafts& moved) const -> Slowed {
+    const int input = train().gears[gear].input;
     Key together;
-    for (int c = 0; c < contacts(); ++c)
-        together.modes[c] = places().contacts[c].bilateral || c == contact ? std::int8_t{0} : std::int8_t{1};
+    for (int c = 0; c < contacts(); ++c) {
+        const bool tied = places().contacts[c].bilateral || c == places().shafts[input].contact || joined[c];
+        together.modes[c] = tied ? std::int8_t{0} : std::int8_t{1};
+    }
     const Ties ties = places().ties(together.modes);
     const std::vector<int> part = parts(places(), together);
-    const std::size_t shafts = train().shafts.size();
-    for (std::size_t s = 0; s < shafts; ++s) {
-        if (part[s] != part[train().gears[gear].input]) continue;
-        if (!ties.at_rest[s]) return false;
-        const ShaftPlace& p = places().shafts[s];
-        moved[s] = true;
-        lost += 0.5 * p.inertia * now.x[p.speed] * now.x[p.speed];
-        places().each_coupled_inertia(static_cast<int>(s), [&](int t, double J) {
-            lost += 0.5 * J * now.x[p.speed] * now.x[places().shafts[t].speed];
-        });
+    Instant stopped = now;
+    for (std::size_t s = 0; s < train().shafts.size(); ++s) {
+        if (part[s] != part[input]) continue;
+        if (!ties.at_rest[s]) return Slowed::impossible;
+        stopped.x[places().shafts[s].speed] = 0.0;
     }
-    for (std::size_t s = 0; s < shafts; ++s)
-        if (moved[s]) now.x[places().shafts[s].speed] = 0.0;
-    return std::none_of(places().contacts.begin(), places().contacts.end(), [&](const ContactPlace& p) {
-        return p.one_way && speed_of(static_cast<int>(&p - places().contacts.data()), now) > 0.0;
-    });
+    // The share of its speeds that is left where the first takes hold.
+    double left = 0.0;
+    int first = nowhere;
+    for (int c = 0; c < contacts(); ++c) {
+        const ContactPlace& p = places().contacts[c];
+        if (!p.one_way || joined[c]) continue;
+        const double at_rest = speed_of(c, stopped), share = at_rest / (at_rest - std::fmin(speed_of(c, now), 0.0));
+        if (p.gap.present()) {
+            if (!has_gap(c, now) && approach(c, stopped)) return Slowed::impossible;
+        } else if (at_rest > 0.0 && (first == nowhere || share > left)) {
+            left = share;
+            first = c;
+        }
+    }
+    double& lost = now.memory[places().gears[gear].impact_loss];
+    const auto add_energy = [&](double sign) {
+        for (std::size_t s = 0; s < train().shafts.size(); ++s) {
+            const ShaftPlace& p = places().shafts[s];
+            const double w = now.x[p.speed];
+            if (part[s] != part[input]) continue;
+            lost += sign * 0.5 * p.inertia * w * w;
+            places().each_coupled_inertia(static_cast<int>(s), [&](int t, double J) {
+                lost += sign * 0.5 * J * w * now.x[places().shafts[t].speed];
+            });
+        }
+    };
+    add_energy(+1.0);
+    for (std::size_t s = 0; s < train().shafts.size(); ++s)
+        if (part[s] == part[input]) {
+            now.x[places().shafts[s].speed] *= left;
+            moved[s] = true;
+        }
+    add_energy(-1.0);
+    if (first == nowhere) return Slowed::stopped;
+    joined[first] = true;
+    return Slowed::joined;
 }
 
 }  // namespace lostmotion::model

@@ -32,7 +32,7 @@ bool SwitchedTrain::conditions(Instant now, const Key& modes, const Event& event
         } else if (guard.kind == Guard::speed && event.at_rest[guard.contact] && !r.at_rest[guard.contact])
             out[guard.contact][1] = clear(along.rate(guard.form, 1), along.rate_magnitude(guard.form, 1));
     }
-    return r.solvable;
+    return r.solvable && !interruption();
 }
 
 // The modes that contacts at rest come to along the way from before the event, where their modes were consistent, to

@@ -45,6 +45,7 @@ auto SwitchedTrain::stopped(const Rest& at_rest) const -> const Stopped& {
 
 Found SwitchedTrain::start(Instant& now, Key& key) {
     constexpr double few_roundings = 8.0 * std::numeric_limits<double>::epsilon();
+    jams_at = nowhere;
     key = Key{};
     Event event;
     Rest given_rest{};
@@ -108,12 +109,15 @@ Found SwitchedTrain::start(Instant& now, Key& key) {
             return Found::yes;
         }
     }
-    return find(now, [&] { return before; }, event, key);
+    const Found found = find(now, [&] { return before; }, event, key);
+    if (found == Found::inconsistent) jams_at = jams(now, event, key);
+    return found;
 }
 
 Found SwitchedTrain::next(Instant& now, int fired_number, Key& key, const Inputs& input, const Rest& given_rest) {
     tried_.clear();
     now.reach(assembly_.layout());
+    jams_at = nowhere;
     regimes_.make_room();
     const SparseRegime& old = regimes_[key];
     const Guard* fired = fired_number == nowhere ? nullptr : &old.guards[static_cast<std::size_t>(fired_number)];
@@ -162,9 +166,30 @@ Found SwitchedTrain::next(Instant& now, int fired_number, Key& key, const Inputs
     const bool by_trials =
         event.with_guard && event.kind == Guard::speed && !some_redundant_ && !has_impacts_ && places().driven.empty();
     tried_.clear();
-    const Found found = find(now, past, event, key);
+    Found found = find(now, past, event, key);
     if (!by_trials || found != Found::yes || tried_.empty() || !(tried_.back()->key == key)) tried_.clear();
-    return found == Found::inconsistent ? locks(now, event, past(), key) : found;
+    if (found != Found::inconsistent) return found;
+    if (drop_rounding(old, past(), event)) found = find(now, past, event, key);
+    if (found == Found::inconsistent) found = locks(now, event, past(), key);
+    if (found == Found::inconsistent) jams_at = jams(now, event, key);
+    tried_.clear();
+    return found;
+}
+
+// Torques that are but rounding beside those that their elimination mixes them with are none: a capacity that has
+// fallen to zero cannot hold them. True if there are some.
+bool SwitchedTrain::drop_rounding(const SparseRegime& old, const Instant& past, Event& event) const {
+    double largest = 0.0;
+    for (const auto* forms : {&old.output_torque, &old.contact_torque})
+        for (const LinearForm& form : *forms) largest = std::fmax(largest, magnitude(form, past));
+    bool some = false;
+    for (auto* torques : {&event.gear, &event.coupling})
+        for (double& torque : *torques)
+            if (torque != 0.0 && std::fabs(torque) <= rounding * largest) {
+                torque = 0.0;
+                some = true;
+            }
+    return some;
 }
 
 // A contact whose capacity has been overcome begins to slip that way, from rest: there is nothing to decide as long as
@@ -305,6 +330,15 @@ double SwitchedTrain::torque_change(const SparseRegime& r, const Instant& now, c
     return sum;
 }
 
+// The size of the angle at which a turn ends, the same for the pieces on both sides: what one of them counts as zero
+// must not be clear of zero for the other.
+double SwitchedTrain::size_at_turn(const Guard& guard, const Instant& now) {
+    double angle = 0.0;
+    for (const auto& [k, factor] : guard.form.of_coupled()) angle += std::fabs(factor * now.x.data()[k]);
+    for (const auto& [k, factor] : guard.form.of_angles()) angle += std::fabs(factor * now.x.data()[now.coupled + k]);
+    return 2.0 * angle + guard.size_at_least();
+}
+
 const SwitchedTrain::Guard* SwitchedTrain::first_left(const SparseRegime& r, const Instant& now,
                                                       const std::vector<std::size_t>& ignored, const Event& event,
                                                       Violated& of_contacts) {
@@ -313,7 +347,8 @@ const SwitchedTrain::Guard* SwitchedTrain::first_left(const SparseRegime& r, con
             const Guard& guard = r.guards[g];
             if (guard.behind || is_of_moving(guard, event)) continue;
             if (!ignored.empty() && std::ranges::find(ignored, g) != ignored.end()) continue;
-            const auto [value, size] = sized(guard.form, now);
+            const auto [value, of_terms] = sized(guard.form, now);
+            const double size = guard.shift == 0.0 ? of_terms : size_at_turn(guard, now);
             if (value > clear_of_zero * size + r.near_event[g]) continue;
             if (!use(guard, value, size)) return;
         }
@@ -407,13 +442,21 @@ Found SwitchedTrain::pivot(Instant& now, const Event& event, Key modes, const Ke
         }
         return false;
     };
-    // Where none of these leads on: combinations spread evenly over all, each once.
+    // Where none of these leads on: all at rest stuck but the one that breaks away, or all; then combinations spread
+    // evenly over all, each once.
+    const bool breaks = event.with_guard && event.kind == Guard::capacity;
+    int stuck = breaks ? 0 : 1;
     std::uint64_t drawn = 1;
     std::size_t begun = 0;  // how many had been tried at the last start
     const auto start_again = [&] {
         constexpr std::uint64_t stride = 2654435761u;  // Knuth's prime near the golden section of 2^32
         path.clear();
         begun = tried.size();
+        while (stuck < 2) {
+            numbered_combination(0, event, from, modes);
+            if (stuck++ == 0) modes.modes[event.contact] = static_cast<std::int8_t>(event.neighbour);
+            if (is_new()) return true;
+        }
         constexpr double countable = 0x1p62;
         const double count = combinations(event);
         for (const auto all = static_cast<std::uint64_t>(std::fmin(count, countable)); drawn <= all;) {
@@ -427,7 +470,7 @@ Found SwitchedTrain::pivot(Instant& now, const Event& event, Key modes, const Ke
         }
         return false;
     };
-    while (tried.size() < longest_pivoting) {
+    while (tried.size() < longest_pivoting && !interruption.requested()) {
         now.memory = before;
         std::vector<Violation> violations;
         const Trial trial = settle(now, modes, event, key, {&violations});
@@ -447,6 +490,7 @@ Found SwitchedTrain::pivot(Instant& now, const Event& event, Key modes, const Ke
         std::erase_if(violations, [&](const Violation& v) {
             return !event.at_rest[v.contact] || modes.modes[v.contact] == v.mode;
         });
+        if (violations.empty() && trial.found == Found::inconsistent) violations = of_neighbours(modes, event);
         std::sort(violations.begin(), violations.end(), [](const Violation& a, const Violation& b) {
             return a.order != b.order ? a.order < b.order : a.relative > b.relative;
         });
@@ -465,6 +509,25 @@ Found SwitchedTrain::pivot(Instant& now, const Event& event, Key modes, const Ke
     now.memory = before;
     key = from;
     return worst;
+}
+
+// Where friction that grows with the load makes a limit impossible to follow, others that are tied to the contact at
+// its limit may have come to theirs: the torques between them are then the nearest that hold.
+std::vector<Violation> SwitchedTrain::of_neighbours(const Key& modes, const Event& event) const {
+    Key together;
+    for (int c = 0; c < contacts(); ++c) together.modes[c] = event.at_rest[c] ? std::int8_t{0} : modes.modes[c];
+    const std::vector<int> part = parts(places(), together);
+    Flags at_limit;
+    for (int c = 0; c < contacts(); ++c)
+        if (event.at_rest[c] && modes.modes[c] != 0) at_limit[part[places().contacts[c].a]] = true;
+    std::vector<Violation> out;
+    for (int c = 0; c < contacts(); ++c) {
+        const ContactPlace& p = places().contacts[c];
+        if (p.bilateral || !event.at_rest[c] || modes.modes[c] != 0 || !std::as_const(at_limit)[part[p.a]]) continue;
+        for (const int way : {-1, +1})
+            if (way < 0 || !p.one_way) out.push_back({c, way, n_derivatives, 0.0});
+    }
+    return out;
 }
 
 bool SwitchedTrain::holds_more(const ContactPlace& c) const {

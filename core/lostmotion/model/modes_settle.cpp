@@ -141,6 +141,7 @@ auto SwitchedTrain::settle(Instant& now, const Key& modes, const Event& event, K
                 other.branch[places().gears[g].cell] = static_cast<std::int16_t>(gear.loss_cell(middle, v) ^ half);
                 const Trial again = walk(now, event, other, key);
                 if (again.found == Found::yes) return again;
+                result.turns_back = result.turns_back || again.turns_back;
             }
         }
     }
@@ -156,6 +157,7 @@ auto SwitchedTrain::settle(Instant& now, const Key& modes, const Event& event, K
         locate_losses(now, T_2, other);
         const Trial again = walk(now, event, other, key);
         if (again.found == Found::yes) return again;
+        result.turns_back = result.turns_back || again.turns_back;
     }
     return result;
 }
@@ -228,7 +230,7 @@ auto SwitchedTrain::walk(Instant& now, const Event& event, Key trial, Key& key, 
     for (int step = 0; step < longest_walk; ++step) {
         const SparseRegime& r = regimes_[trial];
         violated.clear();
-        if (!r.solvable) return result;
+        if (!r.solvable || interruption()) return result;
         const Guard* left = first_left(r, now, along, event, violated);
         if (left != nullptr && left->kind == Guard::outside) {
             result.found = Found::outside;

@@ -63,6 +63,16 @@ std::vector<int> parts(const Places& places, const Key& key) {
     return part;
 }
 
+int given_behind(const Places& places, const Train& train, std::size_t gear) {
+    Key key;
+    for (std::size_t c = 0; c < places.contacts.size(); ++c) key.modes[c] = places.contacts[c].bilateral ? 0 : 1;
+    key.modes[places.gears[gear].contact] = 1;
+    const std::vector<int> part = parts(places, key);
+    for (const int s : places.driven)
+        if (part[s] == part[train.gears[gear].output]) return s;
+    return nowhere;
+}
+
 Statics::Statics(const Places& places, const Key& key, const Ties& ties, std::vector<Row>& motion)
     : places_(places), contacts_(places.contacts), layout_(places.layout), key_(key), ties_(ties), motion_(motion) {
     for (const ShaftPlace& s : places.shafts) inertia_.push_back(s.inertia);

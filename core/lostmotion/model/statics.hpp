@@ -13,6 +13,8 @@ namespace lostmotion::model {
 
 // For each shaft: the first shaft of those that contacts at rest and the mass matrix join to it.
 std::vector<int> parts(const Places& places, const Key& key);
+// A shaft of given motion that rigid gears tie to the output of a rigid gear, without that gear itself; or nowhere.
+int given_behind(const Places& places, const Train& train, std::size_t gear);
 
 // What the reactions of stuck contacts are solved from, J being the mass matrix, most often diagonal. Where the shafts
 // of each rigidly tied part have inertias of like size, reactions come first: C J^-1 (F + B lambda) = 0, C being the

@@ -22,6 +22,7 @@
 #include <utility>
 #include <vector>
 
+#include "../base/interruption.hpp"
 #include "../base/status.hpp"
 #include "guards_after.hpp"
 #include "held_torque.hpp"
@@ -82,6 +83,8 @@ class SwitchedTrain {
 
     double few = 27.0;  // up to so many combinations are tried one after the other; more are pivoted
     SearchCounts searches;
+    int jams_at = nowhere;      // the contact of the gear that the last search found to jam, if it knows
+    Interruption interruption;  // once it is requested, nothing that has been found counts
 
  private:
     using Torques = Few<double, 12>;
@@ -168,15 +171,19 @@ class SwitchedTrain {
     bool close(Instant& now, const Impulses& struck, int contact, const Event& event, const Instant& past,
                const Key& from, Key& key);
     Found locks(Instant& now, const Event& event, const Instant& past, Key& key);
+    int jams(const Instant& now, const Event& event, const Key& from);
     bool locks_in_motion(const Instant& now, const Event& event, const Key& from, std::size_t gear);
-    bool stop_with(Instant& now, std::size_t gear, MovedShafts& moved, double& lost) const;
+    enum class Slowed { stopped, joined, impossible };
+    Slowed slow_down(Instant& now, std::size_t gear, Flags& joined, MovedShafts& moved) const;
 
     Found enumerate(Instant& now, const Event& event, const Key& from, Key& key);
+    std::vector<Violation> of_neighbours(const Key& modes, const Event& event) const;
     Found pivot(Instant& now, const Event& event, Key modes, const Key& from, Key& key);
     Trial settle(Instant& now, const Key& modes, const Event& event, Key& key, Violated violated = {});
     bool settle_on_corner(Instant& now, const Event& event, const Key& trial, Key& key);
     Found settle_at_limit(Instant& now, const Key& modes, const Event& event, Key& key);
     Trial walk(Instant& now, const Event& event, Key trial, Key& key, Violated violated = {});
+    bool drop_rounding(const SparseRegime& old, const Instant& past, Event& event) const;
     bool breaks_away(Instant& now, const Event& event, double margin_size, double near, Key& key);
     void note(const Trial& trial);
     void locate(const Instant& now, const Key& from, Key& trial) const;
@@ -200,6 +207,7 @@ class SwitchedTrain {
 
     const Guard* first_left(const SparseRegime& r, const Instant& now, const std::vector<std::size_t>& ignored,
                             const Event& event, Violated& of_contacts);
+    static double size_at_turn(const Guard& guard, const Instant& now);
     // Is a guard the speed of a contact that moves, whose mode was chosen by that speed, or the end that it is about to
     // strike?
     static bool is_of_moving(const Guard& g, const Event& event) {

@@ -111,6 +111,7 @@ class AdaptiveSolver {
     AdaptiveSolver& operator=(const AdaptiveSolver&) = delete;
 
     Interruption interruption;
+    void set_interruption(const Interruption& i) { interruption = system_.search().interruption = i; }
 
     double time() const { return time_; }
     const State& state() const { return now_.x; }
@@ -118,7 +119,10 @@ class AdaptiveSolver {
     const Regime& regime() { return cache_.regime(key_); }
     const LinearRatesOf<D>& linear_rates() { return cache_.entry(key_).rates; }
     const std::vector<InputBasis>& basis() const { return basis_; }
-    Contact stopped_at() const { return stopped_at_; }
+    Contact stopped_at() const {
+        const int jams = jams_at(system_);
+        return jams < 0 ? stopped_at_ : jams;
+    }
     long steps() const { return steps_; }
     std::size_t switchings() const { return switchings_; }
 
@@ -352,7 +356,8 @@ class AdaptiveSolver {
             return evaluate<D>(guard.form, x, now_.memory, input_at(t, x));
         };
         // A solution of finite accuracy may tremble about a guard that the exact one only approaches.
-        double noise = rounding * magnitude<D>(guard.form, dense.x, now_.memory, input_at(dense.begin, dense.x));
+        double noise = rounding * std::fmax(guard.size_at_least(), magnitude<D>(guard.form, dense.x, now_.memory,
+                                                                                input_at(dense.begin, dense.x)));
         each_state_of<D>(guard.form, [&](int k, double c) { noise += noise_factor * std::fabs(c) * scale_[k]; });
         // The speed of the twist is a small difference, and each of its zeros sets the hysteresis anew: one that the
         // error of the solution may make is none.

@@ -181,7 +181,9 @@ inline auto ExactSolver<System>::judge(Entry& e, const Memory& memory, const Cur
         const double near = t >= 0 ? grazing_[t] : 0.0;
         const bool grazes = t >= 0 && course_.twist[t].off_zero && low - error <= near && c.c3 > near;
         if (low > error && !grazes) return true;
-        const double magnitude = e.guards.magnitude_of(g, memory_magnitudes, state_magnitudes, cursor.input());
+        const double magnitude =
+            std::fmax(e.guards.magnitude_of(g, memory_magnitudes, state_magnitudes, cursor.input()),
+                      e.regime->guards[static_cast<std::size_t>(g)].size_at_least());
         const auto of_rate = rate_multiple(e, cursor, g);
         const double resolution = of_rate.factor != 0.0
                                       ? std::fabs(of_rate.factor) * twist_speed_rounding(e, of_rate.twist, cursor)

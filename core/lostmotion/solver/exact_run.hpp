@@ -64,6 +64,8 @@ class ExactSolver {
     ExactSolver& operator=(const ExactSolver&) = delete;
 
     Interruption interruption;
+    // Of the search of modes, too.
+    void set_interruption(const Interruption& i) { interruption = system_.search().interruption = i; }
 
     double time() const { return time_; }
     const State& state() const { return now_.x; }
@@ -75,7 +77,11 @@ class ExactSolver {
     Cache& cache() { return cache_; }
     const std::vector<InputBasis>& basis() const { return rotations_.basis(); }
     double unit() const { return unit_; }
-    Contact stopped_at() const { return stopped_at_; }
+    // What the last switching was of, or what jams.
+    Contact stopped_at() const {
+        const int jams = jams_at(system_);
+        return jams < 0 ? stopped_at_ : jams;
+    }
     long event_checks() const { return event_checks_; }
     std::size_t switchings() const { return switchings_; }
 
@@ -360,7 +366,12 @@ Status ExactSolver<System>::change_regime(const Guard* fired, Observer& observer
     else
         course_.forget();
     ++switchings_;
-    return accumulation_.add(time_, unit_, [this]() -> auto& { return linear_rates(); });
+    const Status crowded = accumulation_.add(time_, unit_, [this]() -> auto& { return linear_rates(); });
+    if (crowded != Status::zeno || !accumulation_.may_begin_anew()) return crowded;
+    // Speeds that have come to nothing in ever shorter times are at rest for a run that begins here.
+    course_ = {};
+    course_.input = now_.input[0];
+    return status_of(system_.start(now_, key_));
 }
 
 }  // namespace lostmotion

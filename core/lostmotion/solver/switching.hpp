@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <utility>
 
 #include "../base/status.hpp"
 #include "../kernel/flow.hpp"
@@ -48,6 +49,15 @@ void see_inputs(const System& system, const InputState<D>& input, double time, I
 template <class Regime>
 bool follows_inputs(const Regime& r) {
     return !r.drivers.empty();
+}
+
+// What the search of modes has found to jam, if the system has one; else negative.
+template <class System>
+int jams_at(const System& system) {
+    if constexpr (requires { system.search(); })
+        return system.search().jams_at;
+    else
+        return -1;
 }
 
 // Completes a switching with what there is after it, and shows it.
@@ -136,6 +146,7 @@ class Accumulation {
     template <class Rates>
     Status add(double time, double unit, Rates&& rates) {
         const double resolved = span * std::fmax(std::fabs(time), unit);
+        if (time - since_ > resolved) anew_ = false;
         if (count_ == 0 || time - since_ > resolved) {
             count_ = 0;
             since_ = time;
@@ -144,10 +155,17 @@ class Accumulation {
         return resolved * rates().fastest() > 1.0 ? Status::outside : Status::zeno;
     }
 
+    // Once at each accumulation.
+    bool may_begin_anew() {
+        count_ = 0;
+        return !std::exchange(anew_, true);
+    }
+
  private:
     static constexpr int max_count = 100;
     static constexpr double span = 1e4 * std::numeric_limits<double>::epsilon();
     int count_ = 0;
+    bool anew_ = false;
     double since_ = 0.0;
 };
 

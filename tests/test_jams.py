@@ -1,0 +1,282 @@
+"""Where rigid friction has no motion, and where a search for it must not fail: the cases that random trains found."""
+
+from __future__ import annotations
+
+import cmath
+import itertools
+import math
+import os
+from typing import Any
+
+import numpy as np
+import pytest
+
+import lostmotion as lm
+from locking_trains import locking_train
+
+# Of the random cases, this share is tried; `LOSTMOTION_CASES=1` tries all.
+SHARE = float(os.environ.get("LOSTMOTION_CASES", "0.05"))
+
+
+def at_end(result: Any, name: str) -> float:
+    return float(result[name].values[-1])
+
+
+# --- a stop that takes others along ---
+
+
+def flywheel(inertia: float, stiffness: float | None) -> lm.Scenario:
+    """A worm that locks as its motor reverses; a flywheel behind a freewheel, which it has left behind, catches up then."""
+    mesh = {"kind": "rigid"} if stiffness is None else {"kind": "linear", "stiffness": stiffness}
+    damping = {} if stiffness is None else {"mesh_damping": 0.2 * math.sqrt(stiffness)}
+    return lm.Scenario(
+        shafts={
+            "flywheel": {"inertia": inertia},
+            "worm": {"inertia": 1e-4},
+            "drum": {"inertia": 2.0, "torque": {"mean": 5.0, "steps": [{"time": 0.1, "height": -25.0}]}},
+        },
+        motors={
+            "drive": {"shaft": "worm", "kind": "torque_source", "rotor_inertia": 0.0},
+            "slow": {"shaft": "flywheel", "kind": "torque_source", "rotor_inertia": 0.0},
+        },
+        freewheels={"free": {"input": "flywheel", "output": "worm"}},
+        gears={
+            "gear": {
+                "input": "worm",
+                "output": "drum",
+                "ratio": 50.0,
+                "stiffness": mesh,
+                "losses": {"kind": "mesh_efficiency", "drive_efficiency": 0.4, "backdrive_efficiency": -0.3},
+                **damping,
+            }
+        },
+        command={
+            "drive": {"mean": 0.5, "steps": [{"time": 0.1, "height": -0.5}]},
+            "slow": {"mean": 50.0 * inertia, "steps": [{"time": 0.1, "height": -50.0 * inertia}]},
+        },
+        simulation={"duration": 0.11, "sample_interval": 1e-3},
+    )
+
+
+def test_a_gear_that_locks_stops_the_flywheel_behind_its_freewheel_too() -> None:
+    """|eta_b| J_2/i^2 = 2.4e-4 kg m^2 is more than the worm has with this flywheel."""
+    inertia, speed = 1e-5, 50.0 * 0.1
+    worm = (0.5 - 5.0 / (50.0 * 0.4)) / (1e-4 + 2.0 / (2500.0 * 0.4)) * 0.1
+    assert worm > 2.0 * speed
+    rigid = lm.simulate(flywheel(inertia, None))
+    assert at_end(rigid, "worm_speed") == at_end(rigid, "drum_speed") == at_end(rigid, "flywheel_speed") == 0.0
+    energy = lm.energy_of(rigid)
+    lost = 0.5 * (1e-4 + 2.0 / 2500.0) * worm**2 + 0.5 * inertia * speed**2
+    assert energy["gear: impacts"] == pytest.approx(lost, rel=1e-9)
+    assert abs(energy["residual"]) < 1e-12 * energy["turned_over"]
+    # The limit of ever stiffer meshes.
+    soft = [lm.simulate(flywheel(inertia, k)) for k in (1e7, 1e9)]
+    off = [abs(at_end(s, "drum_angle") - at_end(rigid, "drum_angle")) for s in soft]
+    assert abs(at_end(soft[1], "flywheel_speed")) < 1e-6
+    assert off[1] < min(5e-3 * at_end(rigid, "drum_angle"), 0.3 * off[0])
+
+
+def test_a_gear_that_a_flywheel_keeps_from_locking_is_refused_by_name() -> None:
+    """With 1e-3 kg m^2 more all of it goes on, at a speed that the impulses in the meshes decide."""
+    with pytest.raises(lm.SolverError, match=r"'gear'.*'worm'.*'drum'.* t = 0.100000 s: the friction jams.*compliance"):
+        lm.simulate(flywheel(1e-3, None))
+
+
+# --- a given motion against a gear that locks itself ---
+
+
+def against(stiffness: float | None) -> lm.Scenario:
+    mesh = {"kind": "rigid"} if stiffness is None else {"kind": "linear", "stiffness": stiffness}
+    return lm.Scenario(
+        shafts={"worm": {"inertia": 0.001}, "table": {"speed": {"amplitude": 0.02, "frequency": 0.5}}},
+        gears={
+            "gear": {
+                "input": "worm",
+                "output": "table",
+                "ratio": 9.0,
+                "stiffness": mesh,
+                "losses": {"kind": "mesh_efficiency", "drive_efficiency": 0.7, "backdrive_efficiency": -0.3},
+            }
+        },
+        simulation={"duration": 0.5, "sample_interval": 0.01},
+    )
+
+
+def test_a_given_motion_that_drives_a_self_locking_gear_by_its_output_is_refused_with_the_remedy() -> None:
+    with pytest.raises(lm.SolverError) as error:
+        lm.simulate(against(None))
+    for said in ("'gear'", "'worm'", "'table'", "t = 0.000000 s", "stiffness"):
+        assert said in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_with_a_stiffness_that_motion_winds_the_gear_up() -> None:
+    """The worm holds, so that the torque is the stiffness times the given angle."""
+    result = lm.simulate(against(1e4))
+    t = result["time"].values
+    angle = 0.02 * (1.0 - np.cos(math.pi * t)) / math.pi
+    assert np.all(result["worm_speed"].values == 0.0)
+    np.testing.assert_allclose(np.abs(result["gear_output_torque"].values), 1e4 * angle, rtol=1e-9, atol=1e-9)
+
+
+# --- the search itself ---
+
+
+def test_two_torques_over_one_angle_are_their_sum() -> None:
+    """The shaft turns back near the angle 0, where both laws begin a turn: their sum is one sine."""
+    laws = {"a": (0.03, 0.0), "b": (0.1, -2.0)}
+    sum_of = sum(a * cmath.exp(1j * p) for a, p in laws.values())
+    common: dict[str, Any] = {
+        "shafts": {"rotor": {"inertia": 0.0, "friction_torque": 0.02}},
+        "motors": {
+            "m": {
+                "shaft": "rotor",
+                "kind": "dc",
+                "rotor_inertia": 0.04,
+                "rated_torque": 1.0,
+                "rated_speed": 100.0,
+                "armature_voltage_constant": 13.0,
+                "electrical_time_constant": 0.00056,
+            }
+        },
+        "command": {"m": {"amplitude": 0.7, "frequency": 9.0, "phase": 2.0}},
+        "simulation": {"duration": 0.1, "sample_interval": 0.001},
+    }
+    two = {name: {"shaft": "rotor", "kind": "sine", "amplitude": a, "phase": p} for name, (a, p) in laws.items()}
+    one = {"c": {"shaft": "rotor", "kind": "sine", "amplitude": abs(sum_of), "phase": cmath.phase(sum_of)}}
+    first, second = (lm.simulate(lm.Scenario(**common, angle_torques=t)) for t in (two, one))
+    speed = second["rotor_speed"].values
+    np.testing.assert_allclose(first["rotor_speed"].values, speed, rtol=0.0, atol=1e-4 * np.abs(speed).max())
+    assert abs(lm.energy_of(first)["residual"]) < 1e-10 * lm.energy_of(first)["turned_over"]
+
+
+def test_a_torque_between_shafts_at_rest_ends_with_the_capacity_that_holds_it() -> None:
+    """The load on a self-locking gear passes through zero while its shaft rests: what that shaft holds of another does so too."""
+
+    def scenario(**closing: Any) -> lm.Scenario:
+        spring = {"kind": "linear", "stiffness": 1e5}
+        locks = {"kind": "mesh_efficiency", "drive_efficiency": 0.8, "backdrive_efficiency": -0.1}
+        constant = {"kind": "constant_efficiency", "efficiency": 0.68}
+        return lm.Scenario(
+            shafts={"a": {"inertia": 0.2}, "b": {"inertia": 0.3}, "c": {}, "d": {"friction_torque": 0.2}},
+            motors={
+                "m": {
+                    "shaft": "d",
+                    "kind": "dc",
+                    "rotor_inertia": 0.001,
+                    "rated_torque": 1.0,
+                    "rated_speed": 100.0,
+                    "armature_voltage_constant": 10.0,
+                    "electrical_time_constant": 0.005,
+                }
+            },
+            command={"m": 0.9},
+            gears={
+                "x1": {"input": "a", "output": "b", "ratio": 2.0, "stiffness": spring, "losses": locks},
+                "x2": {
+                    "input": "b",
+                    "output": "c",
+                    "ratio": 90.0,
+                    "stiffness": {"kind": "curve", "backlash": 0.0005, "slopes": [4396.306451040023]},
+                },
+                "x3": {
+                    "input": "c",
+                    "output": "d",
+                    "ratio": 2.0,
+                    "stiffness": {"kind": "curve", "backlash": 0.001, "slopes": [147921.0279792854]},
+                },
+                "closing": {"input": "a", "output": "d", "ratio": 0.6, "losses": constant, **closing},
+            },
+            mass_matrices={
+                "j": {
+                    "shafts": ["c", "d"],
+                    "matrix": [
+                        [0.014768608594581978, 0.0003421195468940676],
+                        [0.0003421195468940676, 0.0011858531666905168],
+                    ],
+                }
+            },
+            simulation={"duration": 0.7, "sample_interval": 0.001},
+        )
+
+    result = lm.simulate(scenario())
+    rests = result["a_speed"].values == 0.0
+    mesh, other = (result[f"{name}_output_torque"].values[rests] for name in ("x1", "closing"))
+    assert (mesh > 0.01).any() and (mesh < -0.01).any()
+    held, bounds = -other / (0.6 * 0.68), np.sort([-0.1 * mesh / 2.0, mesh / 0.8 / 2.0], axis=0)
+    assert np.all((bounds[0] - 1e-11 <= held) & (held <= bounds[1] + 1e-11))
+    # The limit of ever stiffer meshes.
+    off = []
+    for k in (1e6, 1e8):
+        soft = lm.simulate(scenario(stiffness={"kind": "linear", "stiffness": k}, mesh_damping=0.05 * math.sqrt(k)))
+        off.append(float(abs(soft["b_speed"] - result["b_speed"]).max() / abs(result["b_speed"]).max()))
+    assert off[1] < min(2e-3, 0.03 * off[0])
+
+
+def test_samples_of_a_large_train_are_right_though_matrices_are_given_up_between_them() -> None:
+    """Stick-slip of 40 shafts: hundreds of regimes lie between two samples, and the matrices of all take more memory than is kept."""
+    names = [f"s{k}" for k in range(40)]
+
+    def run(interval: float) -> Any:
+        load = {"friction_torque": 0.1, "viscous_friction": 0.5, "inertia": 1e-3}
+        return lm.simulate(
+            lm.Scenario(
+                shafts={
+                    s: {**load, "torque": {"amplitude": 0.3, "frequency": 1.0 + 0.137 * k, "phase": 0.7 * k}}
+                    for k, s in enumerate(names)
+                },
+                gears={
+                    f"g{k}": {"input": a, "output": b, "ratio": 1.0, "stiffness": {"kind": "linear", "stiffness": 1.0}}
+                    for k, (a, b) in enumerate(itertools.pairwise(names))
+                },
+                simulation={"duration": 1.0, "sample_interval": interval},
+            )
+        )
+
+    coarse, fine = run(0.5), run(0.05)
+    assert coarse.attrs["switching_count"] > 400
+    for name in names:
+        np.testing.assert_allclose(
+            coarse[f"{name}_speed"].values, fine[f"{name}_speed"].values[::10], rtol=0.0, atol=1e-9
+        )
+
+
+# --- random trains with gears that lock themselves ---
+
+
+def run_locking(number: int, stiffness: float | None = None) -> Any:
+    tables = locking_train(1, number, stiffness)
+    return lm.simulate(lm.Scenario(**{key: table for key, table in tables.items() if table}))
+
+
+def test_random_trains_with_gears_that_lock_themselves_have_a_motion() -> None:
+    for number in range(int(700 * SHARE)):
+        energy = lm.energy_of(run_locking(number))
+        assert abs(energy["residual"]) <= 1e-9 * energy["turned_over"], number
+
+
+def test_speeds_that_come_to_nothing_in_ever_shorter_times_are_at_rest() -> None:
+    """Three shafts lock, slip on a clutch and lock again, at one instant: the limit of ever stiffer meshes goes on from rest."""
+    rigid = run_locking(318)
+    speeds = {name: rigid[name].values for name in rigid.data_vars if str(name).endswith("_speed")}
+    assert len(speeds) == 5
+    for stiffness, share in ((1e7, 2e-3), (1e9, 3e-4)):
+        soft = run_locking(318, stiffness)
+        for name, speed in speeds.items():
+            # Angles, since the teeth of a stiff mesh still rattle.
+            angle = np.cumsum(speed)
+            assert np.abs(np.cumsum(soft[name].values) - angle).max() < share * np.abs(angle).max()
+
+
+@pytest.mark.parametrize("number", [130, 280])
+def test_wedged_gears_rest_where_ever_stiffer_meshes_come_to_rest(number: int) -> None:
+    """The torques between shafts at rest change to the nearest that hold as an input jumps."""
+    assert all(
+        np.all(v.values == 0.0) for name, v in run_locking(number).data_vars.items() if str(name).endswith("_speed")
+    )
+    turned = []
+    for stiffness in (1e5, 1e7, 1e9):
+        soft = run_locking(number, stiffness)
+        turned.append(max(abs(v.values).sum() * 0.005 for n, v in soft.data_vars.items() if str(n).endswith("_speed")))
+    assert turned[2] < 1e-5
+    assert turned[2] < 0.2 * turned[1] < 0.04 * turned[0]
