@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import random
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,16 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
+from fuzz.random_trains import train as fuzz_train
+from lostmotion.identification.identify import identify_logs
+from lostmotion.identification.logs import Log
+from lostmotion.identification.monitor import monitor_logs
+from lostmotion.identification.prepare import Prepared, prepared
+from lostmotion.identification.rig import Rig
+from lostmotion.identification.task import Identification
+from lostmotion.identification.virtual import virtual_log
+from lostmotion.inputs.toml_text import toml_text
+from lostmotion.live_page.description import describe
 from lostmotion.studies.table import read_table
 from test_random_axes import random_axis
 
@@ -35,7 +46,8 @@ def stepped(scenario: lm.Scenario, _: Path) -> None:
 
 
 def stepped_together(scenario: lm.Scenario, _: Path) -> None:
-    lm.SimulationBatch(scenario, step=1e-3, count=2).step(0.1)
+    batch = lm.SimulationBatch(scenario, step=1e-3, count=2)
+    batch.step(**dict.fromkeys(batch.inputs, 0.1))
 
 
 def studied(scenario: lm.Scenario, path: Path) -> None:
@@ -46,6 +58,62 @@ def studied(scenario: lm.Scenario, path: Path) -> None:
         keep={"largest": f"peak({scenario.variables()[0].name})"},
     )
     lm.study(what, path / "study", threads=1)
+
+
+def judged(scenario: lm.Scenario, path: Path) -> None:
+    vary = {"key": next(inertias(scenario)), "relative": True, "values": [1.0, 1.01]}
+    keep = {"largest": f"peak({scenario.variables()[0].name})"}
+    what = lm.studies.Study(scenario=scenario, vary=[vary], keep=keep, select={"objectives": {"largest": "least"}})
+    lm.study(what, path / "study", threads=1)
+
+
+def rig_of(scenario: lm.Scenario, path: Path, **more: Any) -> tuple[Rig, list[Prepared]]:
+    """A rig whose first inertia is sought, and logs of its last speed."""
+    long = scenario.long()
+    (path / "rig.toml").write_text(toml_text(scenario.model_dump(exclude_none=True, mode="json")))
+    key = next(inertias(long))
+    value = lm.simulation.sensitivities.value_at(long, key)
+    start = {"start": 1.02 * value, "min": 0.5 * value, "max": 2.0 * value}
+    speed = long.train().speed_of(list(long.train().shafts)[-1])
+    task = Identification(
+        scenario="rig.toml",
+        logs={"files": ["*.csv"]},
+        measured={"speed": {"channel": "speed", "variable": speed}},
+        set={key: "J"},
+        parameters={"J": start},
+        fit={"iterations": 1},
+        **more,
+    )
+    rig = Rig(task, path)
+    time = np.linspace(0.0, scenario.simulation.duration, 12)
+    logs = [virtual_log(rig, Log(f"{k}", time, {}, {"hours": float(k)}), {"J": value}) for k in range(5)]
+    return rig, [prepared(task, log, rig.units) for log in logs]
+
+
+def identified(scenario: lm.Scenario, path: Path) -> None:
+    rig, logs = rig_of(scenario, path)
+    identify_logs(rig, logs[:1], threads=1)
+
+
+def monitored(scenario: lm.Scenario, path: Path) -> None:
+    monitor_logs(*rig_of(scenario, path, monitor={"baseline": 5, "order": "hours", "watch": {"J": {}}}))
+
+
+def exported(scenario: lm.Scenario, path: Path) -> None:
+    library = path / "x86_64-linux" / "all.so"  # of which nothing is run
+    library.parent.mkdir()
+    library.write_bytes(b"")
+    lm.export_fmu(scenario, path / "x.fmu", libraries=path)
+
+
+def measured(scenario: lm.Scenario, _: Path) -> None:
+    for gear in scenario.train().gears.values():
+        measure_once(gear)
+
+
+@cache
+def measure_once(gear: lm.Gear) -> None:
+    lm.test_rig.measure(gear)
 
 
 def attached(scenario: lm.Scenario, path: Path) -> None:
@@ -71,15 +139,30 @@ FUNCTIONS: dict[str, Callable[[lm.Scenario, Path], Any]] = {
     "write_drive": lambda s, path: lm.mujoco.write_drive(s, path / "x.drive"),
     "rigid_constants": lambda s, _: lm.response.rigid_constants(s),
     "reduce": lambda s, _: lm.mujoco.reduce(s, 0.5, 1.0),
-    "frequency_response": lambda s, _: lm.frequency_response(s, [2.0], 0.2),
+    "frequency_response": lambda s, _: lm.frequency_response(s, [2.0], 0.2, max_periods=5),
+    "select": judged,
+    "commission": lambda s, _: lm.commission(s),
+    "hunting_certificate": lambda s, _: lm.hunting_certificate(s),
+    "limit_cycle": lambda s, _: lm.servo.limit_cycle(s, causes=False),
+    "identify": identified,
+    "monitor": monitored,
+    "export_fmu": exported,
+    "live": lambda s, _: describe(s, "x"),
+    "measure": measured,
     "pointing_budget": lambda s, _: lm.pointing_budget(s, after=0.0, robustness=False),
 }
 
 
-def refusals(scenario: lm.Scenario, path: Path) -> list[str]:
+QUICK = {name: FUNCTIONS[name] for name in FUNCTIONS.keys() - {"commission", "live", "export_fmu", "monitor"}}
+"""those that take less than some seconds; pages, FMUs and servo sheets of shipped scenarios are tested by themselves"""
+QUICKEST = {name: QUICK[name] for name in QUICK.keys() - {"limit_cycle", "sensitivities"}}
+"""those that take no long runs to rest, nor derivatives through many switchings"""
+
+
+def refusals(scenario: lm.Scenario, path: Path, functions: Mapping[str, Any] = QUICK) -> list[str]:
     """Messages of the functions that refuse a scenario by its form."""
     found = []
-    for name, function in FUNCTIONS.items():
+    for name, function in functions.items():
         (path / name).mkdir()
         try:
             function(scenario, path / name)
@@ -100,20 +183,13 @@ def brief(name: str) -> lm.Scenario:
 def test_no_function_refuses_a_shipped_scenario_by_its_form(name: str, tmp_path: Path) -> None:
     (tmp_path / "own").mkdir()
     scenario = brief(name)
-    assert refusals(scenario, tmp_path / "own") == []
+    assert refusals(scenario, tmp_path / "own", FUNCTIONS if name == "ball-screw-axis" else QUICK) == []
     if (long := scenario.long()) != scenario:
         (tmp_path / "long").mkdir()
-        assert refusals(long, tmp_path / "long") == []
+        assert refusals(long, tmp_path / "long", QUICKEST) == []
         own, other = lm.simulate(scenario), lm.simulate(long)
         for shaft in ("motor", "load"):
             assert np.array_equal(own[f"{shaft}_speed"], other[f"{shaft}_speed"])
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_no_function_refuses_a_random_axis_by_its_form(seed: int, tmp_path: Path) -> None:
-    scenario = random_axis(seed)
-    times = {"simulation.duration": 0.01, "simulation.sample_interval": 0.001}
-    assert refusals(scenario.replace(**times), tmp_path) == []
 
 
 def random_gear(seed: int) -> dict[str, Any]:
@@ -133,12 +209,108 @@ def random_gear(seed: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def short_drive(r: random.Random) -> dict[str, Any]:
+    """A motor, a gearbox and a load, under a command, a sampled or a continuous controller."""
+    tables = lm.load(r.choice(["position-axis", "speed-axis", "paper-2dof-nl-small", "catalogue-robot-joint"]))
+    made = tables.replace(**{"load.inertia": tables.load.inertia * r.uniform(0.8, 1.3), "task": {}}).model_dump()
+    if made["controller"] is None and r.random() < 0.5:
+        del made["command"], made["task"]
+        made["controller"] = {"kind": "continuous", "reference": {"kind": "speed", "mean": 0.1}, "speed": {"gain": 0.5}}
+    return made
+
+
+def axis_table(r: random.Random) -> dict[str, Any]:
+    """An axis with gearbox, brake and payload or without, tilted or not, under a process force and a command or a controller."""
+    kind = r.choice(["screw", "rack", "belt"])
+    axis: dict[str, Any] = {
+        "motor": {"kind": "torque_source", "rotor_inertia": 2e-4, "rated_torque": 3.0},
+        kind: {"lead" if kind == "screw" else "travel_per_turn": r.uniform(0.005, 0.1), "efficiency": r.uniform(0.6, 0.95)},
+        "slide": {"mass": r.uniform(2.0, 40.0), "friction_force": r.choice([0.0, 20.0]), "inclination": r.choice([0.0, 0.3, 1.57])},
+    }  # fmt: skip
+    if r.random() < 0.7:
+        axis[kind] |= {"stiffness": 10.0 ** r.uniform(6.0, 7.5), "backlash": r.choice([0.0, 2e-5]), "damping": 1e3}
+    if r.random() < 0.5:
+        axis["gearbox"] = {"ratio": r.choice([3.0, -5.0]), "inertia": 1e-5}
+    if r.random() < 0.5:
+        axis["brake"] = {"torque": 5.0, "command": 0.0}
+    if r.random() < 0.5:
+        axis["payload"] = {"mass": r.uniform(1.0, 10.0)}
+    if r.random() < 0.5:
+        axis["slide"]["force"] = {"mean": -30.0}
+    if r.random() < 0.5:
+        axis["slide"]["end_stops"] = {"lower": -0.2, "upper": 0.2, "stiffness": 1e6}
+    made = {"axis": axis, "simulation": {"duration": 0.05, "sample_interval": 0.005}}
+    if r.random() < 0.5:
+        reference = {"kind": "position", "speed": 0.2, "acceleration": 2.0, "moves": [{"to": 0.005}]}
+        loops = {"sample_time": 5e-4, "position": {"gain": 20.0}, "speed": {"gain": 0.05, "integral_time": 0.05}}
+        return made | {"controller": {"encoder": {"bits": 20}, "reference": reference, **loops}}
+    return made | {"command": {"mean": 0.3, "amplitude": 0.2, "frequency": 5.0}}
+
+
+def train_of_couplings(r: random.Random) -> dict[str, Any]:
+    """Two motors that turn a drum by a limiter, a ratchet, a freewheel, a clutch or a damper each, with end stops and a brake."""
+    shafts: dict[str, Any] = {"drum": {"inertia": 0.2, "friction_torque": 0.1, "torque": {"mean": -1.0}}}
+    made: dict[str, Any] = {"shafts": shafts, "motors": {}, "command": {}, "gears": {}}
+    joints: list[tuple[str, dict[str, Any]]] = [
+        ("torque_limiters", {"release_torque": 3.0, "slip_torque": 1.0}),
+        ("ratchets", {"teeth": 12}),
+        ("freewheels", {}),
+        ("clutches", {"torque": 5.0, "kind": "friction"}),
+        ("dampers", {"viscous_friction": 0.3}),
+    ]
+    for k, (table, joint) in enumerate(r.sample(joints, 2)):
+        shafts |= {f"rotor_{k}": {}, f"middle_{k}": {"inertia": 0.01}}
+        made["motors"][f"m_{k}"] = {
+            "shaft": f"rotor_{k}",
+            "kind": "torque_source",
+            "rated_torque": 1.0,
+            "rotor_inertia": 1e-3,
+        }
+        made["gears"][f"g_{k}"] = {"input": f"rotor_{k}", "output": f"middle_{k}", "ratio": r.choice([5.0, -7.0])}
+        made.setdefault(table, {})[f"c_{k}"] = {"input": f"middle_{k}", "output": "drum", **joint}
+        made["command"] |= {f"m_{k}": r.uniform(-1.0, 1.0)} | ({f"c_{k}": 1.0} if table == "clutches" else {})
+    if r.random() < 0.5:
+        shafts["drum"]["end_stops"] = {"lower": -0.5, "upper": 0.5, "stiffness": 1e4}
+    if r.random() < 0.5:
+        made["brakes"] = {"b": {"shaft": "drum", "torque": 0.5}}
+        made["command"]["b"] = 0.5
+    return made | {"simulation": {"duration": 0.05, "sample_interval": 0.005}}
+
+
+def random_scenario(seed: int) -> lm.Scenario:
+    """A scenario of one of five kinds."""
+    r = random.Random(f"form {seed}")
+    kinds: list[Callable[[], dict[str, Any]]] = [
+        lambda: short_drive(r),
+        lambda: axis_table(r),
+        lambda: train_of_couplings(r),
+        lambda: random_axis(seed).model_dump(),
+        lambda: fuzz_train(r),
+    ]
+    scenario = lm.Scenario(**kinds[seed % 5]())
+    times = {"simulation.duration": 0.01, "simulation.sample_interval": 0.001}
+    return scenario.replace(**times)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_no_function_refuses_a_random_scenario_by_its_form(seed: int, tmp_path: Path) -> None:
+    scenario = random_scenario(seed)
+    assert refusals(scenario, tmp_path, FUNCTIONS if seed < 5 else QUICKEST) == []
+    long = lm.Scenario.of(scenario.tables)  # as it is in the long form
+    if long != scenario or long.form != scenario.form:
+        (tmp_path / "long").mkdir()
+        assert refusals(long, tmp_path / "long", QUICKEST) == []
+        own, other = lm.simulate(scenario), lm.simulate(long)
+        for shaft in long.train().shafts:
+            speed = scenario.train().speed_of(shaft), long.train().speed_of(shaft)
+            assert np.array_equal(own[speed[0]], other[speed[1]])
+
+
 @pytest.mark.parametrize("seed", range(20))
-def test_a_train_of_one_gear_moves_to_the_last_bit_as_the_drive_that_it_is(seed: int, tmp_path: Path) -> None:
+def test_a_train_of_one_gear_moves_to_the_last_bit_as_the_drive_that_it_is(seed: int) -> None:
     from lostmotion.simulation.one_gear import as_drive
 
     scenario = lm.Scenario(**random_gear(seed))
-    assert refusals(scenario, tmp_path) == []
     drive, train = lm.simulate(as_drive(scenario, "test")), lm.simulate(scenario)
     assert np.array_equal(drive["load_speed"], train["b_speed"])
     assert np.array_equal(drive["twist"], train["g_twist"])
