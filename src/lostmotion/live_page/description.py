@@ -43,7 +43,7 @@ def describe(scenario: Scenario, name: str) -> dict[str, Any]:
     core = {
         "numbers": _packed(numbers),
         "with_gap": None
-        if closed is None
+        if closed is None or closed in dict(values)
         else {"key": closed, "numbers": _packed(described(scenario.replace(**{closed: USUAL_BACKLASH}))[0])},
         "inputs": [_signal(signal, scenario.simulation.duration) for _, signal in _inputs(scenario)],
         "references": [reference_view(c.reference, scenario.simulation.duration) for c in scenario.axes().values()],
@@ -118,7 +118,7 @@ def _sliders(scenario: Scenario, values: list[tuple[str, float]], closed: str | 
         views |= {f"{key}.ratio": ["gears", k, "ratio"], f"{key}.stiffness.backlash": ["gears", k, "backlash"]}
         views |= {f"{key}.backlash": ["gears", k, "backlash"]}
     if closed is not None:
-        values = [*values, (closed, 0.0)]
+        values = [*(pair for pair in values if pair[0] != closed), (closed, 0.0)]
         usual[closed] = USUAL_BACKLASH
     for key, _ in values:
         if key.endswith("friction_torque") or (key.startswith("slides.") and key.endswith("friction_force")):
