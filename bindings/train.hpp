@@ -424,9 +424,7 @@ inline void bind_train(nb::module_& m) {
         "lead_angle"_a, "friction_angle"_a);
     m.attr("USUAL_ERROR") = usual_error;
     m.def("harmonic", [](const Record& fields) { return made_by(described<HarmonicLaw>(fields)); }, "fields"_a);
-    m.def(
-        "quadratic_drag", [](const Record& fields) { return made_by(described<QuadraticDrag>(fields)); },
-        "fields"_a);
+    m.def("quadratic_drag", [](const Record& fields) { return made_by(described<QuadraticDrag>(fields)); }, "fields"_a);
     m.def(
         "dry_friction",
         [](const Record& fields) {
