@@ -283,9 +283,9 @@ def test_help_imports_next_to_nothing(tmp_path: Path) -> None:
 MAY_IMPORT = {
     "run paper-2dof-nl-small": set(),
     "run paper-2dof-nl-small --explain 0.5": set(),
-    "run position-axis": set(),
+    "run position-axis": {"scipy"},  # for the poles of its loops
     "run catalogue-robot-joint --set load.inertia=2": set(),
-    "run direction-finder --solver dormand-prince --set simulation.duration=0.1": set(),
+    "run direction-finder --solver dormand-prince --set simulation.duration=0.1": {"scipy"},
     "run paper-2dof-nl-small -o run.csv": DATASETS,
     "run paper-2dof-nl-small -o run.parquet": DATASETS,
     "run paper-2dof-nl-small -o run.nc": DATASETS | NETCDF,

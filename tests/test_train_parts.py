@@ -98,9 +98,9 @@ def test_speeds_are_shown_in_terms_of_the_last_shaft_of_their_own_part() -> None
     from lostmotion.reports.plots import overview
 
     figure = overview(lm.simulate(lm.load("direction-finder", {"simulation.duration": 0.02})))
-    shown = {a.get_ylabel(): [line.get_label() for line in a.get_lines()] for a in figure.axes}
+    shown = {a.get_title(): [line.get_label() for line in a.get_lines()] for a in figure.axes}
     for axis in ("traverse", "elevation"):
-        assert shown[f"speed at {axis} [rad/s]"] == [f"{axis}_motor / 100", axis]
+        assert shown[f"Speed of {axis}"] == [f"{axis}_motor / 100", axis]
 
 
 def test_bits_do_not_depend_on_whether_parts_run_side_by_side(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -121,7 +121,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "as_filter": (lm.control.as_filter, {"system": scipy.signal.dlti([1.0], [1.0, -0.5], dt=1e-3)}),
     "as_state_space": (lm.control.as_state_space, {"system": scipy.signal.lti([1.0], [1.0, 1.0])}),
     "limit_cycle": (lm.servo.limit_cycle, {"scenario": HUNTING, "motor": None, "causes": False}),
-    "hunting_certificate": (lm.hunting_certificate, {"scenario": RESTING, "largest_error": 0.1}),
+    "hunting_certificate": (lm.hunting_certificate, {"scenario": RESTING, "motor": None, "largest_error": 0.1}),
     "hunting_map": (lm.servo.hunting_map, {"scenario": HUNTING, "grid": {"shafts.table.inertia": [0.8]}, "variable": None, "threads": 1, "progress": dangle}),
     "pointing_budget": (lm.pointing_budget, {"scenario": TRACKING, "after": 0.0, "view": None, "robustness": False, "progress": dangle}),
     "first_task": (lm.identification.first_task, {"directory": "none", "home": "", "rig": "", "progress": dangle}),
@@ -179,7 +179,7 @@ if mujoco is not None:
         "attach": (lm.mujoco.attach, {"model": ROBOT, "drives": {"elbow": SCENARIO}, "controllers": None, "replace": True, "substeps": None}),
         "from_mjcf": (lm.mujoco.from_mjcf, {"model": ROBOT, "joint": "elbow", "ratio": 100.0}),
         "load_plugin": (lm.mujoco.load_plugin, {}),
-        "write_drive": (lm.mujoco.write_drive, {"drive": SCENARIO, "path": "elbow.drive", "controller": None}),
+        "write_drive": (lm.mujoco.write_drive, {"drive": SCENARIO, "path": "elbow.drive", "controller": None, "replace": False}),
         "reduce": (lm.mujoco.reduce, {"drive": SCENARIO, "amplitude": 0.5, "frequency": 1.0, "load_torque": 0.0}),
     }  # fmt: skip
 SLOW = {

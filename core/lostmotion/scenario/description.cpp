@@ -63,7 +63,7 @@ std::string ParameterRange::refuses(double v) const {
 namespace {
 
 // As Python has it, also far out.
-SineCosine turned(double angle) {
+SineCosine sine_cosine_at(double angle) {
     constexpr double farthest = 0x1p42, turn = 2.0 * std::numbers::pi;
     if (!std::isfinite(angle)) return {std::nan(""), std::nan("")};
     return sine_cosine(std::fabs(angle) < farthest ? angle : std::fmod(angle, turn));
@@ -84,8 +84,8 @@ std::optional<std::vector<double>> Derivation::values(std::span<const double> pa
             case Formula::product: v.push_back(v[k] * v[n]); break;
             case Formula::quotient: v.push_back(v[k] / v[n]); break;
             case Formula::root: v.push_back(std::sqrt(v[k])); break;
-            case Formula::sine: v.push_back(turned(v[k]).sin); break;
-            case Formula::cosine: v.push_back(turned(v[k]).cos); break;
+            case Formula::sine: v.push_back(sine_cosine_at(v[k]).sin); break;
+            case Formula::cosine: v.push_back(sine_cosine_at(v[k]).cos); break;
             case Formula::arctangent: v.push_back(arctangent(v[k], 1.0)); break;
             case Formula::cube_root: v.push_back(cube_root(v[k])); break;
             case Formula::worm_driving: v.push_back(model::MeshEfficiency::worm(v[k], v[n]).driving()); break;
