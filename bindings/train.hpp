@@ -181,7 +181,7 @@ class TrainDescription : public model::TrainDescription {
             names.push_back(train.shafts[static_cast<std::size_t>(s)].name);
         return names;
     }
-    // Of the states those that move: a kernel may have a place for others.
+    // The states that move; a kernel may have a place for others, which are constant.
     std::vector<std::string> moving_states() const {
         const model::Assembly a(train);
         const std::vector<std::string> states = model::state_names(a);

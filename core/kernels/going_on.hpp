@@ -80,8 +80,8 @@ bool goes_as_before(SwitchedTrain& search, Regimes& regimes, InstantOf<D>& now, 
                     Key& key) {
     auto& from = regimes.entry(key);
     const auto g = static_cast<int>(&fired - from.regime->guards.data());
-    const auto known = std::ranges::find(from.tried, g, [](const auto& t) { return t.guard; });
-    if (known == from.tried.end() || known->regimes.empty()) return false;
+    const auto* known = from.tried_after(g);
+    if (known == nullptr || known->regimes.empty()) return false;
     const bool comes_to_rest = fired.kind == GuardKinds::speed;
     if (!comes_to_rest && magnitude<D>(fired.form, now.x, now.memory, now.input_magnitudes) <= from.near_event[g])
         return false;
@@ -122,16 +122,16 @@ bool goes_as_before(SwitchedTrain& search, Regimes& regimes, InstantOf<D>& now, 
     key = known->regimes.back()->regime->key;
     return true;
 }
-// What the search has tried, so that it need not be done again: where an event comes for the second time, since most
-// come once.
+// Keeps the regimes that the search has tried, for the next event of this kind. Most events come once, so it waits for
+// the second.
 template <class D, class Regimes>
 void remember(const SwitchedTrain& search, Regimes& regimes, const SparseRegime::Guard& fired, const Key& before) {
     constexpr std::size_t most = 9;
     if (search.tried().empty() || search.tried().size() > most) return;
     auto& from = regimes.entry(before);
     const auto g = static_cast<int>(&fired - from.regime->guards.data());
-    const auto known = std::ranges::find(from.tried, g, [](const auto& t) { return t.guard; });
-    if (known == from.tried.end()) {
+    auto* known = from.tried_after(g);
+    if (known == nullptr) {
         from.tried.push_back({g, {}});
         return;
     }

@@ -163,16 +163,12 @@ Found SwitchedTrain::next(Instant& now, int fired_number, Key& key, const Inputs
         out.input[0] = left;
         return out;
     };
-    const bool by_trials =
-        event.with_guard && event.kind == Guard::speed && !some_redundant_ && !has_impacts_ && places().driven.empty();
-    tried_.clear();
     Found found = find(now, past, event, key);
-    if (!by_trials || found != Found::yes || tried_.empty() || !(tried_.back()->key == key)) tried_.clear();
+    if (!by_trials_ || found != Found::yes) tried_.clear();
     if (found != Found::inconsistent) return found;
     if (drop_rounding(old, past(), event)) found = find(now, past, event, key);
     if (found == Found::inconsistent) found = locks(now, event, past(), key);
     if (found == Found::inconsistent) jams_at = jams(now, event, key);
-    tried_.clear();
     return found;
 }
 

@@ -1,4 +1,4 @@
-// What a law of the core made a curve of: scenario files and descriptions have these numbers in place of its points.
+// The numbers of the law that a curve was made by: scenario files and descriptions have these in place of its points.
 #pragma once
 
 #include <vector>

@@ -48,7 +48,7 @@ struct Derivation {
         int one = 0, other = 0;  // formulas before this one, or the number of a parameter
         double value = 0.0;      // of a constant
     };
-    // What the formulas hold for: the comparison of two of them turns out so.
+    // The formulas hold as long as the comparison of two of them turns out so.
     struct Condition {
         enum Comparison { less, at_most, equal } comparison = less;
         int one = 0, other = 0;

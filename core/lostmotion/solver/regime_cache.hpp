@@ -65,6 +65,11 @@ class RegimeCache {
             std::vector<Entry*> regimes;
         };
         std::vector<Tried> tried;
+        // What has been tried after a guard; nullptr if nothing is known of it.
+        Tried* tried_after(int guard) {
+            const auto known = std::ranges::find(tried, guard, &Tried::guard);
+            return known == tried.end() ? nullptr : &*known;
+        }
 
         void set(const System& system, const Key& key) {
             regime = system.build(key);
