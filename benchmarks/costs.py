@@ -17,12 +17,7 @@ from lostmotion import _core
 from lostmotion.simulation.core_runs import core_case
 
 CORES = os.cpu_count() or 1
-PLANE = {
-    "speeds": [0.0, 10.0],
-    "loads": [0.0, 10.0],
-    "values": [[0.02, 0.42], [0.62, 1.02]],
-    "mirrored": True,
-}
+PLANE = {"speeds": [0.0, 10.0], "loads": [0.0, 10.0], "values": [[0.02, 0.42], [0.62, 1.02]], "mirrored": True}
 
 
 def section(report: Report, scenario: lm.Scenario, build: Path, programs: dict[str, list[list[str]]]) -> None:

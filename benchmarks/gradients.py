@@ -12,12 +12,7 @@ import lostmotion as lm
 from lostmotion import _core
 from lostmotion.control.axis import Bound
 from lostmotion.simulation.core_runs import core_case
-from lostmotion.simulation.sensitivities import (
-    core_variation,
-    neighbours,
-    run_cases,
-    sensitive_case,
-)
+from lostmotion.simulation.sensitivities import core_variation, neighbours, run_cases, sensitive_case
 
 KEYS = (
     "shafts.rotor.inertia",

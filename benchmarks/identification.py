@@ -41,12 +41,9 @@ MOST = 4000  # points that CMA-ES may try
 def plan(k: int) -> Log:
     """The k-th of moves of several kinds, weights, lengths and gains: twelve rigs."""
     t = np.arange(0.0, 3.5, 0.01)
-    goal = (
-        np.sin(4.0 * t),
-        np.sin(1.5 * t**2),
-        1.2 * np.minimum(1.5 * t, 1.0),
-        0.8 * np.sign(np.sin(5.0 * t + 0.1)),
-    )[k % 4]
+    goal = (np.sin(4.0 * t), np.sin(1.5 * t**2), 1.2 * np.minimum(1.5 * t, 1.0), 0.8 * np.sign(np.sin(5.0 * t + 0.1)))[
+        k % 4
+    ]
     header = {"mass": (0.5, 1.0)[k % 2], "arm_mass": 0.1, "length": (0.1, 0.15)[k // 2 % 2], "vin": 15.0}
     channels = {
         "goal_position": goal,

@@ -106,10 +106,7 @@ QUOTES = (
     Quote(
         "docs/live.md",
         "The page is one file of {} to {} kB.",
-        lambda r: (
-            min(r.column("Live page", "page [kB]").values()),
-            max(r.column("Live page", "page [kB]").values()),
-        ),
+        lambda r: (min(r.column("Live page", "page [kB]").values()), max(r.column("Live page", "page [kB]").values())),
     ),
 )
 

@@ -63,12 +63,7 @@ def axis(*, torque_source: bool = False) -> lm.Scenario:
         "encoder": {"ideal": True},
         "shaft": "motor",
         "reference": {"kind": "speed", "steps": [{"time": 0.02, "height": SPEED}]},
-        "speed": {
-            "gain": GAIN,
-            "integral_gain": INTEGRAL,
-            "torque_limit": TORQUE,
-            "estimate": {"kind": "exact"},
-        },
+        "speed": {"gain": GAIN, "integral_gain": INTEGRAL, "torque_limit": TORQUE, "estimate": {"kind": "exact"}},
     }
     if not torque_source:
         controller["current"] = {"kind": "field_oriented"}

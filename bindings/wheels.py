@@ -32,10 +32,7 @@ MODULE = [HERE / f"{name}.cpp" for name in ("module", "described", "elementary")
 LIBRARIES = ROOT / "src" / "lostmotion" / "fmu_libraries"
 PAGES = [ROOT / "src" / "lostmotion" / name for name in ("live_page/page.html", "reports/report.js")]
 # The builds of the core, as in CMakeLists.txt: the processors they are for.
-BUILDS = {
-    "x86_64": {"any": "baseline", "avx2": "x86_64+avx2"},
-    "aarch64": {"any": "baseline"},
-}
+BUILDS = {"x86_64": {"any": "baseline", "avx2": "x86_64+avx2"}, "aarch64": {"any": "baseline"}}
 # Headers of the limited API leave stdio.h out.
 NANOBIND_FLAGS = ("-DNDEBUG", "-include", "stdio.h", "-fno-strict-aliasing", "-fno-stack-protector")
 

@@ -90,12 +90,7 @@ def tables_in(node: dict[str, Any], schema: dict[str, Any]) -> list[Mapping[str,
 def write_table(
     title: str, table: Mapping[str, Any], schema: dict[str, Any], lines: list[str], done: set[str], heading: str = ""
 ) -> None:
-    lines += [
-        f"## `{heading}`" if heading else "## The whole file",
-        "",
-        purpose_of(table),
-        "",
-    ]
+    lines += [f"## `{heading}`" if heading else "## The whole file", "", purpose_of(table), ""]
     lines += ["| key | unit | range | default | meaning |", "|---|---|---|---|---|"]
     later = []
     for key, node in table["properties"].items():

@@ -18,8 +18,7 @@ CYCLE = 20.0  # s: one second of acceleration, 4 s of rest, one of braking, and 
 def scenario() -> lm.Scenario:
     """A flywheel on the motor `maxon-ec-i-52-606793` with field orientation, sped up and braked with 0.7 N·m."""
     base = lm.load(
-        "step-to-standstill",
-        {"motor.from": "maxon-ec-i-52-606793", "motor.kind": "torque_source", "command": 0.0},
+        "step-to-standstill", {"motor.from": "maxon-ec-i-52-606793", "motor.kind": "torque_source", "command": 0.0}
     )
     sine = lm.load("step-to-standstill", {"motor.from": "maxon-ec-i-52-606793", "motor.kind": "synchronous"}).motor
     limits = base.motor.limits.model_copy(update={"resistance": None, "torque_constant": None})

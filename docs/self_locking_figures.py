@@ -25,8 +25,7 @@ def histories(out: Path) -> None:
     base = lm.load("worm-lowering")
     hung = {"simulation.duration": 0.6, "simulation.sample_interval": 1e-4}
     holding = base.replace(
-        **hung,
-        **{"command.motor.steps": (), "shafts.drum.torque.steps": [{"height": 20.0, "time": 0.1}]},
+        **hung, **{"command.motor.steps": (), "shafts.drum.torque.steps": [{"height": 20.0, "time": 0.1}]}
     )
     runs = {
         "holding: the load doubles at 0.1 s, motor off": holding,

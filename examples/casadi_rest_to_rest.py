@@ -16,10 +16,7 @@ ANGLE, DURATION, INTERVALS, DEGREE = 0.5, 0.4, 40, 3  # [rad], [s], commands, co
 
 DRIVE = lm.Scenario(
     title="A torque motor, a compliant gearbox and a table",
-    shafts={
-        "rotor": {"friction_torque": 0.1},
-        "table": {"inertia": 0.5, "viscous_friction": 1.0},
-    },
+    shafts={"rotor": {"friction_torque": 0.1}, "table": {"inertia": 0.5, "viscous_friction": 1.0}},
     motors={"motor": {"shaft": "rotor", "kind": "torque_source", "rotor_inertia": 1e-4, "rated_torque": 1.0}},
     gears={
         "gearbox": {"input": "rotor", "output": "table", "ratio": 50.0, "stiffness": {"kind": "curve", "slopes": [5e3]}}

@@ -87,11 +87,7 @@ def motor_torques(t: float) -> np.ndarray:
 
 
 def reference(
-    step: float,
-    end: float,
-    stiffness: float,
-    gap: float = 0.0,
-    torques: Callable[[float], np.ndarray] = motor_torques,
+    step: float, end: float, stiffness: float, gap: float = 0.0, torques: Callable[[float], np.ndarray] = motor_torques
 ) -> np.ndarray:
     """Angles of the joints, by DOP853 from switching to switching, with motor torques held over each step."""
 

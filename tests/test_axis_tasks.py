@@ -46,12 +46,7 @@ GEARBOX: dict[str, Any] = {
     "stiffness": {"kind": "linear", "stiffness": 2e4},
     "losses": {"kind": "constant_efficiency", "efficiency": 0.8},
 }
-REFERENCE = {
-    "kind": "position",
-    "speed": 1.0,
-    "acceleration": 5.0,
-    "moves": [{"to": 1.2, "dwell": 0.6}, {"to": 0.0}],
-}
+REFERENCE = {"kind": "position", "speed": 1.0, "acceleration": 5.0, "moves": [{"to": 1.2, "dwell": 0.6}, {"to": 0.0}]}
 ARM: dict[str, Any] = {
     "task": {"cycle": "4 s", "gravity": {"mass": 2.0, "radius": 0.5}, "hold_without_power": False},
     "load": {"inertia": 0.8, "friction_torque": 0.2},

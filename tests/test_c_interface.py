@@ -310,12 +310,7 @@ def test_clutches_freewheels_and_torques_over_an_angle_have_the_bits_of_python(l
 
 
 class Motion(c.Structure):
-    _fields_ = [
-        ("shaft", c.c_char_p),
-        ("position", c.c_double),
-        ("speed", c.c_double),
-        ("acceleration", c.c_double),
-    ]
+    _fields_ = [("shaft", c.c_char_p), ("position", c.c_double), ("speed", c.c_double), ("acceleration", c.c_double)]
 
 
 def test_a_given_motion_has_the_bits_of_python(library: c.CDLL) -> None:

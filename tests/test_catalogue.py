@@ -231,12 +231,7 @@ def test_command_line(tmp_path: Path):
     out = tmp_path / "sheet"
     done = run(app, ["rig", str(template), "-o", str(out)])
     assert done.exit_code == 0, done.output
-    assert {p.name for p in out.iterdir()} == {
-        "rig.html",
-        "rig.csv",
-        "comparison.csv",
-        "efficiency.csv",
-    }
+    assert {p.name for p in out.iterdir()} == {"rig.html", "rig.csv", "comparison.csv", "efficiency.csv"}
     page = (out / "rig.html").read_text()
     assert "back-driving torque" in page
     assert "ask the manufacturer" in page

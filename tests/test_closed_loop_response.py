@@ -186,9 +186,7 @@ def test_a_law_of_ones_own_has_a_response() -> None:
     scenario = lm.Scenario(
         shafts={"motor": {}},
         motors={"m": {"shaft": "motor", "kind": "torque_source", "rotor_inertia": J, "rated_torque": 1.0}},
-        controllers={
-            "m": {"sample_time": T, "law": True, "reference": {"kind": "speed"}, "encoder": {"ideal": True}},
-        },
+        controllers={"m": {"sample_time": T, "law": True, "reference": {"kind": "speed"}, "encoder": {"ideal": True}}},
         simulation={"duration": 0.1, "sample_interval": 1e-3},
     )
 

@@ -95,10 +95,7 @@ def test_a_file_in_the_long_form_gives_the_train_in_si(file: Path) -> None:
             "shafts.table.inertia=2 kg",
             'key shafts.table.inertia: "2 kg" has the unit of something else (kg); it must be a value in kg*m^2, such as "1 kg*m^2"',
         ),
-        (
-            "gears.belt.housing=tble",
-            'key gears.belt.housing: "tble" is no shaft; did you mean table?',
-        ),
+        ("gears.belt.housing=tble", 'key gears.belt.housing: "tble" is no shaft; did you mean table?'),
         (
             "gears.belt.housing=worm",
             "key gears.belt: has its housing on shaft 'worm', which it joins as well; give the housing a shaft of its own",

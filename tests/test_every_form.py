@@ -52,11 +52,7 @@ def stepped_together(scenario: lm.Scenario, _: Path) -> None:
 
 def studied(scenario: lm.Scenario, path: Path) -> None:
     vary = {"key": next(inertias(scenario)), "relative": True, "values": [1.0, 1.01]}
-    what = lm.studies.Study(
-        scenario=scenario,
-        vary=[vary],
-        keep={"largest": f"peak({scenario.variables()[0].name})"},
-    )
+    what = lm.studies.Study(scenario=scenario, vary=[vary], keep={"largest": f"peak({scenario.variables()[0].name})"})
     lm.study(what, path / "study", threads=1)
 
 

@@ -85,8 +85,7 @@ def test_the_environment_is_the_drive_with_and_without_gymnasium(
     heights = np.diff(clipped, prepend=0.0).tolist()
     steps: list[dict[str, Any]] = [{"height": h, "time": k * module.STEP} for k, h in enumerate(heights)]
     scenario = lm.load("paper-2dof-nl-large").replace(
-        command={"steps": steps},
-        simulation={"duration": module.STEPS * module.STEP, "sample_interval": module.STEP},
+        command={"steps": steps}, simulation={"duration": module.STEPS * module.STEP, "sample_interval": module.STEP}
     )
     run = lm.simulate(scenario, energy=False)["load_angle"].to_numpy()[1:]
     assert np.array(angles) == pytest.approx(run, abs=1e-9)

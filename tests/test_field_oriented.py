@@ -77,12 +77,7 @@ def scenario(a: Axis, ticks: int, **controller: Any) -> lm.Scenario:
             "viscous_friction": a.friction,
             "torque": {"mean": a.load_torque[0][1], "steps": steps},
         },
-        initial={
-            "motor_speed": a.x[1],
-            "load_speed": a.x[3],
-            "load_angle": a.x[2],
-            "twist": a.x[0] / a.ratio - a.x[2],
-        },
+        initial={"motor_speed": a.x[1], "load_speed": a.x[3], "load_angle": a.x[2], "twist": a.x[0] / a.ratio - a.x[2]},
         simulation={"duration": ticks * a.tick, "sample_interval": a.tick},
     )
 

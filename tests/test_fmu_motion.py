@@ -26,12 +26,7 @@ def crank() -> lm.Scenario:
     return lm.Scenario(
         shafts={"crank": {"inertia": J}, "load": {"inertia": 2.0}},
         gears={
-            "g": {
-                "input": "crank",
-                "output": "load",
-                "ratio": 1.0,
-                "stiffness": {"kind": "linear", "stiffness": K},
-            }
+            "g": {"input": "crank", "output": "load", "ratio": 1.0, "stiffness": {"kind": "linear", "stiffness": K}}
         },
         simulation={"duration": 2.0, "sample_interval": 0.01},
     )

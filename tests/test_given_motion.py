@@ -346,10 +346,7 @@ def random_train(seed: int) -> lm.Scenario:
     if free and draw.random() < 0.5:
         shafts[draw.choice(free)]["torque"] = {"amplitude": draw.uniform(0.5, 4.0), "frequency": draw.uniform(0.3, 2.0)}
     return lm.Scenario(
-        shafts=shafts,
-        gears=gears,
-        clutches=clutches,
-        simulation={"duration": 1.5, "sample_interval": 0.01},
+        shafts=shafts, gears=gears, clutches=clutches, simulation={"duration": 1.5, "sample_interval": 0.01}
     )
 
 

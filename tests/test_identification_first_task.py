@@ -146,10 +146,7 @@ def test_a_length_is_that_of_a_slide_and_an_angle_that_of_a_shaft(tmp_path: Path
     (tmp_path / "a.csv").write_text(f"time [s],pos [mm],theta [deg],torque [N*m]\n{rows}\n")
     text = lm.identification.first_task(tmp_path, rig=tmp_path / "rig.toml")
     measured = tomllib.loads(text)["measured"]
-    assert {m["channel"]: m["variable"] for m in measured.values()} == {
-        "pos": "slide_position",
-        "theta": "motor_angle",
-    }
+    assert {m["channel"]: m["variable"] for m in measured.values()} == {"pos": "slide_position", "theta": "motor_angle"}
     assert "Doubt: it is in" not in text
 
 

@@ -223,10 +223,7 @@ def ros2_message(stamp: int, position: float) -> bytes:
 def as_ros_mcap(path: Path, ros: int) -> None:
     mcap = pytest.importorskip("mcap.writer")
     begin = 1_700_000_000_000_000_000
-    encoding, definition, name = [
-        ("ros1", ROS1, "servo_msgs/Joint"),
-        ("cdr", ROS2, "servo_msgs/msg/Joint"),
-    ][ros - 1]
+    encoding, definition, name = [("ros1", ROS1, "servo_msgs/Joint"), ("cdr", ROS2, "servo_msgs/msg/Joint")][ros - 1]
     message = [ros1_message, ros2_message][ros - 1]
     with path.open("wb") as stream:
         writer = mcap.Writer(stream)
@@ -523,10 +520,7 @@ SCREENED: dict[str, tuple[Log, str]] = {
         log_of(position=changed(ANGLE, slice(5, 195, 10), 9.0)),
         "residuals of 19 glitches of position, the first at 0.05 s",
     ),
-    "repeated time": (
-        log_of(changed(TIME, 50, TIME[49])),
-        "dropped 1 sample with the time stamp of the sample before",
-    ),
+    "repeated time": (log_of(changed(TIME, 50, TIME[49])), "dropped 1 sample with the time stamp of the sample before"),
     "time goes back": (log_of(changed(TIME, 50, 0.2)), "dropped 1 sample whose time goes back"),
     "time is not a number": (log_of(changed(TIME, 50, np.nan)), "dropped 1 sample without a time"),
     "coarse clock": (

@@ -299,11 +299,7 @@ def self_locking_chain(draw: np.random.Generator) -> tuple[lm.Scenario, float, f
                 "output": f"s{k + 1}",
                 "ratio": ratio[k],
                 "stiffness": {"kind": "rigid"},
-                "losses": {
-                    "kind": "mesh_efficiency",
-                    "drive_efficiency": drive[k],
-                    "backdrive_efficiency": back[k],
-                },
+                "losses": {"kind": "mesh_efficiency", "drive_efficiency": drive[k], "backdrive_efficiency": back[k]},
             }
             for k in range(n)
         },

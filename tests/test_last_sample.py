@@ -19,11 +19,7 @@ END = 2.449489743  # a lift of 3 m with 1 m/s^2
 WINCH: dict[str, Any] = {
     "shafts": {"drum": {"inertia": 0.8125, "friction_torque": 1300.0}},
     "slides": {
-        "load": {
-            "mass": 250.0,
-            "inclination": math.pi / 2.0,
-            "speed": {"ramps": [{"rise": END, "duration": END}]},
-        }
+        "load": {"mass": 250.0, "inclination": math.pi / 2.0, "speed": {"ramps": [{"rise": END, "duration": END}]}}
     },
     "racks": {"rope": {"input": "drum", "output": "load", "travel_per_turn": 0.4 * math.pi}},
     "simulation": {"duration": END, "sample_interval": 0.01},

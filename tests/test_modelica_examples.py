@@ -281,10 +281,7 @@ def test_simple_gear_shift() -> None:
         gears={"planetary": {"input": "engine", "output": "load", "housing": "ring", "ratio": 2.5}},
         clutches={"clutch": {"input": "engine", "output": "ring", "torque": 100.0}},
         brakes={"brake": {"shaft": "ring", "torque": 100.0}},
-        command={
-            "clutch": engaging,
-            "brake": {"mean": 1.0, "ramps": [{"rise": -1.0, "begin": 2.0, "duration": 0.1}]},
-        },
+        command={"clutch": engaging, "brake": {"mean": 1.0, "ramps": [{"rise": -1.0, "begin": 2.0, "duration": 0.1}]}},
         simulation=simulation(5.0),
     )
 
@@ -336,11 +333,7 @@ def coupled_clutches(peak: float) -> tuple[lm.Scenario, Hybrid]:
         initial={"speeds": {"j1": 10.0}},
         simulation=simulation(1.5),
     )
-    engaged = (
-        lambda t: max(0.0, math.cos(0.4 * math.pi * t)),
-        lambda t: float(t >= 0.4),
-        lambda t: float(t >= 0.9),
-    )
+    engaged = (lambda t: max(0.0, math.cos(0.4 * math.pi * t)), lambda t: float(t >= 0.4), lambda t: float(t >= 0.9))
 
     def torque(t: float, y: Vector) -> Vector:
         return np.array([10.0 * math.sin(10.0 * math.pi * t), 0.0, 0.0, 0.0])
@@ -431,11 +424,7 @@ def test_one_way_clutch() -> None:
         },
         clutches={"clutch": {"input": "input", "output": "output", "torque": 1.5, "breakaway_torque": 37.5}},
         freewheels={"freewheel": {"input": "input", "output": "output"}},
-        command={
-            "clutch": {
-                "steps": [{"height": h, "time": t} for h, t in ((1.0, 0.3), (-1.0, 0.95), (1.0, 1.6))],
-            }
-        },
+        command={"clutch": {"steps": [{"height": h, "time": t} for h, t in ((1.0, 0.3), (-1.0, 0.95), (1.0, 1.6))]}},
         initial={"speeds": {"input": -0.5}},
         simulation=simulation(2.0),
     )

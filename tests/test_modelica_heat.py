@@ -263,10 +263,7 @@ def loss_map(loads: int, speeds: int) -> dict[str, Any]:
 
 def heat_losses(loads: int, speeds: int) -> lm.Scenario:
     shafts: dict[str, Any] = {f"inertia{k}": {"inertia": J} for k in range(1, 7)} | {"gear_output": {}}
-    shafts["inertia1"] |= {
-        "viscous_friction": 10.0,
-        "torque": {"amplitude": 20.0, "frequency": 5.0, "phase": math.pi},
-    }
+    shafts["inertia1"] |= {"viscous_friction": 10.0, "torque": {"amplitude": 20.0, "frequency": 5.0, "phase": math.pi}}
     shafts["inertia3"] |= {"friction_torque": 1.0}
     rigid = {"ratio": RATIO, "stiffness": {"kind": "rigid"}, "rated_input_speed": 1.0, "rated_output_torque": 60.0}
     spring = {"ratio": 1.0, "stiffness": {"kind": "linear", "stiffness": SPRING}}

@@ -47,10 +47,7 @@ TASK: dict[str, Any] = {
     "logs": {"files": ["logs/*.csv"]},
     "inputs": {"drive_command": {"channel": "torque", "interpolation": "hold"}},
     "measured": {"motor": {"channel": "motor", "variable": "motor_angle", "resolution": STEP, "deviation": 1.02e-4}},
-    "set": {
-        "gears.mesh.stiffness.backlash": "backlash",
-        "shafts.motor.friction_torque": "friction",
-    },
+    "set": {"gears.mesh.stiffness.backlash": "backlash", "shafts.motor.friction_torque": "friction"},
     "parameters": {
         "backlash": {"start": 0.58e-3, "min": 1e-5, "max": 5e-3, "unit": "mrad"},
         "friction": {"start": 0.0085, "max": 0.05, "unit": "N*m"},

@@ -279,8 +279,7 @@ def test_the_start_up_transient_is_left_out_and_said_so() -> None:
 
 
 @pytest.mark.parametrize(
-    ("times", "end"),
-    [([], 0.0), ([0.1, 0.2, 0.8], 0.2), ([0.1, 0.55, 0.9, 1.5, 4.0], 1.5), ([0.6, 0.7], 0.0)],
+    ("times", "end"), [([], 0.0), ([0.1, 0.2, 0.8], 0.2), ([0.1, 0.55, 0.9, 1.5, 4.0], 1.5), ([0.6, 0.7], 0.0)]
 )
 def test_a_transient_ends_before_the_first_gap_as_long_as_itself(times: list[float], end: float) -> None:
     """With at least 0.5 s of quiet."""

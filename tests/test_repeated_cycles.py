@@ -39,8 +39,7 @@ TASKS = {
     "a slide": SLIDE,
     "samples": task(task=WINDOWLESS, controller={"reference": {"kind": "position", "samples": SAMPLES}}),
     "a spline": task(
-        task=WINDOWLESS,
-        controller={"reference": {"kind": "position", "samples": SAMPLES | {"interpolation": "cubic"}}},
+        task=WINDOWLESS, controller={"reference": {"kind": "position", "samples": SAMPLES | {"interpolation": "cubic"}}}
     ),
 }
 

@@ -638,11 +638,7 @@ def row(number: int, cells: bytes) -> bytes:
 
 WORKBOOKS: dict[str, tuple[str, bytes, str]] = {
     "many rows": ("xl/worksheets/sheet1.xml", SHEET % (b"<row/>" * 100_000), "needs .* of memory"),
-    "a row of many cells": (
-        "xl/worksheets/sheet1.xml",
-        SHEET % row(2, b"<c/>" * 10_000),
-        "needs .* of memory",
-    ),
+    "a row of many cells": ("xl/worksheets/sheet1.xml", SHEET % row(2, b"<c/>" * 10_000), "needs .* of memory"),
     "rows of far cells": (
         "xl/worksheets/sheet1.xml",
         SHEET % b"".join(row(k, b'<c r="XFD%d"/>' % k) for k in range(2, 100)),

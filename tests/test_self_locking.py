@@ -34,10 +34,7 @@ def worm_tables(
     losses = {"kind": "mesh_efficiency", "drive_efficiency": 0.4, "backdrive_efficiency": eta_b}
     gear = {"input": "worm", "output": "drum", "ratio": ratio, "stiffness": mesh, "losses": losses}
     return {
-        "shafts": {
-            "worm": {"inertia": worm, "viscous_friction": viscous},
-            "drum": {"inertia": mass, "torque": load},
-        },
+        "shafts": {"worm": {"inertia": worm, "viscous_friction": viscous}, "drum": {"inertia": mass, "torque": load}},
         "motors": {"motor": {"shaft": "worm", "kind": "torque_source", "rotor_inertia": 0.0}},
         "gears": {"gear": gear | {"mesh_damping": damping}},
     }

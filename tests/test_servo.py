@@ -114,8 +114,7 @@ def test_the_current_loop_has_its_closed_form_margins() -> None:
 
 
 @pytest.mark.parametrize(
-    ("estimate", "limit", "share"),
-    [("difference", 2.0 * (math.sqrt(2.0) - 1.0), 8.0), ("exact", 1.0, 6.0)],
+    ("estimate", "limit", "share"), [("difference", 2.0 * (math.sqrt(2.0) - 1.0), 8.0), ("exact", 1.0, 6.0)]
 )
 def test_the_proportional_speed_loop_of_a_rigid_drive_is_stable_up_to_its_closed_form_limit(
     estimate: str, limit: float, share: float

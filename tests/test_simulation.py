@@ -348,10 +348,7 @@ def test_thousands_of_steps_are_summed_as_one_by_one():
 
 def test_ramps_that_overlap_are_added():
     signal = lm.CommandSignal(
-        ramps=[
-            {"begin": 0.0, "duration": 2.0, "rise": 1.0},
-            {"begin": 1.0, "duration": 2.0, "rise": -0.5},
-        ],
+        ramps=[{"begin": 0.0, "duration": 2.0, "rise": 1.0}, {"begin": 1.0, "duration": 2.0, "rise": -0.5}],
         steps=[{"time": 1.5, "height": 0.25}],
     )
     for t, value, slope in signal.breakpoint_list():

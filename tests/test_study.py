@@ -133,11 +133,7 @@ def test_bandwidth_and_tracking_error_of_each_run(tmp_path: Path):
             {"key": "gearbox.ratio", "values": [90.0, 60.0, 90.0]},
             {"key": "command.amplitude", "values": [1.0, 0.5, 1e-3]},
         ],
-        keep={
-            "own": "bandwidth()",
-            "small": "bandwidth(0.1)",
-            "lag": "tracking_error(load_speed, ideal_speed)",
-        },
+        keep={"own": "bandwidth()", "small": "bandwidth(0.1)", "lag": "tracking_error(load_speed, ideal_speed)"},
     )
     rows = rows_of(lm.study(study, tmp_path / "s"))
     for run in (0, 1):

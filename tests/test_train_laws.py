@@ -175,9 +175,7 @@ def test_a_spring_balances_an_arm() -> None:
     scenario = lm.Scenario(
         shafts={"arm": {"inertia": J}},
         gravity={"weight": {"shaft": "arm", "mass": mgr / 9.80665, "radius": 1.0, "angle": math.pi / 2, "error": 1e-7}},
-        springs={
-            "balance": {"shaft": "arm", "stiffness": {"kind": "linear", "stiffness": k}, "rest_angle": mgr / k},
-        },
+        springs={"balance": {"shaft": "arm", "stiffness": {"kind": "linear", "stiffness": k}, "rest_angle": mgr / k}},
         initial={"angles": {"arm": small}},
         simulation={"duration": 2.0, "sample_interval": 1e-3},
     )

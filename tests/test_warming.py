@@ -49,9 +49,7 @@ def scenario(**changes: Any) -> lm.Scenario:
     }
     return lm.Scenario(
         shafts={"rotor": {"inertia": 1e-5}, "fan": {"inertia": 1e-3, "viscous_friction": 5e-3}},
-        motors={
-            "motor": {"shaft": "rotor", "kind": "torque_source", "rotor_inertia": 1e-5, "limits": LIMITS},
-        },
+        motors={"motor": {"shaft": "rotor", "kind": "torque_source", "rotor_inertia": 1e-5, "limits": LIMITS}},
         gears={"gear": gear},
         command={"motor": {"mean": 0.1, "amplitude": 0.03, "frequency": 0.3}},
         simulation={"duration": 16.0, "sample_interval": 0.02},

@@ -55,10 +55,7 @@ TRAIN = lm.load("worm-lowering")
 HUNTING = lm.load("hunting-with-static-friction")
 # Without an integrator, so that its certificate takes milliseconds.
 RESTING = HUNTING.replace(
-    **{
-        "controllers.servo.position": {"gain": 8.0, "derivative_gain": 0.3},
-        "controllers.servo.anti_windup_time": None,
-    }
+    **{"controllers.servo.position": {"gain": 8.0, "derivative_gain": 0.3}, "controllers.servo.anti_windup_time": None}
 )
 TRACKING = lm.load("tracking-loss-map", {"simulation.duration": 0.05})
 RESULT = lm.simulate(SCENARIO)

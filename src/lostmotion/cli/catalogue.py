@@ -23,8 +23,7 @@ def catalogue(
     ratio: Annotated[str | None, typer.Option("--ratio", metavar="MIN..MAX", help="Gear ratio.")] = None,
     torque: Annotated[str | None, typer.Option("--torque", metavar="MIN..MAX", help="Rated torque [N·m].")] = None,
     force: Annotated[
-        str | None,
-        typer.Option("--force", metavar="MIN..MAX", help="Rated force [N]; of screws the dynamic capacity."),
+        str | None, typer.Option("--force", metavar="MIN..MAX", help="Rated force [N]; of screws the dynamic capacity.")
     ] = None,
     lead: Annotated[
         str | None, typer.Option("--lead", metavar="MIN..MAX", help='Lead of a screw [m], e.g. "5 mm..10 mm".')

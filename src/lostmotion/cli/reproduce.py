@@ -7,10 +7,7 @@ from .targets import pictures_of, writing
 from .terminal import progress
 
 
-def reproduce(
-    output: ReportOption = None,
-    figures: FiguresOption = None,
-) -> None:
+def reproduce(output: ReportOption = None, figures: FiguresOption = None) -> None:
     """Reproduce the paper: its figures, data and deviations.
 
     The paper is "Simplified dynamic model of the transmission".

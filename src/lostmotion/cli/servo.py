@@ -52,12 +52,10 @@ def servo(
         ),
     ] = None,
     feedforward: Annotated[
-        bool,
-        typer.Option("--feedforward", help="With --tune: feed forward inertia and friction of the drive too."),
+        bool, typer.Option("--feedforward", help="With --tune: feed forward inertia and friction of the drive too.")
     ] = False,
     drive_units: Annotated[
-        bool,
-        typer.Option("--drive-units", help="Print the gains in the units of common drives, to be entered there."),
+        bool, typer.Option("--drive-units", help="Print the gains in the units of common drives, to be entered there.")
     ] = False,
     overrides: Overrides = None,
     figures: FiguresOption = None,

@@ -17,8 +17,7 @@ if TYPE_CHECKING:
 
 
 OutputOption = Annotated[
-    Path | None,
-    typer.Option("-o", "--output", metavar="DIR", help="Directory of the runs, made if missing; required."),
+    Path | None, typer.Option("-o", "--output", metavar="DIR", help="Directory of the runs, made if missing; required.")
 ]
 ThreadsOption = Annotated[
     int | None, typer.Option("--threads", metavar="N", parser=count, help="In the core; all cores by default.")

@@ -210,11 +210,7 @@ class _Place:
         return c.camera.core_fields() | of_motor | {"tracker": tracker}
 
 
-def core_control(
-    train: DriveTrain,
-    controllers: Mapping[str, Controller],
-    laws: Mapping[str, Law] = NO_LAWS,
-) -> Bound:
+def core_control(train: DriveTrain, controllers: Mapping[str, Controller], laws: Mapping[str, Law] = NO_LAWS) -> Bound:
     """The controllers of the motors of a train.
 
     Parameters

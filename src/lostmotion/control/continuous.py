@@ -13,12 +13,7 @@ from .. import _core
 from ..errors import InputError, inside, need
 from ..inputs import described
 from ..inputs.arguments import checked
-from ..inputs.quantities import (
-    Angle,
-    Limit,
-    Number,
-    Speed,
-)
+from ..inputs.quantities import Angle, Limit, Number, Speed
 from ..inputs.validation import did_you_mean, shown
 from ..model.motor import Motor
 from ..model.signals import CommandSignal, Signal, Step

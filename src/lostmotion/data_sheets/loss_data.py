@@ -6,16 +6,7 @@ from typing import Annotated, Self
 from pydantic import model_validator
 
 from ..inputs.part import Part
-from ..inputs.quantities import (
-    KinematicViscosity,
-    Limit,
-    NotNegative,
-    Number,
-    Positive,
-    Speed,
-    Temperature,
-    Torque,
-)
+from ..inputs.quantities import KinematicViscosity, Limit, NotNegative, Number, Positive, Speed, Temperature, Torque
 from ..model.losses import LossMap
 from ..reproducible import log10, power
 

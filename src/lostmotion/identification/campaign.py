@@ -98,12 +98,7 @@ def rig_scenario(gearbox: Gearbox, title: str = "", ripple: TorqueHarmonic | Non
     tables: dict[str, Any] = {
         "shafts": {"motor": {}, "output": {"inertia": inertia, "torque": {"mean": 0.0}}},
         "motors": {
-            "drive": {
-                "shaft": "motor",
-                "kind": "torque_source",
-                "rated_torque": 1.0,
-                "rotor_inertia": _rotor(gearbox),
-            }
+            "drive": {"shaft": "motor", "kind": "torque_source", "rated_torque": 1.0, "rotor_inertia": _rotor(gearbox)}
         },
         "gears": {"gearbox": gear | {"mesh_damping": mesh_damping(gearbox)}},
         "simulation": {"duration": PERIOD, "sample_interval": INTERVAL},

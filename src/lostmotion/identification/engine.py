@@ -52,11 +52,7 @@ class Engine:
         """by log: why it has no run, where residuals were last asked for"""
 
     def residuals(
-        self,
-        logs: Sequence[Prepared],
-        point: Point,
-        rung: int,
-        derivatives: Mapping[str, FreeParameter] | None = None,
+        self, logs: Sequence[Prepared], point: Point, rung: int, derivatives: Mapping[str, FreeParameter] | None = None
     ) -> list[np.ndarray]:
         """Residuals of each log, weighted, one row for each measured channel, SI; NaN if the rig has no motion,
         0 where the log has no number.

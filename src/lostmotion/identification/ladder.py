@@ -168,13 +168,7 @@ def _rung(
         # The rung should contain that below: begin there, with what is new switched off.
         off = {n: p.off if p.off is not None else p.start for n, p in added.items()}
         again = _one(
-            rig,
-            engine,
-            train,
-            rung,
-            replace(below.point, values=below.point.values | off),
-            entry.name,
-            notify,
+            rig, engine, train, rung, replace(below.point, values=below.point.values | off), entry.name, notify
         )
         if _cost(problem, again, best) < best.cost:
             best = again

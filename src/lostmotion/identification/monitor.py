@@ -137,10 +137,7 @@ LEAST = 1e-9  # residual in those of the baseline: less is rounding, and the tre
 
 @checked
 def monitor(
-    source: str | Path,
-    logs: Sequence[str | Path] = (),
-    *,
-    progress: Callable[[str, int, int], None] | None = None,
+    source: str | Path, logs: Sequence[str | Path] = (), *, progress: Callable[[str, int, int], None] | None = None
 ) -> MonitorResult:
     """Follow the parameters of a drive over its life, log by log.
 

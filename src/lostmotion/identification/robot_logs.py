@@ -77,8 +77,7 @@ def read_mcap_log(path: Path, *, time: str = "") -> Log:
     if not recording.topics:
         kinds = listed(sorted(set(recording.left_out.values()))) or "no message"
         raise InputError(
-            f"has no topic in JSON or of ROS ({kinds}); record in one of these, or write its topics as CSV",
-            where=path,
+            f"has no topic in JSON or of ROS ({kinds}); record in one of these, or write its topics as CSV", where=path
         )
     return _log(path, recording, time)
 
@@ -382,8 +381,7 @@ def _shallow(path: Path, topic: str, message: Any, long: set[str]) -> Iterator[t
         yield from _numbers(message, topic, long)
     except RecursionError:
         raise InputError(
-            f"topic {topic}: a message has more than {MOST_LEVELS} lists and objects inside of each other",
-            where=path,
+            f"topic {topic}: a message has more than {MOST_LEVELS} lists and objects inside of each other", where=path
         ) from None
 
 

@@ -152,8 +152,7 @@ def _numbers(log: Log, measured: list[str], inputs: list[str]) -> Log:
             )
         if np.mean(bad) > 0.5:
             raise InputError(
-                f"channel {name} has no number in {np.mean(bad):.0%} of the samples; leave the file out",
-                where=log.name,
+                f"channel {name} has no number in {np.mean(bad):.0%} of the samples; leave the file out", where=log.name
             )
         if bad.any():
             log = _without(

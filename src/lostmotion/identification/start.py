@@ -108,12 +108,7 @@ def _error(rig: Rig, engine: Engine, logs: Sequence[Prepared], point: Point) -> 
 
 
 def _solved(
-    rig: Rig,
-    logs: Sequence[Prepared],
-    point: Point,
-    free: Mapping[str, FreeParameter],
-    shown: Shown,
-    width: int,
+    rig: Rig, logs: Sequence[Prepared], point: Point, free: Mapping[str, FreeParameter], shown: Shown, width: int
 ) -> tuple[dict[str, float], dict[str, str]]:
     """(values found, why others are not) with one filter.
 

@@ -32,8 +32,7 @@ def members(path: Path, archive: zipfile.ZipFile, limit: int = LOG) -> dict[str,
             raise InputError(f"{member.filename}: is encrypted; save the file without a password", where=path)
         if member.compress_type not in METHODS:
             raise InputError(
-                f"{member.filename}: is compressed by a method other than deflate; save it with deflate",
-                where=path,
+                f"{member.filename}: is compressed by a method other than deflate; save it with deflate", where=path
             )
     if len({member.filename for member in found}) < len(found):
         raise InputError("has two members of one name; save it again", where=path)

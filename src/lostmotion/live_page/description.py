@@ -65,10 +65,7 @@ def describe(scenario: Scenario, name: str) -> dict[str, Any]:
             figure
             for motor, c in scenario.axes().items()
             for figure in axis_figures(
-                c,
-                motor,
-                bool(scenario.prefix(motor)),
-                scenario.sliding().get(scenario.prefix(motor), (False, False)),
+                c, motor, bool(scenario.prefix(motor)), scenario.sliding().get(scenario.prefix(motor), (False, False))
             )
         ],
         "sliders": [s.to_page() for s in _sliders(scenario, values, closed)],

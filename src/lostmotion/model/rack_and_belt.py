@@ -43,11 +43,7 @@ class BeltData(described.BeltDataFields, LinearDrive):
 
     @model_validator(mode="after")
     def _is_a_belt(self) -> Self:
-        ways = {
-            "diameter": ("pulley_diameter",),
-            "teeth": ("teeth", "pitch"),
-            "travel": ("travel_per_turn",),
-        }
+        ways = {"diameter": ("pulley_diameter",), "teeth": ("teeth", "pitch"), "travel": ("travel_per_turn",)}
         one_way(self, ways)
         if (self.specific_stiffness is None) != (self.free_lengths is None):
             raise ValueError("has one of specific_stiffness and free_lengths; the stiffness of the belt needs both")

@@ -16,13 +16,7 @@ from pydantic import model_validator
 from .. import _core
 from ..inputs import described
 from ..inputs.described import V
-from ..inputs.quantities import (
-    Force,
-    LinearSpeed,
-    Number,
-    Speed,
-    Torque,
-)
+from ..inputs.quantities import Force, LinearSpeed, Number, Speed, Torque
 from ..recorded import real
 from ..reproducible import sin, total
 from ..units.scalars import is_number, scalar

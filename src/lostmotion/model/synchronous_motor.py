@@ -73,10 +73,7 @@ TORQUE = Forms(
     },
 )
 CONTINUOUS = Forms(
-    RMS_OR_PEAK,
-    "A",
-    "A rms",
-    {"continuous_current_rms": 1.0, "continuous_current_peak": 1.0 / math.sqrt(2.0)},
+    RMS_OR_PEAK, "A", "A rms", {"continuous_current_rms": 1.0, "continuous_current_peak": 1.0 / math.sqrt(2.0)}
 )
 LARGEST = Forms(RMS_OR_PEAK, "A", "A rms", {"max_current_rms": 1.0, "max_current_peak": 1.0 / math.sqrt(2.0)})
 

@@ -11,9 +11,7 @@ from ..inputs import described
 from ..inputs.breakpoints import check_apart
 from ..inputs.described import TorsionCurveFields
 from ..inputs.part import Part
-from ..inputs.quantities import (
-    argument,
-)
+from ..inputs.quantities import argument
 
 
 def check_segments(slopes: tuple[float, ...], breaks: tuple[float, ...], what: str) -> None:

@@ -64,10 +64,7 @@ class Reduction:
 
 @checked
 def reduce(
-    drive: Drive | DriveTrain | Scenario,
-    amplitude: Angle,
-    frequency: Frequency,
-    load_torque: Torque = 0.0,
+    drive: Drive | DriveTrain | Scenario, amplitude: Angle, frequency: Frequency, load_torque: Torque = 0.0
 ) -> Reduction:
     """Describe a drive by armature, damping, friction loss and gear, best for one motion.
 

@@ -126,12 +126,7 @@ def _command_and_torque(results: Results, **options: Any) -> tuple[Panel, ...]:
 def _speed_and_load(results: Results, **options: Any) -> tuple[Panel, ...]:
     speed = list(_pairs(results, lambda r: r["load_speed"].values, "load speed [rad/s]", what="speed", **options))
     torque = list(_pairs(results, _relative_load, "output torque [-]", what="torque", **options))
-    return (
-        *speed,
-        *_differences(speed, "load speed [rad/s]"),
-        *torque,
-        *_differences(torque, "output torque [-]"),
-    )
+    return (*speed, *_differences(speed, "load speed [rad/s]"), *torque, *_differences(torque, "output torque [-]"))
 
 
 def figure_specs(results: Results, facts: Facts) -> list[FigureSpec]:
@@ -368,11 +363,7 @@ def _decibels(values: Any) -> Any:
 
 
 def _response_panels(
-    results: Results,
-    label: str,
-    of: Callable[[Any], Any],
-    y_range: tuple[float, float],
-    level: tuple[str, float],
+    results: Results, label: str, of: Callable[[Any], Any], y_range: tuple[float, float], level: tuple[str, float]
 ) -> Iterator[Panel]:
     """The models at each amplitude, with the cutoff that the paper prints."""
     rigid = paper_scenario("1-DOF-L", "large")

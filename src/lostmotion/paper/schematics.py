@@ -131,11 +131,7 @@ def _two_degrees(s: Sketch) -> None:
     _spring(s, 6.3, 8.3, "$k_{20} = 0.65\\,k_{2max}$")
     _bearing(s, 9.3, "$b_{ZR}$")
     _box(s, 10.8, "$J_Z$", size=(1.2, 1.8))
-    s.text(
-        6.0,
-        -1.7,
-        "$T_2 = k_{20}\\,\\Delta\\varphi_2$,  $T_1 = T_2/(i_C\\,\\eta_C)$",
-    )
+    s.text(6.0, -1.7, "$T_2 = k_{20}\\,\\Delta\\varphi_2$,  $T_1 = T_2/(i_C\\,\\eta_C)$")
 
 
 def _one_degree(s: Sketch) -> None:

@@ -313,9 +313,7 @@ Found = tuple[np.ndarray, dict[str, np.ndarray], dict[str, np.ndarray]]
 
 
 def _different(
-    scenario: Scenario,
-    cases: Mapping[Case, Sequence[Callable[..., None]]],
-    changed: dict[Case, Scenario],
+    scenario: Scenario, cases: Mapping[Case, Sequence[Callable[..., None]]], changed: dict[Case, Scenario]
 ) -> Iterator[Scenario]:
     """The scenarios of the cases, each once: different changes may leave the same. Enters in `changed` which case has which."""
     seen = set()

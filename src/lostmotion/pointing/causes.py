@@ -130,9 +130,7 @@ def _on_motor(data: Tables) -> None:
         controller.pop("blend_time", None)
 
 
-VARIANTS: dict[str, Callable[[Tables], None]] = {
-    "encoders on the motors": _on_motor,
-}
+VARIANTS: dict[str, Callable[[Tables], None]] = {"encoders on the motors": _on_motor}
 """other controllers of the same axes"""
 
 

@@ -41,9 +41,7 @@ def model_description(model: Model) -> bytes:
     if model.states:
         ET.SubElement(root, "ModelExchange", both)
     ET.SubElement(
-        root,
-        "CoSimulation",
-        both | {"canHandleVariableCommunicationStepSize": "true", "canInterpolateInputs": "true"},
+        root, "CoSimulation", both | {"canHandleVariableCommunicationStepSize": "true", "canInterpolateInputs": "true"}
     )
     for kind in root if model.has_sources else ():
         sources = ET.SubElement(kind, "SourceFiles")

@@ -245,11 +245,7 @@ def _reference(scenario: Scenario, prefix: str, kind: str) -> tuple[str, str]:
 
 
 def _model(
-    scenario: Scenario,
-    parameters: tuple[Parameter, ...],
-    guid: str,
-    references_given: bool,
-    motions: Sequence[str],
+    scenario: Scenario, parameters: tuple[Parameter, ...], guid: str, references_given: bool, motions: Sequence[str]
 ) -> Model:
     """Content of modelDescription.xml."""
     core, signals, axes = scenario.core(), scenario.signals(), scenario.by_prefix()

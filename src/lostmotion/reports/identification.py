@@ -43,12 +43,7 @@ HEADER = ("log", "channel", "part", "MAE", "RMSE", "fit [%]", "unit of MAE and R
 
 
 def write_identification(
-    directory: Path,
-    name: str,
-    result: IdentificationResult,
-    pictures: Sequence[str] = (),
-    *,
-    all_logs: bool = False,
+    directory: Path, name: str, result: IdentificationResult, pictures: Sequence[str] = (), *, all_logs: bool = False
 ) -> Path:
     """``identified.html``, tables (CSV) and the rig as a scenario in a directory, made if missing; on request pictures.
 
@@ -443,11 +438,6 @@ def loss_curves(gear: Gear) -> tuple[Curve, ...]:
     if not np.any(table):
         return ()
     return tuple(
-        Curve(
-            f"{speeds[k] * gear.rated_input_speed:.3g} rad/s",
-            torque,
-            table[:, k],
-            look(n),
-        )
+        Curve(f"{speeds[k] * gear.rated_input_speed:.3g} rad/s", torque, table[:, k], look(n))
         for n, k in enumerate((0, len(speeds) - 1))
     )

@@ -107,11 +107,7 @@ def maps(response: xarray.Dataset, output: str) -> list[Panel]:
         return Panel(title, "frequency [Hz]", label, (), log_x=True, log_y=True, ground=ground)
 
     return [
-        panel(
-            f"Gain of {output.replace('_', ' ')}",
-            "gain [dB]",
-            np.where(shown, gain, np.nan),
-        ),
+        panel(f"Gain of {output.replace('_', ' ')}", "gain [dB]", np.where(shown, gain, np.nan)),
         panel("Phase", "phase [degrees]", np.where(shown, phase, np.nan)),
         panel("Mean efficiency", "efficiency [-]", response["efficiency"].values),
         panel("Total harmonic distortion", "THD [%]", harmonics),

@@ -147,13 +147,7 @@ def _phase_panel(
     report: ServoReport, loop: str, which: str, response: Callable[[LoopSheet], np.ndarray], **options: Any
 ) -> Panel:
     return _panel(
-        report,
-        loop,
-        f"{which}: phase",
-        "phase [deg]",
-        lambda r: _phase(response(r)),
-        y_range=(-360.0, 0.0),
-        **options,
+        report, loop, f"{which}: phase", "phase [deg]", lambda r: _phase(response(r)), y_range=(-360.0, 0.0), **options
     )
 
 

@@ -263,13 +263,7 @@ def _by_search(axis: Axis, goal: str, peak: float) -> tuple[SpeedGains, str, flo
     constraint: Any = {"type": "ineq", "fun": lambda x: judged(x)[1]}
     options: Any = {"maxiter": EVALUATIONS, "rhobeg": 0.7, "tol": 1e-3}
     find: Any = minimize  # its stubs know only functions without constraints
-    find(
-        lambda x: -judged(x)[0],
-        start,
-        method="COBYLA",
-        constraints=[constraint],
-        options=options,
-    )
+    find(lambda x: -judged(x)[0], start, method="COBYLA", constraints=[constraint], options=options)
     kept = [x for x, (_, spare) in known.items() if spare >= -1e-3]
     if not kept:
         raise InputError(f"sensitivity_peak: no gains were found that keep {peak:g} in all regimes; permit more")
@@ -375,13 +369,7 @@ def _amperes(axis: Axis) -> Amperes:
 
 
 def _tuning(
-    scenario: Scenario,
-    axis: Axis,
-    rule: str,
-    why: str,
-    gains: SpeedGains,
-    K_v: float | None,
-    feedforward: bool,
+    scenario: Scenario, axis: Axis, rule: str, why: str, gains: SpeedGains, K_v: float | None, feedforward: bool
 ) -> Tuning:
     if feedforward:
         axis = with_controller(axis, **_known(axis))

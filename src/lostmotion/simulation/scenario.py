@@ -88,7 +88,7 @@ class Scenario:
 
     # Why it is refused where another object is wanted, and what to use.
     refused_as: ClassVar[Mapping[str, str]] = {
-        "Gearbox": 'is a scenario, and the test rig measures one gear; give one, such as scenario.gears["NAME"]',
+        "Gearbox": 'is a scenario, and the test rig measures one gear; give one, such as scenario.gears["NAME"]'
     }
 
     def __init__(self, /, *nameless: Any, **tables: Any) -> None:
@@ -416,19 +416,12 @@ class Scenario:
         """Whether the motor of a controller moves a slide, and whether its position is that of one, by the prefix of its variables."""
         train, tables = self.train(), self.tables
         return {
-            self.prefix(name): (
-                train.is_slide(train.motors[name].shaft),
-                train.is_slide(tables.controlled(name)),
-            )
+            self.prefix(name): (train.is_slide(train.motors[name].shaft), train.is_slide(tables.controlled(name)))
             for name in self.axes()
         }
 
     def core(
-        self,
-        *,
-        sampled: bool = True,
-        loaded: Collection[str] | None = None,
-        given: Collection[str] | None = None,
+        self, *, sampled: bool = True, loaded: Collection[str] | None = None, given: Collection[str] | None = None
     ) -> _core.Train:
         """The solver's train with its continuous controllers, its motors as the current loops make them.
 

@@ -172,10 +172,7 @@ class TrainTables(ScenarioTables, LinearElements):
         for suffix in ("_given_speed", "_given_acceleration", "_given_angle", "_given_position"):
             if name.endswith(suffix):
                 return self.given_key(name.removesuffix(suffix))
-        for suffix, key in (
-            ("_load_torque", "shafts.{}.torque"),
-            ("_reference", "controllers.{}.reference"),
-        ):
+        for suffix, key in (("_load_torque", "shafts.{}.torque"), ("_reference", "controllers.{}.reference")):
             if name.endswith(suffix):
                 return key.format(name.removesuffix(suffix))
         return f"command.{name.removesuffix('_command')}"

@@ -55,10 +55,7 @@ def axis_variables(
     return tuple(
         Variable(f"{prefix}{name}", "", unit, meaning)
         for prefix, controller in controllers.items()
-        for name, unit, meaning in (
-            *_core.axis_signals(*sliding.get(prefix, (False, False))),
-            *_core.winding_signals(),
-        )
+        for name, unit, meaning in (*_core.axis_signals(*sliding.get(prefix, (False, False))), *_core.winding_signals())
         if name in signals_of(controller)
     )
 

@@ -123,11 +123,7 @@ def compression_force(core_diameter: float) -> float:
 
 
 def critical_speed(
-    core_diameter: float,
-    length: float,
-    mounting: str,
-    modulus: float = ELASTIC_MODULUS,
-    density: float = STEEL,
+    core_diameter: float, length: float, mounting: str, modulus: float = ELASTIC_MODULUS, density: float = STEEL
 ) -> float:
     """Permissible speed [rad/s] of a long screw: 0.8 of its first bending speed, (lambda/l)^2 sqrt(E I/(rho A)).
 

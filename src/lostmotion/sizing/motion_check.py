@@ -58,11 +58,7 @@ def resonances(motor: Motor, g: Gearbox, load_inertia: float) -> list[tuple[str,
     slopes = [] if isinstance(g.stiffness, Rigid) else [k for k in g.stiffness.all_slopes() if k > 0.0]
     pieces = {"softest": min(slopes, default=0.0), "stiffest": max(slopes, default=0.0)}
     return [
-        (
-            name,
-            math.sqrt(k / J_1 + k / load_inertia) / (2.0 * math.pi),
-            math.sqrt(k / load_inertia) / (2.0 * math.pi),
-        )
+        (name, math.sqrt(k / J_1 + k / load_inertia) / (2.0 * math.pi), math.sqrt(k / load_inertia) / (2.0 * math.pi))
         for name, k in pieces.items()
         if k > 0.0 and not (name == "stiffest" and k == pieces["softest"])
     ]

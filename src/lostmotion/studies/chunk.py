@@ -29,8 +29,7 @@ def compute_chunk(text: str, first: int, last: int, threads: int = 1) -> bytes:
     """The runs first .. last - 1 of a study (as JSON), as the bytes of a Parquet file. What executors are given."""
     study = parsed(text)
     return as_parquet(
-        text,
-        [as_table(text, a, b, run_piece(study, a, b, threads), threads) for a, b in pieces(study, first, last)],
+        text, [as_table(text, a, b, run_piece(study, a, b, threads), threads) for a, b in pieces(study, first, last)]
     )
 
 

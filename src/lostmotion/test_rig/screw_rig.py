@@ -97,11 +97,7 @@ class ScrewRig:
         tables: dict[str, Any] = {
             "shafts": {"input": {"inertia": inertia, "friction_torque": friction, "viscous_friction": viscous}},
             "slides": {
-                "slide": {
-                    "mass": self._mass if mass is None else mass,
-                    "viscous_friction": damping,
-                    "force": force,
-                }
+                "slide": {"mass": self._mass if mass is None else mass, "viscous_friction": damping, "force": force}
             },
             "screws": {"screw": {"input": "input", "output": "slide", **screw}},
             "initial": initial,
@@ -151,11 +147,7 @@ class ScrewRig:
     def loop(self, amplitude: Force) -> Loop:
         """The loop that a slow force between -amplitude and amplitude [N] settles on: deflection [m] over force."""
         result = self._loaded([0.0, amplitude, -amplitude, amplitude, -amplitude, amplitude], SAMPLES)
-        ramps = np.interp(
-            np.arange(2 * SAMPLES + 1),
-            [0, SAMPLES, 2 * SAMPLES],
-            [amplitude, -amplitude, amplitude],
-        )
+        ramps = np.interp(np.arange(2 * SAMPLES + 1), [0, SAMPLES, 2 * SAMPLES], [amplitude, -amplitude, amplitude])
         return Loop(amplitude, self._deflection(result)[3 * SAMPLES :], ramps)
 
     def lost_motion(self) -> float:
