@@ -131,7 +131,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "write_campaign": (lm.identification.write_campaign, {"directory": "none", "gearbox": SCENARIO.gearbox, "title": "", "ripple": None, "seed": 1, "progress": dangle}),
     "design_experiment": (lm.identification.design_experiment, {"result": 5, "plans": [], "deviation": None}),
     "commission": (lm.commission, {"scenario": SCENARIO, "motor": None, "window": None, "progress": dangle}),
-    "tune": (lm.tune, {"scenario": SCENARIO, "rule": "identical_damping", "damping": 0.7, "phase_margin": 1.0, "goal": "bandwidth", "sensitivity_peak": 1.7, "feedforward": False, "motor": None}),
+    "tune": (lm.tune, {"scenario": SCENARIO, "rule": "margins", "damping": None, "phase_margin": 1.0, "gain_margin": 2.0, "bandwidth": 10.0, "goal": None, "sensitivity_peak": None, "feedforward": False, "motor": None}),
     "select": (lm.select, {"task": "task.toml", "directory": None, "threads": 1, "executor": None, "progress": None}),
     "load_task": (lm.studies.load_task, {"path": "task.toml"}),
     "temperatures": (lm.sizing.temperatures, {"result": HEAT, "motor": None, "ambient": 25.0, "winding": 25.0, "case": 25.0, "repeated": False, "constant_resistance": False}),

@@ -41,12 +41,24 @@ def print_bare(what: str, text: str, unit: str | None) -> None:
         print(f"{what}: {read_as(value, unit)}; a bare number is read in SI units")
 
 
-def load_scenario(source: str, overrides: list[str] | None) -> Scenario:
-    """The scenario of a command. Bare numbers of `--set` are printed with the unit in which they are read."""
-    from ..simulation.sources import load
+def decibels(text: str) -> float:
+    """Reads a gain in dB as a factor."""
+    return float(10.0 ** (number()(text.strip().removesuffix("dB")) / 20.0))
+
+
+def load_scenario(source: str, overrides: list[str] | None, missing: list[str] | None = None) -> Scenario:
+    """The scenario of a command, bare numbers of `--set` printed with the unit in which they are read. With a list for their keys
+    its gains may be missing."""
     from ..simulation.units_of_keys import unit_for
 
-    loaded = load(source, overrides or ())
+    if missing is None:
+        from ..simulation.sources import load
+
+        loaded = load(source, overrides or ())
+    else:
+        from ..servo.tuned import load_untuned
+
+        loaded = load_untuned(source, overrides or (), missing)
     for text in overrides or ():
         key, _, value = text.partition("=")
         print_bare(key.strip(), value, unit_for(loaded, key.strip()))

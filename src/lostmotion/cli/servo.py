@@ -5,11 +5,11 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .arguments import FiguresOption, Overrides, SourceArgument, load_scenario, print_bare
+from .arguments import FiguresOption, Overrides, SourceArgument, decibels, load_scenario, number, print_bare
 from .targets import try_directory, try_file, writing
 from .terminal import about, busy, conclude, console, progress
 
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from ..servo.commission import ServoReport
     from ..servo.tuned import Tuning
     from ..simulation.scenario import Scenario
+
+OF_RULES = ("--phase-margin", "--gain-margin", "--bandwidth", "--sensitivity-peak", "--feedforward")
 
 
 def servo(
@@ -51,8 +53,45 @@ def servo(
             help="Tune first: suited, symmetrical_optimum, identical_damping, identical_radius, identical_real_part, margins or search.",
         ),
     ] = None,
+    phase_margin: Annotated[
+        float | None,
+        typer.Option(
+            "--phase-margin",
+            metavar="ANGLE",
+            help='With --tune margins, e.g. "45 deg"; default 60 deg.',
+            parser=number("rad", "--phase-margin"),
+        ),
+    ] = None,
+    gain_margin: Annotated[
+        float | None,
+        typer.Option(
+            "--gain-margin", metavar="DB", help='With --tune margins, e.g. "8 dB"; default 6 dB.', parser=decibels
+        ),
+    ] = None,
+    bandwidth: Annotated[
+        float | None,
+        typer.Option(
+            "--bandwidth",
+            metavar="FREQUENCY",
+            help='With --tune margins: no more gain than this bandwidth of the speed loop takes, e.g. "40 Hz".',
+            parser=number("Hz", "--bandwidth"),
+        ),
+    ] = None,
+    sensitivity_peak: Annotated[
+        float | None,
+        typer.Option(
+            "--sensitivity-peak",
+            metavar="NUMBER",
+            help="With --tune search: largest peak of the sensitivity; default 1.7.",
+            parser=number(),
+        ),
+    ] = None,
     feedforward: Annotated[
-        bool, typer.Option("--feedforward", help="With --tune: feed forward inertia and friction of the drive too.")
+        bool,
+        typer.Option(
+            "--feedforward",
+            help="With --tune: feed forward inertia and friction too, with the losses of gearboxes without load.",
+        ),
     ] = False,
     drive_units: Annotated[
         bool, typer.Option("--drive-units", help="Print the gains in the units of common drives, to be entered there.")
@@ -71,6 +110,7 @@ def servo(
     \b
     lostmotion servo position-axis -o servo
     lostmotion servo position-axis --tune margins --feedforward -o tuned.toml
+    lostmotion servo position-axis --tune margins --phase-margin "45 deg" --gain-margin "8 dB"
     """
     from ..errors import InputError
     from ..reports.pictures import endings
@@ -79,13 +119,13 @@ def servo(
     files, directories = _targets(output or [], rule)
     if pictures and not directories:
         raise InputError(f"--figures {figures}: needs the directory of the report; add -o DIR")
-    if feedforward and rule is None:
-        raise InputError("--feedforward: goes with --tune RULE; add a rule")
-    loaded = load_scenario(scenario, overrides)
-    for path in files:
-        try_file(path)
-    for path in directories:
-        try_directory(path)
+    options = (phase_margin, gain_margin, bandwidth, sensitivity_peak, feedforward or None)
+    wanted = {option: value for option, value in zip(OF_RULES, options, strict=True) if value is not None}
+    if wanted and rule is None:
+        raise InputError(f"{next(iter(wanted))}: goes with --tune RULE; add a rule")
+    missing: list[str] = []
+    loaded = load_scenario(scenario, overrides, None if rule is None else missing)
+    _try(files, directories)
     if loaded.continuous() and not loaded.axes():
         asked = {"--tune": rule, "--window": window, "--motor": motor, "--drive-units": drive_units or None}
         _certify(loaded, scenario, directories, pictures, asked)
@@ -94,7 +134,7 @@ def servo(
 
     with about(scenario):
         total = work(loaded, motor)
-        tuned = None if rule is None else _tuned(loaded, rule, feedforward, motor)
+        tuned = None if rule is None else _tuned(loaded, rule, motor, wanted).without(missing)
     loaded = loaded if tuned is None else tuned.scenario
     settled = None if window is None else _settled(loaded, motor, window)
     with about(scenario), progress(total, "Commissioning") as step:
@@ -114,7 +154,7 @@ def servo(
         _print_tuned(tuned)
     if drive_units:
         _print_drive_units(loaded, motor)
-    print("\n".join([*written, _next(scenario, files, directories, rule)]))
+    print("\n".join([*written, _next(scenario, files, directories, rule, wanted)]))
     conclude(report.verdict)
 
 
@@ -154,12 +194,18 @@ def _certify(
     conclude(verdict_of(certificate))
 
 
-def _tuned(scenario: Scenario, rule: str, feedforward: bool, motor: str | None) -> Tuning:
-    """The scenario with the gains of a rule."""
+def _tuned(scenario: Scenario, rule: str, motor: str | None, wanted: Mapping[str, Any]) -> Tuning:
+    """The scenario with the gains of a rule, which is given these options."""
+    from ..errors import InputError
     from ..servo.tuning import tune
 
-    with busy("Tuning"):
-        return tune(scenario, rule=rule, feedforward=feedforward, motor=motor)
+    given = {option.removeprefix("--").replace("-", "_"): value for option, value in wanted.items()}
+    try:
+        with busy("Tuning"):
+            return tune(scenario, rule=rule, motor=motor, **given)
+    except InputError as error:
+        options = dict(zip(given, wanted, strict=True))
+        raise error.with_keys(lambda key: options.get(key, key)) from None
 
 
 def _settled(scenario: Scenario, motor: str | None, window: str) -> float:
@@ -189,12 +235,23 @@ def _targets(output: list[Path], rule: str | None) -> tuple[list[Path], list[Pat
     return files, [path for path in output if path.suffix != ".toml"]
 
 
-def _next(scenario: str, files: list[Path], directories: list[Path], rule: str | None) -> str:
+def _try(files: list[Path], directories: list[Path]) -> None:
+    for path in files:
+        try_file(path)
+    for path in directories:
+        try_directory(path)
+
+
+def _next(
+    scenario: str, files: list[Path], directories: list[Path], rule: str | None, wanted: Mapping[str, Any]
+) -> str:
     """The next useful command."""
     if files:
         return f"Next: lostmotion run {files[0]} --plot run.png"
     if rule is not None:
-        return f"Keep these gains: lostmotion servo {scenario} --tune {rule} -o tuned.toml"
+        if set(wanted) - {"--feedforward"}:
+            return "Keep these gains: the same command with -o tuned.toml"
+        return f"Keep these gains: lostmotion servo {scenario} --tune {rule}{''.join(f' {x}' for x in wanted)} -o tuned.toml"
     if directories:
         return f"Next: lostmotion servo {scenario} --tune margins -o tuned.toml"
     return f"All charts on a page: lostmotion servo {scenario} -o servo"

@@ -14,8 +14,9 @@ from ..control.turning import turns
 from ..errors import InputError
 from ..model.gear import Gear
 from ..model.gearbox import Gearbox
+from ..model.losses import LossMap
 from ..model.torsion import Rigid
-from .regimes import Axis
+from .regimes import Axis, speed_of
 
 
 def inertias(axis: Axis, beyond: str | None = None) -> tuple[float, float]:
@@ -41,17 +42,38 @@ def inertias(axis: Axis, beyond: str | None = None) -> tuple[float, float]:
 
 
 def frictions(axis: Axis) -> tuple[float, float]:
-    """Viscous friction [N·m·s/rad] and dry friction [N·m] of all that turns with the motor, at the motor."""
+    """Viscous friction [N·m·s/rad] and dry friction [N·m] of all that turns with the motor, at the motor.
+
+    The losses of gears without load are included.
+    """
     train, viscous, dry = axis.train, 0.0, 0.0
     for name, shaft in train.shafts.items():
         i = turns(train, axis.motor_shaft, name)
         if i is None:
             continue
         of_motors = sum(m.friction_torque for m in train.motors.values() if m.shaft == name)
-        viscous += shaft.viscous_friction / i**2
-        viscous += sum(g.viscous_friction for g in train.gears.values() if g.input == name) / i**2
-        dry += (shaft.friction_torque + of_motors) / abs(i)
+        own = [
+            _without_load(g, 2.0 * speed_of(axis) * abs(axis.ratio / i))
+            for g in train.gears.values()
+            if g.input == name
+        ]
+        viscous += (shaft.viscous_friction + sum(slope for slope, _ in own)) / i**2
+        dry += (shaft.friction_torque + of_motors + sum(torque for _, torque in own)) / abs(i)
     return viscous, dry
+
+
+def _without_load(gear: Gear | Gearbox, speed: float) -> tuple[float, float]:
+    """Viscous [N·m·s/rad] and dry friction [N·m] at the input of a gear without load.
+
+    They are the straight line that is nearest to its losses up to a speed [rad/s].
+    """
+    losses, rated = gear.losses, gear.rated_input_speed or 1.0
+    if not isinstance(losses, LossMap):
+        return gear.viscous_friction, 0.0
+    table, w = losses.core(), np.linspace(0.0, speed or rated, 101)
+    torque = np.array([table(0.0, x / rated) for x in w]) * (gear.rated_output_torque or 1.0) / abs(gear.ratio)
+    slope, dry = np.polyfit(w, torque, 1)
+    return gear.viscous_friction + float(slope), float(dry)
 
 
 def secant(gear: Gear | Gearbox) -> float:

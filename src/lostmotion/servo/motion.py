@@ -161,9 +161,9 @@ def _step(axis: Axis, loop: str, size: float) -> RunArrays:
     if loop != "position":
         fields |= {"position": None, "position_encoder": None, "blend_time": None, "phase": 0.0}
     if loop == "current":
-        fields |= {"speed": None, "feedforward": Feedforward()}
-    elif loop != axis.controller.reference.kind:
-        fields |= {"feedforward": Feedforward()}
+        fields["speed"] = None
+    if loop != axis.controller.reference.kind:
+        fields |= {"feedforward": Feedforward(), "inverse_model": None}
     duration = step_duration(axis, loop)
     ticks = max(1, math.ceil(duration / MAX_POINTS / axis.controller.sample_time))
     interval = axis.controller.sample_time * (ticks if loop != "current" else 0.125)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, Literal
@@ -16,8 +16,11 @@ from ..simulation.axis_form import file_schema
 from ..simulation.keys import parse_override
 from ..simulation.linear_units import unit_of_slides
 from ..simulation.scenario import Scenario
+from ..simulation.scenario_files import CHANGED, title_with
+from ..simulation.sources import load
 from ..units.practical import printed
 
+GAINS = (".speed.gain", ".position.gain")  # ends of their keys, which a file may leave out
 Amperes = Literal["peak", "dc", "of the data sheet"]
 """amplitude of a phase, current of an armature, or not known"""
 
@@ -46,6 +49,11 @@ class Tuning:
     """whether the motor moves a slide: gains in [N·s/m] and [N/m]"""
     amperes: Amperes = "of the data sheet"
     """amperes of `torque_constant`"""
+
+    def without(self, missing: Sequence[str]) -> Tuning:
+        """The same gains, found for a scenario that lacked some of them."""
+        changed = {key: (None if key in missing else old, new) for key, (old, new) in self.changed.items()}
+        return replace(self, changed=changed)
 
     @property
     def integral_time(self) -> float:
@@ -118,6 +126,22 @@ class Tuning:
     def __str__(self) -> str:
         """The gains with units, in the words of a scenario and of manufacturers."""
         return "\n".join([f"rule {self.rule}: {self.why}", *aligned(self.conventions())])
+
+
+def load_untuned(source: str | Path, overrides: Iterable[str], missing: list[str]) -> Scenario:
+    """The scenario of a file that may leave out the gains to be found. They are 1 in it; their keys are added to `missing`."""
+    given = [*overrides, *(f"{key}=1" for key in missing)]
+    try:
+        loaded = load(source, given)
+    except InputError as error:
+        keys = [key for problem in error.problems for key in problem.keys if key.endswith(GAINS)]
+        if not keys or set(keys) & {text.partition("=")[0] for text in given}:
+            raise
+        missing += keys
+        return load_untuned(source, overrides, missing)
+    plain = loaded.title.partition(CHANGED)[0]
+    title = title_with(plain, [text.partition("=")[0].strip() for text in overrides])
+    return loaded.model_copy(update={"title": title}) if missing else loaded
 
 
 def conventions(

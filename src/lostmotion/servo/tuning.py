@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,8 +22,8 @@ from ..control.tuning import (
     symmetrical_optimum,
 )
 from ..errors import InputError, need
-from ..inputs.arguments import checked
-from ..inputs.quantities import Angle, Number
+from ..inputs.arguments import ScenarioName, checked
+from ..inputs.quantities import Angle, Frequency, Number
 from ..inputs.validation import did_you_mean, shown
 from ..simulation.scenario import Scenario
 from ..units.practical import counted
@@ -30,7 +32,7 @@ from .margins import STABLE, bandwidth_of, frequencies, margins
 from .motion import with_controller
 from .regimes import Axis, Regime, axis_of, regimes
 from .sampled import SampledLoop
-from .tuned import Amperes, Tuning, aligned, conventions, differences
+from .tuned import Amperes, Tuning, aligned, conventions, differences, load_untuned
 
 RULES = (
     "suited",
@@ -42,11 +44,19 @@ RULES = (
     "search",
 )
 GOALS = ("bandwidth", "stiffness")
-GAIN_MARGIN = 2.0  # that the rule `margins` keeps beside the phase margin
+LITTLE = math.radians(30.0)  # phase margin below which a rule has a comment
 ZERO = 4.0  # K_p/J over the zero K_i/K_p of the PI controller, by `margins`
 SPAN = (1e-3, 1.0)  # of J/T_lag: the gains of the speed loop that are tried
 TRIED = 40
-WORST_PEAK = 1.7  # of the sensitivity, that a search permits in the speed loop by default
+OF_RULES: dict[str, tuple[Any, tuple[str, ...]]] = {
+    "damping": (0.7, ("identical_damping", "identical_real_part")),
+    "phase_margin": (math.pi / 3.0, ("margins",)),
+    "gain_margin": (2.0, ("margins",)),
+    "bandwidth": (None, ("margins",)),
+    "goal": ("bandwidth", ("search",)),
+    "sensitivity_peak": (1.7, ("search",)),
+}
+"""default of what some rules are given, and these rules"""
 EVALUATIONS = 80
 
 
@@ -66,13 +76,15 @@ def drive_units(scenario: Scenario, motor: str | None = None) -> list[str]:
 
 @checked
 def tune(
-    scenario: Scenario,
+    scenario: Scenario | ScenarioName | Path,
     *,
     rule: str = "identical_damping",
-    damping: Number = 0.7,
-    phase_margin: Angle = math.pi / 3.0,
-    goal: str = "bandwidth",
-    sensitivity_peak: Number = WORST_PEAK,
+    damping: Number | None = None,
+    phase_margin: Angle | None = None,
+    gain_margin: Number | None = None,
+    bandwidth: Frequency | None = None,
+    goal: str | None = None,
+    sensitivity_peak: Number | None = None,
     feedforward: bool = False,
     motor: str | None = None,
 ) -> Tuning:
@@ -80,26 +92,33 @@ def tune(
 
     Parameters
     ----------
-    scenario : Scenario
-        A scenario with a controller. Its loops, sample times, filters and encoders count; its gains do not.
+    scenario : Scenario or str or Path
+        A scenario with a controller. Its loops, sample times, filters and encoders count; its gains do not, and a file may leave
+        them out.
     rule : str
         ``"identical_damping"``, ``"identical_radius"`` or ``"identical_real_part"``: poles of two inertias and the spring between them.
         ``"symmetrical_optimum"``: total inertia and sum of the lags. ``"suited"``: identical damping if inertias and sampling permit
-        it, else the symmetrical optimum, as in `select`. ``"margins"``: the largest gain that keeps a phase margin and a gain margin
-        of 2 in all regimes of the exact sampled loop. ``"search"``: an optimum of the exact sampled response. The rule suited sets
+        it, else the symmetrical optimum, as in `select`. ``"margins"``: the largest gain that keeps a phase and a gain
+        margin in all regimes of the exact sampled loop, or the smallest that also has a bandwidth. ``"search"``: an optimum of the exact sampled response. The rule suited sets
         K_v to half of the reciprocal of the speed loop's equivalent time. The others, except search, set K_v to a quarter of the
         speed loop's lowest bandwidth.
-    damping : float
-        Damping ratio of the poles, for identical_damping and identical_real_part.
-    phase_margin : float
-        Phase margin [rad], for margins.
-    goal : str
-        For search: ``"bandwidth"`` of the outermost loop, the lowest of all regimes, or ``"stiffness"``, the least over frequency of
+    damping : float, optional
+        For identical_damping and identical_real_part: damping ratio of the poles. Default: 0.7.
+    phase_margin : float, optional
+        For margins: phase margin [rad]. Default: 60 degrees.
+    gain_margin : float, optional
+        For margins: gain margin, a factor. Default: 2.
+    bandwidth : float, optional
+        For margins: bandwidth of the speed loop, at -3 dB or -90 degrees, the lowest of all regimes [Hz]. Default: as large as the
+        margins permit.
+    goal : str, optional
+        For search: ``"bandwidth"`` (default) of the outermost loop, the lowest of all regimes, or ``"stiffness"``, the least over frequency of
         the load torque that turns the motor by 1 rad.
-    sensitivity_peak : float
-        For search: largest sensitivity peak of the speed loop and of the position loop in each regime.
+    sensitivity_peak : float, optional
+        For search: largest sensitivity peak of the speed loop and of the position loop in each regime. Default: 1.7.
     feedforward : bool
-        Whether to feed forward the speed of the reference, and the torques of inertia, viscous and dry friction of the scenario.
+        Whether to feed forward the speed of the reference, and the torques of inertia, viscous and dry friction of the scenario, with
+        the losses of gears without load.
     motor : str, optional
         Name of the motor whose controller is tuned. Default: the only one.
 
@@ -123,30 +142,34 @@ def tune(
     if rule not in RULES:
         hint = did_you_mean(str(rule), RULES, f"take one of {', '.join(RULES)}")
         raise InputError(f"rule: {shown(rule)} is not known; {hint}")
-    if goal not in GOALS:
-        raise InputError(f"goal: {shown(goal)} is not known; take {' or '.join(GOALS)}")
-    if not damping > 0.0:
-        raise InputError(f"damping: {damping:g} must be above 0; 0.7 is usual")
-    if not 0.0 < phase_margin < 0.5 * math.pi:
-        raise InputError(f"phase_margin: {phase_margin:g} rad must lie between 0 and 90 degrees")
-    if not sensitivity_peak > 1.0:
-        raise InputError(f"sensitivity_peak: {sensitivity_peak:g} must be above 1; 1.7 is usual")
+    given: dict[str, Any] = {
+        "damping": damping,
+        "phase_margin": phase_margin,
+        "gain_margin": gain_margin,
+        "bandwidth": bandwidth,
+        "goal": goal,
+        "sensitivity_peak": sensitivity_peak,
+    }
+    asked = {key: OF_RULES[key][0] if value is None else value for key, value in given.items()}
+    _check(rule, {key: value for key, value in given.items() if value is not None})
+    missing: list[str] = []
+    if not isinstance(scenario, Scenario):
+        scenario = load_untuned(scenario, (), missing)
     axis = axis_of(scenario, motor)
     if axis.controller.speed is None:
-        raise InputError("the controller has no speed loop to tune; add one, with any gain")
+        raise InputError("the controller has no speed loop to tune; add one, in which the gain may be missing")
     if feedforward and axis.controller.inverse_model is not None:
         raise InputError("feedforward: the controller has an inverse_model, which adds the same torques; leave one out")
+    damped = f"damping {asked['damping']:g}"
     by: dict[str, Callable[[], tuple[SpeedGains, str]]] = {
         "symmetrical_optimum": lambda: _by_lags(axis),
-        "identical_damping": lambda: _by_poles(axis, lambda d: identical_damping(d, damping), f"damping {damping:g}"),
+        "identical_damping": lambda: _by_poles(axis, lambda d: identical_damping(d, asked["damping"]), damped),
         "identical_radius": lambda: _by_poles(axis, identical_radius, "poles at the anti-resonance"),
-        "identical_real_part": lambda: _by_poles(
-            axis, lambda d: identical_real_part(d, damping), f"damping {damping:g}"
-        ),
-        "margins": lambda: _by_margins(axis, phase_margin),
+        "identical_real_part": lambda: _by_poles(axis, lambda d: identical_real_part(d, asked["damping"]), damped),
+        "margins": lambda: _by_margins(axis, asked["phase_margin"], asked["gain_margin"], asked["bandwidth"]),
     }
     if rule == "search":
-        gains, why, K_v = _by_search(axis, goal, sensitivity_peak)
+        gains, why, K_v = _by_search(axis, asked["goal"], asked["sensitivity_peak"])
     elif rule == "suited":
         gains, why, K_v = _suited(axis)
     else:
@@ -157,7 +180,25 @@ def tune(
             else rounded(position_gain(_lowest_bandwidth(_with(axis, gains, None), "speed")))
         )
     kept = SpeedGains(_as_in_files(gains.gain), _as_in_files(gains.integral_gain), gains.filter_time)
-    return _tuning(scenario, axis, rule, why, kept, K_v, feedforward)
+    if rule not in ("margins", "search"):
+        why = f"{why}; {_reached(_with(axis, gains, K_v))}"
+    return _tuning(scenario, axis, rule, why, kept, K_v, feedforward).without(missing)
+
+
+def _check(rule: str, given: Mapping[str, Any]) -> None:
+    """Refuse what the rule does not take, and values out of range."""
+    for key, value in given.items():
+        rules = OF_RULES[key][1]
+        if rule not in rules:
+            raise InputError(f"the rule {rule} does not take it; leave it out, or take {' or '.join(rules)}", key)
+        if key == "goal" and value not in GOALS:
+            raise InputError(f"{shown(value)} is not known; take {' or '.join(GOALS)}", key)
+        if key == "phase_margin" and not 0.0 < value < 0.5 * math.pi:
+            raise InputError(f"{value:g} rad must lie between 0 and 90 degrees", key)
+        least = 1.0 if key in ("gain_margin", "sensitivity_peak") else 0.0
+        if key != "goal" and not value > least:
+            usual = "" if OF_RULES[key][0] is None else f"; {OF_RULES[key][0]:g} is usual"
+            raise InputError(f"{value:g} must be above {least:g}{usual}", key)
 
 
 def _as_in_files(value: float) -> float:
@@ -197,44 +238,97 @@ def rounded(gain: float) -> float:
     return float(f"{gain:.4g}")
 
 
-def _by_margins(axis: Axis, phase_margin: float) -> tuple[SpeedGains, str]:
-    """The greatest gain below the first one that breaks a margin, with the integral time ZERO J/K_p."""
+@dataclass(frozen=True)
+class _Reached:
+    """Least margins of some loops in all regimes."""
+
+    phase: float
+    """[rad]; infinite where nothing crosses"""
+    gain: float
+    where: str
+    """loop and regime of the least phase margin, or of what is unstable"""
+    stable: bool = True
+
+    def __str__(self) -> str:
+        """Text such as ``53 degrees and 8.2 dB (speed loop, first stiffness)``."""
+        if not self.stable:
+            return f"no stable loop ({self.where})"
+        phase = "no crossover" if math.isinf(self.phase) else f"{math.degrees(self.phase):.3g} degrees"
+        return phase if math.isinf(self.gain) else f"{phase} and {_decibels(self.gain)} ({self.where})"
+
+    def spare(self, phase: float, gain: float) -> float:
+        """Least reserve over two margins, as a share of them; negative if one is not kept."""
+        return min(min(self.phase, math.pi) / phase - 1.0, min(self.gain / gain, 4.0) - 1.0) if self.stable else -1.0
+
+
+def _decibels(factor: float) -> str:
+    return f"{round(20.0 * math.log10(factor), 1):g} dB"
+
+
+def _least(axis: Axis, points: list[Regime], loops: Sequence[str]) -> _Reached:
+    """The least margins of these loops."""
+    phases, gains = [(math.inf, "")], [math.inf]
+    for regime in points:
+        for loop in loops:
+            m, where = margins(*_loops(axis, regime, loop)), f"{loop} loop, {regime.name}"
+            if not m.stable:
+                return _Reached(0.0, 0.0, where, stable=False)
+            phases += [] if math.isnan(m.phase_margin) else [(m.phase_margin, where)]
+            gains += [] if math.isnan(m.gain_margin) else [m.gain_margin]
+    phase, where = min(phases)
+    return _Reached(phase, min(gains), where)
+
+
+def _reached(axis: Axis) -> str:
+    """The least margins of the gains of a formula, which it does not know."""
+    found = _least(axis, regimes(axis), axis.loops[axis.loops.index("speed") :])
+    little = "" if found.stable and found.phase >= LITTLE else ", which is little: the rule margins keeps more"
+    return f"least margins {found}{little}" if found.stable else f"unstable ({found.where}): take the rule margins"
+
+
+def _by_margins(axis: Axis, phase: float, gain: float, bandwidth: float | None) -> tuple[SpeedGains, str]:
+    """The greatest gain below the first one that breaks a margin, with the integral time ZERO J/K_p. With a bandwidth the smallest
+    gain that reaches it."""
     from scipy.optimize import brentq
 
     J, points = sum(inertias(axis)), regimes(axis)
 
-    def gains(K_p: float) -> SpeedGains:
-        return SpeedGains(K_p, K_p * K_p / (ZERO * J))
+    def tuned(K_p: float) -> Axis:
+        return _with(axis, SpeedGains(K_p, K_p * K_p / (ZERO * J)), None)
 
     def spare(K_p: float) -> float:
-        """Least of what is left of the margins, negative where one is not kept."""
-        left = []
-        tuned = _with(axis, gains(K_p), None)
-        for regime in points:
-            cut, closed = _loops(tuned, regime, "speed")
-            m = margins(cut, closed)
-            phase = math.pi if math.isnan(m.phase_margin) else m.phase_margin
-            gain = math.inf if math.isnan(m.gain_margin) else m.gain_margin
-            left += [phase / phase_margin - 1.0, min(gain / GAIN_MARGIN, 4.0) - 1.0] if m.stable else [-1.0]
-        return min(left)
+        return _least(tuned(K_p), points, ("speed",)).spare(phase, gain)
 
-    tried = J / lag_sum(axis.controller) * np.geomspace(*SPAN, TRIED)
+    tried = [float(K_p) for K_p in J / lag_sum(axis.controller) * np.geomspace(*SPAN, TRIED)]
+    left = {}
     kept = None
     for K_p in tried:
-        if spare(float(K_p)) > 0.0:
-            kept = float(K_p)
+        left[K_p] = spare(K_p)
+        if left[K_p] > 0.0:
+            kept = K_p
         elif kept is not None:
-            kept = float(brentq(spare, kept, float(K_p), xtol=1e-6 * kept, rtol=1e-6))
+            kept = float(brentq(spare, kept, K_p, xtol=1e-6 * kept, rtol=1e-6))
             break
+    what = f"{math.degrees(phase):.4g} degrees and a gain margin of {_decibels(gain)}"
     if kept is None:
-        raise InputError(
-            f"phase_margin: no gain from {tried[0]:.3g} to {tried[-1]:.3g} N·m·s/rad keeps {math.degrees(phase_margin):.4g} degrees and "
-            f"a gain margin of {GAIN_MARGIN:g} in all regimes; ask for less, or take filters or delays out of the loop"
+        best = max(left, key=lambda K_p: left[K_p])
+        worst = _least(tuned(best), points, ("speed",))
+        text = f"no gain keeps {what} in {counted(len(points), 'regime')}; the best, {best:.3g}, reaches {worst}"
+        raise InputError(f"{text}; ask for less, or take filters or delays out of the loop", "phase_margin")
+    if bandwidth is not None:
+        lacks = [_lowest_bandwidth(tuned(K_p), "speed") - bandwidth for K_p in (tried[0], kept)]
+        if lacks[1] < 0.0:
+            largest = f"the largest gain that keeps {what} has {bandwidth + lacks[1]:.3g} Hz"
+            raise InputError(f"{bandwidth:.4g} Hz is out of reach: {largest}; ask for less", "bandwidth")
+        kept = (
+            tried[0]
+            if lacks[0] >= 0.0
+            else float(
+                brentq(lambda K_p: _lowest_bandwidth(tuned(K_p), "speed") - bandwidth, tried[0], kept, rtol=1e-6)
+            )
         )
-    degrees = math.degrees(phase_margin)
-    return gains(
-        rounded(kept)
-    ), f"phase margin {degrees:.4g} degrees and gain margin {GAIN_MARGIN:g} kept in {counted(len(points), 'regime')}"
+    K_p = rounded(kept)
+    return SpeedGains(K_p, K_p * K_p / (ZERO * J)), f"phase margin {what} kept in {counted(len(points), 'regime')}"
 
 
 def _by_search(axis: Axis, goal: str, peak: float) -> tuple[SpeedGains, str, float | None]:
@@ -243,7 +337,7 @@ def _by_search(axis: Axis, goal: str, peak: float) -> tuple[SpeedGains, str, flo
     from scipy.optimize import minimize
 
     points = regimes(axis)
-    cautious, _ = _by_margins(axis, math.radians(65.0))
+    cautious, _ = _by_margins(axis, math.radians(65.0), 2.0, None)
     start = np.log([cautious.gain, cautious.gain / cautious.integral_gain])
     if axis.controller.position is not None:
         start = np.append(start, math.log(position_gain(_lowest_bandwidth(_with(axis, cautious, None), "speed"))))
@@ -266,9 +360,12 @@ def _by_search(axis: Axis, goal: str, peak: float) -> tuple[SpeedGains, str, flo
     find(lambda x: -judged(x)[0], start, method="COBYLA", constraints=[constraint], options=options)
     kept = [x for x, (_, spare) in known.items() if spare >= -1e-3]
     if not kept:
-        raise InputError(f"sensitivity_peak: no gains were found that keep {peak:g} in all regimes; permit more")
-    best = max(kept, key=lambda x: known[x][0])
-    gains, K_v = tuned(np.array(best))
+        reached = max((spare for _, spare in known.values()), default=-math.inf)
+        best = f"; the best reach {peak * (1.0 - reached):.4g}" if reached > -1.0 else ""
+        raise InputError(
+            f"no gains were found that keep {peak:g} in all regimes{best}; permit more", "sensitivity_peak"
+        )
+    gains, K_v = tuned(np.array(max(kept, key=lambda x: known[x][0])))
     return (
         gains,
         f"greatest {goal} with a peak of sensitivity of at most {peak:g} in {counted(len(points), 'regime')}, {len(known)} tried",
@@ -320,8 +417,12 @@ def _lowest_bandwidth(axis: Axis, loop: str) -> float:
                 f"rule: its gains are unstable in the regime {regime.name}, where the exact sampled loop has delays and compliance that "
                 'the rule does not know; take rule = "margins"'
             )
-        b = bandwidth_of(frequencies(closed), closed.closed_loop)
+        f = frequencies(closed)
+        b = bandwidth_of(f, closed.closed_loop)
         found += [x for x in (b.three_decibels, b.ninety_degrees) if not math.isnan(x)]
+        found += (
+            [float(f[0])] if abs(closed.closed_loop(f[:1])[0]) < math.sqrt(0.5) else []
+        )  # it falls below all of them
     return min(found, default=0.5 / axis.controller.loop_time(loop))
 
 
