@@ -201,6 +201,10 @@ lint: $(VENV)/dev
 	$(BIN)/mypy
 	@$(BIN)/clang-format --dry-run --Werror $(FORMATTED)
 
+.PHONY: lint-words
+lint-words: $(VENV)/tools
+	$(BIN)/python docs/lint_words.py
+
 .PHONY: stub
 stub: $(VENV)/built
 	$(BIN)/python -m nanobind.stubgen -q -m lostmotion._core -o src/lostmotion/_core.pyi

@@ -60,12 +60,6 @@ def test_the_readme_s_python_prints_what_it_shows(tmp_path: Path) -> None:
     assert done.stdout == shown.group(1)
 
 
-def test_the_readme_is_short() -> None:
-    lines = (ROOT / "README.md").read_text().splitlines()
-    assert len(lines) <= 80
-    assert max(map(len, lines)) <= 120
-
-
 def test_the_readme_s_second_picture_is_described_by_its_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(ROOT / "docs")
     figures = importlib.import_module("tracking_figures")
@@ -175,16 +169,6 @@ def test_figures_of_pages_leave_the_gallery_alone_and_are_written_once(
 
 def test_every_shipped_scenario_has_a_topic_in_the_gallery(generate: Any) -> None:
     assert {generate.topic_of(name) for name in lm.shipped_scenarios()} == set(generate.TOPICS)
-
-
-# A page of the site that opens with a picture, a command or a condition leaves the reader to guess whether it is for him.
-@pytest.mark.parametrize("page", sorted((ROOT / "docs").glob("*.md")), ids=lambda p: p.stem)
-def test_every_page_opens_with_its_readers_and_its_purpose(page: Path) -> None:
-    if page.name == "contributing.md":  # includes CONTRIBUTING.md
-        return
-    opening = " ".join(page.read_text().split("\n\n")[1].split())
-    assert re.match(r"This (page|site|tutorial) ", opening), opening
-    assert " for " in opening or opening.startswith("This page lists"), opening
 
 
 def test_every_page_is_in_one_part_of_the_site() -> None:

@@ -49,23 +49,6 @@ def test_a_function_states_parameters_returns_errors_and_an_example(name: str) -
         assert sections["Raises"].strip()
 
 
-@pytest.mark.parametrize("name", FUNCTIONS)
-def test_the_summary_of_a_function_is_one_sentence_that_begins_with_a_verb(name: str) -> None:
-    summary = sections_of(inspect.unwrap(FUNCTIONS[name]))[""].split("\n\n")[0].strip()
-    assert summary.endswith(".")
-    assert re.match(r"[A-Z][a-z]+ ", summary)
-    assert summary.split()[0] not in ("The", "A", "An", "Of", "As", "All", "Where", "What", "How", "One", "This"), (
-        summary
-    )
-
-
-@pytest.mark.parametrize("name", CLASSES)
-def test_a_class_says_what_it_is_in_a_sentence(name: str) -> None:
-    summary = sections_of(CLASSES[name])[""].split("\n\n")[0].strip()
-    assert len(summary.split()) >= 2 and summary[0].isupper(), summary
-    assert summary.split()[0] not in ("Of", "As", "Where", "What", "That"), summary
-
-
 EXAMPLES = [name for name, value in {**FUNCTIONS, **CLASSES}.items() if ">>> " in (inspect.getdoc(value) or "")]
 
 

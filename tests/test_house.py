@@ -11,7 +11,6 @@ from types import FrameType
 from typing import Any
 
 import pytest
-from pydantic import BaseModel
 
 import lostmotion
 from conftest import ROOT, run_in_build
@@ -235,20 +234,6 @@ def test_functions_that_platforms_round_differently_are_recognised() -> None:
         assert not rounded_differently(line), line
 
 
-SCREEN = 50  # lines of a function, without its heading and docstring
-
-
-def test_every_function_fits_on_a_screen() -> None:
-    long = []
-    for module in MODULES:
-        for node in ast.walk(ast.parse((PACKAGE / module).with_suffix(".py").read_text())):
-            if isinstance(node, ast.FunctionDef):
-                body = node.body[1:] if ast.get_docstring(node) else node.body
-                if body and (node.end_lineno or 0) - body[0].lineno >= SCREEN:
-                    long.append(f"{module}: {node.name}")
-    assert long == []
-
-
 def test_importing_takes_no_plotting_or_data_library_along() -> None:
     script = "import sys, lostmotion; print([m for m in ('matplotlib', 'xarray', 'pydantic', 'pint', 'numpy') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
@@ -260,50 +245,6 @@ def test_every_public_name_exists_and_is_documented() -> None:
         assert name == "VARIABLES" or public(name).__doc__
     with pytest.raises(AttributeError, match="no attribute 'simulat'"):
         _ = lostmotion.simulat
-
-
-# What is made from the statement of the core, and is not written by hand.
-GENERATED = {"_core.pyi", "described.pyi"}
-
-
-# Parameters of an element, a gear, controllers, a reference, a signal, a filter and the limits of a motor. No other part has a parameter of the same
-# name, but for the gains of three loops.
-STATED = {
-    "the gain of the position loop": r""" "gain",\s*"K_v" """,
-    "the gain of the speed loop": r""" "gain",\s*"k_p" """,
-    "the gain of the current loop": r""" "gain",\s*"g" """,
-    "the stiffness backward": r""" "backward",\s*"" """,
-    # sliders and campaigns use its key
-    "mesh_damping": r""" "mesh_damping",\s*"[^"]*",\s*"|^\s+mesh_damping: |def_\w+\("mesh_damping" """,
-} | {
-    key: rf"""["']{key}["']|^\s+{key}: |def_\w+\("{key}" """
-    for key in (
-        "rest_angle",
-        "reference_weight",
-        "decoupling",
-        "weakening_voltage",
-        "tracking_index",
-        "speed_bandwidth",
-        "reference_filter",
-        "crossing_time",
-        "pole_frequency",
-        "max_winding_temperature",
-        "end_frequency",
-    )
-}
-
-
-@pytest.mark.parametrize("name", STATED)
-def test_a_parameter_is_stated_in_one_file(name: str) -> None:
-    """By its key in quotes, as a field of a class, or as a member of a binding; with its test and its text it has three places."""
-    rooms = [ROOT / room for room in ("core/lostmotion", "bindings", "src/lostmotion", "page/src")]
-    sources = [p for room in rooms for p in room.rglob("*") if p.suffix in (".hpp", ".cpp", ".h", ".py", ".pyi", ".ts")]
-    stated = re.compile(STATED[name].strip(), re.MULTILINE)
-    written = [p for p in sources if p.name not in GENERATED and "fmu_libraries" not in p.parts]
-    files = [p.relative_to(ROOT) for p in written if stated.search(p.read_text())]
-    assert len(files) == 1, files
-    assert files[0].parts[:2] == ("core", "lostmotion")
-    assert not any("def_rw" in p.read_text() for p in (ROOT / "bindings").glob("*.hpp"))
 
 
 def test_no_part_states_again_what_the_core_describes() -> None:
@@ -323,62 +264,6 @@ def test_every_described_parameter_says_what_it_is() -> None:
             assert symbol or meaning, f"{table}.{key}"
             assert unit or kind != "pair" or key in ("limits", "loss_range"), f"{table}.{key}"
             assert default is None or not needed, f"{table}.{key}"
-
-
-# Values of this file, which changes another one: a value of a load and a gain of a controller.
-WRITTEN = """
-base = "position-axis"
-load.inertia = 1.2345
-controller.position.gain = 12.345
-"""
-MOST_FILES = 8  # from the text of a scenario file to the fields that the core takes
-
-
-def holds(given: Any, value: float) -> bool:
-    """Whether something is a value, or the table or part that has it."""
-    if isinstance(given, BaseModel):
-        given = vars(given)
-    entries = given.values() if isinstance(given, dict) else given if isinstance(given, list | tuple) else (given,)
-    return any(type(entry) is float and entry == value for entry in entries)
-
-
-def way_of(value: float, path: Path) -> list[str]:
-    """Files of the package with functions that are called with a value of a scenario file, until the core can take it."""
-    way, ended = ["inputs/toml_files.py"], False  # which reads it
-
-    def follow(frame: FrameType, event: str, result: Any) -> None:
-        nonlocal ended
-        code = frame.f_code
-        if ended or not code.co_filename.startswith(str(PACKAGE)):
-            return
-        sys.setprofile(None)
-        if event == "call":
-            count = code.co_argcount + code.co_kwonlyargcount + bool(code.co_flags & 4) + bool(code.co_flags & 8)
-            file = str(Path(code.co_filename).relative_to(PACKAGE))
-            if any(holds(frame.f_locals.get(name), value) for name in code.co_varnames[:count]) and way[-1] != file:
-                way.append(file)
-        elif event == "return" and code.co_name == "core_fields":
-            ended = holds(result, value)
-        sys.setprofile(follow)
-
-    sys.setprofile(follow)
-    try:
-        lostmotion.load(path).core()
-    finally:
-        sys.setprofile(None)
-    assert ended
-    return way
-
-
-@pytest.mark.parametrize("value", [1.2345, 12.345], ids=["load inertia", "gain of a controller"])
-def test_a_value_goes_from_its_file_to_the_core_without_return(value: float, tmp_path: Path) -> None:
-    lostmotion.load("position-axis")  # makes the parts
-    (tmp_path / "scenario.toml").write_text(WRITTEN)
-    way = way_of(value, tmp_path / "scenario.toml")
-    assert way[1] == "simulation/scenario_files.py"
-    assert way[-1] == "inputs/described.py"
-    assert len(way) <= MOST_FILES, way
-    assert len(set(way)) == len(way), way
 
 
 def test_a_loss_map_is_validated_once() -> None:
