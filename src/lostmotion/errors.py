@@ -113,22 +113,12 @@ def _raised_as(change: Callable[[InputError], InputError]) -> Iterator[None]:
 
 
 def inside(table: str) -> AbstractContextManager[None]:
-    """Errors of values within a table have its name before their keys.
-
-    Raises
-    ------
-    InputError
-    """
+    """Errors of values within a table have its name before their keys."""
     return _raised_as(lambda error: error.with_keys(lambda key: f"{table}.{key}"))
 
 
 def prefixed(where: object) -> AbstractContextManager[None]:
-    """Errors within begin with a file, log or function, or the key of a table of it.
-
-    Raises
-    ------
-    InputError
-    """
+    """Errors within begin with a file, log or function, or the key of a table of it."""
 
     def change(error: InputError) -> InputError:
         whole = f"{where}: {error.where}" if error.where else str(where)

@@ -14,12 +14,7 @@ from ..inputs.toml_files import in_short
 
 
 def try_file(path: Path) -> None:
-    """See, before the work, that a file can be written; nothing is left behind.
-
-    Raises
-    ------
-    InputError
-    """
+    """See, before the work, that a file can be written; nothing is left behind."""
     if os.path.isdir(path):
         raise InputError(f"{path}: is a directory; name a file")
     if os.path.exists(path) and not os.path.isfile(path):  # a device
@@ -32,24 +27,14 @@ def try_file(path: Path) -> None:
 
 
 def try_page(path: Path) -> None:
-    """Test whether the page of a report can be written, as `try_file` does.
-
-    Raises
-    ------
-    InputError
-    """
+    """Test whether the page of a report can be written, as `try_file` does."""
     if path.suffix not in (".html", ".htm"):
         raise InputError(f"{path}: a report is a page; its name must end in .html")
     try_file(path)
 
 
 def try_directory(path: Path) -> None:
-    """See, before the work, that files can be written into a directory, made if missing; nothing is left behind.
-
-    Raises
-    ------
-    InputError
-    """
+    """See, before the work, that files can be written into a directory, made if missing; nothing is left behind."""
     if os.path.lexists(path) and not os.path.isdir(path):
         raise InputError(f"{path}: is a file; -o names a directory")
     made: list[Path] = []

@@ -283,10 +283,6 @@ def check_torques(controllers: Mapping[str, Controller], torques: Mapping[str, f
         By the names of the motors [N·m].
     key
         Of the torque of a motor, for messages.
-
-    Raises
-    ------
-    InputError
     """
     for name, controller in controllers.items():
         kind = controller.current.kind

@@ -47,12 +47,7 @@ class Encoder(described.EncoderDelayFields, EncoderFields):
         return self
 
     def check_shaft(self, *, slides: bool) -> None:
-        """Refuse what a turn has on a slide, and a grating on a shaft.
-
-        Raises
-        ------
-        InputError
-        """
+        """Refuse what a turn has on a slide, and a grating on a shaft."""
         if not slides and self.grating_period is not None:
             raise InputError(
                 "is that of a linear scale, and this encoder is on a shaft; give lines or bits", "grating_period"

@@ -36,10 +36,6 @@ def read_mat_log(path: Path, *, time: str = "") -> Log:
     """Read a MATLAB file: vectors of one length and columns of matrices are channels, single numbers and words the header.
 
     Version 7.3 is read by h5py, older ones by scipy.
-
-    Raises
-    ------
-    InputError
     """
     if not _begins_with(path, b"MATLAB 7.3"):
         return log_of_variables(path, _mat5_variables(path), {}, time)
@@ -52,10 +48,6 @@ def read_hdf5_log(path: Path, *, time: str = "") -> Log:
 
     The attribute ``units`` or ``unit`` of a dataset is its unit. Datasets in groups are named ``GROUP/NAME``; attributes of the group of
     the time belong to the header too.
-
-    Raises
-    ------
-    InputError
     """
     found, units, attributes = _hdf5_variables(path, matlab=False)
     log = log_of_variables(path, found, units, time)
@@ -150,10 +142,6 @@ def read_parquet_log(path: Path, *, time: str = "") -> Log:
     """Read a Parquet table; a field's metadata ``unit`` is the unit of its column, other metadata of the table the header.
 
     Columns without numbers are not read.
-
-    Raises
-    ------
-    InputError
     """
     need("pyarrow", "Reading Parquet files", "identify")
     import pyarrow as pa
@@ -189,10 +177,6 @@ def read_mdf_log(path: Path, *, time: str = "") -> Log:
     """Read an MDF 4 file by asammdf: all channels at the instants of the channel `time`, or of the first.
 
     Algebraic conversions are read by `conversion_of`. Databases of buses that a file attaches are not read.
-
-    Raises
-    ------
-    InputError
     """
     need("asammdf", "Reading MDF files", "identify")
     check_mdf_blocks(path)
@@ -289,10 +273,6 @@ def read_tdms_log(path: Path, *, time: str = "") -> Log:
     """Read a TDMS file by npTDMS: the channels of all groups; their time is a channel, or increments of the waveform.
 
     Channels without numbers are not read.
-
-    Raises
-    ------
-    InputError
     """
     need("nptdms", "Reading TDMS files", "identify")
     import nptdms

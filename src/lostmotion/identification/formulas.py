@@ -106,12 +106,7 @@ def names_within(value: object) -> frozenset[str]:
 
 
 def number(text: str | float, known: Mapping[str, Any], key: str) -> float:
-    """The value of a formula.
-
-    Raises
-    ------
-    InputError
-    """
+    """The value of a formula."""
     if isinstance(text, int | float):
         return float(text)
     try:

@@ -83,12 +83,7 @@ def rates_of(points: np.ndarray) -> np.ndarray:
 
 
 def refuse_given_motion(scenario: Scenario) -> None:
-    """Refuse a rig with a shaft whose motion is given, which begins at no measured state.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse a rig with a shaft whose motion is given, which begins at no measured state."""
     for name, shaft in scenario.shafts.items():
         if shaft.speed is not None:
             raise InputError(f"the motion of shafts.{name} is given")

@@ -65,12 +65,7 @@ class ConditionError:
 
 
 def refuse_leave_out(task: Identification, logs: Sequence[Prepared]) -> None:
-    """Refuse a key of ``fit.leave_out`` that does not divide the fitted logs.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse a key of ``fit.leave_out`` that does not divide the fitted logs."""
     train = [log for log in logs if not log.held_out]
     for key in task.fit.leave_out:
         lacking = [log.name for log in train if key not in log.facts]

@@ -23,12 +23,7 @@ DEFLATE = (0, 1)  # plain and transposed
 
 
 def check_mdf_blocks(path: Path) -> None:
-    """Refuse a file whose lists never end, or whose data need more memory than the limit.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuse a file whose lists never end, or whose data need more memory than the limit."""
     try:
         with path.open("rb") as file:
             if file.read(8).strip() not in (b"MDF", b"UnFinMF") or not file.read(8).startswith(b"4"):

@@ -23,10 +23,6 @@ def read_numpy_log(path: Path, *, time: str = "") -> Log:
 
     The fields of a structured array are channels by their names. Columns of the array of an NPY file are ``column 1``,
     ``column 2`` and so on.
-
-    Raises
-    ------
-    InputError
     """
     variables: dict[str, Any] = {}
     units: dict[str, str] = {}

@@ -40,12 +40,7 @@ class Recording:
     """bytes of memory that its messages need, as estimated"""
 
     def add(self, topic: str, at: int, decode: Callable[[bytes], Any] | None, data: bytes, encoding: str) -> None:
-        """Decode a message and keep it, if all messages together fit into the memory limit.
-
-        Raises
-        ------
-        InputError
-        """
+        """Decode a message and keep it, if all messages together fit into the memory limit."""
         if decode is None:
             self.left_out[topic] = encoding or "of no stated encoding"
             return

@@ -29,10 +29,6 @@ def read_servo_json(path: Path, *, time: str = "") -> Log:
     ----------
     time
         Key of the time in each entry; left out, ``timestamp``, or steps of ``dt`` of the header.
-
-    Raises
-    ------
-    InputError
     """
     clock = time or "timestamp"
     try:

@@ -32,10 +32,6 @@ def read_xlsx_log(path: Path, *, time: str = "") -> Log:
     """Read the first sheet of a workbook with values: a heading, in the first column ``# key: value`` above it as the header.
 
     Formulas count by the values that are saved with them. Times are numbers, time stamps, or cells with a date.
-
-    Raises
-    ------
-    InputError
     """
     need("openpyxl", "Reading XLSX files", "identify")
     import openpyxl

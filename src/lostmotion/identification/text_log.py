@@ -66,10 +66,6 @@ def read_text_log(path: Path, *, time: str = "", decimal: str = "") -> Log:
         Name of the column of the time; left out, ``time``, ``t``, ``timestamp``, or the first column.
     decimal
         What separates decimals. Left out, a comma is taken only where nothing else makes a table of the text, and is noted.
-
-    Raises
-    ------
-    InputError
     """
     try:
         text = path.read_text(encoding="utf-8-sig")

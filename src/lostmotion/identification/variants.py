@@ -32,12 +32,7 @@ class Variants:
         self._checked: set[Any] = set()
 
     def __call__(self, changes: Mapping[str, Any]) -> Scenario:
-        """The scenario with values by dotted key.
-
-        Raises
-        ------
-        InputError
-        """
+        """The scenario with values by dotted key."""
         data = dict(self._data)
         set_values(data, changes.items())
         shape = tuple((key, _shape(value)) for key, value in changes.items())

@@ -66,10 +66,6 @@ def check_memory(needed: float, what: str, default: int = LOG) -> None:
         The input, as the beginning of the message.
     default
         Limit where the user gives none [bytes].
-
-    Raises
-    ------
-    InputError
     """
     if needed > (limit := memory_limit(default)):
         raise InputError(

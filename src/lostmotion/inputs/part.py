@@ -74,12 +74,7 @@ class Part(BaseModel):
 
     @classmethod
     def of_parts(cls, **parts: Any) -> Self:
-        """Make the part of parts that are not checked again. It is only checked whether they fit together.
-
-        Raises
-        ------
-        InputError
-        """
+        """Make the part of parts that are not checked again. It is only checked whether they fit together."""
         made = cls.model_construct(None, **parts)
         try:
             for rule in cls.__pydantic_decorators__.model_validators.values():

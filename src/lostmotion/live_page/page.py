@@ -61,10 +61,5 @@ def page(scenario: Scenario, name: str = "drive") -> str:
 
 
 def write_page(path: Path, scenario: Scenario) -> None:
-    """Writes the page of a scenario, whole or not at all.
-
-    Raises
-    ------
-    InputError
-    """
+    """Writes the page of a scenario, whole or not at all."""
     write_bytes(path, page(scenario, path.stem).encode())

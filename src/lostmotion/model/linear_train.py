@@ -47,12 +47,7 @@ class LinearElements(TrainElements):
         return next((f"{source}.{name}" for source in found), super().key_of(table, name))
 
     def check_places(self, shafts: Mapping[str, Any], slides: Mapping[str, Any]) -> None:
-        """Refuse what joins a slide with something that has other units, and names that are given twice.
-
-        Raises
-        ------
-        InputError
-        """
+        """Refuse what joins a slide with something that has other units, and names that are given twice."""
         for name in slides:
             if name in shafts:
                 raise InputError("have the same name; rename one of them", f"shafts.{name}", f"slides.{name}")

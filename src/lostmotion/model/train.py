@@ -138,10 +138,6 @@ class DriveTrain(TrainElements):
         ----------
         what
             What does, and the remedy.
-
-        Raises
-        ------
-        InputError
         """
         for name, mass in self.mass_matrices.items():
             for one, other, _ in mass.couples():
@@ -243,12 +239,7 @@ class DriveTrain(TrainElements):
 
     @classmethod
     def of_tables(cls, **parts: Any) -> Self:
-        """The train of parts that are not checked again. Whether it moves is left to a check that knows given motions.
-
-        Raises
-        ------
-        InputError
-        """
+        """The train of parts that are not checked again. Whether it moves is left to a check that knows given motions."""
         made = cls.model_construct(None, **parts)
         made._names_what_it_has()
         return made

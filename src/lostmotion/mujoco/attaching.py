@@ -31,12 +31,7 @@ if TYPE_CHECKING:
 
 
 def drive_of_joint(joint: str, given: Any, controller: Controller | None) -> Scenario:
-    """Return the argument of `attach` for a joint as a scenario, with the controller if there is one.
-
-    Raises
-    ------
-    InputError
-    """
+    """Return the argument of `attach` for a joint as a scenario, with the controller if there is one."""
     if isinstance(given, str | Path):
         given = _named(joint, str(given))
     if not isinstance(given, Drive | DriveTrain | Scenario):

@@ -50,12 +50,7 @@ def description(scenario: Scenario, *, parameters: bool = True) -> np.ndarray:
 
 
 def described(scenario: Scenario) -> tuple[np.ndarray, list[tuple[str, float]]]:
-    """The description with its parameters, and their keys and values.
-
-    Raises
-    ------
-    InputError
-    """
+    """The description with its parameters, and their keys and values."""
     found = derivation_of(scenario, numbers_of)
     return written(scenario, found), [(p.key, p.value) for p in found.parameters]
 
@@ -70,12 +65,7 @@ def written(scenario: Scenario, derivation: Derivation) -> np.ndarray:
 
 
 def numbers_of(scenario: Scenario) -> np.ndarray:
-    """The numbers of a scenario alone.
-
-    Raises
-    ------
-    InputError
-    """
+    """The numbers of a scenario alone."""
     if own := [name for name, controller in scenario.axes().items() if controller.law]:
         raise InputError(
             f"controller of {own[0]}: has a law of your own, which only Python can call; describe the scenario without it, and turn "

@@ -56,12 +56,7 @@ class Plant:
     """references of its controllers, by the name of the input"""
 
     def known_source(self, source: str | None) -> str:
-        """The name of an input, if it is one, or of the only motor's command or reference.
-
-        Raises
-        ------
-        InputError
-        """
+        """The name of an input, if it is one, or of the only motor's command or reference."""
         names = [*self.references, *self.signals]
         listed = " or ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
         if source is None and self.source is None:
@@ -71,12 +66,7 @@ class Plant:
         return source or self.source or ""
 
     def known_output(self, output: str | None) -> str:
-        """The name of an output, if it is one, or of the speed of the load.
-
-        Raises
-        ------
-        InputError
-        """
+        """The name of an output, if it is one, or of the speed of the load."""
         return self.output if output is None else known_output(output, self.channels)
 
     def unit(self, source: str) -> str:
@@ -195,12 +185,7 @@ def _plant_of(scenario: Scenario) -> Plant:
 
 
 def known_output(output: str, known: Sequence[str]) -> str:
-    """The name of an output, if it is one of those that are known.
-
-    Raises
-    ------
-    InputError
-    """
+    """The name of an output, if it is one of those that are known."""
     if output not in known:
         raise InputError(f"output {shown(output)} is not known; it must be one of {listed(known)}")
     return output

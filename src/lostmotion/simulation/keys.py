@@ -18,12 +18,7 @@ from ..units.scalars import is_number, plain
 
 
 def parse_override(text: str) -> tuple[str, Any]:
-    """Key and value of ``KEY=VALUE``; a value that is no TOML is text.
-
-    Raises
-    ------
-    InputError
-    """
+    """Key and value of ``KEY=VALUE``; a value that is no TOML is text."""
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
         raise InputError(f"--set {text}: must be KEY=VALUE, such as --set command.amplitude=0.1")

@@ -9,12 +9,7 @@ from .scenario import Scenario
 
 
 def need_open_loop(scenario: Scenario, function: str) -> None:
-    """Refuses a scenario with controllers, for what follows given commands alone.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuses a scenario with controllers, for what follows given commands alone."""
     if scenario.axes():
         table = scenario.key_in_file(scenario.controller_key(next(iter(scenario.axes())))).partition(".")[0]
         none = "None" if table == "controller" else "{}"
@@ -26,12 +21,7 @@ def need_open_loop(scenario: Scenario, function: str) -> None:
 
 
 def need_no_impacts(scenario: Scenario | DriveTrain, function: str) -> None:
-    """Refuses a train with rigid flanks or end stops that strike, for what takes motions without impacts.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuses a train with rigid flanks or end stops that strike, for what takes motions without impacts."""
     if isinstance(scenario, Scenario):
         gears = scenario.gears_by_key()
     else:
@@ -54,12 +44,7 @@ def need_no_impacts(scenario: Scenario | DriveTrain, function: str) -> None:
 
 
 def need_free_motion(scenario: Scenario, function: str) -> None:
-    """Refuses a train in which the motion of a shaft is given or flanks strike, for what torques alone are to move.
-
-    Raises
-    ------
-    InputError
-    """
+    """Refuses a train in which the motion of a shaft is given or flanks strike, for what torques alone are to move."""
     need_no_impacts(scenario, function)
     if given := scenario.given():
         raise InputError(

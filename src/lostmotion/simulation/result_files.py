@@ -30,12 +30,7 @@ PER_BYTE = 4  # bytes of memory for each byte of a result in CSV
 
 
 def check_output(path: str | Path) -> Path:
-    """The path, if a result can be written there by its ending and its directory.
-
-    Raises
-    ------
-    InputError
-    """
+    """The path, if a result can be written there by its ending and its directory."""
     path = Path(path)
     if path.suffix not in FORMATS:
         endings = ", ".join(f"{ending} ({name})" for ending, name in FORMATS.items())

@@ -115,12 +115,7 @@ class Scenario:
             self.check()
 
     def check(self) -> None:
-        """Refuse tables that contradict each other.
-
-        Raises
-        ------
-        InputError
-        """
+        """Refuse tables that contradict each other."""
         try:
             with _in_keys(self.key_in_file):
                 check_train(self)

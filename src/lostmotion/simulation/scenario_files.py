@@ -104,12 +104,7 @@ def changed(tables: dict[str, Any], path: Path) -> Scenario:
 
 
 def read_tables(path: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> dict[str, Any]:
-    """The tables of a scenario file with those of its `base` and the overrides, records still as `from`.
-
-    Raises
-    ------
-    InputError
-    """
+    """The tables of a scenario file with those of its `base` and the overrides, records still as `from`."""
     path = find_scenario(path)
     data = _read(path, ())
     override(data, overrides, path)
@@ -117,12 +112,7 @@ def read_tables(path: str | Path, overrides: Mapping[str, Any] | Iterable[str] =
 
 
 def override(data: dict[str, Any], overrides: Mapping[str, Any] | Iterable[str], path: Path) -> None:
-    """Changes tables of a file by dotted key.
-
-    Raises
-    ------
-    InputError
-    """
+    """Changes tables of a file by dotted key."""
     overrides = [overrides] if isinstance(overrides, str) else overrides
     if not isinstance(overrides, Iterable) or not all(isinstance(entry, str) for entry in overrides):
         raise InputError(f'{shown(overrides)} must be changes by key, such as {{"command.amplitude": 0.1}}')
@@ -302,12 +292,7 @@ def scenario_text(scenario: Scenario, comment: str) -> str:
 
 
 def gearbox_from_record(reference: str, overrides: Iterable[str] = ()) -> tuple[Gearbox, tuple[str, ...]]:
-    """A record's gearbox with ``KEY=VALUE`` changes, as in `[gearbox]`, and its notes.
-
-    Raises
-    ------
-    InputError
-    """
+    """A record's gearbox with ``KEY=VALUE`` changes, as in `[gearbox]`, and its notes."""
     changes: dict[str, Any] = {}
     set_values(changes, ((key.removeprefix("gearbox."), value) for key, value in map(parse_override, overrides)))
     values, built = gearbox_table(reference, changes)
@@ -318,12 +303,7 @@ def gearbox_from_record(reference: str, overrides: Iterable[str] = ()) -> tuple[
 
 
 def screw_from_record(reference: str, overrides: Iterable[str] = ()) -> ScrewData:
-    """A record's screw with ``KEY=VALUE`` changes, as beside `from` in `[screws.NAME]`.
-
-    Raises
-    ------
-    InputError
-    """
+    """A record's screw with ``KEY=VALUE`` changes, as beside `from` in `[screws.NAME]`."""
     changes: dict[str, Any] = {}
     set_values(changes, ((key.removeprefix("screw."), value) for key, value in map(parse_override, overrides)))
     values = linear_table("screw", reference, changes, "screw")

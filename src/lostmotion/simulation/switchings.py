@@ -27,12 +27,7 @@ TORQUES = ("output_torque_before", "output_torque_after")
 
 
 def names_in(attributes: Mapping[str, Any]) -> tuple[str, ...]:
-    """Names of the columns of the switchings of a result with these attributes.
-
-    Raises
-    ------
-    InputError
-    """
+    """Names of the columns of the switchings of a result with these attributes."""
     if COLUMNS not in attributes:
         raise InputError("this result is of an earlier version, whose switchings are numbered otherwise; run it again")
     return tuple(str(attributes[COLUMNS]).split())

@@ -127,10 +127,6 @@ def check_names(
     ----------
     written
         The elements as they were written, for messages; default: the elements of the train.
-
-    Raises
-    ------
-    InputError
     """
     seen = {"time"}
     for variable in (

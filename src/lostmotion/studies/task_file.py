@@ -114,12 +114,7 @@ def _units_on_a_slide(place: tuple[str, ...]) -> list[str]:
 
 
 def task_of(tables: dict[str, Any], directory: Path = Path()) -> Study:
-    """The study of the tables of a task file.
-
-    Raises
-    ------
-    InputError
-    """
+    """The study of the tables of a task file."""
     for key in tables:
         if key not in TABLES:
             raise InputError(unknown_key(key, TABLES), key)
@@ -492,12 +487,7 @@ def _first(written: dict[str, Any], entry: dict[str, Any]) -> None:
 
 
 def _part_of(kind: str, name: Any, beside: dict[str, Any]) -> None:
-    """Sees that a record can be run.
-
-    Raises
-    ------
-    InputError
-    """
+    """Sees that a record can be run."""
     from ..data_sheets.components import gearbox_table, motor_table
 
     (gearbox_table if kind == "gearbox" else motor_table)(name, beside)
