@@ -11,13 +11,13 @@ import numpy as np
 from ..model.losses import LossMap
 from ..reports.looks import FAINT, LEVEL, STYLES, step
 from ..reports.pages import panels_csv, plain, table_csv
-from ..reports.panels import Chart, Curve, Drawing, Ground, Panel, scientific
+from ..reports.panels import Chart, Curve, Ground, Panel, scientific
 from ..response.crossovers import THREE_DECIBELS
 from ..response.rigid import rigid_constants
 from .drive import AMPLITUDES, MODELS, paper_scenario
 from .facts import Facts
 from .runs import FREQUENCIES, Results, stuck_intervals
-from .schematics import sketches
+from .schematics import drawings
 
 if TYPE_CHECKING:
     import xarray
@@ -405,7 +405,7 @@ def draw(spec: FigureSpec) -> Figure:
 def charts_of(spec: FigureSpec) -> tuple[Chart, ...]:
     """Charts of a specification on a page, with plain labels."""
     if spec.number == SCHEMATICS.number:
-        return tuple(Drawing(sketch.title, sketch.svg(), sketch.width > 12.0) for sketch in sketches())
+        return drawings()
     if spec.number == LOSS_MAP.number:
         return _loss_panels()
     return tuple(map(_plainly, spec.panels))
