@@ -4,11 +4,7 @@
 #include <string_view>
 
 #include "arrays.hpp"
-#include "lostmotion/scenario/control_fields.hpp"
 #include "lostmotion/scenario/law_fields.hpp"
-#include "lostmotion/scenario/machine_fields.hpp"
-#include "lostmotion/scenario/shaft_fields.hpp"
-#include "lostmotion/scenario/task_fields.hpp"
 
 namespace lostmotion::binding {
 
@@ -16,22 +12,14 @@ namespace {
 
 // Of each parameter that a scenario file may have: key, kind, symbol, unit, meaning, range (above, from on, up to),
 // whether it is needed, its default, None where it is left out, and more: of a list the fewest and the most entries, of
-// a table the names of the parts that it may be.
+// a table the name of its part.
 class DescribedFields : public FieldVisitor {
  public:
     nb::list rows;
 
-    using FieldVisitor::choice;
     using FieldVisitor::flag;
     using FieldVisitor::number;
     void number(const Field& field, double v = 0.0) { add(field, "number", limits(field.range), nb::float_(v)); }
-    void number(const Field& field, double v, double least, double most) {
-        const nb::object above = limits(field.range)[0];
-        add(field, "number", nb::make_tuple(above, above.is_none() ? bound(least) : nb::none(), bound(most)),
-            nb::float_(v));
-    }
-    // Numbers by the names of elements.
-    void named(const Field& field) { add(field, "named", limits(field.range), nb::dict()); }
     void pair(const Field& field, const std::array<double, 2>& v) {
         add(field, "pair", limits(field.range), nb::make_tuple(v[0], v[1]));
     }
@@ -57,30 +45,9 @@ class DescribedFields : public FieldVisitor {
         use();
         needed_.clear();
     }
-    // Entries of two numbers, the first in the range of the field.
-    void pairs(const Field& field, Range second, int most) {
-        add(field, "pairs", limits(field.range), nb::make_tuple(), nb::make_tuple(limits(second), most));
-    }
-    void texts(const Field& field, int count) {
-        add(field, "texts", limits(Range::any), nb::none(), nb::make_tuple(count));
-    }
-    void instant(const Field& field) { add(field, "instant", limits(Range::any), nb::none()); }
-    // Rows of numbers.
-    void matrix(const Field& field) { add(field, "matrix", limits(field.range), nb::make_tuple()); }
     template <class Use>
-    void table(const Field& field, const char* parts, Use&&) {
-        table(field, parts);
-    }
-    void table(const Field& field, const char* parts) {
-        add(field, "table", limits(Range::any), nb::dict(), parts_of(parts));
-    }
-    // One of several words, by default the first.
-    void choice(const Field& field, const char* words) {
-        const nb::object all = parts_of(words);
-        add(field, "choice", limits(Range::any), all[0], all);
-    }
-    void tables(const Field& field, const char* part) {
-        add(field, "tables", limits(Range::any), nb::make_tuple(), parts_of(part));
+    void table(const Field& field, const char* part, Use&&) {
+        add(field, "table", limits(Range::any), nb::dict(), nb::make_tuple(part));
     }
 
  private:
@@ -99,8 +66,6 @@ class DescribedFields : public FieldVisitor {
             default: return nb::make_tuple(none, none, none);
         }
     }
-    static nb::object bound(double v) { return std::isinf(v) ? nb::none() : nb::object(nb::float_(v)); }
-    static nb::object parts_of(const char* parts) { return nb::str(parts).attr("split")("|"); }
     void add(const Field& field, const char* kind, const nb::tuple& range, const nb::object& value,
              const nb::object& more = nb::make_tuple()) {
         const bool chosen = std::ranges::find(needed_, field.key) != needed_.end();
@@ -127,11 +92,7 @@ void bind_described(nb::module_& m) {
                 model::each_table(add);
                 control::each_table(add);
             } else {
-                signals::each_table(add);
-                signals::each_shaft_table(add);
-                tables::each_machine(add);
-                tables::each_law(add);
-                tables::each_task(add);
+                laws::each_table(add);
             }
             return tables;
         },
@@ -139,9 +100,10 @@ void bind_described(nb::module_& m) {
         nb::sig("def described_tables(of_core: bool) -> dict[str, list[tuple[str, str, str, str, str, tuple[float | "
                 "None, float | "
                 "None, float | None], bool, typing.Any, tuple[typing.Any, ...]]]]"),
-        "Of each part that the core takes by these keys, or of the others that scenario files have, its parameters: "
+        "Of each part that the core takes by these keys, or of those of which it makes curves and filters, its "
+        "parameters: "
         "key, kind, symbol, unit, meaning, range (above, from on, up to), "
-        "whether it is needed, default, and more: of a list the fewest and the most entries, of a table the parts.");
+        "whether it is needed, default, and more: of a list the fewest and the most entries, of a table the part.");
     m.def(
         "reference_blocks",
         [] {

@@ -19,7 +19,7 @@
 #include "lostmotion/analysis/steady_regime.hpp"
 #include "lostmotion/analysis/train_batch.hpp"
 #include "lostmotion/model/train_description.hpp"
-#include "lostmotion/scenario/machine_fields.hpp"
+#include "lostmotion/scenario/law_fields.hpp"
 #include "lostmotion/scenario/variables.hpp"
 
 namespace lostmotion::binding {
@@ -428,7 +428,7 @@ inline void bind_train(nb::module_& m) {
     m.def(
         "dry_friction",
         [](const Record& fields) {
-            const auto f = described<signals::FrictionTable>(fields).law();
+            const auto f = described<laws::FrictionTable>(fields).law();
             Record out;
             out["torque"] = f.torque, out["breakaway_torque"] = f.breakaway_torque;
             out["speeds"] = f.speeds, out["torques"] = f.torques;

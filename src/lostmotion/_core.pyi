@@ -98,7 +98,7 @@ class Signal:
 
 def described_tables(of_core: bool) -> dict[str, list[tuple[str, str, str, str, str, tuple[float | None, float | None, float | None], bool, Any, tuple[Any, ...]]]]:
     """
-    Of each part that the core takes by these keys, or of the others that scenario files have, its parameters: key, kind, symbol, unit, meaning, range (above, from on, up to), whether it is needed, default, and more: of a list the fewest and the most entries, of a table the parts.
+    Of each part that the core takes by these keys, or of those of which it makes curves and filters, its parameters: key, kind, symbol, unit, meaning, range (above, from on, up to), whether it is needed, default, and more: of a list the fewest and the most entries, of a table the part.
     """
 
 def reference_blocks() -> list[tuple[str, str, str]]:

@@ -1,20 +1,25 @@
 """A camera on the axis, and the filter that makes angle, rate and acceleration of a target from its frames."""
 
-from typing import Self
+from typing import Annotated, Self
 
 from pydantic import model_validator
 
 from .. import _core
-from ..inputs import described
 from ..inputs.described import CameraFields, TrackerFields
+from ..inputs.quantities import NotNegative, Positive, Time
 
 
-class Camera(described.CameraTimingFields, CameraFields):
+class Camera(CameraFields):
     """Camera on the shaft of the reference, which measures the angle between the target and the line of sight.
 
     Frame n, at n ``sample_time``: ``p floor((o + noise N_n)/p + 1/2)`` of the offset o while ``|o| <= field/2``,
     added to the reading of the position encoder. N_n are standard normal, p is ``pixel/pixel_parts``.
     """
+
+    sample_time: Annotated[Time, Positive]
+    """time from frame to frame; a whole multiple of the controller's sample time"""
+    latency: Annotated[Time, NotNegative] = 0.0
+    """from the exposure of a frame until the controller has what it shows; a whole multiple, too"""
 
     @model_validator(mode="after")
     def _sees_a_pixel(self) -> Self:

@@ -11,21 +11,33 @@ from pydantic import Field, model_validator
 
 from .. import _core
 from ..errors import InputError, inside, need
-from ..inputs import described
 from ..inputs.arguments import checked
-from ..inputs.quantities import Angle, Limit, Number, Speed
+from ..inputs.part import Part
+from ..inputs.quantities import (
+    Angle,
+    Inertia,
+    NotNegative,
+    Number,
+    Positive,
+    Share,
+    Speed,
+    Stiffness,
+    Time,
+    Torque,
+    ViscousFriction,
+)
 from ..inputs.validation import did_you_mean, shown
 from ..model.motor import Motor
 from ..model.signals import CommandSignal, Signal, Step
 from ..model.train import DriveTrain
 from ..recorded import numbers
 from ..reproducible import sin
+from ..units.conversion import Unit
 from .firmware import Firmware
 from .loops import FirstOrderCurrent, IdealCurrent, VoltageCommand
 from .turning import turns
 
 MAX_ORDER = 8  # of a state space
-Share = Limit(ge=0.0, le=1.0)
 
 Row = tuple[Number, ...]
 
@@ -56,7 +68,14 @@ class LinearSystem:
     back: np.ndarray
 
 
-class _PID(described.PIDFields):
+class _PID(Part):
+    proportional_weight: Annotated[Number, Share] = 1.0
+    """share of the reference that the proportional part sees: below 1 steps of the reference overshoot less"""
+    derivative_weight: Annotated[Number, Share] = 0.0
+    """share of the reference that the derivative part sees: 0 takes the derivative of what is measured alone"""
+    filter_time: Annotated[Time, NotNegative] = 0.0
+    """time constant of the first-order filter of the derivative"""
+
     @property
     def gains(self) -> tuple[float, float, float]:
         """k_p, k_i, k_d (SI)."""
@@ -94,16 +113,30 @@ class _PID(described.PIDFields):
         return LinearSystem(tuple(direct), tuple(rows), A, B, C, numbers(list(direct.values())), back_calculation)
 
 
-class PositionPID(described.PositionPIDFields, _PID):
+class PositionPID(_PID):
     """PID controller of a position: ``k_p (b r - phi) + k_i integral of (r - phi) + k_d d/dt (c r - phi)/(1 +
     filter_time d/dt)``.
     """
 
+    gain: Annotated[Stiffness, NotNegative] = 0.0
+    """k_p"""
+    integral_gain: Annotated[float, Unit("N*m/rad/s"), NotNegative] = 0.0
+    """k_i"""
+    derivative_gain: Annotated[ViscousFriction, NotNegative] = 0.0
+    """k_d"""
 
-class SpeedPID(described.SpeedPIDFields, _PID):
+
+class SpeedPID(_PID):
     """PID controller of a speed: ``k_p (b r - w) + k_i integral of (r - w) + k_d d/dt (c r - w)/(1 + filter_time
     d/dt)``.
     """
+
+    gain: Annotated[ViscousFriction, NotNegative] = 0.0
+    """k_p"""
+    integral_gain: Annotated[Stiffness, NotNegative] = 0.0
+    """k_i"""
+    derivative_gain: Annotated[Inertia, NotNegative] = 0.0
+    """k_d"""
 
     @model_validator(mode="after")
     def _filtered(self) -> Self:
@@ -114,10 +147,21 @@ class SpeedPID(described.SpeedPIDFields, _PID):
         return self
 
 
-class StateSpace(described.StateSpaceFields):
+class StateSpace(Part):
     """State space ``x' = A x + B e, v = C x + D e`` in SI, of the error, or of reference and measured value if B and
     D have two columns.
     """
+
+    A: tuple[tuple[Number, ...], ...] = ()
+    """one row for each state"""
+    B: tuple[tuple[Number, ...], ...] = ()
+    """one row for each state, a column for each input"""
+    C: tuple[Number, ...] = ()
+    """one entry for each state"""
+    D: tuple[Number, ...] = (0.0,)
+    """one entry for each input"""
+    back_calculation: tuple[Number, ...] | None = None
+    """per state, what the excess over the limit adds to its rate: x' = A x + B e + back_calculation (u - v)"""
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
@@ -157,7 +201,7 @@ class StateSpace(described.StateSpaceFields):
         return LinearSystem(("reference", "measured"), states, A, B, np.array(self.C, float), D, back)
 
 
-class ContinuousController(described.ContinuousControllerFields):
+class ContinuousController(Part):
     """A controller without sample time, whose states are states of the train: for theory, and for exact limit cycles.
 
     Examples
@@ -167,6 +211,10 @@ class ContinuousController(described.ContinuousControllerFields):
     8.0
     """
 
+    limit: Annotated[Torque, Positive] | None = None
+    """limit of the magnitude of the torque; torque_limit and the largest current of the motor act, too"""
+    anti_windup_time: Annotated[Time, Positive] | None = None
+    """with which the integrator follows the limited output (back-calculation); left out, gain/integral_gain"""
     kind: Literal["continuous"]
     reference: Annotated[PositionSignal | SpeedSignal, Field(discriminator="kind")]
     """reference of the angle or the speed of `shaft`"""

@@ -5,8 +5,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from ..inputs import described
 from ..inputs.described import ReferenceBlocks
+from ..inputs.quantities import NotNegative, Positive, Switch, Time, Whole
 from ..recorded import real
 from .camera import Camera, Tracker
 from .continuous import ContinuousController
@@ -32,7 +32,7 @@ AnyCurrent = Annotated[
 ]
 
 
-class Controller(described.ControllerFields, ReferenceBlocks):
+class Controller(ReferenceBlocks):
     """Cascade of position, speed and current loop, each at its own sample time; what is left out is not there.
 
     At each sample instant the encoders are read, the loops that are due are computed, the outermost first, and what the innermost
@@ -46,6 +46,16 @@ class Controller(described.ControllerFields, ReferenceBlocks):
     (0.000125, 10.0)
     """
 
+    sample_time: Annotated[Time, Positive]
+    """sample time of the innermost loop, and of loops without their own"""
+    delay: Annotated[Whole, Field(ge=0, le=1)] = 1
+    """sample times from reading the encoders until the result acts"""
+    blend_time: Annotated[Time, Positive] | None = None
+    """time constant of the low pass through which the position encoder corrects the encoder of the speed loop; left out, the position encoder counts alone"""
+    law: Switch = False
+    """the loops are a function of your own, which `simulate(..., law=function)` gives"""
+    phase: Annotated[Time, NotNegative] = 0.0
+    """by which the samples of the position loop come after those of the others"""
     kind: Literal["sampled"] = "sampled"
     reference: AnyReference
     """reference of the position, the speed or the torque, which the outermost loop follows; with a camera, the path of the target"""

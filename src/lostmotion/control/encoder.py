@@ -1,18 +1,18 @@
 """Encoders: what a controller reads of an angle."""
 
-from typing import Self
+from typing import Annotated, Self
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from .. import _core
 from ..errors import InputError
-from ..inputs import described
 from ..inputs.described import EncoderFields
+from ..inputs.quantities import Whole
 
 RESOLUTION_KEYS = ("lines", "bits", "grating_period", "resolution")
 
 
-class Encoder(described.EncoderDelayFields, EncoderFields):
+class Encoder(EncoderFields):
     """A rotary encoder on a shaft: ``q floor(angle/q + 1/2) + error sin(periods angle + phase)``.
 
     Its resolution q is 2 pi/(4 lines) for an incremental encoder, which has `lines`. For an absolute encoder, which
@@ -26,6 +26,8 @@ class Encoder(described.EncoderDelayFields, EncoderFields):
     20
     """
 
+    delay: Annotated[Whole, Field(ge=0, le=1000)] = 0
+    """sample times from the reading until the controller has it"""
     shaft: str | None = None
     """shaft with the encoder; default: the motor's shaft"""
 

@@ -6,15 +6,21 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from ..errors import InputError
-from ..inputs import described
 from ..inputs.described import FirmwareFields
+from ..inputs.part import Part
+from ..inputs.quantities import Angle, NotNegative, Number, Share
 from ..reproducible import interpolate
 
 
-class DutyCurve(described.DutyCurveFields):
+class DutyCurve(Part):
     """Duty cycle of the bridge over the position error, in straight lines from point to point; odd, and constant beyond the last
     point.
     """
+
+    errors: tuple[Annotated[Angle, NotNegative], ...]
+    """position errors, rising from 0"""
+    values: tuple[Annotated[Number, Share], ...]
+    """duty cycle at each of them, from 0 on"""
 
     @model_validator(mode="after")
     def _fits(self) -> Self:

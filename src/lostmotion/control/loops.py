@@ -4,7 +4,6 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from ..inputs import described
 from ..inputs.described import (
     CurrentLoopFields,
     DifferenceFields,
@@ -15,10 +14,18 @@ from ..inputs.described import (
     SpeedLoopFields,
 )
 from ..inputs.part import Part
+from ..inputs.quantities import Positive, Time
 from .filters import Filter
 
 
-class PositionLoop(described.SampledLoopFields, PositionLoopFields):
+class SampledLoop(Part):
+    """A loop with a sample time of its own."""
+
+    sample_time: Annotated[Time, Positive] | None = None
+    """default: the value of the controller"""
+
+
+class PositionLoop(SampledLoop, PositionLoopFields):
     """``speed = sat(gain e + integral + feedforward * rate of the reference)``, in terms of the reference's shaft."""
 
     @model_validator(mode="after")
@@ -53,7 +60,7 @@ class ExactSpeed(Part):
     kind: Literal["exact"]
 
 
-class SpeedLoop(described.SampledLoopFields, SpeedLoopFields):
+class SpeedLoop(SampledLoop, SpeedLoopFields):
     """Proportional and integral, with anti-windup by back-calculation; in terms of the motor.
 
     ``v = I - (k_p - k_t) w + feedforward``, ``M = sat(k_t (w* - w) + v)``, ``I += T (k_i/k_t) (M - v)``
@@ -90,13 +97,15 @@ class VoltageCommand(Part):
     kind: Literal["voltage"]
 
 
-class FirstOrderCurrent(described.FirstOrderCurrentFields):
+class FirstOrderCurrent(Part):
     """The torque follows with a time constant, as a tuned current loop does, within the torque-speed line of the motor."""
 
+    time_constant: Annotated[Time, Positive]
+    """with which the torque follows"""
     kind: Literal["first_order"]
 
 
-class SampledCurrent(described.SampledLoopFields):
+class SampledCurrent(SampledLoop):
     """A sampled PI controller of the voltage, its zero on the pole of the winding, so that the loop is g/(z (z - 1))."""
 
 

@@ -3,14 +3,14 @@
 import itertools
 import math
 from functools import lru_cache
-from typing import Any, ClassVar, Generic, Literal, Self
+from typing import Annotated, Any, ClassVar, Generic, Literal, Self, TypeVar
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from ..errors import InputError
-from ..inputs import described
-from ..inputs.described import A, J, M, S, V
+from ..inputs.described import V
+from ..inputs.part import Part
 from ..inputs.quantities import (
     Acceleration,
     Angle,
@@ -19,7 +19,10 @@ from ..inputs.quantities import (
     LinearAcceleration,
     LinearJerk,
     LinearSpeed,
+    NotNegative,
+    Positive,
     Speed,
+    Time,
     Torque,
 )
 from ..inputs.validation import shown
@@ -27,7 +30,13 @@ from ..model.signals import Breakpoint, Samples, TimeFunction, taylor
 from ..recorded import real
 from ..reproducible import cos, cubic_spline, sin
 from .profiles import Segment, segments
-from .satellites import Satellite  # noqa: F401
+from .satellites import Satellite
+from .targets import Circle, FlyBy, Star, Track, Weave
+
+S = TypeVar("S")  # the rate of a value, with its unit
+A = TypeVar("A")  # its second derivative
+J = TypeVar("J")  # its third derivative
+M = TypeVar("M")  # a move of it
 
 SHORTEST = 1e-6  # share of a move that the rounding of its instants may be
 
@@ -35,11 +44,14 @@ Piece = tuple[float, float, float, float, float]
 """from a time [s] on: value, and its first, second and third derivative"""
 
 
-class Series(described.SeriesFields, Samples[V], Generic[V]):
+class Series(Samples[V], Generic[V]):
     """A curve through the points given; before the first and after the last the value stays.
 
     In a scenario file, `file = "points.csv"` may stand for times and values, as in a signal.
     """
+
+    interpolation: Literal["linear", "cubic"] = "linear"
+    """straight lines, or a cubic spline: first and second derivative are continuous between the first and the last point"""
 
     def breakpoints(self) -> list[Breakpoint]:
         if self.interpolation == "linear":
@@ -57,9 +69,11 @@ class Series(described.SeriesFields, Samples[V], Generic[V]):
         return self._held([*curve, (self.times[-1], values[-1], 0.0)])
 
 
-class Reference(described.ReferenceFields[V], TimeFunction[V], Generic[V]):
+class Reference(TimeFunction[V], Generic[V]):
     """The sum of all that is given; a bare number is a constant."""
 
+    samples: Series[V] | None = None
+    """curve through points"""
     derivatives: ClassVar[int] = 3
 
     @model_validator(mode="after")
@@ -135,11 +149,22 @@ def _table(reference: Reference[Any]) -> np.ndarray:
     return np.array(reference.pieces()).T
 
 
-class LimitedMove(described.LimitedMoveFields[V, S, A, J], Generic[V, S, A, J]):
+class LimitedMove(Part, Generic[V, S, A, J]):
     """From rest at one position to rest at another, in the shortest time that its limits permit.
 
     Without a limit of the jerk the speed is trapezoidal.
     """
+
+    to: V
+    """position at its end"""
+    speed: Annotated[S, Positive] | None = None
+    """limit; default: the value for all moves"""
+    acceleration: Annotated[A, Positive] | None = None
+    """limit, also while it slows down; default: the value for all moves"""
+    jerk: Annotated[J, Positive] | None = None
+    """limit; default: the value for all moves"""
+    dwell: Annotated[Time, NotNegative] | None = None
+    """rest after the move; default: the value for all moves"""
 
 
 class Move(LimitedMove[Angle, Speed, Acceleration, Jerk]):
@@ -156,9 +181,23 @@ class SlideMove(LimitedMove[Length, LinearSpeed, LinearAcceleration, LinearJerk]
     """
 
 
-class MovesReference(described.MovesReferenceFields[V, S, A, J, M], Reference[V], Generic[V, S, A, J, M]):
+class MovesReference(Reference[V], Generic[V, S, A, J, M]):
     """A position over time: the sum of all that is given, or a list of moves."""
 
+    start: V = 0.0  # type: ignore[assignment]
+    """position before the first move"""
+    begin: Annotated[Time, NotNegative] = 0.0
+    """instant at which the first move begins"""
+    speed: Annotated[S, Positive] | None = None
+    """limit of all moves that have none of their own"""
+    acceleration: Annotated[A, Positive] | None = None
+    """limit of all moves that have none of their own"""
+    jerk: Annotated[J, Positive] | None = None
+    """limit of all moves that have none of their own; without any, their speed is trapezoidal"""
+    dwell: Annotated[Time, NotNegative] = 0.0
+    """rest after each move that has none of its own"""
+    moves: tuple[M, ...] = ()
+    """moves, each from rest to rest"""
     kind: Literal["position"] = "position"
 
     def _check(self) -> None:
@@ -225,7 +264,7 @@ class MovesReference(described.MovesReferenceFields[V, S, A, J, M], Reference[V]
         return max([super().duration, *ends])
 
 
-class PositionReference(described.PositionReferenceFields, MovesReference[Angle, Speed, Acceleration, Jerk, Move]):
+class PositionReference(MovesReference[Angle, Speed, Acceleration, Jerk, Move]):
     """A position [rad] over time: the sum of all that is given, or a list of moves.
 
     Examples
@@ -235,6 +274,9 @@ class PositionReference(described.PositionReferenceFields, MovesReference[Angle,
     >>> [round(value, 3) for value in reference.at(0.1)]
     [np.float64(0.025), np.float64(0.5), np.float64(5.0), np.float64(0.0)]
     """
+
+    target: Annotated[FlyBy | Weave | Circle | Track | Star | Satellite, Field(discriminator="path")] | None = None
+    """the angle under which a target in space is seen"""
 
     def _check(self) -> None:
         if self.target is not None and self.moves:

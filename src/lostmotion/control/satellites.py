@@ -2,13 +2,13 @@
 
 import math
 from datetime import UTC, datetime
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import field_validator, model_validator
 
 from ..errors import need
-from ..inputs import described
+from ..inputs.quantities import Angle, Length, Limit, Time
 from ..reproducible import cos, sin
 from .targets import ORDER, Jet, TargetPath
 
@@ -27,7 +27,7 @@ def sidereal_time(days: float, more: np.ndarray) -> np.ndarray:
     return np.asarray(2.0 * math.pi * ((days % 1.0 + more) + (67310.54841 + beyond) / DAY))
 
 
-class Satellite(described.SatelliteFields, TargetPath):
+class Satellite(TargetPath):
     """A satellite over a place on the earth, without refraction. Traverse is the azimuth less the bearing of y.
 
     Its position in the true equator, mean equinox frame of SGP4 is turned into the earth's by the mean sidereal time
@@ -35,6 +35,18 @@ class Satellite(described.SatelliteFields, TargetPath):
     after a day, and more beyond.
     """
 
+    elements: tuple[str, str]
+    """the two lines"""
+    begin: datetime
+    """UTC at t = 0, such as 2024-05-01T20:15:00Z"""
+    latitude: Annotated[Angle, Limit(ge=-0.5 * math.pi, le=0.5 * math.pi)]
+    """latitude of the station, geodetic"""
+    longitude: Angle
+    """east"""
+    altitude: Length = 0.0
+    """above the ellipsoid"""
+    ut1: Annotated[Time, Limit(ge=-1.0, le=1.0)] = 0.0
+    """UT1 - UTC, as the IERS publishes it; a second is 15 arcsec"""
     path: Literal["satellite"]
 
     @field_validator("begin")

@@ -5,12 +5,13 @@ right; elevation E = atan2(z, sqrt(x^2 + y^2)). All derivatives are those of the
 """
 
 import math
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
-from ..inputs import described
+from ..inputs.part import Part
+from ..inputs.quantities import Angle, Frequency, Length, LinearSpeed, NotNegative, Positive, Speed, Time
 from ..reproducible import arctan2, cos, cubic_spline, sin
 
 ORDER = 4  # coefficients of the series: value to third derivative
@@ -66,8 +67,15 @@ def straight(start: np.ndarray | float, rate: float, t: np.ndarray) -> Jet:
     return out
 
 
-class TargetPath(described.TargetPathFields):
+class TargetPath(Part):
     """Path of a target over time, and the axis that follows it."""
+
+    axis: Literal["traverse", "elevation"]
+    """axis that follows the target"""
+    bearing: Angle = 0.0
+    """bearing of the direction y, in which the path is given; it adds to the traverse"""
+    duration: Annotated[Time, Positive] = 60.0
+    """time for which the axis follows; after it the reference stays"""
 
     def position(self, t: np.ndarray) -> tuple[Jet, Jet, Jet]:
         """x, y and z [m] at instants [s]."""
@@ -109,8 +117,19 @@ class TargetPath(described.TargetPathFields):
         return [*map(tuple, np.vstack([t, found])[:, :-1].T.tolist()), last]
 
 
-class Crossing(described.CrossingFields, TargetPath):
+class Crossing(TargetPath):
     """A straight level path that crosses the bearing at a right angle."""
+
+    distance: Annotated[Length, Positive]
+    """R_0, horizontal, of the point next to the station"""
+    height: Length = 0.0
+    """above the station"""
+    speed: Annotated[LinearSpeed, Positive]
+    """speed along the path"""
+    crossing_time: Annotated[Time, NotNegative]
+    """instant at which it is next to the station"""
+    heading: Literal["right", "left"] = "right"
+    """side to which it flies, as seen from the station"""
 
     def position(self, t: np.ndarray) -> tuple[Jet, Jet, Jet]:
         rate = self.speed if self.heading == "right" else -self.speed
@@ -124,9 +143,13 @@ class FlyBy(Crossing):
     path: Literal["fly_by"]
 
 
-class Weave(described.WeaveFields, Crossing):
+class Weave(Crossing):
     """A path past the station that swings to and fro across its course."""
 
+    width: Annotated[Length, Positive]
+    """amplitude of the swing"""
+    frequency: Annotated[Frequency, Positive]
+    """swings in a second"""
     path: Literal["weave"]
 
     @model_validator(mode="after")
@@ -143,9 +166,18 @@ class Weave(described.WeaveFields, Crossing):
         return x, y + self.width * sine_and_cosine(omega * t, omega)[0], z
 
 
-class Circle(described.CircleFields, TargetPath):
+class Circle(TargetPath):
     """A level circle at constant speed."""
 
+    distance: Annotated[Length, NotNegative]
+    """distance of its centre, horizontal, along the bearing"""
+    radius: Annotated[Length, Positive]
+    height: Length = 0.0
+    """above the station"""
+    speed: Annotated[LinearSpeed, Positive]
+    """speed along the circle"""
+    start: Angle = 0.0
+    """starting point on the circle, as an angle from the point farthest along the bearing, to the right"""
     path: Literal["circle"]
 
     @model_validator(mode="after")
@@ -160,9 +192,17 @@ class Circle(described.CircleFields, TargetPath):
         return self.radius * s, straight(self.distance, 0.0, t) + self.radius * c, straight(self.height, 0.0, t)
 
 
-class Track(described.TrackFields, TargetPath):
+class Track(TargetPath):
     """A measured path: a cubic spline through its points, or straight lines."""
 
+    times: Annotated[tuple[Annotated[Time, NotNegative], ...], Field(min_length=4)]
+    """instants, rising, from 0 to the duration at least"""
+    x: tuple[Length, ...]
+    """to the right of the bearing, at each instant"""
+    y: tuple[Length, ...]
+    """along the bearing, at each instant"""
+    z: tuple[Length, ...]
+    """up, at each instant"""
     path: Literal["track"]
 
     @model_validator(mode="after")
@@ -188,9 +228,17 @@ class Track(described.TrackFields, TargetPath):
         return x, y, z
 
 
-class Star(described.StarFields, TargetPath):
+class Star(TargetPath):
     """A direction fixed among the stars, as the earth turns: without refraction. Traverse is the azimuth less the bearing of y."""
 
+    declination: Angle
+    """angle above the plane of the equator"""
+    hour_angle: Angle
+    """at the start, west of the meridian"""
+    latitude: Angle
+    """latitude of the station, north of the equator"""
+    rate: Speed = 7.292115e-05
+    """rate at which the hour angle grows; for the sun 7.2722e-5 rad/s"""
     path: Literal["star"]
 
     def position(self, t: np.ndarray) -> tuple[Jet, Jet, Jet]:

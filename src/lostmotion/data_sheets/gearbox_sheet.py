@@ -7,7 +7,6 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from ..errors import InputError
-from ..inputs import described
 from ..inputs.part import Part
 from ..inputs.quantities import (
     Angle,
@@ -21,7 +20,7 @@ from ..inputs.quantities import (
     Torque,
     ViscousFriction,
 )
-from ..model.gearbox import GearboxLimits
+from ..model.gearbox import GearboxLimits, GearboxLoads
 from ..model.torsion import Hysteresis, LinearStiffness, Rigid, TorsionCurve
 from .loss_data import Efficiency, EfficiencyPoint, LossData, LossEstimate
 from .sheet import Record
@@ -74,7 +73,7 @@ class StiffnessData(Part):
         return tuple(out)
 
 
-class GearboxSheet(described.GearboxLoadsFields, Record):
+class GearboxSheet(GearboxLoads, Record):
     """Data sheet of a gearbox."""
 
     kind: Literal["strain_wave", "planetary", "worm", "cycloidal", "other"]

@@ -5,7 +5,6 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from ..errors import InputError
-from ..inputs import described
 from ..inputs.quantities import (
     Current,
     Inductance,
@@ -22,7 +21,7 @@ from ..inputs.quantities import (
     Voltage,
     Whole,
 )
-from ..model.motor import SAID_BY_WINDING, Motor, MotorLimits
+from ..model.motor import SAID_BY_WINDING, Motor, MotorHeat, MotorLimits
 from ..model.synchronous_motor import Winding
 from .sheet import Record
 
@@ -32,7 +31,7 @@ SYNCHRONOUS, DC_EQUIVALENT, TORQUE_SOURCE = "synchronous motor", "DC-equivalent 
 BLOCK_KEYS = ("rated_voltage", "torque_constant", "resistance", "inductance", "pole_pairs")
 
 
-class MotorSheet(described.MotorHeatFields, Record):
+class MotorSheet(MotorHeat, Record):
     """Data sheet of a DC motor, of a brushless one seen from its supply as a DC motor, or of a synchronous one."""
 
     kind: Literal["dc_brushed", "brushless", "synchronous"] = "dc_brushed"

@@ -3,39 +3,22 @@
 What a part in `model` and `control` adds to them is what the core does not see, such as what must fit together. ``NameFields``
 is the base of the part `Name`. It is made when its name is first used: write ``described.NameFields`` in a class whose
 tables are parts of the same module. The names for type checkers are in `described.pyi`, which ``make stub`` writes.
+Keys that the core does not take are fields of the parts themselves.
 """
 
-from datetime import datetime
-from functools import reduce
-from operator import or_
-from typing import Annotated, Any, ClassVar, Generic, Literal, TypeVar
+from typing import Annotated, Any, ClassVar, Generic, TypeVar
 
 from pydantic import Field, create_model
 
 from .. import _core
 from ..units.conversion import Unit
-from .named import Elements, nothing
 from .part import Part
 from .quantities import Limit, Switch, Whole
 
 V = TypeVar("V")  # the value of a signal, with its unit
-S = TypeVar("S")  # its rate
-A = TypeVar("A")  # its second derivative
-J = TypeVar("J")  # its third derivative
-M = TypeVar("M")  # a move of it
-
-OF_VALUE: dict[str, Any] = {"value": V, "value/s": S, "value/s^2": A, "value/s^3": J}
-"""units in terms of the value"""
-TYPES = {
-    "pair": "tuple[float, float]",
-    "integer": "int",
-    "flag": "bool",
-    "named": "dict[str, float]",
-    "matrix": "tuple[tuple[float, ...], ...]",
-    "pairs": "tuple[tuple[float, float], ...]",
-    "texts": "tuple[str, str]",
-    "instant": "datetime",
-}
+OF_VALUE = "value"
+"""unit of the value of a signal"""
+TYPES = {"pair": "tuple[float, float]", "integer": "int", "flag": "bool", "list": "tuple[float, ...]"}
 
 Row = tuple[Any, ...]
 """key, kind, symbol, unit, meaning, range, whether it is needed, default, and more"""
@@ -60,54 +43,26 @@ class Described(Part):
         return {key: v.fields_of(type(v)) if isinstance(v, Described) else v for key, v in values}
 
 
-def _is_table(row: Row) -> bool:
-    return row[1] in ("table", "tables")
-
-
 def _part_named(name: str, base: type[Part] = Part) -> Any:
     """The part of this name that the package has made."""
     own = (part for part in base.__subclasses__() if part.__name__ == name and part.__module__.startswith("lostmotion"))
     return next(own, None) or next((p for b in base.__subclasses__() if (p := _part_named(name, b))), None)
 
 
-def _is_generic(part: Any) -> bool:
-    return part is not M and bool(part.__pydantic_generic_metadata__["parameters"])
-
-
-def _table(kind: str, names: tuple[str, ...]) -> tuple[Any, Any]:
-    """Type of a field that is one of some parts, or a list of them, and the default of one."""
-    parts = [M if name == M.__name__ else _part_named(name) for name in names]
-    one: Any = reduce(or_, [part[V] if _is_generic(part) else part for part in parts])
-    if len(parts) > 1:
-        one = Annotated[one, Field(discriminator="kind" if "kind" in parts[0].model_fields else "path")]
-    return (one, parts[0]) if kind == "table" else (tuple[one, ...], tuple)
-
-
 def _type(kind: str, unit: str, limits: tuple[float | None, float | None, float | None], more: tuple[Any, ...]) -> Any:
     above, least, most = limits
-    if kind == "choice":
-        return Literal[*more]
+    if kind == "table":
+        return _part_named(more[0])
     if kind == "flag":
         return Switch
-    if kind == "texts":
-        return tuple[(str,) * more[0]]  # type: ignore[misc]
-    if kind == "instant":
-        return datetime
     if kind == "integer":
         return Annotated[Whole, Field(ge=least, le=most)]
-    number: Any = OF_VALUE.get(unit) or Annotated[float, Unit(unit)]
+    number: Any = V if unit == OF_VALUE else Annotated[float, Unit(unit)]
     if limits != (None, None, None):
         number = Annotated[number, Limit(gt=above, ge=least, le=most)]
-    if kind == "named":
-        return Elements[number]
     if kind == "list":
         fewest, largest = more
         return Annotated[tuple[number, ...], Field(min_length=fewest or None, max_length=largest)]
-    if kind == "pairs":
-        second, most = more
-        return Annotated[tuple[tuple[number, _type("number", unit, second, ())], ...], Field(max_length=most)]
-    if kind == "matrix":
-        return tuple[tuple[number, ...], ...]
     return tuple[number, number] if kind == "pair" else number
 
 
@@ -115,31 +70,19 @@ def _part(name: str, rows: list[Row]) -> type[Described]:
     fields: dict[str, Any] = {}
     for row in rows:
         key, kind, _, unit, meaning, limits, needed, default, more = row
-        if _is_table(row):
-            given, new = _table(kind, more)
-            default = None if default is None else new()
-        else:
-            given = _type(kind, unit, limits, more)
+        given = _type(kind, unit, limits, more)
         optional = default is None and not needed
-        text = meaning or None
-        value: Any = Field(... if needed else default, description=text)
-        if kind == "named":
-            value = Field(default_factory=nothing, description=text)
+        value = Field(... if needed else default, description=meaning or None)
         fields[key] = (given | None if optional else given, value)
-    base = (Described, Generic[variables]) if (variables := tuple(_variables(rows))) else Described
+    base = (Described, Generic[V]) if _is_of_value(rows) else Described
     part = create_model(f"{name}Fields", __base__=base, __module__=__name__, **fields)
     part.described = tuple(fields)
     part.core_keys = part.described if name in OF_CORE else ()
     return part
 
 
-def _variables(rows: list[Row]) -> dict[Any, str]:
-    """Variables of the types of a table, and their names."""
-    units, inner = {row[3] for row in rows}, {name for row in rows if _is_table(row) for name in row[8]}
-    if any(name != M.__name__ and _is_generic(_part_named(name)) for name in inner):
-        units.add("value")
-    found = {v: v.__name__ for unit, v in OF_VALUE.items() if unit in units}
-    return found | ({M: M.__name__} if M.__name__ in inner else {})
+def _is_of_value(rows: list[Row]) -> bool:
+    return any(row[3] == OF_VALUE for row in rows)
 
 
 OF_CORE: dict[str, list[Row]] = _core.described_tables(of_core=True)
@@ -170,33 +113,25 @@ ReferenceBlocks = _reference_blocks()
 
 def _stub_type(row: Row) -> str:
     _, kind, _, unit, _, _, _, _, more = row
-    if kind == "choice":
-        return "Literal[" + ", ".join(f'"{word}"' for word in more) + "]"
-    if _is_table(row):
-        one = " | ".join(f"{n}[V]" if n != M.__name__ and _is_generic(_part_named(n)) else n for n in more)
-    else:
-        one = OF_VALUE[unit].__name__ if unit in OF_VALUE else TYPES.get(kind, "float")
-    return f"tuple[{one}, ...]" if kind in ("list", "tables") else one
+    if kind == "table":
+        return str(more[0])
+    return "V" if unit == OF_VALUE else TYPES.get(kind, "float")
 
 
 def stub() -> str:
     """The text of `described.pyi`."""
-    inner = {name for rows in TABLES.values() for row in rows if _is_table(row) for name in row[8]} - {M.__name__}
+    inner = {row[8][0] for rows in TABLES.values() for row in rows if row[1] == "table"}
     homes: dict[str, list[str]] = {}
     for name in sorted(inner):
         homes.setdefault(_part_named(name).__module__.removeprefix("lostmotion"), []).append(name)
-    lines = ["from datetime import datetime", "from typing import Any, ClassVar, Generic, Literal, TypeVar", ""]
+    lines = ["from typing import Any, ClassVar, Generic, TypeVar", ""]
     lines += [f"from .{home} import {', '.join(names)}" for home, names in sorted(homes.items())]
-    lines += [
-        "from .part import Part",
-        "",
-        *(f'{v.__name__} = TypeVar("{v.__name__}")' for v in (*OF_VALUE.values(), M)),
-    ]
+    lines += ["from .part import Part", "", 'V = TypeVar("V")']
     lines += ["", "class Described(Part):", "    described: ClassVar[tuple[str, ...]]"]
     lines += ["    core_keys: ClassVar[tuple[str, ...]]", "    def core_fields(self) -> dict[str, Any]: ..."]
     lines += ["    def fields_of(self, part: type[Described]) -> dict[str, Any]: ..."]
     for name, rows in TABLES.items():
-        generic = f", Generic[{', '.join(names)}]" if (names := _variables(rows).values()) else ""
+        generic = ", Generic[V]" if _is_of_value(rows) else ""
         lines += ["", f"class {name}Fields(Described{generic}):"]
         for row in rows:
             key, needed, default = row[0], row[6], row[7]

@@ -42,6 +42,9 @@ Resistance = Annotated[float, Unit("ohm")]
 Inductance = Annotated[float, Unit("H")]
 TorqueConstant = Annotated[float, Unit("N*m/A")]
 KinematicViscosity = Annotated[float, Unit("m^2/s")]
+SlideStiffness = Annotated[float, Unit("N/m")]
+ThermalResistance = Annotated[float, Unit("K/W")]
+VoltageConstant = Annotated[float, Unit("V*s/rad")]
 
 
 @dataclass(frozen=True)
@@ -62,6 +65,8 @@ class Limit:
 
 Positive = Limit(gt=0.0)
 NotNegative = Limit(ge=0.0)
+UpToOne = Limit(gt=0.0, le=1.0)
+Share = Limit(ge=0.0, le=1.0)
 
 Temperature = Annotated[float, Unit("degC"), Limit(ge=-273.15)]
 Switch = Annotated[bool, Strict()]

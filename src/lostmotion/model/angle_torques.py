@@ -1,6 +1,7 @@
 """Elements that depend on the angle of a shaft: gravity, cogging, ripple, and the transmission error of a gear."""
 
 import itertools
+import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
@@ -10,6 +11,7 @@ from .. import _core
 from ..inputs import described
 from ..inputs.breakpoints import check_apart
 from ..inputs.part import Part
+from ..inputs.quantities import Angle, Length, Mass, NotNegative, Positive, Torque
 
 STANDARD_GRAVITY = 9.80665  # [m/s^2]
 
@@ -27,15 +29,21 @@ class Harmonic(described.HarmonicFields):
         return _core.harmonic({key: getattr(self, key) for key in ("amplitude", "order", "phase", "error")})
 
 
-class AngleCurve(described.AngleCurveFields):
+class AngleCurve(Part):
     """Straight lines through points over one period; the last leads back to the first."""
 
+    of_value: ClassVar[str] = "errors"
+    """key of the values"""
+
+    period: Annotated[Angle, Positive] = 2.0 * math.pi
+    """left out, one turn of the shaft"""
+    angles: Annotated[tuple[Annotated[Angle, NotNegative], ...], Field(min_length=2, max_length=1000)]
+    """rising from 0, below the period"""
     kind: Literal["curve"] = "curve"
 
     def values(self) -> tuple[float, ...]:
         """Value at each angle."""
-        (key,) = self.described
-        found: tuple[float, ...] = getattr(self, key)
+        found: tuple[float, ...] = getattr(self, self.of_value)
         return found
 
     def core(self) -> _core.PeriodicCurve:
@@ -84,9 +92,12 @@ class TorqueHarmonic(PeriodicTorque, described.TorqueHarmonicFields, Harmonic):
     """on which it acts, in the direction of its angle"""
 
 
-class TorqueCurve(PeriodicTorque, described.TorqueCurveFields, AngleCurve):
+class TorqueCurve(PeriodicTorque, AngleCurve):
     """A torque on the shaft over its angle: straight lines through points over one period."""
 
+    of_value: ClassVar[str] = "torques"
+    torques: tuple[Torque, ...]
+    """torque at each angle"""
     shaft: str
     """on which it acts, in the direction of its angle"""
 
@@ -107,13 +118,24 @@ class ErrorHarmonic(described.ErrorHarmonicFields, Harmonic):
     """A transmission error ``amplitude * sin(order * phi + phase)`` over the angle of the input shaft, by straight lines."""
 
 
-class ErrorCurve(described.ErrorCurveFields, AngleCurve):
+class ErrorCurve(AngleCurve):
     """A transmission error over the angle of the input shaft: straight lines through points over one period."""
 
+    errors: tuple[Angle, ...]
+    """at the output"""
 
-class Gravity(PeriodicTorque, described.GravityFields):
+
+class Gravity(PeriodicTorque, Part):
     """A mass off the axis of a horizontal shaft: the torque ``-m g r sin(phi + angle)``, by straight lines."""
 
+    mass: Annotated[Mass, Positive]
+    """mass off the axis"""
+    radius: Annotated[Length, Positive]
+    """distance of the centre of mass from the axis"""
+    angle: Angle = 0.0
+    """angle of the mass when the shaft's angle is 0; 0: it hangs straight down, positive in the direction of the shaft's angle"""
+    error: Annotated[Torque, Positive] | None = None
+    """by which the straight lines depart from the sine at most; left out, 0.1 % of m g r"""
     shaft: str
     """shaft that carries the mass"""
 

@@ -1,12 +1,13 @@
 """Elements that hold a shaft or join two at the same speed: brakes, clutches, freewheels, torque limiters, ratchets."""
 
-from typing import Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import model_validator
 
 from ..inputs import described
 from ..inputs.described import CommandedFields
 from ..inputs.part import Part
+from ..inputs.quantities import NotNegative, Time
 from .signals import CommandSignal
 
 FULL_COMMAND = 1.0 + 1e-9
@@ -26,8 +27,13 @@ class BetweenShafts(Part):
     """shaft"""
 
 
-class Commanded(described.CommandDelaysFields, CommandedFields):
+class Commanded(CommandedFields):
     """Dry friction with a capacity that its command applies, with the delays of a data sheet."""
+
+    engagement_delay: Annotated[Time, NotNegative] = 0.0
+    """from a step up of the command until it acts"""
+    release_delay: Annotated[Time, NotNegative] = 0.0
+    """from a step down of the command until it acts"""
 
     def acting(self, command: CommandSignal) -> CommandSignal:
         """The command as it acts, after the delays.

@@ -1,17 +1,33 @@
 """Gravity, payloads and process forces on the load of an axis over its cycle; its supply and its holding brake."""
 
-from typing import Self
+from typing import Annotated, Self
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
-from ..inputs import described
 from ..inputs.part import Part
+from ..inputs.quantities import (
+    Angle,
+    Current,
+    Force,
+    Inertia,
+    Length,
+    Mass,
+    NotNegative,
+    Positive,
+    Power,
+    Resistance,
+    Switch,
+    Time,
+    Torque,
+    Voltage,
+)
 from ..reproducible import interpolate, sin
+from ..units.conversion import Unit
 from .angle_torques import STANDARD_GRAVITY
 
 
-class ArmGravity(described.ArmGravityFields):
+class ArmGravity(Part):
     """Weight of a body on an arm: against the motion acts m g r sin(position - hanging).
 
     Examples
@@ -19,6 +35,13 @@ class ArmGravity(described.ArmGravityFields):
     >>> round(float(ArmGravity(mass="4 kg", radius="0.3 m").torque(0.5 * 3.141592653589793)), 4)
     11.768
     """
+
+    mass: Annotated[Mass, Positive]
+    """mass of the body"""
+    radius: Annotated[Length, Positive]
+    """distance of its centre of gravity from the axis"""
+    hanging: Angle = 0.0
+    """position at which it hangs straight down; a quarter of a turn on, the arm is level"""
 
     def torque(
         self, position: np.ndarray | float, mass: float | None = None, radius: float | None = None
@@ -28,8 +51,19 @@ class ArmGravity(described.ArmGravityFields):
         return np.asarray(m * STANDARD_GRAVITY * r * sin(np.asarray(position) - self.hanging))
 
 
-class Payload(described.PayloadFields):
+class Payload(Part):
     """A body that the load carries during a part of the cycle."""
+
+    begin: Annotated[Time, NotNegative]
+    """instant from which it is carried"""
+    end: Annotated[Time, Positive]
+    """instant at which it is set down"""
+    mass: Annotated[Mass, NotNegative] = 0.0
+    """mass of the body"""
+    radius: Annotated[Length, Positive] | None = None
+    """distance of its centre of gravity from the axis of a rotary load"""
+    inertia: Annotated[Inertia, NotNegative] = 0.0
+    """about its own centre of gravity, of a rotary load"""
 
     @model_validator(mode="after")
     def _lasts(self) -> Self:
@@ -48,9 +82,18 @@ class Payload(described.PayloadFields):
         return self.mass if slides else self.inertia + self.mass * (self.radius or 0.0) * (self.radius or 0.0)
 
 
-class Process(described.ProcessFields):
+class Process(Part):
     """A torque or a force against the motion in the positive direction, over time or over the position. It follows
     straight lines through points, and is constant before the first and after the last."""
+
+    times: Annotated[tuple[Annotated[Time, NotNegative], ...], Field(min_length=2)] | None = None
+    """instants, rising"""
+    positions: Annotated[tuple[Angle, ...], Field(min_length=2)] | None = None
+    """positions of the load, in place of times"""
+    torques: tuple[Torque, ...] | None = None
+    """on a rotary load"""
+    forces: tuple[Force, ...] | None = None
+    """on a slide"""
 
     @model_validator(mode="after")
     def _is_a_curve(self) -> Self:
@@ -125,8 +168,17 @@ class Duty(Part):
         return self.gravity is not None or bool(self.payload or self.process)
 
 
-class HoldingBrake(described.HoldingBrakeFields):
+class HoldingBrake(Part):
     """Brake on the shaft of the motor, or on a slide."""
+
+    torque: Annotated[Torque, Positive] | None = None
+    """static, that it holds"""
+    inertia: Annotated[Inertia, NotNegative] = 0.0
+    """inertia of the brake, on the shaft of the motor"""
+    force: Annotated[Force, Positive] | None = None
+    """static, of a brake on the slide of a linear axis, in place of torque"""
+    of_the_motor: Switch = False
+    """the brake that is built into the record of the motor"""
 
     @model_validator(mode="after")
     def _holds_something(self) -> Self:
@@ -139,8 +191,17 @@ class HoldingBrake(described.HoldingBrakeFields):
         return self
 
 
-class Amplifier(described.AmplifierFields):
+class Amplifier(Part):
     """Amplifier that feeds the motor. Currents of a motor with a winding are effective values of a phase."""
+
+    continuous_current: Annotated[Current, Positive]
+    """rms over the cycle, of a synchronous motor in a phase"""
+    peak_current: Annotated[Current, Positive] | None = None
+    """largest current, of a synchronous motor as effective value"""
+    peak_time: Annotated[Time, Positive] | None = None
+    """longest time above the continuous current"""
+    max_dc_voltage: Annotated[Voltage, Positive] | None = None
+    """largest voltage of the DC bus"""
 
     @model_validator(mode="after")
     def _peak_is_above(self) -> Self:
@@ -149,8 +210,21 @@ class Amplifier(described.AmplifierFields):
         return self
 
 
-class Bus(described.BusFields):
+class Bus(Part):
     """DC bus that feeds motors, and takes what they return."""
+
+    max_voltage: Annotated[Voltage, Positive] | None = None
+    """largest voltage of the bus before energy returns to it"""
+    voltage_limit: Annotated[Voltage, Positive] | None = None
+    """largest voltage that the bus may reach; with a brake resistor the voltage at which it is switched on"""
+    capacitance: Annotated[float, Unit("A*s/V"), Positive] | None = None
+    """capacitance of the bus"""
+    brake_resistance: Annotated[Resistance, Positive] | None = None
+    """resistance of the brake resistor, which is switched on at voltage_limit"""
+    brake_power: Annotated[Power, Positive] | None = None
+    """continuous power of the brake resistor"""
+    returns_to_mains: Switch = False
+    """the energy goes back to the mains, or a battery takes it: neither capacitors nor resistor are judged"""
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -166,8 +240,13 @@ class Bus(described.BusFields):
         return self.max_voltage
 
 
-class Supply(described.SupplyFields, Bus):
+class Supply(Bus):
     """DC bus and amplifier that feed the motor."""
+
+    min_voltage: Annotated[Voltage, Positive] | None = None
+    """least voltage of the bus, at which the motor must reach its torque and speed"""
+    continuous_current: Annotated[Current, Positive] | None = None
+    """continuous current of the amplifier, rms over the cycle"""
 
     @model_validator(mode="after")
     def _voltages_in_order(self) -> Self:

@@ -6,6 +6,8 @@ from pydantic import Field, field_validator, model_validator
 
 from ..inputs import described
 from ..inputs.described import TransmissionFields
+from ..inputs.part import Part
+from ..inputs.quantities import Force, Number, Positive, Speed, Time, Torque
 from ..units.practical import practical
 from .losses import ConstantEfficiency, LossMap
 from .mesh_stiffness import MeshStiffness
@@ -13,12 +15,39 @@ from .notes import NO_NOTE, Note, note_is_about
 from .torsion import Hysteresis, LinearStiffness, Rigid, TorsionCurve
 
 
-class GearboxLimits(described.GearboxLimitsFields, described.GearboxLoadsFields):
+class GearboxLoads(Part):
+    """Torques and speeds that a gearbox may have."""
+
+    average_output_torque: Annotated[Torque, Positive] | None = None
+    """for the mean over a duty cycle"""
+    peak_output_torque: Annotated[Torque, Positive] | None = None
+    """repeated, as in acceleration"""
+    momentary_output_torque: Annotated[Torque, Positive] | None = None
+    """in an emergency stop"""
+    average_input_speed: Annotated[Speed, Positive] | None = None
+    """for the mean over a duty cycle; the drive check takes the rated speed where it is left out"""
+    max_input_speed: Annotated[Speed, Positive] | None = None
+    """largest speed of the input shaft"""
+
+
+class GearboxLimits(GearboxLoads):
     """Limits of a gearbox. No run depends on them; the drive check compares with them."""
 
+    rated_life: Annotated[Time, Positive] | None = None
+    """L10h at rated torque and rated speed"""
+    life_exponent: Annotated[Number, Positive] = 3.0
+    """p of the life over the torque; 10/3 where roller bearings decide"""
+    max_radial_force: Annotated[Force, Positive] | None = None
+    """on the output bearing"""
+    max_axial_force: Annotated[Force, Positive] | None = None
+    """on the output bearing"""
 
-class Transmission(described.TransmissionDataFields, TransmissionFields):
+
+class Transmission(TransmissionFields):
     """Base of gearboxes and gears of a drive train: ratio, inertia, compliance."""
+
+    loss_range: tuple[Annotated[Number, Positive], Annotated[Number, Positive]] | None = None
+    """range of estimated losses: the multiples between which those of such gearboxes lie. No run depends on it; the drive check says which of its verdicts hold at both ends"""
 
     if TYPE_CHECKING:
         losses: Any  # of which kinds, each of them says

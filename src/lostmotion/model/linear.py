@@ -6,14 +6,32 @@ slide.
 """
 
 import math
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
 from ..errors import InputError
 from ..inputs import described
 from ..inputs.part import Part
+from ..inputs.quantities import (
+    Angle,
+    Force,
+    Inertia,
+    Length,
+    Limit,
+    NotNegative,
+    Number,
+    Positive,
+    Share,
+    SlideStiffness,
+    Speed,
+    Torque,
+    UpToOne,
+    ViscousFriction,
+    Whole,
+)
 from ..reproducible import arctan
+from ..units.conversion import Unit
 from .angle_torques import AngleCurve, ErrorCurve, ErrorHarmonic, Harmonic
 from .gear import Gear
 from .losses import ConstantEfficiency, MeshEfficiency, worm_efficiencies
@@ -24,8 +42,13 @@ STEEL = 7850.0  # [kg/m^3]
 ELASTIC_MODULUS = 206e9  # of steel [Pa]
 
 
-class StiffnessCurve(described.StiffnessCurveFields):
+class StiffnessCurve(Part):
     """Force over deflection: odd, continuous, piecewise linear, as the nut, the screw and its bearings give way together."""
+
+    slopes: Annotated[tuple[Annotated[SlideStiffness, NotNegative], ...], Field(min_length=1, max_length=100)]
+    """slopes of the segments, from deflection 0 outwards"""
+    breaks: tuple[Annotated[Length, Positive], ...] = ()
+    """deflections at which the slope changes; one fewer than slopes"""
 
     @model_validator(mode="after")
     def _is_a_curve(self) -> Self:
@@ -41,8 +64,11 @@ class PitchHarmonic(described.PitchHarmonicFields, Harmonic):
         return ErrorHarmonic(order=self.order, phase=self.phase, amplitude=self.amplitude, error=self.error)
 
 
-class PitchCurve(described.PitchCurveFields, AngleCurve):
+class PitchCurve(AngleCurve):
     """A pitch error over the angle of the input shaft: straight lines through points over one period."""
+
+    errors: tuple[Length, ...]
+    """at the slide"""
 
     def gear_error(self) -> ErrorCurve:
         """The same as the transmission error of a gear."""
@@ -52,9 +78,29 @@ class PitchCurve(described.PitchCurveFields, AngleCurve):
 PitchError = Annotated[PitchHarmonic | PitchCurve, Field(discriminator="kind")]
 
 
-class LinearDrive(described.LinearDriveFields):
+class LinearDrive(Part):
     """Base of screws, racks and belts: losses, compliance, backlash, pitch error, and the values of the input shaft."""
 
+    efficiency: Annotated[Number, UpToOne] | None = None
+    """while the input drives; left out, none is lost"""
+    backdriving_efficiency: Annotated[Number, Limit(le=1.0)] | None = None
+    """while the slide drives; 0 or less: self-locking; left out, 2 - 1/efficiency, which loses the same share of the force"""
+    stiffness: Annotated[SlideStiffness, Positive] | None = None
+    """axial, at the slide, of all that is in series; left out, rigid"""
+    backlash: Annotated[Length, NotNegative] = 0.0
+    """whole axial play at the slide"""
+    restitution: Annotated[Number, Share] | None = None
+    """speed at which rigid flanks part over that at which they strike; needed with backlash and no stiffness"""
+    preload: Annotated[Force, NotNegative] = 0.0
+    """removes the segments of stiffness_curve below it"""
+    damping: Annotated[float, Unit("N*s/m"), NotNegative] = 0.0
+    """at the slide, while the flanks touch"""
+    inertia: Annotated[Inertia, NotNegative] = 0.0
+    """inertia of all that turns with the input shaft"""
+    viscous_friction: Annotated[ViscousFriction, NotNegative] = 0.0
+    """on the input shaft"""
+    drag_torque: Annotated[Torque, NotNegative] = 0.0
+    """dry friction on the input shaft, for example by the preload"""
     stiffness_curve: StiffnessCurve | None = None
     """force over deflection, in place of stiffness"""
     hysteresis: Hysteresis | None = None
@@ -166,7 +212,7 @@ def one_way(part: Part, ways: dict[str, tuple[str, ...]], optional: tuple[str, .
     return used[0]
 
 
-class ScrewData(described.ScrewDataFields, LinearDrive):
+class ScrewData(LinearDrive):
     """A ball screw or a lead screw alone, as a data sheet has it.
 
     Examples
@@ -176,6 +222,37 @@ class ScrewData(described.ScrewDataFields, LinearDrive):
     >>> [round(efficiency, 4) for efficiency in screw.efficiencies()]
     [0.9766, 0.9761]
     """
+
+    lead: Annotated[Length, Positive] | None = None
+    """travel to one turn"""
+    pitch: Annotated[Length, Positive] | None = None
+    """distance of neighbouring threads, which with the number of starts says the lead"""
+    starts: Annotated[Whole, Field(ge=1, le=20)] | None = None
+    """threads of the screw"""
+    mean_diameter: Annotated[Length, Positive] | None = None
+    """d, of the pitch circle; tan(lead angle) = lead/(pi d)"""
+    friction_coefficient: Annotated[Number, NotNegative] | None = None
+    """in the thread: with mean_diameter, in place of efficiency"""
+    friction_angle: Annotated[Angle, NotNegative] | None = None
+    """in place of friction_coefficient"""
+    nut_stiffness: Annotated[SlideStiffness, Positive] | None = None
+    """in series with the next ones, in place of stiffness"""
+    bearing_stiffness: Annotated[SlideStiffness, Positive] | None = None
+    """axial stiffness of its bearings"""
+    supported_length: Annotated[Length, Positive] | None = None
+    """length of the screw between bearing and nut; with both ends fixed, between both bearings, the nut in the middle"""
+    core_diameter: Annotated[Length, Positive] | None = None
+    """core diameter of the screw's thread root"""
+    elastic_modulus: Annotated[float, Unit("Pa"), Positive] | None = None
+    """default: steel, 206 GPa"""
+    support: Literal["one end", "both ends"] | None = None
+    """at which the screw is fixed axially: stiffness E A/L (left out, this), or 4 E A/L"""
+    diameter: Annotated[Length, Positive] | None = None
+    """diameter of the screw: with length, in place of inertia"""
+    length: Annotated[Length, Positive] | None = None
+    """length of the shaft of the screw"""
+    density: Annotated[float, Unit("kg/m^3"), Positive] | None = None
+    """default: steel, 7850 kg/m^3"""
 
     @model_validator(mode="after")
     def _is_a_screw(self) -> Self:
@@ -256,7 +333,7 @@ class ScrewData(described.ScrewDataFields, LinearDrive):
         return math.pi / 32.0 * (self.density or STEEL) * self.length * d2 * d2
 
 
-class RatedScrew(described.RatedScrewFields, ScrewData):
+class RatedScrew(ScrewData):
     """A ball screw or a lead screw alone, with the ratings by which its life, buckling and speed are judged.
 
     Examples
@@ -265,6 +342,19 @@ class RatedScrew(described.RatedScrewFields, ScrewData):
     >>> lm.model.RatedScrew(lead="10 mm", efficiency=0.9, dynamic_capacity="20 kN").dynamic_capacity
     20000.0
     """
+
+    dynamic_capacity: Annotated[Force, Positive] | None = None
+    """C: axial load for a million turns of nominal life"""
+    static_capacity: Annotated[Force, Positive] | None = None
+    """C_0"""
+    load_factor: Annotated[Number, Positive] = 1.0
+    """f_w of the life: 1.2 to 1.5 for normal motion, more with shocks"""
+    mounting: Literal["fixed-supported", "fixed-free", "supported-supported", "fixed-fixed"] = "fixed-supported"
+    """mounting of the ends of the screw, for buckling and bending along supported_length"""
+    ball_circle_diameter: Annotated[Length, Positive] | None = None
+    """diameter of the circle of the centres of its balls"""
+    max_input_speed: Annotated[Speed, Positive] | None = None
+    """left out, 70 m rpm/ball_circle_diameter"""
 
 
 class Placed(Part):

@@ -2,21 +2,23 @@
 
 import itertools
 import math
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from .. import _core
-from ..inputs import described
 from ..inputs.breakpoints import check_apart
 from ..inputs.part import Part
+from ..inputs.quantities import Angle, Length, Limit, NotNegative, Number, Positive, Switch, UpToOne, Whole
 from ..recorded import of_function
 from ..reproducible import arctan
 
 
-class ConstantEfficiency(described.ConstantEfficiencyFields):
+class ConstantEfficiency(Part):
     """T_1 = T_2/(i eta) in both directions of power flow (5b), so it creates energy while the load drives."""
 
+    efficiency: Annotated[Number, UpToOne]
+    """output power over input power, whichever side drives"""
     kind: Literal["constant_efficiency"] = "constant_efficiency"
 
     def core_fields(self) -> dict[str, Any]:
@@ -24,7 +26,7 @@ class ConstantEfficiency(described.ConstantEfficiencyFields):
         return {"losses.efficiency": self.efficiency}
 
 
-class LossMap(described.LossMapFields):
+class LossMap(Part):
     """Loss coefficient m_2B over relative speed and signed relative load (12), linear on triangles.
 
     Examples
@@ -35,6 +37,14 @@ class LossMap(described.LossMapFields):
     (True, True)
     """
 
+    speeds: Annotated[tuple[Annotated[Number, NotNegative], ...], Field(min_length=2)]
+    """v = |w_M|/n_1R, rising from 0"""
+    loads: Annotated[tuple[Number, ...], Field(min_length=2)]
+    """mu = T_2 sign(w_M)/T_2R, rising; positive where the motor drives"""
+    values: tuple[tuple[Annotated[Number, NotNegative], ...], ...]
+    """m_2B, one row for each load, one entry for each speed"""
+    mirrored: Switch = False
+    """loads begin at 0 and hold for both directions of power flow"""
     kind: Literal["map"] = "map"
 
     @field_validator("speeds", "loads")
@@ -119,9 +129,13 @@ class TwoEfficiencies(Part):
         return {"efficiencies": dict(zip(("driving", "overrunning"), self.efficiencies(), strict=True))}
 
 
-class MeshEfficiency(TwoEfficiencies, described.MeshEfficiencyFields):
+class MeshEfficiency(TwoEfficiencies):
     """An efficiency for each direction of power flow, as printed for worm gears. Only in drive trains."""
 
+    drive_efficiency: Annotated[Number, UpToOne]
+    """eta_f, while the input drives"""
+    backdrive_efficiency: Annotated[Number, Limit(le=1.0)]
+    """eta_b, while the output drives; 0 or less: self-locking"""
     kind: Literal["mesh_efficiency"] = "mesh_efficiency"
 
     def efficiencies(self) -> tuple[float, float]:
@@ -129,13 +143,25 @@ class MeshEfficiency(TwoEfficiencies, described.MeshEfficiencyFields):
         return self.drive_efficiency, self.backdrive_efficiency
 
 
-class WormMesh(TwoEfficiencies, described.WormMeshFields):
+class WormMesh(TwoEfficiencies):
     """A worm and its wheel with friction: eta_f = tan g/tan(g + r), eta_b = tan(g - r)/tan g. Only in drive trains.
 
     The lead angle g is given, or follows from module, number of starts and reference diameter of the worm. The
     friction angle r is given, or follows from the coefficient of friction. It is self-locking where g < r.
     """
 
+    lead_angle: Annotated[Angle, Positive] | None = None
+    """g, at the reference diameter"""
+    module: Annotated[Length, Positive] | None = None
+    """axial module m"""
+    starts: Annotated[Whole, Field(ge=1, le=20)] | None = None
+    """threads z of the worm"""
+    diameter: Annotated[Length, Positive] | None = None
+    """reference diameter d of the worm; tan g = m z/d"""
+    friction_angle: Annotated[Angle, NotNegative] | None = None
+    """r"""
+    friction_coefficient: Annotated[Number, NotNegative] | None = None
+    """in the mesh; r is its arc tangent"""
     kind: Literal["worm"] = "worm"
 
     @model_validator(mode="after")

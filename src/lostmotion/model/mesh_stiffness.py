@@ -2,17 +2,18 @@
 
 import itertools
 import math
-from typing import Self
+from typing import Annotated, Self
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from .. import _core
-from ..inputs import described
 from ..inputs.breakpoints import RESOLUTION, check_apart
+from ..inputs.part import Part
+from ..inputs.quantities import Angle, Limit, NotNegative, Number, Positive, UpToOne
 from ..reproducible import total
 
 
-class MeshStiffness(described.MeshStiffnessFields):
+class MeshStiffness(Part):
     """A factor on the stiffness of a gear over the angle of its input shaft, constant while the same pairs of teeth mesh.
 
     Examples
@@ -21,6 +22,19 @@ class MeshStiffness(described.MeshStiffnessFields):
     >>> lm.model.MeshStiffness(teeth=30, contact_ratio=1.6, fewer_pairs=0.7).mean()
     0.88
     """
+
+    teeth: Annotated[Number, Positive]
+    """teeth of the wheel on the input shaft; for other gears, mesh periods in one turn of the input shaft"""
+    contact_ratio: Annotated[Number, Limit(ge=1.0)] | None = None
+    """mean number of pairs of teeth in mesh; its fraction is the share of the period in which one pair more meshes, with the factor 1"""
+    fewer_pairs: Annotated[Number, UpToOne] | None = None
+    """factor on the stiffness while the fewer pairs mesh, below 1; with contact_ratio"""
+    phase: Angle = 0.0
+    """angle of the input shaft at which a period begins: with contact_ratio, at the middle of the more pairs"""
+    pairs: Annotated[
+        tuple[tuple[Annotated[Number, NotNegative], Annotated[Number, Positive]], ...], Field(max_length=1000)
+    ] = ()
+    """in place of contact_ratio and fewer_pairs: from which share of a mesh period on, and the factor on the stiffness"""
 
     @model_validator(mode="after")
     def _is_one_form(self) -> Self:

@@ -8,10 +8,22 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import field_validator, model_validator
 
 from ..errors import InputError
-from ..inputs import described
 from ..inputs.arguments import checked
 from ..inputs.described import MotorFields, ShaftMotorFields
-from ..inputs.quantities import Number, Positive, Voltage
+from ..inputs.part import Part
+from ..inputs.quantities import (
+    Current,
+    Number,
+    Positive,
+    Resistance,
+    Speed,
+    Temperature,
+    ThermalResistance,
+    Time,
+    Torque,
+    TorqueConstant,
+    Voltage,
+)
 from ..reproducible import total
 from ..units.practical import practical
 from .notes import NO_NOTE, Note, note_is_about
@@ -21,9 +33,40 @@ MotorLaw = tuple[tuple[str, Any], ...]
 """fields of a motor that a current loop replaces"""
 
 
-class MotorLimits(described.MotorHeatFields, described.MotorLimitsFields):
+class MotorHeat(Part):
+    """Thermal data of a motor."""
+
+    thermal_resistance: Annotated[ThermalResistance, Positive] | None = None
+    """winding to ambient, in place of its two parts"""
+    thermal_resistance_winding_case: Annotated[ThermalResistance, Positive] | None = None
+    """winding to case"""
+    thermal_resistance_case_ambient: Annotated[ThermalResistance, Positive] | None = None
+    """case to ambient"""
+    thermal_time_constant_winding: Annotated[Time, Positive] | None = None
+    """time constant of the winding against a case of constant temperature"""
+    thermal_time_constant_motor: Annotated[Time, Positive] | None = None
+    """time constant of the case against the ambient"""
+    max_winding_temperature: Temperature | None = None
+    """largest temperature of the winding"""
+
+
+class MotorLimits(MotorHeat):
     """Limits of a motor. No run depends on them; the drive check compares with them."""
 
+    continuous_torque: Annotated[Torque, Positive] | None = None
+    """torque that it may give at all times"""
+    peak_torque: Annotated[Torque, Positive] | None = None
+    """for seconds, as in acceleration"""
+    max_speed: Annotated[Speed, Positive] | None = None
+    """largest speed"""
+    resistance: Annotated[Resistance, Positive] | None = None
+    """resistance of the winding, at 25 °C"""
+    torque_constant: Annotated[TorqueConstant, Positive] | None = None
+    """torque to one ampere of the armature, or to one ampere rms"""
+    max_voltage: Annotated[Voltage, Positive] | None = None
+    """voltage limit of the amplifier of a torque source; a DC motor has `voltage_limit`"""
+    max_current: Annotated[Current, Positive] | None = None
+    """smaller limit of motor and amplifier, in the amperes of torque_constant"""
     max_inertia_ratio: Annotated[Number, Positive] | None = None
     """largest inertia of the load, gearbox included, at the motor relative to that of the rotor"""
 
@@ -65,7 +108,7 @@ POINT_KEYS = ("rated_speed", "armature_voltage_constant")
 SAID_BY_WINDING = ("resistance", "torque_constant", "max_current")
 
 
-class Motor(described.MotorDataFields, MotorFields):
+class Motor(MotorFields):
     """DC motor with servo amplifier (eq. 2), synchronous motor with ideal field orientation, or a torque source in
     its place.
 
@@ -77,6 +120,20 @@ class Motor(described.MotorDataFields, MotorFields):
     '0.0001 kg·m²'
     """
 
+    rated_voltage: Annotated[Voltage, Positive] | None = None
+    """u_ZR, that of command 1. A change over a record or a base, by `--set` or in a study is the same motor at another voltage: rated_speed and armature_voltage_constant follow so that stall torque and no-load speed go with the voltage, unless they are given too"""
+    stall_torque: Annotated[Torque, Positive] | None = None
+    """at rated voltage, with no_load_speed in place of rated_speed and armature_voltage_constant; what the shaft gives, if the currents are stated"""
+    no_load_speed: Annotated[Speed, Positive] | None = None
+    """at rated voltage without load; without friction too, unless the currents are stated"""
+    stall_current: Annotated[Current, Positive] | None = None
+    """at rated voltage, with no_load_current"""
+    no_load_current: Annotated[Current, Positive] | None = None
+    """I_0: the friction of the motor is stall_torque I_0/(I_S - I_0), in place of friction_torque"""
+    voltage_limit: Annotated[Voltage, Positive] | None = None
+    """largest voltage of the amplifier"""
+    dc_voltage: Annotated[Voltage, Positive] | None = None
+    """dc voltage of the amplifier that feeds a synchronous motor"""
     kind: Literal["dc", "torque_source", "synchronous"] = "dc"
     """`torque_source`: the command times `rated_torque` acts on the rotor without delay; `synchronous`: command 1 is the largest
     voltage that the amplifier can give, dc_voltage/sqrt(3), amplitude of a phase"""

@@ -1,16 +1,16 @@
 """Racks with their pinions, and belts with their pulleys."""
 
 import math
-from typing import Self
+from typing import Annotated, Self
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
-from ..inputs import described
+from ..inputs.quantities import Angle, Force, Length, Limit, Positive, Whole
 from ..reproducible import cos
 from .linear import LinearDrive, Placed, one_way
 
 
-class RackData(described.RackDataFields, LinearDrive):
+class RackData(LinearDrive):
     """A rack and its pinion alone, as a data sheet has them.
 
     Examples
@@ -18,6 +18,15 @@ class RackData(described.RackDataFields, LinearDrive):
     >>> RackData(module="2 mm", teeth=20).travel()
     0.12566370614359174
     """
+
+    module: Annotated[Length, Positive] | None = None
+    """normal module"""
+    teeth: Annotated[Whole, Field(ge=4, le=1000)] | None = None
+    """teeth of the pinion"""
+    helix_angle: Annotated[Angle, Limit(ge=0.0, le=0.25 * math.pi)] | None = None
+    """left out, 0: straight teeth"""
+    travel_per_turn: Annotated[Length, Positive] | None = None
+    """in place of module and teeth"""
 
     @model_validator(mode="after")
     def _is_a_rack(self) -> Self:
@@ -32,7 +41,7 @@ class RackData(described.RackDataFields, LinearDrive):
         return math.pi * self.module * self.teeth / cos(self.helix_angle or 0.0)
 
 
-class BeltData(described.BeltDataFields, LinearDrive):
+class BeltData(LinearDrive):
     """A toothed belt and its pulley alone, as a data sheet has them.
 
     Examples
@@ -40,6 +49,19 @@ class BeltData(described.BeltDataFields, LinearDrive):
     >>> BeltData(teeth=20, pitch="5 mm", specific_stiffness="1e6 N", free_lengths=["0.5 m", "1.5 m"]).gear("m", "s").stiffness.stiffness
     2666666.6666666665
     """
+
+    pulley_diameter: Annotated[Length, Positive] | None = None
+    """at the belt's pitch line"""
+    teeth: Annotated[Whole, Field(ge=4, le=1000)] | None = None
+    """teeth of the pulley"""
+    pitch: Annotated[Length, Positive] | None = None
+    """pitch of the belt"""
+    travel_per_turn: Annotated[Length, Positive] | None = None
+    """in place of both"""
+    specific_stiffness: Annotated[Force, Positive] | None = None
+    """c_sp, force to unit strain: with free_lengths, in place of stiffness"""
+    free_lengths: Annotated[tuple[Annotated[Length, Positive], ...], Field(min_length=1, max_length=10)] | None = None
+    """lengths of the strands between pulley and slide that carry together: stiffness = c_sp (1/L_1 + 1/L_2 ...)"""
 
     @model_validator(mode="after")
     def _is_a_belt(self) -> Self:

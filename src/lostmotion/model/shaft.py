@@ -2,14 +2,16 @@
 
 import itertools
 from functools import lru_cache
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from .. import _core
 from ..inputs import described
 from ..inputs.breakpoints import check_apart
-from .end_stops import ShaftEndStops  # noqa: F401
+from ..inputs.part import Part
+from ..inputs.quantities import NotNegative, Positive, Speed, Torque
+from .end_stops import ShaftEndStops
 
 SHARE = _core.USUAL_ERROR
 
@@ -60,9 +62,15 @@ class FrictionCurve(described.FrictionCurveFields):
         return self
 
 
-class DragCurve(described.DragCurveFields):
+class DragCurve(Part):
     """Torque against the motion over the magnitude of the speed: straight lines through points."""
 
+    speeds: Annotated[tuple[Annotated[Speed, NotNegative], ...], Field(min_length=2, max_length=100)]
+    """rising from 0"""
+    torques: tuple[Annotated[Torque, NotNegative], ...]
+    """the first is 0: what holds at rest is friction"""
+    beyond: Literal["extend", "hold"] = "extend"
+    """beyond the last point: the last line goes on, or the last torque stays"""
     kind: Literal["curve"] = "curve"
 
     @model_validator(mode="after")
@@ -95,11 +103,19 @@ class QuadraticDrag(described.QuadraticDragFields):
         return _core.quadratic_drag(self.fields_of(type(self)))
 
 
-class EddyCurrentDrag(described.EddyCurrentDragFields):
+class EddyCurrentDrag(Part):
     """Torque ``2 peak_torque s/(1 + s^2)`` of an eddy-current brake with ``s = w/critical_speed``, by straight lines; beyond `max_speed` the
     last torque stays.
     """
 
+    peak_torque: Annotated[Torque, Positive]
+    """at the critical speed"""
+    critical_speed: Annotated[Speed, Positive]
+    """speed of the largest torque"""
+    max_speed: Annotated[Speed, Positive]
+    """up to which the straight lines follow the law"""
+    error: Annotated[Torque, Positive] | None = None
+    """by which they depart from it at most; left out, 0.1 % of the peak torque"""
     kind: Literal["eddy_current"]
 
     @model_validator(mode="after")
@@ -155,15 +171,25 @@ def _departure(a: float, b: float) -> float:
     return max(abs(f[k] - (f[0] + (f[-1] - f[0]) * k / 32.0)) for k in range(33))
 
 
-class WithDrag(described.DragFields):
+class WithDrag(Part):
     """Base of the elements that a drag acts on."""
+
+    drag: Annotated[DragCurve | QuadraticDrag | EddyCurrentDrag, Field(discriminator="kind")] | None = None
+    """torque over speed against the motion, of dampers over the slip"""
 
     def core_fields(self) -> dict[str, Any]:
         """Fields for the core, in SI units."""
-        return super().core_fields() | ({} if self.drag is None else {"drag": self.drag.core()})
+        return super().core_fields() | ({} if self.drag is None else {"drag": self.drag.core()})  # type: ignore[misc, no-any-return]
 
 
-class Shaft(WithDrag, described.DryFrictionFields, described.StoppedFields, described.ShaftFields):
+class Stopped(Part):
+    """A shaft that end stops hold."""
+
+    end_stops: ShaftEndStops | None = None
+    """stops at both ends of the travel"""
+
+
+class Shaft(WithDrag, described.DryFrictionFields, Stopped, described.ShaftFields):
     """A shaft of a drive train. Rotors of motors and inertias of gears on it are added to it.
 
     Examples

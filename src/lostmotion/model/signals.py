@@ -8,19 +8,32 @@ import math
 from collections import deque
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
-from typing import Any, ClassVar, Generic, Self, TypeVar
+from typing import Annotated, Any, ClassVar, Generic, Self, TypeVar
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from .. import _core
 from ..inputs import described
 from ..inputs.described import V
-from ..inputs.quantities import Force, LinearSpeed, Number, Speed, Torque
+from ..inputs.part import Part
+from ..inputs.quantities import (
+    Angle,
+    Force,
+    Frequency,
+    LinearSpeed,
+    NotNegative,
+    Number,
+    Positive,
+    Speed,
+    Time,
+    Torque,
+    Whole,
+)
 from ..recorded import real
 from ..reproducible import sin, total
 from ..units.scalars import is_number, scalar
-from .wind import Wind  # noqa: F401
+from .wind import Davenport, Kaimal, VonKarman, WindOfTable
 
 N = TypeVar("N", float, np.ndarray)
 
@@ -32,27 +45,52 @@ class Sine(described.SineFields[V], Generic[V]):
     """``amplitude * sin(2 pi frequency t + phase)``."""
 
 
-class Step(described.StepFields[V], Generic[V]):
+class Step(Part, Generic[V]):
     """Adds `height` from `time` on."""
+
+    height: V
+    """height that it adds"""
+    time: Annotated[Time, NotNegative] = 0.0
+    """instant from which it adds its height"""
 
     def breakpoints(self) -> list[Breakpoint]:
         return [(self.time, real(self.height), 0.0)]
 
 
-class Ramp(described.RampFields[V], Generic[V]):
+class Ramp(Part, Generic[V]):
     """Rises by `rise` in a straight line within `duration`, from `begin` on, and stays there."""
+
+    rise: V
+    """height that it adds from its end on"""
+    duration: Annotated[Time, Positive]
+    """time that it takes"""
+    begin: Annotated[Time, NotNegative] = 0.0
+    """instant at which it begins"""
 
     def breakpoints(self) -> list[Breakpoint]:
         rise = real(self.rise)
         return [(self.begin, 0.0, rise / self.duration), (self.begin + self.duration, rise, 0.0)]
 
 
-class Chirp(described.ChirpFields[V], Generic[V]):
+class Chirp(Part, Generic[V]):
     """Sine whose frequency runs in a straight line from one value to another, drawn with straight lines.
 
     The chords depart from the sine by at most ``amplitude * (pi / points_per_period)**2 / 2`` where the frequency is
     highest: 0.12 % with 64 points.
     """
+
+    amplitude: V
+    """amplitude of the sine"""
+    begin_frequency: Annotated[Frequency, Positive]
+    """frequency at its begin"""
+    end_frequency: Annotated[Frequency, Positive]
+    """frequency at its end"""
+    duration: Annotated[Time, Positive]
+    """time from its begin to its end"""
+    begin: Annotated[Time, NotNegative] = 0.0
+    """instant at which it begins"""
+    points_per_period: Annotated[Whole, Field(ge=8, le=1000)] = 64
+    """straight lines in the shortest period"""
 
     def breakpoints(self) -> list[Breakpoint]:
         fastest = max(self.begin_frequency, self.end_frequency)
@@ -65,12 +103,17 @@ class Chirp(described.ChirpFields[V], Generic[V]):
         return [*lines[:-1], (self.begin + self.duration, 0.0, 0.0)]
 
 
-class Samples(described.SamplesFields[V], Generic[V]):
+class Samples(Part, Generic[V]):
     """Straight lines through the points given; before the first and after the last the value stays.
 
     In a scenario file, `file = "points.csv"` may stand for both keys: two columns, time [s] and value. A heading such as
     ``time [ms],torque [Nm]`` gives other units.
     """
+
+    times: tuple[Time, ...]
+    """instants, rising from 0 or later"""
+    values: tuple[V, ...]
+    """value at each instant"""
 
     @model_validator(mode="after")
     def _fit_together(self) -> Self:
@@ -94,9 +137,23 @@ class Samples(described.SamplesFields[V], Generic[V]):
         return points if self.times[0] == 0.0 else [(0.0, points[0][1], 0.0), *points]
 
 
-class TimeFunction(described.TimeFunctionFields[V], Generic[V]):
+class TimeFunction(Part, Generic[V]):
     """The sum of all that is given; a bare number is a constant."""
 
+    mean: V = 0.0  # type: ignore[assignment]
+    """constant part"""
+    amplitude: V | None = None
+    """amplitude of one sine, with frequency and phase"""
+    frequency: Annotated[Frequency, Positive] | None = None
+    """frequency of that sine"""
+    phase: Angle = 0.0
+    """phase of that sine at t = 0"""
+    sines: tuple[Sine[V], ...] = ()
+    """more sines"""
+    steps: tuple[Step[V], ...] = ()
+    """steps, each from an instant on"""
+    ramps: tuple[Ramp[V], ...] = ()
+    """straight lines in time, each with a begin and an end"""
     derivatives: ClassVar[int] = 1
     """derivatives, beside the value, that change at breakpoints; all higher ones are 0 between them"""
 
@@ -148,8 +205,13 @@ class TimeFunction(described.TimeFunctionFields[V], Generic[V]):
         return type(self).model_validate, (self.model_dump(exclude_unset=True),)
 
 
-class Signal(described.SignalFields[V], TimeFunction[V], Generic[V]):
+class Signal(TimeFunction[V], Generic[V]):
     """The sum of all that is given; a bare number is a constant."""
+
+    chirp: Chirp[V] | None = None
+    """sine whose frequency runs from one value to another"""
+    samples: Samples[V] | None = None
+    """straight lines through points"""
 
     def _pieces(self) -> list[list[Breakpoint]]:
         parts: list[Chirp[V] | Samples[V] | None] = [self.chirp, self.samples]
@@ -321,7 +383,7 @@ class AccelerationSignal(Signal[Number]):
         return [(time, slope, 0.0) for time, _, slope in self.speed.breakpoint_list()]
 
 
-class TorqueSignal(described.TorqueSignalFields, Signal[Torque]):
+class TorqueSignal(Signal[Torque]):
     """A torque [N·m] over time: the sum of all that is given.
 
     Examples
@@ -330,6 +392,9 @@ class TorqueSignal(described.TorqueSignalFields, Signal[Torque]):
     >>> lm.TorqueSignal(mean="5 N*m").mean
     5.0
     """
+
+    wind: Annotated[WindOfTable | Davenport | VonKarman | Kaimal, Field(discriminator="kind")] | None = None
+    """random torque with the spectrum of gusts"""
 
     def _pieces(self) -> list[list[Breakpoint]]:
         return [*super()._pieces(), *([] if self.wind is None else [self.wind.breakpoints()])]

@@ -1,13 +1,17 @@
 """Slides: parts that move along a straight line, and their friction."""
 
-from typing import Self
+import math
+from typing import Annotated, Self
 
 from pydantic import model_validator
 
 from ..inputs import described
+from ..inputs.part import Part
+from ..inputs.quantities import Angle, Limit, Mass, NotNegative
 from ..reproducible import sin
+from ..units.conversion import Unit
 from .angle_torques import STANDARD_GRAVITY
-from .end_stops import EndStops  # noqa: F401
+from .end_stops import EndStops
 from .shaft import FrictionCurve, Shaft, check_friction, check_points
 
 
@@ -20,7 +24,20 @@ class ForceCurve(described.ForceCurveFields):
         return self
 
 
-class Slide(described.SlideFrictionFields, described.SlideFields):
+class Movable(Part):
+    """A mass that moves along a straight line, without its friction."""
+
+    mass: Annotated[Mass, NotNegative] = 0.0
+    """mass of all that moves, without masses of linear motors"""
+    viscous_friction: Annotated[float, Unit("N*s/m"), NotNegative] = 0.0
+    """against the frame"""
+    inclination: Annotated[Angle, Limit(ge=-0.5 * math.pi, le=0.5 * math.pi)] = 0.0
+    """inclination of the positive direction above the horizontal; 90 deg: vertical, positive upwards. The weight's share along the slide acts against it"""
+    end_stops: EndStops | None = None
+    """stops at both ends of the travel"""
+
+
+class Slide(described.SlideFrictionFields, Movable):
     """A mass that moves along a straight line: a table, a carriage, a ram. Masses of linear motors on it are added.
 
     Examples

@@ -18,12 +18,22 @@ the DC motor of (2) where command 1 is the voltage u_R and 1 of m_D the torque M
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Self
+from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
-from ..inputs import described
+from ..inputs.part import Part
+from ..inputs.quantities import (
+    Current,
+    Inductance,
+    Positive,
+    Resistance,
+    Temperature,
+    TorqueConstant,
+    VoltageConstant,
+    Whole,
+)
 from ..inputs.validation import shown
 from ..units.conversion import Unit
 
@@ -147,12 +157,59 @@ class PhaseValues:
         return np.sqrt(u_q * u_q + u_d * u_d)
 
 
-class Winding(described.WindingFields):
+class Winding(Part):
     """Winding and magnets of a synchronous motor as data sheets print them: each value in one of its forms.
 
     Values are those of the star connection; that of a delta connection between two terminals is the same. Of several constants
     that say the same (flux linkage, voltage and torque constant) the first given in this order is taken.
     """
+
+    pole_pairs: Annotated[Whole, Field(ge=1)] | None = None
+    """p"""
+    poles: Annotated[Whole, Field(ge=1)] | None = None
+    """2 p, in place of pole_pairs"""
+    resistance_phase: Annotated[Resistance, Positive] | None = None
+    """R"""
+    resistance_line_to_line: Annotated[Resistance, Positive] | None = None
+    """between two terminals, 2 R"""
+    resistance_temperature: Temperature = 25.0
+    """at which the resistance holds"""
+    inductance_phase: Annotated[Inductance, Positive] | None = None
+    """L_d = L_q; also called rotating field inductance"""
+    inductance_line_to_line: Annotated[Inductance, Positive] | None = None
+    """between two terminals, 2 L_d = 2 L_q"""
+    inductance_line_to_line_min: Annotated[Inductance, Positive] | None = None
+    """least inductance of a salient rotor over its angle, 2 L_d"""
+    inductance_line_to_line_max: Annotated[Inductance, Positive] | None = None
+    """largest inductance of a salient rotor over its angle, 2 L_q"""
+    inductance_d: Annotated[Inductance, Positive] | None = None
+    """L_d"""
+    inductance_q: Annotated[Inductance, Positive] | None = None
+    """L_q"""
+    flux_linkage: Annotated[float, Unit("V*s"), Positive] | None = None
+    """psi, amplitude of a phase"""
+    voltage_constant_line_to_line_rms: Annotated[VoltageConstant, Positive] | None = None
+    """k_E, sqrt(3/2) p psi; as "87 V/krpm" too"""
+    voltage_constant_line_to_line_peak: Annotated[VoltageConstant, Positive] | None = None
+    """sqrt(3) p psi"""
+    voltage_constant_phase_rms: Annotated[VoltageConstant, Positive] | None = None
+    """p psi/sqrt(2)"""
+    voltage_constant_phase_peak: Annotated[VoltageConstant, Positive] | None = None
+    """p psi"""
+    torque_constant_rms: Annotated[TorqueConstant, Positive] | None = None
+    """k_T to one ampere rms, (3/sqrt(2)) p psi"""
+    torque_constant_peak: Annotated[TorqueConstant, Positive] | None = None
+    """to one ampere peak, 1.5 p psi"""
+    torque_constant_block: Annotated[TorqueConstant, Positive] | None = None
+    """to one ampere of the supply with block commutation, (3 sqrt(3)/pi) p psi"""
+    continuous_current_rms: Annotated[Current, Positive] | None = None
+    """current that the motor withstands permanently, at rest"""
+    continuous_current_peak: Annotated[Current, Positive] | None = None
+    """the same as amplitude"""
+    max_current_rms: Annotated[Current, Positive] | None = None
+    """smaller limit of motor and amplifier, effective value of a phase"""
+    max_current_peak: Annotated[Current, Positive] | None = None
+    """the same as amplitude"""
 
     @model_validator(mode="before")
     @classmethod

@@ -1,17 +1,16 @@
 """The torsion of a gearbox: stiffness, backlash and hysteresis."""
 
 import itertools
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import model_validator
 
 from .. import _core
 from ..errors import InputError
-from ..inputs import described
 from ..inputs.breakpoints import check_apart
 from ..inputs.described import TorsionCurveFields
 from ..inputs.part import Part
-from ..inputs.quantities import argument
+from ..inputs.quantities import Angle, NotNegative, Number, Positive, Share, Stiffness, UpToOne, argument
 
 
 def check_segments(slopes: tuple[float, ...], breaks: tuple[float, ...], what: str) -> None:
@@ -104,9 +103,11 @@ class TorsionCurve(TorsionCurveFields, Elastic):
         return self.model_copy(update=own)
 
 
-class LinearStiffness(described.LinearStiffnessFields, Elastic):
+class LinearStiffness(Elastic):
     """One stiffness for all twists (5a)."""
 
+    stiffness: Annotated[Stiffness, Positive]
+    """torque to the twist"""
     kind: Literal["linear"] = "linear"
 
     def core(self) -> _core.TorsionCurve:
@@ -114,7 +115,7 @@ class LinearStiffness(described.LinearStiffnessFields, Elastic):
         return _core.TorsionCurve([], [self.stiffness])
 
 
-class Rigid(described.RigidFields):
+class Rigid(Part):
     """No twist at all (7), or rigid flanks that strike at the ends of a backlash.
 
     Examples
@@ -124,6 +125,10 @@ class Rigid(described.RigidFields):
     True
     """
 
+    backlash: Annotated[Angle, NotNegative] = 0.0
+    """total gap at the output"""
+    restitution: Annotated[Number, Share] | None = None
+    """speed at which the flanks part over that at which they strike; needed with backlash"""
     kind: Literal["rigid"] = "rigid"
 
     @property
@@ -140,5 +145,8 @@ class Rigid(described.RigidFields):
         return self
 
 
-class Hysteresis(described.HysteresisFields):
+class Hysteresis(Part):
     """Turning-point hysteresis (16)."""
+
+    efficiency: Annotated[Number, UpToOne]
+    """eta_H, average efficiency of the hysteresis process; 1: none"""

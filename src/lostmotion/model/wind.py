@@ -1,24 +1,46 @@
 """Wind on a load: a torque with the spectrum of the gusts, seeded, so that it is the same each time."""
 
 import math
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
-from ..inputs import described
+from ..inputs.part import Part
+from ..inputs.quantities import (
+    Frequency,
+    Length,
+    Limit,
+    LinearSpeed,
+    NotNegative,
+    Number,
+    Positive,
+    Time,
+    UpToOne,
+    Whole,
+)
 from ..reproducible import cbrt, cos, exp, fourier_sum, interpolate, log, sin
+from ..units.conversion import Unit
 
 MAX_POINTS = 2**17
 KARMAN = 0.4
 
 
-class Wind(described.WindFields):
+class Wind(Part):
     """Random torque of a given one-sided spectrum S, made of sines: ``sum of sqrt(2 S(f_k)/D) cos(2 pi f_k t + phase_k)``, f_k = k/D.
 
     The phases are uniform, from the seed (Shinozuka and Deodatis 1991). It repeats after the duration D; its variance is that of the lines of
     the spectrum up to ``max_frequency``, in every realisation. Between its points, ``1/(points_per_period max_frequency)`` apart, it is straight.
     """
+
+    duration: Annotated[Time, Positive]
+    """D, after which it is constant; its lowest frequency is 1/D"""
+    max_frequency: Annotated[Frequency, Positive]
+    """highest frequency of its lines"""
+    points_per_period: Annotated[Whole, Field(ge=4, le=100)] = 16
+    """straight lines in the shortest period"""
+    seed: Annotated[Whole, Field(ge=0, le=2**53)] = 0
+    """number of the realisation"""
 
     def spectrum(self, frequency: np.ndarray) -> np.ndarray:
         """S, one-sided [(N m)^2/Hz], at frequencies above 0 [Hz]."""
@@ -62,9 +84,13 @@ class Wind(described.WindFields):
         return list(map(tuple, np.column_stack([time, torque, slopes]).tolist()))
 
 
-class WindOfTable(described.WindOfTableFields, Wind):
+class WindOfTable(Wind):
     """A measured spectrum, linear in the logarithms of frequency and density between its points, zero outside."""
 
+    frequencies: Annotated[tuple[Annotated[Frequency, Positive], ...], Field(min_length=2)]
+    """rising"""
+    densities: tuple[Annotated[float, Unit("N^2*m^2/Hz"), Positive], ...]
+    """one-sided [(N·m)²/Hz], at each frequency"""
     kind: Literal["table"]
 
     @model_validator(mode="after")
@@ -83,11 +109,22 @@ class WindOfTable(described.WindOfTableFields, Wind):
         return np.where(inside, exp(interpolate(log(frequency), points, densities)), 0.0)
 
 
-class WindOnArea(described.WindOnAreaFields, Wind):
+class WindOnArea(Wind):
     """Drag on an area with a lever: M = rho c A r (V + v)^2/2, linear in the gusts v, so that S_M = (rho c A r V)^2 S_v.
 
     The gusts over the area are taken as one.
     """
+
+    speed: Annotated[LinearSpeed, Positive]
+    """V, mean over ten minutes, at the height of the load"""
+    drag_coefficient: Annotated[Number, Positive]
+    """c of the area"""
+    area: Annotated[float, Unit("m^2"), Positive]
+    """A on which the wind presses"""
+    lever: Length
+    """r of the centre of pressure from the axis, against the motion forward"""
+    density: Annotated[float, Unit("kg/m^3"), Positive] = 1.225
+    """rho of the air"""
 
     def gusts(self, frequency: np.ndarray) -> np.ndarray:
         """S_v, one-sided [(m/s)²/Hz]."""
@@ -101,9 +138,13 @@ class WindOnArea(described.WindOnAreaFields, Wind):
         return per_speed * per_speed * self.gusts(frequency)
 
 
-class Davenport(described.DavenportFields, WindOnArea):
+class Davenport(WindOnArea):
     """f S_v/u*^2 = 4 x^2/(1 + x^2)^(4/3), x = 1200 m f/V_10 (Davenport 1961)."""
 
+    surface_drag: Annotated[Number, Limit(gt=0.0, le=0.1)] = 0.005
+    """K = u*^2/V_10^2; 0.005 open country, 0.015 suburbs, 0.05 cities"""
+    speed_at_10_m: Annotated[LinearSpeed, Positive] | None = None
+    """V_10; default: the value at the load"""
     kind: Literal["davenport"]
 
     def gusts(self, frequency: np.ndarray) -> np.ndarray:
@@ -113,9 +154,13 @@ class Davenport(described.DavenportFields, WindOnArea):
         return np.asarray(4.0 * self.surface_drag * V * V * x * x / ((1.0 + x * x) * root) / frequency)
 
 
-class VonKarman(described.VonKarmanFields, WindOnArea):
+class VonKarman(WindOnArea):
     """f S_v/sigma^2 = 4 x/(1 + 70.8 x^2)^(5/6), x = f L/V (von Karman 1948)."""
 
+    turbulence: Annotated[Number, UpToOne]
+    """sigma/V"""
+    length_scale: Annotated[Length, Positive]
+    """L, along the wind"""
     kind: Literal["von_karman"]
 
     def gusts(self, frequency: np.ndarray) -> np.ndarray:
@@ -126,9 +171,13 @@ class VonKarman(described.VonKarmanFields, WindOnArea):
         return np.asarray(4.0 * deviation * deviation * x / power / frequency)
 
 
-class Kaimal(described.KaimalFields, WindOnArea):
+class Kaimal(WindOnArea):
     """f S_v/u*^2 = 105 x/(1 + 33 x)^(5/3), x = f z/V, u* = 0.4 V/log(z/z_0) (Kaimal et al. 1972)."""
 
+    height: Annotated[Length, Positive]
+    """z above ground"""
+    roughness_length: Annotated[Length, NotNegative] = 0.03
+    """z_0; 0.03 m open country"""
     kind: Literal["kaimal"]
 
     @model_validator(mode="after")

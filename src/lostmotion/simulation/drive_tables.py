@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import ConfigDict
 
 from ..control.controller import Controller
 from ..data_sheets.components import Conditions
 from ..errors import InputError
-from ..inputs import described
 from ..inputs.kept import kept
 from ..inputs.named import Named
+from ..inputs.part import Part
+from ..inputs.quantities import Angle, NotNegative, Speed, Switch, Torque
 from ..model.drive import Drive
 from ..model.gearbox import Gearbox
 from ..model.load import Load
@@ -24,11 +25,14 @@ from .tables import BASE, RECORD_NAME, ScenarioTables, SimulationTable, with_acc
 from .train_tables import ShaftTable, TrainInitial, TrainTables
 
 
-class LoadTable(described.LoadTableFields, Load):
+class LoadTable(Load):
     """The driven body and the disturbance torque on it."""
 
+    torque: TorqueSignal = TorqueSignal()
+    """M_Z"""
 
-class Initial(described.InitialFields):
+
+class Initial(Part):
     """State of a drive at t = 0.
 
     Examples
@@ -37,6 +41,16 @@ class Initial(described.InitialFields):
     >>> lm.Initial(motor_speed="3000 rpm", load_speed="30 rpm").load_speed
     3.141592653589793
     """
+
+    motor_torque: Torque = 0.0
+    motor_speed: Speed = 0.0
+    load_speed: Speed = 0.0
+    twist: Angle = 0.0
+    load_angle: Angle = 0.0
+    hysteresis_capacity: Annotated[Torque, NotNegative] = 0.0
+    """h, which the last turning point before t = 0 left behind"""
+    on_reference: Switch = False
+    """angle and speeds are those of the controller's reference at t = 0"""
 
     @kept
     def of_train(self) -> TrainInitial:

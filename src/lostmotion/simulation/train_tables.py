@@ -5,23 +5,24 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping
 from functools import cache, lru_cache
-from typing import Any
+from typing import Annotated, Any
 
 from pydantic import ConfigDict, Field, model_validator
 
 from .. import _core
 from ..control.continuous import ContinuousController
 from ..control.controller import AnyController, Controller
-from ..control.references import MovesReference  # noqa: F401
+from ..control.references import PositionReference, SlideReference
 from ..data_sheets.train_components import CONDITIONS, RECORDS
 from ..errors import inside
-from ..inputs import described
 from ..inputs.kept import kept
 from ..inputs.named import Elements, Named, nothing
+from ..inputs.part import Part
+from ..inputs.quantities import Angle, Force, Length, LinearSpeed, NotNegative, Number, Speed, Switch, Torque
 from ..model.linear_train import LinearElements
 from ..model.motor import MotorLaw
 from ..model.shaft import Shaft
-from ..model.signals import CommandSignal, ForceSignal, Signal, TorqueSignal, constant_or
+from ..model.signals import CommandSignal, ForceSignal, Signal, SlideSpeedSignal, SpeedSignal, TorqueSignal, constant_or
 from ..model.slide import Slide
 from ..model.task import Task
 from ..model.train import DriveTrain
@@ -31,15 +32,29 @@ from .tables import BASE, RECORD_NAME, ScenarioTables, SimulationTable, with_acc
 from .train_variables import only_input
 
 
-class ShaftTable(described.ShaftTableFields, Shaft):
+class ShaftTable(Shaft):
     """A shaft, the load torque on it, and its motion where that is given."""
 
+    torque: TorqueSignal | None = None
+    """M_Z, against its motion; left out, none can act on it"""
+    speed: SpeedSignal | None = None
+    """speed that it has whatever acts on it; the torque that this takes is the variable ``NAME_drive_torque``; left out, it moves as the torques let it"""
+    motion: PositionReference | None = None
+    """angle that it has whatever acts on it, such as moves, in place of speed"""
 
-class SlideTable(described.SlideTableFields, Slide):
+
+class SlideTable(Slide):
     """A slide and the load force on it."""
 
+    force: ForceSignal | None = None
+    """against its motion, beside its weight; left out, none can act on it unless it is inclined"""
+    speed: SlideSpeedSignal | None = None
+    """speed that it has whatever acts on it; the force that this takes is the variable ``NAME_drive_force``; left out, it moves as the forces let it"""
+    motion: SlideReference | None = None
+    """position that it has whatever acts on it, such as moves, in place of speed"""
 
-class TrainInitial(described.TrainInitialFields):
+
+class TrainInitial(Part):
     """State of a drive train at t = 0; missing values are 0.
 
     Examples
@@ -48,6 +63,29 @@ class TrainInitial(described.TrainInitialFields):
     >>> lm.TrainInitial(speeds={"motor": "100 rpm"}).speeds["motor"]
     10.471975511965978
     """
+
+    speeds: Elements[Speed] = Field(default_factory=nothing)
+    """speeds of shafts"""
+    angles: Elements[Angle] = Field(default_factory=nothing)
+    """angles of shafts; those of others follow through the gears"""
+    twists: Elements[Angle] = Field(default_factory=nothing)
+    """twists of gears with a stiffness"""
+    positions: Elements[Length] = Field(default_factory=nothing)
+    """positions of slides"""
+    slide_speeds: Elements[LinearSpeed] = Field(default_factory=nothing)
+    """slide speeds of slides"""
+    deflections: Elements[Length] = Field(default_factory=nothing)
+    """deflections of screws, racks and belts with a stiffness"""
+    motor_torques: Elements[Torque] = Field(default_factory=nothing)
+    """motor torques of DC motors"""
+    controller_states: Elements[Number] = Field(default_factory=nothing)
+    """states of continuous controllers, by their result variables (SI), such as ``MOTOR_integral``; the filter of a derivative that is left out has settled"""
+    hysteresis_capacities: Elements[Annotated[Torque, NotNegative]] = Field(default_factory=nothing)
+    """capacities of gears with hysteresis after the last turning point before t = 0"""
+    hysteresis_forces: Elements[Annotated[Force, NotNegative]] = Field(default_factory=nothing)
+    """the same of screws, racks and belts"""
+    on_reference: Switch = False
+    """angles of the shafts of controllers, and the speeds of all that turns with them, are those of their references at t = 0"""
 
     def of_train(self) -> TrainInitial:
         """The state of a drive train: this one."""
