@@ -1,36 +1,32 @@
-"""Formulas that measurement files carry for their channels, read by a grammar of their own and never run as Python."""
+"""Formulas that measurement files carry for their channels: by the grammar of identification files, with ufuncs of NumPy."""
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Callable
 
 import numpy as np
 
-from ..inputs.operators import ARITHMETIC, syntax_tree
+from .formulas import Formula
 
 NAMES = ("X", "X1")  # of the raw value
-CONSTANTS = {"pi": np.pi}
-FUNCTIONS: dict[str, tuple[int, Callable[..., np.ndarray]]] = {
-    "sqrt": (1, np.sqrt),
-    "exp": (1, np.exp),
-    "log": (1, np.log),
-    "ln": (1, np.log),
-    "log10": (1, np.log10),
-    "sin": (1, np.sin),
-    "cos": (1, np.cos),
-    "tan": (1, np.tan),
-    "asin": (1, np.arcsin),
-    "acos": (1, np.arccos),
-    "atan": (1, np.arctan),
-    "sinh": (1, np.sinh),
-    "cosh": (1, np.cosh),
-    "tanh": (1, np.tanh),
-    "abs": (1, np.abs),
-    "pow": (2, np.power),
+FUNCTIONS: dict[str, np.ufunc] = {
+    "sqrt": np.sqrt,
+    "exp": np.exp,
+    "log": np.log,
+    "ln": np.log,
+    "log10": np.log10,
+    "sin": np.sin,
+    "cos": np.cos,
+    "tan": np.tan,
+    "asin": np.arcsin,
+    "acos": np.arccos,
+    "atan": np.arctan,
+    "sinh": np.sinh,
+    "cosh": np.cosh,
+    "tanh": np.tanh,
+    "abs": np.abs,
+    "pow": np.power,
 }
-
-Course = Callable[[np.ndarray], np.ndarray | float]
 
 
 def conversion_of(text: str) -> Callable[[np.ndarray], np.ndarray]:
@@ -51,41 +47,17 @@ def conversion_of(text: str) -> Callable[[np.ndarray], np.ndarray]:
     ValueError
         The formula has something else in it.
     """
-    course = _read(syntax_tree(text, "a formula"), text)
+    formula = Formula(text, FUNCTIONS)
+    if other := sorted(formula.names.difference(NAMES)):
+        raise ValueError(f"{text[:40]!r} names {other[0]}; the raw value is X")
 
     def convert(raw: np.ndarray) -> np.ndarray:
         values = np.asarray(raw, dtype=float)
         with np.errstate(all="ignore"):
-            return np.broadcast_to(np.asarray(course(values), dtype=float), values.shape)
+            found = formula.value(dict.fromkeys(NAMES, values))
+        if isinstance(found, str):
+            raise ValueError(f"{text[:40]!r} is a text, not a number")
+        return np.broadcast_to(np.asarray(found, dtype=float), values.shape)
 
+    convert(np.array([1.0, 2.0]))  # shows what is not of arrays of numbers
     return convert
-
-
-def _read(node: ast.expr, text: str) -> Course:
-    match node:
-        case ast.Constant(bool() | str() | bytes() | complex() | None):
-            pass
-        case ast.Constant(int() | float() as number):
-            try:
-                value = np.float64(number)
-            except OverflowError:
-                raise ValueError(f"{text[:40]!r} has a number that is too large") from None
-            return lambda _: value
-        case ast.Name(name) if name in NAMES:
-            return lambda x: x
-        case ast.Name(name) if name in CONSTANTS:
-            return lambda _: np.float64(CONSTANTS[name])
-        case ast.UnaryOp(ast.USub() | ast.UAdd() as sign, operand):
-            inner = _read(operand, text)
-            return (lambda x: -inner(x)) if isinstance(sign, ast.USub) else inner
-        case ast.BinOp(left, operation, right) if type(operation) in ARITHMETIC:
-            how = ARITHMETIC[type(operation)]
-            a, b = _read(left, text), _read(right, text)
-            return lambda x: how(a(x), b(x))
-        case ast.BinOp(op=ast.BitXor()):
-            raise ValueError(f"{text[:40]!r} has ^, which is a power or a bitwise operator; write pow(a, b)")
-        case ast.Call(ast.Name(name), args, []) if name in FUNCTIONS and len(args) == FUNCTIONS[name][0]:
-            function = FUNCTIONS[name][1]
-            given = [_read(arg, text) for arg in args]
-            return lambda x: function(*(one(x) for one in given))
-    raise ValueError(f"{text[:40]!r} has something else in it than X, numbers, + - * / ** and {', '.join(FUNCTIONS)}")
