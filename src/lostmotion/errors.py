@@ -27,14 +27,10 @@ def visible(text: str, kept: str = "") -> str:
 class Problem(NamedTuple):
     """Fault of a value, or of several."""
 
-    keys: tuple[str, ...]
-    """dotted keys of these; none where it concerns all that was given"""
-    reason: str
-    """the value, what is wrong with it, and the remedy"""
-    table: str = ""
-    """the table that a record fills, where the fault is that of a record"""
-    record: str = ""
-    """this record, as messages name it"""
+    keys: tuple[str, ...]  # dotted keys of these; none where it concerns all that was given
+    reason: str  # the value, what is wrong with it, and the remedy
+    table: str = ""  # the table that a record fills, where the fault is that of a record
+    record: str = ""  # this record, as messages name it
 
     def sentence(self) -> str:
         """Keys, record and reason as messages have them."""

@@ -17,13 +17,11 @@ from typing import Any
 import numpy as np
 
 MARKED_BITS = 0xFFFF
-TINIEST = 2.0**-200
-"""of the marks of 0"""
+TINIEST = 2.0**-200  # of the marks of 0
 FUNCTIONS = ("root", "sine", "cosine", "arctangent", "cube_root", "worm_driving", "worm_overrunning")
 """that the core has for formulas"""
 
-Condition = tuple[str, int, int]
-"""comparison, and the numbers of two formulas"""
+Condition = tuple[str, int, int]  # comparison, and the numbers of two formulas
 
 
 class Tape:

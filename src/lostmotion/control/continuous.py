@@ -58,8 +58,7 @@ class SpeedSignal(Signal[Speed]):
 class LinearSystem:
     """x' = A x + B y + back (u - v), v = C x + D y, in units of what it gives; y by name."""
 
-    signals: tuple[str, ...]
-    """reference, reference_rate, measured, measured_rate"""
+    signals: tuple[str, ...]  # reference, reference_rate, measured, measured_rate
     states: tuple[str, ...]
     A: np.ndarray
     B: np.ndarray

@@ -12,8 +12,7 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.validation import shown
 
-C_FUNCTION: Any = ctypes.CFUNCTYPE(None).__mro__[1]
-"""the class of all function pointers"""
+C_FUNCTION: Any = ctypes.CFUNCTYPE(None).__mro__[1]  # the class of all function pointers
 SIGNATURE = (
     "int (double time, const double *measured, const double *reference, double *state, double *command, void *data)"
 )

@@ -13,11 +13,9 @@ import math
 
 from ..reproducible import cbrt, sqrt
 
-JERK_SIGNS = (1.0, 0.0, -1.0, 0.0, -1.0, 0.0, 1.0, 0.0)
-"""of the segments; the last is rest"""
+JERK_SIGNS = (1.0, 0.0, -1.0, 0.0, -1.0, 0.0, 1.0, 0.0)  # of the segments; the last is rest
 
-Segment = tuple[float, float, float, float, float]
-"""time [s], position, speed, acceleration and jerk at its beginning"""
+Segment = tuple[float, float, float, float, float]  # time [s], position, speed, acceleration and jerk at its beginning
 
 
 def segment_durations(

@@ -18,8 +18,7 @@ ORDER = 4  # coefficients of the series: value to third derivative
 TOLERANCE = 1e-13  # [rad], of a piece of third degree between two instants
 MAX_PIECES = 2_000_000
 
-Jet = np.ndarray
-"""(4, n): Taylor coefficients of a function of time at n instants, value, rate, second/2, third/6"""
+Jet = np.ndarray  # (4, n): Taylor coefficients of a function of time at n instants, value, rate, second/2, third/6
 
 
 def product(a: Jet, b: Jet) -> Jet:

@@ -18,24 +18,18 @@ HELD = 1.5  # sample times of the position loop: one until a result acts, and ha
 class SpeedGains:
     """Gains of a PI speed loop in terms of the motor."""
 
-    gain: float
-    """K_p [N·m·s/rad]"""
-    integral_gain: float
-    """K_i [N·m/rad]"""
-    filter_time: float = 0.0
-    """time constant of a first-order filter of the reference [s]; 0: none"""
+    gain: float  # K_p [N·m·s/rad]
+    integral_gain: float  # K_i [N·m/rad]
+    filter_time: float = 0.0  # time constant of a first-order filter of the reference [s]; 0: none
 
 
 @dataclass(frozen=True)
 class TwoInertias:
     """Motor and load with the spring between them."""
 
-    motor_inertia: float
-    """J_M, all on the motor's side of the spring, at the motor [kg·m²]"""
-    load_inertia: float
-    """J_L, all beyond the spring, at the motor [kg·m²]"""
-    stiffness: float
-    """k at the motor [N·m/rad]"""
+    motor_inertia: float  # J_M, all on the motor's side of the spring, at the motor [kg·m²]
+    load_inertia: float  # J_L, all beyond the spring, at the motor [kg·m²]
+    stiffness: float  # k at the motor [N·m/rad]
 
     @property
     def inertia_ratio(self) -> float:
@@ -140,8 +134,7 @@ class CascadeGains:
 
     rule: str
     speed: SpeedGains
-    position: float
-    """K_v [1/s]"""
+    position: float  # K_v [1/s]
 
 
 def suited(drive: TwoInertias, lag: float, position_time: float) -> CascadeGains:

@@ -398,8 +398,7 @@ def at_voltage(table: Mapping[str, Any], voltage: Any, given: Collection[str], w
     return changed | {key: getattr(moved, key) for key in follow}
 
 
-OF_THE_MOTOR = "of the motor"
-"""brake of a task: that which is built into the motor"""
+OF_THE_MOTOR = "of the motor"  # brake of a task: that which is built into the motor
 # Tables of a task that may name a record, and the keys of both that say the same.
 ACCESSORIES = {
     "brake": {"torque": "holding_torque", "inertia": "inertia"},

@@ -44,12 +44,10 @@ class Engine:
         self.rig = rig
         self.threads = threads or os.cpu_count() or 1
         self._ahead: _Ahead | None = None
-        self.by_differences: dict[str, str] = {}
-        """by parameter: why its derivatives are differences"""
+        self.by_differences: dict[str, str] = {}  # by parameter: why its derivatives are differences
         self.touching: dict[str, str] = {}
         """by log: why its derivatives are differences from some instant on, where they were last asked for"""
-        self.failed: dict[str, str] = {}
-        """by log: why it has no run, where residuals were last asked for"""
+        self.failed: dict[str, str] = {}  # by log: why it has no run, where residuals were last asked for
 
     def residuals(
         self, logs: Sequence[Prepared], point: Point, rung: int, derivatives: Mapping[str, FreeParameter] | None = None
@@ -156,8 +154,7 @@ class _Ahead:
     point: Point
     rung: int
     found: list[Seen]
-    exact: list[str]
-    """parameters of the derivatives"""
+    exact: list[str]  # parameters of the derivatives
 
 
 def _residuals(

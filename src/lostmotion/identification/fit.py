@@ -24,12 +24,9 @@ class Fit:
     """Result of a search."""
 
     point: Point
-    mae: float
-    """mean absolute residual, in units of the deviations if the task gives them, else SI"""
-    cost: float
-    """cost of the logs that were fitted, with priors; half the sum of squares in units of the deviations"""
-    deviations: np.ndarray
-    """deviations of the residuals, one for each measured channel, SI"""
+    mae: float  # mean absolute residual, in units of the deviations if the task gives them, else SI
+    cost: float  # cost of the logs that were fitted, with priors; half the sum of squares in units of the deviations
+    deviations: np.ndarray  # deviations of the residuals, one for each measured channel, SI
     free: tuple[str, ...]
     iterations: int
     history: list[float] = field(default_factory=list)
@@ -37,8 +34,7 @@ class Fit:
     """J'WJ of the scaled parameters, nuisances eliminated, without priors"""
     scores: list[np.ndarray] = field(default_factory=list)
     """blocks x parameters of each log: parts of the gradient, for the bootstrap"""
-    correlation: float = 1.0
-    """number of residuals in a row that count as one independent"""
+    correlation: float = 1.0  # number of residuals in a row that count as one independent
 
 
 @dataclass
@@ -51,12 +47,10 @@ class Problem:
     engine: Engine
     logs: Sequence[Prepared]
     rung: int
-    parameters: Mapping[str, FreeParameter]
-    """free on this rung"""
+    parameters: Mapping[str, FreeParameter]  # free on this rung
     nuisance: Mapping[str, FreeParameter]
     options: FitOptions
-    given: np.ndarray | None = None
-    """deviations of the measured channels, where the task gives them"""
+    given: np.ndarray | None = None  # deviations of the measured channels, where the task gives them
     resolution: np.ndarray = field(default_factory=lambda: np.zeros(1))
 
     def deviations(self, residuals: Sequence[np.ndarray]) -> np.ndarray:

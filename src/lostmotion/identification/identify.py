@@ -164,8 +164,7 @@ class _Climbed:
     rungs: list[RungResult]
     best: int
     odd: list[OddLog]
-    agreed: Point
-    """values that fit the logs which agree with each other"""
+    agreed: Point  # values that fit the logs which agree with each other
 
 
 def _climbed(

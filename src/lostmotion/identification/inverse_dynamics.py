@@ -40,8 +40,7 @@ class Stretch:
     angle: np.ndarray
     speed: np.ndarray
     acceleration: np.ndarray
-    blocks: np.ndarray
-    """samples of each piece in which the shaft turns in one direction: blocks x samples"""
+    blocks: np.ndarray  # samples of each piece in which the shaft turns in one direction: blocks x samples
 
 
 def stretches(rig: Rig, log: Prepared, known: Mapping[str, Any], shown: Shown, width: int) -> list[Stretch]:

@@ -31,18 +31,12 @@ class ConditionError:
     mass = 0.5 (3 logs): mean absolute error 0.002 rad, 0.0025 rad when fitted without them
     """
 
-    key: str
-    """key of the header, or ``file`` or ``folder``"""
-    value: Any
-    """value of the key in these logs"""
-    logs: int
-    """number of these logs"""
-    fitted: float
-    """mean absolute error with these logs in the fit, in the unit by which models are compared"""
-    left_out: float
-    """mean absolute error of the model that was fitted to the other logs; NaN without a run"""
-    failed: str
-    """why there is no error; empty if there is one"""
+    key: str  # key of the header, or `file` or `folder`
+    value: Any  # value of the key in these logs
+    logs: int  # number of these logs
+    fitted: float  # mean absolute error with these logs in the fit, in the unit by which models are compared
+    left_out: float  # mean absolute error of the model that was fitted to the other logs; NaN without a run
+    failed: str  # why there is no error; empty if there is one
 
     @property
     def name(self) -> str:

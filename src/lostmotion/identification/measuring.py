@@ -32,8 +32,7 @@ class Probe:
     """A variable of the rig, and the instants at which it is wanted."""
 
     variable: str
-    at: np.ndarray
-    """[s], ascending, within the log"""
+    at: np.ndarray  # [s], ascending, within the log
 
 
 class Measuring:

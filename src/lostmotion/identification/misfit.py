@@ -29,16 +29,11 @@ class Misfit:
     """Misfit of one measured channel, over all fitted logs."""
 
     channel: str
-    rms: float
-    """rms of the residuals, SI"""
-    ratio: float
-    """to the stated deviation; NaN without one"""
-    correlation: float
-    """correlation of residuals of two samples in a row"""
-    runs: int
-    """number of runs of residuals of one sign"""
-    expected: float
-    """runs of as many independent residuals"""
+    rms: float  # rms of the residuals, SI
+    ratio: float  # to the stated deviation; NaN without one
+    correlation: float  # correlation of residuals of two samples in a row
+    runs: int  # number of runs of residuals of one sign
+    expected: float  # runs of as many independent residuals
     structured: bool
     shapes: tuple[tuple[str, float], ...] = ()
     """variables over which the residuals have a shape, and its share of their variance, the largest first"""

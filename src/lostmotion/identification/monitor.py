@@ -252,10 +252,8 @@ class _Reference:
     rung: int
     values: Mapping[str, float]
     free: Mapping[str, FreeParameter]
-    deviations: np.ndarray | None
-    """deviations of the residuals of the measured channels, SI; None: by those of the log"""
-    given: bool
-    """whether the task states them, so that residuals are in units of them"""
+    deviations: np.ndarray | None  # deviations of the residuals of the measured channels, SI; None: by those of the log
+    given: bool  # whether the task states them, so that residuals are in units of them
 
 
 def _at_start(rig: Rig) -> _Reference:

@@ -29,8 +29,7 @@ class Shown:
 
     channel: str
     shaft: str
-    is_speed: bool
-    """whether it shows the speed; else the angle"""
+    is_speed: bool  # whether it shows the speed; else the angle
 
 
 def shown_motion(rig: Rig) -> Shown:

@@ -56,24 +56,15 @@ class OddLog:
     7.csv: angle: residuals of 0.5 rad are 250 times those of the other logs; angle has the opposite sign: with that undone 0.002 rad
     """
 
-    log: str
-    """name of the log"""
-    channel: str
-    """measured channel with the largest residuals"""
-    unit: str
-    """SI unit of the channel"""
-    rms: float
-    """root mean square of the residuals of the channel, SI"""
-    ratio: float
-    """ratio of these residuals to the median of the other logs"""
-    fault: str
-    """fault that explains the log; empty if none of those tried does"""
-    mended: float
-    """residuals with the fault undone, SI; NaN without a fault"""
-    held_out: bool
-    """whether the log was held out of the fit anyway"""
-    shared: bool = False
-    """whether other logs have the same fault, so that it is the model's"""
+    log: str  # name of the log
+    channel: str  # measured channel with the largest residuals
+    unit: str  # SI unit of the channel
+    rms: float  # root mean square of the residuals of the channel, SI
+    ratio: float  # ratio of these residuals to the median of the other logs
+    fault: str  # fault that explains the log; empty if none of those tried does
+    mended: float  # residuals with the fault undone, SI; NaN without a fault
+    held_out: bool  # whether the log was held out of the fit anyway
+    shared: bool = False  # whether other logs have the same fault, so that it is the model's
 
     @property
     def left_out(self) -> bool:

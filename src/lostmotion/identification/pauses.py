@@ -41,10 +41,8 @@ class Restart:
     channel: str
     shaft: str
     is_speed: bool
-    ratios: Mapping[str, float]
-    """turns of each shaft for one of the measured one"""
-    keys: Mapping[str, Mapping[str, str]]
-    """keys of `initial` for speed and angle of each shaft"""
+    ratios: Mapping[str, float]  # turns of each shaft for one of the measured one
+    keys: Mapping[str, Mapping[str, str]]  # keys of `initial` for speed and angle of each shaft
 
 
 def split_at_pauses(rig: Rig, logs: Sequence[Prepared]) -> tuple[Rig, list[Prepared], dict[str, str]]:

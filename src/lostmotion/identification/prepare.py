@@ -43,23 +43,17 @@ class Segment:
 class Prepared:
     """A log that is compared with runs of the rig."""
 
-    log: Log
-    """screened; all channels whose unit is known in SI"""
-    time: np.ndarray
-    """[s], from 0"""
+    log: Log  # screened; all channels whose unit is known in SI
+    time: np.ndarray  # [s], from 0
     inputs: dict[str, np.ndarray]
     measured: dict[str, np.ndarray]
     """NaN where a channel has no number: such samples are not compared, and what acts goes on"""
-    facts: dict[str, Any]
-    """names for formulas: its header, and ``first_CHANNEL`` and ``mean_CHANNEL`` in SI"""
+    facts: dict[str, Any]  # names for formulas: its header, and `first_CHANNEL` and `mean_CHANNEL` in SI
     segments: tuple[Segment, ...]
     held_out: bool
-    weight: np.ndarray
-    """weight of each sample, by which its errors are multiplied"""
-    first: bool
-    """whether the search is to begin with it"""
-    begin: float = 0.0
-    """[s] of the run: of a log behind a pause, when all that acts is known"""
+    weight: np.ndarray  # weight of each sample, by which its errors are multiplied
+    first: bool  # whether the search is to begin with it
+    begin: float = 0.0  # [s] of the run: of a log behind a pause, when all that acts is known
     cache: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     @cached_property

@@ -36,8 +36,7 @@ class Recording:
     topics: dict[str, list[tuple[int, Any]]] = field(default_factory=dict)
     left_out: dict[str, str] = field(default_factory=dict)
     header: dict[str, Any] = field(default_factory=dict)
-    held: int = 0
-    """bytes of memory that its messages need, as estimated"""
+    held: int = 0  # bytes of memory that its messages need, as estimated
 
     def add(self, topic: str, at: int, decode: Callable[[bytes], Any] | None, data: bytes, encoding: str) -> None:
         """Decode a message and keep it, if all messages together fit into the memory limit."""

@@ -39,16 +39,11 @@ Values = Mapping[str, float]
 class Seen:
     """Computed values of the measured channels of a log."""
 
-    values: np.ndarray
-    """channels x samples, SI"""
-    derivatives: np.ndarray
-    """channels x samples x parameters; NaN from where the motion is not smooth"""
-    extra: dict[str, np.ndarray] = field(default_factory=dict)
-    """further variables at the samples"""
-    ends_by: str = ""
-    """why the derivatives end"""
-    error: Exception | None = None
-    """why there is no run; then there are no values"""
+    values: np.ndarray  # channels x samples, SI
+    derivatives: np.ndarray  # channels x samples x parameters; NaN from where the motion is not smooth
+    extra: dict[str, np.ndarray] = field(default_factory=dict)  # further variables at the samples
+    ends_by: str = ""  # why the derivatives end
+    error: Exception | None = None  # why there is no run; then there are no values
 
 
 class NoDerivativeError(Exception):

@@ -137,10 +137,8 @@ class _Part:
         self.path, self.name = path, name
         self.root = ""
         self.rows, self.cells = 0, 0
-        self.outside = 0
-        """elements that are in no row"""
-        self.largest = 0
-        """elements and attributes of the largest row"""
+        self.outside = 0  # elements that are in no row
+        self.largest = 0  # elements and attributes of the largest row
         self._row, self._column, self._size = 0, 0, 0
         self._in_row, self._in_value = False, False
         self._formula, self._value = False, False

@@ -31,12 +31,9 @@ PER_PARAMETER = 3  # blocks
 class Regression:
     """Start values that the regression has replaced, and the reasons for the others."""
 
-    found: Mapping[str, float] = field(default_factory=dict)
-    """start values by parameter, SI"""
-    kept: Mapping[str, str] = field(default_factory=dict)
-    """why, by parameter"""
-    why_not: str = ""
-    """why there is none at all"""
+    found: Mapping[str, float] = field(default_factory=dict)  # start values by parameter, SI
+    kept: Mapping[str, str] = field(default_factory=dict)  # why, by parameter
+    why_not: str = ""  # why there is none at all
 
     def lines(self, parameters: Mapping[str, FreeParameter]) -> list[str]:
         """Lines of text."""

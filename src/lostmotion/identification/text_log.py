@@ -29,10 +29,8 @@ class Reading:
 
     separator: str
     decimal: str
-    first: tuple[int, str] = (0, "")
-    """line and cell with the first decimal comma"""
-    sure: bool = False
-    """whether a comma separates decimals for certain, since it cannot be one between thousands"""
+    first: tuple[int, str] = (0, "")  # line and cell with the first decimal comma
+    sure: bool = False  # whether a comma separates decimals for certain, since it cannot be one between thousands
     line: int = 0
 
     def cells(self, line: str) -> list[str]:

@@ -12,8 +12,7 @@ from ..inputs.quantities import Count
 from ..simulation.scenario import Scenario
 from .page import page, write_page
 
-HEIGHTS = (200, 10_000)
-"""of the page in a notebook, in pixels"""
+HEIGHTS = (200, 10_000)  # of the page in a notebook, in pixels
 
 # Shows the page and takes up what its sliders say; without it the page is shown alone.
 _WIDGET = """

@@ -90,8 +90,7 @@ def from_zero(value: float, usual: float = 0.0) -> Range:
     return Range(0.0, 4.0 * value if value > 0.0 else usual)
 
 
-LEAST_SHARE = 0.3
-"""of what ends at a largest value that a file may have, such as an efficiency"""
+LEAST_SHARE = 0.3  # of what ends at a largest value that a file may have, such as an efficiency
 
 # End of a key -> label, and how many ways around the value its slider goes; None: from 0 on. Unit and largest value are those of the key.
 LABELS: dict[str, tuple[str, float | None]] = {

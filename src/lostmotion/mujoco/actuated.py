@@ -20,12 +20,10 @@ if TYPE_CHECKING:
     import mujoco
 
 MAX_SUBSTEPS = 1000
-CONTACT_PASSES = 5
-"""Most solutions of MuJoCo's contact solver in a substep."""
+CONTACT_PASSES = 5  # Most solutions of MuJoCo's contact solver in a substep.
 SETTLED = 1e-6
 """Largest difference between the speeds [rad/s] at the end of a substep that solver and drives find, over 1 plus the speed."""
-SUBSTEP_PHASE = 0.5
-"""Largest natural frequency of a mesh times substep [rad]."""
+SUBSTEP_PHASE = 0.5  # Largest natural frequency of a mesh times substep [rad].
 STIFFEST = 1e6
 """Largest inertia of a joint that its drive holds, over its nominal one, as MuJoCo's contact solver sees it."""
 

@@ -16,8 +16,7 @@ from .joints import actuator_name, actuators_of, joint_id
 if TYPE_CHECKING:
     import mujoco
 
-POINTS = 720
-"""Angles of a turn at which a torque is compared with a weight."""
+POINTS = 720  # Angles of a turn at which a torque is compared with a weight.
 SHARE_OF_WEIGHT = 1e-3
 """Part of first order in a torque over the angle, over its largest value, above which it may be a weight."""
 

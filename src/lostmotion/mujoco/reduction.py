@@ -20,8 +20,7 @@ from ..simulation.scenario import Scenario
 from .overlaps import loads_of, weights_of, without_weight
 
 STEPS_PER_PERIOD = 2000
-FASTEST_SHARE = 0.1
-"""Bandwidth of the loop that makes the motion, over the natural frequency of the mesh."""
+FASTEST_SHARE = 0.1  # Bandwidth of the loop that makes the motion, over the natural frequency of the mesh.
 
 
 @dataclass(frozen=True)

@@ -29,14 +29,10 @@ WORK = len(MODELS) * len(AMPLITUDES) * (1 + len(FREQUENCIES)) + 1  # how often `
 class Results:
     """All runs that the figures are drawn from."""
 
-    runs: dict[tuple[str, str], xarray.Dataset]
-    """by model and amplitude"""
-    responses: dict[str, xarray.Dataset]
-    """by model"""
-    first_loading: tuple[Any, Any]
-    """twist [rad] and torque [N·m] of 2-DOF-NL with the input locked"""
-    loops: tuple[Loop, ...]
-    """loops of the same, at the amplitudes `LOOPS`"""
+    runs: dict[tuple[str, str], xarray.Dataset]  # by model and amplitude
+    responses: dict[str, xarray.Dataset]  # by model
+    first_loading: tuple[Any, Any]  # twist [rad] and torque [N·m] of 2-DOF-NL with the input locked
+    loops: tuple[Loop, ...]  # loops of the same, at the amplitudes `LOOPS`
 
     def load_response(self, model: str, amplitude: str) -> Any:
         """F(w)/F(E) [rad/s] of the load's speed over `FREQUENCIES`."""

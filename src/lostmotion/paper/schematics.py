@@ -15,8 +15,7 @@ if TYPE_CHECKING:
 
 FILES = sorted((Path(__file__).parent / "drawings").glob("*.svg"))
 XMLNS = ' xmlns="http://www.w3.org/2000/svg"'  # which a page does not need
-SCRIPTS = {"4": "_", "-5": "^"}
-"""vertical shifts of lower and raised parts of a text, and their signs in TeX"""
+SCRIPTS = {"4": "_", "-5": "^"}  # vertical shifts of lower and raised parts of a text, and their signs in TeX
 
 
 def drawings() -> tuple[Drawing, ...]:

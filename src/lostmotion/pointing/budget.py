@@ -52,8 +52,7 @@ class View:
     """product over the axes of normal distributions of these means and deviations"""
 
 
-Errors = Mapping[str, PointingError]
-"""by the motor of the axis"""
+Errors = Mapping[str, PointingError]  # by the motor of the axis
 
 
 @dataclass(frozen=True)
@@ -245,8 +244,7 @@ def _other_start(scenario: Scenario) -> Callable[[dict[str, Any]], None]:
     return change
 
 
-Case = tuple[str, Any]
-"""what a run is for, and its name there"""
+Case = tuple[str, Any]  # what a run is for, and its name there
 
 
 def _cases(scenario: Scenario, *, robustness: bool = True) -> dict[Case, Sequence[Callable[..., None]]]:

@@ -16,11 +16,9 @@ class Contour:
     """All places where the quantity has one value."""
 
     text: str
-    x: np.ndarray
-    """ends of straight segments, with NaN between two segments"""
+    x: np.ndarray  # ends of straight segments, with NaN between two segments
     y: np.ndarray
-    label: tuple[float, float]
-    """point at which the value is written"""
+    label: tuple[float, float]  # point at which the value is written
 
 
 def ticks(low: float, high: float, count: float, degrees: bool = False, whole: bool = False) -> list[float]:

@@ -16,12 +16,10 @@ def _light_colours() -> dict[str, str]:
     return dict(re.findall(r"--(\w+): (#\w+);", sheet.partition('[data-theme="dark"]')[0]))
 
 
-COLOURS = _light_colours()
-"""all colours by their names in the style sheet, where each has a dark one too"""
+COLOURS = _light_colours()  # all colours by their names in the style sheet, where each has a dark one too
 PALETTE = {name: COLOURS[name] for name in ("first", "second", "third", "fourth")}
 """colours of curves that are told apart"""
-STEPS = tuple(COLOURS[f"step{k}"] for k in range(8))
-"""colours of an ordered series: step0, step1, ..."""
+STEPS = tuple(COLOURS[f"step{k}"] for k in range(8))  # colours of an ordered series: step0, step1, ...
 MUTED, INK, GRID = COLOURS["muted"], COLOURS["text"], COLOURS["grid"]
 
 # Line styles and widths differ, so that curves differ in grey too.
@@ -30,10 +28,8 @@ LOOKS: tuple[dict[str, Any], ...] = tuple(
     for colour, line, width in zip(PALETTE.values(), ("-", "--", "-.", ":"), (1.6, 1.9, 1.7, 1.9), strict=True)
 )
 FIRST, SECOND, THIRD, FOURTH = LOOKS
-FAINT: dict[str, Any] = {"color": MUTED, "linestyle": ":", "linewidth": 1.3}
-"""a command, or a curve to compare with"""
-LEVEL: dict[str, Any] = {"color": MUTED, "linestyle": "-", "linewidth": 0.8}
-"""a limit or a level"""
+FAINT: dict[str, Any] = {"color": MUTED, "linestyle": ":", "linewidth": 1.3}  # a command, or a curve to compare with
+LEVEL: dict[str, Any] = {"color": MUTED, "linestyle": "-", "linewidth": 0.8}  # a limit or a level
 MEASURED: dict[str, Any] = {"color": MUTED, "linestyle": "-", "linewidth": 1.3}
 DOTS: dict[str, Any] = {"color": PALETTE["second"], "linestyle": "none", "marker": "o", "markersize": 7}
 POINTS: dict[str, Any] = {
@@ -53,8 +49,7 @@ STYLES: dict[str, dict[str, Any]] = {
     "1-DOF-L": {"color": PALETTE["third"], "linestyle": "-.", "linewidth": 1.3},
 }
 
-SMALLEST = 9.0
-"""size of the smallest text of a picture [pt], which is read at half the size of the picture too"""
+SMALLEST = 9.0  # size of the smallest text of a picture [pt], which is read at half the size of the picture too
 MATPLOTLIB: Any = {
     "figure.constrained_layout.use": True,
     "figure.constrained_layout.w_pad": 0.07,

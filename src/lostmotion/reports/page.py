@@ -46,10 +46,8 @@ class Table:
     header: Sequence[str]
     rows: Sequence[Sequence[str]]
     note: str = ""
-    marked: frozenset[int] = frozenset()
-    """rows that say what is wrong"""
-    chosen: frozenset[int] = frozenset()
-    """rows that stand out"""
+    marked: frozenset[int] = frozenset()  # rows that say what is wrong
+    chosen: frozenset[int] = frozenset()  # rows that stand out
 
 
 @dataclass(frozen=True)
@@ -59,8 +57,7 @@ class Prose:
     title: str
     paragraphs: Sequence[str]
     listed: bool = False
-    noted: bool = False
-    """set apart as notes"""
+    noted: bool = False  # set apart as notes
 
 
 @dataclass(frozen=True)

@@ -52,8 +52,7 @@ class Ground:
 
     x: Any
     y: Any
-    values: Any
-    """[y, x]; NaN where there is none"""
+    values: Any  # [y, x]; NaN where there is none
     label: str
 
 
@@ -93,14 +92,11 @@ class Bars:
     """Horizontal bars by name, of one or two values each."""
 
     title: str
-    label: str
-    """label of the values"""
+    label: str  # label of the values
     values: Mapping[str, tuple[float, ...]]
-    series: tuple[str, ...] = ()
-    """names of the values of a bar, where there are two"""
+    series: tuple[str, ...] = ()  # names of the values of a bar, where there are two
     x_range: tuple[float, float] | None = None
-    limit: float | None = None
-    """beyond which a bar stands out"""
+    limit: float | None = None  # beyond which a bar stands out
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,7 @@ from .panels import Chart, Contacts, Curve, Flows, Ground, Panel
 if TYPE_CHECKING:
     import xarray
 
-Series = tuple[str, str, float]
-"""variable, label, factor"""
+Series = tuple[str, str, float]  # variable, label, factor
 NEAR = 0.25  # of the range of a motion: the distance of end stops that are drawn
 FIGURES = ("motion", "losses", "contacts", "energy")
 

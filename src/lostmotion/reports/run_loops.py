@@ -36,30 +36,20 @@ class LoopErrors:
     """Errors of one controlled axis over a run."""
 
     name: str
-    quantity: str
-    """position or speed"""
-    shaft: str
-    """shaft of the reference"""
+    quantity: str  # position or speed
+    shaft: str  # shaft of the reference
     unit: str
-    true: np.ndarray
-    """reference less the true value at its shaft"""
+    true: np.ndarray  # reference less the true value at its shaft
     measured: np.ndarray | None
     """reference less the value that the loop reads, both at the shaft of the reference; None of a continuous controller, which reads
     the true value"""
-    encoder: str
-    """shaft with the encoder that is read"""
-    overshoot: float
-    """by which the true value leaves the range of its reference"""
-    range: float
-    """range of the reference, from the first true value on"""
-    swing: float
-    """half of what the error swings by at the end, if that does not die out; else 0"""
-    frequency: float
-    """[Hz]"""
-    grows: bool
-    """whether that swing grows, or the error diverges"""
-    pole: str
-    """pole outside the unit circle of the sampled loops of the axis; empty if there is none, or none is known"""
+    encoder: str  # shaft with the encoder that is read
+    overshoot: float  # by which the true value leaves the range of its reference
+    range: float  # range of the reference, from the first true value on
+    swing: float  # half of what the error swings by at the end, if that does not die out; else 0
+    frequency: float  # [Hz]
+    grows: bool  # whether that swing grows, or the error diverges
+    pole: str  # pole outside the unit circle of the sampled loops of the axis; empty if there is none, or none is known
 
     def lines(self) -> Iterator[str]:
         """Lines of a summary."""

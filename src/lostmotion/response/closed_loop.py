@@ -41,31 +41,23 @@ class AxisSignal:
     """A variable that a controller holds from tick to tick."""
 
     name: str
-    slot: int
-    """slot in the memory of all controllers"""
-    every: int
-    """ticks from one value to the next; 0: it varies between the ticks"""
-    phase: int
-    """tick of the first"""
+    slot: int  # slot in the memory of all controllers
+    every: int  # ticks from one value to the next; 0: it varies between the ticks
+    phase: int  # tick of the first
 
 
 @dataclass(frozen=True)
 class Motion:
     """Motion at one point."""
 
-    plant: np.ndarray
-    """variables of the drive or train over the samples, (channel, sample) of one window or more"""
+    plant: np.ndarray  # variables of the drive or train over the samples, (channel, sample) of one window or more
     signals: dict[str, tuple[np.ndarray, np.ndarray]]
     """for each variable of a controller the angles of the sine at its instants [rad], and its values"""
     residual: float
-    windows: int
-    """followed, all in all"""
-    jumps: int
-    """extrapolations that were taken"""
-    advance: float
-    """advance of the reported angle over a period [rad]"""
-    spread: float
-    """spread of the first harmonic of the output from window to window / its mean; 0 of a periodic motion"""
+    windows: int  # followed, all in all
+    jumps: int  # extrapolations that were taken
+    advance: float  # advance of the reported angle over a period [rad]
+    spread: float  # spread of the first harmonic of the output from window to window / its mean; 0 of a periodic motion
 
 
 class ClosedLoop:

@@ -38,16 +38,11 @@ class Proof:
     """Verdict for errors up to one."""
 
     verdict: Certainty
-    reason: str
-    """reason of a verdict other than hunts"""
-    largest: float
-    """error up to which it holds"""
-    factor: float = math.nan
-    """bound of the share of its error that each slip leaves, without an excess"""
-    band: tuple[float, float] | None = None
-    """magnitudes of errors, which the map takes into itself"""
-    ranges: tuple[tuple[float, float], ...] = field(default_factory=tuple)
-    """magnitudes from which it is reached"""
+    reason: str  # reason of a verdict other than hunts
+    largest: float  # error up to which it holds
+    factor: float = math.nan  # bound of the share of its error that each slip leaves, without an excess
+    band: tuple[float, float] | None = None  # magnitudes of errors, which the map takes into itself
+    ranges: tuple[tuple[float, float], ...] = field(default_factory=tuple)  # magnitudes from which it is reached
 
 
 def prove(of: StickSlip, largest: float) -> Proof:

@@ -35,10 +35,8 @@ class Found:
     """Result of the search."""
 
     verdict: Verdict
-    reason: str
-    """why there is no limit cycle, or none was found; empty if there is one"""
-    result: dict[str, Any] = field(default_factory=dict, repr=False)
-    """result of the core's search, of one point"""
+    reason: str  # why there is no limit cycle, or none was found; empty if there is one
+    result: dict[str, Any] = field(default_factory=dict, repr=False)  # result of the core's search, of one point
     channels: tuple[str, ...] = ()
 
     @property
@@ -57,12 +55,9 @@ class Loop:
 
     core: _core.Train
     case: _core.Case
-    constants: Sequence[_core.Signal]
-    """constant values that the inputs have reached"""
-    settled: float
-    """from when on the inputs are constant [s]"""
-    watched: str
-    """the channel whose swing is looked at"""
+    constants: Sequence[_core.Signal]  # constant values that the inputs have reached
+    settled: float  # from when on the inputs are constant [s]
+    watched: str  # the channel whose swing is looked at
     channels: tuple[str, ...]
     scenario: Scenario
 

@@ -27,30 +27,20 @@ class Plant:
 
     train: DriveTrain
     core: _core.Train
-    signals: Mapping[str, Signal[Any]]
-    """by the name of their variable; of open loops in the order of the core"""
-    source: str | None
-    """the input that is meant if none is named: command or reference of the only motor"""
-    start: Mapping[str, float]
-    """initial state of the scenario, by component; missing values are 0"""
+    signals: Mapping[str, Signal[Any]]  # by the name of their variable; of open loops in the order of the core
+    source: str | None  # the input that is meant if none is named: command or reference of the only motor
+    start: Mapping[str, float]  # initial state of the scenario, by component; missing values are 0
     rest: Mapping[str, float]
     """initial state of responses: at rest, a train with the angles and twists of its scenario, on which gravity may depend"""
-    start_of: Callable[[Any], Mapping[str, float]]
-    """the same of another initial state"""
+    start_of: Callable[[Any], Mapping[str, float]]  # the same of another initial state
     channels: tuple[str, ...]
-    variables: tuple[Variable, ...]
-    """the channels, and what is derived from them"""
-    derive: Callable[[dict[str, Any], np.ndarray], None]
-    """adds them to the channels, over time"""
-    output: str
-    """the variable that is looked at if none is named: the speed of the load"""
-    angle: str
-    """angle whose advance over a period is reported: that of the load"""
-    floors: Mapping[str, float]
-    """rated magnitudes of the variables by which motions are compared"""
+    variables: tuple[Variable, ...]  # the channels, and what is derived from them
+    derive: Callable[[dict[str, Any], np.ndarray], None]  # adds them to the channels, over time
+    output: str  # the variable that is looked at if none is named: the speed of the load
+    angle: str  # angle whose advance over a period is reported: that of the load
+    floors: Mapping[str, float]  # rated magnitudes of the variables by which motions are compared
     scenario: Scenario
-    closed: Scenario | None = None
-    """the scenario, if it has controllers"""
+    closed: Scenario | None = None  # the scenario, if it has controllers
 
     references: Mapping[str, AnyReference] = field(default_factory=dict)
     """references of its controllers, by the name of the input"""

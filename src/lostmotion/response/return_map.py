@@ -199,16 +199,11 @@ class Image:
     """Bounds of what follows from an interval of errors."""
 
     low: float
-    high: float
-    """bounds of the error that is left; positive if the slip ends before it is 0"""
-    slip: tuple[float, float]
-    """shortest and longest [s]"""
-    stuck: tuple[float, float]
-    """shortest and longest time until it breaks away again [s]"""
-    left: Transients
-    """transients that are left then, in the direction of the next slip"""
-    reason: str = ""
-    """why the bounds do not hold; empty if they do"""
+    high: float  # bounds of the error that is left; positive if the slip ends before it is 0
+    slip: tuple[float, float]  # shortest and longest [s]
+    stuck: tuple[float, float]  # shortest and longest time until it breaks away again [s]
+    left: Transients  # transients that are left then, in the direction of the next slip
+    reason: str = ""  # why the bounds do not hold; empty if they do
 
     @property
     def largest(self) -> float:

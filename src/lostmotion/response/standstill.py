@@ -56,8 +56,7 @@ class Outlook:
 
     breaks_away: float
     """time until a contact breaks away [s]; infinite at an equilibrium, NaN where it does not follow from the state"""
-    contact: str = ""
-    """contact that breaks away"""
+    contact: str = ""  # contact that breaks away
 
     @property
     def rests(self) -> bool:
@@ -81,12 +80,9 @@ class _Look:
     numbers: np.ndarray
     key: tuple[int, ...]
     contacts: tuple[str, ...]
-    margins: np.ndarray
-    """torques of each contact that free it forward, and in reverse [N·m]"""
-    scales: np.ndarray
-    """capacities that these belong to [N·m]"""
-    creep: float
-    """speed of contacts that slip by no more than rounding [rad/s]"""
+    margins: np.ndarray  # torques of each contact that free it forward, and in reverse [N·m]
+    scales: np.ndarray  # capacities that these belong to [N·m]
+    creep: float  # speed of contacts that slip by no more than rounding [rad/s]
 
 
 class Watch:
@@ -102,8 +98,7 @@ class Watch:
         self._running = list(running_slots(self.simulation._control))
         self.noise = np.array([_noise(scenario, name) for name in self.names])
         self._speeds = tuple(map(scenario.train().speed_of, scenario.train().shafts))
-        self.skipped = 0.0
-        """time that was extrapolated, not run [s]"""
+        self.skipped = 0.0  # time that was extrapolated, not run [s]
         self.times = np.zeros(0)
         self.rows = np.zeros((0, len(self.names)))
         self.magnitude = np.zeros(0)
@@ -354,12 +349,9 @@ class Decision:
 
     verdict: Verdict
     reason: str
-    watched: float
-    """[s], since the inputs have come to rest"""
-    frequency: float
-    """[Hz]; NaN unless it hunts"""
-    range: np.ndarray
-    """least and largest value of each variable over the last quarter of the watch (2, variable)"""
+    watched: float  # [s], since the inputs have come to rest
+    frequency: float  # [Hz]; NaN unless it hunts
+    range: np.ndarray  # least and largest value of each variable over the last quarter of the watch (2, variable)
 
     @property
     def swing(self) -> np.ndarray:

@@ -46,38 +46,26 @@ class StickSlip:
     """Slip and stuck interval of one contact, in modal coordinates of the slip; rows give outputs over them."""
 
     contact: str
-    slip_rates: np.ndarray
-    """eigenvalues of the slip"""
-    rounding: float
-    """relative error of what is computed by modes"""
+    slip_rates: np.ndarray  # eigenvalues of the slip
+    rounding: float  # relative error of what is computed by modes
     q: np.ndarray
     p: np.ndarray
     speed: np.ndarray
-    error: np.ndarray
-    """component along q: the error, once it is stuck"""
-    torque: np.ndarray
-    """component along p: the contact torque, once all has settled"""
-    held: np.ndarray
-    """contact torque that holds it"""
+    error: np.ndarray  # component along q: the error, once it is stuck
+    torque: np.ndarray  # component along p: the contact torque, once all has settled
+    held: np.ndarray  # contact torque that holds it
     command: np.ndarray
-    transients: np.ndarray
-    """components along the modes of the stuck regime that settle (mode, state)"""
-    stuck_rates: np.ndarray
-    """their eigenvalues"""
+    transients: np.ndarray  # components along the modes of the stuck regime that settle (mode, state)
+    stuck_rates: np.ndarray  # their eigenvalues
     held_of_transients: np.ndarray
     command_of_transients: np.ndarray
-    freed: np.ndarray
-    """state that a transient adds at the break-away, with the contact torque kept (state, mode)"""
-    ramp: float
-    """kappa, by which the contact torque rises per error and time [N m/(rad s)]"""
-    sliding: float
-    """T_C"""
-    breakaway: float
-    """T_S"""
+    freed: np.ndarray  # state that a transient adds at the break-away, with the contact torque kept (state, mode)
+    ramp: float  # kappa, by which the contact torque rises per error and time [N m/(rad s)]
+    sliding: float  # T_C
+    breakaway: float  # T_S
     command_per_torque: float
     command_per_error: float
-    limit: float
-    """limit of the command, less the command at rest without friction"""
+    limit: float  # limit of the command, less the command at rest without friction
 
     @property
     def excess(self) -> float:

@@ -16,18 +16,13 @@ SAMPLES = 256  # a period, at least, of what is looked at
 class Window:
     """Some periods of a sine that take as long as some frames, the time after which all sample times of controllers repeat."""
 
-    asked: float
-    """frequency that was asked for [Hz]"""
-    tick: float
-    """base tick of the controllers [s]"""
-    frame: int
-    """ticks"""
+    asked: float  # frequency that was asked for [Hz]
+    tick: float  # base tick of the controllers [s]
+    frame: int  # ticks
     periods: int
     frames: int
-    stride: int
-    """ticks from sample to sample"""
-    points: int
-    """samples in a tick, if stride is 1"""
+    stride: int  # ticks from sample to sample
+    points: int  # samples in a tick, if stride is 1
 
     @property
     def ticks(self) -> int:

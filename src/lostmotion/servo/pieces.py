@@ -17,16 +17,11 @@ ROUNDING = 1e-9  # of an encoder step, and of torque and speed, by which pieces 
 class Pieces(Sets):
     """Pieces of the starts, after the same sample."""
 
-    slope: np.ndarray
-    """g, (piece, state); the centre is c"""
-    radius: np.ndarray
-    """bound of what is not affine"""
-    strip: np.ndarray
-    """least and largest w, (piece, 2)"""
-    below: np.ndarray
-    """least x at both"""
-    above: np.ndarray
-    """largest x at both"""
+    slope: np.ndarray  # g, (piece, state); the centre is c
+    radius: np.ndarray  # bound of what is not affine
+    strip: np.ndarray  # least and largest w, (piece, 2)
+    below: np.ndarray  # least x at both
+    above: np.ndarray  # largest x at both
 
     def ends(self, row: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Values of an output that does not depend on x at both values of w, (piece, 2), and the radius."""

@@ -25,8 +25,7 @@ INPUTS = ("reference", "rate", "acceleration", "measured")
 CURRENTS = {"direct current": _core.CurrentAxis.direct, "current": _core.CurrentAxis.quadrature}
 """loops of field-oriented control, of i_d and of i_q, the other one closed"""
 
-Row = np.ndarray
-"""a signal as a linear form over the state at a tick, and the inputs"""
+Row = np.ndarray  # a signal as a linear form over the state at a tick, and the inputs
 
 
 @dataclass(frozen=True)

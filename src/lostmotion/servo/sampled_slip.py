@@ -38,36 +38,23 @@ class SampledSlip:
     """Matrices of slip, stuck interval and controller over a sample time, the slip being forward."""
 
     contact: str
-    tick: float
-    """[s]"""
-    inertia: float
-    """inertia of all that turns, at the contact"""
-    viscous: float
-    """rate by which the speed decays without torque, not positive [1/s]"""
-    sliding: float
-    """T_C"""
-    breakaway: float
-    """T_S"""
-    lag: float
-    """time constant of the torque [s]; 0: the torque follows the controller at once"""
-    step: float
-    """q, resolution of the encoder at the contact's shaft; 0 for an ideal one"""
-    offset: float
-    """f: the reference is this share of a step beyond the middle of one, from -1/2 to 1/2"""
-    ratio: float
-    """turns of the encoder for one of the contact"""
+    tick: float  # [s]
+    inertia: float  # inertia of all that turns, at the contact
+    viscous: float  # rate by which the speed decays without torque, not positive [1/s]
+    sliding: float  # T_C
+    breakaway: float  # T_S
+    lag: float  # time constant of the torque [s]; 0: the torque follows the controller at once
+    step: float  # q, resolution of the encoder at the contact's shaft; 0 for an ideal one
+    offset: float  # f: the reference is this share of a step beyond the middle of one, from -1/2 to 1/2
+    ratio: float  # turns of the encoder for one of the contact
     slip: np.ndarray
-    push: np.ndarray
-    """change that friction adds to a forward slip over a tick"""
+    push: np.ndarray  # change that friction adds to a forward slip over a tick
     stuck: np.ndarray
     samples: tuple[tuple[np.ndarray, np.ndarray], ...]
     """for each tick of a frame, matrix of the state, and column of the reading of the encoder less that at the break-away"""
-    held: np.ndarray
-    """row of the torque at the contact, without friction"""
-    command: np.ndarray
-    """row of the torque that it goes to"""
-    limited: tuple[tuple[np.ndarray, float], ...]
-    """rows of what the controller limits, with what is left of each limit"""
+    held: np.ndarray  # row of the torque at the contact, without friction
+    command: np.ndarray  # row of the torque that it goes to
+    limited: tuple[tuple[np.ndarray, float], ...]  # rows of what the controller limits, with what is left of each limit
 
     @property
     def excess(self) -> float:
@@ -106,12 +93,10 @@ class SampledSlip:
 class Ramp:
     """The settled stuck state after each tick of a frame: ``reading * z + torque * b``, with the torque at the contact."""
 
-    ticks: int
-    """until all but the integrator has settled"""
+    ticks: int  # until all but the integrator has settled
     z: tuple[np.ndarray, ...]
     b: tuple[np.ndarray, ...]
-    rises: tuple[float, ...]
-    """by which the torque has risen at each tick, per reading"""
+    rises: tuple[float, ...]  # by which the torque has risen at each tick, per reading
 
     @classmethod
     def of(cls, slip: SampledSlip) -> Ramp:

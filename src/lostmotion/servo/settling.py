@@ -238,8 +238,7 @@ class _Seen:
     time: np.ndarray
     error: np.ndarray
     unseen: np.ndarray
-    covers: bool
-    """whether it covers all that was watched after the last move"""
+    covers: bool  # whether it covers all that was watched after the last move
 
     def during(self, begin: float, end: float = math.inf) -> np.ndarray:
         """Indices of the samples between two instants."""

@@ -32,12 +32,9 @@ CELLS = 8  # of an encoder step, in which stops are collected
 class Boxes(Sets):
     """Boxes of states after the same sample."""
 
-    spread: np.ndarray
-    """(box, state, unknown)"""
-    origin: np.ndarray
-    """number of the start"""
-    before: np.ndarray
-    """the reading before the last"""
+    spread: np.ndarray  # (box, state, unknown)
+    origin: np.ndarray  # number of the start
+    before: np.ndarray  # the reading before the last
 
     @classmethod
     def around(cls, low: np.ndarray, high: np.ndarray, origin: np.ndarray, read: np.ndarray) -> Boxes:
@@ -97,8 +94,7 @@ class Settled:
     """Stuck states in which all but the integrator has settled, by origin."""
 
     origin: np.ndarray
-    read: np.ndarray
-    """reading less that at the break-away, in steps"""
+    read: np.ndarray  # reading less that at the break-away, in steps
     angle: np.ndarray
     """least and largest angle of the contact's shaft, from the middle of the step of the break-away (box, 2)"""
 
@@ -135,8 +131,7 @@ class Flow:
     def __init__(self, of: SampledSlip, fast: float = math.inf) -> None:
         self.of = of
         self.fast = fast
-        self.passed: list[tuple[Boxes, int]] = []
-        """forward slips faster than that, with their tick"""
+        self.passed: list[tuple[Boxes, int]] = []  # forward slips faster than that, with their tick
         self.settled: list[Settled] = []
         self._stopped: dict[tuple[Any, ...], tuple[np.ndarray, np.ndarray]] = {}
 

@@ -21,14 +21,10 @@ class Sets:
     """
 
     centre: np.ndarray
-    mode: np.ndarray
-    """1, 0 or -1: slips forward, is stuck, slips in reverse"""
-    waited: np.ndarray
-    """samples for which it has been stuck"""
-    read: np.ndarray
-    """last reading less that at the break-away, in steps"""
-    came: np.ndarray
-    """direction of the slip that has just ended"""
+    mode: np.ndarray  # 1, 0 or -1: slips forward, is stuck, slips in reverse
+    waited: np.ndarray  # samples for which it has been stuck
+    read: np.ndarray  # last reading less that at the break-away, in steps
+    came: np.ndarray  # direction of the slip that has just ended
 
     def __len__(self) -> int:
         return len(self.centre)

@@ -21,8 +21,7 @@ from ..simulation.sources import load
 from ..units.practical import printed
 
 GAINS = (".speed.gain", ".position.gain")  # ends of their keys, which a file may leave out
-Amperes = Literal["peak", "dc", "of the data sheet"]
-"""amplitude of a phase, current of an armature, or not known"""
+Amperes = Literal["peak", "dc", "of the data sheet"]  # amplitude of a phase, current of an armature, or not known
 
 
 @dataclass(frozen=True)

@@ -242,11 +242,9 @@ def rounded(gain: float) -> float:
 class _Reached:
     """Least margins of some loops in all regimes."""
 
-    phase: float
-    """[rad]; infinite where nothing crosses"""
+    phase: float  # [rad]; infinite where nothing crosses
     gain: float
-    where: str
-    """loop and regime of the least phase margin, or of what is unstable"""
+    where: str  # loop and regime of the least phase margin, or of what is unstable
     stable: bool = True
 
     def __str__(self) -> str:

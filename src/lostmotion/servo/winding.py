@@ -42,45 +42,30 @@ def turn(angle: float) -> np.ndarray:
 class Steady:
     """The steady motion: what repeats from sample to sample of the currents."""
 
-    torque_reference: float
-    """[N·m]"""
-    wanted: np.ndarray
-    """i_d*, i_q* [A]"""
-    weakening: float
-    """by which i_d* is below that of the least current [A], not above 0"""
-    asked: np.ndarray
-    """voltage in the coordinates that are read at the sample [V]"""
+    torque_reference: float  # [N·m]
+    wanted: np.ndarray  # i_d*, i_q* [A]
+    weakening: float  # by which i_d* is below that of the least current [A], not above 0
+    asked: np.ndarray  # voltage in the coordinates that are read at the sample [V]
 
 
 @dataclass(frozen=True)
 class OrientedWinding:
     """Winding and inverter of an axis in one regime, about its steady motion."""
 
-    law: _core.Axis
-    """the controller as the solver has it"""
+    law: _core.Axis  # the controller as the solver has it
     phase: PhaseValues
     loop: FieldOriented
-    tick: float
-    """base tick [s]"""
-    every: int
-    """ticks from one sample of the currents to the next"""
-    delay: int
-    """ticks until a voltage acts"""
-    lag: float
-    """electrical angle by which the rotor is ahead of what is read, at the speed of the regime [rad]"""
-    speed: float
-    """speed of the rotor [rad/s]"""
-    torque: float
-    """mean torque of the motor [N·m]"""
-    largest_voltage: float
-    """amplitude of a phase [V]"""
-    largest_current: float
-    """amplitude of a phase [A]"""
+    tick: float  # base tick [s]
+    every: int  # ticks from one sample of the currents to the next
+    delay: int  # ticks until a voltage acts
+    lag: float  # electrical angle by which the rotor is ahead of what is read, at the speed of the regime [rad]
+    speed: float  # speed of the rotor [rad/s]
+    torque: float  # mean torque of the motor [N·m]
+    largest_voltage: float  # amplitude of a phase [V]
+    largest_current: float  # amplitude of a phase [A]
     model: LinearModel
-    command: np.ndarray
-    """dependence of the rates of the plant's states on the torque of the motor [1/(N·m)]"""
-    speed_row: np.ndarray
-    """the speed of the rotor over the plant's states"""
+    command: np.ndarray  # dependence of the rates of the plant's states on the torque of the motor [1/(N·m)]
+    speed_row: np.ndarray  # the speed of the rotor over the plant's states
 
     @classmethod
     def of(cls, motor: ShaftMotor, name: str, c: Controller, law: _core.Axis, model: LinearModel) -> OrientedWinding:

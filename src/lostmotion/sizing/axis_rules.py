@@ -197,14 +197,10 @@ def stage_rules(motion: RequiredMotion, stage: Stage, wanted_life: float | None)
 class AxialLoad:
     """Loads of a screw over one cycle."""
 
-    time: np.ndarray
-    """[s]"""
-    speed: np.ndarray
-    """speed of the slide [m/s]"""
-    force: np.ndarray
-    """[N]"""
-    cycle: float
-    """[s]"""
+    time: np.ndarray  # [s]
+    speed: np.ndarray  # speed of the slide [m/s]
+    force: np.ndarray  # [N]
+    cycle: float  # [s]
 
 
 def axial_load(motion: RequiredMotion) -> AxialLoad:

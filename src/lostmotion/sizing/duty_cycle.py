@@ -33,18 +33,13 @@ def integral(time: np.ndarray, values: np.ndarray) -> float:
 class DutyCycle:
     """The repeated cycle."""
 
-    time: np.ndarray
-    """instants of the motion [s]"""
-    input_speed: np.ndarray
-    """magnitude at these instants [rad/s]"""
-    output_torque: np.ndarray
-    """[N·m]"""
-    motor_torque: np.ndarray
-    """[N·m]"""
+    time: np.ndarray  # instants of the motion [s]
+    input_speed: np.ndarray  # magnitude at these instants [rad/s]
+    output_torque: np.ndarray  # [N·m]
+    motor_torque: np.ndarray  # [N·m]
     holding_torque: float | None
     """holding torque of the motor, at rest after the motion [N·m]; None: the run ends in motion"""
-    period: float | None
-    """`task.cycle` [s]; None: no pause"""
+    period: float | None  # `task.cycle` [s]; None: no pause
 
     def __str__(self) -> str:
         if not self.moves:

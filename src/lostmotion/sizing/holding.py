@@ -33,14 +33,10 @@ class Holding:
     Speeds [rad/s, m/s] of the load; 0: it stays, or comes to rest; infinite: it gets ever faster.
     """
 
-    load: float
-    """[N·m], of a slide [N]"""
-    from_rest: float
-    """speed at which it drives the load, once raised slowly on the drive at rest"""
-    from_motion: float
-    """speed that remains where the power fails in motion"""
-    begin: float
-    """speed at which the power fails"""
+    load: float  # [N·m], of a slide [N]
+    from_rest: float  # speed at which it drives the load, once raised slowly on the drive at rest
+    from_motion: float  # speed that remains where the power fails in motion
+    begin: float  # speed at which the power fails
 
     @property
     def holds(self) -> bool:

@@ -23,10 +23,8 @@ class OneAxis:
     """A train that is one axis, as a motor and a gearbox with a load behind it; a slide in units of translation."""
 
     motor: str
-    whole: Gearbox
-    """all gears and shafts between the motor and the load as one gear"""
-    load: float
-    """inertia of the load [kg·m²], or mass of the slide [kg]"""
+    whole: Gearbox  # all gears and shafts between the motor and the load as one gear
+    load: float  # inertia of the load [kg·m²], or mass of the slide [kg]
     slides: bool
 
     @classmethod

@@ -30,22 +30,14 @@ WITHIN = 1e-9  # of an interval: so close to its ends, values are those on this 
 class RequiredMotion:
     """A cycle at the load: two samples at each instant at which something jumps."""
 
-    time: np.ndarray
-    """[s]"""
-    speed: np.ndarray
-    """[rad/s]"""
-    acceleration: np.ndarray
-    """[rad/s²]"""
-    torque: np.ndarray
-    """torque of the gearbox [N·m]"""
-    cycle: float
-    """[s]"""
-    position: np.ndarray
-    """[rad]"""
-    inertia: np.ndarray
-    """inertia of the load with its payloads [kg·m²]"""
-    holding: np.ndarray
-    """torque that holds the load at rest there, without friction [N·m]"""
+    time: np.ndarray  # [s]
+    speed: np.ndarray  # [rad/s]
+    acceleration: np.ndarray  # [rad/s²]
+    torque: np.ndarray  # torque of the gearbox [N·m]
+    cycle: float  # [s]
+    position: np.ndarray  # [rad]
+    inertia: np.ndarray  # inertia of the load with its payloads [kg·m²]
+    holding: np.ndarray  # torque that holds the load at rest there, without friction [N·m]
 
 
 NO_DUTY = Duty()
@@ -125,14 +117,10 @@ class InputDemand:
 
     motion: RequiredMotion
     gearbox: Gearbox
-    speed: np.ndarray
-    """[rad/s]"""
-    acceleration: np.ndarray
-    """[rad/s²]"""
-    torque: np.ndarray
-    """with losses and inertia of the gearbox [N·m]"""
-    with_stage: Gearbox | None = None
-    """the gearbox and the stage of a linear axis behind it as one"""
+    speed: np.ndarray  # [rad/s]
+    acceleration: np.ndarray  # [rad/s²]
+    torque: np.ndarray  # with losses and inertia of the gearbox [N·m]
+    with_stage: Gearbox | None = None  # the gearbox and the stage of a linear axis behind it as one
 
     @property
     def whole(self) -> Gearbox:

@@ -26,14 +26,10 @@ from .required_motion import InputDemand
 class Returned:
     """Energy that one cycle of an axis, or of several on one DC bus, returns."""
 
-    largest: float
-    """without a pause [J]"""
-    each: tuple[float, ...]
-    """energy of each stretch of braking [J]"""
-    power: float
-    """largest [W]"""
-    cycle: float
-    """[s]"""
+    largest: float  # without a pause [J]
+    each: tuple[float, ...]  # energy of each stretch of braking [J]
+    power: float  # largest [W]
+    cycle: float  # [s]
 
 
 def electrical_power(demand: InputDemand, motor: Motor) -> np.ndarray:

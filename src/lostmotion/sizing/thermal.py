@@ -28,22 +28,14 @@ SERIES = 0.1  # below it the divided difference of the exponential loses digits,
 class TwoBodies:
     """Winding and case."""
 
-    winding_case: float
-    """R_wc [K/W]"""
-    case_ambient: float
-    """R_ca [K/W]"""
-    winding_time: float
-    """tau_w [s], of the winding against a case of constant temperature"""
-    case_time: float
-    """tau_m [s], of the case against the ambient"""
-    loss: float
-    """p [W/(N·m)²]"""
-    reference: float
-    """T_r [°C]"""
-    ambient: float
-    """T_a [°C]"""
-    alpha: float = COPPER
-    """[1/K]"""
+    winding_case: float  # R_wc [K/W]
+    case_ambient: float  # R_ca [K/W]
+    winding_time: float  # tau_w [s], of the winding against a case of constant temperature
+    case_time: float  # tau_m [s], of the case against the ambient
+    loss: float  # p [W/(N·m)²]
+    reference: float  # T_r [°C]
+    ambient: float  # T_a [°C]
+    alpha: float = COPPER  # [1/K]
 
     @classmethod
     def of(cls, motor: Motor, ambient: float, alpha: float = COPPER) -> TwoBodies | None:

@@ -36,14 +36,10 @@ PERIODS = 0.25  # of the fastest sine, the longest piece
 class Squares:
     """A torque over intervals."""
 
-    duration: np.ndarray
-    """[s]"""
-    mean: np.ndarray
-    """[N·m]"""
-    variance: np.ndarray
-    """mean of the square of the deviation from the mean [(N·m)²]"""
-    error: float
-    """bound on the error of the integral of the square, of all intervals together [(N·m)² s]"""
+    duration: np.ndarray  # [s]
+    mean: np.ndarray  # [N·m]
+    variance: np.ndarray  # mean of the square of the deviation from the mean [(N·m)²]
+    error: float  # bound on the error of the integral of the square, of all intervals together [(N·m)² s]
 
     @property
     def square(self) -> np.ndarray:

@@ -17,10 +17,8 @@ from ..model.motor import Motor, MotorLimits
 from ..model.synchronous_motor import Winding
 from .stages import DIRECT
 
-LINEAR = ("linear_motor",)
-"""kinds of records that move a slide themselves"""
-WHOLE = (*LINEAR, "actuator")
-"""kinds of records that need no gearbox and no stage"""
+LINEAR = ("linear_motor",)  # kinds of records that move a slide themselves
+WHOLE = (*LINEAR, "actuator")  # kinds of records that need no gearbox and no stage
 BESIDE: dict[str, tuple[str, ...]] = {
     "actuator": ("rotor_inertia", "efficiency"),
     "linear_motor": ("mass", "rated_force", "peak_force", "force_constant", "friction_force"),

@@ -19,18 +19,12 @@ from ..sizing.thermal import mean_square
 class Electrical:
     """Over the samples of one cycle, one in each sample time, both ends included, or over the times between them."""
 
-    current: np.ndarray
-    """at the samples [A]; of a synchronous motor amplitude of a phase"""
-    voltage: np.ndarray
-    """the same [V]"""
-    energy: np.ndarray
-    """taken in each sample time [J]"""
-    torque_square: np.ndarray
-    """mean of the torque squared in each [(N·m)²]"""
-    heating_square: np.ndarray
-    """the same of the torque that all of the current would give across the magnets"""
-    current_rms: float
-    """[A]"""
+    current: np.ndarray  # at the samples [A]; of a synchronous motor amplitude of a phase
+    voltage: np.ndarray  # the same [V]
+    energy: np.ndarray  # taken in each sample time [J]
+    torque_square: np.ndarray  # mean of the torque squared in each [(N·m)²]
+    heating_square: np.ndarray  # the same of the torque that all of the current would give across the magnets
+    current_rms: float  # [A]
 
     @classmethod
     def of(cls, scenario: Scenario, result: RunArrays, here: slice) -> Electrical:

@@ -14,16 +14,12 @@ TEXTS = ("violated", "why", "not judged")
 """rules that are violated, in words, and rules without a limit to compare with"""
 COLUMNS: dict[str, float | str] = {f"{USE}{rule}": math.nan for rule in SHARES} | dict.fromkeys(TEXTS, "")
 """each with what stands in the row of a run that has failed"""
-ESTIMATED = "estimated losses"
-"""column of tasks: verdict over the range of estimated losses"""
-MISSING = "missing data"
-"""column of tasks: what the rules that are not judged lack, or what its records lack for a run"""
-NO_DATA = "data"
-"""stands among the violated rules of a pair whose record lacks what a run needs"""
+ESTIMATED = "estimated losses"  # column of tasks: verdict over the range of estimated losses
+MISSING = "missing data"  # column of tasks: what the rules that are not judged lack, or what its records lack for a run
+NO_DATA = "data"  # stands among the violated rules of a pair whose record lacks what a run needs
 UNSTABLE = "its loop, with gains by rule, is unstable"
 """begins the reason of a candidate whose run says little of its parts"""
-BETWEEN = " | "
-"""stands between two of these"""
+BETWEEN = " | "  # stands between two of these
 TASK_COLUMNS: dict[str, float | str] = {f"{USE}{rule}": math.nan for rule in TASK_SHARES} | dict.fromkeys(
     (*TEXTS, MISSING, ESTIMATED), ""
 )

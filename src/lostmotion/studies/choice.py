@@ -17,19 +17,13 @@ DAY = 86400.0  # [s]
 class Quantity:
     """One quantity of the choice."""
 
-    key: str
-    """key of a record"""
-    limit: str
-    """key of the task that limits it"""
+    key: str  # key of a record
+    limit: str  # key of the task that limits it
     what: str
-    unit: str
-    """unit of the column"""
-    shown: tuple[str, float]
-    """unit in messages, and how many of the column's unit one is"""
-    stage: bool = True
-    """whether the last stage of a linear axis counts"""
-    latest: bool = False
-    """whether the largest of the parts counts, and not their sum"""
+    unit: str  # unit of the column
+    shown: tuple[str, float]  # unit in messages, and how many of the column's unit one is
+    stage: bool = True  # whether the last stage of a linear axis counts
+    latest: bool = False  # whether the largest of the parts counts, and not their sum
 
 
 CHOICE = {

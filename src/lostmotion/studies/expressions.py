@@ -44,8 +44,7 @@ class Term(NamedTuple):
 
     measure: Measure
     value: Callable[[Names], Any]
-    number: float | int | None = None
-    """its value, if it is a written number"""
+    number: float | int | None = None  # its value, if it is a written number
 
 
 LEFT_OUT = Term(Measure(), lambda _: None)
@@ -70,8 +69,7 @@ class Expression:
     def __init__(self, text: str, vocabulary: Vocabulary = OF_DRIVES) -> None:
         self.text, shown = text, shortened(text, MAX_LISTED)
         tree = syntax_tree(text, "an expression", "split it into several columns")
-        self.names = frozenset(node.id for node in ast.walk(tree) if isinstance(node, ast.Name))
-        """all that it names"""
+        self.names = frozenset(node.id for node in ast.walk(tree) if isinstance(node, ast.Name))  # all that it names
         known = {name for name, _ in vocabulary.variables}
         for name in sorted(self.names - FUNCTIONS.keys() - set(vocabulary.of_the_run) - known):
             raise _unknown(name, shown, vocabulary)
@@ -79,10 +77,8 @@ class Expression:
         self._term = reader.read(tree)
         if self._term.measure.over_time:
             raise ValueError(f"{shown!r} leaves a value for each instant; reduce it, as in peak({shown})")
-        self.instants = tuple(reader.instants)
-        """instants [s] that it reads by .sel(time=...)"""
-        self.indices = tuple(reader.indices)
-        """samples that it reads by .isel(time=...)"""
+        self.instants = tuple(reader.instants)  # instants [s] that it reads by .sel(time=...)
+        self.indices = tuple(reader.indices)  # samples that it reads by .isel(time=...)
         self.variables = (self.names & known) | ({vocabulary.command} if "ideal_speed" in self.names else frozenset())
         """the result variables that it needs"""
         self.unit = text_of(self._term.measure, KNOWN_UNITS)

@@ -15,8 +15,7 @@ from .. import _core
 from ..simulation.sampling import last_share, weights
 from .measures import Measure, measure, one_of, plain, power, product, reduced
 
-REDUCTIONS = tuple(_core.reductions())
-"""of a variable over time, as the core knows them"""
+REDUCTIONS = tuple(_core.reductions())  # of a variable over time, as the core knows them
 
 Kind = Literal["series", "value", "of a run", "condition", "share", "index", "instant", "time", "nearest"]
 """what a parameter takes: a variable over time; that or one value; one value for each run; a comparison; a written number

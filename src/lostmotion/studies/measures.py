@@ -8,8 +8,7 @@ from typing import NamedTuple
 from ..units.grammar import PREFIXED
 from ..units.table import dimension_of
 
-Powers = dict[str, float]
-"""unit of the table: its power"""
+Powers = dict[str, float]  # unit of the table: its power
 NAMES = {symbol: name for symbol, (name, _) in PREFIXED.items()} | {"J": "joule"}
 
 
@@ -18,10 +17,8 @@ class Measure(NamedTuple):
 
     unit: Powers | None = None
     """None where it cannot be determined, as of a number that may be a factor or a change of unit"""
-    over_time: bool = False
-    """a value for each instant, not one for each run"""
-    boolean: bool = False
-    """the outcome of a comparison"""
+    over_time: bool = False  # a value for each instant, not one for each run
+    boolean: bool = False  # the outcome of a comparison
 
 
 def measure(unit: str, *, over_time: bool = False) -> Measure:

@@ -34,12 +34,10 @@ class Miss:
     """A candidate that does not fit, with what it lacks."""
 
     candidate: Candidate
-    lacks: dict[str, float]
-    """by rule or column: by how much its limit is exceeded, as a share of it"""
+    lacks: dict[str, float]  # by rule or column: by how much its limit is exceeded, as a share of it
     slower: float | None
     """a cycle so many times as long passes the rules, by evaluation; None: none up to `SLOWEST` does, or it was not tried"""
-    then: str = ""
-    """result of the rules and the run for that cycle"""
+    then: str = ""  # result of the rules and the run for that cycle
 
     @property
     def worst(self) -> float:

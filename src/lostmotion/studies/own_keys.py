@@ -21,8 +21,7 @@ from .axis import AxisTask
 from .records import kind_of_record
 from .vary import WAYS, Vary
 
-COMMON = ("task", "load", "slide", "controller")
-"""tables that all candidates share"""
+COMMON = ("task", "load", "slide", "controller")  # tables that all candidates share
 TABLES = (*COMMON, *STAGES, *WHOLE)
 PARTS = {**STAGES, "task": AxisTask, "linear_motor": LinearMotorData, "actuator": Motor}
 

@@ -11,12 +11,10 @@ from ..sizing.finding import RULES, TASK_RULES
 
 Direction = Literal["least", "largest"]
 
-USE = "use of "
-"""begins the columns of the drive check: the share of each limit that is used"""
+USE = "use of "  # begins the columns of the drive check: the share of each limit that is used
 SHARES = tuple(rule for rule in RULES if rule not in ("resonance", "dead_zone", "holding", "loss_map"))
 """rules of the drive check that compare a value with a limit"""
-TASK_SHARES = (*SHARES, *TASK_RULES)
-"""the same of tasks"""
+TASK_SHARES = (*SHARES, *TASK_RULES)  # the same of tasks
 
 
 class Bound(Part):

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 
 WINDOW = "settling_window"
 """stands for the limit of a settling time that has no end: by how much the load rests beyond the window"""
-NOT_RUN = "cannot be run"
-"""stands among the limits of a run that has failed"""
+NOT_RUN = "cannot be run"  # stands among the limits of a run that has failed
 
 
 @dataclass(frozen=True)
@@ -30,21 +29,14 @@ class Candidate:
     """One run of a study that selects."""
 
     run: int
-    name: str
-    """varied values as text"""
-    violated: tuple[str, ...]
-    """rules of the drive check, columns with a limit, or `NOT_RUN`"""
+    name: str  # varied values as text
+    violated: tuple[str, ...]  # rules of the drive check, columns with a limit, or `NOT_RUN`
     why: str
-    not_judged: str
-    """rules of the drive check that have no limit to compare with"""
-    values: dict[str, float]
-    """values of the objectives"""
-    tightest: str = ""
-    """the rule of the drive check whose limit is used most, and its share"""
-    ran: bool = True
-    """whether it was run: of a task, those that the rules refuse are not"""
-    estimated: str = ""
-    """verdict over the range of losses, if the gearbox of a task has estimated ones"""
+    not_judged: str  # rules of the drive check that have no limit to compare with
+    values: dict[str, float]  # values of the objectives
+    tightest: str = ""  # the rule of the drive check whose limit is used most, and its share
+    ran: bool = True  # whether it was run: of a task, those that the rules refuse are not
+    estimated: str = ""  # verdict over the range of losses, if the gearbox of a task has estimated ones
     choice: dict[str, float] = field(default_factory=dict)
     """mass, length, price and lead time of the pair of a task, as far as they are known"""
     missing: tuple[str, ...] = ()
@@ -68,12 +60,9 @@ class Price:
     """Price of one limit."""
 
     limit: str
-    excludes: int
-    """runs that violate it"""
-    alone: int
-    """runs that violate it and nothing else"""
-    best: Candidate | None
-    """the best that would fit without it"""
+    excludes: int  # runs that violate it
+    alone: int  # runs that violate it and nothing else
+    best: Candidate | None  # the best that would fit without it
     opens: float
     """by how much, as a share of it, the limit would have to be relaxed so that one more candidate fits; NaN where it is not known"""
     gain: float

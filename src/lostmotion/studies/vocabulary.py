@@ -22,15 +22,11 @@ command; the bandwidth [Hz] of the load speed, a function of the command's ampli
 class Vocabulary(NamedTuple):
     """Vocabulary of one drive, or of one drive train."""
 
-    variables: tuple[tuple[str, str], ...]
-    """result variables, each with its unit"""
-    channels: tuple[str, ...]
-    """variables that the core returns; the others follow from these"""
-    energies: tuple[tuple[str, str], ...]
-    """entries of the ledger, each as expressions call it and as the ledger does"""
+    variables: tuple[tuple[str, str], ...]  # result variables, each with its unit
+    channels: tuple[str, ...]  # variables that the core returns; the others follow from these
+    energies: tuple[tuple[str, str], ...]  # entries of the ledger, each as expressions call it and as the ledger does
     of_the_run: tuple[str, ...]
-    command: str = "command"
-    """the command of the one motor"""
+    command: str = "command"  # the command of the one motor
 
 
 OF_DRIVES = Vocabulary(

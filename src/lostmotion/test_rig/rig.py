@@ -72,8 +72,7 @@ class TestRig:
         if isinstance(gearbox, Gear):
             gearbox = gearbox.gearbox()
         self.gearbox = gearbox = gearbox.forward()
-        self.rigid = isinstance(gearbox.stiffness, Rigid)
-        """without a twist"""
+        self.rigid = isinstance(gearbox.stiffness, Rigid)  # without a twist
         self.load = self._load()
 
     def _load(self) -> Load:

@@ -64,8 +64,7 @@ class ScrewRig:
         self._travel = screw.travel() / (2.0 * np.pi)  # [m/rad]
         gear = screw.gear("input", "slide")
         self._inertia = gear.inertia
-        self.rigid = isinstance(gear.stiffness, Rigid)
-        """without any deflection"""
+        self.rigid = isinstance(gear.stiffness, Rigid)  # without any deflection
         self._k = 0.0 if isinstance(gear.stiffness, Rigid) else max(gear.stiffness.all_slopes())
         omega = 2.0 * np.pi * RIG_FREQUENCY
         self._mass = LIGHT if self.rigid else self._k / omega**2

@@ -8,8 +8,7 @@ import unicodedata
 from functools import cache
 from itertools import product as pairs
 
-Product = dict[str, int]
-"""unit of the table: its power"""
+Product = dict[str, int]  # unit of the table: its power
 
 PREFIXES = {
     "n": "nano",

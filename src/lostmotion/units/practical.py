@@ -44,8 +44,7 @@ def counted(number: int, noun: str) -> str:
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
-ROUNDING = 1e-9
-"""share of a limit within which a value is at the limit: both may have been converted from other units"""
+ROUNDING = 1e-9  # share of a limit within which a value is at the limit: both may have been converted from other units
 
 
 def excess(share: float) -> str:
