@@ -16,11 +16,11 @@ from typer.testing import CliRunner
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.cli import app
+from lostmotion.control.command import CommandSignal
 from lostmotion.live_page import page as live_page
 from lostmotion.live_page.description import describe
 from lostmotion.live_page.references import reference_sliders, reference_view
 from lostmotion.live_page.sliders import LABELS, UNITS, of_signal
-from lostmotion.model.signals import CommandSignal
 
 SOURCE = (ROOT / "page" / "index.html").read_text()
 SHORT = {"simulation.duration": "0.1 s"}

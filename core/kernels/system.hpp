@@ -101,7 +101,10 @@ class TrainSystem {
         for (const auto& e : assembly_.places().acting) {
             if (e->remainder == nowhere) continue;
             const ShaftPlace& p = assembly_.places().shafts[static_cast<std::size_t>(e->shaft)];
-            const auto rest = e->remainder_at({x[p.speed], x[p.angle], 0.0, memory[e->turn]}, key.branch[e->branch]);
+            const auto position = static_cast<std::size_t>(e->position);
+            const double field_speed = rate == nullptr || e->position == model::nowhere ? 0.0 : (*rate)[position];
+            const auto rest = e->remainder_at({x[p.speed] - field_speed, e->seen(x[p.angle], u), 0.0, memory[e->turn]},
+                                              key.branch[e->branch]);
             u[e->remainder] = rest.value;
             if (rate != nullptr) (*rate)[e->remainder] = rest.rate;
         }
@@ -112,6 +115,7 @@ class TrainSystem {
             if (e->remainder == nowhere) continue;
             ShaftInstant here = assembly_.places().instant_of(*e, now);
             here.turn = e->turn_at(here.angle);
+            if (e->position != model::nowhere) here.speed -= now.input[1][e->position];
             const auto rest = e->remainder_at(here, e->next(0, here));
             now.input[0][e->remainder] = rest.value;
             now.input[1][e->remainder] = rest.rate;

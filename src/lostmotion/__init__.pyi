@@ -14,6 +14,7 @@ from . import sizing as sizing
 from . import studies as studies
 from . import test_rig as test_rig
 from ._core import SolverError as SolverError
+from .control.command import CommandSignal as CommandSignal
 from .control.controller import Controller as Controller
 from .control.references import PositionReference as PositionReference
 from .data_sheets.components import actuator as actuator
@@ -36,7 +37,6 @@ from .model.load import Load as Load
 from .model.motor import Motor as Motor
 from .model.motor import ShaftMotor as ShaftMotor
 from .model.shaft import Shaft as Shaft
-from .model.signals import CommandSignal as CommandSignal
 from .model.signals import TorqueSignal as TorqueSignal
 from .model.slide import Slide as Slide
 from .model.springs import Spring as Spring

@@ -8,7 +8,9 @@ double Breakaway::command(int motor, int s) {
     loop_ = false;
     visited_.assign(train_.shafts.size(), false);
     const double needed = to_turn(m.shaft, s, nullptr);
-    return loop_ ? std::numeric_limits<double>::quiet_NaN() : needed / m.law.stall_torque();
+    // The command of a stepper is an angle.
+    return loop_ || m.law.kind == Motor::stepper ? std::numeric_limits<double>::quiet_NaN()
+                                                 : needed / m.law.stall_torque();
 }
 
 double Breakaway::to_turn(int shaft, int s, const void* from) {

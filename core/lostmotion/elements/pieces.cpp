@@ -14,13 +14,13 @@ void add_piece_guards(const Terms& terms, const Row& variable, const TorsionCurv
 
 void add_piece_guards(const Terms& terms, const Row& angle, const PeriodicCurve& curve, int turn, int branch,
                       const Key& key, std::vector<Guard>& guards) {
-    const int k = key.branch[branch], last = curve.pieces() - 1;
+    const int n = curve.pieces(), k = key.branch[branch] % n, first = key.branch[branch] - k, last = n - 1;
     const Row within = angle - terms.memory(turn);
     const auto add = [&](const Row& form, int neighbour, double shift) {
         guards.push_back({.form = form,
                           .kind = Guard::edge,
                           .branch = branch,
-                          .neighbour = neighbour,
+                          .neighbour = first + neighbour,
                           .memory = shift == 0.0 ? nowhere : turn,
                           .shift = shift});
     };

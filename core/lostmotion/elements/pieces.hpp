@@ -19,7 +19,7 @@ void add_piece_guards(const Terms& terms, const Row& variable, const TorsionCurv
                       std::vector<Guard>& guards);
 
 // The last and the first piece of a periodic curve are neighbours: then the angle at which the present turn began,
-// which is remembered, moves by a period.
+// which is remembered, moves by a period. A branch may stand for such a piece in one of several variants of a law.
 void add_piece_guards(const Terms& terms, const Row& angle, const PeriodicCurve& curve, int turn, int branch,
                       const Key& key, std::vector<Guard>& guards);
 

@@ -36,7 +36,7 @@ struct Site {
 // The same at one instant.
 struct ShaftInstant {
     double speed = 0.0;    // [rad/s]
-    double angle = 0.0;    // [rad], if something depends on it
+    double angle = 0.0;    // [rad], if something depends on it; what the law depends on
     double command = 0.0;  // if the element has one
     double turn = 0.0;     // [rad], if its law is periodic
 };
@@ -54,6 +54,7 @@ class ShaftElement {
     int turn = nowhere;       // memory: the angle at which the present turn of a periodic law began
     int contact = nowhere;    // of what strikes
     int remainder = nowhere;  // input of the adaptive solver: what straight lines leave of a smooth law
+    int position = nowhere;   // input: the angle that its law is relative to
 
     // What it has.
     virtual bool has_command() const { return false; }
@@ -61,6 +62,7 @@ class ShaftElement {
     virtual int pieces() const { return 1; }
     virtual bool over_angle() const { return false; }
     virtual double period() const { return 0.0; }  // [rad] of a law over the angle; 0: it has none
+    virtual int motor() const { return nowhere; }  // whose torque it is, relative to the angle that is its command
     virtual bool is_smooth() const { return false; }
     virtual bool drives() const { return false; }  // it may set a train in motion
     // The angles at which the shaft strikes something rigid; and whether what it is pressed against is a result.
@@ -95,6 +97,13 @@ class ShaftElement {
 
     // The angle at which the period began that this one lies in [rad].
     double turn_at(double angle) const { return period() * std::floor(angle / period()); }
+    // What its law depends on: of a motor, the angle to its field, from half a period before it on. So a period begins
+    // where the rotor falls out of step.
+    template <class Inputs>
+    double seen(double angle, const Inputs& input) const {
+        if (position == nowhere) return angle;
+        return angle - input[static_cast<std::size_t>(position)] + 0.5 * period();
+    }
 
  protected:
     ShaftElement(const ShaftElement&) = default;

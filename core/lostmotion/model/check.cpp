@@ -127,6 +127,10 @@ Fault TrainCheck::elements() const {
         for (std::size_t k = 0; k < elements.size() && error.empty(); ++k)
             error = too_fine(named(table, kind, elements[k].name, k), between_shafts(elements[k])->pieces());
     });
+    for (const auto& e : shaft_elements(train_))
+        if (e->motor() != nowhere && error.empty())
+            error = too_fine(named("motors", "motor", train_.motors[static_cast<std::size_t>(e->motor())].name, 0),
+                             e->pieces());
     if (!error.empty()) return error;
     for (std::size_t s = 0; s < train_.shafts.size(); ++s) {
         const DryFriction& f = train_.shafts[s].friction;

@@ -35,7 +35,9 @@ void Equations::compose_motors(const Key& key, Regime& r) const {
         const MotorPlace& p = places_.motors[m];
         const Motor::Terms of = forms_.motor_terms(static_cast<int>(m));
         const int limit = p.branch == nowhere ? 0 : key.branch[p.branch];
-        if (motor.law.has_torque_state())
+        if (motor.law.kind == Motor::stepper)
+            r.motor_torque.push_back(field_torque(static_cast<int>(m), key));
+        else if (motor.law.has_torque_state())
             r.motor_torque.push_back(motor.law.torque<Row>(of));
         else if (p.controller != nowhere)
             r.motor_torque.push_back(motor.law.torque(of, forms_.controller_command(p.controller, key)));
@@ -46,6 +48,14 @@ void Equations::compose_motors(const Key& key, Regime& r) const {
         else
             r.motor_torque.push_back(motor.law.torque(of, terms_.one(limit * motor.command_limit())));
     }
+}
+
+// Of a stepper, whose torque acts as a law over the angle.
+Row Equations::field_torque(int motor, const Key& key) const {
+    Row sum;
+    for (const auto& e : places_.acting)
+        if (e->motor() == motor) sum += e->torque(forms_.site(e->shaft), key);
+    return sum;
 }
 
 // T_2 = P(d) + H, with damping while the flanks touch, of a limited one at most another P; T_1 without the losses that
@@ -120,7 +130,7 @@ Row Equations::net_torque(int shaft, const Key& key, const Regime& r) const {
     const ShaftPlace& p = places_.shafts[shaft];
     Row sum;
     for (std::size_t m = 0; m < train_.motors.size(); ++m)
-        if (train_.motors[m].shaft == shaft) sum += r.motor_torque[m];
+        if (train_.motors[m].shaft == shaft && train_.motors[m].law.kind != Motor::stepper) sum += r.motor_torque[m];
     for (std::size_t g = 0; g < train_.gears.size(); ++g)
         if (train_.gears[g].output == shaft) sum += r.output_torque[g];
     for (const auto& c : places_.couplings)

@@ -38,6 +38,7 @@ class Equations {
 
  private:
     void compose_motors(const Key& key, Regime& r) const;
+    Row field_torque(int motor, const Key& key) const;
     void compose_gear(int gear, const Key& key, Regime& r) const;
     void compose_coupling(const CouplingElement& c, const Key& key, Regime& r) const;
     Row shaft_friction(int shaft, const Key& key, const Regime& r) const;

@@ -96,8 +96,7 @@ Found SwitchedTrain::start(Instant& now, Key& key) {
     each_coupling_contact([&](int c) {
         if (const int locked = places().contacts[c].locked; locked != nowhere) event.coupling[c] = now.memory[locked];
     });
-    for (const auto& e : places().acting)
-        if (e->turn != nowhere) now.memory[e->turn] = e->turn_at(now.x[places().shafts[e->shaft].angle]);
+    set_turns(now, [](const ShaftElement&) { return true; });
     // A run that goes on from the end of another keeps the torques that rest has left open there, if it can.
     const auto has_torque = [&](const ContactPlace& p) { return p.locked != nowhere && now.memory[p.locked] != 0.0; };
     if (std::any_of(places().contacts.begin(), places().contacts.end(), has_torque)) {
@@ -114,6 +113,13 @@ Found SwitchedTrain::start(Instant& now, Key& key) {
     return found;
 }
 
+// Sets the angles at which the present periods of those laws began that are wanted.
+template <class Wanted>
+void SwitchedTrain::set_turns(Instant& now, Wanted&& wanted) const {
+    for (const auto& e : places().acting)
+        if (e->turn != nowhere && wanted(*e)) now.memory[e->turn] = e->turn_at(places().instant_of(*e, now).angle);
+}
+
 Found SwitchedTrain::next(Instant& now, int fired_number, Key& key, const Inputs& input, const Rest& given_rest) {
     tried_.clear();
     now.reach(assembly_.layout());
@@ -122,6 +128,8 @@ Found SwitchedTrain::next(Instant& now, int fired_number, Key& key, const Inputs
     const SparseRegime& old = regimes_[key];
     const Guard* fired = fired_number == nowhere ? nullptr : &old.guards[static_cast<std::size_t>(fired_number)];
     if (fired != nullptr && fired->kind == Guard::impact) return strikes(now, *fired, key);
+    // The angle of a field may have jumped.
+    if (fired == nullptr) set_turns(now, [](const ShaftElement& e) { return e.position != nowhere; });
     Event event;
     event.before = event.from = key;
     Inputs left = input;

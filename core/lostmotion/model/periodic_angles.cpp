@@ -33,12 +33,13 @@ std::vector<PeriodicAngle> periodic_angles(const Assembly& a) {
         }
         std::vector<double> periods;
         for (const PeriodicAngle::Turn& t : angle.turns) periods.push_back(t.period);
-        // A controller or a spring knows the angle itself, however often the shaft has turned.
-        const bool known = std::any_of(train.controllers.begin(), train.controllers.end(),
-                                       [&](const LinearController& c) { return c.takes_angle(angle.shaft); }) ||
-                           std::any_of(a.places().acting.begin(), a.places().acting.end(), [&](const auto& e) {
-                               return e->shaft == angle.shaft && e->over_angle() && e->turn == nowhere;
-                           });
+        // A controller, a spring or the field of a stepper knows the angle itself, however often the shaft has turned.
+        const bool known =
+            std::any_of(train.controllers.begin(), train.controllers.end(),
+                        [&](const LinearController& c) { return c.takes_angle(angle.shaft); }) ||
+            std::any_of(a.places().acting.begin(), a.places().acting.end(), [&](const auto& e) {
+                return e->shaft == angle.shaft && e->over_angle() && (e->turn == nowhere || e->motor() != nowhere);
+            });
         if (!known) angle.period = common_period(periods);
         angles.push_back(std::move(angle));
     }

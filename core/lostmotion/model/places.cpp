@@ -44,8 +44,10 @@ Places::Places(const Train& train, bool with_remainders)
     place_contacts(train);
     find_massless();
     place_inputs(train);
-    for (const auto& e : acting)
+    for (const auto& e : acting) {
+        if (e->motor() != nowhere) e->position = motors[e->motor()].command;
         if (with_remainders && e->is_smooth()) e->remainder = layout.inputs++;
+    }
     place_memory_and_branches(train);
     layout.arrange();
 }

@@ -122,7 +122,7 @@ struct Places {
     template <class Now>
     ShaftInstant instant_of(const ShaftElement& e, const Now& now) const {
         const ShaftPlace& p = shafts[e.shaft];
-        return {now.x[p.speed], p.angle == nowhere ? 0.0 : now.x[p.angle],
+        return {now.x[p.speed], p.angle == nowhere ? 0.0 : e.seen(now.x[p.angle], now.input[0]),
                 e.command == nowhere ? 0.0 : now.input[0][e.command], e.turn == nowhere ? 0.0 : now.memory[e.turn]};
     }
     template <class Now>

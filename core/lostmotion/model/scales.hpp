@@ -104,6 +104,10 @@ void balanced_scale(const Assembly& a, State& s, int first_angle) {
         if (c->twist != nowhere) s[c->twist] = s[p.shafts[c->output].speed];
     for (std::size_t n = 0; n < train.shafts.size(); ++n)
         if (p.shafts[n].angle != nowhere) s[p.shafts[n].angle] = s[p.shafts[n].speed];
+    for (const ShaftMotor& m : train.motors)
+        if (m.law.kind == Motor::stepper)  // the field turns its rotor as a spring does
+            s[p.shafts[m.shaft].angle] =
+                s[p.shafts[m.shaft].speed] * std::sqrt(inertia(m.shaft) / (m.law.pole_pairs() * m.law.holding_torque));
     for (std::size_t k = 0; k < train.controllers.size(); ++k) {
         const ShaftMotor& motor = train.motors[static_cast<std::size_t>(train.controllers[k].motor)];
         const Motor& law = motor.law;

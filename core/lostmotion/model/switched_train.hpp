@@ -131,6 +131,9 @@ class SwitchedTrain {
             if (places().contacts[c].has_own_torque()) use(c);
     }
 
+    template <class Wanted>
+    void set_turns(Instant& now, Wanted&& wanted) const;
+
     // What contacts at rest make of the speeds: found once for each set.
     struct Stopped {
         Rest at_rest, kept;

@@ -9,7 +9,7 @@
 namespace lostmotion {
 
 struct Motor {
-    enum Kind { dc, torque_source } kind = dc;
+    enum Kind { dc, torque_source, stepper } kind = dc;
 
     double rotor_inertia = 0.0;              // J_M [kg m2]
     double friction_torque = 0.0;            // T_10 [N m], dry friction of the bearings
@@ -18,10 +18,17 @@ struct Motor {
     double electrical_time_constant = 1e-3;  // tau_a [s]; 0: the torque follows voltage and speed at once
     double armature_voltage_constant = 2.0;  // k_N [-], stall torque / rated torque at rated voltage
     double voltage_limit = std::numeric_limits<double>::infinity();  // of |E_Z| [-]
+    // Of a stepper with ideal current. Its command is the angle of the field phi* [rad]: it turns its rotor with
+    // -T_H sin(n (phi - phi*)) - T_D sin(4 n phi), n = steps_per_revolution/4.
+    double steps_per_revolution = 200.0;
+    double holding_torque = 1.0;      // T_H [N m]
+    double detent_torque = 0.0;       // T_D [N m]
+    double torque_error = 0.0;        // [N m], of the straight lines that stand for the sines; 0: T_H/1000
+    double standstill_current = 1.0;  // share of the current that is left at rest
 
     template <class Fields>
     void describe(Fields& f) {
-        f.choice("kind", kind, {"dc", "torque_source"});
+        f.choice("kind", kind, {"dc", "torque_source", "stepper"});
         f.number({"rotor_inertia", "J_M", "kg*m^2", Range::not_negative, Given::needed, "J_M"}, rotor_inertia);
         f.number({"friction_torque", "T_10", "N*m", Range::not_negative, Given::has_default,
                   "T_10, dry friction of the bearings"},
@@ -37,7 +44,26 @@ struct Motor {
                   "k_N, stall torque / rated torque at rated voltage"},
                  armature_voltage_constant);
         f.number({"command_limit", "", "", Range::limit, Given::none}, voltage_limit);
+        f.number({"steps_per_revolution", "", "", Range::positive, Given::may_be_left_out,
+                  "full steps of a stepper in a turn of its rotor, a multiple of 4: 200 of 1.8 deg, 400 of 0.9 deg"},
+                 steps_per_revolution);
+        f.number({"holding_torque", "T_H", "N*m", Range::positive, Given::may_be_left_out,
+                  "T_H of a stepper, largest torque at standstill with rated current in both phases"},
+                 holding_torque);
+        f.number({"detent_torque", "T_D", "N*m", Range::not_negative, Given::may_be_left_out,
+                  "T_D of a stepper, amplitude of the torque without current, with a period of one step"},
+                 detent_torque);
+        f.number({"torque_error", "", "N*m", Range::positive, Given::may_be_left_out,
+                  "largest error of the straight lines that stand for the torque of a stepper over its angle; left "
+                  "out, a thousandth of holding_torque"},
+                 torque_error);
+        f.number({"standstill_current", "", "", Range::share, Given::may_be_left_out,
+                  "share of its current that a stepper keeps at rest; left out, all of it"},
+                 standstill_current);
     }
+
+    double pole_pairs() const { return 0.25 * steps_per_revolution; }
+    double error_of_torque() const { return torque_error > 0.0 ? torque_error : 1e-3 * holding_torque; }
 
     // The terms of its forms: M_D, w_M, the command E_C and 1.
     struct Terms {

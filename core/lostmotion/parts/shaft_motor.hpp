@@ -27,6 +27,7 @@ struct ShaftMotor {
     }
     // Torque [N m] at standstill under a constant command.
     double torque_at_rest(double u) const {
+        if (law.kind == Motor::stepper) return 0.0;  // its field is a torque over the angle
         const double most = limited() ? command_limit() : std::numeric_limits<double>::infinity();
         return law.stall_torque() * std::clamp(u, -most, most);
     }

@@ -50,7 +50,11 @@ std::vector<TrainChannel> train_channels(const model::Assembly& a) {
         if (k >= first_reference(a)) break;
         if (is_given(p, static_cast<int>(k))) continue;  // the speed is a state
         const auto loaded = std::ranges::find(p.shafts, static_cast<int>(k), &model::ShaftPlace::load);
-        if (loaded == p.shafts.end()) {
+        const auto stepper =
+            std::ranges::find_if(p.acting, [&](const auto& e) { return e->position == static_cast<int>(k); });
+        if (stepper != p.acting.end()) {
+            out.push_back({C::input, static_cast<int>(k), inputs[k], "rad", "angle of the field", "phi*"});
+        } else if (loaded == p.shafts.end()) {
             out.push_back({C::input, static_cast<int>(k), inputs[k], "1", "command: 1 is the rated value", "E_C"});
         } else {
             const int s = static_cast<int>(loaded - p.shafts.begin());

@@ -1,5 +1,6 @@
 from .camera import Camera as Camera
 from .camera import Tracker as Tracker
+from .command import Stepping as Stepping
 from .continuous import ContinuousController as ContinuousController
 from .continuous import PositionPID as PositionPID
 from .continuous import PositionSignal as PositionSignal

@@ -28,11 +28,12 @@ from ..inputs.quantities import (
 )
 from ..inputs.validation import did_you_mean, shown
 from ..model.motor import Motor
-from ..model.signals import CommandSignal, Signal, Step
+from ..model.signals import Signal, Step
 from ..model.train import DriveTrain
 from ..recorded import numbers
 from ..reproducible import sin
 from ..units.conversion import Unit
+from .command import CommandSignal
 from .firmware import Firmware
 from .loops import FirstOrderCurrent, IdealCurrent, VoltageCommand
 from .turning import turns

@@ -7,8 +7,8 @@ from pydantic import model_validator
 from ..inputs import described
 from ..inputs.described import CommandedFields
 from ..inputs.part import Part
-from ..inputs.quantities import NotNegative, Time
-from .signals import CommandSignal
+from ..inputs.quantities import NotNegative, Number, Time
+from .signals import Signal
 
 FULL_COMMAND = 1.0 + 1e-9
 """Greatest command of a brake or clutch: the full torque, up to the rounding of a sum of signals."""
@@ -35,7 +35,7 @@ class Commanded(CommandedFields):
     release_delay: Annotated[Time, NotNegative] = 0.0
     """from a step down of the command until it acts"""
 
-    def acting(self, command: CommandSignal) -> CommandSignal:
+    def acting(self, command: Signal[Number]) -> Signal[Number]:
         """The command as it acts, after the delays.
 
         Raises

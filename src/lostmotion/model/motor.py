@@ -13,6 +13,7 @@ from ..inputs.described import MotorFields, ShaftMotorFields
 from ..inputs.part import Part
 from ..inputs.quantities import (
     Current,
+    Inductance,
     Number,
     Positive,
     Resistance,
@@ -100,6 +101,19 @@ DC_KEYS = (
     "stall_current",
     "no_load_current",
 )
+# Keys that only a stepper has.
+STEPPER_KEYS = (
+    "steps_per_revolution",
+    "holding_torque",
+    "detent_torque",
+    "torque_error",
+    "standstill_current",
+    "rated_current",
+    "resistance_phase",
+    "inductance_phase",
+    "supply_voltage",
+)
+LEAST_TORQUE_ERROR = 2e-8  # share of the holding torque; less takes more straight lines than the core has room for
 # Keys of a DC motor known by its line from stall to no load, in place of its rated point.
 LINE_KEYS = ("stall_torque", "no_load_speed")
 CURRENT_KEYS = ("stall_current", "no_load_current")
@@ -134,9 +148,18 @@ class Motor(MotorFields):
     """largest voltage of the amplifier"""
     dc_voltage: Annotated[Voltage, Positive] | None = None
     """dc voltage of the amplifier that feeds a synchronous motor"""
-    kind: Literal["dc", "torque_source", "synchronous"] = "dc"
+    kind: Literal["dc", "torque_source", "synchronous", "stepper"] = "dc"
     """`torque_source`: the command times `rated_torque` acts on the rotor without delay; `synchronous`: command 1 is the largest
-    voltage that the amplifier can give, dc_voltage/sqrt(3), amplitude of a phase"""
+    voltage that the amplifier can give, dc_voltage/sqrt(3), amplitude of a phase; `stepper`: hybrid stepper, whose command is the angle
+    of its field"""
+    rated_current: Annotated[Current, Positive] | None = None
+    """current of a phase of a stepper, amplitude, at which it has its holding torque"""
+    resistance_phase: Annotated[Resistance, Positive] | None = None
+    """resistance of a phase of a stepper"""
+    inductance_phase: Annotated[Inductance, Positive] | None = None
+    """inductance of a phase of a stepper"""
+    supply_voltage: Annotated[Voltage, Positive] | None = None
+    """supply of the driver of a stepper, for the pull-out torque over the speed"""
     winding: Winding | None = None
     """winding of a synchronous motor, or of one that is modelled as a torque source, for its current and its heat"""
     limits: MotorLimits | None = None
@@ -147,6 +170,7 @@ class Motor(MotorFields):
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
+        self._check_stepper()
         if self.kind == "dc":
             self._check_line()
             self._take_rated_point()
@@ -156,9 +180,8 @@ class Motor(MotorFields):
                         f'lacks {key}, which a motor of kind "dc" needs; or give stall_torque and no_load_speed'
                     )
         else:
-            self._refuse(
-                DC_KEYS, f"of no use to a {'torque_source' if self.kind == 'torque_source' else 'synchronous motor'}"
-            )
+            what = {"torque_source": "torque_source", "stepper": "stepper"}.get(self.kind, "synchronous motor")
+            self._refuse(DC_KEYS, f"of no use to a {what}")
         if self.kind == "synchronous":
             for key in ("winding", "dc_voltage"):
                 if getattr(self, key) is None:
@@ -175,6 +198,26 @@ class Motor(MotorFields):
             if self.limits is not None and self.limits.max_voltage is not None:
                 raise ValueError("has voltage_limit and limits.max_voltage, which say the same of a DC motor; give one")
         return self
+
+    def _check_stepper(self) -> None:
+        """A stepper has its own keys; its holding torque stands for the rated torque."""
+        if self.kind != "stepper":
+            self._refuse(STEPPER_KEYS, 'which only a motor of kind "stepper" has')
+            return
+        for key in ("steps_per_revolution", "holding_torque"):
+            if getattr(self, key) is None:
+                raise ValueError(f'lacks {key}, which a motor of kind "stepper" needs')
+        assert self.steps_per_revolution is not None
+        assert self.holding_torque is not None
+        if self.steps_per_revolution % 4.0 != 0.0:
+            raise ValueError(
+                f"has steps_per_revolution = {self.steps_per_revolution:g}, which must be a multiple of 4: two phases make four steps in a period of the field"
+            )
+        if self.torque_error is not None and self.torque_error < LEAST_TORQUE_ERROR * self.holding_torque:
+            raise ValueError(
+                f"has torque_error = {self.torque_error:g} N*m, less than {LEAST_TORQUE_ERROR:g} of its holding_torque; allow more"
+            )
+        self.__dict__["rated_torque"] = self.holding_torque
 
     def _check_line(self) -> None:
         """Stall torque and no-load speed come together, in place of a rated point; so do the currents."""
@@ -249,13 +292,21 @@ class Motor(MotorFields):
                 )
 
     def __repr__(self) -> str:
-        if self.kind == "torque_source":
+        if self.kind == "stepper":
+            rated = f"stepper, {self.steps_per_revolution:g} steps, {self.holding_torque:.4g} N·m"
+        elif self.kind == "torque_source":
             rated = f"torque source, rated {self.rated_torque:.4g} N·m"
         else:
             speed = self.as_dc().rated_speed
             assert speed is not None
             rated = f"{self.kind}, {self.rated_torque:.4g} N·m at {practical(speed, 'rad/s', 4)}"
         return f"{type(self).__name__}({rated}, rotor {self.rotor_inertia:.4g} kg·m²)"
+
+    @property
+    def full_step(self) -> float:
+        """Full step of a stepper [rad]."""
+        assert self.steps_per_revolution is not None
+        return 2.0 * math.pi / self.steps_per_revolution
 
     @property
     def phase_voltage(self) -> float:

@@ -324,18 +324,6 @@ def _polyline(times: Any, values: list[float]) -> list[Breakpoint]:
     return [*lines, (times[-1], values[-1], 0.0)]
 
 
-class CommandSignal(Signal[Number]):
-    """A command E_C over time: the sum of all that is given.
-
-    Examples
-    --------
-    >>> import lostmotion as lm
-    >>> signal = lm.CommandSignal(mean=0.1, amplitude=0.5, frequency="2 Hz")
-    >>> signal.mean
-    0.1
-    """
-
-
 class ForceSignal(Signal[Force]):
     """A force [N] over time: the sum of all that is given."""
 

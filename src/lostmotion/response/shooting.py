@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import _core
+from ..control.command import CommandSignal
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count, Number, Torque
 from ..model.drive import Drive
-from ..model.signals import CommandSignal, Signal, TorqueSignal, constant_or
+from ..model.signals import Signal, TorqueSignal, constant_or
 from ..simulation.drive_tables import Initial
 from ..simulation.scenario import Scenario
 from ..simulation.train_tables import TrainInitial

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 from pydantic import ConfigDict
 
+from ..control.command import CommandSignal
 from ..control.controller import Controller
 from ..data_sheets.components import Conditions
 from ..errors import InputError
@@ -17,7 +18,7 @@ from ..model.drive import Drive
 from ..model.gearbox import Gearbox
 from ..model.load import Load
 from ..model.motor import Motor
-from ..model.signals import CommandSignal, TorqueSignal
+from ..model.signals import TorqueSignal
 from ..model.task import Task
 from ..recorded import may_differ
 from .aliases import GEARBOX, LOAD, MOTOR

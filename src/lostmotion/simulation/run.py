@@ -8,13 +8,14 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 from ..control.axis import Bound
+from ..control.command import CommandSignal
 from ..control.law import as_laws
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.limits import check_free
 from ..inputs.quantities import Number
 from ..model.drive import Drive
-from ..model.signals import CommandSignal, TorqueSignal
+from ..model.signals import TorqueSignal
 from ..worker_threads import thread_pool
 from .core_runs import Options, core_result
 from .drive_tables import Initial

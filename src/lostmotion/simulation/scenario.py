@@ -31,7 +31,7 @@ from ..model.motor import Motor
 from ..model.signals import Signal
 from ..model.train import DriveTrain
 from ..recorded import may_differ
-from . import axis_form, drive_form
+from . import axis_form, drive_form, steppers
 from .aliases import AXIS, DRIVE, TRAIN, Form
 from .drive_tables import DriveTables, Initial, LoadTable
 from .keys import set_values
@@ -464,14 +464,17 @@ class Scenario:
         """All that acts on the train, after delays of brakes and clutches, by the name of its result variable."""
         train, controllers = self.train(), self.continuous()
         commands = {
-            train.command_of(name): self.tables.acting(name) for name in self.commanded() if name not in controllers
+            train.command_of(name): steppers.acting(self.tables, name)
+            for name in self.commanded()
+            if name not in controllers
         }
         torques = {train.load_torque_of(name): load for name, load in self.tables.loads().items()}
         references = {name: s for motor, c in controllers.items() for name, s in c.signals(motor).items()}
         motions: dict[str, Signal[Any]] = {}
         for name, (speed, acceleration) in self.tables.motions().items():
             motions |= {f"{name}_given_speed": speed, f"{name}_given_acceleration": acceleration}
-        return {**commands, **torques, **motions, **references}
+        currents = {f"{name}_current_command": level for name, level in steppers.currents(self.tables).items()}
+        return {**commands, **currents, **torques, **motions, **references}
 
     @kept
     def begin(self) -> TrainInitial:

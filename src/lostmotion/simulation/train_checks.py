@@ -8,6 +8,7 @@ from ..control.axis import check_torques
 from ..errors import InputError
 from ..inputs.validation import did_you_mean, shown
 from .given_motion import check_continuous
+from .steppers import acting
 from .tables import Whole
 from .train_tables import LINEAR_INITIAL
 from .train_variables import check_names
@@ -155,6 +156,6 @@ def _check_commands(scenario: Whole) -> None:
         raise InputError(reason, *idle)
     for name in known:
         try:
-            tables.acting(name)
+            acting(tables, name)
         except ValueError as problem:
             raise InputError(problem, f"command.{name}") from None

@@ -44,7 +44,7 @@ def start_values(
     """
     stiff = [name for name, g in train.gears.items() if not isinstance(g.stiffness, Rigid) or g.stiffness.strikes]
     lossy = [name for name in stiff if (h := train.gears[name].hysteresis) is not None and h.efficiency < 1.0]
-    electric = [name for name, m in train.motors.items() if m.kind != "torque_source"]
+    electric = [name for name, m in train.motors.items() if m.kind not in ("torque_source", "stepper")]
     speeds, twists = tied_speeds(train, initial.of_all("speeds")), initial.of_all("twists")
     for keys, what in ((("speeds", "angles"), "shaft"), (("slide_speeds", "positions"), "slide")):
         for key in keys:

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 from pydantic import ConfigDict, Field, model_validator
 
 from .. import _core
+from ..control.command import CommandSignal
 from ..control.continuous import ContinuousController
 from ..control.controller import AnyController, Controller
 from ..control.references import PositionReference, SlideReference
@@ -22,7 +23,7 @@ from ..inputs.quantities import Angle, Force, Length, LinearSpeed, NotNegative, 
 from ..model.linear_train import LinearElements
 from ..model.motor import MotorLaw
 from ..model.shaft import Shaft
-from ..model.signals import CommandSignal, ForceSignal, Signal, SlideSpeedSignal, SpeedSignal, TorqueSignal, constant_or
+from ..model.signals import ForceSignal, Signal, SlideSpeedSignal, SpeedSignal, TorqueSignal, constant_or
 from ..model.slide import Slide
 from ..model.task import Task
 from ..model.train import DriveTrain
@@ -195,7 +196,7 @@ class TrainTables(ScenarioTables, LinearElements):
                 found[name] = s.speed, s.speed.acceleration()
         return found
 
-    def acting(self, name: str) -> CommandSignal:
+    def acting(self, name: str) -> Signal[Number]:
         """The command of a motor, brake or clutch after its delays."""
         command = self.command.get(name, CommandSignal())
         element = self.brakes.get(name) or self.clutches.get(name)
@@ -213,7 +214,7 @@ class TrainTables(ScenarioTables, LinearElements):
         for suffix, key in (("_load_torque", "shafts.{}.torque"), ("_reference", "controllers.{}.reference")):
             if name.endswith(suffix):
                 return key.format(name.removesuffix(suffix))
-        return f"command.{name.removesuffix('_command')}"
+        return f"command.{name.removesuffix('_command').removesuffix('_current')}"
 
     def record_keys(self) -> Iterator[str]:
         """Keys that take names of records, and the conditions of their use."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
+from ..control.command import CommandSignal
 from ..model.gearbox import Gearbox
 from ..model.motor import Motor
-from ..model.signals import CommandSignal
 from ..model.torsion import Rigid
 from .finding import Finding, Judgement
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..control.command import CommandSignal
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.limits import check_free
@@ -22,7 +23,7 @@ from ..model.gear import Gear
 from ..model.gearbox import Gearbox
 from ..model.load import Load
 from ..model.motor import Motor
-from ..model.signals import CommandSignal, Samples, TorqueSignal
+from ..model.signals import Samples, TorqueSignal
 from ..model.torsion import Rigid
 from ..simulation.drive_tables import Initial
 from ..simulation.results import RunArrays
