@@ -39,6 +39,9 @@ inline void bind_joint_trains(nb::module_& m) {
     using T = JointTrains;
     nb::class_<JointSnapshot>(m, "JointSnapshot");
     m.def("joint_rows", [] { return std::vector<std::string>(joint_rows.begin(), joint_rows.end()); });
+    m.def(
+        "turns_joint", [](TrainSimulation& t, int shaft) { return T::joint(t, shaft).has_value(); }, "train"_a,
+        "shaft"_a, "Whether the angle of a shaft follows from the states, and no mass matrix joins it to others.");
     nb::class_<T>(m, "JointTrains")
         .def(
             "__init__",
@@ -46,9 +49,11 @@ inline void bind_joint_trains(nb::module_& m) {
                const std::vector<int>& commands, const std::vector<double>& scales) {
                 std::vector<T::Joint> joints;
                 for (std::size_t k = 0; k < trains.size(); ++k) {
-                    const std::optional<LoadShaft> shaft = trains[k]->load_shaft(shafts[k]);
-                    if (!shaft) throw nb::value_error("a load shaft without load torque, or whose angle is no state");
-                    joints.push_back({trains[k], *shaft, commands[k], scales[k]});
+                    std::optional<T::Joint> joint = T::joint(*trains[k], shafts[k]);
+                    if (!joint) throw nb::value_error(("shaft of joint " + std::to_string(k)).c_str());
+                    joint->command = commands[k];
+                    joint->command_scale = scales[k];
+                    joints.push_back(std::move(*joint));
                 }
                 new (self) T(std::move(joints));
             },

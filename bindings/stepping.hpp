@@ -77,7 +77,7 @@ inline void bind_stepping(nb::module_& m) {
             "answer",
             [](S& s, double interval, const Numbers& begin, const Numbers& end, int shaft) {
                 const std::optional<LoadShaft> load = s.load_shaft(shaft);
-                if (!load) throw nb::type_error("a shaft without load torque, or whose angle is no state");
+                if (!load) throw nb::type_error("a shaft without load torque");
                 LoadAnswer out;
                 advance(s, begin, end, [&] { return s.motion().answer(interval, begin, end, *load, out); });
                 return std::make_tuple(load->inertia, out.acceleration, out.compliance);

@@ -304,13 +304,23 @@ def test_no_function_refuses_a_random_scenario_by_its_form(seed: int, tmp_path: 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_a_train_of_one_gear_moves_to_the_last_bit_as_the_drive_that_it_is(seed: int) -> None:
-    from lostmotion.simulation.one_gear import as_drive
-
-    scenario = lm.Scenario(**random_gear(seed))
-    drive, train = lm.simulate(as_drive(scenario, "test")), lm.simulate(scenario)
+    tables = random_gear(seed)
+    motor, gear = (
+        {key: v for key, v in tables[t][n].items() if key not in ("shaft", "input", "output")}
+        for t, n in (("motors", "m"), ("gears", "g"))
+    )
+    one = lm.Scenario(
+        motor=motor,
+        gearbox={"stiffness": {"kind": "rigid"}} | gear | {"inertia": tables["shafts"]["a"]["inertia"]},
+        load=tables["shafts"]["b"],
+        command=tables["command"]["m"],
+        simulation=tables["simulation"],
+    )
+    scenario = lm.Scenario(**tables)
+    drive, train = lm.simulate(one), lm.simulate(scenario)
     assert np.array_equal(drive["load_speed"], train["b_speed"])
     assert np.array_equal(drive["twist"], train["g_twist"])
-    short, long = lm.check_drive(as_drive(scenario, "test")), lm.check_drive(scenario)
+    short, long = lm.check_drive(one), lm.check_drive(scenario)
     assert [(f.rule, f.verdict) for f in short] == [(f.rule, f.verdict) for f in long]
 
 

@@ -12,7 +12,21 @@ import lostmotion as lm
 
 mujoco = pytest.importorskip("mujoco", reason='pip install "lostmotion[mujoco]"')
 
-from robot_arm import ARM, RATIO, ROTOR, drive, motor_torques, robot  # noqa: E402  (it needs MuJoCo)
+from robot_arm import ARM, HINGE, RATIO, ROTOR, drive, motor_torques, robot  # noqa: E402  (it needs MuJoCo)
+
+# Belt and worm between the motor and the joint, which a spring turns back; a flywheel beside them.
+STAGES = {"belt": 5.0, "worm": 20.0}
+TRAIN = {
+    "shafts": {"rotor": {}, "worm": {"inertia": 2e-4}, "joint": {"inertia": 1.0}, "flywheel": {"inertia": 0.01}},
+    "motors": {"m": {"shaft": "rotor", "kind": "torque_source", "rated_torque": 2.0, "rotor_inertia": 1e-4}},
+    "gears": {
+        "belt": {"input": "rotor", "output": "worm", "ratio": STAGES["belt"], "inertia": 3e-5},
+        "worm": {"input": "worm", "output": "joint", "ratio": STAGES["worm"]},
+        "bevel": {"input": "flywheel", "output": "worm", "ratio": -2.0},
+    },
+}
+AT_JOINT = 100.0**2 * 1.3e-4 + 20.0**2 * (2e-4 + 4.0 * 0.01)
+"""inertia of motor, worm and flywheel at the joint [kg m2]"""
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -141,3 +155,51 @@ def test_controls_are_limited_and_found_behind_an_actuator_of_two(tmp_path: Path
         ends.append(data.qpos.tolist())
     assert ends[0] == ends[2]
     assert ends[1] == ends[2]
+
+
+def hinge(train: dict[str, Any], where: Path, step: float) -> Any:
+    """The hinge of the tests of `attach`, turned by a train by way of the lines that `write_drive` returns."""
+    joint, actuator = lm.mujoco.write_drive(lm.DriveTrain(**train), where / "hinge.drive").split("\n")
+    armature = joint.partition("armature=")[2].partition("/")[0]
+    text = HINGE.format(step=step).replace('type="hinge"', f'type="hinge" armature={armature}')
+    text = text.replace("<worldbody>", '<extension><plugin plugin="lostmotion.drive"/></extension><worldbody>')
+    text = text.replace("</mujoco>", f"<actuator>{actuator.replace('JOINT', 'hinge')}</actuator></mujoco>")
+    return mujoco.MjModel.from_xml_string(text)
+
+
+def test_a_joint_behind_belt_and_worm_speeds_up_by_the_torque_over_all_inertias(tmp_path: Path) -> None:
+    model = hinge(TRAIN, tmp_path, 1e-3)
+    data = mujoco.MjData(model)
+    data.ctrl[:] = 0.7
+    mujoco.mj_step(model, data, 200)
+    assert model.dof_armature[0] == pytest.approx(AT_JOINT, rel=1e-8)
+    exact = lm.mujoco.attach(mujoco.MjModel.from_xml_string(HINGE.format(step=1e-3)), {"hinge": lm.DriveTrain(**TRAIN)})
+    for _ in range(200):
+        exact.step([0.7])
+    acceleration = 100.0 * 0.7 / (AT_JOINT + 0.03 + 0.1**2)
+    assert [data.qvel[0], exact.data.qvel[0]] == pytest.approx(2 * [0.2 * acceleration], rel=1e-9)
+    assert exact.data.qpos[0] == pytest.approx(0.5 * acceleration * 0.2**2, rel=1e-9)
+
+
+def test_a_joint_that_begins_away_from_0_swings_on_the_spring_of_its_train(tmp_path: Path) -> None:
+    stiffness = 400.0
+    train = TRAIN | {"springs": {"s": {"shaft": "joint", "stiffness": {"kind": "linear", "stiffness": stiffness}}}}
+    w = np.sqrt(stiffness / (AT_JOINT + 0.03 + 0.1**2))
+    for step in (2e-3, 1e-3):
+        model = hinge(train, tmp_path, step)
+        data = mujoco.MjData(model)
+        data.qpos[0] = 0.5
+        mujoco.mj_step(model, data, round(0.4 / step))
+        # MuJoCo advances positions with the speed at the end of a step.
+        ahead = -0.5 * step * 0.5 * w * np.sin(0.4 * w)
+        assert data.qpos[0] - 0.5 * np.cos(0.4 * w) == pytest.approx(ahead, rel=0.02)
+
+
+def test_two_motors_and_two_ends_are_refused_for_what_they_are(tmp_path: Path) -> None:
+    second = {"shaft": "worm", "kind": "torque_source", "rated_torque": 1.0, "rotor_inertia": 1e-4}
+    for changed, reason in (
+        ({"motors": TRAIN["motors"] | {"n": second}}, "2 motors turn it"),
+        ({"gears": TRAIN["gears"] | {"bevel": {"input": "worm", "output": "flywheel", "ratio": 2.0}}}, "2 shafts"),
+    ):
+        with pytest.raises(lm.InputError, match=reason):
+            lm.mujoco.write_drive(lm.DriveTrain(**TRAIN | changed), tmp_path / "x")

@@ -1,6 +1,7 @@
-// An actuator plugin of MuJoCo: a drive that turns a hinge. It loads into the stock library by mj_loadPluginLibrary.
+// An actuator plugin of MuJoCo: a drive train that turns a hinge. It loads into the stock library by
+// mj_loadPluginLibrary.
 //
-// The joint needs the inertia A that the drive has at the joint through a closed mesh as its armature, since a plugin
+// The joint needs the inertia A that the drive has at the joint through closed meshes as its armature, since a plugin
 // cannot change the armature from step to step. The drives of a model are solved together: with the inertia matrix S of
 // the robot at their joints, the other joints free, and all forces f there but contacts, both at the begin of the step,
 //     S a = f + tau(a),
@@ -10,7 +11,9 @@
 // the engine has found: with a contact it is another one. Newton's method finds the load torque by its exact
 // derivative.
 //
-// plugin_state: the whole state of the train, then its load torque and the speed of the joint at the begin of the step.
+// plugin_state: the whole state of the train, then its load torque, and speed and angle of the joint at the begin of
+// the step. The file: the description of a train with a load torque on the shaft of the joint alone, which starts with
+// the speeds at which this shaft has 1 rad/s, then A.
 #include <mujoco/mujoco.h>
 
 #include <algorithm>
@@ -20,7 +23,6 @@
 #include <string>
 #include <vector>
 
-#include "lostmotion/model/drive_train.hpp"
 #include "lostmotion/scenario/description.hpp"
 #include "lostmotion/scenario/simulation.hpp"
 #include "lostmotion/simulation/joint_trains.hpp"
@@ -50,18 +52,27 @@ std::vector<double> numbers_of(const std::string& path) {
     return numbers;
 }
 
-lm::Scenario scenario_of(const mjModel* m, int instance) {
+struct DriveFile {
+    lm::Scenario scenario;
+    std::size_t joint;  // shaft
+    double armature;
+};
+
+DriveFile file_of(const mjModel* m, int instance) {
     const char* path = mj_getPluginConfig(m, instance, "scenario");
     if (path == nullptr || path[0] == '\0')
         fail(m, instance, "the key scenario is missing; give the file that lostmotion.mujoco.write_drive has written");
-    const lm::ScenarioDescription description(numbers_of(path));
-    if (!description.error().empty())
+    std::vector<double> numbers = numbers_of(path);
+    const double armature = numbers.empty() ? 0.0 : numbers.back();
+    if (!numbers.empty()) numbers.pop_back();
+    const lm::ScenarioDescription description(std::move(numbers));
+    lm::Scenario s = description.error().empty() ? description.scenario() : lm::Scenario{};
+    const auto joint = std::ranges::find(s.train.shafts, true, &lm::model::Shaft::loaded);
+    if (joint == s.train.shafts.end() || s.train.motors.size() != 1)
         fail(m, instance, "scenario " + std::string(path) + ": is no file of lostmotion.mujoco.write_drive");
-    lm::Scenario s = description.scenario();
-    if (!lm::model::is_drive(s.train))
-        fail(m, instance, "scenario " + std::string(path) + ": is more than a motor, a gear and a load");
     s.references_given = true;
-    return s;
+    const auto shaft = static_cast<std::size_t>(joint - s.train.shafts.begin());
+    return {std::move(s), shaft, armature};
 }
 
 // The drives of a model.
@@ -74,22 +85,24 @@ struct Group {
 };
 
 struct Drive {
-    Drive(const lm::Scenario& scenario, double step) : simulation(scenario, step) {
-        shaft = *simulation.train().load_shaft(scenario.train.gears[0].output);
+    Drive(const DriveFile& file, double step) : simulation(file.scenario, step), at_one(file.scenario.start) {
+        const lm::Scenario& scenario = file.scenario;
         inputs.resize(simulation.names().inputs.size());
-        load = simulation.input_of(shaft.load);
+        joint = lm::JointTrains::joint(simulation.train(), static_cast<int>(file.joint)).value();
+        load = simulation.input_of(joint.shaft.load);
         const auto& motor = scenario.train.motors[0].law;
-        const bool torque_source = motor.kind == lm::Motor::torque_source && scenario.control.axes.empty();
         controlled = !scenario.control.axes.empty();
-        scale = torque_source ? 1.0 / motor.rated_torque : 1.0;
+        const bool commanded = !controlled && scenario.train.controllers.empty();
+        scale = commanded && motor.kind == lm::Motor::torque_source ? 1.0 / motor.rated_torque : 1.0;
     }
-    double speed() const { return simulation.motion().state(shaft.speed_state); }
+    double speed() const { return simulation.motion().state(joint.shaft.speed_state); }
     lm::ScenarioSimulation simulation;
-    lm::LoadShaft shaft;
+    std::vector<double> at_one;  // states at which the joint has 1 rad/s
+    lm::JointTrains::Joint joint;
     std::vector<double> inputs;
     std::size_t load = 0;
-    double scale = 1.0;                       // from the control of MuJoCo to the command
-    int control = -1, output = -1, dof = -1;  // places in mjData
+    double scale = 1.0;                                      // from the control of MuJoCo to the command
+    int control = -1, output = -1, dof = -1, position = -1;  // places in mjData
     bool controlled = false;
     double armature = 0.0;         // A
     std::unique_ptr<Group> group;  // of the first drive of a model
@@ -109,8 +122,8 @@ double given(const mjModel* m, const mjData* d, const Drive& drive) {
 Drive& drive_of(const mjData* d, int instance) { return *reinterpret_cast<Drive*>(d->plugin_data[instance]); }
 
 int state_size(const mjModel* m, int instance) {
-    const lm::ScenarioSimulation simulation(scenario_of(m, instance), m->opt.timestep);
-    return static_cast<int>(simulation.state_size()) + 2;
+    const lm::ScenarioSimulation simulation(file_of(m, instance).scenario, m->opt.timestep);
+    return static_cast<int>(simulation.state_size()) + 3;
 }
 
 // What the engine would do to the force of the actuator, and what joint and actuator have of a drive.
@@ -147,23 +160,22 @@ int init(const mjModel* m, mjData* d, int instance) {
     if (m->actuator_gear[6 * output] != 1.0) fail(m, instance, "the actuator has a gear; the drive has its own");
     refuse_limits(m, instance, actuator, joint);
     if (m->opt.integrator == mjINT_RK4) fail(m, instance, "needs another integrator than RK4");
-    lm::Scenario scenario = scenario_of(m, instance);
+    DriveFile file = file_of(m, instance);
     const int dof = m->jnt_dofadr[joint];
-    const auto& gear = scenario.train.gears[0].law;
-    const double armature = gear.ratio * gear.ratio * (scenario.train.motors[0].law.rotor_inertia + gear.inertia);
     const double given = m->dof_armature[dof];
-    if (!(std::fabs(given - armature) <= 1e-3 * armature)) {
+    if (!(std::fabs(given - file.armature) <= 1e-3 * file.armature)) {
         char line[160];
         std::snprintf(line, sizeof line, "the joint has the armature %.6g; give it %.6g, the inertia of the drive",
-                      given, armature);
+                      given, file.armature);
         fail(m, instance, line);
     }
     const double whole = 1.0 / m->dof_invweight0[dof];
-    scenario.train.shafts[static_cast<std::size_t>(scenario.train.gears[0].output)].inertia = whole - given;
-    auto made = std::make_unique<Drive>(scenario, m->opt.timestep);
+    file.scenario.train.shafts[file.joint].inertia = whole - given;
+    auto made = std::make_unique<Drive>(file, m->opt.timestep);
     made->control = control;
     made->output = output;
     made->dof = dof;
+    made->position = m->jnt_qposadr[joint];
     made->armature = given;
     made->numbers = made->simulation.state_size();
     d->plugin_data[instance] = reinterpret_cast<uintptr_t>(made.release());
@@ -175,20 +187,26 @@ void destroy(mjData* d, int instance) {
     d->plugin_data[instance] = 0;
 }
 
-// At rest or, with a speed of the joint, with closed meshes.
-void place(Drive& drive, double* state, double speed) {
-    const auto& names = drive.simulation.names();
-    std::vector<double> x(names.states.size());
-    const double ratio = drive.simulation.train().assembly().train().gears[0].law.ratio;
-    for (std::size_t k = 0; k < x.size(); ++k)
-        x[k] = names.states[k] == "load_speed" ? speed : names.states[k] == "motor_speed" ? ratio * speed : 0.0;
-    drive.simulation.reset(x, std::vector<double>(names.capacities.size()));
+// All meshes closed, in the middle of their gaps.
+void place(Drive& drive, double* state, double speed, double angle) {
+    const auto& names = drive.simulation.names().states;
+    std::vector<double> x(names.size());
+    for (std::size_t k = 0; k < x.size(); ++k) {
+        const std::size_t end = names[k].rfind('_');
+        const std::string quantity = names[k].substr(end + 1);
+        const auto turning = std::ranges::find(names, names[k].substr(0, end) + "_speed");
+        if (turning == names.end() || (quantity != "speed" && quantity != "angle" && quantity != "position")) continue;
+        const double ratio = drive.at_one[static_cast<std::size_t>(turning - names.begin())];
+        x[k] = ratio * (quantity == "speed" ? speed : angle);
+    }
+    drive.simulation.reset(x, std::vector<double>(drive.simulation.names().capacities.size()));
     drive.simulation.get_state(state);
     state[drive.numbers] = 0.0;
     state[drive.numbers + 1] = speed;
+    state[drive.numbers + 2] = angle;
 }
 
-void reset(const mjModel*, mjtNum* state, void* data, int) { place(*static_cast<Drive*>(data), state, 0.0); }
+void reset(const mjModel*, mjtNum* state, void* data, int) { place(*static_cast<Drive*>(data), state, 0.0, 0.0); }
 
 // Advances the drive from its state, against the load torque that solves an equation. equation(L, answer): its residual
 // over what rounding leaves, and the change of L by Newton's method; 0 where nothing can be done.
@@ -201,7 +219,7 @@ void solve(const mjModel* m, const mjData* d, int instance, double load, Equatio
             fail(m, instance, "plugin_state is not that of this drive");
         drive.inputs[drive.load] = load;
         const lm::Status status =
-            drive.simulation.answer(m->opt.timestep, drive.inputs, drive.inputs, drive.shaft, drive.answer);
+            drive.simulation.answer(m->opt.timestep, drive.inputs, drive.inputs, drive.joint.shaft, drive.answer);
         if (status != lm::Status::done) fail(m, instance, drive.simulation.text(status));
         const auto [residual, change] = equation(load, drive.answer);
         if (std::fabs(residual) <= 1e-11 || change == 0.0 || n == most_iterations) return;
@@ -236,7 +254,7 @@ Group* group_of(const mjModel* m, const mjData* d, int instance) {
         if (m->plugin[k] == m->plugin[instance]) {
             group->instances.push_back(k);
             group->drives.push_back(&drive_of(d, k));
-            joints.push_back({&group->drives.back()->simulation.train(), group->drives.back()->shaft});
+            joints.push_back(group->drives.back()->joint);
         }
     group->trains = std::make_unique<lm::JointTrains>(std::move(joints));
     const std::size_t n = group->drives.size();
@@ -260,8 +278,9 @@ void compute(const mjModel* m, mjData* d, int instance, int) {
     for (std::size_t k = 0; k < n; ++k) {
         Drive& drive = *group->drives[k];
         double* state = d->plugin_state + m->plugin_stateadr[group->instances[k]];
-        // The speed has been changed from outside.
-        if (d->qvel[drive.dof] != state[drive.numbers + 1]) place(drive, state, d->qvel[drive.dof]);
+        // The joint has been moved from outside.
+        const double speed = d->qvel[drive.dof], angle = d->qpos[drive.position];
+        if (speed != state[drive.numbers + 1] || angle != state[drive.numbers + 2]) place(drive, state, speed, angle);
         if (!drive.simulation.set_state(state)) fail(m, group->instances[k], "plugin_state is not that of this drive");
         const double control = given(m, d, drive);
         std::ranges::fill(group->trains->inputs(k), control);
@@ -317,6 +336,7 @@ void advance(const mjModel* m, mjData* d, int instance) {
     drive.simulation.get_state(state);
     state[drive.numbers] = load;
     state[drive.numbers + 1] = speed;
+    state[drive.numbers + 2] = d->qpos[drive.position];
 }
 
 }  // namespace

@@ -380,6 +380,11 @@ class JointSnapshot:
 
 def joint_rows() -> list[str]: ...
 
+def turns_joint(train: Simulation, shaft: int) -> bool:
+    """
+    Whether the angle of a shaft follows from the states, and no mass matrix joins it to others.
+    """
+
 class JointTrains:
     def __init__(self, trains: Sequence[Simulation], *, shafts: Sequence[int], commands: Sequence[int], scales: Sequence[float]) -> None:
         """

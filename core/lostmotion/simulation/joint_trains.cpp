@@ -3,7 +3,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "../model/shaft_angle.hpp"
+
 namespace lostmotion {
+
+std::optional<JointTrains::Joint> JointTrains::joint(TrainSimulation& train, int shaft) {
+    const std::optional<LoadShaft> load = train.load_shaft(shaft);
+    std::optional<model::Row> position = model::shaft_angle(train.assembly(), shaft);
+    if (!load || !position) return {};
+    return Joint{&train, *load, std::move(*position)};
+}
 
 JointTrains::JointTrains(std::vector<Joint> joints) : joints_(std::move(joints)) {
     const std::size_t n = joints_.size();
@@ -44,7 +53,9 @@ void JointTrains::set_guess(std::size_t joint, const Guess& g) {
 void JointTrains::read() {
     for (Joint& j : joints_) {
         j.speed = j.train->motion().state(j.shaft.speed_state);
-        j.angle = j.train->motion().state(j.shaft.angle_state);
+        j.angle = 0.0;
+        for (int k = 0; k < j.train->assembly().layout().states; ++k)
+            if (const double factor = j.position.c[k]; factor != 0.0) j.angle += factor * j.train->motion().state(k);
     }
 }
 

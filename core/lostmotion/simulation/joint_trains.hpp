@@ -13,9 +13,11 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "../elements/row.hpp"
 #include "train_stepping.hpp"
 
 namespace lostmotion {
@@ -25,7 +27,8 @@ class JointTrains {
     struct Joint {
         TrainSimulation* train;
         LoadShaft shaft;
-        int command = -1;  // place of the command among the inputs; -1: a controller has a reference in its place
+        model::Row position;  // of the joint, a form in the states
+        int command = -1;     // place of the command among the inputs; -1: a controller has a reference in its place
         double command_scale = 1.0;
         std::vector<double> inputs = {};  // the last of all inputs of the train
         double torque = 0.0;              // mean torque on the joint over the last step [N m]
@@ -34,6 +37,9 @@ class JointTrains {
         double compliance = 0.0;          // c_i of the last substep [1/(kg m2)]
         MotionState step_begin = {}, substep_begin = {};
     };
+
+    // Nothing: the train does not answer a torque on this shaft, or its angle does not follow from the states.
+    static std::optional<Joint> joint(TrainSimulation& train, int shaft);
 
     // The trains must stay.
     explicit JointTrains(std::vector<Joint> joints);

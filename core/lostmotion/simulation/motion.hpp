@@ -11,9 +11,9 @@
 
 namespace lostmotion {
 
-// A shaft with a load torque whose angle is a state.
+// A shaft with a load torque.
 struct LoadShaft {
-    int speed_state, angle_state;
+    int speed_state;
     int load;        // its load torque, among the inputs
     double inertia;  // [kg m^2]
 };

@@ -10,11 +10,7 @@ std::optional<LoadShaft> TrainSimulation::load_shaft(int shaft) const {
     if (place.load == model::nowhere) return {};
     for (const model::MassMatrix& m : a.train().mass_matrices)
         if (std::ranges::find(m.shafts, shaft) != m.shafts.end()) return {};
-    int angle = place.angle;
-    for (std::size_t part = 0; angle == model::nowhere && part < a.places().last_shaft.size(); ++part)
-        if (a.places().last_shaft[part] == shaft) angle = a.layout().coupled + static_cast<int>(part);
-    if (angle == model::nowhere) return {};
-    return LoadShaft{place.speed, angle, place.load, a.train().shafts[static_cast<std::size_t>(shaft)].inertia};
+    return LoadShaft{place.speed, place.load, a.train().shafts[static_cast<std::size_t>(shaft)].inertia};
 }
 
 bool TrainSimulation::restore(const MotionState& from) {

@@ -20,7 +20,7 @@ class TrainSimulation {
     Motion& motion() { return *motion_; }
     const Motion& motion() const { return *motion_; }
 
-    // Nothing: the shaft has no load torque, its angle is no state, or a mass matrix joins it to others.
+    // Nothing: the shaft has no load torque, or a mass matrix joins it to others.
     std::optional<LoadShaft> load_shaft(int shaft) const;
     // To t = 0, with the contacts still to be found. Returns what is wrong with the start, or nothing.
     std::string reset(const TrainStart& start);

@@ -5,13 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from .. import _core
 from ..control.controller import Controller
 from ..errors import InputError, need
 from ..inputs.arguments import checked
+from ..model.signals import CommandSignal
 from ..portable.checkout import made_here
-from ..portable.descriptions import description
+from ..portable.derivation import Derivation
+from ..portable.descriptions import written
 from ..simulation.joint_trains import joint_drive
-from ..simulation.one_gear import as_drive
+from ..simulation.train_tables import TrainInitial
 from .attaching import drive_of_joint
 from .overlaps import without_weight
 
@@ -53,13 +58,12 @@ def load_plugin() -> Path:
 
 @checked
 def write_drive(drive: Any, path: str | Path, *, controller: Controller | None = None, replace: bool = False) -> str:
-    """Write a drive to a file for the plugin, and return the MJCF that uses it.
+    """Write a drive train to a file for the plugin, and return the MJCF that uses it.
 
     Parameters
     ----------
     drive
-        As of `attach`: a drive, a scenario or its name, or a gearbox of the catalogue. What is more than a motor, a gearbox and a
-        load is for `attach`.
+        As of `attach`: a drive, a drive train, a scenario or its name, or a gearbox of the catalogue.
     path
         Of the file.
     controller
@@ -75,7 +79,7 @@ def write_drive(drive: Any, path: str | Path, *, controller: Controller | None =
     Raises
     ------
     InputError
-        It is more than a motor, a gearbox and a load, or has a controller with a law of your own.
+        Not one motor turns one end of the train, or a controller has a law of your own.
 
     Examples
     --------
@@ -88,14 +92,17 @@ def write_drive(drive: Any, path: str | Path, *, controller: Controller | None =
     """
     given = drive_of_joint(str(path), drive, controller)
     given = without_weight(str(path), given, replace=replace, weighs=True)
-    scenario = as_drive(given, "drive")
-    armature = joint_drive(str(path), scenario, scenario.load.inertia, 1e-3).reflected_inertia
-    numbers = description(scenario, parameters=False)
+    joint = joint_drive(str(path), given, 1.0, 1e-3)
+    core = joint.simulation._core_train
+    still = [CommandSignal().core()] * len(core.input_names())
+    start = joint.drive.start(TrainInitial(speeds=joint.ratios()))
+    case = _core.Case(core, inputs=still, start=start, hysteresis_capacities={})
+    numbers = np.append(written(joint.drive, Derivation(), case), joint.reflected_inertia)
     try:
         numbers.astype("<f8").tofile(path)
     except OSError as problem:
         raise InputError(f"{path}: cannot be written: {problem.strerror}") from None
     return (
-        f'<joint name="JOINT" armature="{armature:.9g}"/>\n'
+        f'<joint name="JOINT" armature="{joint.reflected_inertia:.9g}"/>\n'
         f'<plugin joint="JOINT" plugin="lostmotion.drive"><config key="scenario" value="{path}"/></plugin>'
     )

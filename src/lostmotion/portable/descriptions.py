@@ -55,16 +55,16 @@ def described(scenario: Scenario) -> tuple[np.ndarray, list[tuple[str, float]]]:
     return written(scenario, found), [(p.key, p.value) for p in found.parameters]
 
 
-def written(scenario: Scenario, derivation: Derivation) -> np.ndarray:
-    """The description with these parameters."""
+def written(scenario: Scenario, derivation: Derivation, case: _core.Case | None = None) -> np.ndarray:
+    """The description with these parameters, or that of another case with the controllers of the scenario."""
     return np.array(
         _core.write_description(
-            numbers_of(scenario).tolist(), [p.core() for p in derivation.parameters], derivation.core()
+            numbers_of(scenario, case).tolist(), [p.core() for p in derivation.parameters], derivation.core()
         )
     )
 
 
-def numbers_of(scenario: Scenario) -> np.ndarray:
+def numbers_of(scenario: Scenario, case: _core.Case | None = None) -> np.ndarray:
     """The numbers of a scenario alone."""
     if own := [name for name, controller in scenario.axes().items() if controller.law]:
         raise InputError(
@@ -74,4 +74,4 @@ def numbers_of(scenario: Scenario) -> np.ndarray:
     table = scenario.tables.simulation
     times = {"duration": table.duration, "sample_interval": table.sample_interval}
     control = scenario.control() if scenario.axes() else OPEN_LOOP
-    return np.array(_core.describe(core_case(scenario), title=scenario.tables.title, **times, control=control))
+    return np.array(_core.describe(case or core_case(scenario), title=scenario.tables.title, **times, control=control))

@@ -143,6 +143,10 @@ def joint_drive(name: str, drive: Driven, inertia: float, step: float) -> JointD
         )
     changed = scenario.with_inertia(shaft, inertia)
     simulation = Simulation(changed, step=step, loaded=None if changed.loaded() == [shaft] else [shaft])
+    if not _core.turns_joint(simulation._core, list(changed.train().shafts).index(shaft)):
+        raise InputError(
+            f"joint {name!r}: the angle of {shaft!r} does not follow from those that the train keeps; make it the last of its shafts"
+        )
     command, scale = _command(changed, simulation._core_train.input_names())
     return JointDrive(name, changed, simulation, changed.train(), shaft, command, scale)
 

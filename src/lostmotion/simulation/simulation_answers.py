@@ -121,9 +121,7 @@ class SimulationAnswers(SimulationReadings):
             )
         number = shafts.index(shaft)
         if not self._core.answers(number):
-            raise InputError(
-                f"shaft {shaft!r}: has no load torque, an angle that follows from another shaft, or a mass matrix joins it to others"
-            )
+            raise InputError(f"shaft {shaft!r}: has no load torque, or a mass matrix joins it to others")
         return number
 
     def snapshot(self) -> SimulationSnapshot:
