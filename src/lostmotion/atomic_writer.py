@@ -13,10 +13,7 @@ from .errors import InputError
 def write_whole(path: Path, write: Callable[[Path], None]) -> None:
     """Write a file under another name and move it into place, so that no half-written file bears the final name.
 
-    Raises
-    ------
-    InputError
-        The file cannot be written there; nothing is left behind.
+    Raises InputError: the file cannot be written there; nothing is left behind.
     """
     temporary: Path | None = None
     try:

@@ -143,10 +143,7 @@ def need(module: str, purpose: str, extra: str) -> None:
     extra
         The extra of this package that brings it.
 
-    Raises
-    ------
-    MissingLibraryError
-        It is not installed.
+    Raises MissingLibraryError: it is not installed.
     """
     if find_spec(module) is None:
         raise MissingLibraryError(f'{purpose} needs {module}; install it: pip install "lostmotion[{extra}]"')

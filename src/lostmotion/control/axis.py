@@ -218,10 +218,7 @@ def core_control(train: DriveTrain, controllers: Mapping[str, Controller], laws:
     laws
         Of controllers with ``law = true``.
 
-    Raises
-    ------
-    InputError
-        One of them does not fit its motor or its shafts, or their sample times do not nest.
+    Raises InputError: one of them does not fit its motor or its shafts, or their sample times do not nest.
     """
     if not controllers:
         return OPEN_LOOP

@@ -48,10 +48,7 @@ def discrete(
 ) -> tuple[list[float], list[float], dict[str, Any]]:
     """Numerator and denominator in z, the highest power first, and the solver's system.
 
-    Raises
-    ------
-    InputError
-        The filter was made for another sample time, or its frequency is not below half the sampling frequency.
+    Raises InputError: the filter was made for another sample time, or its frequency is not below half the sampling frequency.
     """
     if not isinstance(filter, TransferFunction):
         if not filter.frequency < 0.5 / sample_time:

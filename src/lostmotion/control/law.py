@@ -87,10 +87,7 @@ def _address_of(data: Any) -> int:
 def as_laws(law: Any, axes: Mapping[str, Any]) -> dict[str, Law]:
     """Laws by the name of the controller: one alone is that of the only controller.
 
-    Raises
-    ------
-    InputError
-        A controller with ``law = true`` has none, or one without has one.
+    Raises InputError: a controller with ``law = true`` has none, or one without has one.
     """
     wanted = [name for name, controller in axes.items() if controller.law]
     given = law if isinstance(law, Mapping) else {} if law is None else dict.fromkeys(wanted[:1] or [""], law)

@@ -106,10 +106,7 @@ class Reference(TimeFunction[V], Generic[V]):
         time
             One instant or an array of them [s], from 0 on.
 
-        Raises
-        ------
-        InputError
-            A time is negative or no number.
+        Raises InputError: a time is negative or no number.
         """
         try:
             if np.iscomplexobj(time):

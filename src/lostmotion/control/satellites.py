@@ -82,10 +82,7 @@ class Satellite(TargetPath):
     def seen(self, t: np.ndarray) -> np.ndarray:
         """(n, 3): east, north and up from the station [m] at instants [s] after the beginning.
 
-        Raises
-        ------
-        ValueError
-            SGP4 cannot go so far from the epoch of the elements.
+        Raises ValueError: SGP4 cannot go so far from the epoch of the elements.
         """
         need("sgp4", "A satellite", "satellites")
         from sgp4.api import SGP4_ERRORS, Satrec, jday

@@ -54,10 +54,7 @@ def symmetrical_optimum(inertia: float, lag: float, a: float = 2.0) -> SpeedGain
     a
         Crossover 1/(a T); 2 is the usual choice, more is better damped.
 
-    Raises
-    ------
-    InputError
-        a is not above 1.
+    Raises InputError: a is not above 1.
     """
     if not a > 1.0:
         raise InputError(f"a: {a:g} must be above 1; 2 is usual")
@@ -68,10 +65,7 @@ def symmetrical_optimum(inertia: float, lag: float, a: float = 2.0) -> SpeedGain
 def identical_damping(drive: TwoInertias, damping: float) -> SpeedGains:
     """Both pairs of poles with the same damping: K_i = J_M w_a^2, K_p = 2 zeta J_M w_a sqrt(R + 4 - 4 zeta^2).
 
-    Raises
-    ------
-    InputError
-        R < 4 zeta^2, where no gains give it.
+    Raises InputError: r < 4 zeta^2, where no gains give it.
     """
     R, J, w = drive.inertia_ratio, drive.motor_inertia, drive.antiresonance
     if 4.0 * damping * damping > R:
@@ -85,10 +79,7 @@ def identical_damping(drive: TwoInertias, damping: float) -> SpeedGains:
 def identical_radius(drive: TwoInertias) -> SpeedGains:
     """All poles at the distance w_a from 0: K_i = J_M w_a^2, K_p = 2 sqrt(R) J_M w_a; their damping is sqrt(R)/2.
 
-    Raises
-    ------
-    InputError
-        R > 4, where the poles are real and part.
+    Raises InputError: r > 4, where the poles are real and part.
     """
     R, J, w = drive.inertia_ratio, drive.motor_inertia, drive.antiresonance
     if R > 4.0:
@@ -106,10 +97,7 @@ def identical_real_part(drive: TwoInertias, damping: float) -> SpeedGains:
     d^2) w_a^2``, and ``s = zeta w_2`` gives ``d = -2 zeta^2 + sqrt(4 zeta^4 - 4 zeta^2 + R)``. The other pair is
     complex while s < w_1, so that d lies from 0 to (1 - zeta^2)/(1 + zeta^2).
 
-    Raises
-    ------
-    InputError
-        R is outside the range that this gives, where no gains do it.
+    Raises InputError: r is outside the range that this gives, where no gains do it.
     """
     R, J, w, z2 = drive.inertia_ratio, drive.motor_inertia, drive.antiresonance, damping * damping
     widest = (1.0 - z2) / (1.0 + z2)

@@ -48,10 +48,7 @@ def gearbox_table(
     A change replaces the value that it names and nothing else. The hysteresis stays that of the record as printed,
     also if the stiffness is changed or wear adds backlash.
 
-    Raises
-    ------
-    InputError
-        The record lacks what a run needs and `changes` do not give it; the message says where to read it.
+    Raises InputError: the record lacks what a run needs and `changes` do not give it; the message says where to read it.
     """
     from .gearbox_sheet import GearboxSheet  # here, as most scenarios name no record
     from .records import find
@@ -70,10 +67,7 @@ def gearbox_table(
 def gearbox_of(sheet: GearboxSheet) -> Gearbox:
     """The gearbox of a data sheet.
 
-    Raises
-    ------
-    InputError
-        It lacks what a run needs.
+    Raises InputError: it lacks what a run needs.
     """
     return Gearbox(**_table_of_sheet(sheet, shown(sheet.name), {}, "gearbox")[0])
 
@@ -322,10 +316,7 @@ CLOSES = {
 def motor_table(reference: str, changes: Mapping[str, Any], where: str = "motor") -> dict[str, Any]:
     """Values of `[motor]`, or of the table `where`, for a record with `changes`, each of which takes the place of what it names.
 
-    Raises
-    ------
-    InputError
-        The record lacks what a run needs and `changes` do not give it; the message says where to read it.
+    Raises InputError: the record lacks what a run needs and `changes` do not give it; the message says where to read it.
     """
     from .motor_sheet import MotorSheet
     from .records import find
@@ -375,10 +366,7 @@ def at_voltage(table: Mapping[str, Any], voltage: Any, given: Collection[str], w
     given
         Keys that are changed too: where these say all that would follow, nothing does.
 
-    Raises
-    ------
-    InputError
-        At this voltage the motor does not reach its rated torque.
+    Raises InputError: at this voltage the motor does not reach its rated torque.
     """
     changed = {**table, "rated_voltage": voltage}
     if {"rated_speed", "armature_voltage_constant"} <= set(given):
@@ -409,10 +397,7 @@ ACCESSORIES = {
 def built_in_brake(motor: str) -> dict[str, Any]:
     """Values of `task.brake` for the brake of a record of a motor.
 
-    Raises
-    ------
-    InputError
-        The catalogue has none.
+    Raises InputError: the catalogue has none.
     """
     from .accessory_sheets import BrakeSheet
     from .records import catalogue
@@ -439,10 +424,7 @@ def _accessory(kind: str, table: Mapping[str, Any]) -> dict[str, Any]:
 def use_accessories(task: Any, motor: Any = None) -> Any:
     """A table `[task]` with the values of the records of brake and amplifier; the brake of the motor that `motor` names, if it does.
 
-    Raises
-    ------
-    InputError
-        A record is unknown, or lacks its main datum.
+    Raises InputError: a record is unknown, or lacks its main datum.
     """
     if not isinstance(task, dict):
         return task

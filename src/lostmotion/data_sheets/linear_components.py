@@ -31,10 +31,7 @@ def linear_table(kind: str, reference: str, changes: Mapping[str, Any], where: s
     kind
         ``"screw"``, ``"rack"``, ``"belt"`` or ``"linear_motor"``.
 
-    Raises
-    ------
-    InputError
-        The record lacks what a run needs and `changes` do not give it; the message says where to read it.
+    Raises InputError: the record lacks what a run needs and `changes` do not give it; the message says where to read it.
     """
     from .linear_sheets import LinearSheet, ScrewSheet
     from .records import find

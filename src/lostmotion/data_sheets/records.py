@@ -106,10 +106,7 @@ def _named(name: str) -> Sheet | None:
 def read_sheets(path: Path) -> list[Sheet]:
     """The records of a sheet file.
 
-    Raises
-    ------
-    InputError
-        With one line that names the file, the record, the key, the value and the remedy.
+    Raises InputError: with one line that names the file, the record, the key, the value and the remedy.
     """
     return parse_sheets(read_toml(path, "a data sheet"), str(path))
 
@@ -157,10 +154,7 @@ def _tables(data: Mapping[str, Any], key: str, where: str) -> list[Mapping[str, 
 def read_again(path: Path) -> tuple[Sheet, ...]:
     """The records of a sheet file, read only once as long as it does not change.
 
-    Raises
-    ------
-    InputError
-        As `read_sheets`.
+    Raises InputError: as `read_sheets`.
     """
     try:
         status = path.stat()
@@ -177,10 +171,7 @@ def _kept_sheets(path: Path, _modified: int, _size: int) -> tuple[Sheet, ...]:
 def _in_file(reference: str, table: str) -> Sheet:
     """The record that a reference to a file means.
 
-    Raises
-    ------
-    InputError
-        The file has none, or several and no name chooses one.
+    Raises InputError: the file has none, or several and no name chooses one.
     """
     file, _, name = reference.partition("#")
     own = [r for r in read_again(Path(file)) if isinstance(r, KINDS[table])]
@@ -205,10 +196,7 @@ def find(reference: str, table: str) -> Sheet:
     table
         A key of `KINDS`, such as ``"gearbox"``.
 
-    Raises
-    ------
-    InputError
-        There is none.
+    Raises InputError: there is none.
     """
     kind = KINDS[table]
     if not isinstance(reference, str):
@@ -230,10 +218,7 @@ def find(reference: str, table: str) -> Sheet:
 def find_one_of(reference: str, tables: Sequence[str]) -> Sheet:
     """Find a record of one of several kinds, as `find` does.
 
-    Raises
-    ------
-    InputError
-        There is none.
+    Raises InputError: there is none.
     """
     if is_in_file(reference):
         of_file = {table_of(record) for record in read_again(Path(reference.partition("#")[0]))}

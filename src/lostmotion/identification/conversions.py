@@ -42,10 +42,7 @@ def conversion_of(text: str) -> Callable[[np.ndarray], np.ndarray]:
     callable
         Takes an array of raw values of any type of numbers, and computes in double precision.
 
-    Raises
-    ------
-    ValueError
-        The formula has something else in it.
+    Raises ValueError: the formula has something else in it.
     """
     formula = Formula(text, FUNCTIONS)
     if other := sorted(formula.names.difference(NAMES)):

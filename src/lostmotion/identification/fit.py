@@ -202,10 +202,7 @@ def search(
     notify
         Is told the iteration and the cost.
 
-    Raises
-    ------
-    InputError
-        The rig has no motion at the start, or no log can be run.
+    Raises InputError: the rig has no motion at the start, or no log can be run.
     """
     both = {**problem.parameters, **problem.nuisance}
     residuals = problem.engine.residuals(problem.logs, start, problem.rung, both)

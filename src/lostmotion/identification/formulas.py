@@ -64,10 +64,7 @@ class Formula:
     def value(self, values: Values) -> Any:
         """With the values of its names.
 
-        Raises
-        ------
-        ValueError
-            A name has no value, or the result is no finite number.
+        Raises ValueError: a name has no value, or the result is no finite number.
         """
         for name in sorted(self.names):
             if name not in values:

@@ -77,10 +77,7 @@ def stretches(rig: Rig, log: Prepared, known: Mapping[str, Any], shown: Shown, w
 def missing_torque(rig: Rig, s: Stretch, known: Mapping[str, Any], rung: int, shown: Shown) -> np.ndarray:
     """r of each block [N·m].
 
-    Raises
-    ------
-    InputError
-        The rig is not one that moves as one shaft, or a torque is not known: why.
+    Raises InputError: the rig is not one that moves as one shaft, or a torque is not known: why.
     """
     scenario = rig.built(rig.changes(known, rung, s.phase)).scenario
     _check(scenario)

@@ -119,10 +119,7 @@ def climb(
     models
         Those that an interrupted identification has fitted: the search goes on from their values.
 
-    Raises
-    ------
-    InputError
-        No log is left to fit, or the rig has no motion at the start.
+    Raises InputError: no log is left to fit, or the rig has no motion at the start.
     """
     task = rig.task
     train = [log for log in logs if not log.held_out]

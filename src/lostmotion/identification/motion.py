@@ -35,10 +35,7 @@ class Shown:
 def shown_motion(rig: Rig) -> Shown:
     """The first measured channel that shows an angle, or if none does and no torque depends on the angle, a speed.
 
-    Raises
-    ------
-    InputError
-        None does.
+    Raises InputError: none does.
     """
     refuse_given_motion(rig.scenario)
     train = rig.scenario.train()
@@ -88,10 +85,7 @@ def windows(rig: Rig, logs: Sequence[Prepared], point: Point, rung: int, length:
     length
         Of a window [s].
 
-    Raises
-    ------
-    InputError
-        No channel shows the state of the rig, or a window has too few samples.
+    Raises InputError: no channel shows the state of the rig, or a window has too few samples.
     """
     try:
         shown = shown_motion(rig)

@@ -109,10 +109,7 @@ def _late(task: Identification, log: Prepared) -> int:
 def shown_by(rig: Rig, log: Prepared, known: Mapping[str, Any]) -> Restart:
     """The channel that shows the state.
 
-    Raises
-    ------
-    InputError
-        None does: why.
+    Raises InputError: none does: why.
     """
     built = rig.built(rig.changes(known, 0, log.segments[0].phase))
     scenario = built.scenario

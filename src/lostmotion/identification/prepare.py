@@ -127,10 +127,7 @@ def channel_unit(written: str, of_file: str, unit: str, where: str) -> tuple[flo
     unit
         SI unit of what it is compared with; units of another kind are read as what they are, for a `scale` to turn them.
 
-    Raises
-    ------
-    InputError
-        The unit is not known.
+    Raises InputError: the unit is not known.
     """
     text = (written or of_file).strip()
     if text in ("", "-", "1", "bool"):
@@ -176,10 +173,7 @@ def prepared(
     origin
         What formulas may name of its file, ``file`` and ``folder``, unless its header has the same key.
 
-    Raises
-    ------
-    InputError
-        It lacks a channel, or nothing of it can be used.
+    Raises InputError: it lacks a channel, or nothing of it can be used.
     """
     measured = {name: m.channel for name, m in task.measured.items()}
     inputs = {name: i.channel for name, i in task.inputs.items()}

@@ -99,10 +99,7 @@ def read_log(path: str | Path, *, time: str = "", decimal: str = "") -> Log:
 def find_logs(patterns: Sequence[str], directory: Path) -> list[Path]:
     """Files by names or patterns (``*``, ``**``) relative to a directory; a directory stands for all logs in it.
 
-    Raises
-    ------
-    InputError
-        One of them names no file.
+    Raises InputError: one of them names no file.
     """
     found: list[Path] = []
     for pattern in patterns:

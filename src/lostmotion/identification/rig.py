@@ -182,10 +182,7 @@ class Rig:
         keys
             These alone; left out, all.
 
-        Raises
-        ------
-        InputError
-            A formula has no value.
+        Raises InputError: a formula has no value.
         """
         formulas = self.formulas(rung, phase)
         return {key: _value(formulas[key], values, key) for key in (formulas if keys is None else keys)}

@@ -221,10 +221,7 @@ def _types(text: str, name: str, *, idl: bool) -> dict[str, Any]:
     which it writes lines of code. They are also lists of messages without any byte, and shifts to numbers of any
     length.
 
-    Raises
-    ------
-    ValueError
-        The definition is too large; the library raises errors of its own where it cannot be read.
+    Raises ValueError: the definition is too large; the library raises errors of its own where it cannot be read.
     """
     from rosbags.typesys import get_types_from_idl, get_types_from_msg
 

@@ -72,10 +72,7 @@ def run_logs(
     extra
         Further variables of the rig that are shown.
 
-    Raises
-    ------
-    NoDerivativeError
-        One of the parameters has no exact derivative.
+    Raises NoDerivativeError: one of the parameters has no exact derivative.
     """
     by = dict(parameters or {})
     courses = [_Course(rig, log, values, rung, by, extra) for log, values in requests]

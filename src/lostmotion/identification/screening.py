@@ -45,10 +45,7 @@ def screened(log: Log, measured: Iterable[str], inputs: Iterable[str], stated: d
     stated
         Keys of the header, and the channels that ought to agree with them.
 
-    Raises
-    ------
-    InputError
-        Nothing is left that could be used; the message says why.
+    Raises InputError: nothing is left that could be used; the message says why.
     """
     measured, inputs = list(measured), list(inputs)
     for name in (*measured, *inputs):

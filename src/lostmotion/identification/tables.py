@@ -51,10 +51,7 @@ class Stamps:
     def seconds(self, cell: Any) -> float | None:
         """Time of a stamp [s]; None where the cell is no stamp.
 
-        Raises
-        ------
-        ValueError
-            Some stamps have a zone, and others have none.
+        Raises ValueError: some stamps have a zone, and others have none.
         """
         found = _nanoseconds(cell)
         if found is None:

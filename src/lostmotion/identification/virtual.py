@@ -44,10 +44,7 @@ def virtual_log(
     seed
         Of the noise.
 
-    Raises
-    ------
-    InputError
-        The values make no rig.
+    Raises InputError: the values make no rig.
     """
     task = rig.task
     known = {name: p.start for name, p in {**task.parameters, **task.nuisance}.items()} | dict(values)

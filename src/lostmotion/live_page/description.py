@@ -32,10 +32,7 @@ def describe(scenario: Scenario, name: str) -> dict[str, Any]:
     name
         By which downloads are called.
 
-    Raises
-    ------
-    InputError
-        A controller has a law of your own, which only Python can call.
+    Raises InputError: a controller has a law of your own, which only Python can call.
     """
     need_free_motion(scenario, "live page")
     numbers, values = described(scenario)

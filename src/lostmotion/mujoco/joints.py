@@ -15,10 +15,7 @@ if TYPE_CHECKING:
 def compiled(model: mujoco.MjSpec | mujoco.MjModel) -> mujoco.MjModel:
     """An own copy of a model, compiled.
 
-    Raises
-    ------
-    InputError
-        MuJoCo refuses the specification.
+    Raises InputError: MuJoCo refuses the specification.
     """
     import mujoco
 
@@ -33,10 +30,7 @@ def compiled(model: mujoco.MjSpec | mujoco.MjModel) -> mujoco.MjModel:
 def joint_id(model: mujoco.MjModel, name: str) -> int:
     """The number of a hinge.
 
-    Raises
-    ------
-    InputError
-        The model has no such joint, or it is no hinge.
+    Raises InputError: the model has no such joint, or it is no hinge.
     """
     import mujoco
 

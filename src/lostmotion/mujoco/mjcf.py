@@ -166,10 +166,7 @@ def from_mjcf(
 def _law(model: mujoco.MjModel, joint: str, k: int) -> _Law:
     """The law of an actuator on a hinge.
 
-    Raises
-    ------
-    InputError
-        It has another one, or an attribute that is not taken over.
+    Raises InputError: it has another one, or an attribute that is not taken over.
     """
     import mujoco
 

@@ -33,10 +33,7 @@ def without_weight(name: str, drive: Scenario, *, replace: bool, weighs: bool) -
     weighs
         Whether gravity acts in the robot.
 
-    Raises
-    ------
-    InputError
-        The drive has such, and it is not to be replaced.
+    Raises InputError: the drive has such, and it is not to be replaced.
     """
     weights = _weights(name, drive) if weighs else []
     keys = [*loads_of(drive), *(weights_of(name, drive) if weighs else [])]
@@ -98,10 +95,7 @@ def _turns_once(torque: PeriodicTorque) -> bool:
 def clear(model: mujoco.MjModel, name: str, drive: Scenario, *, replace: bool) -> None:
     """Remove MuJoCo's own description of the drive of a joint.
 
-    Raises
-    ------
-    InputError
-        There is such a thing, and it is not to be replaced or cannot be.
+    Raises InputError: there is such a thing, and it is not to be replaced or cannot be.
     """
     import mujoco
 

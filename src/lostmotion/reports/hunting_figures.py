@@ -22,10 +22,7 @@ def map_figure(found: xarray.Dataset) -> Figure:
     """Amplitude and frequency of a hunting map over its two keys; white where there is no limit cycle, hatched where it is
     unstable.
 
-    Raises
-    ------
-    InputError
-        The map has one key.
+    Raises InputError: the map has one key.
     """
     dims = found["amplitude"].dims
     if len(dims) != 2:

@@ -70,10 +70,7 @@ def list_records(
     every
         All of them, or as many as a screen shows.
 
-    Raises
-    ------
-    InputError
-        Unknown kind, or a range that is none.
+    Raises InputError: unknown kind, or a range that is none.
     """
     records = catalogue()
     kinds = [*KINDS, *sorted({r.kind for r in records})]
@@ -205,10 +202,7 @@ def _table_in_file(reference: str) -> str:
 def record_text(name: str) -> str:
     """One record: data with the status of their source, sources, gaps.
 
-    Raises
-    ------
-    InputError
-        There is no such record.
+    Raises InputError: there is no such record.
     """
     kinds = {r.name: table_of(r) for r in catalogue()}
     if not is_in_file(name) and name not in kinds:
@@ -259,10 +253,7 @@ def template(kind: str | None = None) -> str:
     kind
         A table of records, such as ``"motor"`` or ``"screw"``, or a kind within one, such as ``"worm"``.
 
-    Raises
-    ------
-    InputError
-        Unknown kind.
+    Raises InputError: unknown kind.
     """
     of_kind = {inner: table for table, sheet in KINDS.items() for inner in _kinds(sheet)}
     if kind is not None and kind not in (*KINDS, *of_kind):

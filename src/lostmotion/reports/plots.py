@@ -233,10 +233,7 @@ def overview(result: xarray.Dataset, figure: str | None = None) -> Figure:
     figure
         A part of it alone: motion, losses, contacts or energy.
 
-    Raises
-    ------
-    InputError
-        The dataset lacks what is shown.
+    Raises InputError: the dataset lacks what is shown.
     """
     charts = run_charts(result) if figure is None else figure_charts(result, figure)
     columns = min(2, len(charts))

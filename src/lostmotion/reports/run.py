@@ -201,10 +201,7 @@ def closes_to(result: xarray.Dataset | RunArrays) -> str:
 def run_report(name: str, result: xarray.Dataset) -> Report:
     """The page of a run.
 
-    Raises
-    ------
-    InputError
-        The dataset is no run.
+    Raises InputError: the dataset is no run.
     """
     from .page import Prose, Report
     from .panels import Flows, Group

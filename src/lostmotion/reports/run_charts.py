@@ -30,10 +30,7 @@ FIGURES = ("motion", "losses", "contacts", "energy")
 def run_charts(result: xarray.Dataset) -> list[Chart]:
     """Charts over time: of controlled axes reference, measured value and following error; then what moves, and the contacts.
 
-    Raises
-    ------
-    InputError
-        The dataset lacks what is shown.
+    Raises InputError: the dataset lacks what is shown.
     """
     if "scenario" not in result.attrs:
         raise InputError("this dataset is neither a run nor a frequency response; there is no figure of it")
@@ -49,10 +46,7 @@ def figure_charts(result: xarray.Dataset, figure: str) -> list[Chart]:
         ``"motion"``: references, errors, commands, speeds, torques, twists; ``"losses"``: torque over twist, and the way through the loss
         maps; ``"contacts"``: what is stuck when; ``"energy"``: where it comes from and where it goes.
 
-    Raises
-    ------
-    InputError
-        The figure is unknown, or the drive has nothing that it shows.
+    Raises InputError: the figure is unknown, or the drive has nothing that it shows.
     """
     if figure not in FIGURES:
         raise InputError(f"figure: {shown(figure)} is not known; take one of {', '.join(FIGURES)}")

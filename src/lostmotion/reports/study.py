@@ -77,10 +77,7 @@ def influence(table: pa.Table, study: Study) -> dict[str, dict[str, float]]:
 def sobol_indices(table: pa.Table, study: Study) -> dict[str, dict[str, tuple[float, float]]]:
     """(first order, total) of each parameter for each kept value; for the design saltelli only.
 
-    Raises
-    ------
-    InputError
-        Runs are missing or failed.
+    Raises InputError: runs are missing or failed.
     """
     from SALib.analyze import sobol
 
@@ -99,10 +96,7 @@ def sobol_indices(table: pa.Table, study: Study) -> dict[str, dict[str, tuple[fl
 def best_lines(directory: Path, text: str) -> list[str]:
     """The ten best runs as text, for ``COLUMN``, ``COLUMN:least`` or ``COLUMN:largest``.
 
-    Raises
-    ------
-    InputError
-        There is no such column, or direction.
+    Raises InputError: there is no such column, or direction.
     """
     table = read_table(directory)
     name, colon, direction = text.rpartition(":")
@@ -265,10 +259,7 @@ def study_report(directory: Path) -> tuple[Report, dict[str, str]]:
 def summary(directory: Path) -> tuple[list[str], Verdict | None]:
     """The lines to print of a study in a directory, and its verdict if it selects.
 
-    Raises
-    ------
-    InputError
-        A library that studies need is not installed, or the directory holds no study.
+    Raises InputError: a library that studies need is not installed, or the directory holds no study.
     """
     need("pyarrow", "Showing a study", "study")
     study, table = study_of(directory), read_table(directory)
@@ -290,10 +281,7 @@ def write_study(directory: Path, target: Path, pictures: Sequence[str] = ()) -> 
     Path
         Of the page.
 
-    Raises
-    ------
-    InputError
-        The target is the directory of the study, all files of which readers of Parquet try to read.
+    Raises InputError: the target is the directory of the study, all files of which readers of Parquet try to read.
     """
     need("scipy", "The page of a study", "study")
     if target.resolve().is_relative_to(directory.resolve()):

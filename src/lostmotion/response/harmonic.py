@@ -304,10 +304,7 @@ def _of_each_point(r: dict[str, Any], found: np.ndarray) -> tuple[dict[str, np.n
 def of_output(response: xarray.Dataset, output: str | None = None) -> xarray.DataArray:
     """The response of one output over amplitude and frequency; default: the load's speed.
 
-    Raises
-    ------
-    InputError
-        The dataset is no frequency response, or has no such output.
+    Raises InputError: the dataset is no frequency response, or has no such output.
     """
     if "response" not in response:
         raise InputError("this dataset is no frequency response; lm.frequency_response makes one")

@@ -68,10 +68,7 @@ class Plant:
     def with_means(self, command: float | None, load_torque: float | None) -> Plant:
         """The same with another constant part of the one command and the one load torque.
 
-        Raises
-        ------
-        InputError
-            There is none, or there are several.
+        Raises InputError: there is none, or there are several.
         """
         wanted = {}
         for word, mean in (("command", command), ("load_torque", load_torque)):

@@ -109,10 +109,7 @@ def rigid_constants(
 def _at_motor(scenario: Scenario) -> tuple[ShaftMotor, float, float]:
     """The one motor, inertia [kg·m²] and viscous friction [N·m·s/rad] at its shaft, all gears rigid.
 
-    Raises
-    ------
-    InputError
-        They are not constant.
+    Raises InputError: they are not constant.
     """
     need_free_motion(scenario, "rigid_constants")
     train = scenario.train()
@@ -144,10 +141,7 @@ def _at_motor(scenario: Scenario) -> tuple[ShaftMotor, float, float]:
 def _efficiency(key: str, gear: Gear) -> float:
     """Efficiency of a gear that drives.
 
-    Raises
-    ------
-    InputError
-        It is not constant, or its housing turns.
+    Raises InputError: it is not constant, or its housing turns.
     """
     if gear.housing is not None:
         raise InputError("turns, and the closed form is for gears whose housing stands", f"{key}.housing")

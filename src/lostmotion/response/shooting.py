@@ -82,10 +82,7 @@ def respond(
 def _period(signals: Iterable[Signal[Any]]) -> float:
     """The common period [s] of signals that are sums of sines and constants.
 
-    Raises
-    ------
-    InputError
-        They have none.
+    Raises InputError: they have none.
     """
     frequencies = []
     for s in signals:

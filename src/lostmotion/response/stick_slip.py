@@ -120,10 +120,7 @@ def only_contact(
 ) -> tuple[str, float]:
     """Shaft of the only dry contact, and the torque that it holds.
 
-    Raises
-    ------
-    UndecidableError
-        There is none, or there are several.
+    Raises UndecidableError: there is none, or there are several.
     """
     zeros = [core_signal([(0.0, 0.0, 0.0)]) for _ in core.input_names()]
     case = _core.Case(core, inputs=zeros, start=start, hysteresis_capacities=capacities)

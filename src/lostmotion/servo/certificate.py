@@ -199,10 +199,7 @@ def certified(axis: Axis, rests: Callable[[], bool], largest_error: float | None
     rests
         Whether the run of the scenario comes to rest.
 
-    Raises
-    ------
-    InputError
-        An input never comes to rest.
+    Raises InputError: an input never comes to rest.
     """
     train, kind = axis.scenario, axis.controller.reference.kind
     if kind != "position":

@@ -94,10 +94,7 @@ def secant(gear: Gear | Gearbox) -> float:
 def two_inertias(axis: Axis) -> TwoInertias:
     """Motor, load, and the main gear between them, with its secant stiffness up to rated torque.
 
-    Raises
-    ------
-    InputError
-        All gears are rigid.
+    Raises InputError: all gears are rigid.
     """
     main = axis.main_gear()
     if main is None:

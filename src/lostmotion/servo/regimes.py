@@ -120,10 +120,7 @@ def axis_of(scenario: Scenario, motor: str | None = None) -> Axis:
     motor
         Whose controller is looked at; may be left out where there is one.
 
-    Raises
-    ------
-    InputError
-        There is no controller, there are several, or its loops are a function (law = true).
+    Raises InputError: there is no controller, there are several, or its loops are a function (law = true).
     """
     need_free_motion(scenario, "servo")
     names = list(scenario.axes())

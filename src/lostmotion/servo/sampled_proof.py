@@ -57,10 +57,7 @@ def end_of_slip(
 ) -> tuple[float, float]:
     """Least and largest error after a forward slip from errors that are read as between two; with steps, as they are read then.
 
-    Raises
-    ------
-    UndecidableError
-        The bounds do not hold.
+    Raises UndecidableError: the bounds do not hold.
     """
     reading = (-high * of.ratio, -low * of.ratio)
     least, most = math.inf, -math.inf

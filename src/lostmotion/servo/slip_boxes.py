@@ -138,10 +138,7 @@ class Flow:
     def follow(self, boxes: Boxes, phase: int) -> Settled:
         """From states after the sample at a tick of the frame.
 
-        Raises
-        ------
-        UndecidableError
-            The boxes become too many, or a limit of the controller may act.
+        Raises UndecidableError: the boxes become too many, or a limit of the controller may act.
         """
         work = [(boxes, phase)]
         for _ in range(GENERATIONS):

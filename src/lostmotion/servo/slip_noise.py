@@ -53,10 +53,7 @@ def loudest(of: SampledSlip) -> float:
 def finish(of: SampledSlip, boxes: Boxes, tick: int) -> tuple[np.ndarray, np.ndarray]:
     """Least and largest angles at which fast forward slips end, from states after the sample at a tick of the frame.
 
-    Raises
-    ------
-    UndecidableError
-        A limit of the controller may act, or the contact may break away again before all has settled.
+    Raises UndecidableError: a limit of the controller may act, or the contact may break away again before all has settled.
     """
     n, count = len(of.held), len(boxes)
     noise, low, high = Noise(of), np.full(count, np.inf), np.full(count, -np.inf)

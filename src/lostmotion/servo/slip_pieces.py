@@ -54,10 +54,7 @@ class Slips:
             Whether the rest of a slip is bounded as in `finish`, once all speeds exceed what readings can take from them. It is quicker
             than to follow all readings to the end, and finds more errors.
 
-        Raises
-        ------
-        UndecidableError
-            The pieces become too many, or a limit of the controller may act.
+        Raises UndecidableError: the pieces become too many, or a limit of the controller may act.
         """
         if (count, bounded) not in self._left:
             fast = self._loudest if bounded else math.inf

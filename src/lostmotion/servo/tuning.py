@@ -402,10 +402,7 @@ def _loops(axis: Axis, regime: Regime, loop: str) -> tuple[SampledLoop, SampledL
 def _lowest_bandwidth(axis: Axis, loop: str) -> float:
     """The lower of that at -3 dB and at -90 degrees, the lowest of all regimes [Hz].
 
-    Raises
-    ------
-    InputError
-        The loop is unstable in a regime.
+    Raises InputError: the loop is unstable in a regime.
     """
     found = []
     for regime in regimes(axis):

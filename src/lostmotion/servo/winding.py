@@ -78,10 +78,7 @@ class OrientedWinding:
         c, law
             Its controller, and what the solver makes of that.
 
-        Raises
-        ------
-        InputError
-            The inverter has not the voltage for it.
+        Raises InputError: the inverter has not the voltage for it.
         """
         loop = c.current
         assert isinstance(loop, FieldOriented)

@@ -124,10 +124,7 @@ def duty_cycle(
     speed, motor_torque, output_torque
         Variables of the result: the input shaft, what turns it, what leaves at the output.
 
-    Raises
-    ------
-    InputError
-        The motion does not fit into the period, or is not at its end where a pause would begin.
+    Raises InputError: the motion does not fit into the period, or is not at its end where a pause would begin.
     """
     time, torque = np.asarray(result["time"]), np.asarray(result[motor_torque])
     fast = np.abs(np.asarray(result[speed]))

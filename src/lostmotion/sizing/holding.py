@@ -57,10 +57,7 @@ def holding(scenario: Scenario, load: float, speed: float, shaft: str = "load") 
     shaft
         The shaft or slide that the load acts on.
 
-    Raises
-    ------
-    SolverError
-        As `simulate`.
+    Raises SolverError: as `simulate`.
     """
     train, tables = scenario.train(), scenario.tables
     ratios = {name: turns(train, name, shaft) or 0.0 for name in train.shafts}

@@ -63,10 +63,7 @@ STAGES: dict[str, type[RatedScrew] | type[RackStage] | type[BeltStage]] = {
 def stage_of(kind: str, table: Mapping[str, Any]) -> Stage:
     """The stage of a table `[screw]`, `[rack]` or `[belt]`, with or without the name of a record in `from`.
 
-    Raises
-    ------
-    InputError
-        The record lacks what a run needs, or a value cannot be used.
+    Raises InputError: the record lacks what a run needs, or a value cannot be used.
     """
     part = STAGES[kind]
     name = table.get("from")

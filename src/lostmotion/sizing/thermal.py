@@ -196,10 +196,7 @@ def _divided(l_1: np.ndarray, l_2: np.ndarray, h: np.ndarray) -> np.ndarray:
 def need_two_bodies(motor: Motor, ambient: float, alpha: float, where: str) -> TwoBodies:
     """Bodies as `TwoBodies.of` returns them; an error if data are missing.
 
-    Raises
-    ------
-    InputError
-        With the keys that lack.
+    Raises InputError: with the keys that lack.
     """
     bodies = TwoBodies.of(motor, ambient, alpha)
     if bodies is None:

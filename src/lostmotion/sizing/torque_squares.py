@@ -65,10 +65,7 @@ class Squares:
 def squares_of(scenario: Scenario, motor: str, time: np.ndarray) -> Squares:
     """The torque of a motor of a scenario between instants [s].
 
-    Raises
-    ------
-    SolverError
-        As `simulate`.
+    Raises SolverError: as `simulate`.
     """
     parts = parts_of(scenario)
     part = next(p for p in parts if motor in p.train().motors)
@@ -122,10 +119,7 @@ def squares(
 def over_pieces(at: Callable[[np.ndarray], np.ndarray], time: np.ndarray, edges: np.ndarray) -> Squares:
     """A function of time [s] over the intervals between instants, which are among the edges of pieces.
 
-    Raises
-    ------
-    InputError
-        The pieces do not fit into the memory.
+    Raises InputError: the pieces do not fit into the memory.
     """
     pieces = np.column_stack([edges[:-1], edges[1:]])
     done: list[tuple[np.ndarray, ...]] = []

@@ -52,10 +52,7 @@ def whole_drive(kind: str, name: str, beside: Mapping[str, Any], guide_friction:
     guide_friction
         Friction coefficient of the guide of a slide, on which the attraction of a linear motor acts.
 
-    Raises
-    ------
-    InputError
-        The record lacks what a run needs.
+    Raises InputError: the record lacks what a run needs.
     """
     if kind == "actuator":
         return actuator(name, **beside)

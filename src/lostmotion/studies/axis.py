@@ -181,10 +181,7 @@ class AxisTask(Task, Duty):
     def fed(self, motor: Motor, brake: HoldingBrake | None) -> Motor:
         """A motor with the inertia of its brake, at the least voltage of the supply and the peak current of the amplifier.
 
-        Raises
-        ------
-        InputError
-            The motor has a voltage that contradicts it.
+        Raises InputError: the motor has a voltage that contradicts it.
         """
         changes: dict[str, Any] = {}
         if brake is not None and brake.inertia > 0.0:
@@ -218,10 +215,7 @@ class AxisTask(Task, Duty):
     def check(self, scenario: Scenario) -> None:
         """Sees that the motion of a scenario can be repeated, and that it has what the task asks for.
 
-        Raises
-        ------
-        InputError
-            It cannot, or has not.
+        Raises InputError: it cannot, or has not.
         """
         reference = reference_of(scenario)
         assert scenario.controller is not None
@@ -258,10 +252,7 @@ def _up_to(motor: Motor, current: float) -> Motor:
 def reference_of(scenario: Scenario) -> PositionReference:
     """The positions that the axis follows.
 
-    Raises
-    ------
-    ValueError
-        It follows something else.
+    Raises ValueError: it follows something else.
     """
     reference = None if scenario.controller is None else scenario.controller.reference
     if not isinstance(reference, PositionReference):
@@ -301,10 +292,7 @@ def _tiled(samples: Any, cycle: float, count: int, step: float, key: str) -> dic
 def repeated(reference: PositionReference, cycle: float, count: int) -> PositionReference:
     """The reference of so many cycles; one that ends elsewhere than it began goes on from there.
 
-    Raises
-    ------
-    InputError
-        It cannot be repeated, or does not fit into the cycle.
+    Raises InputError: it cannot be repeated, or does not fit into the cycle.
     """
     key = "controller.reference"
     _periodic(reference, cycle, key)
@@ -334,10 +322,7 @@ def repeated(reference: PositionReference, cycle: float, count: int) -> Position
 def repeated_torque(torque: TorqueSignal, cycle: float, count: int) -> TorqueSignal:
     """The load torque of so many cycles.
 
-    Raises
-    ------
-    InputError
-        It cannot be repeated, or does not fit into the cycle.
+    Raises InputError: it cannot be repeated, or does not fit into the cycle.
     """
     _periodic(torque, cycle, "load.torque")
     if torque.samples is None:

@@ -106,10 +106,7 @@ class Axes:
     def stage(self, row: np.ndarray) -> tuple[Stage, RequiredMotion, list[Finding]] | None:
         """The last stage of a linear axis, the motion of its shaft and what its rules say; None of a rotary load.
 
-        Raises
-        ------
-        InputError
-            Its record lacks data.
+        Raises InputError: its record lacks data.
         """
         if self.task.linear is None or self.study.slides_itself(row):
             return None
@@ -362,10 +359,7 @@ class Axes:
     def measured(self, row: np.ndarray) -> tuple[Row, int]:
         """The columns of a pair that is run, and its switchings.
 
-        Raises
-        ------
-        InputError, SolverError
-            It cannot be run.
+        Raises InputError, SolverError: it cannot be run.
         """
         made = until_it_repeats(self.study, row)
         columns = row_of(made, slides=self.study.slides_itself(row))

@@ -43,10 +43,7 @@ def _duty_torque(
 def axis_scenario(base: Scenario, motor: Motor, gearbox: Gearbox, task: AxisTask, count: int) -> Scenario:
     """The base with a motor, a gearbox and gains by rule for them, over so many cycles, from rest where the reference begins.
 
-    Raises
-    ------
-    InputError
-        The parts do not fit together.
+    Raises InputError: the parts do not fit together.
     """
     around = cycles_of(base, task, count)
     changes: dict[str, Any] = {"motor": motor, "gearbox": gearbox, "initial": around.initial}

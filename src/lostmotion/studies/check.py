@@ -29,10 +29,7 @@ TASK_COLUMNS: dict[str, float | str] = {f"{USE}{rule}": math.nan for rule in TAS
 def check_columns(scenario: Scenario) -> dict[str, float | str]:
     """The columns of one run.
 
-    Raises
-    ------
-    InputError, SolverError
-        As `check_drive`.
+    Raises InputError, SolverError: as `check_drive`.
     """
     return columns_of(check_drive(scenario))
 

@@ -133,10 +133,7 @@ def _rising(progress: Callable[[int], None]) -> Callable[[int], None]:
 def damages_of(directory: Path, what: Study) -> dict[Path, str]:
     """Damaged parts of the directory of a study, each with the reason.
 
-    Raises
-    ------
-    InputError
-        The note is what is wrong: it is of another study than all parts, which repairing would remove.
+    Raises InputError: the note is what is wrong: it is of another study than all parts, which repairing would remove.
     """
     text = to_json(what)
     damaged = damages(directory, text, what.total)
@@ -152,10 +149,7 @@ def damages_of(directory: Path, what: Study) -> dict[Path, str]:
 def refuse_damaged(directory: Path, damaged: Mapping[Path, str]) -> None:
     """Refuse a directory with damaged parts.
 
-    Raises
-    ------
-    InputError
-        It names the first of them.
+    Raises InputError: it names the first of them.
     """
     for path, reason in damaged.items():
         if reason in NO_REPAIR:
@@ -263,10 +257,7 @@ def _together(text: str, tables: list[Future[Any]]) -> bytes:
 def study_of(directory: str | Path) -> Study:
     """The study that a directory holds.
 
-    Raises
-    ------
-    InputError
-        It holds none.
+    Raises InputError: it holds none.
     """
     note = Path(directory) / NOTE
     if not note.is_file():
@@ -284,10 +275,7 @@ def study_of(directory: str | Path) -> Study:
 def restore_note(directory: Path) -> None:
     """Write the study that a part carries into the directory, if its own note is missing, damaged or of another study.
 
-    Raises
-    ------
-    InputError
-        No part can be read.
+    Raises InputError: no part can be read.
     """
     need("pyarrow", "A study", "study")
     try:

@@ -80,10 +80,7 @@ def slowed(study: Study, factor: float) -> Study:
 
     Its loads over time are stretched; torques of a process and of the load keep their values.
 
-    Raises
-    ------
-    InputError
-        The motion has parts that cannot be stretched, such as a target in space.
+    Raises InputError: the motion has parts that cannot be stretched, such as a target in space.
     """
     task, base = study.axis, study.scenario
     assert task is not None

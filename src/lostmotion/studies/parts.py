@@ -32,10 +32,7 @@ def part_of(directory: Path, first: int) -> Path:
 def write_part(directory: Path, first: int, content: bytes) -> None:
     """Write a part whole or not at all. Its checksum comes first: a part without one would be made again.
 
-    Raises
-    ------
-    InputError
-        The part cannot be written.
+    Raises InputError: the part cannot be written.
     """
     part = part_of(directory, first)
     try:
@@ -49,10 +46,7 @@ def write_part(directory: Path, first: int, content: bytes) -> None:
 def checksums(directory: Path) -> dict[str, str]:
     """Checksums of parts by their names; lines that a kill or damage left unreadable are passed over.
 
-    Raises
-    ------
-    InputError
-        There is something else in place of their file.
+    Raises InputError: there is something else in place of their file.
     """
     path = directory / CHECKSUMS
     if not os.path.lexists(path):

@@ -39,10 +39,7 @@ class Bound(Part):
     def in_unit(self, unit: str) -> tuple[float, float]:
         """(minimum, maximum) permissible value in the unit of a column, ``"1"`` of a plain number; empty: not known, any is taken in SI.
 
-        Raises
-        ------
-        ValueError
-            A value has the unit of something else.
+        Raises ValueError: a value has the unit of something else.
         """
         low, high = (in_si(value, {"1": "", "": None}.get(unit, unit)) for value in (self.min, self.max))
         return (-float("inf") if low is None else float(low), float("inf") if high is None else float(high))

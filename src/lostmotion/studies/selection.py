@@ -75,10 +75,7 @@ def candidates(table: pa.Table, study: Study) -> list[Candidate]:
     """Rank the runs of a study that selects. Runs that fit come first, then those that violate one limit, two, ...,
     each from the best to the worst. Runs that failed come last.
 
-    Raises
-    ------
-    ValueError
-        The study has no table `[select]`.
+    Raises ValueError: the study has no table `[select]`.
     """
     select = study.select
     if select is None:

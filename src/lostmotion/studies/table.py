@@ -15,10 +15,7 @@ if TYPE_CHECKING:
 def read_table(directory: Path) -> pa.Table:
     """All rows that are there, in the order of the runs.
 
-    Raises
-    ------
-    InputError
-        There are none, or a part is damaged.
+    Raises InputError: there are none, or a part is damaged.
     """
     import pyarrow.dataset as ds
 

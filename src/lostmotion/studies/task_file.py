@@ -191,10 +191,7 @@ def _with_parts(written: dict[str, Any], vary: list[Any], *, linear: bool) -> No
 def _with_candidates(tables: dict[str, Any]) -> dict[str, Any]:
     """The tables with `[candidates]` written as `[[vary]]`.
 
-    Raises
-    ------
-    InputError
-        A key is none of a part, or varies twice.
+    Raises InputError: a key is none of a part, or varies twice.
     """
     if "candidates" not in tables:
         return tables
@@ -255,10 +252,7 @@ def _names(entry: dict[str, Any]) -> list[str]:
 def linear_axis(tables: dict[str, Any]) -> dict[str, Any] | None:
     """Last stage and slope of a linear task, or None for a rotary one.
 
-    Raises
-    ------
-    InputError
-        A table is missing, or does not fit the others.
+    Raises InputError: a table is missing, or does not fit the others.
     """
     given, direct = ([kind for kind in kinds if kind in tables or _varied(tables, kind)] for kinds in (STAGES, LINEAR))
     if "slide" not in tables and not given and not direct:
@@ -299,10 +293,7 @@ def in_translation(tables: dict[str, Any]) -> dict[str, Any]:
 
     The equations of a slide behind a screw are those of a load behind a gear of the ratio 2 pi/lead.
 
-    Raises
-    ------
-    InputError
-        A value has the unit of something else.
+    Raises InputError: a value has the unit of something else.
     """
     slide = tables["slide"]
     for key in slide:
@@ -384,10 +375,7 @@ def _controller(given: dict[str, Any]) -> dict[str, Any]:
 def _apart(controller: dict[str, Any]) -> tuple[AnyCurrent | None, dict[str, Any]]:
     """The current loop of a controller, and the controller with an ideal one, which every motor of the task can have.
 
-    Raises
-    ------
-    InputError
-        The loop has a value that cannot be used.
+    Raises InputError: the loop has a value that cannot be used.
     """
     if not isinstance(controller["current"], dict):
         return None, controller  # which the scenario refuses
@@ -425,10 +413,7 @@ def _entry_of(tables: dict[str, Any], kind: str) -> dict[str, Any]:
 def _beside_whole(tables: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """Values beside the records of whole drives.
 
-    Raises
-    ------
-    InputError
-        One is none of such a drive.
+    Raises InputError: one is none of such a drive.
     """
     given = {kind: _table(tables, kind) for kind in WHOLE if kind in tables}
     for kind, table in given.items():
@@ -452,10 +437,7 @@ def _has_pairs(tables: dict[str, Any], vary: list[Any]) -> bool:
 def _need_scale(controller: dict[str, Any], vary: list[Any]) -> None:
     """Sees that a task with linear motors has the scale by which they are controlled.
 
-    Raises
-    ------
-    InputError
-        It has none.
+    Raises InputError: it has none.
     """
     if controller.get("position_encoder") is None and _varied({"vary": vary}, "linear_motor"):
         raise InputError(

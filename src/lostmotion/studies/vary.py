@@ -182,10 +182,7 @@ def _with_names(data: Mapping[str, Any], table: str) -> dict[str, Any]:
 def base_value(scenario: Scenario, key: str) -> Any:
     """Value of a scenario at a dotted key.
 
-    Raises
-    ------
-    ValueError
-        There is nothing of that name.
+    Raises ValueError: there is nothing of that name.
     """
     node: Any = scenario.written
     for part in key.split("."):
@@ -240,10 +237,7 @@ def with_keys_of_tables(scenario: Scenario, entries: Any, of_task: bool) -> Any:
 def check_spelling(scenario: Scenario, entries: Any) -> None:
     """Sees, before the units of their values are asked for, that the keys of a study are known.
 
-    Raises
-    ------
-    ValueError
-        One is not; the message says what may have been meant.
+    Raises ValueError: one is not; the message says what may have been meant.
     """
     for entry in entries if isinstance(entries, list | tuple) else ():
         for key in [entry.get("key"), *(entry.get("keys") or ())] if isinstance(entry, dict) else ():
@@ -260,10 +254,7 @@ def check_spelling(scenario: Scenario, entries: Any) -> None:
 def check_key(scenario: Scenario, key: str, *, relative: bool) -> None:
     """Sees that a number, or with `relative` a factor, can take the place of what a scenario has under a key.
 
-    Raises
-    ------
-    ValueError
-        It cannot; the message says what to vary instead.
+    Raises ValueError: it cannot; the message says what to vary instead.
     """
     if is_condition(key):
         if relative:

@@ -85,10 +85,7 @@ def si_value(text: str, unit: str) -> float:
 def si_factor(unit: str) -> float:
     """One of a unit in SI, angles in rad: ``"deg"`` is 0.01745, ``"rpm"`` 0.1047; 1 without a unit.
 
-    Raises
-    ------
-    ValueError
-        The unit is not known.
+    Raises ValueError: the unit is not known.
     """
     if unit.strip() in ("", "-", "1"):
         return 1.0
@@ -311,10 +308,7 @@ class Unit:
     def read(self, value: Any) -> Any:
         """The value in SI.
 
-        Raises
-        ------
-        ValueError
-            It is not a number, or a string that is not one with a fitting unit.
+        Raises ValueError: it is not a number, or a string that is not one with a fitting unit.
         """
         if type(value) is float:  # nearly always, and large tables are read often
             return value
