@@ -12,10 +12,7 @@ from unicodedata import category
 def visible(text: str, kept: str = "") -> str:
     """A text with escapes in place of what a terminal would obey or not show.
 
-    Parameters
-    ----------
-    kept
-        Characters that stay, such as the end of a line.
+    kept: characters that stay, such as the end of a line.
     """
     if text.isprintable():
         return text
@@ -134,14 +131,9 @@ class MissingLibraryError(ImportError):
 def need(module: str, purpose: str, extra: str) -> None:
     """Check that a library is there which only some functions need.
 
-    Parameters
-    ----------
-    module
-        What will be imported, such as ``"pyarrow"``.
-    purpose
-        What needs it, as the beginning of a sentence.
-    extra
-        The extra of this package that brings it.
+    module: what will be imported, such as ``"pyarrow"``.
+    purpose: what needs it, as the beginning of a sentence.
+    extra: the extra of this package that brings it.
 
     Raises MissingLibraryError: it is not installed.
     """

@@ -171,12 +171,8 @@ def cubic_spline(times: Iterable[float], values: np.ndarray) -> np.ndarray:
     ``h[k] s[k-1] + 2 (h[k-1] + h[k]) s[k] + h[k-1] s[k+1] = 3 (h[k] d[k-1] + h[k-1] d[k])`` at the inner points. Elimination
     needs no exchange of rows, since every pivot is positive. Three points give a parabola, two a straight line.
 
-    Parameters
-    ----------
-    times
-        Rising instants [s], two at least.
-    values
-        (n,) or (n, channels).
+    times: rising instants [s], two at least.
+    values: (n,) or (n, channels).
 
     Returns
     -------
@@ -228,10 +224,7 @@ def fourier_sum(real: np.ndarray, imaginary: np.ndarray) -> tuple[np.ndarray, np
 
     Mixed-radix algorithm (Cooley and Tukey 1965); its cost grows with the sum of the prime factors of n.
 
-    Parameters
-    ----------
-    real, imaginary
-        (..., n).
+    real, imaginary: (..., n).
 
     Returns
     -------

@@ -213,10 +213,7 @@ class _Place:
 def core_control(train: DriveTrain, controllers: Mapping[str, Controller], laws: Mapping[str, Law] = NO_LAWS) -> Bound:
     """The controllers of the motors of a train.
 
-    Parameters
-    ----------
-    laws
-        Of controllers with ``law = true``.
+    laws: of controllers with ``law = true``.
 
     Raises InputError: one of them does not fit its motor or its shafts, or their sample times do not nest.
     """
@@ -274,12 +271,8 @@ def motor_laws(controllers: Mapping[str, Controller | ContinuousController]) -> 
 def check_torques(controllers: Mapping[str, Controller], torques: Mapping[str, float], key: str) -> None:
     """Refuses torques at t = 0 of motors whose current loop leaves the torque no state.
 
-    Parameters
-    ----------
-    torques
-        By the names of the motors [N·m].
-    key
-        Of the torque of a motor, for messages.
+    torques: by the names of the motors [N·m].
+    key: of the torque of a motor, for messages.
     """
     for name, controller in controllers.items():
         kind = controller.current.kind

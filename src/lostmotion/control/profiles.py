@@ -46,12 +46,8 @@ def segment_durations(
 def segments(distance: float, speed: float, acceleration: float, jerk: float = math.inf) -> list[Segment]:
     """The segments of a move, and rest after them. A segment that it does not have begins when the next one does.
 
-    Parameters
-    ----------
-    distance
-        With its sign [rad].
-    speed, acceleration, jerk
-        Limits, above 0 [rad/s, rad/s^2, rad/s^3]. Without a limit of the jerk the speed is trapezoidal.
+    distance: with its sign [rad].
+    speed, acceleration, jerk: limits, above 0 [rad/s, rad/s^2, rad/s^3]. Without a limit of the jerk the speed is trapezoidal.
     """
     t, c, s, A = segment_durations(distance, speed, acceleration, jerk)
     j = 0.0 if math.isinf(jerk) else jerk

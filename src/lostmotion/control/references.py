@@ -101,10 +101,7 @@ class Reference(TimeFunction[V], Generic[V]):
     def at(self, time: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Value, and its first, second and third derivative over time; where they jump, the value after the jump.
 
-        Parameters
-        ----------
-        time
-            One instant or an array of them [s], from 0 on.
+        time: one instant or an array of them [s], from 0 on.
 
         Raises InputError: a time is negative or no number.
         """

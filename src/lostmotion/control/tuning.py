@@ -45,14 +45,9 @@ class TwoInertias:
 def symmetrical_optimum(inertia: float, lag: float, a: float = 2.0) -> SpeedGains:
     """K_p = J/(a T), T_i = a^2 T, with a filter of the reference of a^2 T.
 
-    Parameters
-    ----------
-    inertia
-        J of all that turns, at the motor [kg·m²].
-    lag
-        T, sum of the lags in the loop [s].
-    a
-        Crossover 1/(a T); 2 is the usual choice, more is better damped.
+    inertia: J of all that turns, at the motor [kg·m²].
+    lag: T, sum of the lags in the loop [s].
+    a: crossover 1/(a T); 2 is the usual choice, more is better damped.
 
     Raises InputError: a is not above 1.
     """
@@ -133,14 +128,9 @@ def suited(drive: TwoInertias, lag: float, position_time: float) -> CascadeGains
     almost rigid, so that equal damping takes more gain than the sampling allows. The position loop gets half of the
     reciprocal of the speed loop's equivalent time.
 
-    Parameters
-    ----------
-    drive
-        Of infinite stiffness where it is rigid.
-    lag
-        Sum of the lags in the speed loop [s].
-    position_time
-        Sample time of the position loop [s].
+    drive: of infinite stiffness where it is rigid.
+    lag: sum of the lags in the speed loop [s].
+    position_time: sample time of the position loop [s].
     """
     optimum = symmetrical_optimum(drive.motor_inertia + drive.load_inertia, lag)
     if math.isfinite(drive.stiffness) and drive.inertia_ratio >= 4.0 * ALIKE * ALIKE:

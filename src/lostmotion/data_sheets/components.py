@@ -357,14 +357,9 @@ def as_torque_source(table: Mapping[str, Any]) -> dict[str, Any]:
 def at_voltage(table: Mapping[str, Any], voltage: Any, given: Collection[str], where: str = "motor") -> dict[str, Any]:
     """Values of `[motor]` with another rated voltage, as `Motor.at_voltage`.
 
-    Parameters
-    ----------
-    table
-        As a scenario has it. One that is no whole DC motor with a rated voltage only gets the new one.
-    voltage
-        [V], or text with a unit.
-    given
-        Keys that are changed too: where these say all that would follow, nothing does.
+    table: as a scenario has it. One that is no whole DC motor with a rated voltage only gets the new one.
+    voltage: [V], or text with a unit.
+    given: keys that are changed too: where these say all that would follow, nothing does.
 
     Raises InputError: at this voltage the motor does not reach its rated torque.
     """

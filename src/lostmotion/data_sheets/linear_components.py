@@ -26,10 +26,7 @@ class ScrewConditions(Part):
 def linear_table(kind: str, reference: str, changes: Mapping[str, Any], where: str) -> dict[str, Any]:
     """Values of the table `where` for a record with `changes`, each of which takes the place of what says the same.
 
-    Parameters
-    ----------
-    kind
-        ``"screw"``, ``"rack"``, ``"belt"`` or ``"linear_motor"``.
+    kind: ``"screw"``, ``"rack"``, ``"belt"`` or ``"linear_motor"``.
 
     Raises InputError: the record lacks what a run needs and `changes` do not give it; the message says where to read it.
     """

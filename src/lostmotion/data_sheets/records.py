@@ -191,10 +191,7 @@ def _in_file(reference: str, table: str) -> Sheet:
 def find(reference: str, table: str) -> Sheet:
     """The record of a name, or one of that kind in a file: the only one (``sheets.toml``), or that of a name (``sheets.toml#name``).
 
-    Parameters
-    ----------
-    table
-        A key of `KINDS`, such as ``"gearbox"``.
+    table: a key of `KINDS`, such as ``"gearbox"``.
 
     Raises InputError: there is none.
     """

@@ -54,12 +54,8 @@ def course_of_input(
 class Acting:
     """The inputs of a log from one instant to another.
 
-    Parameters
-    ----------
-    known
-        What formulas may name, by which is settled how many samples act.
-    begin, end
-        [s]
+    known: what formulas may name, by which is settled how many samples act.
+    begin, end: [s]
     """
 
     def __init__(self, task: Identification, log: Prepared, known: Mapping[str, Any], begin: float, end: float) -> None:

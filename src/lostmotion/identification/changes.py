@@ -172,10 +172,7 @@ def _present(
 def _at_end(rows: _Rows, first: int, d: np.ndarray) -> tuple[float, float]:
     """(value at the end at the mean conditions, its deviation in those of the series) if a change has the course d.
 
-    Parameters
-    ----------
-    first
-        First value behind the baseline that is used; the baseline gives the effect of the conditions.
+    first: first value behind the baseline that is used; the baseline gives the effect of the conditions.
     """
     n = len(d)
     used = (np.arange(n) >= first) | (d == 0.0)

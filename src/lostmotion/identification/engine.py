@@ -32,12 +32,8 @@ class Point:
 class Engine:
     """Residuals of logs against runs of the rig, and their Jacobians.
 
-    Parameters
-    ----------
-    rig
-        What is measured.
-    threads
-        Runs at the same time; left out, as many as there are processors.
+    rig: what is measured.
+    threads: runs at the same time; left out, as many as there are processors.
     """
 
     def __init__(self, rig: Rig, threads: int | None = None) -> None:

@@ -197,10 +197,7 @@ def search(
 ) -> Fit:
     """Levenberg-Marquardt from a point.
 
-    Parameters
-    ----------
-    notify
-        Is told the iteration and the cost.
+    notify: is told the iteration and the cost.
 
     Raises InputError: the rig has no motion at the start, or no log can be run.
     """

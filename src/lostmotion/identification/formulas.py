@@ -34,12 +34,8 @@ class Formula:
 
     Nothing of it is ever run as Python.
 
-    Parameters
-    ----------
-    text
-        As written; a number is a constant.
-    functions
-        Functions that it may call; a NumPy ufunc takes its number of arguments.
+    text: as written; a number is a constant.
+    functions: functions that it may call; a NumPy ufunc takes its number of arguments.
 
     Raises
     ------

@@ -84,10 +84,7 @@ def distinct_names(paths: list[Path]) -> list[str]:
 def _unlike(rig: Rig, log: Prepared, known: frozenset[str]) -> str:
     """Why the rig cannot be made with the header of a log; empty if it can.
 
-    Parameters
-    ----------
-    known
-        What the headers of all logs have.
+    known: what the headers of all logs have.
     """
     own = {name: p.start for name, p in rig.task.nuisance.items()}
     values: dict[str, Any] = {**log.facts, **start_point(rig.task, []).values, **own}

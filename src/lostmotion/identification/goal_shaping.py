@@ -18,20 +18,12 @@ def shaped(
 ) -> tuple[np.ndarray, np.ndarray, int]:
     """Course of a goal that is filtered, then limited in its rate and its acceleration.
 
-    Parameters
-    ----------
-    time
-        Instants of the samples [s].
-    goal
-        Values there.
-    held
-        Whether the goal keeps its value between two samples; else it goes in straight lines.
-    rate
-        Largest rate of the course, infinite without a limit.
-    acceleration
-        Largest rate of that rate, infinite without a limit. The course begins to brake so that it ends on the goal.
-    filter_time
-        Time constant of a first-order filter of the goal [s]; 0 without one.
+    time: instants of the samples [s].
+    goal: values there.
+    held: whether the goal keeps its value between two samples; else it goes in straight lines.
+    rate: largest rate of the course, infinite without a limit.
+    acceleration: largest rate of that rate, infinite without a limit. The course begins to brake so that it ends on the goal.
+    filter_time: time constant of a first-order filter of the goal [s]; 0 without one.
 
     Returns
     -------

@@ -119,12 +119,8 @@ def _determined_of_several(
 ) -> str:
     """The only combination of parameters that is determined, found from pairs of them while the others stay.
 
-    Parameters
-    ----------
-    names
-        The one that is most free first.
-    gradient
-        Of the combination, in relative changes.
+    names: the one that is most free first.
+    gradient: of the combination, in relative changes.
     """
     first, *others = names
     kinds = [
@@ -153,12 +149,8 @@ def resting_on(
 ) -> list[Undetermined]:
     """Dependence on the value of a parameter that is not free, if the logs do not determine it to within its scale.
 
-    Parameters
-    ----------
-    parameters
-        Those that are free, and this one as the last.
-    normal
-        J'WJ of the scaled parameters.
+    parameters: those that are free, and this one as the last.
+    normal: J'WJ of the scaled parameters.
     """
     names = list(parameters)
     p, given = parameters[name], fit.point.values[name]

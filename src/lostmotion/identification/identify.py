@@ -350,10 +350,7 @@ def residual_table(
 ) -> dict[str, dict[str, np.ndarray]]:
     """By log: time, measured and computed channels, and variables of the rig along the run; NaN of a log that has no run.
 
-    Parameters
-    ----------
-    logs
-        Names of the logs; left out, all.
+    logs: names of the logs; left out, all.
     """
     assert result.rig is not None
     shown = [log for log in result.logs if logs is None or log.name in logs]

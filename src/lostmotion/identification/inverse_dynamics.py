@@ -46,10 +46,7 @@ class Stretch:
 def stretches(rig: Rig, log: Prepared, known: Mapping[str, Any], shown: Shown, width: int) -> list[Stretch]:
     """All of a log that is long enough.
 
-    Parameters
-    ----------
-    width
-        Samples of the filter, cubics by least squares (Savitzky and Golay 1964), and of a block; odd.
+    width: samples of the filter, cubics by least squares (Savitzky and Golay 1964), and of a block; odd.
     """
     at, x = measured_course(rig, log, shown.channel, known)
     h, found = log.log.interval, []

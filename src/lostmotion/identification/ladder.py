@@ -114,10 +114,7 @@ def climb(
 ) -> list[RungResult]:
     """All rungs of the ladder.
 
-    Parameters
-    ----------
-    models
-        Those that an interrupted identification has fitted: the search goes on from their values.
+    models: those that an interrupted identification has fitted: the search goes on from their values.
 
     Raises InputError: no log is left to fit, or the rig has no motion at the start.
     """

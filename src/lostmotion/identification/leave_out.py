@@ -47,10 +47,7 @@ class ConditionError:
     def text(self, unit: str) -> str:
         """One line.
 
-        Parameters
-        ----------
-        unit
-            Of the errors.
+        unit: of the errors.
         """
         unit = f" {unit}".rstrip()
         without = self.failed or f"{self.left_out:.4g}{unit} when fitted without them"
@@ -78,12 +75,8 @@ def left_out_errors(
 ) -> list[ConditionError]:
     """Errors of the fitted logs of each condition that ``fit.leave_out`` names, with and without them in the fit.
 
-    Parameters
-    ----------
-    logs
-        All that were fitted or held out; those that were held out take no part.
-    fit
-        Of the model that is taken: the search without some of the logs begins there.
+    logs: all that were fitted or held out; those that were held out take no part.
+    fit: of the model that is taken: the search without some of the logs begins there.
     """
     train = [log for log in logs if not log.held_out]
     found = []

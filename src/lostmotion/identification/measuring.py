@@ -38,10 +38,7 @@ class Probe:
 class Measuring:
     """The measured channels of a log at some values of the parameters.
 
-    Parameters
-    ----------
-    known
-        What formulas may name.
+    known: what formulas may name.
     """
 
     def __init__(self, task: Identification, log: Prepared, known: Mapping[str, Any], rates: Sequence[str]) -> None:
@@ -77,12 +74,8 @@ class Measuring:
     ) -> np.ndarray:
         """Channels x samples x parameters.
 
-        Parameters
-        ----------
-        by
-            Of each probe parameters x instants.
-        beside
-            Of each parameter its name, and for a channel the (weight, numbers) beside its value; see `neighbours_of`.
+        by: of each probe parameters x instants.
+        beside: of each parameter its name, and for a channel the (weight, numbers) beside its value; see `neighbours_of`.
         """
         found = []
         rows = {name: d for name, d, _ in self._each(by)}

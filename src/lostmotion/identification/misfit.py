@@ -161,10 +161,7 @@ def shape_variables(rig: Rig) -> dict[str, str]:
 def _share_over(x: np.ndarray, r: np.ndarray, independent: float) -> float:
     """Share of the variance of residuals that the means over classes of a variable have; 0 if chance explains it.
 
-    Parameters
-    ----------
-    independent
-        Number of independent residuals.
+    independent: number of independent residuals.
     """
     from scipy.stats import f
 

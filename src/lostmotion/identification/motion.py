@@ -80,10 +80,7 @@ def names_of_channel(rig: Rig, channel: str) -> frozenset[str]:
 def windows(rig: Rig, logs: Sequence[Prepared], point: Point, rung: int, length: float) -> list[Prepared]:
     """Logs in windows, each run of which begins at the angle and the speed that were measured there, or at the speed alone.
 
-    Parameters
-    ----------
-    length
-        Of a window [s].
+    length: of a window [s].
 
     Raises InputError: no channel shows the state of the rig, or a window has too few samples.
     """

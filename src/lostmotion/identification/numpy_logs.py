@@ -55,10 +55,7 @@ def read_numpy_log(path: Path, *, time: str = "") -> Log:
 def _array(path: Path, name: str, file: IO[bytes], size: int) -> np.ndarray:
     """An array of a file, if its description tells of numbers, and of no more than the file holds.
 
-    Parameters
-    ----------
-    size
-        Of the file [bytes].
+    size: of the file [bytes].
     """
     what = f"{path}: {name}" if name else str(path)
     version = np.lib.format.read_magic(file)

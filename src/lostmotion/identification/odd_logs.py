@@ -89,14 +89,9 @@ def odd_logs(
 ) -> tuple[list[OddLog], Point]:
     """Logs that disagree with the others, those fitted and those held out, and the point that fits the others.
 
-    Parameters
-    ----------
-    logs
-        All that were fitted or held out.
-    start
-        Where the search began.
-    fit
-        Where it ended, on this rung of the model sequence.
+    logs: all that were fitted or held out.
+    start: where the search began.
+    fit: where it ended, on this rung of the model sequence.
 
     Returns
     -------

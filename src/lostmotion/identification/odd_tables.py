@@ -33,10 +33,7 @@ Number = Callable[[Any], float | None]
 def odd_table_log(path: Path, rows: Sequence[Row], number: Number, comments: list[str], time: str) -> tuple[int, Log]:
     """(number of lines and cells that are lost, the log).
 
-    Parameters
-    ----------
-    rows, number, comments, time
-        As in `table_log`.
+    rows, number, comments, time: as in `table_log`.
 
     Raises
     ------

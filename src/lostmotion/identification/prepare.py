@@ -120,12 +120,8 @@ def channel_factor(written: str, of_file: str, unit: str, where: str) -> float:
 def channel_unit(written: str, of_file: str, unit: str, where: str) -> tuple[float, str]:
     """(what one of the unit of a channel is in SI, the SI unit).
 
-    Parameters
-    ----------
-    written
-        As the identification file says; if empty, `of_file` holds, and if that is empty, the channel is in SI.
-    unit
-        SI unit of what it is compared with; units of another kind are read as what they are, for a `scale` to turn them.
+    written: as the identification file says; if empty, `of_file` holds, and if that is empty, the channel is in SI.
+    unit: SI unit of what it is compared with; units of another kind are read as what they are, for a `scale` to turn them.
 
     Raises InputError: the unit is not known.
     """
@@ -166,12 +162,8 @@ def prepared(
 ) -> Prepared:
     """A log of the task, screened.
 
-    Parameters
-    ----------
-    units
-        SI units of inputs and measured variables of the rig by name.
-    origin
-        What formulas may name of its file, ``file`` and ``folder``, unless its header has the same key.
+    units: SI units of inputs and measured variables of the rig by name.
+    origin: what formulas may name of its file, ``file`` and ``folder``, unless its header has the same key.
 
     Raises InputError: it lacks a channel, or nothing of it can be used.
     """

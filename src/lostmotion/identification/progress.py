@@ -18,10 +18,7 @@ from .task import Identification
 class Progress:
     """Fitted models of some logs.
 
-    Parameters
-    ----------
-    path
-        File that keeps them; None: nothing is kept. A file of another task, of other logs or of another version is replaced.
+    path: file that keeps them; None: nothing is kept. A file of another task, of other logs or of another version is replaced.
     """
 
     def __init__(self, path: Path | None) -> None:

@@ -17,12 +17,8 @@ RIGID = "The logs were compared with a rig whose gear is rigid, so that they say
 def gear_sheet(gear: Gear, name: str, title: str, source: str) -> GearboxSheet:
     """A gear as a data sheet with the status "identified".
 
-    Parameters
-    ----------
-    name
-        Of the record: lower-case letters, digits, dots and dashes.
-    source
-        What it was identified from.
+    name: of the record: lower-case letters, digits, dots and dashes.
+    source: what it was identified from.
     """
     data: dict[str, Any] = {
         "ratio": gear.ratio,

@@ -74,12 +74,8 @@ class Built:
 class Rig:
     """The rig of a task, with the formulas by which logs and parameters change it.
 
-    Parameters
-    ----------
-    task
-        The identification.
-    directory
-        That file names are relative to.
+    task: the identification.
+    directory: that file names are relative to.
 
     Raises
     ------
@@ -177,10 +173,7 @@ class Rig:
     ) -> dict[str, Any]:
         """Values of the scenario by dotted key.
 
-        Parameters
-        ----------
-        keys
-            These alone; left out, all.
+        keys: these alone; left out, all.
 
         Raises InputError: a formula has no value.
         """

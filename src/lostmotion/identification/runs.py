@@ -65,12 +65,8 @@ def run_logs(
 ) -> list[Seen]:
     """Runs of logs, each with values of all parameters.
 
-    Parameters
-    ----------
-    parameters
-        By which there are derivatives.
-    extra
-        Further variables of the rig that are shown.
+    parameters: by which there are derivatives.
+    extra: further variables of the rig that are shown.
 
     Raises NoDerivativeError: one of the parameters has no exact derivative.
     """

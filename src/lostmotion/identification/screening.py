@@ -36,14 +36,9 @@ CONTRADICTION = 0.03  # share by which the mean of a channel may depart from wha
 def screened(log: Log, measured: Iterable[str], inputs: Iterable[str], stated: dict[str, str] | None = None) -> Log:
     """A log that can be compared with a run: its time rises, its channels are numbers.
 
-    Parameters
-    ----------
-    measured
-        Channels that are compared: glitches in them become NaN as missing values are, and all others keep the sample.
-    inputs
-        Channels that act on the rig, or that switch it: samples in which one is missing are dropped.
-    stated
-        Keys of the header, and the channels that ought to agree with them.
+    measured: channels that are compared: glitches in them become NaN as missing values are, and all others keep the sample.
+    inputs: channels that act on the rig, or that switch it: samples in which one is missing are dropped.
+    stated: keys of the header, and the channels that ought to agree with them.
 
     Raises InputError: nothing is left that could be used; the message says why.
     """

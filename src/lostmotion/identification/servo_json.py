@@ -25,10 +25,7 @@ def read_servo_json(path: Path, *, time: str = "") -> Log:
     Or a file ``{"mass": 0.5, ..., "timestamps": [0.0, ...], "positions": [0.1, ...]}``, whose arrays of one length are the channels. A
     file that was cut off is read up to there, and a few entries without a number are missing samples. Keys of the header with hyphens are read with underscores. Words and lists of the header are kept as they are.
 
-    Parameters
-    ----------
-    time
-        Key of the time in each entry; left out, ``timestamp``, or steps of ``dt`` of the header.
+    time: key of the time in each entry; left out, ``timestamp``, or steps of ``dt`` of the header.
     """
     clock = time or "timestamp"
     try:

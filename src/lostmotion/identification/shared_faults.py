@@ -93,12 +93,8 @@ def shared_faults(
 ) -> list[SharedFault]:
     """Faults of the model's kind that several logs share.
 
-    Parameters
-    ----------
-    logs
-        All logs, those that disagree with the others included.
-    point
-        Values with which candidates are tried.
+    logs: all logs, those that disagree with the others included.
+    point: values with which candidates are tried.
     """
     found = []
     of_family: dict[str, list[OddLog]] = {}
@@ -124,10 +120,7 @@ def shared_faults(
 def kinds(logs: Sequence[Prepared], errors: dict[str, float], odd: Sequence[OddLog]) -> list[KindError]:
     """Mean absolute errors by the values of each key of the header that takes a few.
 
-    Parameters
-    ----------
-    errors
-        Mean absolute error of the first channel by log.
+    errors: mean absolute error of the first channel by log.
     """
     names = {o.log for o in odd}
     able = [log for log in logs if math.isfinite(errors.get(log.name, math.nan))]

@@ -55,12 +55,8 @@ def regressed(
 ) -> tuple[Point, Regression]:
     """The start of the lowest rung.
 
-    Parameters
-    ----------
-    logs
-        That are fitted.
-    free
-        On the lowest rung.
+    logs: that are fitted.
+    free: on the lowest rung.
     """
     try:
         shown = shown_motion(rig)

@@ -27,10 +27,7 @@ USUAL_BACKLASH = 12.0 / ARCMIN  # to where the slider goes where there is none
 def describe(scenario: Scenario, name: str) -> dict[str, Any]:
     """The scenario as page/src/description.ts describes it.
 
-    Parameters
-    ----------
-    name
-        By which downloads are called.
+    name: by which downloads are called.
 
     Raises InputError: a controller has a law of your own, which only Python can call.
     """

@@ -69,12 +69,8 @@ def axis_figures(
 ) -> list[dict[str, Any]]:
     """Charts over time of a controller.
 
-    Parameters
-    ----------
-    named
-        Its variables begin with the name of its motor.
-    sliding
-        Whether the motor moves a slide, and whether the position is that of one.
+    named: its variables begin with the name of its motor.
+    sliding: whether the motor moves a slide, and whether the position is that of one.
     """
     prefix, of = (f"{motor}_", f" of {motor.replace('_', ' ')}") if named else ("", "")
     kind = controller.reference.kind

@@ -28,10 +28,7 @@ def core_of(scenario: Scenario) -> Path:
 def page(scenario: Scenario, name: str = "drive") -> str:
     """The page as HTML; nothing in it refers to anything outside.
 
-    Parameters
-    ----------
-    name
-        By which downloads are called.
+    name: by which downloads are called.
 
     Raises
     ------

@@ -49,14 +49,9 @@ def reference_sliders(
 ) -> Iterator[Slider]:
     """Sliders of the moves of a reference; without moves, of its mean, its first sine and its steps.
 
-    Parameters
-    ----------
-    key
-        Table of the reference in the scenario file.
-    number
-        Among the controllers.
-    sliding
-        Whether the motor moves a slide, and whether the position is that of one.
+    key: table of the reference in the scenario file.
+    number: among the controllers.
+    sliding: whether the motor moves a slide, and whether the position is that of one.
     """
     reference = controller.reference
     positions = sliding[1] and reference.kind != "torque"

@@ -144,16 +144,10 @@ def of_parameters(
 ) -> Iterator[Slider]:
     """Sliders of the values that the core can change.
 
-    Parameters
-    ----------
-    values
-        Keys of the scenario file, and the values.
-    usual
-        Of keys that are 0: to where the slider goes.
-    views
-        Of keys that are drawn: where they stand.
-    units, limits
-        SI units of the keys, which are those of forces where a motor moves a slide, and what a file may have.
+    values: keys of the scenario file, and the values.
+    usual: of keys that are 0: to where the slider goes.
+    views: of keys that are drawn: where they stand.
+    units, limits: SI units of the keys, which are those of forces where a motor moves a slide, and what a file may have.
     """
     for key, value in values:
         table, *names = key.split(".")
@@ -197,16 +191,10 @@ def of_signal(
 ) -> Iterator[Slider]:
     """Sliders of a command, a load torque or a reference: its mean, its first sine, its steps; where there is none, one can be added.
 
-    Parameters
-    ----------
-    key
-        Its table in the scenario file.
-    where
-        Its number among the inputs, or the references, of the core.
-    most
-        To where its values go, at least.
-    duration
-        Of the run [s].
+    key: its table in the scenario file.
+    where: its number among the inputs, or the references, of the core.
+    most: to where its values go, at least.
+    duration: of the run [s].
     """
 
     def slider(

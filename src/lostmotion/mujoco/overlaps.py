@@ -24,14 +24,9 @@ SHARE_OF_WEIGHT = 1e-3
 def without_weight(name: str, drive: Scenario, *, replace: bool, weighs: bool) -> Scenario:
     """The drive of a joint without the loads and weights on it, which the robot has.
 
-    Parameters
-    ----------
-    name
-        Of the joint.
-    replace
-        Whether to take them off the drive.
-    weighs
-        Whether gravity acts in the robot.
+    name: of the joint.
+    replace: whether to take them off the drive.
+    weighs: whether gravity acts in the robot.
 
     Raises InputError: the drive has such, and it is not to be replaced.
     """

@@ -28,12 +28,8 @@ DOES_NOT = "the printed value does not follow from the printed"
 def paper_scenario(model: str, amplitude: str) -> Scenario:
     """One of the paper's runs.
 
-    Parameters
-    ----------
-    model
-        ``"1-DOF-L"``, ``"2-DOF-L"`` or ``"2-DOF-NL"``.
-    amplitude
-        ``"large"`` (E_CA = 1.0275) or ``"small"`` (0.025).
+    model: ``"1-DOF-L"``, ``"2-DOF-L"`` or ``"2-DOF-NL"``.
+    amplitude: ``"large"`` (E_CA = 1.0275) or ``"small"`` (0.025).
     """
     if model not in MODELS or amplitude not in AMPLITUDES:
         raise InputError(f"there is no run {model!r}, {amplitude!r}; models: {MODELS}, amplitudes: {tuple(AMPLITUDES)}")

@@ -19,12 +19,8 @@ WORK = runs.WORK + FIGURES  # units of work for the progress bar
 def reproduce(directory: Path, progress: Callable[[], None] = lambda: None, pictures: Sequence[str] = ()) -> Path:
     """Write ``report.html``, the data of its figures (CSV) and the constants (CSV) into a directory.
 
-    Parameters
-    ----------
-    progress
-        Called `WORK` times.
-    pictures
-        Endings of the files in which matplotlib draws each figure of the paper: png, svg, pdf.
+    progress: called `WORK` times.
+    pictures: endings of the files in which matplotlib draws each figure of the paper: png, svg, pdf.
 
     Returns
     -------

@@ -43,16 +43,10 @@ def contours(x: Any, y: Any, values: Any, *, log_x: bool, log_y: bool, degrees: 
 
     Each cell of the grid is cut into two triangles, on which the quantity is linear over the axes as they are drawn.
 
-    Parameters
-    ----------
-    x, y
-        Values along the axes, rising.
-    values
-        The quantity, shape (y, x); NaN where there is none.
-    log_x, log_y
-        Whether an axis is logarithmic.
-    degrees
-        Whether the quantity is an angle in degrees.
+    x, y: values along the axes, rising.
+    values: the quantity, shape (y, x); NaN where there is none.
+    log_x, log_y: whether an axis is logarithmic.
+    degrees: whether the quantity is an angle in degrees.
     """
     u, v = (np.log(a) if log else np.asarray(a, float) for a, log in ((x, log_x), (y, log_y)))
     z = np.asarray(values, float)

@@ -49,10 +49,7 @@ def write_identification(
 
     Values are written first, then the page, then pictures.
 
-    Parameters
-    ----------
-    all_logs
-        Draw all logs; else of many logs the worst, median and best.
+    all_logs: draw all logs; else of many logs the worst, median and best.
 
     Returns
     -------
@@ -209,10 +206,7 @@ def _chosen_logs(result: IdentificationResult) -> dict[str, str]:
 def _groups(result: IdentificationResult, chosen: Mapping[str, str]) -> list[Group]:
     """All charts, those of some logs first.
 
-    Parameters
-    ----------
-    chosen
-        Names of the logs that are drawn, with their rank; empty: all.
+    chosen: names of the logs that are drawn, with their rank; empty: all.
     """
     variables = _variables(result)
     spread = [log.name for log in result.logs[:: max(1, len(result.logs) // CLOUDS)]]
@@ -267,10 +261,7 @@ def _overlays(
 ) -> list[Panel]:
     """Measured and computed channels of a log.
 
-    Parameters
-    ----------
-    panels
-        Number of all overlays, which share the points of the page.
+    panels: number of all overlays, which share the points of the page.
     """
     least, most, together = POINTS
     count = max(least, min(most, together // (2 * panels)))

@@ -248,10 +248,7 @@ def record_text(name: str) -> str:
 def template(kind: str | None = None) -> str:
     """A commented sheet file to fill in, for a gearbox if nothing else is said.
 
-    Parameters
-    ----------
-    kind
-        A table of records, such as ``"motor"`` or ``"screw"``, or a kind within one, such as ``"worm"``.
+    kind: a table of records, such as ``"motor"`` or ``"screw"``, or a kind within one, such as ``"worm"``.
 
     Raises InputError: unknown kind.
     """

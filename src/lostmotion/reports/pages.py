@@ -55,12 +55,8 @@ def write_report(
 ) -> Path:
     """Write a page, the data of its charts and its tables into a directory, made if missing.
 
-    Parameters
-    ----------
-    tables
-        Text of further CSV files by their names.
-    pictures
-        Endings of the files in which matplotlib draws each group of charts: png, svg, pdf.
+    tables: text of further CSV files by their names.
+    pictures: endings of the files in which matplotlib draws each group of charts: png, svg, pdf.
 
     Returns
     -------

@@ -228,10 +228,7 @@ def _range_within(curves: Iterable[Curve], x_range: tuple[float, float]) -> tupl
 def overview(result: xarray.Dataset, figure: str | None = None) -> Figure:
     """A run at a glance: controlled axes with their following errors, commands, speeds, torques, twists, contacts as bars.
 
-    Parameters
-    ----------
-    figure
-        A part of it alone: motion, losses, contacts or energy.
+    figure: a part of it alone: motion, losses, contacts or energy.
 
     Raises InputError: the dataset lacks what is shown.
     """

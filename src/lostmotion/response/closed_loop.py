@@ -321,10 +321,7 @@ def change(numbers: np.ndarray, scale: np.ndarray, free: bool) -> float:
 def limit_of(numbers: np.ndarray, *, free: bool) -> np.ndarray | None:
     """Limit of a sequence of states by reduced rank extrapolation: the affine combination of them whose change is least.
 
-    Parameters
-    ----------
-    free
-        An angle may advance by the same in each step: the change of the change counts.
+    free: an angle may advance by the same in each step: the change of the change counts.
     """
     changes = np.diff(numbers, n=2 if free else 1, axis=0)
     scale = np.abs(changes).max(axis=0)

@@ -116,10 +116,7 @@ class Loop:
 def find_limit_cycle(loop: Loop, duration: float) -> Found:
     """The limit cycle that a run from the start leads to.
 
-    Parameters
-    ----------
-    duration
-        Of the shortest run [s]; where it does not suffice, longer ones follow.
+    duration: of the shortest run [s]; where it does not suffice, longer ones follow.
     """
     reason, first = "", 0.0
     for _ in range(LONGER):

@@ -272,10 +272,7 @@ def periodic_motions(
 def _same(floors: Mapping[str, float], a: xarray.Dataset, b: xarray.Dataset) -> bool:
     """Whether two motions are one; that of the longer period is compared at each shift by the shorter one.
 
-    Parameters
-    ----------
-    floors
-        Rated magnitudes: what is smaller than `SAME` of them is no difference between motions.
+    floors: rated magnitudes: what is smaller than `SAME` of them is no difference between motions.
     """
     if a.attrs["period"] < b.attrs["period"]:
         a, b = b, a

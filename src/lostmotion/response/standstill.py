@@ -362,12 +362,8 @@ class Decision:
 def decide(watch: Watch, first: float, most: float) -> Decision:
     """Watches a loop until it is shown to be at rest, or to swing on.
 
-    Parameters
-    ----------
-    first
-        Shortest time to watch [s].
-    most
-        Longest time to follow [s]; stuck intervals that are extrapolated do not count.
+    first: shortest time to watch [s].
+    most: longest time to follow [s]; stuck intervals that are extrapolated do not count.
     """
     duration, seen, idle, outlook = first, 0.0, 0, UNKNOWN
     candidate: tuple[float, np.ndarray, float] | None = None

@@ -50,14 +50,9 @@ class Window:
 def fitting(frequency: float, tick: float, frame: int) -> Window:
     """The window of the frequency that is nearest.
 
-    Parameters
-    ----------
-    frequency
-        [Hz].
-    tick
-        Base tick [s].
-    frame
-        In ticks.
+    frequency: [Hz].
+    tick: base tick [s].
+    frame: in ticks.
     """
     length = 1.0 / (frequency * frame * tick)  # of a period, in frames
     every = max(int(length / SAMPLES), 1)  # frames from sample to sample

@@ -194,10 +194,7 @@ def _at_rest(why: AtRestError, *, rests: bool) -> HuntingCertificate:
 def certified(axis: Axis, rests: Callable[[], bool], largest_error: float | None = None) -> HuntingCertificate:
     """Certificate of an axis with a sampled controller.
 
-    Parameters
-    ----------
-    rests
-        Whether the run of the scenario comes to rest.
+    rests: whether the run of the scenario comes to rest.
 
     Raises InputError: an input never comes to rest.
     """

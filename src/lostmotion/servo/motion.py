@@ -332,10 +332,7 @@ def _with(axis: Axis, scenario: Scenario | None) -> Axis | None:
 def at_rest(axis: Axis, most: float = math.inf) -> AtRest:
     """After the end of its reference; after a small step of the position where that never comes to rest, or never moves.
 
-    Parameters
-    ----------
-    most
-        Longest time to follow [s].
+    most: longest time to follow [s].
     """
     c, reference = axis.controller, axis.controller.reference
     assert c.position is not None

@@ -115,10 +115,7 @@ class Axis:
 def axis_of(scenario: Scenario, motor: str | None = None) -> Axis:
     """The axis of a scenario.
 
-    Parameters
-    ----------
-    motor
-        Whose controller is looked at; may be left out where there is one.
+    motor: whose controller is looked at; may be left out where there is one.
 
     Raises InputError: there is no controller, there are several, or its loops are a function (law = true).
     """

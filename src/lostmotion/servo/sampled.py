@@ -181,14 +181,9 @@ class SampledLoop:
     def _samples(self, signal: str, w: np.ndarray, forced: np.ndarray, direct: np.ndarray) -> np.ndarray:
         """A signal at the samples of the loop, where all that enters goes as exp(j w t).
 
-        Parameters
-        ----------
-        w
-            Angular frequencies [rad/s].
-        forced
-            What has entered the state from one sample to the next, over the frequencies.
-        direct
-            The inputs at the sample, over the frequencies.
+        w: angular frequencies [rad/s].
+        forced: what has entered the state from one sample to the next, over the frequencies.
+        direct: the inputs at the sample, over the frequencies.
         """
         whole, turn = self.transition, np.exp(1j * w * self.tick * len(self.ticks))
         n = len(whole)

@@ -204,10 +204,7 @@ def _apart(axis: Axis, cycles: int, period: float, interval: float) -> float:
 def settling(moves: Moves, rest: AtRest, window: float) -> list[Settling]:
     """After each move of the last cycle, and after the last move, behind which the position is held.
 
-    Parameters
-    ----------
-    rest
-        What follows the last move.
+    rest: what follows the last move.
     """
     seen = _seen(moves, rest)
     held = len(moves.reference.moves) - 1

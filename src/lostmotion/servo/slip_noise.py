@@ -90,10 +90,7 @@ def _stays_stuck(
 ) -> None:
     """Refuses stops after which the torque may free the contact before all but the integrator has settled.
 
-    Parameters
-    ----------
-    turned, passed
-        Largest angles from the last sample to the stop, and in the tick before.
+    turned, passed: largest angles from the last sample to the stop, and in the tick before.
     """
     if of.ramp.ticks > SETTLING:
         raise UndecidableError("the controller settles too slowly while the contact is stuck")
@@ -114,12 +111,8 @@ def _one_way(effects: np.ndarray, falls: np.ndarray) -> np.ndarray:
     Each reading differs from the angle by ``n``, from -1 to 1. As no reading is below the one before, ``n`` falls by no more than the
     angle has grown, ``f``. With any ``t`` above 0, ``a n + a' n' <= t f + |a - t| + |a' + t|``, where n' follows n.
 
-    Parameters
-    ----------
-    effects
-        ``a`` of each row and reading, the last being that of the stuck interval.
-    falls
-        ``f`` of each box, from the last but two readings to the last but one, and from there to the last.
+    effects: ``a`` of each row and reading, the last being that of the stuck interval.
+    falls: ``f`` of each box, from the last but two readings to the last but one, and from there to the last.
     """
     kept, total = effects.copy(), np.zeros((falls.shape[1], len(effects)))
     for k, fall in ((-1, falls[1]), (-2, falls[0])):

@@ -81,10 +81,7 @@ def one_way(sets: Sets, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, 
 def bend_of(of: SampledSlip, sets: Any, noise: Callable[[np.ndarray], Any] = lambda _: 0.0) -> np.ndarray:
     """By how much the speed may be below that at both ends of a tick: with a torque that is held it has its least value at one.
 
-    Parameters
-    ----------
-    noise
-        Largest effect of readings on an output, beside what is in the sets.
+    noise: largest effect of readings on an output, beside what is in the sets.
     """
     if of.lag == 0.0:
         return np.zeros(len(sets))

@@ -71,12 +71,8 @@ class OrientedWinding:
     def of(cls, motor: ShaftMotor, name: str, c: Controller, law: _core.Axis, model: LinearModel) -> OrientedWinding:
         """In the regime of a linear model, at the speed of its point.
 
-        Parameters
-        ----------
-        motor, name
-            With field-oriented control, and its name in the model.
-        c, law
-            Its controller, and what the solver makes of that.
+        motor, name: with field-oriented control, and its name in the model.
+        c, law: its controller, and what the solver makes of that.
 
         Raises InputError: the inverter has not the voltage for it.
         """
@@ -246,10 +242,7 @@ class OrientedWinding:
     def step(self, outermost: _core.CurrentAxis | None, cut: bool, tick: int) -> np.ndarray:
         """The matrix of `_core.linear_orientation` at a tick.
 
-        Parameters
-        ----------
-        outermost
-            The current that is looked at; None for both under a torque.
+        outermost: the current that is looked at; None for both under a torque.
         """
         m = self.steady
         return _core.linear_orientation(

@@ -234,12 +234,8 @@ def screw_life(load: AxialLoad, screw: RatedScrew) -> float | None:
 def screw_rules(load: AxialLoad, screw: RatedScrew, wanted_life: float | None, *, key: str = "screw") -> list[Finding]:
     """Life, static load, buckling, bending speed and ball speed of a screw. Sources: `formulas` and `TASK_RULES`.
 
-    Parameters
-    ----------
-    wanted_life
-        [s]; None: the life is not judged.
-    key
-        Table of the screw, for what is missing.
+    wanted_life: [s]; None: the life is not judged.
+    key: table of the screw, for what is missing.
     """
     turning = 2.0 * math.pi / screw.travel()
     peak = float(np.abs(load.force).max())

@@ -115,14 +115,9 @@ def duty_cycle(
     A standstill at its beginning or end is rest if it is no mere reversal of the motion. That is, it is not too
     short, and the torque of the motor does not change.
 
-    Parameters
-    ----------
-    result
-        Of `simulate`.
-    period
-        `task.cycle` [s].
-    speed, motor_torque, output_torque
-        Variables of the result: the input shaft, what turns it, what leaves at the output.
+    result: of `simulate`.
+    period: `task.cycle` [s].
+    speed, motor_torque, output_torque: variables of the result: the input shaft, what turns it, what leaves at the output.
 
     Raises InputError: the motion does not fit into the period, or is not at its end where a pause would begin.
     """

@@ -48,12 +48,8 @@ def required_motion(
 ) -> RequiredMotion:
     """The motion of a load that follows its reference over one cycle [s]: J acceleration + friction + load torque.
 
-    Parameters
-    ----------
-    duty
-        What acts on the load beside.
-    rise
-        Sine of the slope of a slide; None of a rotary load. All values of a slide are in units of translation.
+    duty: what acts on the load beside.
+    rise: sine of the slope of a slide; None of a rotary load. All values of a slide are in units of translation.
     """
     times_of = (*reference.pieces(), *load.torque.breakpoint_list())
     breakpoints = {t for t in ({t for t, *_ in times_of} | duty.edges()) if 0.0 < t < cycle}

@@ -71,12 +71,8 @@ def bus_findings(
 
     What one motor returns while another one takes power does not reach the capacitors.
 
-    Parameters
-    ----------
-    powers
-        Of each motor [W], by its table.
-    cycle
-        Period after which the motion of the run repeats [s]; None: without a pause.
+    powers: of each motor [W], by its table.
+    cycle: period after which the motion of the run repeats [s]; None: without a pause.
     """
     if supply is None:
         return []

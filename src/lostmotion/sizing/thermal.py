@@ -101,12 +101,8 @@ class TwoBodies:
     def error_bound(self, lead: float, hottest: float) -> float:
         """Error bound of the temperatures at the ends of intervals [K], where the heat of each is spread evenly.
 
-        Parameters
-        ----------
-        lead
-            Largest integral from the start of an interval of M² less its mean [(N·m)² s].
-        hottest
-            Highest temperature of the winding [°C].
+        lead: largest integral from the start of an interval of M² less its mean [(N·m)² s].
+        hottest: highest temperature of the winding [°C].
 
         Notes
         -----

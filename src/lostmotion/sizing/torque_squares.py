@@ -88,12 +88,8 @@ def squares(
 ) -> Squares:
     """A channel of a run of the core between instants [s].
 
-    Parameters
-    ----------
-    breaks
-        Instants at which inputs jump or bend [s].
-    fastest
-        Frequency of their fastest sine [Hz].
+    breaks: instants at which inputs jump or bend [s].
+    fastest: frequency of their fastest sine [Hz].
     """
     end = float(time[-1])
     grid: dict[str, Any] = {"duration": end, "sample_interval": end}

@@ -45,12 +45,8 @@ class LinearWinding(Winding):
 def whole_drive(kind: str, name: str, beside: Mapping[str, Any], guide_friction: float) -> tuple[Motor, Gearbox]:
     """Motor and gearbox of a record of one of the kinds `WHOLE`.
 
-    Parameters
-    ----------
-    beside
-        Values of the task that replace those of the record.
-    guide_friction
-        Friction coefficient of the guide of a slide, on which the attraction of a linear motor acts.
+    beside: values of the task that replace those of the record.
+    guide_friction: friction coefficient of the guide of a slide, on which the attraction of a linear motor acts.
 
     Raises InputError: the record lacks what a run needs.
     """

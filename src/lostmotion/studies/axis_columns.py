@@ -131,12 +131,8 @@ def temperatures_of(motor: Motor, time: np.ndarray, square: np.ndarray, ambient:
     """Highest temperatures of winding and case [°C] in the cycle repeated for ever, as far as the data of the motor
     allow. Without its time constants the winding alone is computed, by the rms torque. NaN if nothing is known.
 
-    Parameters
-    ----------
-    time
-        [s], evenly.
-    square
-        Mean of the torque that heats as this cycle does, squared, over each interval [(N·m)²].
+    time: [s], evenly.
+    square: mean of the torque that heats as this cycle does, squared, over each interval [(N·m)²].
     """
     bodies = TwoBodies.of(motor, ambient)
     if bodies is not None:

@@ -306,10 +306,7 @@ class Axes:
     def verdict_at_ends(self, row: np.ndarray, own: tuple[str, ...]) -> str:
         """Verdict over the range of estimated losses; empty where the losses are printed.
 
-        Parameters
-        ----------
-        own
-            Limits that the pair violates with the estimate itself.
+        own: limits that the pair violates with the estimate itself.
         """
         gearbox = self._once(("part", self.study.part_key("gearbox", row)), lambda: self.study.part("gearbox", row))
         if isinstance(gearbox, InputError) or gearbox.loss_range is None:

@@ -15,14 +15,9 @@ CHUNK = 500  # runs that are computed, and written, as one
 def unit_cube(design: str, parameters: int, total: int, seed: int, first: int, last: int) -> np.ndarray:
     """The points first .. last - 1 of a design, one row each, within 0 and 1, both excluded.
 
-    Parameters
-    ----------
-    design
-        ``"sobol"``, ``"saltelli"``, ``"random"`` or ``"latin_hypercube"``.
-    parameters
-        Columns.
-    total
-        Points of the whole design.
+    design: ``"sobol"``, ``"saltelli"``, ``"random"`` or ``"latin_hypercube"``.
+    parameters: columns.
+    total: points of the whole design.
     """
     if design == "sobol":
         points = _sobol(parameters, seed, first, last)

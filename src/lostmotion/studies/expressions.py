@@ -53,12 +53,8 @@ LEFT_OUT = Term(Measure(), lambda _: None)
 class Expression:
     """An expression of the result variables, as `keep` has it.
 
-    Parameters
-    ----------
-    text
-        As written.
-    vocabulary
-        What it may name.
+    text: as written.
+    vocabulary: what it may name.
 
     Raises
     ------

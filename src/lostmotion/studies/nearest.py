@@ -54,14 +54,9 @@ class Miss:
 def misses(study: Study, ranked: list[Candidate], count: int) -> list[Miss]:
     """Find the candidates of a task that come nearest to fitting, the nearest first: the largest excess over a limit ranks them.
 
-    Parameters
-    ----------
-    study
-        The task.
-    ranked
-        From `candidates`.
-    count
-        How many of them; for these a slower cycle is sought, and tried by rules and run.
+    study: the task.
+    ranked: from `candidates`.
+    count: how many of them; for these a slower cycle is sought, and tried by rules and run.
     """
     found = [Miss(c, lacks, None) for c in ranked if not c.fits and (lacks := _lacks(c))]
     found.sort(key=lambda miss: (miss.worst, miss.candidate.run))

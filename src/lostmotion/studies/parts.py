@@ -80,12 +80,8 @@ def carried(metadata: Mapping[bytes, bytes] | None) -> str:
 def damages(directory: Path, text: str, total: int) -> dict[Path, str]:
     """Parts that are damaged, or belong elsewhere, each with the reason.
 
-    Parameters
-    ----------
-    text
-        The study as JSON.
-    total
-        Number of its runs.
+    text: the study as JSON.
+    total: number of its runs.
     """
     known = checksums(directory)
     runs = {part_of(directory, first): (first, last) for first, last in chunks(total)}

@@ -168,10 +168,7 @@ def _excess(column: str, value: float, low: float, high: float) -> dict[str, flo
 def prices(ranked: list[Candidate], select: Selection) -> list[Price]:
     """Price of each limit that some run violates, the most critical first.
 
-    Parameters
-    ----------
-    ranked
-        From `candidates`.
+    ranked: from `candidates`.
     """
     objective = next(iter(select.objectives))
     best = next((c for c in ranked if c.fits), None)

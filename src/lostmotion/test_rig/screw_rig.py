@@ -38,12 +38,8 @@ MOST = 3.0  # of the load: how far the search for a force that drives the screw 
 class ScrewRig:
     """Rig with one screw on it: an input shaft, the screw, and a slide that a force acts on.
 
-    Parameters
-    ----------
-    screw
-        A rigid one has no stiffness to measure.
-    load
-        Axial force [N] that measurements refer to, such as a tenth of the dynamic capacity.
+    screw: a rigid one has no stiffness to measure.
+    load: axial force [N] that measurements refer to, such as a tenth of the dynamic capacity.
 
     Examples
     --------
