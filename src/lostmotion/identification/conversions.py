@@ -37,10 +37,7 @@ def conversion_of(text: str) -> Callable[[np.ndarray], np.ndarray]:
     text
         Numbers, ``X`` or ``X1`` for the raw value, ``+ - * / **``, brackets, `FUNCTIONS` (``log`` and ``ln`` to the base e) and ``pi``.
 
-    Returns
-    -------
-    callable
-        Takes an array of raw values of any type of numbers, and computes in double precision.
+    Returns callable: takes an array of raw values of any type of numbers, and computes in double precision.
 
     Raises ValueError: the formula has something else in it.
     """

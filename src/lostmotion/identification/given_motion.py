@@ -63,10 +63,7 @@ def rates_of(points: np.ndarray) -> np.ndarray:
     points : array (points, 3)
         Time, speed and slope.
 
-    Returns
-    -------
-    array (points, 3)
-        Time, acceleration and its slope.
+    Returns array (points, 3): time, acceleration and its slope.
     """
     t, slope = points[:, 0], points[:, 2].copy()
     if len(t) > 1:

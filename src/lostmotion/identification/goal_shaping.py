@@ -25,10 +25,7 @@ def shaped(
     acceleration: largest rate of that rate, infinite without a limit. The course begins to brake so that it ends on the goal.
     filter_time: time constant of a first-order filter of the goal [s]; 0 without one.
 
-    Returns
-    -------
-    tuple
-        Instants [s], values there, and how many of them there are for one sample.
+    Returns tuple: instants [s], values there, and how many of them there are for one sample.
 
     Examples
     --------

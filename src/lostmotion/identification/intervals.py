@@ -135,10 +135,7 @@ def reach(directions: np.ndarray, room: np.ndarray) -> tuple[np.ndarray, np.ndar
 def profile(problem: Problem, fit: Fit, name: str, points: int = 3) -> tuple[Interval, list[tuple[float, float]]]:
     """By the values at which the loss, all other parameters fitted again, has risen by that of a 95 % interval.
 
-    Returns
-    -------
-    tuple
-        The interval, and (value, rise of the loss) of the points that were fitted.
+    Returns tuple: the interval, and (value, rise of the loss) of the points that were fitted.
     """
     p, value = problem.parameters[name], fit.point.values[name]
     names = list(problem.parameters)

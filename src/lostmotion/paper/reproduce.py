@@ -22,10 +22,7 @@ def reproduce(directory: Path, progress: Callable[[], None] = lambda: None, pict
     progress: called `WORK` times.
     pictures: endings of the files in which matplotlib draws each figure of the paper: png, svg, pdf.
 
-    Returns
-    -------
-    Path
-        Of the report. It links to ``live.html`` where that lies in the directory.
+    Returns the path of the report. It links to ``live.html`` where that lies in the directory.
     """
     directory.mkdir(parents=True, exist_ok=True)
     results = runs.compute(progress)

@@ -110,9 +110,6 @@ def write_certificate(
 ) -> Path:
     """``servo.html`` and its data as CSV in a directory, made if missing; on request pictures with these endings.
 
-    Returns
-    -------
-    Path
-        Of the page.
+    Returns the path of the page.
     """
     return write_report(directory, "servo.html", certificate_report(name, title, certificate), {}, pictures)

@@ -51,10 +51,7 @@ def write_identification(
 
     all_logs: draw all logs; else of many logs the worst, median and best.
 
-    Returns
-    -------
-    Path
-        Of the page.
+    Returns the path of the page.
     """
     tables = {
         "errors.csv": table_csv(HEADER, error_rows(result)),

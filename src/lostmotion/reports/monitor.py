@@ -31,10 +31,7 @@ WATCHED = ("value", "baseline", "now", "from", "to", "unit", "change", "limit")
 def write_monitor(directory: Path, name: str, result: MonitorResult, pictures: Sequence[str] = ()) -> Path:
     """``monitor.html`` and tables (CSV) in a directory, made if missing; on request pictures.
 
-    Returns
-    -------
-    Path
-        Of the page.
+    Returns the path of the page.
     """
     tables = {
         "values.csv": table_csv(

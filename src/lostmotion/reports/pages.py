@@ -58,10 +58,7 @@ def write_report(
     tables: text of further CSV files by their names.
     pictures: endings of the files in which matplotlib draws each group of charts: png, svg, pdf.
 
-    Returns
-    -------
-    Path
-        Of the page.
+    Returns the path of the page.
     """
     directory.mkdir(parents=True, exist_ok=True)
     write_page(directory / file, report)

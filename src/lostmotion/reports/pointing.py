@@ -267,10 +267,7 @@ def pointing_report(name: str, budget: PointingBudget) -> Report:
 def write_pointing(directory: Path, name: str, budget: PointingBudget, pictures: Sequence[str] = ()) -> Path:
     """``track.html``, tables and data as CSV in a directory, made if missing; on request pictures with these endings.
 
-    Returns
-    -------
-    Path
-        Of the page.
+    Returns the path of the page.
     """
     tables = {
         "budget.csv": table_csv(header(budget), budget_rows(budget)),

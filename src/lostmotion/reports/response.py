@@ -222,10 +222,7 @@ def write_response(
 ) -> Path:
     """``response.html`` and tables in a directory, made if missing; on request pictures with these endings.
 
-    Returns
-    -------
-    Path
-        Of the page.
+    Returns the path of the page.
     """
     response = next(iter(responses.values()))
     report, found = response_report(responses, scenario, output)

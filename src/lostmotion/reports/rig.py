@@ -262,10 +262,7 @@ def write_sheet(
 ) -> Path:
     """``rig.html`` and the measurements as CSV in a directory, made if missing; on request pictures with these endings.
 
-    Returns
-    -------
-    Path
-        Of the page.
+    Returns the path of the page.
     """
     table = report.map
     rows = [

@@ -122,10 +122,7 @@ def write_sheet(
 ) -> Path:
     """``rig.html`` and the measurements as CSV in a directory, made if missing; on request pictures with these endings.
 
-    Returns
-    -------
-    Path
-        Of the page.
+    Returns the path of the page.
     """
     rows = ([share * report.load, eta, back] for share, eta, back in zip(*report.efficiency, strict=True))
     head = ["axial force [N]", "efficiency, the screw drives", "efficiency, the slide drives"]

@@ -262,10 +262,7 @@ def servo_report(name: str, report: ServoReport) -> Report:
 def write_servo(directory: Path, name: str, report: ServoReport, pictures: Sequence[str] = ()) -> Path:
     """``servo.html`` and its data as CSV in a directory, made if missing; on request pictures with these endings.
 
-    Returns
-    -------
-    Path
-        Of the page.
+    Returns the path of the page.
     """
     tables = {"margins.csv": table_csv(HEADER, loop_rows(report))}
     return write_report(directory, "servo.html", servo_report(name, report), tables, pictures)

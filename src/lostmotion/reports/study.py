@@ -276,10 +276,7 @@ def summary(directory: Path) -> tuple[list[str], Verdict | None]:
 def write_study(directory: Path, target: Path, pictures: Sequence[str] = ()) -> Path:
     """Write ``study.html`` and tables of a study into another directory, made if missing; on request pictures.
 
-    Returns
-    -------
-    Path
-        Of the page.
+    Returns the path of the page.
 
     Raises InputError: the target is the directory of the study, all files of which readers of Parquet try to read.
     """
