@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..control.command import CommandSignal
 from ..control.controller import Controller
 from ..errors import InputError, need
 from ..inputs.arguments import checked
-from ..model.signals import CommandSignal
 from ..portable.checkout import made_here
 from ..portable.derivation import Derivation
 from ..portable.descriptions import written
