@@ -20,6 +20,7 @@ from conftest import ROOT
 from lostmotion.control import profiles
 from lostmotion.control.controller import AnyReference
 from lostmotion.inputs.part import Part
+from lostmotion.live_page.references import reference_view
 from lostmotion.model.signals import taylor
 from lostmotion.simulation import scenario_files
 
@@ -483,3 +484,82 @@ def test_any_series_is_refused_in_one_plain_line_or_passes_through_its_points(ti
         assert not re.search(r"Input should|https?:|pydantic|NoneType|dtype|array|dydx", str(error))
         return
     assert reference.at(times)[0] == pytest.approx(values, rel=1e-14)
+
+
+# --- moves of a given duration ---
+
+COEFFICIENTS = {  # peak speed, acceleration and jerk of a move by 1 in 1 s: VDI 2143-1; R. L. Norton, Cam Design, table 3-3
+    "parabola": (2.0, 4.0, None),
+    "least_jerk": (2.0, 8.0, 32.0),
+    "harmonic": (1.5708, 4.9348, 15.503),
+    "cycloidal": (2.0, 6.2832, 39.478),
+    "fifth_order": (1.875, 5.7735, 60.0),
+    "seventh_order": (2.1875, 7.5132, 52.5),
+    "modified_sine": (1.7596, 5.5280, 69.466),
+    "modified_trapezoid": (2.0, 4.8881, 61.426),
+}
+
+
+@pytest.mark.parametrize("law", COEFFICIENTS)
+def test_a_timed_move_has_the_published_coefficients_of_its_law(law: str) -> None:
+    distance, duration = math.radians(90.0), 0.4
+    move = {"to": distance, "duration": duration, "law": law}
+    reference = lm.PositionReference(moves=[move, {**move, "to": 0.0}], dwell="0.6 s")
+    assert reference.intervals() == [(0.0, 0.4), (1.0, 1.4)]
+    value, *derivatives = reference.at(np.linspace(0.0, duration, 10_241)[:-1])
+    for n, (found, expected) in enumerate(zip(derivatives, COEFFICIENTS[law], strict=True), 1):
+        if expected is not None:  # pieces of constant jerk: it is 1.2 % below a jerk that peaks at an end
+            peak = np.abs(found).max() * duration**n / distance
+            assert peak == pytest.approx(expected, rel=1.3e-2 if n == 3 else 3e-4)
+    t = np.linspace(0.0, duration, 10_241)[:-1]
+    assert value == pytest.approx(distance - value[::-1], abs=1e-3)  # symmetric, over a step of 39 us
+    assert np.gradient(value, t)[1:-1] == pytest.approx(derivatives[0][1:-1], abs=1e-3)
+    assert [float(reference.at(x)[0]) for x in (0.5, 1.5)] == [distance, 0.0]
+
+
+def test_the_fifth_order_is_its_polynomial() -> None:
+    reference = lm.PositionReference(moves=[{"to": 2.0, "duration": 3.0, "law": "fifth_order"}])
+    t = np.linspace(0.0, 3.0, 1001)
+    x = t / 3.0
+    value, speed, *_ = reference.at(t)
+    assert value == pytest.approx(2.0 * (10.0 * x**3 - 15.0 * x**4 + 6.0 * x**5), abs=1e-4)
+    assert speed == pytest.approx(20.0 * (x * (1.0 - x)) ** 2, abs=1e-4)
+
+
+def test_a_duration_that_limits_forbid_names_the_least_one() -> None:
+    """The peak speed 1.875 D/T is 1 rad/s at T = 1.875 s, the peak acceleration 5.7735 D/T^2 is 4 rad/s^2 at 1.2014 s."""
+    move = {"to": 1.0, "duration": 1.0, "law": "fifth_order"}
+    for limit, least in (({"speed": 1.0}, 1.875), ({"acceleration": 4.0}, 1.2014)):
+        with pytest.raises(lm.InputError, match=f"at least {least:.3f}"):
+            lm.PositionReference(moves=[move], **limit)
+        lm.PositionReference(moves=[{**move, "duration": 1.001 * least}], **limit)
+    for wrong in ({"moves": [{"to": 1.0, "duration": 1.0}]}, {"law": "parabola"}):
+        with pytest.raises(lm.InputError, match="law"):
+            lm.PositionReference(**wrong)
+
+
+def test_an_inertia_that_is_moved_by_a_law_takes_its_peak_acceleration() -> None:
+    """J C_a D/T^2, with C_a = 5.5280 of the modified sine; the live page draws the same move."""
+    motion = {"moves": [{"to": "90 deg", "duration": "0.4 s", "law": "modified_sine"}]}
+    table = {
+        "shafts": {"table": {"inertia": 0.02, "motion": motion}},
+        "simulation": {"duration": 0.5, "sample_interval": 1e-4},
+    }
+    scenario = lm.Scenario(**table)
+    torque = lm.simulate(scenario)["table_drive_torque"]
+    assert float(np.abs(torque).max()) == pytest.approx(0.02 * 5.528 * math.radians(90.0) / 0.16, rel=3e-4)
+    axis = lm.load("position-axis").replace(**{"controller.reference": {"kind": "position", **motion}})
+    view = reference_view(axis.controller.reference, 1.0)
+    assert view is not None
+    assert view["moves"] is None
+    assert len(view["courses"][0]) == len(axis.controller.reference.pieces())
+
+
+def test_a_timed_move_is_repeated_both_ways_where_settling_is_judged() -> None:
+    move = {"to": "40 deg", "duration": "0.9 s"}
+    reference = {"kind": "position", "dwell": "0.6 s", "law": "modified_sine", "moves": [move]}
+    report = lm.commission(lm.load("position-axis").replace(**{"controller.reference": reference}))
+    assert report.moves is not None
+    spans = report.moves.reference.intervals()
+    assert len(spans) >= 4
+    assert [end - begin for begin, end in spans] == pytest.approx([0.9] * len(spans))

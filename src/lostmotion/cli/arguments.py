@@ -65,6 +65,16 @@ def load_scenario(source: str, overrides: list[str] | None, missing: list[str] |
     return loaded
 
 
+def print_timed_moves(scenario: Scenario) -> None:
+    """Print law and peaks of the moves with a duration."""
+    from ..control.references import MovesReference
+
+    for controller in (scenario.axes() | scenario.continuous()).values():
+        reference = controller.reference
+        for line in reference.timed_moves() if isinstance(reference, MovesReference) else ():
+            print(f"  {line}")
+
+
 def count(text: str) -> int:
     """Reads the value of an option that counts something."""
     if not (text.isascii() and text.isdecimal() and int(text) > 0):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .arguments import Overrides, SourceArgument, load_scenario, number
+from .arguments import Overrides, SourceArgument, load_scenario, number, print_timed_moves
 from .targets import try_file, try_page
 from .terminal import about, busy, conclude, simulating
 
@@ -97,6 +97,7 @@ def run(
     from ..reports.run import summary, verdict_of
 
     print(summary(result))
+    print_timed_moves(loaded)
     if explain is not None:
         from ..simulation.explanation import explain as explain_instant
 

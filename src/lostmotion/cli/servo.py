@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .arguments import FiguresOption, Overrides, SourceArgument, decibels, load_scenario, number, print_bare
+from .arguments import (
+    FiguresOption,
+    Overrides,
+    SourceArgument,
+    decibels,
+    load_scenario,
+    number,
+    print_bare,
+    print_timed_moves,
+)
 from .targets import try_directory, try_file, writing
 from .terminal import about, busy, conclude, console, progress
 
@@ -150,6 +159,7 @@ def servo(
 
             written.append(f"Report written to {write_servo(path, Path(scenario).stem, report, pictures)}")
     _print_summary(loaded.title or Path(scenario).stem, report)
+    print_timed_moves(loaded)
     if tuned is not None:
         _print_tuned(tuned)
     if drive_units:

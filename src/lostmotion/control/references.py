@@ -28,7 +28,9 @@ from ..inputs.quantities import (
 from ..inputs.validation import shown
 from ..model.signals import Breakpoint, Samples, TimeFunction, taylor
 from ..recorded import real
-from ..reproducible import cos, cubic_spline, sin
+from ..reproducible import cbrt, cos, cubic_spline, sin, sqrt
+from ..units.practical import printed
+from .cam_laws import peaks, timed
 from .profiles import Segment, segments
 from .satellites import Satellite
 from .targets import Circle, FlyBy, Star, Track, Weave
@@ -143,10 +145,23 @@ def _table(reference: Reference[Any]) -> np.ndarray:
     return np.array(reference.pieces()).T
 
 
+Law = Literal[
+    "parabola",
+    "least_jerk",
+    "harmonic",
+    "cycloidal",
+    "fifth_order",
+    "seventh_order",
+    "modified_sine",
+    "modified_trapezoid",
+]
+"""laws of `cam_laws`"""
+
+
 class LimitedMove(Part, Generic[V, S, A, J]):
     """From rest at one position to rest at another, in the shortest time that its limits permit.
 
-    Without a limit of the jerk the speed is trapezoidal.
+    Without a limit of the jerk the speed is trapezoidal. With a duration it takes that long, by its law, and must keep its limits.
     """
 
     to: V
@@ -159,6 +174,10 @@ class LimitedMove(Part, Generic[V, S, A, J]):
     """limit; default: the value for all moves"""
     dwell: Annotated[Time, NotNegative] | None = None
     """rest after the move; default: the value for all moves"""
+    duration: Annotated[Time, Positive] | None = None
+    """time of the move, by its law; default: the shortest that its limits permit"""
+    law: Law | None = None
+    """law of VDI 2143 for a move with a duration; default: the law of all moves"""
 
 
 class Move(LimitedMove[Angle, Speed, Acceleration, Jerk]):
@@ -178,6 +197,7 @@ class SlideMove(LimitedMove[Length, LinearSpeed, LinearAcceleration, LinearJerk]
 class MovesReference(Reference[V], Generic[V, S, A, J, M]):
     """A position over time: the sum of all that is given, or a list of moves."""
 
+    unit: ClassVar[str] = "rad"
     start: V = 0.0  # type: ignore[assignment]
     """position before the first move"""
     begin: Annotated[Time, NotNegative] = 0.0
@@ -193,6 +213,8 @@ class MovesReference(Reference[V], Generic[V, S, A, J, M]):
     moves: tuple[M, ...] = ()
     """moves, each from rest to rest"""
     kind: Literal["position"] = "position"
+    law: Law | None = None
+    """law of VDI 2143 for all moves with a duration that have none of their own"""
 
     def _check(self) -> None:
         limits = [key for key in ("speed", "acceleration", "jerk") if getattr(self, key) is not None]
@@ -202,6 +224,7 @@ class MovesReference(Reference[V], Generic[V, S, A, J, M]):
             )
         if not self.moves:
             given = limits + [key for key in ("start", "begin", "dwell") if getattr(self, key) != 0.0]
+            given += [] if self.law is None else ["law"]
             if given:
                 raise ValueError(f"has {given[0]} but no moves; add moves = [{{ to = 1.0 }}], or leave it out")
             return
@@ -209,7 +232,8 @@ class MovesReference(Reference[V], Generic[V, S, A, J, M]):
             raise ValueError(f"has mean = {self.mean:g} and moves between positions; give start in place of mean")
         moves: tuple[Any, ...] = self.moves
         for k, move in enumerate(moves):
-            lacking = [key for key in ("speed", "acceleration") if self._of(move, key) is None]
+            needed = ("speed", "acceleration") if move.duration is None else ("law",)
+            lacking = [key for key in needed if self._of(move, key) is None]
             if lacking:
                 raise ValueError(f"lacks {lacking[0]} of moves[{k}]; give it there, or beside moves for all of them")
         positions = [self.start, *(move.to for move in moves)]
@@ -230,15 +254,47 @@ class MovesReference(Reference[V], Generic[V, S, A, J, M]):
         found: list[list[Segment]] = []
         moves: tuple[Any, ...] = self.moves
         time, origin = self.begin, real(self.start)
-        for move in moves:
+        for k, move in enumerate(moves):
             speed, acceleration, jerk, dwell = (
                 self._of(move, key) for key in ("speed", "acceleration", "jerk", "dwell")
             )
-            own = segments(move.to - origin, speed, acceleration, math.inf if jerk is None else jerk)
+            if move.duration is not None:
+                own = timed(move.to - origin, move.duration, self._of(move, "law"))
+                self._keep_limits(k, own)
+            else:
+                own = segments(move.to - origin, speed, acceleration, math.inf if jerk is None else jerk)
             found.append([(time + t, origin + position, *of_it) for t, position, *of_it in own])  # type: ignore[misc]
             found[-1][-1] = (found[-1][-1][0], move.to, *found[-1][-1][2:])
             time, origin = time + (own[-1][0] + dwell), move.to
         return found
+
+    def _keep_limits(self, k: int, own: list[Segment]) -> None:
+        """Refuse a duration that is too short for the limits of its move."""
+        moves: tuple[Any, ...] = self.moves
+        limits = [self._of(moves[k], key) for key in ("speed", "acceleration", "jerk")]
+        if limits == [None, None, None]:
+            return
+        uses = [0.0 if limit is None else peak / limit for peak, limit in zip(peaks(own), limits, strict=True)]
+        least = max(uses[0], sqrt(uses[1]), cbrt(uses[2])) * moves[k].duration
+        if max(uses) > 1.0 + SHORTEST:
+            n = uses.index(max(uses))
+            key, peak = ("speed", "acceleration", "jerk")[n], uses[n] * limits[n]
+            unit = printed(f"{self.unit}/s^{n + 1}" if n else f"{self.unit}/s")
+            raise ValueError(
+                f"has moves[{k}] with a peak {key} of {peak:.5g} {unit}, above its limit of {limits[n]:.5g} {unit}; "
+                f"give a duration of at least {least:.4g} s, or leave the limit out"
+            )
+
+    def timed_moves(self) -> list[str]:
+        """A line for each move with a duration: its law, and its largest speed and acceleration."""
+        moves: tuple[Any, ...] = self.moves
+        return [
+            f"moves[{k}] in {move.duration:g} s, {self._of(move, 'law')}: peak speed {speed:.4g} {self.unit}/s, "
+            f"acceleration {acceleration:.4g} {self.unit}/s²"
+            for k, (move, own) in enumerate(zip(moves, self._segments(), strict=True))
+            if move.duration is not None
+            for speed, acceleration, _ in [peaks(own)]
+        ]
 
     def _pieces(self) -> list[list[Breakpoint]]:
         if not self.moves:
@@ -293,6 +349,8 @@ class SlideReference(MovesReference[Length, LinearSpeed, LinearAcceleration, Lin
     >>> float(reference.at(1.0)[0])
     0.1
     """
+
+    unit: ClassVar[str] = "m"
 
 
 class SpeedReference(Reference[Speed]):

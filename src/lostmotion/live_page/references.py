@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 from typing import Any
@@ -21,22 +22,30 @@ def reference_view(reference: Reference[Any], duration: float) -> dict[str, Any]
 
     None for what follows a target, which the page cannot change.
     """
-    moves = None
+    moves, timed = None, []
     if isinstance(reference, PositionReference):
         if reference.target is not None:
             return None
-        if reference.moves:
+        if _has_sliders(reference):
             own = ("start", "begin", "speed", "acceleration", "jerk", "dwell")
             moves = {key: getattr(reference, key) for key in own}
-            moves["moves"] = [m.model_dump() for m in reference.moves]
+            moves["moves"] = [m.model_dump(exclude={"duration", "law"}) for m in reference.moves]
+        elif reference.moves:
+            points = reference._pieces()[-1]
+            timed = [[*(p for p, q in itertools.pairwise(points) if p[0] < q[0]), points[-1]]]
     return {
         "mean": reference.mean,
         "sines": reference.sine_list() or [(0.0, 1.0, 0.0)],
         "steps": [(s.height, s.time) for s in reference.steps] or [sliders.no_step(duration)],
         "ramps": [(r.rise, r.duration, r.begin) for r in reference.ramps],
-        "courses": [] if reference.samples is None else [reference.samples.breakpoints()],
+        "courses": [*([] if reference.samples is None else [reference.samples.breakpoints()]), *timed],
         "moves": moves,
     }
+
+
+def _has_sliders(reference: PositionReference) -> bool:
+    """Whether the page can change its moves. It has no laws of moves with a duration, which are drawn as they are."""
+    return bool(reference.moves) and all(move.duration is None for move in reference.moves)
 
 
 def reference_sliders(
@@ -57,7 +66,8 @@ def reference_sliders(
     positions = sliding[1] and reference.kind != "torque"
     unit = of_slides(REFERENCE_UNITS[reference.kind], positions=positions, forces=sliding[0])
     if isinstance(reference, PositionReference) and reference.moves:
-        yield from _of_moves(reference, key, group, number, slides=sliding[1])
+        if _has_sliders(reference):
+            yield from _of_moves(reference, key, group, number, slides=sliding[1])
         return
     if isinstance(reference, PositionReference) and reference.target is not None:
         return

@@ -161,8 +161,10 @@ def _following(axis: Axis, new: AnyMoves) -> Axis:
 
 def _resolved(reference: AnyMoves) -> list[dict[str, float]]:
     """The moves with all that is given beside them."""
-    keys = ("speed", "acceleration", "jerk", "dwell")
-    return [{"to": move.to} | {key: reference._of(move, key) for key in keys} for move in reference.moves]
+    keys = ("speed", "acceleration", "jerk", "dwell", "law")
+    moves: tuple[Any, ...] = reference.moves
+    own = [{"to": move.to, "duration": move.duration} for move in moves]
+    return [given | {key: reference._of(move, key) for key in keys} for given, move in zip(own, moves, strict=True)]
 
 
 def _backward(start: float, there: Sequence[dict[str, float]]) -> list[dict[str, float]]:
