@@ -17,13 +17,10 @@ from ..model.signals import Breakpoint, Samples, Signal, taylor
 from ..reproducible import sin
 from .references import PositionReference, Reference, SlideReference
 
-MAX_STEPS = 4_000_000
-"""microsteps of a run"""
-HALVINGS = 60
-"""of an interval in which a microstep is: an instant to the last digit"""
+MAX_STEPS = 4_000_000  # microsteps of a run
+HALVINGS = 60  # of an interval in which a microstep is: an instant to the last digit
 MOST_MICROSTEPS = 4096
-POINTS_PER_PERIOD = 32
-"""of a sine, between which it is taken to turn once at most"""
+POINTS_PER_PERIOD = 32  # of a sine, between which it is taken to turn once at most
 
 Side = Literal["left", "right"]
 
@@ -137,14 +134,10 @@ class FieldAngle(Signal[Number]):
     """The angle of a stepper's field [rad], as its driver turns it."""
 
     stepping: Stepping
-    turns: float
-    """of the motor, to one of the reference"""
-    step: float
-    """full step [rad]"""
-    start: float
-    """angle at t = 0 [rad]"""
-    until: float
-    """end of the run [s]"""
+    turns: float  #: of the motor, to one of the reference
+    step: float  #: full step [rad]
+    start: float  #: angle at t = 0 [rad]
+    until: float  #: end of the run [s]
 
     def instants(self) -> tuple[np.ndarray, np.ndarray]:
         """Instants at which the field moves, and its number of microsteps from there on."""

@@ -73,8 +73,7 @@ class _PID(Part):
     """share of the reference that the proportional part sees: below 1 steps of the reference overshoot less"""
     derivative_weight: Annotated[Number, Share] = 0.0
     """share of the reference that the derivative part sees: 0 takes the derivative of what is measured alone"""
-    filter_time: Annotated[Time, NotNegative] = 0.0
-    """time constant of the first-order filter of the derivative"""
+    filter_time: Annotated[Time, NotNegative] = 0.0  #: time constant of the first-order filter of the derivative
 
     @property
     def gains(self) -> tuple[float, float, float]:

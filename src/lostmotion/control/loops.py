@@ -21,8 +21,7 @@ from .filters import Filter
 class SampledLoop(Part):
     """A loop with a sample time of its own."""
 
-    sample_time: Annotated[Time, Positive] | None = None
-    """default: the value of the controller"""
+    sample_time: Annotated[Time, Positive] | None = None  #: default: the value of the controller
 
 
 class PositionLoop(SampledLoop, PositionLoopFields):
@@ -100,8 +99,7 @@ class VoltageCommand(Part):
 class FirstOrderCurrent(Part):
     """The torque follows with a time constant, as a tuned current loop does, within the torque-speed line of the motor."""
 
-    time_constant: Annotated[Time, Positive]
-    """with which the torque follows"""
+    time_constant: Annotated[Time, Positive]  #: with which the torque follows
     kind: Literal["first_order"]
 
 

@@ -74,8 +74,7 @@ class Series(Samples[V], Generic[V]):
 class Reference(TimeFunction[V], Generic[V]):
     """The sum of all that is given; a bare number is a constant."""
 
-    samples: Series[V] | None = None
-    """curve through points"""
+    samples: Series[V] | None = None  #: curve through points
     derivatives: ClassVar[int] = 3
 
     @model_validator(mode="after")
@@ -164,20 +163,15 @@ class LimitedMove(Part, Generic[V, S, A, J]):
     Without a limit of the jerk the speed is trapezoidal. With a duration it takes that long, by its law, and must keep its limits.
     """
 
-    to: V
-    """position at its end"""
-    speed: Annotated[S, Positive] | None = None
-    """limit; default: the value for all moves"""
+    to: V  #: position at its end
+    speed: Annotated[S, Positive] | None = None  #: limit; default: the value for all moves
     acceleration: Annotated[A, Positive] | None = None
     """limit, also while it slows down; default: the value for all moves"""
-    jerk: Annotated[J, Positive] | None = None
-    """limit; default: the value for all moves"""
-    dwell: Annotated[Time, NotNegative] | None = None
-    """rest after the move; default: the value for all moves"""
+    jerk: Annotated[J, Positive] | None = None  #: limit; default: the value for all moves
+    dwell: Annotated[Time, NotNegative] | None = None  #: rest after the move; default: the value for all moves
     duration: Annotated[Time, Positive] | None = None
     """time of the move, by its law; default: the shortest that its limits permit"""
-    law: Law | None = None
-    """law of VDI 2143 for a move with a duration; default: the law of all moves"""
+    law: Law | None = None  #: law of VDI 2143 for a move with a duration; default: the law of all moves
 
 
 class Move(LimitedMove[Angle, Speed, Acceleration, Jerk]):
@@ -200,21 +194,15 @@ class MovesReference(Reference[V], Generic[V, S, A, J, M]):
     unit: ClassVar[str] = "rad"
     start: V = 0.0  # type: ignore[assignment]
     """position before the first move"""
-    begin: Annotated[Time, NotNegative] = 0.0
-    """instant at which the first move begins"""
-    speed: Annotated[S, Positive] | None = None
-    """limit of all moves that have none of their own"""
-    acceleration: Annotated[A, Positive] | None = None
-    """limit of all moves that have none of their own"""
+    begin: Annotated[Time, NotNegative] = 0.0  #: instant at which the first move begins
+    speed: Annotated[S, Positive] | None = None  #: limit of all moves that have none of their own
+    acceleration: Annotated[A, Positive] | None = None  #: limit of all moves that have none of their own
     jerk: Annotated[J, Positive] | None = None
     """limit of all moves that have none of their own; without any, their speed is trapezoidal"""
-    dwell: Annotated[Time, NotNegative] = 0.0
-    """rest after each move that has none of its own"""
-    moves: tuple[M, ...] = ()
-    """moves, each from rest to rest"""
+    dwell: Annotated[Time, NotNegative] = 0.0  #: rest after each move that has none of its own
+    moves: tuple[M, ...] = ()  #: moves, each from rest to rest
     kind: Literal["position"] = "position"
-    law: Law | None = None
-    """law of VDI 2143 for all moves with a duration that have none of their own"""
+    law: Law | None = None  #: law of VDI 2143 for all moves with a duration that have none of their own
 
     def _check(self) -> None:
         limits = [key for key in ("speed", "acceleration", "jerk") if getattr(self, key) is not None]

@@ -35,18 +35,12 @@ class Satellite(TargetPath):
     after a day, and more beyond.
     """
 
-    elements: tuple[str, str]
-    """the two lines"""
-    begin: datetime
-    """UTC at t = 0, such as 2024-05-01T20:15:00Z"""
-    latitude: Annotated[Angle, Limit(ge=-0.5 * math.pi, le=0.5 * math.pi)]
-    """latitude of the station, geodetic"""
-    longitude: Angle
-    """east"""
-    altitude: Length = 0.0
-    """above the ellipsoid"""
-    ut1: Annotated[Time, Limit(ge=-1.0, le=1.0)] = 0.0
-    """UT1 - UTC, as the IERS publishes it; a second is 15 arcsec"""
+    elements: tuple[str, str]  #: the two lines
+    begin: datetime  #: UTC at t = 0, such as 2024-05-01T20:15:00Z
+    latitude: Annotated[Angle, Limit(ge=-0.5 * math.pi, le=0.5 * math.pi)]  #: latitude of the station, geodetic
+    longitude: Angle  #: east
+    altitude: Length = 0.0  #: above the ellipsoid
+    ut1: Annotated[Time, Limit(ge=-1.0, le=1.0)] = 0.0  #: UT1 - UTC, as the IERS publishes it; a second is 15 arcsec
     path: Literal["satellite"]
 
     @field_validator("begin")

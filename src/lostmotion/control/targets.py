@@ -69,12 +69,9 @@ def straight(start: np.ndarray | float, rate: float, t: np.ndarray) -> Jet:
 class TargetPath(Part):
     """Path of a target over time, and the axis that follows it."""
 
-    axis: Literal["traverse", "elevation"]
-    """axis that follows the target"""
-    bearing: Angle = 0.0
-    """bearing of the direction y, in which the path is given; it adds to the traverse"""
-    duration: Annotated[Time, Positive] = 60.0
-    """time for which the axis follows; after it the reference stays"""
+    axis: Literal["traverse", "elevation"]  #: axis that follows the target
+    bearing: Angle = 0.0  #: bearing of the direction y, in which the path is given; it adds to the traverse
+    duration: Annotated[Time, Positive] = 60.0  #: time for which the axis follows; after it the reference stays
 
     def position(self, t: np.ndarray) -> tuple[Jet, Jet, Jet]:
         """x, y and z [m] at instants [s]."""
@@ -119,16 +116,11 @@ class TargetPath(Part):
 class Crossing(TargetPath):
     """A straight level path that crosses the bearing at a right angle."""
 
-    distance: Annotated[Length, Positive]
-    """R_0, horizontal, of the point next to the station"""
-    height: Length = 0.0
-    """above the station"""
-    speed: Annotated[LinearSpeed, Positive]
-    """speed along the path"""
-    crossing_time: Annotated[Time, NotNegative]
-    """instant at which it is next to the station"""
-    heading: Literal["right", "left"] = "right"
-    """side to which it flies, as seen from the station"""
+    distance: Annotated[Length, Positive]  #: R_0, horizontal, of the point next to the station
+    height: Length = 0.0  #: above the station
+    speed: Annotated[LinearSpeed, Positive]  #: speed along the path
+    crossing_time: Annotated[Time, NotNegative]  #: instant at which it is next to the station
+    heading: Literal["right", "left"] = "right"  #: side to which it flies, as seen from the station
 
     def position(self, t: np.ndarray) -> tuple[Jet, Jet, Jet]:
         rate = self.speed if self.heading == "right" else -self.speed
@@ -145,10 +137,8 @@ class FlyBy(Crossing):
 class Weave(Crossing):
     """A path past the station that swings to and fro across its course."""
 
-    width: Annotated[Length, Positive]
-    """amplitude of the swing"""
-    frequency: Annotated[Frequency, Positive]
-    """swings in a second"""
+    width: Annotated[Length, Positive]  #: amplitude of the swing
+    frequency: Annotated[Frequency, Positive]  #: swings in a second
     path: Literal["weave"]
 
     @model_validator(mode="after")
@@ -168,13 +158,10 @@ class Weave(Crossing):
 class Circle(TargetPath):
     """A level circle at constant speed."""
 
-    distance: Annotated[Length, NotNegative]
-    """distance of its centre, horizontal, along the bearing"""
+    distance: Annotated[Length, NotNegative]  #: distance of its centre, horizontal, along the bearing
     radius: Annotated[Length, Positive]
-    height: Length = 0.0
-    """above the station"""
-    speed: Annotated[LinearSpeed, Positive]
-    """speed along the circle"""
+    height: Length = 0.0  #: above the station
+    speed: Annotated[LinearSpeed, Positive]  #: speed along the circle
     start: Angle = 0.0
     """starting point on the circle, as an angle from the point farthest along the bearing, to the right"""
     path: Literal["circle"]
@@ -196,12 +183,9 @@ class Track(TargetPath):
 
     times: Annotated[tuple[Annotated[Time, NotNegative], ...], Field(min_length=4)]
     """instants, rising, from 0 to the duration at least"""
-    x: tuple[Length, ...]
-    """to the right of the bearing, at each instant"""
-    y: tuple[Length, ...]
-    """along the bearing, at each instant"""
-    z: tuple[Length, ...]
-    """up, at each instant"""
+    x: tuple[Length, ...]  #: to the right of the bearing, at each instant
+    y: tuple[Length, ...]  #: along the bearing, at each instant
+    z: tuple[Length, ...]  #: up, at each instant
     path: Literal["track"]
 
     @model_validator(mode="after")
@@ -230,14 +214,10 @@ class Track(TargetPath):
 class Star(TargetPath):
     """A direction fixed among the stars, as the earth turns: without refraction. Traverse is the azimuth less the bearing of y."""
 
-    declination: Angle
-    """angle above the plane of the equator"""
-    hour_angle: Angle
-    """at the start, west of the meridian"""
-    latitude: Angle
-    """latitude of the station, north of the equator"""
-    rate: Speed = 7.292115e-05
-    """rate at which the hour angle grows; for the sun 7.2722e-5 rad/s"""
+    declination: Angle  #: angle above the plane of the equator
+    hour_angle: Angle  #: at the start, west of the meridian
+    latitude: Angle  #: latitude of the station, north of the equator
+    rate: Speed = 7.292115e-05  #: rate at which the hour angle grows; for the sun 7.2722e-5 rad/s
     path: Literal["star"]
 
     def position(self, t: np.ndarray) -> tuple[Jet, Jet, Jet]:

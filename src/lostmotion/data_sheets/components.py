@@ -32,12 +32,9 @@ S = TypeVar("S", bound="GearboxSheet | MotorSheet | ActuatorSheet")
 class Conditions(Part):
     """Under which conditions a record is used: keys of `[gearbox]` beside `from`."""
 
-    temperature: Temperature | None = None
-    """temperature of the lubricant; default: the temperature of the data"""
-    added_backlash: Annotated[Angle, NotNegative] = 0.0
-    """wear"""
-    loss_factor: Annotated[Number, Positive] = 1.0
-    """wear"""
+    temperature: Temperature | None = None  #: temperature of the lubricant; default: the temperature of the data
+    added_backlash: Annotated[Angle, NotNegative] = 0.0  #: wear
+    loss_factor: Annotated[Number, Positive] = 1.0  #: wear
 
 
 def gearbox_table(

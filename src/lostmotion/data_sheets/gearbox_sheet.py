@@ -45,12 +45,9 @@ ESTIMATES: dict[str, tuple[tuple[float, LossEstimate], ...]] = {
 class StiffnessData(Part):
     """Torsional stiffness by segments, as manufacturers print it: K1 up to torque T1, K2 up to T2, K3 beyond."""
 
-    slopes: tuple[Annotated[Stiffness, Positive], ...] = Field(min_length=1)
-    """K1, K2, ..."""
-    torques: tuple[Annotated[Torque, Positive], ...] = ()
-    """T1, T2, ...: one fewer"""
-    scatter: Annotated[Number, NotNegative] | None = None
-    """relative, from unit to unit"""
+    slopes: tuple[Annotated[Stiffness, Positive], ...] = Field(min_length=1)  #: K1, K2, ...
+    torques: tuple[Annotated[Torque, Positive], ...] = ()  #: T1, T2, ...: one fewer
+    scatter: Annotated[Number, NotNegative] | None = None  #: relative, from unit to unit
 
     @model_validator(mode="after")
     def _matches(self) -> Self:

@@ -17,8 +17,7 @@ class EfficiencyPoint(Part):
     """Efficiency at one speed and load."""
 
     input_speed: Annotated[Speed, Positive]
-    load: Annotated[Number, Positive] = 1.0
-    """output torque / rated output torque"""
+    load: Annotated[Number, Positive] = 1.0  #: output torque / rated output torque
     efficiency: Efficiency
     temperature: Temperature | None = None
 
@@ -78,28 +77,22 @@ class LossEstimate:
 class LossData(Part):
     """All that a data sheet may say about losses. Torques at the input shaft unless said otherwise."""
 
-    efficiency: tuple[EfficiencyPoint, ...] = ()
-    """while the motor drives"""
+    efficiency: tuple[EfficiencyPoint, ...] = ()  #: while the motor drives
     load_correction: tuple[tuple[Annotated[Number, Positive], Annotated[Number, Positive]], ...] = ()
     """(load, factor on the efficiency at rated load), for manufacturers who print one efficiency and a curve of factors"""
-    backdrive_efficiency: tuple[EfficiencyPoint, ...] = ()
-    """while the load drives"""
+    backdrive_efficiency: tuple[EfficiencyPoint, ...] = ()  #: while the load drives
     no_load_torque: tuple[NoLoadPoint, ...] = ()
-    starting_torque: Annotated[Torque, Positive] | None = None
-    """at the input, breaks the unloaded gearbox loose"""
+    starting_torque: Annotated[Torque, Positive] | None = None  #: at the input, breaks the unloaded gearbox loose
     starting_temperature: Temperature | None = None
     backdriving_torque: Annotated[Torque, Positive] | None = None
     """at the output, breaks the gearbox with a free input loose"""
     backdriving_temperature: Temperature | None = None
-    static_efficiency: Efficiency | None = None
-    """when breaking loose under load, as printed for worm gears"""
-    temperature: Temperature = 20.0
-    """temperature of all data that name no other"""
+    static_efficiency: Efficiency | None = None  #: when breaking loose under load, as printed for worm gears
+    temperature: Temperature = 20.0  #: temperature of all data that name no other
     lubricant: Lubricant | None = None
     static_load_factor: Annotated[Number, Positive] = 1.2
     """load-dependent loss at standstill / that in motion, where no static or back-driving datum says it"""
-    table: LossMap | None = None
-    """a whole loss map, which makes all others superfluous"""
+    table: LossMap | None = None  #: a whole loss map, which makes all others superfluous
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

@@ -55,8 +55,7 @@ class Gap(Remark):
     """A datum that the record lacks."""
 
     datum: str
-    where: str
-    """place to read it"""
+    where: str  #: place to read it
 
 
 class Record(Part):
@@ -65,20 +64,14 @@ class Record(Part):
     name: Annotated[str, BeforeValidator(in_lower_case)] = Field(pattern=r"^[a-z0-9][a-z0-9.-]*$")
     """letters, digits, dots and dashes; capitals are read as small letters"""
     manufacturer: str = ""
-    title: str = ""
-    """name of the product at the manufacturer"""
-    note: Note = NO_NOTE
-    """for readers of results: text, or by the key of the part in a scenario that it is about"""
+    title: str = ""  #: name of the product at the manufacturer
+    note: Note = NO_NOTE  #: for readers of results: text, or by the key of the part in a scenario that it is about
     illustrative: Switch = False
     """no product that can be bought: a filter of the catalogue passes it over unless it asks for its name"""
-    total_mass: Annotated[Mass, Positive] | None = None
-    """mass of the whole component, for the choice"""
-    overall_length: Annotated[Length, Positive] | None = None
-    """along the axis, for the space that it takes"""
-    price: Annotated[Number, Positive] | None = None
-    """in one currency for all sheets that are compared"""
-    lead_time: Annotated[Time, Positive] | None = None
-    """from order to delivery"""
+    total_mass: Annotated[Mass, Positive] | None = None  #: mass of the whole component, for the choice
+    overall_length: Annotated[Length, Positive] | None = None  #: along the axis, for the space that it takes
+    price: Annotated[Number, Positive] | None = None  #: in one currency for all sheets that are compared
+    lead_time: Annotated[Time, Positive] | None = None  #: from order to delivery
     sources: tuple[Source, ...] = ()
     gaps: tuple[Gap, ...] = ()
 

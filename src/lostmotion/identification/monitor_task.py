@@ -16,12 +16,9 @@ Limit = float | str | None
 class Watch(Part):
     """A parameter that is watched."""
 
-    direction: Literal["up", "down", "both"] = "both"
-    """direction of the changes that are of interest"""
-    min: Limit = None
-    """least value without an alarm, SI or text with the unit of the parameter"""
-    max: Limit = None
-    """largest value without an alarm, SI or text with the unit of the parameter"""
+    direction: Literal["up", "down", "both"] = "both"  #: direction of the changes that are of interest
+    min: Limit = None  #: least value without an alarm, SI or text with the unit of the parameter
+    max: Limit = None  #: largest value without an alarm, SI or text with the unit of the parameter
 
 
 class Monitoring(Part):
@@ -33,16 +30,14 @@ class Monitoring(Part):
     """parameters that wear does not change, such as an inertia: they stay at their start values"""
     baseline: Annotated[Whole, Field(ge=5, le=1000)] = 20
     """number of logs at the beginning, in which the drive is as it should be"""
-    model: str = ""
-    """name of the model of the ladder; left out, the last"""
+    model: str = ""  #: name of the model of the ladder; left out, the last
     order: str = ""
     """formula of the header by which logs are in order, such as ``hours``; left out, the order of their names"""
     conditions: tuple[str, ...] = ()
     """formulas of the header on which the values depend, such as ``mean_temperature``: their effect is estimated and taken away"""
     false_alarms: Annotated[Number, Field(gt=0.0, le=0.5)] = 0.01
     """largest probability of a false alarm within as many logs as `within`, all watched values together"""
-    within: Annotated[Whole, Field(ge=10, le=100_000)] = 1000
-    """logs behind the baseline"""
+    within: Annotated[Whole, Field(ge=10, le=100_000)] = 1000  #: logs behind the baseline
 
     @model_validator(mode="after")
     def _watches_what_changes(self) -> Self:

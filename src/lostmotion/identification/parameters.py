@@ -30,24 +30,18 @@ def in_unit(value: Any, unit: str, key: str) -> float | None:
 class FreeParameter(Part):
     """One number that is sought. Values are in SI, or text with a unit."""
 
-    start: Number
-    """from which the search begins; with a prior, its mean"""
-    min: Number = 0.0
-    """least value"""
-    max: Number = math.inf
-    """largest value"""
+    start: Number  #: from which the search begins; with a prior, its mean
+    min: Number = 0.0  #: least value
+    max: Number = math.inf  #: largest value
     unit: str = ""
     """in which results show it, and of the kind of which its texts are; numbers in the file are in SI all the same"""
     scale: Number | None = None
     """a change that matters; left out, a tenth of the start value, or of the range where that is 0"""
     tolerance: Number | None = None
     """with a prior: of the catalogue value `start`, within which it lies with 95 % probability; left out, there is no prior"""
-    off: Number | None = None
-    """value on the rungs of the ladder that do not have it; left out, the start value"""
-    fixed: bool = False
-    """stays at its start value"""
-    logarithmic: bool = False
-    """sought by its logarithm, for what is positive and known to an order of magnitude"""
+    off: Number | None = None  #: value on the rungs of the ladder that do not have it; left out, the start value
+    fixed: bool = False  #: stays at its start value
+    logarithmic: bool = False  #: sought by its logarithm, for what is positive and known to an order of magnitude
 
     model_config = Part.model_config | {"allow_inf_nan": True}
 

@@ -30,8 +30,7 @@ class LogFiles(Part):
 
     files: tuple[str, ...] = Field(min_length=1)
     """names or patterns, relative to the identification file; a directory stands for all logs in it"""
-    time: str = ""
-    """channel of the time, where it is not found by itself"""
+    time: str = ""  #: channel of the time, where it is not found by itself
     decimal: Literal["", ".", ","] = ""
     """decimal separator in text files; left out, a comma only if a file has no other reading, with a note"""
     held_out: FormulaText | None = None
@@ -42,10 +41,8 @@ class LogFiles(Part):
     """further values of the header: 1 where a log has the channel, 0 where it has not"""
     stated: Elements[str] = Field(default_factory=nothing)
     """keys of the header, and the channels that ought to agree with them, such as ``vin = "input_volts"``"""
-    first: Annotated[Time, NotNegative] = 0.0
-    """left out at the beginning of each log"""
-    last: Annotated[Time, Positive] | None = None
-    """after which a log is not used; left out, to its end"""
+    first: Annotated[Time, NotNegative] = 0.0  #: left out at the beginning of each log
+    last: Annotated[Time, Positive] | None = None  #: after which a log is not used; left out, to its end
     weight: FormulaText = 1.0
     """weight of samples, by the header or by channels that switch, such as ``1 + 9*(ramp < 100)``: their errors count as if they were larger
     by that factor"""
@@ -55,24 +52,17 @@ class InputChannel(Part):
     """A channel that acts on the rig."""
 
     channel: str
-    default: Number | None = None
-    """value in logs that lack the channel; left out, such logs are refused"""
-    unit: str = ""
-    """unit of the channel; default: the unit in its file, else SI"""
-    scale: FormulaText = 1.0
-    """factor on it"""
-    offset: FormulaText = 0.0
-    """added to it after the factor: what acts is scale*channel + offset"""
-    delay: FormulaText = 0.0
-    """by which it acts later: dead time [s]"""
+    default: Number | None = None  #: value in logs that lack the channel; left out, such logs are refused
+    unit: str = ""  #: unit of the channel; default: the unit in its file, else SI
+    scale: FormulaText = 1.0  #: factor on it
+    offset: FormulaText = 0.0  #: added to it after the factor: what acts is scale*channel + offset
+    delay: FormulaText = 0.0  #: by which it acts later: dead time [s]
     interpolation: Literal["hold", "linear"] | None = None
     """between samples; left out, held where the channel repeats its values or moves in steps, else the way that is nearer to the logs"""
     rate_limit: FormulaText | None = None
     """largest rate with which the rig follows the channel, such as a firmware's limit of the goal's speed; SI; left out, none"""
-    acceleration_limit: FormulaText | None = None
-    """largest rate of that rate, SI; left out, none"""
-    filter_time: FormulaText = 0.0
-    """time constant of a first-order filter of the channel, before the limits [s]"""
+    acceleration_limit: FormulaText | None = None  #: largest rate of that rate, SI; left out, none
+    filter_time: FormulaText = 0.0  #: time constant of a first-order filter of the channel, before the limits [s]
     smoothing: Annotated[Time, NotNegative] = 0.0
     """smoothing of a measured motion, ``SHAFT_given_speed``: length of the local cubics that smooth it, and differentiate a channel of an angle"""
 
@@ -81,19 +71,14 @@ class MeasuredChannel(Part):
     """A channel that is compared with a result variable: ``scale * variable(t - delay) + offset``, filtered."""
 
     channel: str
-    variable: str
-    """result variable of the rig"""
-    unit: str = ""
-    """unit of the channel; default: the unit in its file, else SI"""
+    variable: str  #: result variable of the rig
+    unit: str = ""  #: unit of the channel; default: the unit in its file, else SI
     scale: FormulaText = 1.0
     offset: FormulaText = 0.0
     """reading of the channel where the variable is 0, SI: the channel is scale*variable + offset, as recorded"""
-    delay: FormulaText = 0.0
-    """from the quantity until its sample [s]"""
-    filter_time: FormulaText = 0.0
-    """time constant of the first-order filter of the channel [s]"""
-    resolution: FormulaText = 0.0
-    """step of its quantisation, SI"""
+    delay: FormulaText = 0.0  #: from the quantity until its sample [s]
+    filter_time: FormulaText = 0.0  #: time constant of the first-order filter of the channel [s]
+    resolution: FormulaText = 0.0  #: step of its quantisation, SI
     deviation: Annotated[Number, Positive] | None = None
     """standard deviation of its errors, SI: the weight against other channels; needed where there are several"""
 
@@ -101,18 +86,15 @@ class MeasuredChannel(Part):
 class Phase(Part):
     """A part of a log in which the rig is another: motor off, brake on."""
 
-    when: FormulaText
-    """condition on the channels of a sample, such as ``torque_enable == 0``"""
-    set: dict[str, Any] = Field(default_factory=dict)
-    """values of the scenario by dotted key"""
+    when: FormulaText  #: condition on the channels of a sample, such as `torque_enable == 0`
+    set: dict[str, Any] = Field(default_factory=dict)  #: values of the scenario by dotted key
 
 
 class Rung(Part):
     """One rung of the ladder of models: that below, and more free parameters."""
 
     name: str
-    free: tuple[str, ...] = ()
-    """parameters, beside those of the rungs below"""
+    free: tuple[str, ...] = ()  #: parameters, beside those of the rungs below
     set: dict[str, Any] = Field(default_factory=dict)
     """values of the scenario by dotted key, beside those of the rungs below"""
     multi_start: Elements[tuple[Number, ...]] = Field(default_factory=nothing)
@@ -126,8 +108,7 @@ class FitOptions(Part):
     """loss of a residual; huber: linear beyond `outlier` standard deviations"""
     outlier: Annotated[Number, Positive] = 1.345
     iterations: Annotated[Whole, Field(ge=1, le=500)] = 30
-    first_logs: Annotated[Whole, Field(ge=1)] = 12
-    """number of logs with which the search begins, before it takes all"""
+    first_logs: Annotated[Whole, Field(ge=1)] = 12  #: number of logs with which the search begins, before it takes all
     leave_out: tuple[str, ...] = ()
     """keys of the header, ``file`` or ``folder``: for each value of one, the model taken is fitted again without the logs that have it, and
     their error is reported"""

@@ -1,4 +1,4 @@
-"""The docstrings of fields, which stand below them in the source."""
+"""The docstrings of fields: below them in the source, or behind ``#:`` on their line."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from functools import cache
 
 
 def docstring_of(cls: type, field: str) -> str | None:
-    """Text below a field where it was last annotated, in the class or the first of its bases."""
+    """Text on a field where it was last annotated, in the class or the first of its bases."""
     owner = next((c for c in cls.__mro__ if field in vars(c).get("__annotations__", {})), None)
     if owner is None:
         return None
@@ -28,20 +28,19 @@ def _docstrings(module: str) -> dict[tuple[str, str], str]:
             if not isinstance(statement, ast.ClassDef):
                 continue
             qualified = f"{path}{statement.name}"
-            for field, below in itertools.pairwise(statement.body):
-                if (
-                    isinstance(field, ast.AnnAssign)
-                    and isinstance(field.target, ast.Name)
-                    and isinstance(below, ast.Expr)
-                    and isinstance(below.value, ast.Constant)
-                    and isinstance(below.value.value, str)
-                ):
-                    found[qualified, field.target.id] = inspect.cleandoc(below.value.value)
+            for field, below in itertools.pairwise([*statement.body, ast.Pass()]):
+                if not (isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)):
+                    continue
+                if comment := lines[(field.end_lineno or 0) - 1].partition("  #: ")[2]:
+                    found[qualified, field.target.id] = comment
+                elif isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant):
+                    found[qualified, field.target.id] = inspect.cleandoc(str(below.value.value))
             visit(statement.body, f"{qualified}.")
 
     try:
         source = inspect.getsource(sys.modules[module])
     except (OSError, TypeError):  # of a notebook, or without sources
         return found
+    lines = source.splitlines()
     visit(ast.parse(source).body, "")
     return found

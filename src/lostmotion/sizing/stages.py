@@ -30,8 +30,7 @@ class RackStage(RackData):
     8000.0
     """
 
-    rated_force: Annotated[Force, Positive] | None = None
-    """along the rack, continuous"""
+    rated_force: Annotated[Force, Positive] | None = None  #: along the rack, continuous
     peak_force: Annotated[Force, Positive] | None = None
 
 
@@ -44,10 +43,8 @@ class BeltStage(BeltData):
     1700.0
     """
 
-    rated_force: Annotated[Force, Positive] | None = None
-    """largest one of the tension members in operation"""
-    tooth_force: Annotated[Force, Positive] | None = None
-    """force that one tooth in mesh carries"""
+    rated_force: Annotated[Force, Positive] | None = None  #: largest one of the tension members in operation
+    tooth_force: Annotated[Force, Positive] | None = None  #: force that one tooth in mesh carries
     pretension: Annotated[Force, Positive] | None = None
     """force of a strand at rest; left out, the largest circumferential force, so that no strand is slack"""
 

@@ -32,8 +32,7 @@ class LinearWinding(Winding):
     With the pole pitch tau the electrical angle is pi x/tau, so that pi/tau stands for the pole pairs.
     """
 
-    pole_pitch: Annotated[Length, Positive]
-    """half of a magnetic period"""
+    pole_pitch: Annotated[Length, Positive]  #: half of a magnetic period
 
     def _check_poles(self) -> None:
         """It has a pitch in place of poles."""

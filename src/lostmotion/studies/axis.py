@@ -55,14 +55,11 @@ REQUIREMENTS = {
 class LinearAxis(Part):
     """Last stage of a linear axis and the slope of its slide."""
 
-    kind: Literal["screw", "rack", "belt"] | None = None
-    """left out where linear motors alone are candidates"""
-    stage: dict[str, Any] = Field(default={})
-    """the table `[screw]`, `[rack]` or `[belt]`, of which a record may vary"""
+    kind: Literal["screw", "rack", "belt"] | None = None  #: left out where linear motors alone are candidates
+    stage: dict[str, Any] = Field(default={})  #: the table `[screw]`, `[rack]` or `[belt]`, of which a record may vary
     guide_friction: Annotated[Number, NotNegative] | None = None
     """friction coefficient of the guide, on which the attraction of a linear motor acts"""
-    rise: Annotated[Number, Limit(ge=-1.0, le=1.0)] = 0.0
-    """sine of the slide's inclination"""
+    rise: Annotated[Number, Limit(ge=-1.0, le=1.0)] = 0.0  #: sine of the slide's inclination
 
     def carrying(self, load: LoadTable, mass: float) -> LoadTable:
         """The load with the weight of a mass [kg] that rides on the slide: along the slope, and on the guide with its friction."""
@@ -81,14 +78,12 @@ class InnerLoop(Part):
 class AxisTask(Task, Duty):
     """Requirements of an axis, beside the motion of its reference."""
 
-    cycle: Annotated[Time, Positive]
-    """after which the motion repeats, pause included"""
+    cycle: Annotated[Time, Positive]  #: after which the motion repeats, pause included
     max_cycles: Annotated[Whole, Field(ge=FEWEST, le=1000)] = 4
     """largest number of cycles to run, until two of them agree within 1 %"""
     max_inertia_ratio: Annotated[Number, Positive] | None = None
     """largest inertia of load, stage and gearbox at the motor relative to the rotor; left out, that of the motor's manufacturer, or else 10"""
-    max_tracking_error: Annotated[Angle, Positive] | None = None
-    """largest tracking error of the load over the cycle"""
+    max_tracking_error: Annotated[Angle, Positive] | None = None  #: largest tracking error of the load over the cycle
     max_reversal_error: Annotated[Angle, Positive] | None = None
     """largest reversal error of the load: mean position at rest after motion in one direction, minus that after the other"""
     settling_window: Annotated[Angle, Positive] | None = None
@@ -97,34 +92,25 @@ class AxisTask(Task, Duty):
     """from the end of the reference's move until the load stays in the window"""
     altitude: Annotated[Length, NotNegative] = 0.0
     """above the sea; the continuous torque of the motor falls by 1 % to each 100 m above 1000 m"""
-    life: Annotated[Time, Positive] | None = None
-    """wanted L10h of gearbox and screw"""
+    life: Annotated[Time, Positive] | None = None  #: wanted L10h of gearbox and screw
     max_mass: Annotated[Mass, Positive] | None = None
     """largest mass of the parts that are records, by their total_mass"""
     max_length: Annotated[Length, Positive] | None = None
     """largest length of motor and gearbox in line, by the overall_length of their records"""
-    max_price: Annotated[Number, Positive] | None = None
-    """largest price of the parts that are records"""
-    max_lead_time: Annotated[Time, Positive] | None = None
-    """latest delivery of a part that is a record"""
+    max_price: Annotated[Number, Positive] | None = None  #: largest price of the parts that are records
+    max_lead_time: Annotated[Time, Positive] | None = None  #: latest delivery of a part that is a record
     emergency_stop: Annotated[Acceleration, Positive] | None = None
     """at which the load is stopped from any speed of the cycle"""
-    radial_force: Annotated[Force, NotNegative] | None = None
-    """on the output bearing of the gearbox"""
-    axial_force: Annotated[Force, NotNegative] | None = None
-    """on the output bearing of the gearbox"""
+    radial_force: Annotated[Force, NotNegative] | None = None  #: on the output bearing of the gearbox
+    axial_force: Annotated[Force, NotNegative] | None = None  #: on the output bearing of the gearbox
     supply: Supply | None = None
-    safety_factors: dict[str, Annotated[Number, Positive]] = Field(default={})
-    """by rule"""
-    current: AnyCurrent | None = None
-    """current loop of `[controller]`; of a torque source a lag in its place"""
+    safety_factors: dict[str, Annotated[Number, Positive]] = Field(default={})  #: by rule
+    current: AnyCurrent | None = None  #: current loop of `[controller]`; of a torque source a lag in its place
     linear: LinearAxis | None = None
     """tables `[slide]` and `[screw]`, `[rack]` or `[belt]`; all values of the load are then in units of translation"""
 
-    whole: dict[str, dict[str, Any]] = Field(default={})
-    """table `[linear_motor]`: values beside its records"""
-    pairs: Switch = True
-    """whether pairs of motor and gearbox are candidates"""
+    whole: dict[str, dict[str, Any]] = Field(default={})  #: table `[linear_motor]`: values beside its records
+    pairs: Switch = True  #: whether pairs of motor and gearbox are candidates
 
     @model_validator(mode="after")
     def _rules_are_known(self) -> Self:

@@ -50,10 +50,8 @@ class Selection(Part):
 
     objectives: dict[str, Direction] = Field(min_length=1)
     """columns, each to be least or largest; the first ranks the runs, the first two make the Pareto plot"""
-    limits: dict[str, Bound] = Field(default={})
-    """columns and their permissible values"""
-    drive_check: Switch = True
-    """each run must also pass the drive check"""
+    limits: dict[str, Bound] = Field(default={})  #: columns and their permissible values
+    drive_check: Switch = True  #: each run must also pass the drive check
 
     def named(self) -> tuple[str, ...]:
         """All columns that it names."""

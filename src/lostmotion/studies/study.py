@@ -46,8 +46,7 @@ class Trajectories(Part):
     """Samples to keep, beside the scalars."""
 
     variables: tuple[str, ...] = Field(min_length=1)
-    every: Annotated[Whole, Field(ge=1)] = 1
-    """one of so many samples"""
+    every: Annotated[Whole, Field(ge=1)] = 1  #: one of so many samples
 
 
 class Study(Part):

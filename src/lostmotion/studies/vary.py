@@ -33,8 +33,7 @@ class Normal(Part):
     """Normal distribution."""
 
     mean: float
-    deviation: Annotated[float, Field(gt=0.0)]
-    """standard deviation"""
+    deviation: Annotated[float, Field(gt=0.0)]  #: standard deviation
 
 
 class Vary(Part):
@@ -44,25 +43,18 @@ class Vary(Part):
     `gears.NAME.gearbox` and `motors.NAME.from`, names of records.
     """
 
-    key: str = ""
-    """dotted key of the scenario, such as load.inertia"""
-    keys: tuple[str, ...] = ()
-    """several keys that all get the value"""
-    name: str = ""
-    """column in the result; the first key if left out"""
-    relative: Switch = False
-    """the value multiplies what the base scenario has (of a list, each entry)"""
-    unit_of_values: str | None = None
-    """SI unit of the values, where the key alone does not say it; of a task"""
+    key: str = ""  #: dotted key of the scenario, such as load.inertia
+    keys: tuple[str, ...] = ()  #: several keys that all get the value
+    name: str = ""  #: column in the result; the first key if left out
+    relative: Switch = False  #: the value multiplies what the base scenario has (of a list, each entry)
+    unit_of_values: str | None = None  #: SI unit of the values, where the key alone does not say it; of a task
     values: tuple[float | str, ...] | None = None
     """values as they are, or names of records; in a random design each is equally likely"""
-    grid: tuple[float, float, int] | None = None
-    """first, last, how many"""
+    grid: tuple[float, float, int] | None = None  #: first, last, how many
     uniform: tuple[float, float] | None = None
     log_uniform: tuple[float, float] | None = None
     normal: Normal | None = None
-    triangular: tuple[float, float, float] | None = None
-    """minimum, mode, maximum"""
+    triangular: tuple[float, float, float] | None = None  #: minimum, mode, maximum
 
     @model_validator(mode="before")
     @classmethod
