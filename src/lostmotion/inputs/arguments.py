@@ -88,14 +88,9 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
 def misfit(function: str, parameters: Iterable[str], given: Iterable[str], problem: str) -> ArgumentError:
     """Error in the names or the number of the arguments of a call.
 
-    Parameters
-    ----------
-    parameters
-        Names of the arguments that the function has.
-    given
-        Names of those that it was given by name.
-    problem
-        What is wrong with the call if all names are known.
+    parameters: names of the arguments that the function has.
+    given: names of those that it was given by name.
+    problem: what is wrong with the call if all names are known.
     """
     known = [name for name in parameters if name != "self"]
     where = f"{function.removesuffix('.__init__')}()"

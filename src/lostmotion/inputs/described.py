@@ -16,21 +16,17 @@ from .part import Part
 from .quantities import Limit, Switch, Whole
 
 V = TypeVar("V")  # the value of a signal, with its unit
-OF_VALUE = "value"
-"""unit of the value of a signal"""
+OF_VALUE = "value"  # unit of the value of a signal
 TYPES = {"pair": "tuple[float, float]", "integer": "int", "flag": "bool", "list": "tuple[float, ...]"}
 
-Row = tuple[Any, ...]
-"""key, kind, symbol, unit, meaning, range, whether it is needed, default, and more"""
+Row = tuple[Any, ...]  # key, kind, symbol, unit, meaning, range, whether it is needed, default, and more
 
 
 class Described(Part):
     """A part whose own parameters the core describes."""
 
-    described: ClassVar[tuple[str, ...]] = ()
-    """keys of these"""
-    core_keys: ClassVar[tuple[str, ...]] = ()
-    """keys of those that the core takes"""
+    described: ClassVar[tuple[str, ...]] = ()  #: keys of these
+    core_keys: ClassVar[tuple[str, ...]] = ()  #: keys of those that the core takes
 
     def core_fields(self) -> dict[str, Any]:
         """Fields for the core, in SI units, without those that are None."""
@@ -86,8 +82,7 @@ def _is_of_value(rows: list[Row]) -> bool:
 
 
 OF_CORE: dict[str, list[Row]] = _core.described_tables(of_core=True)
-TABLES = OF_CORE | _core.described_tables(of_core=False)
-"""rows of the parameters of each part"""
+TABLES = OF_CORE | _core.described_tables(of_core=False)  # rows of the parameters of each part
 
 
 def __getattr__(name: str) -> Any:

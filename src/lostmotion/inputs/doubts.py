@@ -61,14 +61,9 @@ def trusted() -> Iterator[None]:
 def doubt(key: str, value: Any, where: object = "") -> None:
     """Warn of a bare number that no drive has.
 
-    Parameters
-    ----------
-    key
-        Dotted key, whose last part says what it is.
-    value
-        As it was written; text has a unit of its own and is not doubted.
-    where
-        File or function that the warning begins with.
+    key: dotted key, whose last part says what it is.
+    value: as it was written; text has a unit of its own and is not doubted.
+    where: file or function that the warning begins with.
     """
     usual = GAP_OF_SLIDE if OF_SLIDE.fullmatch(key) else LARGEST.get(key.rpartition(".")[2])
     if _TRUSTED.get() or usual is None or not is_number(value) or not abs(value) > usual.most:

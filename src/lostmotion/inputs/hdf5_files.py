@@ -17,19 +17,11 @@ EXPANSION = 1032  # bytes that deflate makes of one, at most
 def datasets(path: Path, file: Any, limit: int = LOG, depth: int = 0) -> dict[str, Any]:
     """Datasets of an open file by their paths, if all of them fit into memory.
 
-    Parameters
-    ----------
-    file
-        ``h5py.File``.
-    limit
-        Default of the memory limit [bytes].
-    depth
-        Levels of groups below the root whose datasets are wanted.
+    file: ``h5py.File``.
+    limit: default of the memory limit [bytes].
+    depth: levels of groups below the root whose datasets are wanted.
 
-    Raises
-    ------
-    InputError
-        The file announces or contains more data than the limit, or refers to other files.
+    Raises InputError: the file announces or contains more data than the limit, or refers to other files.
     """
     found: dict[str, Any] = {}
     _collect(path, file, "", found, depth, set())

@@ -21,10 +21,7 @@ PREFIXES = {"": 1.0, "k": 1e3, "M": 1e6, "G": 1e9, "T": 1e12}
 def size_of(text: str) -> int:
     """Bytes of a size such as ``2 GB`` or ``800 MiB``.
 
-    Raises
-    ------
-    ValueError
-        The text is no size.
+    Raises ValueError: the text is no size.
     """
     match = re.fullmatch(r"\s*([0-9]+(?:\.[0-9]*)?)\s*([kKMGT]?)(i?)B?\s*", text)
     if match is None:
@@ -43,10 +40,7 @@ def shown_size(size: float) -> str:
 def memory_limit(default: int = LOG) -> int:
     """Bytes that one input file may need: ``LOSTMOTION_MEMORY``, else the default.
 
-    Raises
-    ------
-    InputError
-        The variable is no size.
+    Raises InputError: the variable is no size.
     """
     text = os.environ.get(VARIABLE, "")
     try:
@@ -58,14 +52,9 @@ def memory_limit(default: int = LOG) -> int:
 def check_memory(needed: float, what: str, default: int = LOG) -> None:
     """Refuse an input that needs more memory than the limit.
 
-    Parameters
-    ----------
-    needed
-        Bytes.
-    what
-        The input, as the beginning of the message.
-    default
-        Limit where the user gives none [bytes].
+    needed: bytes.
+    what: the input, as the beginning of the message.
+    default: limit where the user gives none [bytes].
     """
     if needed > (limit := memory_limit(default)):
         raise InputError(
@@ -78,19 +67,11 @@ def check_memory(needed: float, what: str, default: int = LOG) -> None:
 def check_free(needed: float, what: str, remedy: str) -> None:
     """Refuse results that do not fit into the memory that is free.
 
-    Parameters
-    ----------
-    needed
-        Bytes.
-    what
-        The results in the plural, as the beginning of the message.
-    remedy
-        Its end.
+    needed: bytes.
+    what: the results in the plural, as the beginning of the message.
+    remedy: its end.
 
-    Raises
-    ------
-    InputError
-        It states the memory that they need and the free memory.
+    Raises InputError: it states the memory that they need and the free memory.
     """
     free = None if needed < ALWAYS_FREE else free_memory()
     if free is not None and needed > free:
@@ -114,14 +95,9 @@ def free_memory() -> int | None:
 def read_text(path: Path, *, per_byte: float = PER_BYTE, default: int = LOG) -> str:
     """Text of a file in UTF-8; devices and files that need more memory than the limit are refused while they are read.
 
-    Parameters
-    ----------
-    path
-        May be a pipe.
-    per_byte
-        Memory that each byte of the text will need in the end.
-    default
-        Limit where the user gives none [bytes].
+    path: may be a pipe.
+    per_byte: memory that each byte of the text will need in the end.
+    default: limit where the user gives none [bytes].
 
     Raises
     ------

@@ -47,8 +47,7 @@ class Named(dict[str, V]):
     clear = pop = popitem = setdefault = update = _refuse
 
 
-Elements = Annotated[dict[str, V], AfterValidator(Named)]
-"""by name, in the order of the equations"""
+Elements = Annotated[dict[str, V], AfterValidator(Named)]  # by name, in the order of the equations
 
 
 def nothing() -> Named[Any]:

@@ -32,17 +32,10 @@ MAX_DEPTH = 100  # parts inside of parts, which functions that call themselves c
 def syntax_tree(text: str, kind: str, remedy: str = "") -> ast.expr:
     """The syntax tree of an expression, not too large to be walked. Nothing of it is run.
 
-    Parameters
-    ----------
-    kind
-        What it is in messages, such as ``"a formula"``.
-    remedy
-        Clause on what to do with one that is too long or nested too deeply.
+    kind: what it is in messages, such as ``"a formula"``.
+    remedy: clause on what to do with one that is too long or nested too deeply.
 
-    Raises
-    ------
-    ValueError
-        It cannot be read, or is too long or nested too deeply.
+    Raises ValueError: it cannot be read, or is too long or nested too deeply.
     """
     remedy = f"; {remedy}" if remedy else ""
     if len(text) > MAX_LENGTH:

@@ -14,8 +14,7 @@ from ..units.conversion import Unit
 from ..units.scalars import is_several
 from .validation import shown
 
-Count = Annotated[int, "above 0"]
-"""a whole number above 0, as the core takes it"""
+Count = Annotated[int, "above 0"]  # a whole number above 0, as the core takes it
 Number = Annotated[float, Unit("")]
 Torque = Annotated[float, Unit("N*m")]
 Inertia = Annotated[float, Unit("kg*m^2")]
@@ -69,8 +68,7 @@ UpToOne = Limit(gt=0.0, le=1.0)
 Share = Limit(ge=0.0, le=1.0)
 
 Temperature = Annotated[float, Unit("degC"), Limit(ge=-273.15)]
-Switch = Annotated[bool, Strict()]
-"""true or false, and not 1 or "yes\""""
+Switch = Annotated[bool, Strict()]  # true or false, and not 1 or "yes"
 
 
 def _no_boolean(value: Any) -> Any:
@@ -79,17 +77,13 @@ def _no_boolean(value: Any) -> Any:
     return value
 
 
-Whole = Annotated[int, BeforeValidator(_no_boolean)]
-"""a whole number"""
+Whole = Annotated[int, BeforeValidator(_no_boolean)]  # a whole number
 
 
 def argument(name: str, value: Any, unit: str) -> float:
     """A number that is given to a function, in `unit` (SI); as a string with its own unit too.
 
-    Raises
-    ------
-    InputError
-        It is no finite number, or has the unit of something else.
+    Raises InputError: it is no finite number, or has the unit of something else.
     """
     try:
         number = Unit(unit).read(value)

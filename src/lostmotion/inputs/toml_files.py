@@ -50,10 +50,7 @@ def in_short(path: Path) -> str:
 def read_toml(path: Path, what: str) -> dict[str, Any]:
     """The contents of a TOML file that is meant to hold `what`.
 
-    Raises
-    ------
-    InputError
-        It cannot be read; the message says why, and what may have been meant.
+    Raises InputError: it cannot be read; the message says why, and what may have been meant.
     """
     if path.suffix in RESULTS and os.path.isfile(path):
         raise InputError(f"{path}: has the ending of a saved result; {what} is a TOML file (.toml)")
@@ -88,10 +85,7 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
 def shallow(data: dict[str, Any]) -> dict[str, Any]:
     """Tables that can be walked by functions that call themselves.
 
-    Raises
-    ------
-    RecursionError
-        They have too many levels.
+    Raises RecursionError: they have too many levels.
     """
     level: list[Any] = [data]
     for _ in range(MAX_LEVELS):

@@ -10,10 +10,7 @@ from typing import Any
 def toml_text(tables: Mapping[str, Any], comment: str = "") -> str:
     """Nested tables as a TOML file; what is None is left out.
 
-    Parameters
-    ----------
-    comment
-        Lines above it.
+    comment: lines above it.
     """
     lines = [f"# {line}".rstrip() for line in comment.splitlines()]
     plain = {k: v for k, v in tables.items() if not isinstance(v, Mapping) and v is not None}

@@ -32,11 +32,9 @@ class Harmonic(described.HarmonicFields):
 class AngleCurve(Part):
     """Straight lines through points over one period; the last leads back to the first."""
 
-    of_value: ClassVar[str] = "errors"
-    """key of the values"""
+    of_value: ClassVar[str] = "errors"  #: key of the values
 
-    period: Annotated[Angle, Positive] = 2.0 * math.pi
-    """left out, one turn of the shaft"""
+    period: Annotated[Angle, Positive] = 2.0 * math.pi  #: left out, one turn of the shaft
     angles: Annotated[tuple[Annotated[Angle, NotNegative], ...], Field(min_length=2, max_length=1000)]
     """rising from 0, below the period"""
     kind: Literal["curve"] = "curve"

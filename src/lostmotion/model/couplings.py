@@ -17,23 +17,17 @@ FULL_COMMAND = 1.0 + 1e-9
 class BetweenShafts(Part):
     """Base of the elements that join two shafts."""
 
-    holds: ClassVar[bool] = True
-    """whether it may hold them at one speed"""
-    strikes: ClassVar[bool] = False
-    """whether its parts strike each other"""
-    input: str
-    """shaft"""
-    output: str
-    """shaft"""
+    holds: ClassVar[bool] = True  #: whether it may hold them at one speed
+    strikes: ClassVar[bool] = False  #: whether its parts strike each other
+    input: str  #: shaft
+    output: str  #: shaft
 
 
 class Commanded(CommandedFields):
     """Dry friction with a capacity that its command applies, with the delays of a data sheet."""
 
-    engagement_delay: Annotated[Time, NotNegative] = 0.0
-    """from a step up of the command until it acts"""
-    release_delay: Annotated[Time, NotNegative] = 0.0
-    """from a step down of the command until it acts"""
+    engagement_delay: Annotated[Time, NotNegative] = 0.0  #: from a step up of the command until it acts
+    release_delay: Annotated[Time, NotNegative] = 0.0  #: from a step down of the command until it acts
 
     def acting(self, command: Signal[Number]) -> Signal[Number]:
         """The command as it acts, after the delays.

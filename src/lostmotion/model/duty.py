@@ -36,12 +36,9 @@ class ArmGravity(Part):
     11.768
     """
 
-    mass: Annotated[Mass, Positive]
-    """mass of the body"""
-    radius: Annotated[Length, Positive]
-    """distance of its centre of gravity from the axis"""
-    hanging: Angle = 0.0
-    """position at which it hangs straight down; a quarter of a turn on, the arm is level"""
+    mass: Annotated[Mass, Positive]  #: mass of the body
+    radius: Annotated[Length, Positive]  #: distance of its centre of gravity from the axis
+    hanging: Angle = 0.0  #: position at which it hangs straight down; a quarter of a turn on, the arm is level
 
     def torque(
         self, position: np.ndarray | float, mass: float | None = None, radius: float | None = None
@@ -54,16 +51,12 @@ class ArmGravity(Part):
 class Payload(Part):
     """A body that the load carries during a part of the cycle."""
 
-    begin: Annotated[Time, NotNegative]
-    """instant from which it is carried"""
-    end: Annotated[Time, Positive]
-    """instant at which it is set down"""
-    mass: Annotated[Mass, NotNegative] = 0.0
-    """mass of the body"""
+    begin: Annotated[Time, NotNegative]  #: instant from which it is carried
+    end: Annotated[Time, Positive]  #: instant at which it is set down
+    mass: Annotated[Mass, NotNegative] = 0.0  #: mass of the body
     radius: Annotated[Length, Positive] | None = None
     """distance of its centre of gravity from the axis of a rotary load"""
-    inertia: Annotated[Inertia, NotNegative] = 0.0
-    """about its own centre of gravity, of a rotary load"""
+    inertia: Annotated[Inertia, NotNegative] = 0.0  #: about its own centre of gravity, of a rotary load
 
     @model_validator(mode="after")
     def _lasts(self) -> Self:
@@ -86,14 +79,11 @@ class Process(Part):
     """A torque or a force against the motion in the positive direction, over time or over the position. It follows
     straight lines through points, and is constant before the first and after the last."""
 
-    times: Annotated[tuple[Annotated[Time, NotNegative], ...], Field(min_length=2)] | None = None
-    """instants, rising"""
+    times: Annotated[tuple[Annotated[Time, NotNegative], ...], Field(min_length=2)] | None = None  #: instants, rising
     positions: Annotated[tuple[Angle, ...], Field(min_length=2)] | None = None
     """positions of the load, in place of times"""
-    torques: tuple[Torque, ...] | None = None
-    """on a rotary load"""
-    forces: tuple[Force, ...] | None = None
-    """on a slide"""
+    torques: tuple[Torque, ...] | None = None  #: on a rotary load
+    forces: tuple[Force, ...] | None = None  #: on a slide
 
     @model_validator(mode="after")
     def _is_a_curve(self) -> Self:
@@ -126,8 +116,7 @@ class Process(Part):
 class Duty(Part):
     """Gravity, payloads and process forces on the load, beside the values of `[load]` or `[slide]`."""
 
-    gravity: ArmGravity | None = None
-    """weight of an arm, of a rotary load"""
+    gravity: ArmGravity | None = None  #: weight of an arm, of a rotary load
     payload: tuple[Payload, ...] = ()
     process: tuple[Process, ...] = ()
 
@@ -145,10 +134,7 @@ class Duty(Part):
     def torque(self, time: np.ndarray, position: np.ndarray, rise: float | None) -> np.ndarray:
         """Torque to hold the load over its motion [N·m], of a slide force [N].
 
-        Parameters
-        ----------
-        rise
-            Sine of the slope of a slide; None for a rotary load.
+        rise: sine of the slope of a slide; None for a rotary load.
         """
         found = np.zeros_like(time)
         if self.gravity is not None:
@@ -171,14 +157,11 @@ class Duty(Part):
 class HoldingBrake(Part):
     """Brake on the shaft of the motor, or on a slide."""
 
-    torque: Annotated[Torque, Positive] | None = None
-    """static, that it holds"""
-    inertia: Annotated[Inertia, NotNegative] = 0.0
-    """inertia of the brake, on the shaft of the motor"""
+    torque: Annotated[Torque, Positive] | None = None  #: static, that it holds
+    inertia: Annotated[Inertia, NotNegative] = 0.0  #: inertia of the brake, on the shaft of the motor
     force: Annotated[Force, Positive] | None = None
     """static, of a brake on the slide of a linear axis, in place of torque"""
-    of_the_motor: Switch = False
-    """the brake that is built into the record of the motor"""
+    of_the_motor: Switch = False  #: the brake that is built into the record of the motor
 
     @model_validator(mode="after")
     def _holds_something(self) -> Self:
@@ -194,14 +177,11 @@ class HoldingBrake(Part):
 class Amplifier(Part):
     """Amplifier that feeds the motor. Currents of a motor with a winding are effective values of a phase."""
 
-    continuous_current: Annotated[Current, Positive]
-    """rms over the cycle, of a synchronous motor in a phase"""
+    continuous_current: Annotated[Current, Positive]  #: rms over the cycle, of a synchronous motor in a phase
     peak_current: Annotated[Current, Positive] | None = None
     """largest current, of a synchronous motor as effective value"""
-    peak_time: Annotated[Time, Positive] | None = None
-    """longest time above the continuous current"""
-    max_dc_voltage: Annotated[Voltage, Positive] | None = None
-    """largest voltage of the DC bus"""
+    peak_time: Annotated[Time, Positive] | None = None  #: longest time above the continuous current
+    max_dc_voltage: Annotated[Voltage, Positive] | None = None  #: largest voltage of the DC bus
 
     @model_validator(mode="after")
     def _peak_is_above(self) -> Self:
@@ -213,16 +193,13 @@ class Amplifier(Part):
 class Bus(Part):
     """DC bus that feeds motors, and takes what they return."""
 
-    max_voltage: Annotated[Voltage, Positive] | None = None
-    """largest voltage of the bus before energy returns to it"""
+    max_voltage: Annotated[Voltage, Positive] | None = None  #: largest voltage of the bus before energy returns to it
     voltage_limit: Annotated[Voltage, Positive] | None = None
     """largest voltage that the bus may reach; with a brake resistor the voltage at which it is switched on"""
-    capacitance: Annotated[float, Unit("A*s/V"), Positive] | None = None
-    """capacitance of the bus"""
+    capacitance: Annotated[float, Unit("A*s/V"), Positive] | None = None  #: capacitance of the bus
     brake_resistance: Annotated[Resistance, Positive] | None = None
     """resistance of the brake resistor, which is switched on at voltage_limit"""
-    brake_power: Annotated[Power, Positive] | None = None
-    """continuous power of the brake resistor"""
+    brake_power: Annotated[Power, Positive] | None = None  #: continuous power of the brake resistor
     returns_to_mains: Switch = False
     """the energy goes back to the mains, or a battery takes it: neither capacitors nor resistor are judged"""
 

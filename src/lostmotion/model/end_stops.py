@@ -6,8 +6,7 @@ from pydantic import model_validator
 
 from ..inputs import described
 
-END_STOP = "_end_stop"
-"""behind the name of a shaft or slide: the name of its stops in the core"""
+END_STOP = "_end_stop"  # behind the name of a shaft or slide: the name of its stops in the core
 
 
 def _check(stops: Any, unit: str) -> None:

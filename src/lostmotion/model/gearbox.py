@@ -18,16 +18,12 @@ from .torsion import Hysteresis, LinearStiffness, Rigid, TorsionCurve
 class GearboxLoads(Part):
     """Torques and speeds that a gearbox may have."""
 
-    average_output_torque: Annotated[Torque, Positive] | None = None
-    """for the mean over a duty cycle"""
-    peak_output_torque: Annotated[Torque, Positive] | None = None
-    """repeated, as in acceleration"""
-    momentary_output_torque: Annotated[Torque, Positive] | None = None
-    """in an emergency stop"""
+    average_output_torque: Annotated[Torque, Positive] | None = None  #: for the mean over a duty cycle
+    peak_output_torque: Annotated[Torque, Positive] | None = None  #: repeated, as in acceleration
+    momentary_output_torque: Annotated[Torque, Positive] | None = None  #: in an emergency stop
     average_input_speed: Annotated[Speed, Positive] | None = None
     """for the mean over a duty cycle; the drive check takes the rated speed where it is left out"""
-    max_input_speed: Annotated[Speed, Positive] | None = None
-    """largest speed of the input shaft"""
+    max_input_speed: Annotated[Speed, Positive] | None = None  #: largest speed of the input shaft
 
 
 class GearboxLimits(GearboxLoads):

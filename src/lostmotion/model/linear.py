@@ -81,33 +81,24 @@ PitchError = Annotated[PitchHarmonic | PitchCurve, Field(discriminator="kind")]
 class LinearDrive(Part):
     """Base of screws, racks and belts: losses, compliance, backlash, pitch error, and the values of the input shaft."""
 
-    efficiency: Annotated[Number, UpToOne] | None = None
-    """while the input drives; left out, none is lost"""
+    efficiency: Annotated[Number, UpToOne] | None = None  #: while the input drives; left out, none is lost
     backdriving_efficiency: Annotated[Number, Limit(le=1.0)] | None = None
     """while the slide drives; 0 or less: self-locking; left out, 2 - 1/efficiency, which loses the same share of the force"""
     stiffness: Annotated[SlideStiffness, Positive] | None = None
     """axial, at the slide, of all that is in series; left out, rigid"""
-    backlash: Annotated[Length, NotNegative] = 0.0
-    """whole axial play at the slide"""
+    backlash: Annotated[Length, NotNegative] = 0.0  #: whole axial play at the slide
     restitution: Annotated[Number, Share] | None = None
     """speed at which rigid flanks part over that at which they strike; needed with backlash and no stiffness"""
-    preload: Annotated[Force, NotNegative] = 0.0
-    """removes the segments of stiffness_curve below it"""
-    damping: Annotated[float, Unit("N*s/m"), NotNegative] = 0.0
-    """at the slide, while the flanks touch"""
-    inertia: Annotated[Inertia, NotNegative] = 0.0
-    """inertia of all that turns with the input shaft"""
-    viscous_friction: Annotated[ViscousFriction, NotNegative] = 0.0
-    """on the input shaft"""
-    drag_torque: Annotated[Torque, NotNegative] = 0.0
-    """dry friction on the input shaft, for example by the preload"""
-    stiffness_curve: StiffnessCurve | None = None
-    """force over deflection, in place of stiffness"""
+    preload: Annotated[Force, NotNegative] = 0.0  #: removes the segments of stiffness_curve below it
+    damping: Annotated[float, Unit("N*s/m"), NotNegative] = 0.0  #: at the slide, while the flanks touch
+    inertia: Annotated[Inertia, NotNegative] = 0.0  #: inertia of all that turns with the input shaft
+    viscous_friction: Annotated[ViscousFriction, NotNegative] = 0.0  #: on the input shaft
+    drag_torque: Annotated[Torque, NotNegative] = 0.0  #: dry friction on the input shaft, for example by the preload
+    stiffness_curve: StiffnessCurve | None = None  #: force over deflection, in place of stiffness
     hysteresis: Hysteresis | None = None
     pitch_error: PitchError | None = None
     """e over the angle of the input shaft, at the slide: deflection = input angle/ratio - position - e"""
-    note: Note = NO_NOTE
-    """for readers of the results: text, or by the key that it is about"""
+    note: Note = NO_NOTE  #: for readers of the results: text, or by the key that it is about
 
     _note_is_about_a_key = field_validator("note")(classmethod(note_is_about))
 
@@ -360,10 +351,8 @@ class RatedScrew(ScrewData):
 class Placed(Part):
     """Base of what turns into a straight line, with the names of its shaft and its slide."""
 
-    input: str
-    """shaft"""
-    output: str
-    """slide"""
+    input: str  #: shaft
+    output: str  #: slide
 
 
 class Screw(RatedScrew, Placed):

@@ -22,28 +22,20 @@ class LinearMotorData(Part):
     (200.0, 600.0)
     """
 
-    mass: Annotated[Mass, NotNegative] = 0.0
-    """mass of the part that moves"""
-    rated_force: Annotated[Force, Positive] | None = None
-    """force at command 1"""
-    peak_force: Annotated[Force, Positive] | None = None
-    """at which the force ends; left out, without limit"""
+    mass: Annotated[Mass, NotNegative] = 0.0  #: mass of the part that moves
+    rated_force: Annotated[Force, Positive] | None = None  #: force at command 1
+    peak_force: Annotated[Force, Positive] | None = None  #: at which the force ends; left out, without limit
     force_constant: Annotated[float, Unit("N/A"), Positive] | None = None
     """force to the current in the unit of the currents"""
-    rated_current: Annotated[Current, Positive] | None = None
-    """with force_constant, in place of rated_force"""
-    peak_current: Annotated[Current, Positive] | None = None
-    """with force_constant, in place of peak_force"""
-    friction_force: Annotated[Force, NotNegative] = 0.0
-    """dry friction"""
-    cogging_force: Annotated[Force, Positive] | None = None
-    """amplitude, over the position with the period pole_pitch"""
+    rated_current: Annotated[Current, Positive] | None = None  #: with force_constant, in place of rated_force
+    peak_current: Annotated[Current, Positive] | None = None  #: with force_constant, in place of peak_force
+    friction_force: Annotated[Force, NotNegative] = 0.0  #: dry friction
+    cogging_force: Annotated[Force, Positive] | None = None  #: amplitude, over the position with the period pole_pitch
     cogging_error: Annotated[Force, Positive] | None = None
     """by which the straight lines depart from the sine of the cogging at most; left out, 0.1 % of cogging_force"""
     pole_pitch: Annotated[Length, Positive] | None = None
     """tau, from a north pole to the next south pole: half a magnetic period"""
-    note: Note = NO_NOTE
-    """for readers of the results: text, or by the key that it is about"""
+    note: Note = NO_NOTE  #: for readers of the results: text, or by the key that it is about
 
     _note_is_about_a_key = field_validator("note")(classmethod(note_is_about))
 

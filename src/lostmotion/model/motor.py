@@ -30,8 +30,7 @@ from ..units.practical import practical
 from .notes import NO_NOTE, Note, note_is_about
 from .synchronous_motor import PhaseValues, Winding
 
-MotorLaw = tuple[tuple[str, Any], ...]
-"""fields of a motor that a current loop replaces"""
+MotorLaw = tuple[tuple[str, Any], ...]  # fields of a motor that a current loop replaces
 
 
 class MotorHeat(Part):
@@ -39,16 +38,13 @@ class MotorHeat(Part):
 
     thermal_resistance: Annotated[ThermalResistance, Positive] | None = None
     """winding to ambient, in place of its two parts"""
-    thermal_resistance_winding_case: Annotated[ThermalResistance, Positive] | None = None
-    """winding to case"""
-    thermal_resistance_case_ambient: Annotated[ThermalResistance, Positive] | None = None
-    """case to ambient"""
+    thermal_resistance_winding_case: Annotated[ThermalResistance, Positive] | None = None  #: winding to case
+    thermal_resistance_case_ambient: Annotated[ThermalResistance, Positive] | None = None  #: case to ambient
     thermal_time_constant_winding: Annotated[Time, Positive] | None = None
     """time constant of the winding against a case of constant temperature"""
     thermal_time_constant_motor: Annotated[Time, Positive] | None = None
     """time constant of the case against the ambient"""
-    max_winding_temperature: Temperature | None = None
-    """largest temperature of the winding"""
+    max_winding_temperature: Temperature | None = None  #: largest temperature of the winding
 
 
 class MotorLimits(MotorHeat):

@@ -9,8 +9,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, Field
 
 from ..inputs.named import Named
 
-WHOLE = "general"
-"""key of a note that is about no single key of its part"""
+WHOLE = "general"  # key of a note that is about no single key of its part
 
 
 class Notes(Named[str]):

@@ -19,14 +19,10 @@ class RackData(LinearDrive):
     0.12566370614359174
     """
 
-    module: Annotated[Length, Positive] | None = None
-    """normal module"""
-    teeth: Annotated[Whole, Field(ge=4, le=1000)] | None = None
-    """teeth of the pinion"""
-    helix_angle: Annotated[Angle, Limit(ge=0.0, le=0.25 * math.pi)] | None = None
-    """left out, 0: straight teeth"""
-    travel_per_turn: Annotated[Length, Positive] | None = None
-    """in place of module and teeth"""
+    module: Annotated[Length, Positive] | None = None  #: normal module
+    teeth: Annotated[Whole, Field(ge=4, le=1000)] | None = None  #: teeth of the pinion
+    helix_angle: Annotated[Angle, Limit(ge=0.0, le=0.25 * math.pi)] | None = None  #: left out, 0: straight teeth
+    travel_per_turn: Annotated[Length, Positive] | None = None  #: in place of module and teeth
 
     @model_validator(mode="after")
     def _is_a_rack(self) -> Self:
@@ -50,14 +46,10 @@ class BeltData(LinearDrive):
     2666666.6666666665
     """
 
-    pulley_diameter: Annotated[Length, Positive] | None = None
-    """at the belt's pitch line"""
-    teeth: Annotated[Whole, Field(ge=4, le=1000)] | None = None
-    """teeth of the pulley"""
-    pitch: Annotated[Length, Positive] | None = None
-    """pitch of the belt"""
-    travel_per_turn: Annotated[Length, Positive] | None = None
-    """in place of both"""
+    pulley_diameter: Annotated[Length, Positive] | None = None  #: at the belt's pitch line
+    teeth: Annotated[Whole, Field(ge=4, le=1000)] | None = None  #: teeth of the pulley
+    pitch: Annotated[Length, Positive] | None = None  #: pitch of the belt
+    travel_per_turn: Annotated[Length, Positive] | None = None  #: in place of both
     specific_stiffness: Annotated[Force, Positive] | None = None
     """c_sp, force to unit strain: with free_lengths, in place of stiffness"""
     free_lengths: Annotated[tuple[Annotated[Length, Positive], ...], Field(min_length=1, max_length=10)] | None = None

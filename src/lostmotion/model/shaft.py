@@ -31,10 +31,7 @@ def check_points(speeds: tuple[float, ...], torques: tuple[float, ...], what: st
 def check_friction(part: Any, force: str, unit: str) -> None:
     """Refuse dry friction that is stated twice or rises when a shaft or slide breaks away.
 
-    Parameters
-    ----------
-    force
-        In the keys of the part: `torque` or `force`, in the unit given.
+    force: in the keys of the part: `torque` or `force`, in the unit given.
     """
     slipping, breakaway = getattr(part, f"friction_{force}"), getattr(part, f"breakaway_{force}")
     if part.friction_curve is not None:
@@ -185,8 +182,7 @@ class WithDrag(Part):
 class Stopped(Part):
     """A shaft that end stops hold."""
 
-    end_stops: ShaftEndStops | None = None
-    """stops at both ends of the travel"""
+    end_stops: ShaftEndStops | None = None  #: stops at both ends of the travel
 
 
 class Shaft(WithDrag, described.DryFrictionFields, Stopped, described.ShaftFields):

@@ -48,10 +48,8 @@ class Sine(described.SineFields[V], Generic[V]):
 class Step(Part, Generic[V]):
     """Adds `height` from `time` on."""
 
-    height: V
-    """height that it adds"""
-    time: Annotated[Time, NotNegative] = 0.0
-    """instant from which it adds its height"""
+    height: V  #: height that it adds
+    time: Annotated[Time, NotNegative] = 0.0  #: instant from which it adds its height
 
     def breakpoints(self) -> list[Breakpoint]:
         return [(self.time, real(self.height), 0.0)]
@@ -60,12 +58,9 @@ class Step(Part, Generic[V]):
 class Ramp(Part, Generic[V]):
     """Rises by `rise` in a straight line within `duration`, from `begin` on, and stays there."""
 
-    rise: V
-    """height that it adds from its end on"""
-    duration: Annotated[Time, Positive]
-    """time that it takes"""
-    begin: Annotated[Time, NotNegative] = 0.0
-    """instant at which it begins"""
+    rise: V  #: height that it adds from its end on
+    duration: Annotated[Time, Positive]  #: time that it takes
+    begin: Annotated[Time, NotNegative] = 0.0  #: instant at which it begins
 
     def breakpoints(self) -> list[Breakpoint]:
         rise = real(self.rise)
@@ -79,18 +74,12 @@ class Chirp(Part, Generic[V]):
     highest: 0.12 % with 64 points.
     """
 
-    amplitude: V
-    """amplitude of the sine"""
-    begin_frequency: Annotated[Frequency, Positive]
-    """frequency at its begin"""
-    end_frequency: Annotated[Frequency, Positive]
-    """frequency at its end"""
-    duration: Annotated[Time, Positive]
-    """time from its begin to its end"""
-    begin: Annotated[Time, NotNegative] = 0.0
-    """instant at which it begins"""
-    points_per_period: Annotated[Whole, Field(ge=8, le=1000)] = 64
-    """straight lines in the shortest period"""
+    amplitude: V  #: amplitude of the sine
+    begin_frequency: Annotated[Frequency, Positive]  #: frequency at its begin
+    end_frequency: Annotated[Frequency, Positive]  #: frequency at its end
+    duration: Annotated[Time, Positive]  #: time from its begin to its end
+    begin: Annotated[Time, NotNegative] = 0.0  #: instant at which it begins
+    points_per_period: Annotated[Whole, Field(ge=8, le=1000)] = 64  #: straight lines in the shortest period
 
     def breakpoints(self) -> list[Breakpoint]:
         fastest = max(self.begin_frequency, self.end_frequency)
@@ -110,10 +99,8 @@ class Samples(Part, Generic[V]):
     ``time [ms],torque [Nm]`` gives other units.
     """
 
-    times: tuple[Time, ...]
-    """instants, rising from 0 or later"""
-    values: tuple[V, ...]
-    """value at each instant"""
+    times: tuple[Time, ...]  #: instants, rising from 0 or later
+    values: tuple[V, ...]  #: value at each instant
 
     @model_validator(mode="after")
     def _fit_together(self) -> Self:
@@ -142,18 +129,12 @@ class TimeFunction(Part, Generic[V]):
 
     mean: V = 0.0  # type: ignore[assignment]
     """constant part"""
-    amplitude: V | None = None
-    """amplitude of one sine, with frequency and phase"""
-    frequency: Annotated[Frequency, Positive] | None = None
-    """frequency of that sine"""
-    phase: Angle = 0.0
-    """phase of that sine at t = 0"""
-    sines: tuple[Sine[V], ...] = ()
-    """more sines"""
-    steps: tuple[Step[V], ...] = ()
-    """steps, each from an instant on"""
-    ramps: tuple[Ramp[V], ...] = ()
-    """straight lines in time, each with a begin and an end"""
+    amplitude: V | None = None  #: amplitude of one sine, with frequency and phase
+    frequency: Annotated[Frequency, Positive] | None = None  #: frequency of that sine
+    phase: Angle = 0.0  #: phase of that sine at t = 0
+    sines: tuple[Sine[V], ...] = ()  #: more sines
+    steps: tuple[Step[V], ...] = ()  #: steps, each from an instant on
+    ramps: tuple[Ramp[V], ...] = ()  #: straight lines in time, each with a begin and an end
     derivatives: ClassVar[int] = 1
     """derivatives, beside the value, that change at breakpoints; all higher ones are 0 between them"""
 
@@ -208,10 +189,8 @@ class TimeFunction(Part, Generic[V]):
 class Signal(TimeFunction[V], Generic[V]):
     """The sum of all that is given; a bare number is a constant."""
 
-    chirp: Chirp[V] | None = None
-    """sine whose frequency runs from one value to another"""
-    samples: Samples[V] | None = None
-    """straight lines through points"""
+    chirp: Chirp[V] | None = None  #: sine whose frequency runs from one value to another
+    samples: Samples[V] | None = None  #: straight lines through points
 
     def _pieces(self) -> list[list[Breakpoint]]:
         parts: list[Chirp[V] | Samples[V] | None] = [self.chirp, self.samples]
@@ -224,10 +203,7 @@ class Signal(TimeFunction[V], Generic[V]):
     def delayed(self, up: float, down: float) -> Self:
         """The same signal whose steps up act later by `up` [s], those down by `down` [s].
 
-        Raises
-        ------
-        ValueError
-            It is not made of a mean and steps, or a step would act before the one that precedes it.
+        Raises ValueError: it is not made of a mean and steps, or a step would act before the one that precedes it.
         """
         if up == 0.0 == down:
             return self

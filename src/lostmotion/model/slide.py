@@ -27,14 +27,11 @@ class ForceCurve(described.ForceCurveFields):
 class Movable(Part):
     """A mass that moves along a straight line, without its friction."""
 
-    mass: Annotated[Mass, NotNegative] = 0.0
-    """mass of all that moves, without masses of linear motors"""
-    viscous_friction: Annotated[float, Unit("N*s/m"), NotNegative] = 0.0
-    """against the frame"""
+    mass: Annotated[Mass, NotNegative] = 0.0  #: mass of all that moves, without masses of linear motors
+    viscous_friction: Annotated[float, Unit("N*s/m"), NotNegative] = 0.0  #: against the frame
     inclination: Annotated[Angle, Limit(ge=-0.5 * math.pi, le=0.5 * math.pi)] = 0.0
     """inclination of the positive direction above the horizontal; 90 deg: vertical, positive upwards. The weight's share along the slide acts against it"""
-    end_stops: EndStops | None = None
-    """stops at both ends of the travel"""
+    end_stops: EndStops | None = None  #: stops at both ends of the travel
 
 
 class Slide(described.SlideFrictionFields, Movable):

@@ -45,10 +45,8 @@ class Forms(NamedTuple):
 
     question: str
     unit: str
-    common: str
-    """form to which all others are converted"""
-    factors: dict[str, float]
-    """key of a form: the common value to one of it"""
+    common: str  # form to which all others are converted
+    factors: dict[str, float]  # key of a form: the common value to one of it
 
 
 PHASE_OR_LINES = "between two terminals or of one phase"

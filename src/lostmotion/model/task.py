@@ -12,15 +12,12 @@ class Task(Part):
 
     cycle: Annotated[Time, Positive] | None = None
     """period after which the motion of the run repeats, pause included; left out, it repeats without a pause"""
-    ambient_temperature: Temperature = 25.0
-    """temperature of the surroundings"""
+    ambient_temperature: Temperature = 25.0  #: temperature of the surroundings
     max_lost_motion: Annotated[Angle, Positive] | None = None
     """largest permissible lost motion at 3 % of the rated torque, total at the output"""
     hold_without_power: Switch = True
     """whether the load must stay at rest against its torque with command 0; false where a brake or a controller holds it"""
-    supply: Bus | None = None
-    """DC bus that feeds all motors, and takes what they return"""
-    amplifier: Amplifier | None = None
-    """amplifier that feeds the motor, also as the name of a record; for one motor"""
+    supply: Bus | None = None  #: DC bus that feeds all motors, and takes what they return
+    amplifier: Amplifier | None = None  #: amplifier that feeds the motor, also as the name of a record; for one motor
     brake: HoldingBrake | None = None
     """holding brake on the motor, also as the name of a record, or "of the motor"; or on the slide, with a force"""

@@ -54,10 +54,7 @@ class Elastic(Part):
     def pieces(self) -> tuple[list[float], list[float]]:
         """(breaks [rad], slopes [N·m/rad]) of one direction, for what takes both as the same.
 
-        Raises
-        ------
-        InputError
-            They are not.
+        Raises InputError: they are not.
         """
         curve = self.core()
         if not curve.odd:

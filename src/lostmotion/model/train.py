@@ -48,10 +48,7 @@ class TrainElements(Part):
     def check(self, core: _core.Train) -> None:
         """Refuse a train that was made of these tables and cannot move, or whose motion is not determined.
 
-        Raises
-        ------
-        InputError
-            With the key of the element, what is wrong with it, and the remedy.
+        Raises InputError: with the key of the element, what is wrong with it, and the remedy.
         """
         if fault := core.check():
             table, name, reason = fault

@@ -33,14 +33,10 @@ class Wind(Part):
     the spectrum up to ``max_frequency``, in every realisation. Between its points, ``1/(points_per_period max_frequency)`` apart, it is straight.
     """
 
-    duration: Annotated[Time, Positive]
-    """D, after which it is constant; its lowest frequency is 1/D"""
-    max_frequency: Annotated[Frequency, Positive]
-    """highest frequency of its lines"""
-    points_per_period: Annotated[Whole, Field(ge=4, le=100)] = 16
-    """straight lines in the shortest period"""
-    seed: Annotated[Whole, Field(ge=0, le=2**53)] = 0
-    """number of the realisation"""
+    duration: Annotated[Time, Positive]  #: D, after which it is constant; its lowest frequency is 1/D
+    max_frequency: Annotated[Frequency, Positive]  #: highest frequency of its lines
+    points_per_period: Annotated[Whole, Field(ge=4, le=100)] = 16  #: straight lines in the shortest period
+    seed: Annotated[Whole, Field(ge=0, le=2**53)] = 0  #: number of the realisation
 
     def spectrum(self, frequency: np.ndarray) -> np.ndarray:
         """S, one-sided [(N m)^2/Hz], at frequencies above 0 [Hz]."""
@@ -87,10 +83,8 @@ class Wind(Part):
 class WindOfTable(Wind):
     """A measured spectrum, linear in the logarithms of frequency and density between its points, zero outside."""
 
-    frequencies: Annotated[tuple[Annotated[Frequency, Positive], ...], Field(min_length=2)]
-    """rising"""
-    densities: tuple[Annotated[float, Unit("N^2*m^2/Hz"), Positive], ...]
-    """one-sided [(N·m)²/Hz], at each frequency"""
+    frequencies: Annotated[tuple[Annotated[Frequency, Positive], ...], Field(min_length=2)]  #: rising
+    densities: tuple[Annotated[float, Unit("N^2*m^2/Hz"), Positive], ...]  #: one-sided [(N·m)²/Hz], at each frequency
     kind: Literal["table"]
 
     @model_validator(mode="after")
@@ -115,16 +109,11 @@ class WindOnArea(Wind):
     The gusts over the area are taken as one.
     """
 
-    speed: Annotated[LinearSpeed, Positive]
-    """V, mean over ten minutes, at the height of the load"""
-    drag_coefficient: Annotated[Number, Positive]
-    """c of the area"""
-    area: Annotated[float, Unit("m^2"), Positive]
-    """A on which the wind presses"""
-    lever: Length
-    """r of the centre of pressure from the axis, against the motion forward"""
-    density: Annotated[float, Unit("kg/m^3"), Positive] = 1.225
-    """rho of the air"""
+    speed: Annotated[LinearSpeed, Positive]  #: V, mean over ten minutes, at the height of the load
+    drag_coefficient: Annotated[Number, Positive]  #: c of the area
+    area: Annotated[float, Unit("m^2"), Positive]  #: A on which the wind presses
+    lever: Length  #: r of the centre of pressure from the axis, against the motion forward
+    density: Annotated[float, Unit("kg/m^3"), Positive] = 1.225  #: rho of the air
 
     def gusts(self, frequency: np.ndarray) -> np.ndarray:
         """S_v, one-sided [(m/s)²/Hz]."""
@@ -143,8 +132,7 @@ class Davenport(WindOnArea):
 
     surface_drag: Annotated[Number, Limit(gt=0.0, le=0.1)] = 0.005
     """K = u*^2/V_10^2; 0.005 open country, 0.015 suburbs, 0.05 cities"""
-    speed_at_10_m: Annotated[LinearSpeed, Positive] | None = None
-    """V_10; default: the value at the load"""
+    speed_at_10_m: Annotated[LinearSpeed, Positive] | None = None  #: V_10; default: the value at the load
     kind: Literal["davenport"]
 
     def gusts(self, frequency: np.ndarray) -> np.ndarray:
@@ -157,10 +145,8 @@ class Davenport(WindOnArea):
 class VonKarman(WindOnArea):
     """f S_v/sigma^2 = 4 x/(1 + 70.8 x^2)^(5/6), x = f L/V (von Karman 1948)."""
 
-    turbulence: Annotated[Number, UpToOne]
-    """sigma/V"""
-    length_scale: Annotated[Length, Positive]
-    """L, along the wind"""
+    turbulence: Annotated[Number, UpToOne]  #: sigma/V
+    length_scale: Annotated[Length, Positive]  #: L, along the wind
     kind: Literal["von_karman"]
 
     def gusts(self, frequency: np.ndarray) -> np.ndarray:
@@ -174,10 +160,8 @@ class VonKarman(WindOnArea):
 class Kaimal(WindOnArea):
     """f S_v/u*^2 = 105 x/(1 + 33 x)^(5/3), x = f z/V, u* = 0.4 V/log(z/z_0) (Kaimal et al. 1972)."""
 
-    height: Annotated[Length, Positive]
-    """z above ground"""
-    roughness_length: Annotated[Length, NotNegative] = 0.03
-    """z_0; 0.03 m open country"""
+    height: Annotated[Length, Positive]  #: z above ground
+    roughness_length: Annotated[Length, NotNegative] = 0.03  #: z_0; 0.03 m open country
     kind: Literal["kaimal"]
 
     @model_validator(mode="after")

@@ -16,19 +16,11 @@ CHECKOUT = Path(__file__).parents[3]
 def made_here(target: str, made: Iterable[Path], what: str) -> None:
     """Compile in a checkout what is missing there, or older than the sources of the core. An installed package has it already.
 
-    Parameters
-    ----------
-    target
-        Of the Makefile.
-    made
-        The files, as far as they exist.
-    what
-        What they are, for the line that announces it.
+    target: of the Makefile.
+    made: the files, as far as they exist.
+    what: what they are, for the line that announces it.
 
-    Raises
-    ------
-    InputError
-        The compilation failed.
+    Raises InputError: the compilation failed.
     """
     if not (CHECKOUT / "Makefile").is_file() or not (CHECKOUT / "core" / "kernels").is_dir():
         return

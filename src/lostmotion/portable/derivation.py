@@ -21,8 +21,7 @@ Numbers = Callable[[Scenario], np.ndarray]
 
 # Not of the motion: when it is read, and what was asked of the drive.
 _OTHERS = ("simulation", "task", "title")
-FROM_ZERO = 0.25
-"""what a value of 0 is changed to, to see whether it may be another alone"""
+FROM_ZERO = 0.25  # what a value of 0 is changed to, to see whether it may be another alone
 
 
 @dataclass(frozen=True)
@@ -32,8 +31,7 @@ class Parameter:
     key: str
     unit: str
     value: float
-    limit: Limit
-    """the range of its value in scenario files"""
+    limit: Limit  # the range of its value in scenario files
     meaning: str = ""
 
     def core(self) -> dict[str, Any]:
@@ -48,12 +46,10 @@ class Derivation:
     """The parameters of a scenario, and the formulas by which its numbers follow from them."""
 
     parameters: tuple[Parameter, ...] = ()
-    formulas: tuple[tuple[str, int, int, float], ...] = ()
-    """law, formulas or parameter that it takes, constant"""
+    formulas: tuple[tuple[str, int, int, float], ...] = ()  # law, formulas or parameter that it takes, constant
     conditions: tuple[tuple[str, int, int, bool], ...] = ()
     """comparison of two formulas, and its outcome, for which the formulas hold"""
-    results: tuple[tuple[int, int], ...] = ()
-    """place among the numbers, and formula"""
+    results: tuple[tuple[int, int], ...] = ()  # place among the numbers, and formula
 
     def core(self) -> dict[str, list[dict[str, Any]]]:
         """The formulas as `write_description` of the core takes them."""
@@ -68,12 +64,8 @@ class Derivation:
 def derivation_of(scenario: Scenario, numbers: Numbers, without: Callable[[str], bool] | None = None) -> Derivation:
     """The values of a scenario that can be changed in its numbers, and what follows from them.
 
-    Parameters
-    ----------
-    numbers
-        Gives those of a scenario.
-    without
-        Whether a key is to be left out.
+    numbers: gives those of a scenario.
+    without: whether a key is to be left out.
     """
     values = {
         key: value

@@ -24,8 +24,7 @@ FIRST_INPUT, FIRST_INPUT_RATE, FIRST_OUTPUT, FIRST_STATE, FIRST_DERIVATIVE, FIRS
     1_000_000,
 )
 
-TOLERANCE = "1e-8"
-"""relative, of integrators in Model Exchange"""
+TOLERANCE = "1e-8"  # relative, of integrators in Model Exchange
 
 # Powers of kg, m, s, A, K, rad.
 _BASE = {
@@ -65,10 +64,8 @@ class Declared:
     name: str
     unit: str
     meaning: str
-    size: float
-    """largest magnitude in a run of the scenario, 0 if it is not known"""
-    discrete: bool = False
-    """whether it changes at events alone"""
+    size: float  # largest magnitude in a run of the scenario, 0 if it is not known
+    discrete: bool = False  # whether it changes at events alone
 
     @property
     def decade(self) -> int:
@@ -90,25 +87,18 @@ class Model:
     duration: float
     step: float
     inputs: list[Declared]
-    starts: list[float]
-    """values of the inputs at t = 0"""
+    starts: list[float]  # values of the inputs at t = 0
     outputs: list[Declared]
-    states: list[Declared]
-    """states of Model Exchange; empty: the FMU is for Co-Simulation alone"""
-    state_starts: list[float]
-    """values of the states at t = 0"""
-    indicators: int
-    """number of event indicators"""
+    states: list[Declared]  # states of Model Exchange; empty: the FMU is for Co-Simulation alone
+    state_starts: list[float]  # values of the states at t = 0
+    indicators: int  # number of event indicators
     parameters: list[Parameter]
-    references_given: bool
-    """whether the references of sampled controllers are inputs"""
-    positions: Mapping[str, str]
-    """shafts whose position is an input, the last of these, with its variable"""
+    references_given: bool  # whether the references of sampled controllers are inputs
+    positions: Mapping[str, str]  # shafts whose position is an input, the last of these, with its variable
     dependencies: Mapping[str, list[str]]
     """inputs and states that outputs and derivatives, as ``der(NAME)``, depend on at once; what is left out may depend on all"""
     note: str
-    identifier: str = "lostmotion"
-    """model identifier"""
+    identifier: str = "lostmotion"  # model identifier
     has_sources: bool = False
 
     def names(self) -> str:
@@ -133,10 +123,7 @@ def rate_unit(unit: str) -> str:
 def add_units(root: ET.Element, model: Model, *, input_rates: bool) -> None:
     """The units of all variables, as FMI 2 and 3 have them.
 
-    Parameters
-    ----------
-    input_rates
-        Whether the time derivatives of the inputs are variables too.
+    input_rates: whether the time derivatives of the inputs are variables too.
     """
     units = (
         {v.unit for v in (*model.inputs, *model.outputs, *model.states)} | {p.unit for p in model.parameters} | {"s"}

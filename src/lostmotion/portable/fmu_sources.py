@@ -11,8 +11,7 @@ import numpy as np
 from ..errors import InputError
 from .fmu_model import document
 
-SOURCES = ("solving.cpp", "model.cpp", "fmi.cpp", "resources.cpp")
-"""the files to compile"""
+SOURCES = ("solving.cpp", "model.cpp", "fmi.cpp", "resources.cpp")  # the files to compile
 _LANGUAGE = "C++20"
 _CMAKE = """# Compiles the FMU for this machine: cmake -S sources -B build && cmake --build build
 cmake_minimum_required(VERSION 3.18)
@@ -39,23 +38,13 @@ def source_files(
 ) -> Iterator[tuple[str, str]]:
     """Names and contents of the files in sources/.
 
-    Parameters
-    ----------
-    directory
-        What bindings/fmu/sources.py has written.
-    fmi
-        Version of the standard, 2 or 3.
-    kernel
-        Kernel that the scenario needs.
-    identifier
-        Model identifier, the prefix of all functions.
-    description, names
-        The resources scenario.bin and names.txt.
+    directory: what bindings/fmu/sources.py has written.
+    fmi: version of the standard, 2 or 3.
+    kernel: kernel that the scenario needs.
+    identifier: model identifier, the prefix of all functions.
+    description, names: the resources scenario.bin and names.txt.
 
-    Raises
-    ------
-    InputError
-        This installation has no sources.
+    Raises InputError: this installation has no sources.
     """
     listed = directory / "names.txt"
     if not listed.is_file():

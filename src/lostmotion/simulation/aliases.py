@@ -43,8 +43,7 @@ _AXIS = {
 class Form:
     """A form of files."""
 
-    keys: tuple[tuple[str, str], ...]
-    """keys of the long form, and what they are called"""
+    keys: tuple[tuple[str, str], ...]  # keys of the long form, and what they are called
     back: tuple[tuple[str, str], ...]
     """keys of what is kept of it, and of the tables that a scenario is read from again"""
 

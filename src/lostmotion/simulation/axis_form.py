@@ -27,10 +27,7 @@ def is_axis(tables: Mapping[str, Any]) -> bool:
 def long_form(tables: Mapping[str, Any]) -> dict[str, Any]:
     """The same tables in the long form.
 
-    Raises
-    ------
-    InputError
-        A table is missing, or is none of this form.
+    Raises InputError: a table is missing, or is none of this form.
     """
     kind = _kind_of(tables)
     table: dict[str, dict[str, Any]] = {
@@ -64,10 +61,7 @@ def long_form(tables: Mapping[str, Any]) -> dict[str, Any]:
 def _kind_of(tables: Mapping[str, Any]) -> str:
     """Kind of what moves the slide: screw, rack or belt.
 
-    Raises
-    ------
-    InputError
-        A table is missing, or is none of this form.
+    Raises InputError: a table is missing, or is none of this form.
     """
     for key in tables:
         if key not in ("axis", *BESIDE):
@@ -102,10 +96,7 @@ def _kind_of(tables: Mapping[str, Any]) -> str:
 def _carrying(slide: dict[str, Any], payload: dict[str, Any] | None) -> dict[str, Any]:
     """The slide with the mass of its payload.
 
-    Raises
-    ------
-    InputError
-        The payload has no mass, or something else.
+    Raises InputError: the payload has no mass, or something else.
     """
     if payload is None:
         return slide

@@ -10,8 +10,7 @@ from ..errors import InputError
 from .aliases import GEARBOX, LOAD, MOTOR
 from .drive_tables import DriveTables
 
-OF_SHAFT = ("speed", "motion", "end_stops")
-"""of the load, which drive trains alone have"""
+OF_SHAFT = ("speed", "motion", "end_stops")  # of the load, which drive trains alone have
 
 
 def is_short(tables: Mapping[str, Any]) -> bool:
@@ -22,10 +21,7 @@ def is_short(tables: Mapping[str, Any]) -> bool:
 def long_form(tables: Mapping[str, Any]) -> dict[str, Any]:
     """The same tables in the long form, for what only drive trains have.
 
-    Raises
-    ------
-    InputError
-        A value cannot be used.
+    Raises InputError: a value cannot be used.
     """
     continuous, of_shaft, strikes = _continuous(tables), _of_shaft(tables), _strikes(tables)
     if continuous:

@@ -29,8 +29,7 @@ from .train_tables import ShaftTable, TrainInitial, TrainTables
 class LoadTable(Load):
     """The driven body and the disturbance torque on it."""
 
-    torque: TorqueSignal = TorqueSignal()
-    """M_Z"""
+    torque: TorqueSignal = TorqueSignal()  #: M_Z
 
 
 class Initial(Part):

@@ -20,26 +20,17 @@ LONG = 0.2  # of the duration: stretches without a change of the inputs that are
 class Forecast(NamedTuple):
     """Estimated time of a run if it continues as it begins."""
 
-    seconds: float
-    """[s] of processor time"""
-    part: float
-    """[s] of motion up to the last part that was tried"""
-    switchings: int
-    """in that time"""
+    seconds: float  # [s] of processor time
+    part: float  # [s] of motion up to the last part that was tried
+    switchings: int  # in that time
 
 
 def forecast(scenario: Scenario, tolerance: float = 0.0) -> Forecast:
     """Estimate the length of a run. That takes a fiftieth of its time, or some tenths of a second.
 
-    Parameters
-    ----------
-    tolerance
-        Relative one of the adaptive solver; 0: the exact solver.
+    tolerance: relative one of the adaptive solver; 0: the exact solver.
 
-    Raises
-    ------
-    SolverError
-        The motion has no continuation.
+    Raises SolverError: the motion has no continuation.
     """
     control = scenario.control({})
 

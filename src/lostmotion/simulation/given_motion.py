@@ -38,10 +38,7 @@ class MotionDerivative(Signal[Number]):
 def check_continuous(reference: PositionReference | SlideReference, unit: str) -> None:
     """Refuse a position that jumps, or whose speed does.
 
-    Parameters
-    ----------
-    unit
-        Of the position.
+    unit: of the position.
 
     Raises
     ------
@@ -62,15 +59,9 @@ def check_continuous(reference: PositionReference | SlideReference, unit: str) -
 def motion_given(name: str, values: Any, units: Mapping[str, str] = UNITS) -> dict[str, float]:
     """Given motion at the end of a step, in SI.
 
-    Parameters
-    ----------
-    units
-        Of what may be given: those of a shaft, or of a slide.
+    units: of what may be given: those of a shaft, or of a slide.
 
-    Raises
-    ------
-    InputError
-        There is no speed among it, or something else.
+    Raises InputError: there is no speed among it, or something else.
     """
     check_motion(f"motion.{name}", values, units)
     return {key: argument(f"motion.{name}.{key}", value, units[key]) for key, value in values.items()}
@@ -79,10 +70,7 @@ def motion_given(name: str, values: Any, units: Mapping[str, str] = UNITS) -> di
 def check_motion(where: str, values: Any, units: Mapping[str, str] = UNITS) -> None:
     """Refuse what names no motion.
 
-    Raises
-    ------
-    InputError
-        There is no speed among it, or something else.
+    Raises InputError: there is no speed among it, or something else.
     """
     if not isinstance(values, Mapping):
         raise InputError(

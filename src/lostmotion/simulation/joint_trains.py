@@ -29,18 +29,13 @@ Driven = Drive | Scenario | DriveTrain
 class JointDrive:
     """A drive that turns a joint."""
 
-    name: str
-    """name of the joint"""
-    drive: Scenario
-    """with the inertia of the load that the multibody engine has given it"""
+    name: str  # name of the joint
+    drive: Scenario  # with the inertia of the load that the multibody engine has given it
     simulation: Simulation = field(repr=False)
     train: DriveTrain = field(repr=False)
-    shaft: str
-    """shaft whose angle is that of the joint"""
-    command: int | None
-    """place of the command among the inputs of the solver; None: a controller turns the motor"""
-    command_scale: float
-    """from what `step` is given to the command"""
+    shaft: str  # shaft whose angle is that of the joint
+    command: int | None  # place of the command among the inputs of the solver; None: a controller turns the motor
+    command_scale: float  # from what `step` is given to the command
 
     @property
     def mesh_frequency(self) -> float:
@@ -102,10 +97,7 @@ class JointDrive:
 
         Gears hand the torque on without losses: at rest these leave open how much of it each carries.
 
-        Raises
-        ------
-        InputError
-            The train is no chain of gears.
+        Raises InputError: the train is no chain of gears.
         """
         twists: dict[str, float] = {}
         capacities: dict[str, float] = {}
@@ -203,10 +195,7 @@ def output_of(name: str, train: DriveTrain) -> str:
 class JointTrains:
     """Drives that turn joints which an inertia matrix joins.
 
-    Parameters
-    ----------
-    drives
-        One for each joint.
+    drives: one for each joint.
 
     Notes
     -----
@@ -304,10 +293,7 @@ class JointTrains:
             By the number of a joint the torque [N·m] that keeps it at rest, which its gear and its own springs give, with the
             hysteresis that such a torque leaves.
 
-        Raises
-        ------
-        InputError
-            A train that is no chain of gears is held.
+        Raises InputError: a train that is no chain of gears is held.
         """
         for k, drive in enumerate(self.drives):
             carried = held[k] - drive.own_torque(angles[k]) if k in held else 0.0

@@ -45,8 +45,7 @@ _FIRST = tuple(
         r"(motor|motors\.[^.]+)\.rated_voltage",
     )
 )
-CHANGES_OTHERS = _FIRST[-1]
-"""of these a number, with which other values change"""
+CHANGES_OTHERS = _FIRST[-1]  # of these a number, with which other values change
 _SIGNALS = re.compile(r"command|load\.torque")
 _OFF_DIAGONAL = re.compile(r"(mass_matrices\.[^.]+\.matrix)\.(\d+)\.(\d+)")
 _TRAIN_SIGNALS = re.compile(r"command\.[^.]+|shafts\.[^.]+\.torque|slides\.[^.]+\.force")
@@ -153,10 +152,7 @@ def _changed(node: Any, keys: list[str], value: Any, where: str, signals: re.Pat
 def list_index(entries: Sequence[Any], part: str) -> int:
     """The index that a part of a dotted key names, such as 0 in ``command.ramps.0.rise``.
 
-    Raises
-    ------
-    ValueError
-        There is no such entry.
+    Raises ValueError: there is no such entry.
     """
     if not (part.isascii() and part.isdigit()):
         raise ValueError(f"{part!r} is no index; entries of a list are numbered from 0")
@@ -169,10 +165,7 @@ def list_index(entries: Sequence[Any], part: str) -> int:
 def renamed(key: str, names: Mapping[str, str]) -> str:
     """A dotted key in which a table, or a value, has another name.
 
-    Parameters
-    ----------
-    names
-        By the dotted keys that are replaced, the first that fits.
+    names: by the dotted keys that are replaced, the first that fits.
     """
     for old, new in names.items():
         if key == old or key.startswith(f"{old}."):

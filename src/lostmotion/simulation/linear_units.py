@@ -27,15 +27,9 @@ LOST_MOTION = "max_lost_motion"
 def in_si(data: Mapping[str, Any], schema: Callable[[], Mapping[str, Any]]) -> dict[str, Any]:
     """The tables of a train with the strings of controllers of slides as numbers in SI.
 
-    Parameters
-    ----------
-    schema
-        Of the tables, which says the unit of each key for a shaft.
+    schema: of the tables, which says the unit of each key for a shaft.
 
-    Raises
-    ------
-    InputError
-        A value has the unit of something else.
+    Raises InputError: a value has the unit of something else.
     """
     slides, controllers = data.get("slides"), data.get("controllers")
     if not isinstance(slides, Mapping) or not slides:
@@ -85,12 +79,8 @@ def _unit_of_mass(shafts: Sequence[str], a: int, b: int, slides: Mapping[str, An
 def unit_of_slides(data: Mapping[str, Any], key: str, unit: str) -> str:
     """The unit of a key for the slides of the tables of a train.
 
-    Parameters
-    ----------
-    key
-        Dotted, such as ``controllers.motor.reference.moves.0.to``.
-    unit
-        That it has for shafts.
+    key: dotted, such as ``controllers.motor.reference.moves.0.to``.
+    unit: that it has for shafts.
     """
     table, _, rest = key.partition(".")
     if data.get("slides") and key == f"task.{LOST_MOTION}":

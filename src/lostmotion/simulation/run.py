@@ -227,10 +227,7 @@ def whole_run(scenario: Scenario, how: str, control: Bound, options: Options) ->
 def check_memory(samples: int, width: float) -> None:
     """Refuse a run whose samples, `width` bytes each, do not fit into the memory that is free.
 
-    Raises
-    ------
-    InputError
-        It says what they need and what there is.
+    Raises InputError: it says what they need and what there is.
     """
     check_free(
         samples * width,

@@ -35,10 +35,7 @@ CHANGED, MORE, MOST_KEYS = "; changed: ", ", ...", 3  # keys in a title
 def find_scenario(name: str | Path, directory: Path = Path()) -> Path:
     """The file that is meant: a path relative to `directory`, or the name of a shipped scenario.
 
-    Raises
-    ------
-    InputError
-        It is neither; the message names what is near.
+    Raises InputError: it is neither; the message names what is near.
     """
     path = directory / name
     shipped = shipped_scenarios() if len(Path(name).parts) == 1 else {}
@@ -59,10 +56,7 @@ def find_scenario(name: str | Path, directory: Path = Path()) -> Path:
 def find_base(base: str, path: Path) -> Path:
     """The file that the key `base` of another file means.
 
-    Raises
-    ------
-    InputError
-        There is none.
+    Raises InputError: there is none.
     """
     with prefixed(f"{path}: key base"):
         found = find_scenario(base, path.parent)
@@ -94,10 +88,7 @@ def load(path: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) ->
 def changed(tables: dict[str, Any], path: Path) -> Scenario:
     """The scenario of the tables of a file, in the short or the long form. The file's name stands in messages.
 
-    Raises
-    ------
-    InputError
-        With one line that names the file, the key, the value and the remedy.
+    Raises InputError: with one line that names the file, the key, the value and the remedy.
     """
     with prefixed(path):
         return Scenario(**tables)
@@ -220,17 +211,10 @@ def read_series_files(
 ) -> None:
     """Puts the points of `samples.file`, a CSV file beside the scenario or task of a path, in its place.
 
-    Parameters
-    ----------
-    units_at
-        SI units that values may have at keys, with the kind of each table that says it, which its units may depend on.
-    keys, kinds
-        The keys of `data`, without and with those kinds.
+    units_at: SI units that values may have at keys, with the kind of each table that says it, which its units may depend on.
+    keys, kinds: the keys of `data`, without and with those kinds.
 
-    Raises
-    ------
-    InputError
-        A file cannot be used.
+    Raises InputError: a file cannot be used.
     """
     for key, value in data.items():
         if not isinstance(value, dict):

@@ -34,19 +34,11 @@ def write_changed(
     The comments and the order of the file are kept. The written file is read again and compared with the scenario. If
     the changes cannot be made in the file, or the source is a saved result, the whole scenario is written instead.
 
-    Parameters
-    ----------
-    source
-        That the scenario was loaded from.
-    changes
-        New values by dotted key; None removes a key.
-    notes
-        Lines of the comment at the top.
+    source: that the scenario was loaded from.
+    changes: new values by dotted key; None removes a key.
+    notes: lines of the comment at the top.
 
-    Raises
-    ------
-    InputError
-        The file cannot be written; nothing is left behind.
+    Raises InputError: the file cannot be written; nothing is left behind.
     """
     texts = []
     changes = {**changes, **({"title": scenario.title} if CHANGED in scenario.title else {})}
@@ -73,10 +65,7 @@ def write_changed(
 def changed_text(source: Path, changes: Mapping[str, Any], target: Path, notes: list[str], inline: bool = False) -> str:
     """The text of a scenario file with some values changed, for a file at another place.
 
-    Parameters
-    ----------
-    inline
-        Whether tables that are new stand on one line, as they must among dotted keys.
+    inline: whether tables that are new stand on one line, as they must among dotted keys.
     """
     document = tomlkit.parse(source.read_text(encoding="utf-8"))
     new: list[Any] = []

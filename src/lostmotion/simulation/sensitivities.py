@@ -42,25 +42,17 @@ ENDS_AT, ENDS_BY = "sensitivities_end_at", "sensitivities_end_by"
 class Neighbour:
     """A scenario at another value of a parameter."""
 
-    offset: float
-    """offset of the value [SI unit]"""
-    weight: float
-    """df/dp = sum of weight (f - f at the value itself)"""
+    offset: float  # offset of the value [SI unit]
+    weight: float  # df/dp = sum of weight (f - f at the value itself)
     scenario: Scenario
 
 
 def value_at(scenario: Scenario, key: str, function: str = "sensitivities") -> float:
     """The number under a dotted key; 0 where a start or a command is left out.
 
-    Parameters
-    ----------
-    function
-        That needs it, for messages.
+    function: that needs it, for messages.
 
-    Raises
-    ------
-    InputError
-        There is not a number.
+    Raises InputError: there is not a number.
     """
     value = _entry_at(scenario, key)
     if value is None and key.partition(".")[0] in ("initial", "command"):
@@ -92,10 +84,7 @@ def _entry_at(scenario: Scenario, key: str) -> Any:
 def neighbours(scenario: Scenario, key: str) -> list[Neighbour]:
     """Scenarios beside a value: on both sides of it or, at an end of its range, on one.
 
-    Raises
-    ------
-    InputError
-        There are none.
+    Raises InputError: there are none.
     """
     value = value_at(scenario, key)
     step = STEP * abs(value) or STEP_AT_ZERO
@@ -156,10 +145,8 @@ class Sensitivities:
     """Derivatives of the result variables of a run."""
 
     parameters: tuple[str, ...]
-    values: dict[str, np.ndarray]
-    """by result variable: parameters x instants"""
-    ends_at: float
-    """from when on they do not exist [s]; infinite if they do throughout"""
+    values: dict[str, np.ndarray]  # by result variable: parameters x instants
+    ends_at: float  # from when on they do not exist [s]; infinite if they do throughout
     ends_by: str
 
     def add_to(self, result: xarray.Dataset) -> xarray.Dataset:
@@ -185,20 +172,13 @@ class Sensitivities:
 class CoreDerivatives:
     """Derivatives of one run from the core."""
 
-    error: str
-    """why the motion has no continuation; then there are no values"""
-    values: np.ndarray
-    """channels x instants"""
-    derivatives: np.ndarray
-    """parameters x channels x instants"""
-    signals: np.ndarray
-    """axes x signals x instants, of the controllers"""
-    signal_derivatives: np.ndarray
-    """parameters x axes x signals x instants"""
-    end_state: dict[str, float]
-    """by name"""
-    ends_at: float
-    """[s] from when on there are no derivatives; infinite if there are throughout"""
+    error: str  # why the motion has no continuation; then there are no values
+    values: np.ndarray  # channels x instants
+    derivatives: np.ndarray  # parameters x channels x instants
+    signals: np.ndarray  # axes x signals x instants, of the controllers
+    signal_derivatives: np.ndarray  # parameters x axes x signals x instants
+    end_state: dict[str, float]  # by name
+    ends_at: float  # [s] from when on there are no derivatives; infinite if there are throughout
     ends_by: str
 
 
@@ -207,15 +187,9 @@ def run_cases(
 ) -> list[CoreDerivatives]:
     """Runs with their derivatives, each as `sensitive_case` gives it, on several threads.
 
-    Parameters
-    ----------
-    signals
-        Also of what the controllers show; then the instants are the multiples of an interval.
+    signals: also of what the controllers show; then the instants are the multiples of an interval.
 
-    Raises
-    ------
-    InputError
-        What one of them asks for has no derivative.
+    Raises InputError: what one of them asks for has no derivative.
     """
     out = []
     for row in _core.run_sensitive_trains(cases, channels, signals=signals, threads=threads):

@@ -18,10 +18,7 @@ from ..units.grammar import UnknownUnitError, plain, read_unit
 def read_series(path: Path, unit: str) -> tuple[list[float], list[float]]:
     """Times [s] and values [`unit`] of a CSV file. A heading may name the units of the columns in brackets.
 
-    Raises
-    ------
-    InputError
-        With one line that names the file, the line and the remedy.
+    Raises InputError: with one line that names the file, the line and the remedy.
     """
     try:
         lines = csv.reader(io.StringIO(read_text(path), newline=""))

@@ -71,12 +71,8 @@ class SimulationAnswers(SimulationReadings):
         A multibody engine needs both from an actuator. The derivative predicts the torque at the acceleration that the
         engine is about to find.
 
-        Parameters
-        ----------
-        interval, command, load_torque, inputs
-            As of `advance`.
-        shaft
-            Of a train the shaft that is the load. A load torque acts on it.
+        interval, command, load_torque, inputs: as of `advance`.
+        shaft: of a train the shaft that is the load. A load torque acts on it.
 
         Returns
         -------
@@ -134,10 +130,7 @@ class SimulationAnswers(SimulationReadings):
     def restore(self, snapshot: SimulationSnapshot) -> None:
         """Return to the state of a snapshot of this simulation.
 
-        Raises
-        ------
-        InputError
-            The snapshot is that of another simulation.
+        Raises InputError: the snapshot is that of another simulation.
         """
         if not isinstance(snapshot, SimulationSnapshot) or snapshot.made is not self._made:
             raise InputError(f"snapshot: {shown(snapshot)} is none of this simulation; between simulations, use state")

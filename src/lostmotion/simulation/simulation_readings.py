@@ -32,8 +32,7 @@ class SimulationReadings:
     _loaded: tuple[str, ...]
     _given: tuple[str, ...]
     _controllers: dict[str, Controller]
-    _signals: dict[str, int]
-    """places of the signals of controllers"""
+    _signals: dict[str, int]  # places of the signals of controllers
     _channel: dict[str, int]
     _derived: dict[str, Derived]
     _variables: tuple[Variable, ...]
@@ -87,10 +86,7 @@ class SimulationReadings:
     def __getitem__(self, name: str | tuple[str, ...] | list[str]) -> float | np.ndarray:
         """Value of a result variable now (SI), with the inputs at their last values; of several, as an array.
 
-        Raises
-        ------
-        InputError
-            There is no such variable.
+        Raises InputError: there is no such variable.
         """
         with self._turn:
             values = self._idle().read()

@@ -14,12 +14,8 @@ State = tuple[Any, dict[str, float], dict[str, float]]
 class StepBound:
     """Largest distance of two simulations at the ends of the steps.
 
-    Parameters
-    ----------
-    coarse
-        The `Simulation` with one exchange of torque and speed in each tick.
-    names
-        The variables that are compared, as of `windings.bounded`.
+    coarse: the `Simulation` with one exchange of torque and speed in each tick.
+    names: the variables that are compared, as of `windings.bounded`.
     """
 
     def __init__(self, coarse: Any, names: Mapping[str, str]) -> None:

@@ -18,10 +18,7 @@ if TYPE_CHECKING:
 def acting(tables: TrainTables, name: str) -> Signal[Number]:
     """The command of a motor, brake or clutch as it acts; of a stepper the angle of its field [rad].
 
-    Raises
-    ------
-    ValueError
-        A brake, a clutch or the driver of a stepper cannot follow it.
+    Raises ValueError: a brake, a clutch or the driver of a stepper cannot follow it.
     """
     command = tables.command.get(name, CommandSignal())
     return tables.acting(name) if command.stepping is None else _field(tables, name, command.stepping)

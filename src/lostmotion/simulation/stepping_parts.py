@@ -30,10 +30,7 @@ def parts(
 
     A load torque may act on all shafts of a train alone.
 
-    Raises
-    ------
-    InputError
-        One of them is no shaft, or names of variables coincide.
+    Raises InputError: one of them is no shaft, or names of variables coincide.
     """
     scenario = Scenario.of_any(what)
     if isinstance(what, DriveTrain) and loaded is None:
@@ -91,10 +88,7 @@ def no_input(train: DriveTrain, inputs: Sequence[str], name: str) -> InputError:
 def ends_of(name: str, value: Any, unit: str) -> tuple[float, float]:
     """The values of an input at the begin and the end of an interval.
 
-    Raises
-    ------
-    InputError
-        It is neither a number nor a pair of numbers.
+    Raises InputError: it is neither a number nor a pair of numbers.
     """
     if type(value) is float and value - value == 0.0:  # nearly always
         return value, value

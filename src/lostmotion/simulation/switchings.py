@@ -15,8 +15,7 @@ from ..inputs.arguments import checked
 if TYPE_CHECKING:
     import xarray
 
-CAUSES = dict(_core.causes())
-"""what ended a regime, by its number"""
+CAUSES = dict(_core.causes())  # what ended a regime, by its number
 
 MESH_STEP = next(number for number, cause in CAUSES.items() if cause == "step of the mesh stiffness")
 """number of that cause"""

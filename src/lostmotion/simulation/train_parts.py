@@ -132,12 +132,8 @@ def joined_results(
 ) -> dict[str, Any]:
     """Result of the whole train from those of its parts.
 
-    Parameters
-    ----------
-    results
-        Of the parts, with `channels` and `contacts`, their names.
-    most
-        Switchings that are kept.
+    results: of the parts, with `channels` and `contacts`, their names.
+    most: switchings that are kept.
     """
     core = whole.core()
     rows = {name: row for r in results for name, row in zip(r["channels"], r["values"], strict=True)}

@@ -30,17 +30,10 @@ def start_values(
 ) -> dict[str, float]:
     """Values at t = 0 by the name of their result variable; what is not among them is 0.
 
-    Parameters
-    ----------
-    core
-        The solver's train, if there is one already.
-    driven
-        Names of the shafts whose motion is given.
+    core: the solver's train, if there is one already.
+    driven: names of the shafts whose motion is given.
 
-    Raises
-    ------
-    InputError
-        A name is unknown, or values contradict each other.
+    Raises InputError: a name is unknown, or values contradict each other.
     """
     stiff = [name for name, g in train.gears.items() if not isinstance(g.stiffness, Rigid) or g.stiffness.strikes]
     lossy = [name for name in stiff if (h := train.gears[name].hysteresis) is not None and h.efficiency < 1.0]
@@ -131,15 +124,9 @@ def angles_at_start(
 ) -> dict[str, float]:
     """The angles of all shafts [rad], from those that are given through the gears to the others.
 
-    Parameters
-    ----------
-    driven
-        Names of the shafts whose motion is given, which are at 0 before others are.
+    driven: names of the shafts whose motion is given, which are at 0 before others are.
 
-    Raises
-    ------
-    InputError
-        Two that are given contradict each other.
+    Raises InputError: two that are given contradict each other.
     """
     angles, origin = dict(given), {shaft: shaft for shaft in given}
     waiting = list(given)

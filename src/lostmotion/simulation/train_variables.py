@@ -47,10 +47,7 @@ def axis_variables(
 ) -> tuple[Variable, ...]:
     """Variables of the controllers of a run, by the prefix of their names.
 
-    Parameters
-    ----------
-    sliding
-        By the same key, whether the motor moves a slide, and whether the position is that of one; left out, neither.
+    sliding: by the same key, whether the motor moves a slide, and whether the position is that of one; left out, neither.
     """
     return tuple(
         Variable(f"{prefix}{name}", "", unit, meaning)
@@ -73,19 +70,11 @@ def named_signals(controllers: Mapping[str, Controller], values: Any) -> dict[st
 def only_input(train: DriveTrain, word: str, names: Collection[str], argument: str = "") -> str:
     """Name of the one command, or the one load torque, among inputs.
 
-    Parameters
-    ----------
-    word
-        command or load_torque
-    names
-        Of the inputs; references count as commands.
-    argument
-        What is given, for messages; default: the word.
+    word: command or load_torque
+    names: of the inputs; references count as commands.
+    argument: what is given, for messages; default: the word.
 
-    Raises
-    ------
-    InputError
-        There is none, or there are several.
+    Raises InputError: there is none, or there are several.
     """
     loads = {train.load_torque_of(shaft) for shaft in train.shafts}
     found = [name for name in names if (name in loads) == (word == "load_torque")]
@@ -123,10 +112,7 @@ def check_names(
 ) -> None:
     """Refuse two elements whose result variables have the same name.
 
-    Parameters
-    ----------
-    written
-        The elements as they were written, for messages; default: the elements of the train.
+    written: the elements as they were written, for messages; default: the elements of the train.
     """
     seen = {"time"}
     for variable in (

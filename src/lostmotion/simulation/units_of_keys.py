@@ -17,8 +17,7 @@ from .scenario import Scenario
 from .tables import ScenarioTables
 from .train_tables import TrainTables
 
-Place = tuple[int | str, ...]
-"""parts of a dotted key"""
+Place = tuple[int | str, ...]  # parts of a dotted key
 
 
 def unit_of_key(key: str) -> str | None:
@@ -103,10 +102,7 @@ def _made(form: type[ScenarioTables]) -> dict[str, Any]:
 def in_si(value: Any, unit: str | None) -> Any:
     """Strings with a unit as numbers, in lists and tables too; numbers as they are.
 
-    Raises
-    ------
-    ValueError
-        A string is not a number with a unit, or has the unit of something else; or a value is anything else.
+    Raises ValueError: a string is not a number with a unit, or has the unit of something else; or a value is anything else.
     """
     if isinstance(value, bool):
         raise ValueError(f"{str(value).lower()} is not a number")
