@@ -447,11 +447,34 @@ Found SwitchedTrain::pivot(Instant& now, const Event& event, Key modes, const Ke
         return false;
     };
     // Where none of these leads on: all at rest stuck but the one that breaks away, or all; then combinations spread
-    // evenly over all, each once.
+    // evenly over all, each once. Contacts that the event does not reach keep their modes.
     const bool breaks = event.with_guard && event.kind == Guard::capacity;
     int stuck = breaks ? 0 : 1;
     std::uint64_t drawn = 1;
     std::size_t begun = 0;  // how many had been tried at the last start
+    const Key at_first = modes;
+    Event reached = event;
+    const std::vector<int> part = parts_at(event);
+    Flags seen;  // of the parts
+    const auto see = [&](int contact) { return !std::exchange(seen[part[places().contacts[contact].a]], true); };
+    for (int c = 0; c < contacts(); ++c)
+        if (event.stopped[c] || c == event.contact) see(c);
+    const auto reach = [&] {
+        bool more = false;
+        for (const Tried& t : tried)
+            for (const Violation& v : t.violations) more = see(v.contact) || more;
+        if (more) drawn = 1;
+        // Without any, losses leave no accelerations.
+        const auto none = [&] {
+            return std::none_of(part.begin(), part.end(), [&](int p) { return std::as_const(seen)[p]; });
+        };
+        if (none())
+            for (const Gear& gear : train().gears)
+                if (gear.has_dry_losses()) seen[part[gear.input]] = true;
+        const bool all = none();
+        for (int c = 0; c < contacts(); ++c)
+            reached.at_rest[c] = event.at_rest[c] && (all || std::as_const(seen)[part[places().contacts[c].a]]);
+    };
     const auto start_again = [&] {
         constexpr std::uint64_t stride = 2654435761u;  // Knuth's prime near the golden section of 2^32
         path.clear();
@@ -461,15 +484,16 @@ Found SwitchedTrain::pivot(Instant& now, const Event& event, Key modes, const Ke
             if (stuck++ == 0) modes.modes[event.contact] = static_cast<std::int8_t>(event.neighbour);
             if (is_new()) return true;
         }
+        reach();
         constexpr double countable = 0x1p62;
-        const double count = combinations(event);
+        const double count = combinations(reached);
         for (const auto all = static_cast<std::uint64_t>(std::fmin(count, countable)); drawn <= all;) {
             std::uint64_t number = drawn++ * stride;
             if (count < countable)
-                numbered_combination(number % all, event, from, modes);
+                numbered_combination(number % all, reached, at_first, modes);
             else
                 combination([&](std::uint64_t n) { return ((number = number * 6364136223846793005u + 1) >> 33) % n; },
-                            event, from, modes);
+                            reached, at_first, modes);
             if (is_new()) return true;
         }
         return false;
@@ -515,12 +539,19 @@ Found SwitchedTrain::pivot(Instant& now, const Event& event, Key modes, const Ke
     return worst;
 }
 
+// What all contacts at rest may join, of each shaft: no other contact has to do with its accelerations at an event.
+// All, where shafts have no inertia: springs and dampers tie their speeds.
+std::vector<int> SwitchedTrain::parts_at(const Event& event) const {
+    if (!places().massless.empty()) return std::vector<int>(places().shafts.size());
+    Key together;
+    for (int c = 0; c < contacts(); ++c) together.modes[c] = event.at_rest[c] ? std::int8_t{0} : std::int8_t{1};
+    return parts(places(), together);
+}
+
 // Where friction that grows with the load makes a limit impossible to follow, others that are tied to the contact at
 // its limit may have come to theirs: the torques between them are then the nearest that hold.
 std::vector<Violation> SwitchedTrain::of_neighbours(const Key& modes, const Event& event) const {
-    Key together;
-    for (int c = 0; c < contacts(); ++c) together.modes[c] = event.at_rest[c] ? std::int8_t{0} : modes.modes[c];
-    const std::vector<int> part = parts(places(), together);
+    const std::vector<int> part = parts_at(event);
     Flags at_limit;
     for (int c = 0; c < contacts(); ++c)
         if (event.at_rest[c] && modes.modes[c] != 0) at_limit[part[places().contacts[c].a]] = true;

@@ -180,6 +180,7 @@ class SwitchedTrain {
     Slowed slow_down(Instant& now, std::size_t gear, Flags& joined, MovedShafts& moved) const;
 
     Found enumerate(Instant& now, const Event& event, const Key& from, Key& key);
+    std::vector<int> parts_at(const Event& event) const;
     std::vector<Violation> of_neighbours(const Key& modes, const Event& event) const;
     Found pivot(Instant& now, const Event& event, Key modes, const Key& from, Key& key);
     Trial settle(Instant& now, const Key& modes, const Event& event, Key& key, Violated violated = {});
