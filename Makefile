@@ -142,7 +142,7 @@ $(LIVE)/page.html: page/node_modules/installed $(PAGE_SOURCES) $(PACKAGE)/report
 	cd page && npm run --silent build
 	cp build/page/index.html $@
 $(KERNELS:%=$(LIVE)/%.wasm.gz): $(LIVE)/%.wasm.gz: $(WASM_SOURCES) | $(VENV)/zig page/node_modules/installed
-	@echo 'Compiling the core of the live page (kernel: $*) to WebAssembly; this takes about a minute.'
+	@echo 'Compiling the core of the live page (kernel: $*) to WebAssembly; this takes about half a minute.'
 	$(BIN)/python bindings/c/build.py page $(LIVE) $*
 page/node_modules/installed: page/package.json page/package-lock.json
 	@$(NEED_NODE)

@@ -55,7 +55,12 @@ FMU_FLAGS = (*FLAGS, "-DLM_API=", "-ffunction-sections", "-fdata-sections", "-fn
 # Of the kernels of FMUs: a twentieth smaller; a step of 0.35 us takes 0.03 us more.
 FMU_KERNEL_FLAGS = ("-mllvm", "-inline-threshold=60", "-mllvm", "-unroll-threshold=40")
 # Of a live page, beside the kernel of its drive: nothing else.
-PAGE_SOURCES = [*REST, *(s for s in INTERFACE if s.stem in ("run", "explanation", "scenario", "freestanding"))]
+PAGE_SOURCES = [
+    *TICKS,
+    *REGIMES,
+    *REST,
+    *(s for s in INTERFACE if s.stem in ("run", "explanation", "scenario", "freestanding")),
+]
 # With the oldest C library that the libraries for Linux need, and the extension of their names.
 PLATFORMS = {
     "x86_64-linux": ("x86_64-linux-gnu.2.17", ".so"),
@@ -66,21 +71,12 @@ PLATFORMS = {
     "aarch64-darwin": ("aarch64-macos", ".dylib"),
 }
 WASM = ("-target", "wasm32-wasi")
+# In place of a C library, which would be compiled in half a minute.
+WASM_LIBRARY = [HERE / "wasm_library.cpp"]
 # Small blocks are cleared and copied in place: an engine leaves memory.fill and memory.copy to a function of its own.
 WASM_CODE = (*WASM, "-msimd128", "-mllvm", "-max-store-memset=32", "-mllvm", "-max-store-memcpy=32")
 # Of what solves drives in a live page: browsers inline and unroll nothing, and their calls and loops cost more. Trains become a quarter larger by it.
 INLINED = ("-mllvm", "-inline-threshold=350", "-mllvm", "-unroll-threshold=600")
-# Binaryen, which npm installs for the page: modules become an eighth smaller and some per cent faster.
-WASM_OPT = ROOT / "page" / "node_modules" / ".bin" / "wasm-opt"
-WASM_FEATURES = (
-    "simd",
-    "bulk-memory",
-    "sign-ext",
-    "mutable-globals",
-    "nontrapping-float-to-int",
-    "multivalue",
-    "reference-types",
-)
 STACK = 1 << 20
 PAGE_CORES = ROOT / "build" / "page-core"
 
@@ -127,8 +123,8 @@ def objects(
 def linked(to: Path, made: Sequence[Path], *exports: str) -> None:
     """A WebAssembly module that imports nothing; `_initialize` is to be called first."""
     unfinished = to.with_suffix(".unfinished.wasm")
-    options = ("-mexec-model=reactor", "-s", *(f"-Wl,{e}" for e in exports), f"-Wl,-z,stack-size={STACK}")
-    zig("cc", *WASM, *options, *made, "-o", unfinished)
+    options = ("-nostartfiles", "-fno-sanitize=all", "-s", "-Wl,--no-entry", *(f"-Wl,{e}" for e in exports))
+    zig("cc", "-target", "wasm32-freestanding", *options, f"-Wl,-z,stack-size={STACK}", *made, "-o", unfinished)
     unfinished.replace(to)
 
 
@@ -137,7 +133,7 @@ def wasm(to: Path, optimisation: str = "-O3") -> Path:
     to.parent.mkdir(parents=True, exist_ok=True)
     with (to.parent / f".{to.name}.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # one process compiles, the others wait
-        groups = [*([kernel] for kernel in KERNELS.values()), [*TICKS, *REGIMES], [*REST, *INTERFACE]]
+        groups = [*([kernel] for kernel in KERNELS.values()), [*TICKS, *REGIMES], [*REST, *INTERFACE], WASM_LIBRARY]
         made = objects(groups, WASM_CODE, optimisation, to.parent / f"{to.stem}-objects")
         if not to.exists() or to.stat().st_mtime < max(o.stat().st_mtime for o in made):
             linked(to, made, "--export=malloc", "--export=free", "--export-dynamic")
@@ -159,12 +155,7 @@ def page_core(kernel: str, made: Sequence[Path]) -> Path:
     """The core of a live page with one kernel alone: a WebAssembly module with the functions that a page calls."""
     to, calls = PAGE_CORES / kernel / "core.wasm", ROOT / "page" / "src" / "core.ts"
     if not to.exists() or to.stat().st_mtime < max(p.stat().st_mtime for p in (*made, calls)):
-        module = to.with_name("linked.wasm")
-        linked(module, made, *(f"--export={name}" for name in called_by_page()))
-        if WASM_OPT.exists():
-            features = [f"--enable-{name}" for name in WASM_FEATURES]
-            subprocess.run([WASM_OPT, "-O3", *features, module, "-o", module], check=True)
-        module.replace(to)
+        linked(to, made, *(f"--export={name}" for name in called_by_page()))
     return to
 
 
@@ -174,7 +165,7 @@ def page_cores(kernels: Sequence[str], optimisation: str = "-O3") -> list[Path]:
     with (PAGE_CORES / ".lock").open("w") as lock, ThreadPoolExecutor(os.cpu_count()) as pool:
         fcntl.flock(lock, fcntl.LOCK_EX)  # one process compiles, the others wait
         own = [pool.submit(compiled, [KERNELS[k]], kernel_target(k), optimisation, PAGE_CORES / k) for k in kernels]
-        shared = ((TICKS, optimisation), (REGIMES, "-O2"), (PAGE_SOURCES, "-Oz"))
+        shared = ((PAGE_SOURCES, "-Os"), (WASM_LIBRARY, "-O2"))
         rest = [pool.submit(compiled, group, WASM_CODE, level, PAGE_CORES) for group, level in shared]
         made = [part.result() for part in rest]
         return [page_core(kernel, [of.result(), *made]) for kernel, of in zip(kernels, own, strict=True)]

@@ -1,9 +1,10 @@
 // What the C library needs of libc++'s object files where it is built by the Zig compiler, so that they need not be
 // compiled and linked: that takes minutes.
-#include <cstdio>
 #include <cstdlib>
 #include <new>
 #include <string>
+
+#include "lostmotion/base/decimal.hpp"
 
 void* operator new(std::size_t n) {
     void* p = std::malloc(n == 0 ? 1 : n);
@@ -43,17 +44,20 @@ void __libcpp_verbose_abort(const char*, ...) noexcept { __builtin_trap(); }
 template class basic_string<char>;
 template string operator+(const char*, const string&);
 
-template <class Number>
-static string printed(const char* format, Number value) {
-    char text[400];
-    return {text, text + std::snprintf(text, sizeof text, format, value)};
+string to_string(unsigned long long value) {
+    string digits;
+    do digits.insert(digits.begin(), static_cast<char>('0' + value % 10));
+    while (value /= 10);
+    return digits;
 }
-string to_string(double value) { return printed("%f", value); }
-string to_string(int value) { return printed("%d", value); }
-string to_string(unsigned value) { return printed("%u", value); }
-string to_string(long value) { return printed("%ld", value); }
-string to_string(unsigned long value) { return printed("%lu", value); }
-string to_string(long long value) { return printed("%lld", value); }
-string to_string(unsigned long long value) { return printed("%llu", value); }
+string to_string(long long value) {
+    const auto bits = static_cast<unsigned long long>(value);
+    return value < 0 ? '-' + to_string(-bits) : to_string(bits);
+}
+string to_string(int value) { return to_string(static_cast<long long>(value)); }
+string to_string(long value) { return to_string(static_cast<long long>(value)); }
+string to_string(unsigned value) { return to_string(static_cast<unsigned long long>(value)); }
+string to_string(unsigned long value) { return to_string(static_cast<unsigned long long>(value)); }
+string to_string(double value) { return lostmotion::fixed_text(value); }
 
 _LIBCPP_END_NAMESPACE_STD

@@ -1,11 +1,17 @@
 #include <doctest/doctest.h>
 #include <quadmath.h>
 
+#include <bit>
 #include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <initializer_list>
 #include <limits>
 #include <random>
+#include <string>
 
 #include "lostmotion/base/arctangent.hpp"
+#include "lostmotion/base/decimal.hpp"
 #include "lostmotion/base/powers.hpp"
 #include "lostmotion/base/sine.hpp"
 
@@ -148,5 +154,27 @@ TEST_SUITE("powers") {
                 CHECK(arctangent(y, x) == static_cast<double>(atan2q(y, x)));
                 CHECK(std::signbit(arctangent(y, x)) == std::signbit(static_cast<double>(atan2q(y, x))));
             }
+    }
+    TEST_CASE("numbers are written as the C library writes them, halves and the ends of the range, too") {
+        const auto check = [](double v) {
+            for (const int digits : {1, 6, 10, 17}) {
+                char text[40];
+                std::snprintf(text, sizeof text, "%.*g", digits, v);
+                CHECK(general_text(v, digits) == text);
+            }
+            CHECK(fixed_text(v) == std::to_string(v));
+        };
+        for (const double v : {0.0, 1.0, 0.5, 2.5, 9.5, 99.5, 1e5, 1e6, 1e22, 1e-4, 1e-5, 9.9999995e-5, 0.9999995, 5e-7,
+                               999999.5, 5e-324, 1.7976931348623157e308, std::numeric_limits<double>::infinity()}) {
+            check(v);
+            check(-v);
+        }
+        std::mt19937_64 random(9);
+        for (int k = 0; k < 3000; ++k) {
+            const std::uint64_t bits = random();
+            if (const auto any = std::bit_cast<double>(bits); k % 30 == 0 && !std::isnan(any)) check(any);
+            check(static_cast<double>(bits % 1000000) / 1000.0);
+            check(std::ldexp(static_cast<double>(bits >> 40), static_cast<int>(bits % 60) - 40));
+        }
     }
 }

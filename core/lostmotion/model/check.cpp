@@ -1,5 +1,6 @@
 #include "check.hpp"
 
+#include "../base/decimal.hpp"
 #include "assembly.hpp"
 #include "eigenvalue.hpp"
 #include "names.hpp"
@@ -214,11 +215,7 @@ Fault TrainCheck::what_strikes() const {
 
 Fault TrainCheck::mass_matrices() const {
     constexpr double rounding = 1e-12;  // of entries that were computed, relative to the diagonal
-    const auto number = [](double v) {
-        char text[32];
-        std::snprintf(text, sizeof text, "%.6g", v);
-        return std::string(text);
-    };
+    const auto number = [](double v) { return general_text(v, 6); };
     std::vector<std::string> of(train_.shafts.size());
     for (std::size_t k = 0; k < train_.mass_matrices.size(); ++k) {
         const MassMatrix& m = train_.mass_matrices[k];
@@ -329,10 +326,7 @@ std::string TrainCheck::harmless_inertia(int s) const {
                                          : 0.0;
         if (J > 0.0 && (least == 0.0 || J < least)) least = J;
     }
-    char text[48];
-    std::snprintf(text, sizeof text, "%.1g %s", 1e-4 * (least > 0.0 ? least : most),
-                  is_slide(train_, s) ? "kg" : "kg*m^2");
-    return text;
+    return general_text(1e-4 * (least > 0.0 ? least : most), 1) + (is_slide(train_, s) ? " kg" : " kg*m^2");
 }
 
 Fault TrainCheck::rigid_loops() const {
@@ -404,11 +398,7 @@ Fault TrainCheck::too_fine(const Fault& element, int pieces) {
 }
 
 std::string check_start(const Train& train, const std::vector<double>& speed) {
-    const auto number = [](double v) {
-        char text[32];
-        std::snprintf(text, sizeof text, "%.10g", v);
-        return std::string(text);
-    };
+    const auto number = [](double v) { return general_text(v, 10); };
     const auto one = [&](int s) {
         return train.shafts[static_cast<std::size_t>(s)].name + " = " + number(speed[static_cast<std::size_t>(s)]) +
                ' ' + speed_unit(train, s);

@@ -50,9 +50,7 @@ double ScenarioDescription::version() {
 
 std::string ParameterRange::refuses(double v) const {
     const auto must = [v](const char* be, double limit) {
-        char text[96];
-        std::snprintf(text, sizeof text, "%.10g must be %s %g", v, be, limit);
-        return std::string(text);
+        return general_text(v, 10) + " must be " + be + ' ' + general_text(limit, 6);
     };
     return !(v > above)       ? must("greater than", above)
            : !(v >= at_least) ? must("at least", at_least)

@@ -52,7 +52,8 @@ void FieldWriter::list(const char*, const std::vector<double>& v, Range) {
 void FieldReader::number(const char* name, double& v, Range range) {
     const double given = take(name);
     if (!well()) return;
-    if (!within(range, given)) return wrong(name, "is " + printed(given) + "; it must be " + range_text(range));
+    if (!within(range, given))
+        return wrong(name, "is " + general_text(given, 10) + "; it must be " + range_text(range));
     v = given;
 }
 
@@ -66,7 +67,7 @@ void FieldReader::number(const Field& field, double& v) {
 void FieldReader::pair(const Field& field, std::array<double, 2>& v) {
     for (double& end : v) number(field.key, end, field.range);
     if (well() && v[1] < v[0])
-        wrong(field.key, "falls from " + printed(v[0]) + " to " + printed(v[1]) + "; it must not");
+        wrong(field.key, "falls from " + general_text(v[0], 10) + " to " + general_text(v[1], 10) + "; it must not");
 }
 
 void FieldReader::flag(const char* name, bool& v) {
@@ -89,12 +90,6 @@ void FieldReader::list(const char* name, std::vector<double>& v, Range range) {
     const std::size_t n = length(name);
     v.assign(n, 0.0);
     for (std::size_t k = 0; k < n && well(); ++k) number(name, v[k], range);
-}
-
-std::string FieldReader::printed(double v) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.10g", v);
-    return text;
 }
 
 double FieldReader::take(const char* name) {

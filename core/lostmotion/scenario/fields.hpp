@@ -9,7 +9,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <cstdio>
 #include <initializer_list>
 #include <limits>
 #include <optional>
@@ -18,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include "../base/decimal.hpp"
 #include "../parts/field.hpp"
 
 namespace lostmotion {
@@ -137,8 +137,8 @@ class FieldReader {
         const double given = take(name);
         if (!well()) return;
         if (!(given >= static_cast<double>(low) && given <= static_cast<double>(high)) || given != std::floor(given))
-            return wrong(name, "is " + printed(given) + "; it must be a whole number from " + std::to_string(low) +
-                                   " to " + std::to_string(high));
+            return wrong(name, "is " + general_text(given, 10) + "; it must be a whole number from " +
+                                   std::to_string(low) + " to " + std::to_string(high));
         v = static_cast<Integer>(given);
     }
     template <class Integer>
@@ -209,7 +209,6 @@ class FieldReader {
     }
 
  private:
-    static std::string printed(double v);
     double take(const char* name);
     // Of a text or a list, each entry of which takes a number at least.
     std::size_t length(const char* name);
