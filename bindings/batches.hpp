@@ -98,6 +98,12 @@ inline void bind_exact_batch(nb::module_& m) {
             "inputs"_a, nb::kw_only(), "speed"_a = nb::none(), "angle"_a = nb::none(), "acceleration"_a = nb::none(),
             "threads"_a)
         .def(
+            "replace",
+            [](B& b, std::size_t k, const TrainDescription& train, const BoundControl& control) {
+                return b.replace(k, batch_scenario(train, control));
+            },
+            "k"_a, "train"_a, "control"_a, "Gives a drive other parameters; false: it has other states then.")
+        .def(
             "reset",
             [](B& b, const std::optional<BatchMask>& which, const Values& start) {
                 if (which && which->shape(0) != b.size()) throw nb::type_error("a mask of other drives");
@@ -130,20 +136,22 @@ inline void bind_batches(nb::module_& m) {
     nb::class_<B>(m, "DriveBatch")
         .def(
             "__init__",
-            [](B* self, const std::vector<const TrainDescription*>& bases, std::vector<int> base,
-               std::vector<std::string> keys, int curve_breaks, const Values& values, std::vector<int> model_of,
-               double step) {
-                batch::Models models;
-                for (const TrainDescription* t : bases) models.bases.push_back(t->train);
-                models.base = std::move(base);
-                models.keys = std::move(keys);
-                models.curve_breaks = curve_breaks;
-                models.values.assign(values.data(), values.data() + values.size());
-                if (values.shape(0) != models.size() || values.shape(1) != models.width())
-                    throw nb::type_error("values of other models");
-                new (self) B(std::move(models), std::move(model_of), step);
+            [](B* self, const std::vector<const TrainDescription*>& kinds, std::vector<int> kind_of, double step) {
+                std::vector<model::Train> trains;
+                for (const TrainDescription* t : kinds) trains.push_back(t->train);
+                new (self) B(trains, std::move(kind_of), step);
             },
-            "bases"_a, nb::kw_only(), "base"_a, "keys"_a, "curve_breaks"_a, "values"_a, "model_of"_a, "step"_a)
+            "kinds"_a, nb::kw_only(), "kind_of"_a, "step"_a)
+        .def(
+            "set",
+            [](B& b, const std::string& key, const BatchInput& values) {
+                if (values.shape(0) != b.size()) throw nb::type_error("values of other drives");
+                if (!b.set(key, values.data())) throw nb::value_error("no parameter of a drive");
+            },
+            "key"_a, "values"_a, "Sets a parameter of all drives, by its key in the short form.")
+        .def(
+            "replace", [](B& b, std::size_t k, const TrainDescription& train) { b.replace(k, train.train); }, "k"_a,
+            "train"_a, "Gives a drive a train of its own.")
         .def_static(
             "error", [](const TrainDescription& t) { return B::error(t.train); }, "train"_a,
             "What keeps a train from being stepped in a batch, or nothing.")
@@ -158,13 +166,13 @@ inline void bind_batches(nb::module_& m) {
             "reset",
             [](B& b, const std::optional<BatchMask>& which, const std::optional<Values>& start) {
                 if (which && which->shape(0) != b.size()) throw nb::type_error("a mask of other drives");
-                if (start && (start->shape(0) != b.size() || start->shape(1) != batch::D::states))
+                if (start && (start->shape(0) != b.size() || start->shape(1) != B::states))
                     throw nb::type_error("states of other drives");
                 b.reset(which ? which->data() : nullptr, start ? start->data() : nullptr);
             },
             "which"_a.none(), "start"_a.none())
         .def_prop_ro(
-            "states", [](B& b) { return batch_rows(b, b.states(), batch::D::states); },
+            "states", [](B& b) { return batch_rows(b, b.shown(), B::states); },
             "The values of all drives, by state; each step writes them anew.")
         .def("output_torque", [](const B& b) { return read_batch(b, [&](double* out) { b.read_output_torque(out); }); })
         .def("motor_torque", [](const B& b) { return read_batch(b, [&](double* out) { b.read_motor_torque(out); }); })
@@ -179,7 +187,7 @@ inline void bind_batches(nb::module_& m) {
                          const batch::Counts& c = b.counts();
                          return std::make_tuple(c.steps, c.walked, c.general, c.switchings);
                      })
-        .def_prop_ro("memory", &B::memory, "Bytes of states, tables and parameters.");
+        .def_prop_ro("memory", &B::memory, "Bytes of states and parameters.");
 }
 
 }  // namespace lostmotion::binding

@@ -119,11 +119,11 @@ def test_no_headers_include_each_other_in_a_circle() -> None:
 
 
 def test_only_kernels_see_the_solver() -> None:
-    """Headers of `kernel` and `solver` are included in `core/kernels` alone, and in the steps of batches."""
+    """Headers of `kernel` and `solver` are included in `core/kernels` alone."""
     solving = {"kernel", "solver", "kernels"}
     seen = {s: {h.parent.name for h in included_by(s)} & solving for s in SOURCES}
     assert sum(map(bool, seen.values())) > 20
-    assert {s.parent.name for s, rooms in seen.items() if rooms} <= {*solving, "batch"}
+    assert {s.parent.name for s, rooms in seen.items() if rooms} <= solving
 
 
 # What ties code to a platform: threads, exceptions, and functions of the mathematical library that it need not round

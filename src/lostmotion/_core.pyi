@@ -464,6 +464,9 @@ class ExactBatch:
 
     def step(self, inputs: Sequence[Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]], *, speed: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None, angle: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None, acceleration: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None, threads: int) -> None: ...
 
+    def replace(self, k: int, train: Train, control: tuple[float, Sequence[Axis]]) -> bool:
+        """Gives a drive other parameters; false: it has other states then."""
+
     def reset(self, which: Annotated[NDArray[numpy.bool_], dict(shape=(None,), order='C', device='cpu', writable=False)] | None, start: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> None: ...
 
     @property
@@ -491,7 +494,13 @@ class BatchSnapshot:
     pass
 
 class DriveBatch:
-    def __init__(self, bases: Sequence[Train], *, base: Sequence[int], keys: Sequence[str], curve_breaks: int, values: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], model_of: Sequence[int], step: float) -> None: ...
+    def __init__(self, kinds: Sequence[Train], *, kind_of: Sequence[int], step: float) -> None: ...
+
+    def set(self, key: str, values: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> None:
+        """Sets a parameter of all drives, by its key in the short form."""
+
+    def replace(self, k: int, train: Train) -> None:
+        """Gives a drive a train of its own."""
 
     @staticmethod
     def error(train: Train) -> str:
@@ -522,7 +531,7 @@ class DriveBatch:
 
     @property
     def memory(self) -> int:
-        """Bytes of states, tables and parameters."""
+        """Bytes of states and parameters."""
 
 def respond(train: Train, points: Sequence[tuple[Sequence[Signal], float, Mapping[str, float]]], *, samples: int, harmonics: int, max_periods: int, tolerance: float, keep_table: bool, limit_cycle: bool, threads: int, progress: object | None = None) -> dict[str, Any]: ...
 

@@ -1,40 +1,43 @@
 #include "drive_batch.hpp"
 
 #include <algorithm>
+#include <span>
+#include <utility>
 
 #include "../model/drive_train.hpp"
 #include "../simulation/train_status.hpp"
-#include "walk.hpp"
 
 namespace lostmotion::batch {
 
 namespace {
 
 constexpr std::size_t most_solvers = 64;  // that a thread keeps
-constexpr std::size_t ahead = 4;          // drives whose tables are fetched
+constexpr const char* backlash = "gearbox.stiffness.backlash";
+
+// A train with another gap, of an odd torsion curve.
+void set_gap(model::Train& train, double half_gap) {
+    TorsionCurve& curve = train.gears[0].law.curve;
+    auto [breaks, slopes] = curve.forward();
+    if (slopes[0] == 0.0) {
+        const double was = breaks[0];
+        slopes.erase(slopes.begin());
+        breaks.erase(breaks.begin());
+        for (double& at : breaks) at -= was;
+    }
+    if (half_gap > 0.0) {
+        for (double& at : breaks) at += half_gap;
+        breaks.insert(breaks.begin(), half_gap);
+        slopes.insert(slopes.begin(), 0.0);
+    }
+    curve = TorsionCurve(std::move(breaks), std::move(slopes));
+}
 
 }  // namespace
 
-model::Train Models::train(std::size_t m) const {
-    model::Train t = bases[static_cast<std::size_t>(base[m])];
-    const double* values = row(m);
-    for (const std::string& key : keys) *model::find_parameter(t, key) = *values++;
-    if (curve_breaks >= 0) {
-        const double *slopes = values + curve_breaks, *end = slopes + curve_breaks + 1;
-        t.gears[0].law.curve = TorsionCurve({values, slopes}, {slopes, end});
-    }
-    return t;
-}
-
-int Models::place(const char* key) const {
-    const auto at = std::ranges::find(keys, key);
-    return at == keys.end() ? -1 : static_cast<int>(at - keys.begin());
-}
-
-// What a thread keeps: general solvers of some models.
+// What a thread keeps: general solvers of some drives.
 struct DriveBatch::Worker {
     struct Kept {
-        std::size_t model;
+        std::size_t number;
         long used;
         std::unique_ptr<TrainSimulation> simulation;
     };
@@ -43,57 +46,106 @@ struct DriveBatch::Worker {
     Counts counts;
     Failure failure;
     MotionState state;  // its memory is used again
-
-    TrainSimulation& solver(const Models& models, std::size_t model, double step) {
-        ++clock;
-        for (Kept& k : solvers)
-            if (k.model == model) {
-                k.used = clock;
-                return *k.simulation;
-            }
-        if (solvers.size() == most_solvers) solvers.erase(std::ranges::min_element(solvers, {}, &Kept::used));
-        solvers.push_back({model, clock, std::make_unique<TrainSimulation>(models.train(model), step)});
-        return *solvers.back().simulation;
-    }
 };
 
 std::string DriveBatch::error(const model::Train& train) {
     const TrainRun run(train);
-    if (!run.error().empty()) return run.error();
-    if (!model::is_drive(train) || !sizes_of<D>.hold(train, run.assembly().layout()) ||
-        run.assembly().layout().branches > Label::max_branches)
-        return "is more than a motor, a gearbox with torsion curve and losses, and a load with plain friction";
-    return "";
+    return run.error().empty() ? not_walked(train) : run.error();
 }
 
-DriveBatch::DriveBatch(Models models, std::vector<int> model_of, double step)
-    : models_(std::move(models)),
-      model_of_(std::move(model_of)),
+DriveBatch::DriveBatch(const std::vector<model::Train>& kinds, std::vector<int> kind_of, double step)
+    : kind_of_(std::move(kind_of)),
       step_(step),
-      drives_(model_of_.size()),
-      inputs_(model_of_.size()),
-      states_(model_of_.size() * D::states),
-      tables_(models_.size()),
-      rated_output_torque_(models_.place("gearbox.rated_output_torque")),
-      rated_input_speed_(models_.place("gearbox.rated_input_speed")) {}
+      drives_(kind_of_.size()),
+      inputs_(2 * kind_of_.size()),
+      locked_(kind_of_.size()),
+      shown_(states * kind_of_.size()) {
+    for (const model::Train& train : kinds) {
+        const DriveKind& made = *kinds_.emplace_back(std::make_unique<const DriveKind>(train));
+        numbers_.push_back(numbers_of(made, train, made.half_gap()));
+    }
+}
 
 DriveBatch::~DriveBatch() = default;
 
-RegimeTable* DriveBatch::find(std::size_t model, const Label& label) const {
-    RegimeTable* t = tables_[model].load(std::memory_order_acquire);
-    while (t != nullptr && !(t->label == label)) t = t->next;
+double DriveBatch::half_gap_of(std::size_t k) const {
+    const auto at = std::ranges::find(own_, backlash, &Own::key);
+    return at == own_.end() ? kind(k).half_gap() : 0.5 * at->values[k];
+}
+
+model::Train DriveBatch::train_of(std::size_t k) const {
+    model::Train t = kind(k).train();
+    for (const Own& own : own_)
+        if (double* value = model::find_parameter(t, own.key)) *value = own.values[k];
+    if (const double half_gap = half_gap_of(k); half_gap != kind(k).half_gap()) set_gap(t, half_gap);
     return t;
 }
 
-// Two threads may make the same table, with the same numbers; the first one stays.
-RegimeTable* DriveBatch::table(std::size_t model, const Label& label, Worker& worker) {
-    if (RegimeTable* known = find(model, label)) return known;
-    const Tabulated made = tabulate(worker.solver(models_, model, step_).assembly(), label, step_);
-    const std::lock_guard lock(adding_);
-    if (RegimeTable* known = find(model, label)) return known;
-    RegimeTable* added = store_.add(made, tables_[model].load(std::memory_order_relaxed));
-    tables_[model].store(added, std::memory_order_release);
-    return added;
+bool DriveBatch::set(const std::string& key, const double* values) {
+    model::Train first = kinds_[0]->train();
+    if (key != backlash && model::find_parameter(first, key) == nullptr) return false;
+    auto at = std::ranges::find(own_, key, &Own::key);
+    const bool added = at == own_.end();
+    if (added) {
+        spread_numbers();
+        at = own_.insert(at, {key, std::vector<double>(size())});
+        for (std::size_t k = 0; k < size(); ++k) {
+            model::Train t = kind(k).train();
+            at->values[k] = key == backlash ? 2.0 * kind(k).half_gap() : *model::find_parameter(t, key);
+        }
+    }
+    for (std::size_t k = 0; k < size(); ++k)
+        if (at->values[k] != values[k]) {
+            at->values[k] = values[k];
+            renew(k);
+        }
+    return true;
+}
+
+void DriveBatch::replace(std::size_t k, const model::Train& train) {
+    spread_numbers();
+    auto made = std::make_unique<const DriveKind>(train);
+    const auto [at, added] = replaced_.emplace(k, static_cast<int>(kinds_.size()));
+    if (added)
+        kinds_.push_back(std::move(made));
+    else
+        kinds_[static_cast<std::size_t>(at->second)] = std::move(made);
+    kind_of_[k] = at->second;
+    renew(k);
+}
+
+void DriveBatch::spread_numbers() {
+    if (std::exchange(each_its_own_, true)) return;
+    std::vector<DriveNumbers> each;
+    for (const int kind : kind_of_) each.push_back(numbers_[static_cast<std::size_t>(kind)]);
+    numbers_ = std::move(each);
+    for (const auto& w : workers_) w->solvers.clear();
+}
+
+// The numbers of a drive, after its parameters have changed. One whose gap closes becomes one of a kind without it.
+void DriveBatch::renew(std::size_t k) {
+    const model::Train train = train_of(k);
+    if (kind(k).laws().has_gap != train.gears[0].has_backlash()) {
+        const auto [at, added] = other_gap_.emplace(kind_of_[k], static_cast<int>(kinds_.size()));
+        if (added) {
+            other_gap_[at->second] = kind_of_[k];
+            kinds_.push_back(std::make_unique<const DriveKind>(train));
+        }
+        kind_of_[k] = at->second;
+    }
+    DriveState& x = drives_[k];
+    const double before = ratio(k), motor_speed = before * x.a, load_speed = x.a - x.v,
+                 torque = numbers(k).turned * x.q;
+    numbers_[k] = numbers_of(kind(k), train, half_gap_of(k));
+    if (ratio(k) != before) {
+        x.q = numbers(k).turned * torque;
+        x.a = motor_speed / ratio(k);
+        x.v = x.a - load_speed;
+    }
+    x.known = false;
+    ++changes_;
+    for (const auto& w : workers_)
+        std::erase_if(w->solvers, [k](const Worker::Kept& kept) { return kept.number == k; });
 }
 
 Failure DriveBatch::step(const Input& command, const Input& load_torque, unsigned threads) {
@@ -109,116 +161,79 @@ Failure DriveBatch::step(const Input& command, const Input& load_torque, unsigne
     return first;
 }
 
-// Fetches what the drives that follow read into the cache: tables, and after them what these share.
-[[gnu::always_inline]] inline void DriveBatch::fetch(std::size_t k, std::size_t end) const {
-    const auto lines = [](const void* from, std::size_t bytes) ALWAYS_INLINE {
-        for (std::size_t at = 0; at < bytes; at += 64) __builtin_prefetch(static_cast<const char*>(from) + at);
-    };
-    if (k + 2 * ahead < end && drives_[k + 2 * ahead].regime != nullptr)
-        lines(drives_[k + 2 * ahead].regime, sizeof(RegimeTable) + 2 * sizeof(Column));
-    if (k + ahead < end && drives_[k + ahead].regime != nullptr && drives_[k + ahead].regime->plain())
-        lines(drives_[k + ahead].regime->shared, sizeof(SharedTable) + 6 * sizeof(Column));
-}
-
 void DriveBatch::step_range(std::size_t begin, std::size_t end, const Input& command, const Input& load_torque,
                             Worker& worker) {
-    struct Known final : Regimes {
-        Known(DriveBatch& batch, Worker& worker) : batch_(batch), worker_(worker) {}
-        RegimeTable* at(const Label& label) override { return batch_.table(model, label, worker_); }
-        void locate_losses(Label& label, const RegimeDetails& of, double T_2, double speed) const override {
-            const Models& all = batch_.models_;
-            const model::Gear& gear = all.bases[static_cast<std::size_t>(all.base[model])].gears[0];
-            const int s = label.modes[static_cast<std::size_t>(of.input_contact)];
-            const double rated =
-                gear.efficiencies ? 1.0 : all.number(model, batch_.rated_output_torque_, gear.law.rated_output_torque);
-            const double rated_speed = all.number(model, batch_.rated_input_speed_, gear.law.rated_input_speed);
-            const auto cells = gear.loss_cells(s, gear.sense() * T_2 / rated, speed, rated_speed);
-            label.branch[static_cast<std::size_t>(of.cell)] = cells[0];
-            label.branch[static_cast<std::size_t>(of.cell_back)] = cells[1];
-        }
-        std::size_t model = 0;
-
-     private:
-        DriveBatch& batch_;
-        Worker& worker_;
-    } known(*this, worker);
-    const double h = step_;
-    const std::size_t n = drives_.size();
-    double* out = states_.data();
     for (std::size_t k = begin; k < end; ++k) {
-        DriveState& d = drives_[k];
-        const Inputs u{command[k], load_torque[k]};
-        const RegimeTable* r = d.regime;
-        fetch(k, end);
         ++worker.counts.steps;
-        bool done = false;
-        if (r != nullptr && r->plain()) [[likely]] {
-            const Four x = Four::load(d.x.data());
-            const SharedTable& t = *r->shared;
-            const Forms rates = r->rates();
-            const Four rate = rates.of_state(x) + rates.constant(d.memory, u);
-            const Four to = x + t.G * rate, size = absolute(rate);
-            bool clear = true;
-            for (int b = 0; b < t.n_blocks; ++b) {
-                const Forms g = r->guards(b);
-                const Four constant = g.constant(d.memory, u);
-                const Four first = constant + g.of_state(x), last = constant + g.of_state(to);
-                const Four apart = sum_in_fours<D::coupled>(
-                    [&](auto j) ALWAYS_INLINE { return size.template spread<j>() * t.departure(b, j); });
-                clear = clear && above(least_of(first, last), apart) == 15u;
-            }
-            if (clear) [[likely]] {
-                const double angle = d.x[D::coupled] +
-                                     t.angle_coefficient * (h * d.x[static_cast<std::size_t>(t.angle_speed)]) +
-                                     (load<D>(t.angle) * rate).sum();
-                to.store(d.x.data());
-                d.x[D::coupled] = angle;
-                done = true;
-            } else {
-                known.model = static_cast<std::size_t>(model_of_[k]);
-                Walk walk(known, d, u);
-                if (walk.over(h)) {
-                    walk.store(d);
-                    ++worker.counts.walked;
-                    worker.counts.switchings += walk.switchings();
-                    done = true;
-                }
-            }
+        DriveWalk walk(kind(k).laws(), numbers(k), drives_[k], command[k], load_torque[k]);
+        if (walk.advance(step_)) {
+            drives_[k] = walk.x;
+            worker.counts.walked += walk.switchings > 0;
+            worker.counts.switchings += walk.switchings;
+        } else if (!solve(k, command[k], load_torque[k], worker)) {
+            continue;
         }
-        if (!done && !solve(k, u, worker)) continue;
-        inputs_[k] = u;
-        for (std::size_t s = 0; s < D::states; ++s) out[s * n + k] = d.x[s];
+        inputs_[2 * k] = command[k];
+        inputs_[2 * k + 1] = load_torque[k];
+        show(k);
     }
 }
 
 // By the general solver. False: the motion cannot go on.
-bool DriveBatch::solve(std::size_t k, const Inputs& u, Worker& worker) {
+bool DriveBatch::solve(std::size_t k, double command, double load_torque, Worker& worker) {
     ++worker.counts.general;
-    DriveState& d = drives_[k];
-    const auto model = static_cast<std::size_t>(model_of_[k]);
-    TrainSimulation& simulation = worker.solver(models_, model, step_);
+    const std::size_t number = each_its_own_ ? k : static_cast<std::size_t>(kind_of_[k]);
+    auto kept = std::ranges::find(worker.solvers, number, &Worker::Kept::number);
+    if (kept == worker.solvers.end()) {
+        if (worker.solvers.size() == most_solvers)
+            worker.solvers.erase(std::ranges::min_element(worker.solvers, {}, &Worker::Kept::used));
+        worker.solvers.push_back({number, 0, std::make_unique<TrainSimulation>(train_of(k), step_)});
+        kept = worker.solvers.end() - 1;
+    }
+    kept->used = ++worker.clock;
+    TrainSimulation& simulation = *kept->simulation;
     const model::Assembly& a = simulation.assembly();
     const model::Layout& n = a.layout();
+    const model::Places& places = a.places();
+    const model::GearPlace& gear = places.gears[0];
+    const model::ShaftPlace &first = places.shafts[0], &last = places.shafts[1];
+    const auto at = [](auto& list, int place) -> auto& { return list[static_cast<std::size_t>(place)]; };
+    const DriveNumbers& p = numbers(k);
+    const int torque = places.motors[0].torque, limit = places.motors[0].branch, zero = kind(k).laws().zero;
+    const int locked = gear.contact == model::nowhere ? model::nowhere : at(places.contacts, gear.contact).locked;
+    DriveState& x = drives_[k];
     MotionState& s = worker.state;
     s.clear();
     s.x.resize(static_cast<std::size_t>(n.states));
-    model::unpack_state<D>(d.x, n, s.x.begin());
-    s.memory.assign(d.memory.begin(), d.memory.begin() + n.memory);
-    if (d.regime != nullptr) {
-        s.started = true;
-        s.key = d.regime->label.key();
-        s.rate_input.assign(inputs_[k].begin(), inputs_[k].begin() + n.inputs);
-    } else {
-        const model::GearPlace& gear = a.places().gears[0];
-        const int locked = gear.contact == model::nowhere
-                               ? model::nowhere
-                               : a.places().contacts[static_cast<std::size_t>(gear.contact)].locked;
-        if (locked != model::nowhere && gear.twist != model::nowhere)
-            s.memory[static_cast<std::size_t>(locked)] =
-                a.train().gears[0].law.curve.torque(d.x[static_cast<std::size_t>(gear.twist)]);
+    s.memory.resize(static_cast<std::size_t>(n.memory));
+    if (torque != model::nowhere) at(s.x, torque) = p.turned * x.q;
+    at(s.x, first.speed) = ratio(k) * x.a;
+    at(s.x, last.speed) = x.a - x.v;
+    if (gear.twist != model::nowhere) at(s.x, gear.twist) = x.d;
+    at(s.x, n.coupled) = x.angle;
+    if (gear.hysteresis != model::nowhere) at(s.memory, gear.hysteresis) = x.hysteresis;
+    if (locked != model::nowhere) at(s.memory, locked) = locked_[k];
+    s.started = x.known;
+    if (x.known) {
+        if (first.contact != model::nowhere)
+            at(s.key.modes, first.contact) = static_cast<std::int8_t>(p.turned * x.motor);
+        if (gear.contact != model::nowhere) at(s.key.modes, gear.contact) = x.twist;
+        if (last.contact != model::nowhere) at(s.key.modes, last.contact) = x.load;
+        if (gear.piece != model::nowhere) at(s.key.branch, gear.piece) = static_cast<std::int16_t>(x.piece - zero);
+        if (gear.flanks != model::nowhere) at(s.key.branch, gear.flanks) = x.flanks;
+        if (gear.cell != model::nowhere) at(s.key.branch, gear.cell) = x.cell;
+        if (gear.cell_back != model::nowhere) at(s.key.branch, gear.cell_back) = x.back;
+        if (limit != model::nowhere)
+            at(s.key.branch, limit) = static_cast<std::int16_t>(inputs_[2 * k] > p.command_limit) -
+                                      static_cast<std::int16_t>(inputs_[2 * k] < -p.command_limit);
+        s.rate_input.assign(inputs_.begin() + static_cast<std::ptrdiff_t>(2 * k),
+                            inputs_.begin() + static_cast<std::ptrdiff_t>(2 * k) + n.inputs);
+    } else if (locked != model::nowhere && gear.twist != model::nowhere) {
+        at(s.memory, locked) = a.train().gears[0].law.curve.torque(x.d);
     }
     simulation.motion().restore(s);
-    const auto inputs = std::span(u).first(static_cast<std::size_t>(n.inputs));
+    const std::array<double, 2> both{command, load_torque};
+    const auto inputs = std::span(both).first(static_cast<std::size_t>(n.inputs));
     const Status status = simulation.motion().advance(step_, inputs, inputs);
     if (status != Status::done) {
         const Motion& m = simulation.motion();
@@ -226,19 +241,38 @@ bool DriveBatch::solve(std::size_t k, const Inputs& u, Worker& worker) {
         return false;
     }
     simulation.motion().save(s);
-    const auto to = model::packed_start<D>(n, s.x, s.memory);
-    std::ranges::copy(to.x, d.x.begin());
-    d.memory = to.memory;
-    d.regime = table(model, Label::of(s.key), worker);
+    if (torque != model::nowhere) x.q = p.turned * at(s.x, torque);
+    x.a = at(s.x, first.speed) / ratio(k);
+    x.v = x.a - at(s.x, last.speed);
+    if (gear.twist != model::nowhere) x.d = at(s.x, gear.twist);
+    x.angle = at(s.x, n.coupled);
+    if (gear.hysteresis != model::nowhere) x.hysteresis = at(s.memory, gear.hysteresis);
+    if (locked != model::nowhere) locked_[k] = at(s.memory, locked);
+    x.known = true;
+    if (first.contact != model::nowhere) x.motor = static_cast<signed char>(p.turned * at(s.key.modes, first.contact));
+    if (gear.contact != model::nowhere) x.twist = at(s.key.modes, gear.contact);
+    if (last.contact != model::nowhere) x.load = at(s.key.modes, last.contact);
+    if (gear.piece != model::nowhere) x.piece = static_cast<short>(at(s.key.branch, gear.piece) + zero);
+    if (gear.flanks != model::nowhere) x.flanks = static_cast<signed char>(at(s.key.branch, gear.flanks));
+    if (gear.cell != model::nowhere) x.cell = at(s.key.branch, gear.cell);
+    if (gear.cell_back != model::nowhere) x.back = at(s.key.branch, gear.cell_back);
+    if (gear.contact != model::nowhere && x.twist == 0) x.v = 0.0;
     return true;
 }
 
 void DriveBatch::reset(const bool* which, const double* start) {
-    for (std::size_t k = 0; k < drives_.size(); ++k) {
+    for (std::size_t k = 0; k < size(); ++k) {
         if (which != nullptr && !which[k]) continue;
-        drives_[k] = {};
-        if (start != nullptr) std::copy_n(start + k * D::states, D::states, drives_[k].x.begin());
-        inputs_[k] = {};
+        DriveState& x = drives_[k] = {};
+        inputs_[2 * k] = inputs_[2 * k + 1] = locked_[k] = 0.0;
+        if (start != nullptr) {
+            const double* from = start + k * states;
+            x.q = numbers(k).turned * from[0];
+            x.a = from[1] / ratio(k);
+            x.v = x.a - from[2];
+            x.d = from[3];
+            x.angle = from[4];
+        }
         show(k);
     }
 }
@@ -246,33 +280,48 @@ void DriveBatch::reset(const bool* which, const double* start) {
 void DriveBatch::restore(const Snapshot& s) {
     drives_ = s.drives;
     inputs_ = s.inputs;
-    for (std::size_t k = 0; k < drives_.size(); ++k) show(k);
-}
-
-void DriveBatch::read(double* out, Coefficients RegimeDetails::* form, double RegimeTable::* constant) const {
-    for (std::size_t k = 0; k < drives_.size(); ++k) {
-        const DriveState& d = drives_[k];
-        out[k] = 0.0;
-        if (d.regime == nullptr) continue;
-        StateOf<D> x;
-        std::ranges::copy(d.x, x.begin());
-        out[k] = value_of((*d.regime->details).*form, (*d.regime).*constant, x, d.memory, inputs_[k]);
+    locked_ = s.locked;
+    for (std::size_t k = 0; k < size(); ++k) {
+        drives_[k].known = drives_[k].known && s.changes == changes_;
+        show(k);
     }
 }
 
-void DriveBatch::read_contact(std::int8_t* out, std::int8_t RegimeDetails::* contact) const {
-    for (std::size_t k = 0; k < drives_.size(); ++k) {
-        const RegimeTable* r = drives_[k].regime;
-        const int number = r == nullptr ? -1 : (*r->details).*contact;
-        out[k] = number < 0 ? 0 : r->label.modes[static_cast<std::size_t>(number)];
+void DriveBatch::show(std::size_t k) {
+    const DriveState& x = drives_[k];
+    const double numbers_shown[states] = {numbers(k).turned * x.q, ratio(k) * x.a, x.a - x.v, x.d, x.angle};
+    for (std::size_t s = 0; s < states; ++s) shown_[s * size() + k] = numbers_shown[s];
+}
+
+// From the regime that a drive is in, under the inputs of its last step.
+template <class Read>
+void DriveBatch::read(double* out, Read&& what) const {
+    for (std::size_t k = 0; k < size(); ++k) {
+        DriveWalk walk(kind(k).laws(), numbers(k), drives_[k], inputs_[2 * k], inputs_[2 * k + 1]);
+        if (!walk.x.known) walk.begin();
+        out[k] = walk.make() ? what(walk, k) : locked_[k];
     }
+}
+
+void DriveBatch::read_output_torque(double* out) const {
+    read(out, [](const DriveWalk& w, std::size_t) { return w.r.output.at(w.x); });
+}
+
+void DriveBatch::read_motor_torque(double* out) const {
+    read(out, [this](const DriveWalk& w, std::size_t k) { return numbers(k).turned * w.r.pull.at(w.x); });
+}
+
+void DriveBatch::read_input_contact(std::int8_t* out) const {
+    for (std::size_t k = 0; k < size(); ++k) out[k] = static_cast<std::int8_t>(numbers(k).turned * drives_[k].motor);
+}
+
+void DriveBatch::read_twist_contact(std::int8_t* out) const {
+    for (std::size_t k = 0; k < size(); ++k) out[k] = drives_[k].twist;
 }
 
 std::size_t DriveBatch::memory() const {
-    std::size_t bytes =
-        drives_.size() * (sizeof(DriveState) + sizeof(Inputs) + sizeof(int) + D::states * sizeof(double));
-    bytes += models_.size() * (models_.width() * sizeof(double) + sizeof(int) + sizeof(tables_[0]));
-    return bytes + store_.memory();
+    return size() * (sizeof(DriveState) + sizeof(int) + (3 + states + own_.size()) * sizeof(double)) +
+           numbers_.size() * sizeof(DriveNumbers);
 }
 
 }  // namespace lostmotion::batch

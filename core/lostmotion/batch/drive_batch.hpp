@@ -1,51 +1,27 @@
 // Many drives at once, all advanced by the same step, with inputs that are constant over it.
 //
-// Each drive is stepped by the table of its regime (regime_table.hpp). Where a guard may have a zero within the step,
-// the step is walked through: from where a regime begins, the motion is its Taylor series over a short time; a guard is
-// certain to stay positive, or certain to fall, by the Bernstein coefficients of its cubic and the sum of what lies
-// beyond; its zero is found by Newton's method on the series. The regime that follows has to hold strictly: each of its
-// guards is positive, or zero and rising. Whatever is not certain is left to the general solver, which repeats the step
-// from where it began. A drive does not know of the others, so its bits do not depend on their number, on their order
-// or on threads.
+// Each drive is stepped by the walk of `drive_walk.hpp`. Whatever is not certain there is left to the general solver,
+// which repeats the step from where it began. A drive does not know of the others, so its bits do not depend on their
+// number, on their order or on threads.
 #pragma once
 
-#include <atomic>
+#include <cstdint>
+#include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
 #include "../simulation/train_stepping.hpp"
+#include "drive_numbers.hpp"
 #include "input.hpp"
-#include "regime_table.hpp"
 #include "team.hpp"
 
 namespace lostmotion::batch {
 
-// The parameters of drives: those of `bases`, with numbers of their own under `keys` and, if it has breaks, a torsion
-// curve of its own.
-struct Models {
-    std::vector<model::Train> bases;
-    std::vector<int> base;          // of each model
-    std::vector<std::string> keys;  // as in a scenario file
-    int curve_breaks = -1;          // of each torsion curve; -1: that of the base
-    std::vector<double> values;     // of each model: by key, breaks, slopes
-
-    std::size_t size() const { return base.size(); }
-    std::size_t width() const {
-        return keys.size() + (curve_breaks < 0 ? 0 : 2 * static_cast<std::size_t>(curve_breaks) + 1);
-    }
-    const double* row(std::size_t m) const { return values.data() + m * width(); }
-    model::Train train(std::size_t m) const;
-    // The index of a key; -1 if all models have the number of their base.
-    int place(const char* key) const;
-    double number(std::size_t m, int place, double of_base) const { return place < 0 ? of_base : row(m)[place]; }
-};
-
 // How many steps have been made, and how.
 struct Counts {
     long steps = 0;
-    long walked = 0;      // with an event, or none that was certain at once
+    long walked = 0;      // with switchings
     long general = 0;     // by the general solver
     long switchings = 0;  // of those walked
     Counts& operator+=(const Counts& o) {
@@ -57,78 +33,86 @@ struct Counts {
     }
 };
 
-// What goes on with a drive, in one line of the cache.
-struct alignas(64) DriveState {
-    std::array<double, D::states> x{};
-    Memory memory{};
-    RegimeTable* regime = nullptr;  // nullptr: the contacts have still to be found
-};
-static_assert(sizeof(DriveState) == 64);
-
 class DriveBatch {
  public:
-    // model_of: of each drive its model. step: [s].
-    DriveBatch(Models models, std::vector<int> model_of, double step);
+    // kind_of: of each drive its kind. step: [s].
+    DriveBatch(const std::vector<model::Train>& kinds, std::vector<int> kind_of, double step);
     ~DriveBatch();
     DriveBatch(const DriveBatch&) = delete;
     DriveBatch& operator=(const DriveBatch&) = delete;
 
-    // What keeps a model from being stepped in a batch, or nothing.
+    // What keeps a train from being stepped in such a batch, or nothing.
     static std::string error(const model::Train& train);
 
     std::size_t size() const { return drives_.size(); }
+    // Sets a parameter of all drives, by its key; it acts from the next step on. False: there is none of this key.
+    bool set(const std::string& key, const double* values);
+    // Gives one drive a train of its own, which `error` has passed; it goes on from the state that it is in.
+    void replace(std::size_t k, const model::Train& train);
     // Advances all drives. Those that cannot go on stay where they were; the first of them is reported.
     Failure step(const Input& command, const Input& load_torque, unsigned threads);
     // To t = 0. which: for each drive whether it is meant; nullptr: all. start: of each drive its states; nullptr:
     // rest.
     void reset(const bool* which, const double* start);
 
-    // Of each state the values of all drives, one state after the other.
-    double* states() { return states_.data(); }
-    void read_output_torque(double* out) const {
-        read(out, &RegimeDetails::output_torque, &RegimeTable::output_torque);
-    }
-    void read_motor_torque(double* out) const { read(out, &RegimeDetails::motor_torque, &RegimeTable::motor_torque); }
+    // Of each state the values of all drives, one state after the other: torque and speed of the motor, speed of the
+    // load, twist, angle of the load.
+    static constexpr std::size_t states = 5;
+    double* shown() { return shown_.data(); }
+    void read_output_torque(double* out) const;
+    void read_motor_torque(double* out) const;
     // The modes of a contact: 0 stuck, +1 or -1 slipping, also where there is none.
-    void read_input_contact(std::int8_t* out) const { read_contact(out, &RegimeDetails::input_contact); }
-    void read_twist_contact(std::int8_t* out) const { read_contact(out, &RegimeDetails::twist_contact); }
+    void read_input_contact(std::int8_t* out) const;
+    void read_twist_contact(std::int8_t* out) const;
 
     struct Snapshot {
         const DriveBatch* of;
         std::vector<DriveState> drives;
-        std::vector<Inputs> inputs;
+        std::vector<double> inputs, locked;
+        long changes;
     };
-    Snapshot snapshot() const { return {this, drives_, inputs_}; }
+    Snapshot snapshot() const { return {this, drives_, inputs_, locked_, changes_}; }
     void restore(const Snapshot& s);
 
     const Counts& counts() const { return counts_; }
-    // Bytes of states, tables and parameters, without what the threads share.
+    // Bytes of states and parameters.
     std::size_t memory() const;
 
  private:
     struct Worker;
+    struct Own {
+        std::string key;
+        std::vector<double> values;
+    };
 
     void step_range(std::size_t begin, std::size_t end, const Input& command, const Input& load_torque, Worker& worker);
-    void fetch(std::size_t k, std::size_t end) const;
-    bool solve(std::size_t k, const Inputs& u, Worker& worker);
-    RegimeTable* find(std::size_t model, const Label& label) const;
-    RegimeTable* table(std::size_t model, const Label& label, Worker& worker);
-    void show(std::size_t k) {
-        for (std::size_t s = 0; s < D::states; ++s) states_[s * drives_.size() + k] = drives_[k].x[s];
+    bool solve(std::size_t k, double command, double load_torque, Worker& worker);
+    model::Train train_of(std::size_t k) const;
+    double half_gap_of(std::size_t k) const;
+    void renew(std::size_t k);
+    void spread_numbers();
+    const DriveKind& kind(std::size_t k) const { return *kinds_[static_cast<std::size_t>(kind_of_[k])]; }
+    const DriveNumbers& numbers(std::size_t k) const {
+        return numbers_[each_its_own_ ? k : static_cast<std::size_t>(kind_of_[k])];
     }
-    void read(double* out, Coefficients RegimeDetails::* form, double RegimeTable::* constant) const;
-    void read_contact(std::int8_t* out, std::int8_t RegimeDetails::* contact) const;
+    double ratio(std::size_t k) const { return numbers(k).turned / numbers(k).per_ratio; }
+    void show(std::size_t k);
+    template <class Read>
+    void read(double* out, Read&& what) const;
 
-    Models models_;
-    std::vector<int> model_of_;
+    std::vector<std::unique_ptr<const DriveKind>> kinds_;
+    std::vector<int> kind_of_;
     double step_;
     std::vector<DriveState> drives_;
-    std::vector<Inputs> inputs_;  // of the last step
-    std::vector<double> states_;
-    TableStore store_;
-    std::vector<std::atomic<RegimeTable*>> tables_;  // of each model
-    int rated_output_torque_, rated_input_speed_;    // places of these keys
-    std::mutex adding_;
+    std::vector<double> inputs_;  // of the last step: command and load torque of each drive
+    std::vector<double> locked_;  // torque that rest leaves open [N m]
+    std::vector<double> shown_;
+    std::vector<Own> own_;  // parameters that were set
+    bool each_its_own_ = false;
+    std::vector<DriveNumbers> numbers_;    // of each drive, if each has its own; of each kind
+    std::map<int, int> other_gap_;         // kinds with a gap in place of those without, and the other way
+    long changes_ = 0;                     // of numbers
+    std::map<std::size_t, int> replaced_;  // kinds of drives that have a train of their own
     std::vector<std::unique_ptr<Worker>> workers_;
     Team team_;
     Counts counts_;

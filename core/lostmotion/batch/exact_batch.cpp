@@ -39,6 +39,15 @@ Failure ExactBatch::step(std::span<const Input> inputs, const std::optional<Moti
     return first;
 }
 
+bool ExactBatch::replace(std::size_t k, const Scenario& scenario) {
+    auto made = std::make_unique<ScenarioSimulation>(scenario, step_);
+    MotionState now;
+    drives_[k]->motion().save(now);
+    if (made->names().states != states() || !made->restore(now)) return false;
+    drives_[k] = std::move(made);
+    return true;
+}
+
 std::string ExactBatch::reset(const bool* which, const double* start) {
     const std::size_t n = states().size();
     const std::vector<double> capacities(drives_[0]->names().capacities.size());

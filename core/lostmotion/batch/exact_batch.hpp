@@ -30,6 +30,8 @@ class ExactBatch {
     // Advances all drives with constant inputs, in the order of their names. Those that cannot go on stay where they
     // were; the first of them is reported.
     Failure step(std::span<const Input> inputs, const std::optional<Motion>& motion, unsigned threads);
+    // Gives a drive other parameters; it goes on from the state that it is in. False: it has other states.
+    bool replace(std::size_t k, const Scenario& scenario);
     // To t = 0. which: for each drive whether it is meant; nullptr: all. start: of each drive its states, in the order
     // of their names, and the speed of a load whose motion is given. Returns what is wrong with it, or nothing.
     std::string reset(const bool* which, const double* start);

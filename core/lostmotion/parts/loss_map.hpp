@@ -8,16 +8,8 @@
 
 namespace lostmotion {
 
-// m = at_zero + per_speed * v + per_load * mu
-struct Plane {
-    double at_zero = 0.0, per_speed = 0.0, per_load = 0.0;
-};
-
-// The half plane at_zero + per_speed * v + per_load * mu >= 0 that bounds a triangle, and what lies beyond it.
-struct Edge {
-    Plane inside;
-    int neighbour = -1;  // triangle on the other side; -1: the end of the extended map
-};
+using real = double;  // of the grid
+#include "loss_grid.hpp"
 
 // The loss law (12) of a gear as forms, in one plane m of its losses. The forms may be those of a drive or of a train.
 template <class F>
@@ -64,71 +56,18 @@ class LossMap {
     const std::vector<double>& loads() const { return loads_; }
     const std::vector<double>& values() const { return values_; }
 
-    // Number of the triangle that contains (mu, v); on an edge, one of its two.
-    int triangle(double mu, double v) const {
-        const int i = interval(speeds_, v), j = interval(loads_, mu);
-        const double s = (v - speeds_[i]) / (speeds_[i + 1] - speeds_[i]);
-        const double r = (mu - loads_[j]) / (loads_[j + 1] - loads_[j]);
-        const bool upper = rising(j) ? r > s : r > 1.0 - s;
-        return 2 * (j * cells_along_speed() + i) + (upper ? 1 : 0);
+    LossGrid grid() const {
+        return {speeds_.data(), loads_.data(), values_.data(), static_cast<int>(speeds_.size()),
+                static_cast<int>(loads_.size())};
     }
-    // Number of the interval of the load axis that contains mu: the cells of the line v = 0.
-    int load_interval(double mu) const { return interval(loads_, mu); }
-    double load_interval_lower(int j) const { return loads_[j]; }
-    double load_interval_upper(int j) const { return loads_[j + 1]; }
+    int triangle(double mu, double v) const { return grid().triangle(mu, v); }
+    int load_interval(double mu) const { return grid().load_interval(mu); }
+    double load_interval_lower(int j) const { return loads_[static_cast<std::size_t>(j)]; }
+    double load_interval_upper(int j) const { return loads_[static_cast<std::size_t>(j) + 1]; }
     int load_intervals() const { return static_cast<int>(loads_.size()) - 1; }
-
-    Plane plane(int triangle) const {
-        const int cell = triangle / 2, i = cell % cells_along_speed(), j = cell / cells_along_speed();
-        const bool upper = triangle % 2 == 1;
-        const double dv = speeds_[i + 1] - speeds_[i], dm = loads_[j + 1] - loads_[j];
-        // The triangle has a whole side along v (at the top or the bottom) and one along mu (left or right).
-        const int row = upper ? j + 1 : j;
-        const int column = rising(j) == upper ? i : i + 1;
-        Plane p;
-        p.per_speed = (value(row, i + 1) - value(row, i)) / dv;
-        p.per_load = (value(j + 1, column) - value(j, column)) / dm;
-        p.at_zero = value(row, column) - p.per_speed * speeds_[column] - p.per_load * loads_[row];
-        // Without load at standstill, rounding must not leave a loss where there is none: nothing else may hold.
-        const int far_row = upper ? j : j + 1, far_column = rising(j) == upper ? i + 1 : i;
-        if (no_loss_at_origin(row, far_column) || no_loss_at_origin(far_row, column)) p.at_zero = 0.0;
-        return p;
-    }
-    // On the line v = 0, as a function of mu alone.
-    Plane line_at_standstill(int j) const {
-        Plane p;
-        p.per_load = (value(j + 1, 0) - value(j, 0)) / (loads_[j + 1] - loads_[j]);
-        p.at_zero = no_loss_at_origin(j + 1, 0) ? 0.0 : value(j, 0) - p.per_load * loads_[j];
-        return p;
-    }
-
-    // The edges of a triangle, without the one on v = 0 (that is the sign of the speed, not an edge of the map).
-    // Returns their number (at most 3).
-    int edges(int triangle, Edge out[3]) const {
-        const int cell = triangle / 2, n = cells_along_speed(), i = cell % n, j = cell / n;
-        const bool upper = triangle % 2 == 1, up = rising(j);
-        int count = 0;
-        // Across the diagonal: r - s (rising) or r + s - 1 (falling), positive in the upper triangle.
-        const double dv = speeds_[i + 1] - speeds_[i], dm = loads_[j + 1] - loads_[j];
-        Plane diagonal;
-        diagonal.per_load = 1.0 / dm;
-        diagonal.per_speed = (up ? -1.0 : 1.0) / dv;
-        diagonal.at_zero = -loads_[j] / dm + (up ? speeds_[i] : -speeds_[i]) / dv - (up ? 0.0 : 1.0);
-        if (!upper) diagonal = {-diagonal.at_zero, -diagonal.per_speed, -diagonal.per_load};
-        out[count++] = {diagonal, triangle ^ 1};
-        // Along v: the top of an upper triangle, the bottom of a lower one.
-        if (upper)
-            out[count++] = {{loads_[j + 1] / dm, 0.0, -1.0 / dm}, j + 1 < load_intervals() ? 2 * (cell + n) : -1};
-        else
-            out[count++] = {{-loads_[j] / dm, 0.0, 1.0 / dm}, j > 0 ? 2 * (cell - n) + 1 : -1};
-        // Along mu: upper and rising, or lower and falling, touch the left side; the others the right.
-        if (upper == up) {
-            if (i > 0) out[count++] = {{-speeds_[i] / dv, 1.0 / dv, 0.0}, 2 * (cell - 1) + (up ? 0 : 1)};
-        } else {
-            out[count++] = {{speeds_[i + 1] / dv, -1.0 / dv, 0.0}, i + 1 < n ? 2 * (cell + 1) + (up ? 1 : 0) : -1};
-        }
-        return count;
-    }
+    Plane plane(int triangle) const { return grid().plane(triangle); }
+    Plane line_at_standstill(int j) const { return grid().line_at_standstill(j); }
+    int edges(int triangle, Edge out[3]) const { return grid().edges(triangle, out); }
 
     double operator()(double mu, double v) const {
         const Plane p = plane(triangle(mu, v));
@@ -154,17 +93,6 @@ class LossMap {
  private:
     int cells_along_speed() const { return static_cast<int>(speeds_.size()) - 1; }
     double value(std::size_t j, std::size_t i) const { return values_[j * speeds_.size() + i]; }
-    // Is this node that of no load at standstill, and without loss?
-    bool no_loss_at_origin(int j, int i) const { return loads_[j] == 0.0 && speeds_[i] == 0.0 && value(j, i) == 0.0; }
-    // Diagonals rise for mu > 0 and fall for mu < 0, so that a map mirrored in its data is mirrored in its triangles.
-    bool rising(int j) const { return loads_[j] + loads_[j + 1] >= 0.0; }
-
-    static int interval(const std::vector<double>& axis, double at) {
-        int k = 0;
-        while (k + 2 < static_cast<int>(axis.size()) && at > axis[k + 1]) ++k;
-        return k;
-    }
-
     // One more row on each side of the load axis and one more column at the fast end, far away. Each continues its
     // whole edge with one slope, so that the far cells are no more crooked than the last ones of the data.
     void extend() {

@@ -12,12 +12,12 @@ import numpy as np
 from ..control.controller import Controller
 from ..errors import InputError
 from ..inputs.arguments import checked
-from ..inputs.doubts import trusted
 from ..inputs.limits import check_free
 from ..inputs.quantities import Count, Time
 from ..inputs.validation import did_you_mean, listed, shown
 from ..model.drive import Drive
 from ..model.train import DriveTrain
+from .batch_parameters import BatchParameters, check_range
 from .exact_batches import ExactBatch
 from .given_motion import check_motion
 from .scenario import Scenario
@@ -87,7 +87,7 @@ class SimulationBatch:
     -----
     Each step is exact, whatever its length: `switchings` within it are located to rounding. A drive does not know of the
     others, so its results do not depend on their number, on their order or on `threads`, to the last bit. A motor, a gear and a
-    load without controllers are stepped by tables, all others by the solver of `Simulation`.
+    load without controllers are stepped by a walk that needs no tables, all others by the solver of `Simulation`.
     """
 
     @checked
@@ -124,11 +124,13 @@ class SimulationBatch:
         columns = _columns(scenarios[0], vary or {}, self._count, np.random.default_rng(seed))
         self._given = given_motion
         self._core: ExactBatch | WalkedBatch
-        if not given_motion and WalkedBatch.takes(scenarios, columns):
-            self._core = WalkedBatch(scenarios, columns, self._count, step)
+        self._parameters = BatchParameters(scenarios, columns, self._count)
+        if not given_motion and WalkedBatch.takes(scenarios):
+            self._core = WalkedBatch(scenarios, self._parameters, self._count, step)
         else:
+            each = [self._parameters.scenario(k) for k in range(self._count)]
             tuned = scenarios * (self._count // len(scenarios))
-            self._core = ExactBatch(_each(tuned, columns), tuned, given_motion, step)
+            self._core = ExactBatch(each, tuned, given_motion, step)
         self._train, self._time = scenarios[0].train(), np.zeros(self._count)
         loads = {self._train.load_torque_of(shaft) for shaft in self._train.shafts}
         self._required = {name for name in self._core.inputs if name not in loads}
@@ -147,7 +149,7 @@ class SimulationBatch:
 
     @property
     def memory(self) -> int:
-        """Memory [bytes] of the states, parameters and tables of all drives, as far as the motion has met their regimes."""
+        """Memory [bytes] of the states and parameters of all drives."""
         return int(self._core.memory)
 
     @property
@@ -159,6 +161,11 @@ class SimulationBatch:
         yet.
         """
         return dict(zip(("steps", "with_events", "general", "switchings"), self._core.counts, strict=True))
+
+    @property
+    def parameters(self) -> BatchParameters:
+        """Parameters of all drives, by their keys in a scenario file, as arrays that may be written between steps."""
+        return self._parameters
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -204,6 +211,9 @@ class SimulationBatch:
         if missing := self._required - values.keys():
             raise InputError(f"{', '.join(sorted(missing))}: missing; all commands and references are to be given")
         course = self._motion_of(motion)
+        keys, rows = self._parameters.changes()
+        if keys:
+            self._core.change(self._parameters, keys, rows)
         if isinstance(self._core, ExactBatch):
             self._core.step(values, course, self._threads)
         else:
@@ -352,15 +362,6 @@ def _starts(scenarios: Sequence[Scenario], count: int) -> dict[str, Any]:
     return {name: x if len(x) == count else x[0] for name, x in initial.items() if x.any()}
 
 
-def _each(scenarios: Sequence[Scenario], columns: Mapping[str, np.ndarray]) -> list[Scenario]:
-    """The scenarios of a batch one by one."""
-    if not columns:
-        return list(scenarios)
-    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-    with trusted():
-        return [one.replace(**dict(zip(columns, row, strict=True))) for one, row in zip(scenarios, rows, strict=True)]
-
-
 def _count_of(count: int | None, vary: Mapping[str, Any]) -> int:
     """Number of drives, from the arrays if it is not given."""
     sizes = {key: np.shape(value)[0] for key, value in vary.items() if not callable(value) and np.ndim(value) == 1}
@@ -383,9 +384,7 @@ def _columns(
         value_at(scenario, key, "vary")
         column = value(generator, count) if callable(value) else value
         columns[key] = np.broadcast_to(_numbers(f"vary.{key}", column, count), (count,))
-    with trusted():
-        for pick in (np.min, np.max) if columns else ():  # the range of each number is an interval
-            scenario.replace(**{key: float(pick(column)) for key, column in columns.items()})
+    check_range(scenario, columns)
     return columns
 
 

@@ -12,6 +12,7 @@ from ..control.axis import OPEN_LOOP
 from ..errors import InputError
 from ..inputs.validation import shown
 from ..model.drive import DriveOfOneGear
+from .batch_parameters import BatchParameters
 from .scenario import Scenario
 
 JOINT = "load"  # the shaft whose motion is given
@@ -33,6 +34,7 @@ class ExactBatch:
     """
 
     def __init__(self, scenarios: Sequence[Scenario], tuned: Sequence[Scenario], given: bool, step: float) -> None:
+        self._tuned = tuned
         kinds: dict[Any, int] = {}
         trains, controls, kind_of = [], [], []
         for one, base in zip(scenarios, tuned, strict=True):
@@ -40,7 +42,7 @@ class ExactBatch:
             if key not in kinds:
                 kinds[key] = len(kinds)
                 trains.append(_with_given_load(one) if given else one.core())
-                controls.append(base.control() if base.axes() else OPEN_LOOP)
+                controls.append(_control_of(base))
             kind_of.append(kinds[key])
         self._core = _core.ExactBatch(trains, controls=controls, kind_of=kind_of, step=step)
         self._given, self._count, self._steps = given, len(kind_of), 0
@@ -61,6 +63,17 @@ class ExactBatch:
     def read(self, name: str) -> np.ndarray:
         """Values of a variable, which each step writes anew."""
         return self._variables[name]
+
+    def change(self, parameters: BatchParameters, keys: Sequence[str], rows: np.ndarray) -> None:
+        """Take over what has been written under some keys for some trains."""
+        for k in rows.tolist():
+            one = parameters.scenario(k)
+            if not self._core.replace(
+                k, _with_given_load(one) if self._given else one.core(), _control_of(self._tuned[k])
+            ):
+                raise InputError(
+                    "adds or removes a part that has states; take a batch of its own", f"parameters.{keys[0]}"
+                )
 
     @property
     def counts(self) -> tuple[int, int, int, int]:
@@ -131,3 +144,8 @@ def _with_given_load(scenario: Scenario) -> _core.Train:
         raise InputError(f"given_motion: is that of the shaft called {JOINT}, and the shafts are {known}; rename one")
     loaded = [name for name in scenario.loaded() if name != JOINT]
     return scenario.long().core(loaded=loaded, given=(JOINT,))
+
+
+def _control_of(scenario: Scenario) -> Any:
+    """Its controllers, as the core takes them."""
+    return scenario.control() if scenario.axes() else OPEN_LOOP

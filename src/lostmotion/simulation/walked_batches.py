@@ -1,4 +1,4 @@
-"""Trains of a batch that are a motor, a gear and a load: most steps are one product with a table."""
+"""Trains of a batch that are a motor, a gear and a load: a walk from event to event, which begins anew at each step."""
 
 from __future__ import annotations
 
@@ -10,20 +10,18 @@ import numpy as np
 from .. import _core
 from ..errors import InputError
 from ..model.torsion import Rigid, TorsionCurve
+from .batch_parameters import BatchParameters
 from .keys import renamed
 from .one_gear import drive_keys
 from .scenario import Scenario
 
 BACKLASH = "gearbox.stiffness.backlash"
-KEYS = (
-    *(
-        key
-        for key in _core.batch_fields()
-        if key.startswith(("motor.", "gearbox.", "load."))
-        and not key.startswith("load.torque.")
-        and key != "gearbox.stiffness.slopes"
-    ),
-    BACKLASH,
+KEYS = tuple(
+    key
+    for key in _core.batch_fields()
+    if key.startswith(("motor.", "gearbox.", "load."))
+    and not key.startswith("load.torque.")
+    and key != "gearbox.stiffness.slopes"
 )
 """numbers that the core changes by itself, by their keys in the short form"""
 
@@ -35,37 +33,24 @@ class WalkedBatch:
     ----------
     scenarios
         One for all trains, or one for each.
-    columns
-        Values of what varies, by their keys, one for each train.
+    parameters
+        What differs from train to train, beside that.
     count
         Number of trains.
     step
         [s]
     """
 
-    def __init__(
-        self, scenarios: Sequence[Scenario], columns: Mapping[str, np.ndarray], count: int, step: float
-    ) -> None:
+    def __init__(self, scenarios: Sequence[Scenario], parameters: BatchParameters, count: int, step: float) -> None:
         first = scenarios[0]
-        train, own = first.train(), {renamed(key, drive_keys(first)): column for key, column in columns.items()}
+        train = first.train()
         numbers: dict[Scenario, int] = {}
-        models = np.array([numbers.setdefault(one, len(numbers)) for one in scenarios])
-        base, values, breaks = list(range(len(numbers))), np.zeros((len(numbers), 0)), -1
-        if len(scenarios) != count:
-            models = np.zeros(count, dtype=int)
-        if own:
-            values, breaks = _table(first, own)
-            values, models = np.unique(values, axis=0, return_inverse=True)
-            base = [0] * len(values)
+        kinds = [numbers.setdefault(one, len(numbers)) for one in scenarios]
         self._core = _core.DriveBatch(
-            [_core_of(one) for one in numbers],
-            base=base,
-            keys=[key for key in own if key != BACKLASH],
-            curve_breaks=breaks,
-            values=np.ascontiguousarray(values),
-            model_of=models.reshape(-1).tolist(),
-            step=step,
+            [_core_of(one) for one in numbers], kind_of=kinds if len(kinds) == count else kinds * count, step=step
         )
+        self._first, self._numbers = first, drive_keys(first)
+        self.change(parameters, tuple(parameters), np.arange(count))
         ((motor, part),), ((gear, between),) = train.motors.items(), train.gears.items()
         torque, output = train.motor_torque_of(motor), between.output
         states = (
@@ -89,23 +74,32 @@ class WalkedBatch:
         self.inputs = self._given if first.loaded() else self._given[:1]
 
     @staticmethod
-    def takes(scenarios: Sequence[Scenario], columns: Mapping[str, np.ndarray]) -> bool:
-        """Whether the core takes these trains, and changes what varies by itself."""
+    def takes(scenarios: Sequence[Scenario]) -> bool:
+        """Whether the core takes these trains."""
         if any(scenario.axes() or scenario.continuous() for scenario in scenarios):
             return False
-        if any(_core.DriveBatch.error(_core_of(scenario)) for scenario in dict.fromkeys(scenarios)):
-            return False
-        one = scenarios[0]
-        for key, column in ((renamed(key, drive_keys(one)), column) for key, column in columns.items()):
-            if key not in KEYS or (
-                key.startswith("motor.") and next(iter(one.train().motors.values())).kind == "synchronous"
-            ):
-                return False  # of a synchronous motor the core's numbers follow from one another
-            if key == BACKLASH and (
-                column.min() <= 0.0 or not _plain(next(iter(one.train().gears.values())).stiffness)
-            ):
-                return False
-        return True
+        return not any(_core.DriveBatch.error(_core_of(scenario)) for scenario in dict.fromkeys(scenarios))
+
+    def change(self, parameters: BatchParameters, keys: Sequence[str], rows: np.ndarray) -> None:
+        """Take over what has been written under some keys for some trains."""
+        own = {key: renamed(key, self._numbers) for key in keys}
+        if all(self._is_number_of_core(key) for key in own.values()):
+            for key, number in own.items():
+                self._core.set(number, parameters[key])
+            return
+        for k in rows.tolist():
+            one = _core_of(parameters.scenario(k))
+            if error := _core.DriveBatch.error(one):
+                raise InputError(f"{error}; such drives have a batch of their own", f"parameters.{keys[0]}")
+            self._core.replace(k, one)
+
+    def _is_number_of_core(self, key: str) -> bool:
+        """Whether the core changes this number by itself. Of a synchronous motor its numbers follow from others."""
+        train = self._first.train()
+        if key == BACKLASH:
+            return _plain(next(iter(train.gears.values())).stiffness)
+        synchronous = next(iter(train.motors.values())).kind == "synchronous"
+        return key in KEYS and not (synchronous and key.startswith("motor."))
 
     @property
     def variables(self) -> tuple[str, ...]:
@@ -129,7 +123,7 @@ class WalkedBatch:
 
     @property
     def memory(self) -> int:
-        """Memory [bytes] of states, tables and parameters."""
+        """Memory [bytes] of states and parameters."""
         return int(self._core.memory)
 
     def step(self, values: Mapping[str, np.ndarray], threads: int) -> None:
@@ -162,18 +156,3 @@ def _core_of(scenario: Scenario) -> _core.Train:
 
 def _plain(stiffness: Any) -> bool:
     return isinstance(stiffness, TorsionCurve) and stiffness.core().odd
-
-
-def _table(scenario: Scenario, columns: Mapping[str, np.ndarray]) -> tuple[np.ndarray, int]:
-    """Values as the core takes them, one row for each train, and the number of breaks among them; -1: no backlash varies.
-
-    First are those by key, then the breaks and the slopes of the torsion curve.
-    """
-    own, breaks = [column for key, column in columns.items() if key != BACKLASH], -1
-    if BACKLASH in columns:
-        ((_, gear),) = scenario.train().gears.items()
-        curve, half = gear.stiffness, 0.5 * columns[BACKLASH]
-        assert isinstance(curve, TorsionCurve)
-        own += [half, *(half + b for b in curve.breaks), *(np.full(len(half), s) for s in (0.0, *curve.slopes))]
-        breaks = 1 + len(curve.breaks)
-    return np.column_stack(own), breaks

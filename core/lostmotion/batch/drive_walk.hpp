@@ -1,0 +1,780 @@
+// A step of a drive from event to event, by Taylor series and without tables.
+//
+// The drive has two inertias, on the two sides of a gear of ratio i. Its states are
+//
+//   q    torque of the motor [N m], if that follows its command with a delay
+//   a    speed of the motor over i [rad/s]
+//   v    rate of the twist [rad/s], so that the load turns with a - v
+//   d    twist [rad]
+//
+// and the angle of the load [rad]. They are local to the mesh, so that single precision keeps their digits. A drive
+// whose ratio is below zero is its mirror image at the motor, and seen as that here.
+//
+// A regime is linear: fixed are the mode of each dry contact, the piece of the torsion curve and the cell of the loss
+// law. It is made from the numbers of the drive where it begins, so that these may change at any step. From there the
+// motion is its Taylor series over a short time. Guards are linear in the states; Bernstein coefficients of the cubic
+// and the sum of what lies beyond prove that a guard stays positive, or that it falls through zero once; Newton's
+// method then finds where. Across an edge of a continuous law the motion goes on in the next piece. Where a contact
+// stops or is overcome, the regime that follows has to hold strictly: each of its guards is positive, or zero and
+// rising. Whatever is not certain is said, and nothing of that step may be used.
+//
+// The text of this file is plain: it includes nothing, allocates nothing and calls nothing but what it defines, so that
+// it is also the body of a kernel for graphics processors. `real` is the type of its numbers, `EPSILON` their rounding;
+// `parts/loss_grid.hpp` stands before it.
+
+// What drives of a kind share.
+struct DriveLaws {
+    enum Losses { constant, by_direction, by_map };
+    // Pieces of the torsion curve, from the most negative; `zero`: the one around twist 0. P = slope d + offset between
+    // `lower` and `upper`; root: of the slope.
+    const real *lower, *upper, *slope, *offset, *root;
+    int pieces, zero;
+    bool has_gap;         // piece `zero` has no stiffness
+    bool rigid;           // no twist at all
+    bool delays_torque;   // q is a state
+    bool limits_damping;  // to the torque of the spring
+    int losses;
+    LossGrid map;
+    const real* reach;    // of a series of each degree: |A| t up to which what lies beyond is below rounding
+    const real* inverse;  // 1/k
+    int most_degree;
+};
+
+// The numbers of one drive, made of those in its data sheet.
+struct DriveNumbers {
+    real per_motor, per_load;       // i/(i^2 J_1), 1/J_2: accelerations a', w' per torque on the two shafts
+    real motor_drag, load_drag;     // torques per a and w [N m s/rad]
+    real motor_slips, motor_holds;  // dry friction [N m]
+    real load_slips, load_holds;
+    real stall_torque, back_torque;  // of the motor per command, per a
+    real delay, command_limit;       // 1/tau_a, of the magnitude
+    real per_ratio;                  // 1/|i|
+    real driving, overrunning;       // T_1 |i|/T_2 of constant losses and of those by direction
+    real rated_torque, per_rated;    // T_2R and its inverse
+    real speed_share;                // |i|/n_1R
+    real hysteresis;                 // (1 - eta_H)/2
+    real mesh_damping;
+    real gap;                             // by which flanks are further out than `laws` has them [rad]
+    real stiff;                           // root of the largest twist acceleration per torque
+    real torque_scale, per_torque_scale;  // of q over that of a, and its inverse
+    unsigned char has;                    // contacts
+    signed char turned;                   // -1: a ratio below zero
+    enum Contact { of_motor = 1, of_twist = 2, of_load = 4, dry_losses = 8 };
+};
+
+struct DriveState {
+    real q, a, v, d, angle;
+    real hysteresis;                 // capacity [N m]
+    signed char motor, twist, load;  // modes of the contacts: 0 at rest, +1 or -1
+    signed char flanks;              // 0 touch, 1 parted, 2 damping at its limit
+    short piece, cell, back;         // of the torsion curve; of the losses; of those in the other direction, at rest
+    bool known;                      // the modes
+};
+
+struct DriveWalk {
+    enum Verdict { yes, no, unsure };
+    enum Kind { speed, capacity, piece, cell, back, flanks };
+    enum Contact { motor, twist, load };
+    enum { longest_series = 24, most_guards = 16, most_switchings = 200, most_halvings = 60, longest_walk = 24 };
+
+    // one + q q + a a + v v + d d
+    struct Form {
+        real one, q, a, v, d;
+        real at(const DriveState& x) const { return one + (q * x.q + a * x.a) + (v * x.v + d * x.d); }
+        real size(const DriveState& x) const {
+            return magnitude(one) + magnitude(q * x.q) + magnitude(a * x.a) + magnitude(v * x.v) + magnitude(d * x.d);
+        }
+        bool varies() const { return q != 0 || a != 0 || v != 0 || d != 0; }
+        void add(real s, const Form& f) {
+            one += s * f.one;
+            q += s * f.q;
+            a += s * f.a;
+            v += s * f.v;
+            d += s * f.d;
+        }
+    };
+    struct Guard {
+        Form form;
+        short kind, of, to;  // of: contact; to: what lies beyond
+    };
+    struct Regime {
+        Form q, a, w, v;  // rates
+        bool twists;      // d' = v
+        Form output;      // T_2
+        Form pull;        // M
+        real norm;        // bound on the matrix of the rates, in scales that balance twist and speed, torque and speed
+        real per_q, per_d;  // these scales
+        int n;
+        Guard guards[most_guards];
+    };
+    struct Crossing {
+        int guard;
+        real at;
+        bool doubtful;  // another one is near
+    };
+
+    const DriveLaws& laws;
+    const DriveNumbers& p;
+    real command, load_torque;
+    DriveState x;
+    Regime r;
+    int switchings, degree;
+    real y[4][longest_series + 1];  // terms of the series of q, a, v, d, in the share of its time
+    real tail[4], slope_tail[4];    // of the terms beyond the cubic, and of its slope
+
+    static real magnitude(real v) { return v < 0 ? -v : v; }
+    static real least(real a, real b) { return a < b ? a : b; }
+    static real most(real a, real b) { return a > b ? a : b; }
+    static real doubt() { return real(4e6) * EPSILON; }     // of a value over the sum of the magnitudes of its terms
+    static real on_zero() { return real(5e3) * EPSILON; }   // the same, where a guard begins on zero
+    static real together() { return real(4e6) * EPSILON; }  // of two zeros, in the time of the series
+
+    DriveWalk(const DriveLaws& the_laws, const DriveNumbers& numbers, const DriveState& from, real to_motor,
+              real to_load)
+        : laws(the_laws), p(numbers), load_torque(to_load), x(from), switchings(0), degree(0) {
+        const real asked = p.turned < 0 ? -to_motor : to_motor;
+        command = asked > p.command_limit ? p.command_limit : asked < -p.command_limit ? -p.command_limit : asked;
+    }
+
+    bool has(int contact) const { return (p.has & contact) != 0; }
+    bool motor_rests() const { return has(DriveNumbers::of_motor) && x.motor == 0; }
+    bool load_rests() const { return has(DriveNumbers::of_load) && x.load == 0; }
+    bool tied() const { return laws.rigid || (has(DriveNumbers::of_twist) && x.twist == 0); }
+    signed char* mode(int contact) { return contact == motor ? &x.motor : contact == twist ? &x.twist : &x.load; }
+
+    // Bounds of a piece, and its torque as a form.
+    real beyond(int k) const { return k > laws.zero ? p.gap : k < laws.zero ? -p.gap : 0; }
+    real lower(int k) const { return laws.lower[k] + (k > laws.zero ? p.gap : -p.gap); }
+    real upper(int k) const { return laws.upper[k] + (k < laws.zero ? -p.gap : p.gap); }
+    real spring(int k) const { return laws.offset[k] - laws.slope[k] * beyond(k); }
+    bool in_gap() const { return laws.has_gap && x.piece == laws.zero; }
+    void locate_piece() {
+        int k = laws.zero;
+        while (x.d > 0 && k + 1 < laws.pieces && x.d > upper(k)) ++k;
+        while (x.d < 0 && k > 0 && x.d < lower(k)) --k;
+        x.piece = static_cast<short>(k);
+    }
+    Plane loss_plane(int of, bool at_rest) const {
+        if (laws.losses == DriveLaws::by_map) return at_rest ? laws.map.line_at_standstill(of) : laws.map.plane(of);
+        return {0, 0, of == 0 ? p.overrunning - 1 : p.driving - 1};
+    }
+    // The cells of the losses at a torque of the mesh.
+    void locate_losses(real torque) {
+        if (!has(DriveNumbers::dry_losses)) return;
+        const real mu = torque * p.per_rated;
+        const bool map = laws.losses == DriveLaws::by_map;
+        const auto interval = [&](real at) { return map ? laws.map.load_interval(at) : at < 0 ? 0 : 1; };
+        x.back = 0;
+        if (x.motor == 0) {
+            x.cell = static_cast<short>(interval(mu));
+            x.back = static_cast<short>(interval(-mu));
+        } else if (map) {
+            x.cell = static_cast<short>(laws.map.triangle(x.motor * mu, magnitude(x.a) * p.speed_share));
+        } else {
+            x.cell = x.motor * mu < 0 ? 0 : 1;
+        }
+    }
+
+    void guard(const Form& form, int kind, int of, int to) {
+        if (form.one == 0 && !form.varies()) return;  // as of a loss law whose load is zero in the gap: it ends nothing
+        Guard& g = r.guards[r.n++];
+        g.form = form;
+        g.kind = static_cast<short>(kind);
+        g.of = static_cast<short>(of);
+        g.to = static_cast<short>(to);
+    }
+    static Form over(const Form& f, real by, real one) {
+        Form out = {one, 0, 0, 0, 0};
+        out.add(by, f);
+        return out;
+    }
+
+    // The regime of the modes, the piece and the cells. False: it is for the general solver.
+    bool make() {
+        r.n = 0;
+        r.twists = false;
+        const bool motor_at_rest = motor_rests(), load_at_rest = load_rests(), together = tied();
+        if (motor_at_rest && load_at_rest && has(DriveNumbers::of_twist)) return false;
+        if (together && (load_at_rest || (motor_at_rest && has(DriveNumbers::of_load)))) return false;
+        // The motor.
+        if (laws.delays_torque) {
+            r.pull = {0, 1, 0, 0, 0};
+            r.q = {p.delay * p.stall_torque * command, -p.delay, -p.delay * p.back_torque, 0, 0};
+        } else {
+            r.pull = {p.stall_torque * command, 0, -p.back_torque, 0, 0};
+            r.q = {0, 0, 0, 0, 0};
+        }
+        // What the mesh passes on.
+        const int k = x.piece;
+        const Form P = laws.rigid ? Form{0, 0, 0, 0, 0} : Form{spring(k), 0, 0, 0, laws.slope[k]};
+        const bool damped = p.mesh_damping > 0 && !in_gap() && !(motor_at_rest && load_at_rest);
+        if (!together) {
+            r.output = P;
+            if (has(DriveNumbers::of_twist)) r.output.one += x.twist * x.hysteresis;
+            if (x.flanks == 1)
+                r.output = {0, 0, 0, 0, 0};
+            else if (x.flanks == 2)
+                r.output = over(P, 2, 0);
+            else if (damped)
+                r.output.v += p.mesh_damping;
+        }
+        // T_1 |i| = loss + share T_2 where the motor turns.
+        const bool dry = has(DriveNumbers::dry_losses);
+        real share = p.driving;
+        Form loss = {0, 0, 0, 0, 0};
+        if (dry && !motor_at_rest) {
+            const Plane m = loss_plane(x.cell, false);
+            share = 1 + m.per_load;
+            loss.one = x.motor * p.rated_torque * m.at_zero;
+            loss.a = p.rated_torque * p.speed_share * m.per_speed;
+        }
+        const real motor_friction = has(DriveNumbers::of_motor) ? x.motor * p.motor_slips : 0;
+        const real load_friction = has(DriveNumbers::of_load) ? x.load * p.load_slips : 0;
+        Form to_motor = r.pull;  // torque on the motor less that of the mesh
+        to_motor.one -= motor_friction;
+        to_motor.a -= p.motor_drag;
+        to_motor.add(-p.per_ratio, loss);
+        Form to_load = {-load_torque - load_friction, 0, -p.load_drag, p.load_drag, 0};  // the same at the load
+        if (together && motor_at_rest) {
+            r.output = {load_torque, 0, 0, 0, 0};
+            r.a = r.w = {0, 0, 0, 0, 0};
+        } else if (together) {
+            to_load.v = 0;
+            const real inertia = 1 / p.per_motor + share * p.per_ratio / p.per_load;
+            if (!(inertia > 0)) return false;
+            r.a = over(to_motor, 1 / inertia, 0);
+            r.a.add(share * p.per_ratio / inertia, to_load);
+            r.w = r.a;
+            r.output = over(r.a, 1 / p.per_load, 0);
+            r.output.add(-1, to_load);
+        } else {
+            r.a = r.w = {0, 0, 0, 0, 0};
+            if (!motor_at_rest) {
+                r.a = over(to_motor, p.per_motor, 0);
+                r.a.add(-p.per_motor * share * p.per_ratio, r.output);
+            }
+            if (!load_at_rest) {
+                r.w = over(to_load, p.per_load, 0);
+                r.w.add(p.per_load, r.output);
+            }
+            r.twists = !(motor_at_rest && load_at_rest);
+        }
+        r.v = r.a;
+        r.v.add(-1, r.w);
+        if (together) r.v = {0, 0, 0, 0, 0};
+        // Contacts that slip.
+        if (has(DriveNumbers::of_motor) && x.motor != 0)
+            guard({0, 0, static_cast<real>(x.motor), 0, 0}, speed, motor, 0);
+        if (has(DriveNumbers::of_twist) && x.twist != 0)
+            guard({0, 0, 0, static_cast<real>(x.twist), 0}, speed, twist, 0);
+        if (has(DriveNumbers::of_load) && x.load != 0) {
+            const real s = x.load;
+            guard({0, 0, s, -s, 0}, speed, load, 0);
+        }
+        if (motor_at_rest) {  // T_1 |i| = share T_2 + standing where it begins to turn
+            real forward = share, backward = share, standing = 0, standing_back = 0;
+            if (dry) {
+                const Plane up = loss_plane(x.cell, true), down = loss_plane(x.back, true);
+                forward = 1 + up.per_load;
+                backward = 1 + down.per_load;
+                standing = p.rated_torque * up.at_zero;
+                standing_back = p.rated_torque * down.at_zero;
+            }
+            Form most_ahead = over(r.output, forward * p.per_ratio, p.motor_holds + standing * p.per_ratio);
+            most_ahead.add(-1, r.pull);
+            Form most_back = over(r.output, -backward * p.per_ratio, p.motor_holds + standing_back * p.per_ratio);
+            most_back.add(1, r.pull);
+            guard(most_ahead, capacity, motor, 1);
+            guard(most_back, capacity, motor, -1);
+        }
+        if (has(DriveNumbers::of_twist) && x.twist == 0) {
+            Form held = r.output;
+            held.add(-1, P);
+            guard(over(held, -1, x.hysteresis), capacity, twist, 1);
+            guard(over(held, 1, x.hysteresis), capacity, twist, -1);
+        }
+        if (load_at_rest) {
+            guard(over(r.output, -1, p.load_holds + load_torque), capacity, load, 1);
+            guard(over(r.output, 1, p.load_holds - load_torque), capacity, load, -1);
+        }
+        if (r.twists) add_pieces(P);
+        if (dry) add_cells(motor_at_rest);
+        set_norm();
+        return true;
+    }
+
+    void add_pieces(const Form& P) {
+        // An end that the twist slips away from is not reached.
+        const int slip = has(DriveNumbers::of_twist) ? x.twist : 0;
+        if (x.piece + 1 < laws.pieces && slip >= 0) guard({upper(x.piece), 0, 0, 0, -1}, piece, 0, 1);
+        if (x.piece > 0 && slip <= 0) guard({-lower(x.piece), 0, 0, 0, 1}, piece, 0, -1);
+        if (!laws.has_gap || !(p.mesh_damping > 0) || in_gap()) return;
+        const real way = x.piece > laws.zero ? 1 : -1;
+        Form pressed = over(P, way, 0), spare = pressed;
+        pressed.v += way * p.mesh_damping;
+        spare.v -= way * p.mesh_damping;
+        if (x.flanks == 1) return guard(over(pressed, -1, 0), flanks, 0, 0);
+        if (x.flanks == 2) return guard(over(spare, -1, 0), flanks, 0, 0);
+        guard(pressed, flanks, 0, 1);
+        if (laws.limits_damping) guard(spare, flanks, 0, 2);
+    }
+
+    void add_cells(bool at_rest) {
+        const Form mu = over(r.output, p.per_rated, 0);
+        const bool map = laws.losses == DriveLaws::by_map;
+        if (!at_rest && map) {
+            Edge edges[3];
+            const int n = laws.map.edges(x.cell, edges);
+            for (int e = 0; e < n; ++e) {
+                const Plane& in = edges[e].inside;
+                Form form = over(mu, x.motor * in.per_load, in.at_zero);
+                form.a += x.motor * p.speed_share * in.per_speed;
+                guard(form, cell, 0, edges[e].neighbour);
+            }
+            return;
+        }
+        const int n = map ? laws.map.load_intervals() : 2;
+        for (int way = 1; way >= -1; way -= 2) {
+            if (!at_rest && way < 0) return;
+            const int k = way > 0 ? x.cell : x.back;
+            const real s = at_rest ? way : x.motor;
+            if (k > 0) guard(over(mu, s, map ? -laws.map.loads[k] : 0), way > 0 ? cell : back, 0, k - 1);
+            if (k + 1 < n) guard(over(mu, -s, map ? laws.map.loads[k + 1] : 0), way > 0 ? cell : back, 0, k + 1);
+        }
+    }
+
+    void set_norm() {
+        const real w = laws.rigid ? 0 : laws.root[x.piece] * p.stiff, per_w = w > 0 ? 1 / w : 0, t = p.torque_scale;
+        r.per_q = p.per_torque_scale;
+        r.per_d = w;
+        const auto row = [&](const Form& f) {
+            return magnitude(f.q) * t + magnitude(f.a) + magnitude(f.v) + magnitude(f.d) * per_w;
+        };
+        r.norm = most(most(row(r.a), row(r.v)), w);
+        if (laws.delays_torque) r.norm = most(r.norm, p.delay + p.delay * p.back_torque * p.per_torque_scale);
+    }
+
+    // Advances by a time h. False: something is not certain; nothing of this walk may be used.
+    bool advance(real h) {
+        if (!x.known) {
+            if (!begin()) return false;
+        } else {
+            if (!make()) return false;
+            int violated = -1;
+            const Verdict v = verify(0, -1, true, violated);
+            if (v == unsure || (v == no && !resolve(violated, true))) return false;
+        }
+        real left = h;
+        while (left > 0) {
+            int fired = -1;
+            if (!go_on(left, fired)) return false;
+            if (fired < 0) return true;
+            if (++switchings > most_switchings || !resolve(fired, false)) return false;
+        }
+        return true;
+    }
+
+    // Finds the modes where only the states are known.
+    bool begin() {
+        x.known = true;
+        x.flanks = 0;
+        if (!laws.rigid) locate_piece();
+        const real w = x.a - x.v;
+        const real speeds[3] = {x.a, x.v, w};
+        const int bits[3] = {DriveNumbers::of_motor, DriveNumbers::of_twist, DriveNumbers::of_load};
+        unsigned moving = 0;
+        int open = 0, opened[3] = {0, 0, 0};
+        for (int c = 0; c < 3; ++c) {
+            *mode(c) = 0;
+            if (!has(bits[c])) continue;
+            if (speeds[c] != 0) {
+                *mode(c) = speeds[c] > 0 ? 1 : -1;
+                moving |= 1u << c;
+            } else {
+                opened[open++] = c;
+            }
+        }
+        int combinations = 1;
+        for (int k = 0; k < open; ++k) combinations *= 3;
+        const DriveState from = x;
+        for (int n = 0; n < combinations; ++n) {
+            x = from;
+            for (int k = 0, rest = n; k < open; ++k, rest /= 3)
+                *mode(opened[k]) = static_cast<signed char>(rest % 3 == 2 ? -1 : rest % 3);
+            locate_losses(laws.rigid ? 0 : spring(x.piece) + laws.slope[x.piece] * x.d + x.twist * x.hysteresis);
+            const Verdict v = accept(moving, -1);
+            if (v != no) return v == yes;
+        }
+        return false;
+    }
+
+    // Within the regime, to the next guard that falls or to the end. False: not certain.
+    bool go_on(real& left, int& fired) {
+        int halvings = 0;
+        for (bool fresh = true; left > 0; fresh = false) {
+            const real longest = laws.reach[laws.most_degree];
+            real s = r.norm * left > longest ? longest / r.norm : left;
+            expand(s);
+            Crossing first;
+            while (true) {
+                bool halve = false;
+                if (!see(s, fresh, first, halve)) return false;
+                if (!halve) break;
+                if (++halvings > most_halvings) return false;
+                shorten();
+                s *= real(0.5);
+            }
+            if (first.doubtful) return false;
+            if (first.guard >= 0) {
+                move(s, first.at);
+                left -= first.at * s;
+                fired = first.guard;
+                return true;
+            }
+            move(s, 1);
+            left = s == left ? 0 : left - s;
+        }
+        return true;
+    }
+
+    // The series over a time s.
+    void expand(real s) {
+        const real reached = r.norm * s;
+        int longest = 4;
+        while (longest < laws.most_degree && reached > laws.reach[longest]) ++longest;
+        real q = x.q, a = x.a, v = x.v, d = x.d;
+        y[0][0] = q;
+        y[1][0] = a;
+        y[2][0] = v;
+        y[3][0] = d;
+        q = s * r.q.at(x);
+        a = s * r.a.at(x);
+        real w = s * r.w.at(x);
+        d = r.twists ? s * x.v : 0;
+        v = r.twists ? a - w : 0;
+        y[0][1] = q;
+        y[1][1] = a;
+        y[2][1] = v;
+        y[3][1] = d;
+        for (int c = 0; c < 4; ++c) tail[c] = slope_tail[c] = 0;
+        const real twists = r.twists ? 1 : 0;
+        const auto size = [&] {
+            return most(most(magnitude(q) * r.per_q, magnitude(d) * r.per_d), most(magnitude(a), magnitude(v)));
+        };
+        const real enough = real(0.0625) * EPSILON * size();
+        int k = 2;
+        for (; k <= longest; ++k) {
+            const real f = s * laws.inverse[k];
+            const real next_q = f * (r.q.q * q + r.q.a * a);
+            const real next_a = f * ((r.a.q * q + r.a.a * a) + (r.a.v * v + r.a.d * d));
+            const real next_v = f * ((r.v.q * q + r.v.a * a) + (r.v.v * v + r.v.d * d));
+            d = f * twists * v;
+            q = next_q;
+            a = next_a;
+            v = next_v;
+            y[0][k] = q;
+            y[1][k] = a;
+            y[2][k] = v;
+            y[3][k] = d;
+            if (k > 3) {
+                tail[0] += magnitude(q);
+                tail[1] += magnitude(a);
+                tail[2] += magnitude(v);
+                tail[3] += magnitude(d);
+                slope_tail[0] += k * magnitude(q);
+                slope_tail[1] += k * magnitude(a);
+                slope_tail[2] += k * magnitude(v);
+                slope_tail[3] += k * magnitude(d);
+                // The terms beyond are bounded by this one and |A| s.
+                if ((k & 1) == 0 && reached * laws.inverse[k + 1] * size() <= enough) break;
+            }
+        }
+        degree = k < longest ? k : longest;
+    }
+    // To half of its time.
+    void shorten() {
+        real share = 1;
+        for (int c = 0; c < 4; ++c) tail[c] = slope_tail[c] = 0;
+        for (int k = 0; k <= degree; ++k, share *= real(0.5))
+            for (int c = 0; c < 4; ++c) {
+                y[c][k] *= share;
+                if (k > 3) {
+                    tail[c] += magnitude(y[c][k]);
+                    slope_tail[c] += k * magnitude(y[c][k]);
+                }
+            }
+    }
+    // To the share `at` of the time of the series.
+    void move(real s, real at) {
+        real sum[4], turned = (y[1][degree] - y[2][degree]) * laws.inverse[degree + 1];
+        for (int c = 0; c < 4; ++c) sum[c] = y[c][degree];
+        for (int k = degree - 1; k >= 0; --k) {
+            for (int c = 0; c < 4; ++c) sum[c] = at * sum[c] + y[c][k];
+            turned = at * turned + (y[1][k] - y[2][k]) * laws.inverse[k + 1];
+        }
+        x.q = sum[0];
+        x.a = sum[1];
+        x.v = sum[2];
+        x.d = sum[3];
+        x.angle += s * (at * turned);
+    }
+
+    // What the guards do over the series. False: not certain.
+    bool see(real s, bool fresh, Crossing& first, bool& halve) const {
+        first.guard = -1;
+        first.at = 2;
+        first.doubtful = false;
+        for (int g = 0; g < r.n; ++g) {
+            const Form& f = r.guards[g].form;
+            real c[4];
+            for (int k = 0; k < 4; ++k) c[k] = (f.q * y[0][k] + f.a * y[1][k]) + (f.v * y[2][k] + f.d * y[3][k]);
+            c[0] += f.one;
+            const real rest = (magnitude(f.q) * tail[0] + magnitude(f.a) * tail[1]) +
+                              (magnitude(f.v) * tail[2] + magnitude(f.d) * tail[3]);
+            // Bernstein coefficients of the cubic.
+            const real third = real(1) / 3, b1 = c[0] + third * c[1], b2 = b1 + third * (c[1] + c[2]),
+                       b3 = (c[0] + c[1]) + (c[2] + c[3]);
+            if (least(least(c[0], b1), least(b2, b3)) > rest) continue;
+            real at = 0;
+            const Verdict v = judge(f, c, rest, s, first.at, fresh, at, halve);
+            if (v == unsure) return false;
+            if (halve) return true;
+            if (v == yes) continue;
+            if (magnitude(at - first.at) < together()) first.doubtful = true;
+            if (at < first.at) {
+                if (first.at - at >= together()) first.doubtful = false;
+                first.guard = g;
+                first.at = at;
+            }
+        }
+        return true;
+    }
+
+    real term(const Form& f, int k) const { return (f.q * y[0][k] + f.a * y[1][k]) + (f.v * y[2][k] + f.d * y[3][k]); }
+    // Does a guard whose cubic is c stay positive, or does it fall later than another that falls `before`? No: it falls
+    // through zero once, there.
+    Verdict judge(const Form& f, const real* c, real rest, real s, real before, bool fresh, real& at,
+                  bool& halve) const {
+        const real size = f.size(x), zero = on_zero() * size;
+        if (c[0] < -zero) return unsure;
+        if (c[0] <= zero) {  // it begins on zero: does it depart?
+            const real no_slope = 10 * on_zero() * s * size_of_rate(f);
+            if (c[1] < -no_slope) {
+                at = 0;
+                return fresh ? unsure : no;
+            }
+            if (c[1] > no_slope) {
+                halve = !(least(c[1], least(c[1] + real(0.5) * c[2], c[1] + c[2] + c[3])) > rest);
+                return yes;
+            }
+            if (!(c[2] > no_slope)) return unsure;
+            halve = !(least(c[2], c[2] + c[3]) > rest);
+            return yes;
+        }
+        const real slope_rest = (magnitude(f.q) * slope_tail[0] + magnitude(f.a) * slope_tail[1]) +
+                                (magnitude(f.v) * slope_tail[2] + magnitude(f.d) * slope_tail[3]);
+        const real d0 = c[1], d1 = c[1] + c[2], d2 = c[1] + 2 * c[2] + 3 * c[3];
+        if (least(d0, least(d1, d2)) > slope_rest) return yes;
+        if (!(most(d0, most(d1, d2)) < -slope_rest)) {
+            halve = true;
+            return yes;
+        }
+        real all[longest_series + 1], end = 0;
+        int n = degree;
+        for (int k = degree; k >= 4; --k) end += all[k] = term(f, k);
+        for (int k = 0; k < 4; ++k) all[k] = c[k];
+        end += c[3] + c[2] + c[1] + c[0];
+        if (end >= 0) return yes;
+        while (n > 3 && magnitude(all[n]) < real(1e-3) * EPSILON * size) --n;
+        const auto value_at = [&](real t, int to, real& slope) {
+            real value = all[to];
+            slope = 0;
+            for (int k = to - 1; k >= 0; --k) {
+                slope = slope * t + value;
+                value = value * t + all[k];
+            }
+            return value;
+        };
+        real slope;
+        if (before <= 1 && value_at(before + together(), n, slope) > zero) return yes;  // another one falls first
+        // Newton's method within the bracket that the zero lies in, first of the terms that matter most. Steps shrink
+        // quadratically: once short, the next one would be below rounding.
+        real low = 0, high = 1, t = c[0] / (c[0] - end);
+        for (int m = 0; m < 3; ++m) {
+            const real value = value_at(t, n < 6 ? n : 6, slope), next = t - value / slope;
+            if (next > 0 && next < 1) t = next;
+        }
+        for (int m = 0; m < 60; ++m) {
+            const real value = value_at(t, n, slope);
+            (value > 0 ? low : high) = t;
+            const real next = t - value / slope;
+            const bool close = magnitude(next - t) <= together(), inside = next > low && next < high;
+            if (close && !inside) break;
+            t = inside ? next : real(0.5) * (low + high);
+            if (close) break;
+        }
+        at = t;
+        return no;
+    }
+    // The sum of the magnitudes of the terms that the rate of a form consists of.
+    real size_of_rate(const Form& f) const {
+        return magnitude(f.q) * r.q.size(x) + magnitude(f.a) * r.a.size(x) +
+               magnitude(f.v) * (r.twists ? r.v.size(x) : 0) + magnitude(f.d) * (r.twists ? magnitude(x.v) : 0);
+    }
+    real rate(const Form& f) const {
+        return (f.q * r.q.at(x) + f.a * r.a.at(x)) + (r.twists ? f.v * r.v.at(x) + f.d * x.v : 0);
+    }
+    real second_rate(const Form& f, real& size) const {
+        const real q = r.q.at(x), a = r.a.at(x), v = r.twists ? r.v.at(x) : 0, d = r.twists ? x.v : 0;
+        const auto next = [&](const Form& of, real& magnitudes) {
+            magnitudes = magnitude(of.q) * r.q.size(x) + magnitude(of.a) * r.a.size(x) +
+                         magnitude(of.v) * (r.twists ? r.v.size(x) : 0) + magnitude(of.d) * magnitude(d);
+            return (of.q * q + of.a * a) + (of.v * v + of.d * d);
+        };
+        real of_q, of_a, of_v;
+        const real q2 = next(r.q, of_q), a2 = next(r.a, of_a), v2 = next(r.v, of_v), d2 = r.twists ? v : 0;
+        size = magnitude(f.q) * of_q + magnitude(f.a) * of_a +
+               (r.twists ? magnitude(f.v) * of_v + magnitude(f.d) * r.v.size(x) : 0);
+        return (f.q * q2 + f.a * a2) + (r.twists ? f.v * v2 + f.d * d2 : 0);
+    }
+    // Does a guard that is zero rise from there, by its first or second derivative?
+    Verdict departs(const Form& f) const {
+        const real first = rate(f);
+        if (magnitude(first) > doubt() * size_of_rate(f)) return first > 0 ? yes : no;
+        real size;
+        const real second = second_rate(f, size);
+        return second > doubt() * size ? yes : unsure;
+    }
+
+    // Finds the regime that follows where a guard has fallen, or, after the inputs have jumped, is below zero.
+    bool resolve(int fired, bool jump) {
+        const Guard g = r.guards[fired];
+        if (g.kind == cell || g.kind == back) {
+            if (g.to < 0) return false;
+            (g.kind == cell ? x.cell : x.back) = g.to;
+            // A continuous law: across its edge the motion goes on, and what guards it has not changed.
+            return jump ? accept(moving(), -1) == yes : make();
+        }
+        if (g.kind == piece) {
+            x.d = g.to > 0 ? upper(x.piece) : lower(x.piece);
+            // Where flanks meet, their damping is more than the torque of the spring.
+            const bool met = in_gap();
+            if (met) x.flanks = laws.limits_damping && p.mesh_damping > 0 ? 2 : 0;
+            x.piece += g.to;
+            if (!met && !in_gap() && !jump) return make();  // a continuous law
+            if (in_gap()) x.flanks = 0;
+            locate_losses(mesh_torque());
+            return accept(moving(), -1) == yes;
+        }
+        if (g.kind == flanks) {
+            x.flanks = static_cast<signed char>(g.to);
+            locate_losses(mesh_torque());
+            return accept(moving(), -1) == yes;
+        }
+        if (g.kind == capacity) {
+            const unsigned go = moving();
+            const real torque = r.output.at(x);
+            *mode(g.of) = static_cast<signed char>(g.to);
+            if (g.of == motor || tied()) locate_losses(torque);
+            return accept(jump ? go : go | 1u << g.of, -1) == yes;
+        }
+        if (jump) return false;
+        const real torque = r.output.at(x);
+        const unsigned go = moving() & ~(1u << g.of);
+        stop(g.of);
+        const signed char was = *mode(g.of);
+        const DriveState from = x;
+        for (int n = 0; n < 3; ++n) {
+            x = from;
+            *mode(g.of) = n == 0 ? static_cast<signed char>(0) : n == 1 ? static_cast<signed char>(-was) : was;
+            locate_losses(torque);
+            const Verdict v = accept(go, g.of);
+            if (v != no) return v == yes;
+        }
+        return false;
+    }
+    // Torque that the spring of the mesh passes on where it slips.
+    real mesh_torque() const {
+        if (laws.rigid) return r.output.at(x);
+        const real P = spring(x.piece) + laws.slope[x.piece] * x.d;
+        return has(DriveNumbers::of_twist) ? P + x.twist * x.hysteresis : P;
+    }
+    // Contacts that slip: they go on in their direction, whatever their speed.
+    unsigned moving() const {
+        return (has(DriveNumbers::of_motor) && x.motor != 0 ? 1u : 0u) |
+               (has(DriveNumbers::of_twist) && x.twist != 0 ? 2u : 0u) |
+               (has(DriveNumbers::of_load) && x.load != 0 ? 4u : 0u);
+    }
+    // A contact has come to rest: its speed is zero to the last bit, and a turning point sets the hysteresis (16).
+    void stop(int contact) {
+        if (contact == motor) {
+            x.v = tied() ? 0 : load_rests() ? 0 : x.v - x.a;
+            x.a = 0;
+        } else if (contact == load) {
+            if (motor_rests())
+                x.v = 0;
+            else if (tied())
+                x.a = 0;
+            else
+                x.v = x.a;
+        } else {
+            x.v = 0;
+            x.hysteresis = p.hysteresis * magnitude(spring(x.piece) + laws.slope[x.piece] * x.d);
+        }
+    }
+
+    // Takes the regime of these modes, its pieces and cells found by a walk across the edges that are violated, if it
+    // holds. moving: contacts that go on in their direction. by_value: a contact that has just come to rest, of which
+    // the torque alone decides.
+    Verdict accept(unsigned moving, int by_value) {
+        for (int n = 0; n < longest_walk; ++n) {
+            if (!make()) return unsure;
+            int violated = -1;
+            const Verdict v = verify(moving, by_value, false, violated);
+            if (v != no) return v;
+            const Guard& g = r.guards[violated];
+            if (g.kind == speed || g.kind == capacity) return no;
+            if (g.to < 0 && g.kind != piece) return unsure;
+            if (g.kind == piece)
+                x.piece += g.to;
+            else if (g.kind == flanks)
+                x.flanks = static_cast<signed char>(g.to);
+            else
+                (g.kind == cell ? x.cell : x.back) = g.to;
+        }
+        return unsure;
+    }
+
+    // Whether the regime holds strictly just after now. lasting: the present one after a change of the inputs: what is
+    // zero holds. violated: a guard that is not, edges first.
+    Verdict verify(unsigned go_on, int by_value, bool lasting, int& violated) const {
+        violated = -1;
+        bool sure = true, by_contact = false;
+        int contacts_violated = 0;
+        const bool jumps = tied();
+        if (lasting) go_on = moving();
+        for (int g = 0; g < r.n; ++g) {
+            const Guard& it = r.guards[g];
+            if (it.kind == speed && (go_on >> it.of & 1u) != 0) continue;
+            // A jump of the inputs changes torques at rest and, of tied shafts, what the mesh passes on.
+            if (lasting && it.kind != capacity && !jumps) continue;
+            const real value = it.form.at(x), near = doubt() * it.form.size(x);
+            if (value > near) continue;
+            if (!(value < -near)) {
+                if (lasting) continue;
+                if (it.kind == capacity && it.of == by_value) sure = false;
+                const Verdict rises = departs(it.form);
+                if (rises == unsure) sure = false;
+                if (rises != no) continue;
+            }
+            const bool of_contact = it.kind == speed || it.kind == capacity;
+            if (of_contact) ++contacts_violated;
+            if (violated < 0 || (by_contact && !of_contact)) {
+                violated = g;
+                by_contact = of_contact;
+            }
+        }
+        if (!sure || (lasting && contacts_violated > 1)) return unsure;
+        return violated < 0 ? yes : no;
+    }
+};
