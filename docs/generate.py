@@ -165,7 +165,7 @@ def changes() -> list[str]:
         "- `motor.rated_torque`, `motor.rated_speed` and `motor.armature_voltage_constant` define the speed-torque line. A change of one of them",
         "  gives another motor. Its stall torque is the product of the first and the last.",
         '- `motor.kind = "torque_source"`: rotor, friction and rated torque stay. Values that only a DC motor has are dropped.',
-        "- `motor.limits` and `gearbox.limits` are the limits of the manufacturer. They change no motion, only the verdicts of `lostmotion drive check`,",
+        "- `motor.limits` and `gearbox.limits` are the limits of the manufacturer. They change no motion, only the verdicts of `lostmotion check`,",
         "  and no other key changes them.",
         "- `gearbox.ratio`, `inertia`, `viscous_friction`, `rated_input_speed` and `rated_output_torque` beside `from` replace values of the record.",
         "  The loss map is computed from them. Stiffness and hysteresis stay as printed.",

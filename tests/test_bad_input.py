@@ -599,7 +599,7 @@ def test_bad_call_ends_in_one_line_and_exit_code_1(tmp_path: Path, arguments: li
 def test_titles_and_names_of_files_do_not_command_the_terminal(tmp_path: Path) -> None:
     (tmp_path / "e\x1b[31m\x07.toml").write_text(f'title = "t\\u001b]0;x\\u0007\\u009b\\r"\n{GOOD}')
     calls = [["run", "e\x1b[31m\x07.toml", "-o", "o\x1b\x07.csv"], ["run", "o\x1b\x07.csv"], ["run", "no\x1b\x07"]]
-    calls += [["drive", "check", "e\x1b[31m\x07.toml"], ["run", "e\x1b[31m\x07.toml", "--set", "load.inertia=\x1b\x07"]]
+    calls += [["check", "e\x1b[31m\x07.toml"], ["run", "e\x1b[31m\x07.toml", "--set", "load.inertia=\x1b\x07"]]
     calls += [["study", "show", "\x1b\x07"], ["run", "--no\x1b\x07"]]
     for arguments in calls:
         done = lostmotion(*arguments, cwd=tmp_path)

@@ -235,7 +235,7 @@ def test_command_line(tmp_path: Path):
     page = (out / "rig.html").read_text()
     assert "back-driving torque" in page
     assert "ask the manufacturer" in page
-    checked = run(app, ["drive", "check", str(ROOT / "scenarios" / "catalogue-robot-joint.toml")])
+    checked = run(app, ["check", str(ROOT / "scenarios" / "catalogue-robot-joint.toml")])
     assert checked.exit_code == 0
     assert (
         "Verdict: fits, with a reservation: 3 of 16 points not judged" in checked.output

@@ -213,8 +213,15 @@ def test_the_command_says_what_it_has_moved_and_what_does_not_repeat(tmp_path: P
     assert ",spread,reason" in (tmp_path / "r" / "response.csv").read_text().splitlines()[0]
 
 
-def test_explain_refuses_a_controlled_scenario_before_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("lostmotion.simulation.run.run", lambda *_, **__: pytest.fail("it was run"))
-    done = CliRunner().invoke(app, ["run", "position-axis", "--explain", "0.1"])
-    assert done.exit_code == 1
-    assert "--explain 0.1: the scenario has a controller" in str(done.exception or done.output)
+@pytest.mark.parametrize(
+    ("name", "time"), [("position-axis", 1.2), ("gantry-two-screws", 0.5), ("vertical-axis-with-brake", 0.4)]
+)
+def test_a_controlled_scenario_is_explained_in_the_state_of_its_run(name: str, time: float) -> None:
+    scenario = lm.load(name)
+    explained, run = lm.explain(scenario, time), lm.simulate(scenario, duration=time)
+    assert float(run.time[-1]) == time
+    for variable, value in explained.values.items():
+        if variable in run:
+            assert value == pytest.approx(float(run[variable][-1]), rel=1e-9, abs=1e-9), variable
+    modes = {contact.name: contact.mode for contact in explained.contacts}
+    assert {key: int(run[key][-1]) for key in modes if key in run} == {key: modes[key] for key in modes if key in run}

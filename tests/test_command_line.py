@@ -46,6 +46,23 @@ def test_shipped_scenarios_are_known_by_name(tmp_path: Path) -> None:
         assert line.split(maxsplit=1) == [path.stem, lm.load(path).title]
 
 
+def test_a_copy_of_a_shipped_scenario_loads_anywhere_and_keeps_its_comments(tmp_path: Path) -> None:
+    for path in ALL_SCENARIOS:
+        done = CliRunner().invoke(app, ["new", path.stem, "-o", str(tmp_path / path.name)])
+        assert done.exit_code == 0, done.output
+        assert lm.load(tmp_path / path.name) == lm.load(path.stem)
+        assert path.read_text().count("#") == (tmp_path / path.name).read_text().count("#")
+    again = CliRunner().invoke(app, ["new", "position-axis", "-o", str(tmp_path / "position-axis.toml")])
+    assert "exists; name another file" in str(again.exception)
+
+
+def test_the_check_has_its_former_name_too() -> None:
+    outputs = [
+        CliRunner().invoke(app, [*name, "catalogue-robot-joint"]).output for name in (["check"], ["drive", "check"])
+    ]
+    assert outputs[0] == outputs[1]
+
+
 def test_a_file_comes_before_a_shipped_name_and_may_build_on_one(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("mine.toml").write_text(f'base = "{SMALL}"\ntitle = "mine"\n')
@@ -130,8 +147,11 @@ def test_the_catalogue_says_what_is_a_gearbox_a_motor_complete_or_not() -> None:
     only = list_records("gearbox", complete=True).splitlines()
     assert [line.split()[0] for line in only[1:-2]] == [r.name for r in complete]
     assert len(list_records("dc_brushed").splitlines()) > 4
-    with pytest.raises(lm.InputError, match=r"--kind engine: must be one of gearbox, motor, .*worm"):
+    with pytest.raises(lm.InputError, match="--kind engine: is not known; take one of gearbox, motor, "):
         list_records("engine")
+    with pytest.raises(lm.InputError, match=r"--kind planetry: is not known; did you mean planetary\?"):
+        list_records("planetry")
+    assert list_records(ratio="50-100") == list_records(ratio="50..100")
 
 
 @pytest.mark.parametrize(("kind", "expected"), [("motor", "brushless"), ("dc_brushed", "dc_brushed")])
@@ -294,8 +314,8 @@ MAY_IMPORT = {
     "catalogue": set(),
     "catalogue schaeffler-rt1-h-20-100": set(),
     "catalogue new --kind motor": set(),
-    "drive check catalogue-robot-joint": set(),
-    "drive check position-axis": set(),
+    "check catalogue-robot-joint": set(),
+    "check position-axis": set(),
     "rig schaeffler-rt1-h-20-100": DATASETS | FIGURES,
     "response paper-2dof-nl-small --amplitudes 0.1 --frequencies 1.0,2.0": DATASETS | NETCDF | FIGURES,
     "servo position-axis": {"scipy", "rich"},
@@ -320,7 +340,7 @@ def test_a_command_imports_what_it_needs_alone(tmp_path: Path) -> None:
 
 def test_short_help_version_and_completion() -> None:
     run = CliRunner().invoke
-    for command in ([], ["run"], ["rig"], ["drive", "check"], ["study"]):
+    for command in ([], ["run"], ["rig"], ["check"], ["study"]):
         short, long = (run(app, [*command, option]) for option in ("-h", "--help"))
         assert short.exit_code == 0
         assert short.output == long.output

@@ -20,9 +20,9 @@ from lostmotion.simulation.train_tables import TrainTables
 
 def test_the_tutorial_can_be_followed(tmp_path: Path) -> None:
     page = (ROOT / "docs" / "tutorial.md").read_text()
-    sheet, drive = re.findall(r"```toml\n(.*?)```", page, re.S)
+    sheet, drive, changed = re.findall(r"```toml\n(.*?)```", page, re.S)
     commands = re.findall(r"^lostmotion (.*)$", "\n".join(re.findall(r"```sh\n(.*?)```", page, re.S)), re.M)
-    assert len(commands) == 7
+    assert len(commands) == 8
 
     def run(command: str) -> str:
         done = lostmotion(*shlex.split(command), cwd=tmp_path)
@@ -40,7 +40,9 @@ def test_the_tutorial_can_be_followed(tmp_path: Path) -> None:
     assert (tmp_path / "rig" / "rig.html").exists()
     assert (tmp_path / "my-drive.png").exists()
     assert "input_contact: stuck" in printed[4]
-    assert "motor first_motor: its shaft turns forward with a constant command above" in printed[5]
+    assert "motor first_motor: its shaft turns forward with a constant command above" in printed[6]
+    (tmp_path / "changed.toml").write_text(changed)
+    assert lm.load(tmp_path / "changed.toml").load.inertia == 3.0
     result = lm.simulate(lm.load(tmp_path / "my-drive.toml"))
     assert float(abs(result["load_speed"]).max()) > 0.1
     (tmp_path / "my-drive.toml").write_text(drive.replace("friction_torque =", "friction_torqe ="))

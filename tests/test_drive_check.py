@@ -314,7 +314,7 @@ def test_every_scenario_can_be_checked(path):
 
 def test_the_command_line_says_what_is_wrong():
     path = ROOT / "scenarios" / "overrunning-load.toml"
-    done = CliRunner().invoke(app, ["drive", "check", str(path)])
+    done = CliRunner().invoke(app, ["check", str(path)])
     assert done.exit_code == 1
     assert "WARNING  holding 20 N·m with command 0: the load torque drives the load" in done.output
     assert re.search(r"^Verdict: does not fit: \S", done.output, re.MULTILINE)
@@ -327,7 +327,7 @@ def test_nothing_judged_is_not_decided_and_what_is_not_judged_is_a_reservation()
     assert (len(kept), len(unknown)) == (13, 3)
     assert [f.verdict.state for f in (kept, whole, unknown)] == ["fits", "fits with a reservation", "not decided"]
     assert all(f.what in whole.verdict.lines[0] for f in unknown)
-    done = CliRunner().invoke(app, ["drive", "check", "two-motors-one-ring"])
+    done = CliRunner().invoke(app, ["check", "two-motors-one-ring"])
     assert done.exit_code == 3
     assert re.search(r"^Verdict: not decided: none of \d+ points is judged", done.output, re.MULTILINE)
 
@@ -552,7 +552,7 @@ def test_a_load_that_drives_is_no_dead_zone():
 
 def test_the_page_of_a_check_has_the_uses_and_verdicts_of_its_findings(tmp_path: Path) -> None:
     findings, page = lm.check_drive(lm.load("catalogue-robot-joint")), tmp_path / "check.html"
-    done = CliRunner().invoke(app, ["drive", "check", "catalogue-robot-joint", "--report", str(page)])
+    done = CliRunner().invoke(app, ["check", "catalogue-robot-joint", "--report", str(page)])
     assert done.exit_code == 0, done.output
     text = page.read_text()
     assert not Page(text).faults

@@ -94,7 +94,7 @@ UNASKED = [
     ("response", "paper-2dof-nl-small", "--amplitudes", "0.025,1", "--frequencies", "1,2,3"),
     ("rig", "schaeffler-rt1-h-20-100"),
     ("run", "paper-2dof-nl-small"),
-    ("drive", "check", "catalogue-robot-joint"),
+    ("check", "catalogue-robot-joint"),
     ("reproduce",),
     ("monitor", str(ROOT / "examples" / "wear" / "monitor.toml")),
 ]

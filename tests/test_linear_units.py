@@ -81,7 +81,7 @@ COMMANDS = {
     "explain": (COMMAND, ["run", "FILE", "--explain", "0.13"]),
     "servo": (LOOPS, ["servo", "FILE", "-o", "sheet", "--drive-units", "--figures", "svg"]),
     "tune": (LOOPS, ["servo", "FILE", "--tune", "suited", "--feedforward", "-o", "tuned.toml"]),
-    "check": (LOOPS, ["drive", "check", "FILE"]),
+    "check": (LOOPS, ["check", "FILE"]),
     "response": (COMMAND, ["response", "FILE", "--input", "drive_command", "--variable", "table_speed", "-o", "response", "--figures", "svg",
                              "--amplitudes", "0.2,1.0", "--frequencies", "2..40:4"]),
     "track": (FOLLOWS, ["track", "FILE", "-o", "track", "--figures", "svg"]),

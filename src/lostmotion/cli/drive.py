@@ -1,4 +1,4 @@
-"""`lostmotion drive check`."""
+"""`lostmotion check`."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def check(
     page name the source of each rule. The table [task] of the scenario gives the duty cycle and requirements.
 
     \b
-    lostmotion drive check drive.toml --set task.cycle="2 s"
-    lostmotion drive check catalogue-robot-joint --report check.html
+    lostmotion check drive.toml --set task.cycle="2 s"
+    lostmotion check catalogue-robot-joint --report check.html
     """
     from ..reports.drive_check import check_report
     from ..sizing.drive_check import check_drive
@@ -49,5 +49,5 @@ def check(
         print(f"Report written to {report}")
         print(f"Next: lostmotion run {scenario} --plot run.png")
     else:
-        print(f"All rules with their sources on a page: lostmotion drive check {scenario} --report check.html")
+        print(f"All rules with their sources on a page: lostmotion check {scenario} --report check.html")
     conclude(findings.verdict)

@@ -142,7 +142,16 @@ def common(
     """Dynamics of geared servo drives: lost motion, sticking and load-dependent losses, solved exactly."""
 
 
-JUDGES = (servo.servo, select.select, study.study, track.track, run.run, identify.identify, monitor.monitor)
+JUDGES = (
+    drive.check,
+    servo.servo,
+    select.select,
+    study.study,
+    track.track,
+    run.run,
+    identify.identify,
+    monitor.monitor,
+)
 """commands that end in a verdict"""
 for command in (
     reproduce.reproduce,
@@ -153,6 +162,8 @@ for command in (
     rig.rig,
     catalogue.catalogue,
     scenarios.scenarios,
+    scenarios.new,
+    drive.check,
     servo.servo,
     study.study,
     select.select,
@@ -163,5 +174,5 @@ for command in (
     app.command(epilog=EXIT_HELP if command in JUDGES else None)(command)
 drive_app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Check a drive against its task.")
 drive_app.command(epilog=EXIT_HELP)(drive.check)
-app.add_typer(drive_app, name="drive")
+app.add_typer(drive_app, name="drive", hidden=True)  # the name that `lostmotion check` had
 app.command()(scenarios.schema)

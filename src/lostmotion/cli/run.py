@@ -80,7 +80,6 @@ def run(
     lostmotion run result.csv --explain 0.25
     """
     from ..errors import InputError
-    from ..simulation.needs import need_open_loop
 
     _try_files(output, plot, report)
     _check_figure(figure, plot)
@@ -89,8 +88,6 @@ def run(
         raise InputError(
             f"--explain {explain}: must lie between 0 and simulation.duration, {loaded.simulation.duration} s"
         )
-    if explain is not None:
-        need_open_loop(loaded, f"--explain {explain:g}")
     _check_solver(solver, tolerance)
     with about(scenario):
         result = _simulated(loaded, solver, tolerance)

@@ -1,6 +1,13 @@
-"""`lostmotion scenarios` and `lostmotion schema`."""
+"""`lostmotion scenarios`, `lostmotion new` and `lostmotion schema`."""
 
 from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .arguments import SourceArgument
 
 
 def scenarios() -> None:
@@ -18,7 +25,39 @@ def scenarios() -> None:
     width = max(map(len, found))
     for name, path in found.items():
         print(f"{name:<{width}}  {read_toml(path, 'a scenario')['title']}")
-    print("Next: lostmotion run position-axis --plot run.png")
+    print(
+        "Next: lostmotion run position-axis --plot run.png, or lostmotion new position-axis -o my.toml for a copy to change"
+    )
+
+
+def new(
+    scenario: SourceArgument,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE.toml", help="The copy.")],
+) -> None:
+    """Copy a shipped scenario, with its comments, to change it.
+
+    \b
+    lostmotion new position-axis -o my.toml
+    """
+    from ..atomic_writer import write_whole
+    from ..errors import InputError, need
+    from ..simulation.scenario_files import find_scenario
+    from ..simulation.scenario_writer import changed_text
+
+    need("tomlkit", "A copy with its comments", "control")
+    for path in (Path(scenario), output):
+        if path.suffix != ".toml" and (path.suffix or path is output):
+            raise InputError(f"{path}: a scenario is a TOML file; its name must end in .toml")
+    if output.exists():
+        raise InputError(f"{output}: exists; name another file")
+    text = changed_text(find_scenario(scenario), {}, output, [])
+
+    def write(path: Path) -> None:
+        path.write_text(text, encoding="utf-8")
+
+    write_whole(output, write)
+    print(f"Scenario written to {output}")
+    print(f"Next: lostmotion run {output}")
 
 
 def schema() -> None:

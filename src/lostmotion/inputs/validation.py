@@ -56,7 +56,7 @@ def refusal(error: ValidationError, schema: Mapping[str, Any], subject: str, giv
     others = [p for p in problems if p.kind not in ("extra_forbidden", "missing")]
     said = [p.problem(subject) for p in misspelt[:MAX_PROBLEMS]]
     if missing:
-        names = tuple(shortened(p.name) for p in missing)
+        names = tuple(shortened(p.name, MAX_LINE) for p in missing)
         told = names if len(", ".join(names)) <= MAX_LISTED else (listed(names),)
         said.append(Problem(told, "is missing; add it" if len(names) == 1 else "are missing; add them"))
     said += [p.problem(subject) for p in others[:MAX_PROBLEMS]]
@@ -209,7 +209,7 @@ class _Problem:
     def problem(self, subject: str) -> Problem:
         text, refused = self._text(), self.context.get("error")
         if self.keys:
-            return Problem((shortened(self.name),), text)
+            return Problem((shortened(self.name, MAX_LINE),), text)
         if not isinstance(refused, InputError):
             return Problem((), f"{subject} {text}")
         return refused.problems[0] if [p.sentence() for p in refused.problems] == [text] else Problem((), text)

@@ -19,7 +19,7 @@ from ..data_sheets.motor_sheet import MotorSheet
 from ..data_sheets.records import KINDS, Sheet, catalogue, find, read_sheets, table_of
 from ..errors import InputError
 from ..inputs.toml_files import is_in_file
-from ..inputs.validation import names_like
+from ..inputs.validation import did_you_mean, names_like
 from ..units.conversion import si_value
 from ..units.practical import RPM
 from .sheet_rows import rows_of
@@ -28,9 +28,11 @@ SCREEN = 34  # records that fit on a screen with the lines around them
 
 
 def _range(text: str | None, option: str, unit: str = "") -> tuple[float, float]:
-    """Bounds from ``MIN..MAX``; each may be left out."""
+    """Bounds from ``MIN..MAX``, of which each may be left out, or from ``MIN-MAX``."""
     if text is None:
         return -np.inf, np.inf
+    if (dash := re.fullmatch(r"(.*[^eE\s])\s*[-–]\s*([\d.].*)", text)) and ".." not in text:
+        text = "..".join(dash.groups())
     low, dots, high = text.partition("..")
     problem = f"--{option} {text}: must be MIN..MAX, such as --{option} 50..120"
     try:
@@ -75,7 +77,7 @@ def list_records(
     records = catalogue()
     kinds = [*KINDS, *sorted({r.kind for r in records})]
     if kind is not None and kind not in kinds:
-        raise InputError(f"--kind {kind}: must be one of {', '.join(kinds)}")
+        raise InputError(f"--kind {kind}: is not known; {did_you_mean(kind, kinds, 'take one of ' + ', '.join(kinds))}")
     bounds = [
         (data_of, _range(text, option, unit))
         for option, text, unit, data_of in (
@@ -254,7 +256,8 @@ def template(kind: str | None = None) -> str:
     """
     of_kind = {inner: table for table, sheet in KINDS.items() for inner in _kinds(sheet)}
     if kind is not None and kind not in (*KINDS, *of_kind):
-        raise InputError(f"--kind {kind}: must be one of {', '.join((*KINDS, *of_kind))}")
+        known = (*KINDS, *of_kind)
+        raise InputError(f"--kind {kind}: is not known; {did_you_mean(kind, known, 'take one of ' + ', '.join(known))}")
     table = "gearbox" if kind is None else of_kind.get(kind, kind)
     name = "synchronous" if kind == "synchronous" else table
     text = files("lostmotion").joinpath(f"data_sheets/{TEMPLATES[name]}-template.toml").read_text(encoding="utf-8")

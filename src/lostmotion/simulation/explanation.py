@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
+
+import numpy as np
 
 from .. import _core
 from ..errors import InputError
@@ -17,9 +20,11 @@ from ..model.signals import core_signal
 from ..model.train import DriveTrain
 from ..units.practical import charted
 from .core_runs import core_case
-from .needs import need_open_loop
 from .scenario import Scenario
 from .stepping import Simulation
+from .stepping_parts import MAX_INTERVAL
+
+CHORDS = 1000  # of a period of an input
 
 
 @dataclass(frozen=True)
@@ -218,8 +223,36 @@ def explain(what: Scenario | Simulation, time: Time | None = None) -> Explanatio
         raise InputError(f"time is missing; give one between 0 and the duration, {what.simulation.duration} s")
     if not 0.0 <= time <= what.simulation.duration:
         raise InputError(f"time {time} s must lie between 0 and the duration, {what.simulation.duration} s")
-    need_open_loop(what, "explain")
+    if what.axes():
+        return explain(_followed(what, time))
     return _explanation(what.train(), what.core(), time, **_core.explain_at(core_case(what), time))
+
+
+def _followed(scenario: Scenario, time: float) -> Simulation:
+    """A scenario with sampled controllers, stepped to a time.
+
+    Its inputs run in straight lines from one of their breakpoints to the next, and along their sines in chords.
+    """
+    simulation = Simulation(scenario, step=min(MAX_INTERVAL, scenario.simulation.duration))
+    signals = {name: scenario.signals()[name] for name in simulation.inputs}
+    lists = {name: signal.breakpoint_list() for name, signal in signals.items()}
+    instants = {0.0, time, *(point[0] for points in lists.values() for point in points)}
+    for signal in signals.values():
+        for _, frequency, _ in signal.sine_list():
+            instants |= set(np.arange(0.0, time, 1.0 / (CHORDS * frequency)).tolist())
+    for begin, end in itertools.pairwise(sorted(t for t in instants if t <= time)):
+        given: dict[str, Any] = {}
+        for name, points in lists.items():
+            piece = [point for point in points if point[0] <= begin][-1]
+            sines = [
+                sum(a * math.sin(2.0 * math.pi * f * t + p) for a, f, p in signals[name].sine_list())
+                for t in (begin, end)
+            ]
+            given[name] = tuple(
+                piece[1] + piece[2] * (t - piece[0]) + s for t, s in zip((begin, end), sines, strict=True)
+            )
+        simulation.advance(end - begin, **given)
+    return simulation
 
 
 def smallest_commands(scenario: Scenario, loads: Mapping[str, float] = {}) -> tuple[float, float]:

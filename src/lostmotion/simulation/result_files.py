@@ -34,7 +34,12 @@ def check_output(path: str | Path) -> Path:
     path = Path(path)
     if path.suffix not in FORMATS:
         endings = ", ".join(f"{ending} ({name})" for ending, name in FORMATS.items())
-        raise InputError(f"{path}: the ending {path.suffix or '(none)'} is not known; it must be one of {endings}")
+        scenario = (
+            "; a copy of a scenario is made by lostmotion new NAME -o FILE.toml" if path.suffix == ".toml" else ""
+        )
+        raise InputError(
+            f"{path}: the ending {path.suffix or '(none)'} is not known; it must be one of {endings}{scenario}"
+        )
     if os.path.isdir(path):
         raise InputError(f"{path}: is a directory; name a file")
     if not os.path.isdir(path.parent):

@@ -107,7 +107,7 @@ class Finding:
 class Findings(tuple[Finding, ...]):
     """Findings of one check, as an immutable sequence of `Finding`.
 
-    In a notebook it is shown as the page that `lostmotion drive check` writes.
+    In a notebook it is shown as the page that `lostmotion check` writes.
 
     Examples
     --------
