@@ -107,6 +107,16 @@ def test_options_print_bare_numbers_back_with_their_unit() -> None:
     assert "bare number" not in quiet
 
 
+def test_the_bare_numbers_of_a_list_of_tables_are_printed_back() -> None:
+    moves = 'controller.reference.moves=[{to=1.0}, {to="90 deg", dwell=0.1}]'
+    said = CliRunner().invoke(app, ["run", "position-axis", "--set", moves]).output
+    assert "controller.reference.moves.0.to: 1 rad (57.3 deg); a bare number" in said
+    assert "controller.reference.moves.1.dwell: 0.1 s; a bare number" in said
+    assert "moves.1.to" not in said
+    slide = CliRunner().invoke(app, ["run", "ball-screw-axis", "--set", "controller.reference.moves=[{to=0.2}]"]).output
+    assert "controller.reference.moves.0.to: 0.2 m; a bare number" in slide
+
+
 @pytest.mark.parametrize(
     ("name", "key", "unit"),
     [

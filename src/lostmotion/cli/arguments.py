@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -49,6 +49,7 @@ def decibels(text: str) -> float:
 def load_scenario(source: str, overrides: list[str] | None, missing: list[str] | None = None) -> Scenario:
     """The scenario of a command, bare numbers of `--set` printed with the unit in which they are read. With a list for their keys
     its gains may be missing."""
+    from ..simulation.keys import key_and_value
     from ..simulation.units_of_keys import unit_for
 
     if missing is None:
@@ -60,9 +61,18 @@ def load_scenario(source: str, overrides: list[str] | None, missing: list[str] |
 
         loaded = load_untuned(source, overrides or (), missing)
     for text in overrides or ():
-        key, _, value = text.partition("=")
-        print_bare(key.strip(), value, unit_for(loaded, key.strip()))
+        for key, value in _numbers_of(*key_and_value(text)):
+            print_bare(key, value, unit_for(loaded, key))
     return loaded
+
+
+def _numbers_of(key: str, value: Any) -> Iterator[tuple[str, str]]:
+    """The bare numbers of a value, as text, with their dotted keys: those of lists and tables too."""
+    if isinstance(value, dict | list):
+        for name, entry in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from _numbers_of(f"{key}.{name}", entry)
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        yield key, str(value)
 
 
 def print_timed_moves(scenario: Scenario) -> None:

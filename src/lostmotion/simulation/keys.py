@@ -18,7 +18,15 @@ from ..units.scalars import is_number, plain
 
 
 def parse_override(text: str) -> tuple[str, Any]:
-    """Key and value of ``KEY=VALUE``; a value that is no TOML is text."""
+    """Key and value of ``KEY=VALUE``, with a warning of a doubtful value; a value that is no TOML is text."""
+    key, value = key_and_value(text)
+    if not isinstance(value, str):
+        doubt(key, value, "--set")
+    return key, value
+
+
+def key_and_value(text: str) -> tuple[str, Any]:
+    """The same without warnings."""
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
         raise InputError(f"--set {text}: must be KEY=VALUE, such as --set command.amplitude=0.1")
@@ -30,7 +38,6 @@ def parse_override(text: str) -> tuple[str, Any]:
         return key.strip(), value.strip()
     if len(parsed) > 1:
         return key.strip(), value.strip()
-    doubt(key.strip(), parsed["value"], "--set")
     return key.strip(), parsed["value"]
 
 
