@@ -82,7 +82,7 @@ def without(key: str, **header: Any) -> dict[str, Any]:
 
 
 UNUSABLE: dict[str, tuple[dict[str, Any] | str, str]] = {
-    "an array": ("[1, 2]", "has no list entries"),
+    "an array": ("[1, 2]", "has no list of entries"),
     "deep": ("[" * 200_000, "its lists are too deep"),
     "a number of 5000 digits": ('{"entries": [{"timestamp": ' + "9" * 5000 + "}]}", "is not JSON"),
     "no time": (without("timestamp"), "entries[0] lacks timestamp; add it to each entry, or the interval dt"),

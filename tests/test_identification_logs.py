@@ -595,7 +595,7 @@ def test_a_log_that_cannot_be_used_is_refused_in_one_line(what: str) -> None:
 
 FILES: dict[str, tuple[str, bytes | str, str]] = {
     "cut off": ("a.json", '{"entries": [{"timestamp": 0.0, "posi', "is not JSON"),
-    "no entries": ("b.json", "{}", "has no list entries"),
+    "no entries": ("b.json", "{}", "has no list of entries"),
     "empty entries": ("c.json", '{"entries": []}', "is empty"),
     "entry without a channel": (
         "d.json",

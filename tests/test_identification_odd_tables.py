@@ -117,6 +117,19 @@ def test_json_with_an_array_for_each_channel(tmp_path: Path) -> None:
     assert np.array_equal(log.time, TIME) and np.array_equal(log.values("positions"), X)
 
 
+@pytest.mark.parametrize("layout", ["objects", "lines", "rows", "inside"])
+def test_json_in_other_shapes_and_with_units_in_its_names(tmp_path: Path, layout: str) -> None:
+    names, table = ["Time [ms]", "X.pos [mm]"], [[1e3 * t, x] for t, x in zip(TIME.tolist(), X.tolist(), strict=True)]
+    objects = [dict(zip(names, row, strict=True)) for row in table]
+    arrays = {name: [row[k] for row in table] for k, name in enumerate(names)}
+    data = {"objects": objects, "rows": [names, *table], "inside": {"robot": "R1", "data": arrays}}.get(layout)
+    text = "\n".join(map(json.dumps, objects)) if layout == "lines" else json.dumps(data)
+    log = read(tmp_path / ("a.jsonl" if layout == "lines" else "a.json"), text)
+    assert {name: c.unit for name, c in log.channels.items()} == {"X.pos": "mm"}
+    assert np.allclose(log.time, TIME, rtol=1e-15) and np.array_equal(log.values("X.pos"), X)
+    assert log.header == ({"robot": "R1"} if layout == "inside" else {})
+
+
 @pytest.mark.parametrize("layout", ["entries", "arrays"])
 def test_json_that_is_cut_off_or_holds_a_word_is_read_but_for_that(tmp_path: Path, layout: str) -> None:
     x: list[float | str] = [*X.tolist()]

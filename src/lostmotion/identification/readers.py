@@ -34,7 +34,7 @@ TABLES: dict[str, Callable[..., Log]] = {
     ".bag": read_ros_bag,
     ".db3": read_ros_bag,
 }
-ENDINGS = (".json", *TABLES)
+ENDINGS = (".json", ".jsonl", *TABLES)
 
 
 @checked
@@ -87,7 +87,7 @@ def read_log(path: str | Path, *, time: str = "", decimal: str = "") -> Log:
         raise InputError("is a device or a pipe; name a file", where=path)
     ending = path.suffix.lower()
     check_memory(path.stat().st_size, str(path))
-    if ending == ".json":
+    if ending in (".json", ".jsonl"):
         return read_servo_json(path, time=time)
     if ending not in TABLES:
         raise InputError(f"is no log by its ending; logs end in {', '.join(ENDINGS)}", where=path)

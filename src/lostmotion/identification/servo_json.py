@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..inputs.limits import check_memory
 from .logs import Channel, Log, as_number, reason
 from .odd_tables import LEAST, LOST
-from .tables import TIME_NAMES
+from .tables import TIME_NAMES, named_columns, seconds_of
 
 # Bytes of memory for the objects, lists, keys and values of JSON, by a sign of each; measured.
 PER_SIGN = {"{": 64, "[": 64, ":": 100, ",": 32}
@@ -22,17 +22,21 @@ PER_SIGN = {"{": 64, "[": 64, ":": 100, ",": 32}
 def read_servo_json(path: Path, *, time: str = "") -> Log:
     """Read a file ``{"mass": 0.5, ..., "entries": [{"timestamp": 0.0, "position": 0.1, ...}, ...]}``; units are SI.
 
-    Or a file ``{"mass": 0.5, ..., "timestamps": [0.0, ...], "positions": [0.1, ...]}``, whose arrays of one length are the channels. A
+    Or a file ``{"mass": 0.5, ..., "timestamps": [0.0, ...], "positions": [0.1, ...]}``, whose arrays of one length are the channels; or
+    a list of objects, one in each line (``.jsonl``), or of rows below a heading; or an object that has one of these within. Names may
+    have units, such as ``"position [mm]"``. A
     file that was cut off is read up to there, and a few entries without a number are missing samples. Keys of the header with hyphens are read with underscores. Words and lists of the header are kept as they are.
 
-    time: key of the time in each entry; left out, ``timestamp``, or steps of ``dt`` of the header.
+    time: key of the time in each entry; left out, ``timestamp``, ``time``, ``t``, or steps of ``dt`` of the header.
     """
-    clock = time or "timestamp"
     try:
         text = path.read_text(encoding="utf-8-sig")
         check_memory(2 * sys.getsizeof(text) + sum(n * text.count(sign) for sign, n in PER_SIGN.items()), str(path))
+        if path.suffix.lower() == ".jsonl":
+            text = f"[{','.join(line for line in text.splitlines() if line.strip())}]"
         data, cut = _parsed(text)
         del text
+        data = _table(data)
     except InputError:
         raise
     except OSError as error:
@@ -46,16 +50,18 @@ def read_servo_json(path: Path, *, time: str = "") -> Log:
     notes = ["the file is cut off; it is read up to there"] if cut else []
     if isinstance(data, dict) and "entries" not in data and (arrays := _arrays(data, cut=cut)):
         columns, others = arrays, {key: value for key, value in data.items() if key not in arrays}
-        clock = time or next((key for key in columns if key.lower().removesuffix("s") in TIME_NAMES), clock)
     else:
         columns, others, more = _entries(path, data)
         notes += more
+    names = named_columns(list(columns))
+    columns, units = dict(zip((name for name, _ in names), columns.values(), strict=True)), dict(names)
+    clock = time or next((key for key in columns if key.lower().removesuffix("s") in TIME_NAMES), "timestamp")
     header = {key.replace("-", "_"): as_number(value) for key, value in others.items()}
     step, count = header.get("dt"), len(next(iter(columns.values())))
     if clock in columns:
-        times = _numbers(path, columns[clock], clock, notes)
+        times = _numbers(path, columns[clock], clock, notes) * seconds_of(path, units[clock] or "")
     elif not time and isinstance(step, int | float) and step > 0:
-        times = step * np.arange(count)
+        times = float(step) * np.arange(count, dtype=float)
     else:
         raise InputError(
             f"{'entries[0] ' if 'entries' in data else ''}lacks {clock}; add it to each entry, or the interval dt [s] to the header",
@@ -64,9 +70,23 @@ def read_servo_json(path: Path, *, time: str = "") -> Log:
     keys = [key for key, values in columns.items() if key != clock and any(map(_is_number, values))]
     if lacking := sorted(columns.keys() - set(keys) - {clock}):
         notes.append(f"channels without numbers are left out: {', '.join(lacking)}")
-    return Log(
-        path.name, times, {key: Channel(_numbers(path, columns[key], key, notes)) for key in keys}, header, tuple(notes)
-    )
+    channels = {key: Channel(_numbers(path, columns[key], key, notes), units[key] or "") for key in keys}
+    return Log(path.name, times, channels, header, tuple(notes))
+
+
+def _table(data: Any) -> Any:
+    """The object with entries or arrays that a file is, or has within; made of a list of objects, or of rows below a heading."""
+    if isinstance(data, list) and data and all(isinstance(row, dict) for row in data):
+        return {"entries": data}
+    if isinstance(data, list) and data and all(isinstance(row, list) and len(row) == len(data[0]) for row in data):
+        names, *rows = data
+        return {name: [row[k] for row in rows] for k, name in enumerate(names) if isinstance(name, str)}
+    if isinstance(data, dict) and "entries" not in data and not _arrays(data, cut=False):
+        for key, value in data.items():
+            inner = _table(value)
+            if isinstance(inner, dict) and ("entries" in inner or _arrays(inner, cut=False)):
+                return {name: other for name, other in data.items() if name != key} | inner
+    return data
 
 
 def _parsed(text: str) -> tuple[Any, bool]:
@@ -97,7 +117,7 @@ def _entries(path: Path, data: Any) -> tuple[dict[str, list[Any]], dict[str, Any
     """(values of each entry by key, header, notes)."""
     if not isinstance(data, dict) or not isinstance(data.get("entries"), list):
         raise InputError(
-            "has no list entries; a servo log is an object with entries, or with arrays of one length, one of them the time",
+            "has no list of entries; a log is a list of objects or rows, or an object with arrays of one length, one of them the time",
             where=path,
         )
     entries = data["entries"]

@@ -133,7 +133,7 @@ def table_log(
         if not stamps.zoned:
             notes.append("its time stamps have no zone; they are taken to be of one clock that is not set meanwhile")
     else:
-        values = values * _seconds(path, units.get(names[place], ""))
+        values = values * seconds_of(path, units.get(names[place], ""))
     found = {name: Channel(table[:, k], units.get(name, "")) for k, name in enumerate(names) if k != place}
     return Log(path.name, values, {n: c for n, c in found.items() if not _is_blank(n, c)}, header, tuple(notes))
 
@@ -236,7 +236,8 @@ def _time_column(row: int, names: list[str], wanted: str) -> int:
     return next((lower.index(name) for name in TIME_NAMES if name in lower), 0)
 
 
-def _seconds(path: Path, unit: str) -> float:
+def seconds_of(path: Path, unit: str) -> float:
+    """Seconds of a unit of time."""
     if unit.strip() not in SECONDS:
         raise InputError(f"the unit {unit!r} of the time is none of {', '.join(filter(None, SECONDS))}", where=path)
     return SECONDS[unit.strip()]
