@@ -19,7 +19,7 @@ NODE := command -v npm >/dev/null
 # Not every ninja understands the job server of every make.
 unexport MAKEFLAGS
 
-# The core of the live page compiles beside the extension.
+# The libraries are installed, and the core of the live page compiles, beside the extension.
 demo: $(VENV)/tools
 	@$(MAKE) --no-print-directory --jobs=2 $(VENV)/built demo-page
 	@if $(NODE); then mkdir -p out && $(BIN)/lostmotion live paper-2dof-nl-small -o out/live.html; \
@@ -148,7 +148,7 @@ page/node_modules/installed: page/package.json page/package-lock.json
 	@$(NEED_NODE)
 	cd page && npm ci --silent
 	touch $@
-$(VENV)/zig: $(VENV)/tools
+$(VENV)/zig: $(VENV)/libraries
 	$(BIN)/pip install -q ziglang
 	touch $@
 $(VENV)/portable: $(VENV)/dev
@@ -202,7 +202,7 @@ lint: $(VENV)/dev
 	@$(BIN)/clang-format --dry-run --Werror $(FORMATTED)
 
 .PHONY: lint-words
-lint-words: $(VENV)/tools
+lint-words: $(VENV)/libraries
 	$(BIN)/python docs/lint_words.py
 
 .PHONY: stub
@@ -215,17 +215,23 @@ format: $(VENV)/dev
 	$(BIN)/ruff format .
 	$(BIN)/clang-format -i $(FORMATTED)
 
-# What compiles, the package with the libraries of its report, then the extension; only what changed is compiled again.
+# What compiles; the package with the libraries of its report, and the extension; only what changed is compiled again.
 $(VENV)/tools: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV) || { apt-get update -q && apt-get install -qy python3-venv && $(PYTHON) -m venv $(VENV); }
 	command -v c++ >/dev/null || { apt-get update -q && apt-get install -qy g++; }
 	@echo 'Installing libraries into $(VENV): about half a minute.'
 	$(BIN)/pip install -q --upgrade "pip>=25.1"
 	$(BIN)/pip install -q --group build
-	$(BIN)/pip install -q --no-build-isolation --config-settings=wheel.cmake=false --editable ".[report,control]"
 	mkdir -p build
 	touch $@
-$(VENV)/built: $(VENV)/tools $(SOURCES)
+# Half of these libraries are their own tests, which need not become bytecode.
+$(VENV)/libraries: $(VENV)/tools
+	$(BIN)/pip install -q --no-compile --no-build-isolation --config-settings=wheel.cmake=false --editable ".[report,control]"
+	$(BIN)/python -m compileall -q -x '/(tests|setuptools|pip)/' $(VENV)/lib/*/site-packages || true
+	touch $@
+$(VENV)/built: $(VENV)/extension $(VENV)/libraries
+	touch $@
+$(VENV)/extension: $(VENV)/tools $(SOURCES)
 	@$(BIN)/python -c 'import os; n = os.cpu_count() or 1; print(f"Compiling the core on {n} processors: about {max(1, round(200 / n / 30) / 2):g} min.")'
 	@$(CMAKE) -S . -B $(TREE) -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) -DPython_EXECUTABLE=$(abspath $(BIN)/python) \
 		-Dnanobind_DIR=$$($(BIN)/python -m nanobind --cmake_dir) -DLOSTMOTION_PYTHON=ON -DLOSTMOTION_WERROR=ON >build/cmake.log || { cat build/cmake.log; false; }
