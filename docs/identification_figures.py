@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from figure_files import save
 
 import lostmotion as lm
 from lostmotion.identification.runs import run_log
-from lostmotion.reports import plots
 from lostmotion.reports.looks import MEASURED, SECOND
 from lostmotion.reports.panels import Curve, Panel
 
@@ -41,4 +41,4 @@ def write(out: Path) -> None:
     panels = []
     for name, file in (("baseline", "baseline.toml"), ("split pin wheel", "split-pinwheel.toml")):
         panels += loops(name, lm.identify(EXAMPLE / file))
-    plots.draw(panels, 2, (10.0, 7.2)).savefig(out / "cycloidal-loops.png", dpi=100, metadata={"Software": None})
+    save(panels, 2, (10.0, 7.2), out, "cycloidal-loops")

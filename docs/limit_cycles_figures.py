@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from figure_files import save
 
 import lostmotion as lm
-from lostmotion.reports import plots
 from lostmotion.reports.looks import FIRST, MUTED, SECOND
 from lostmotion.reports.panels import Curve, Panel
 
@@ -32,7 +32,7 @@ def run(out: Path, scenario: lm.Scenario) -> None:
         Panel("position error", "time [s]", "[mrad]", errors, y_range=(-10.0, 10.0)),
         Panel("torque of the motor", "time [s]", "[N·m]", torques),
     ]
-    plots.draw(panels, 1, (9.0, 5.4)).savefig(out / "hunting-run.png", dpi=100, metadata={"Software": None})
+    save(panels, 1, (9.0, 5.4), out, "hunting-run")
 
 
 def certificates(out: Path, scenario: lm.Scenario) -> None:
@@ -49,7 +49,7 @@ def certificates(out: Path, scenario: lm.Scenario) -> None:
         curves.append(Curve("limit cycle", cycles, -cycles, POINT | {"color": style["color"]}, "_"))
     labels = ("error at the break-away [mrad]", "error left by the slip [mrad]")
     panel = Panel("From break-away to break-away", *labels, tuple(curves), x_range=(0.0, top), y_range=(-10.0, 4.0))
-    plots.draw([panel], 1, (7.0, 4.2)).savefig(out / "hunting-certificate.png", dpi=100, metadata={"Software": None})
+    save([panel], 1, (7.0, 4.2), out, "hunting-certificate")
 
 
 def maps(out: Path, scenario: lm.Scenario) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from two_motors_figures import save
+from figure_files import save
 
 import lostmotion as lm
 from lostmotion.reports.looks import FAINT, FIRST, SECOND

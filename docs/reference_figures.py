@@ -6,9 +6,9 @@ import math
 from pathlib import Path
 
 import numpy as np
+from figure_files import save
 
 import lostmotion as lm
-from lostmotion.reports import plots
 from lostmotion.reports.looks import FIRST, SECOND
 from lostmotion.reports.panels import Curve, Panel
 
@@ -29,4 +29,4 @@ def write(out: Path) -> None:
         if k < 3:  # the jerk of the other one is a pulse of no duration
             curves.append(Curve("trapezoidal speed", t, plain[k], SECOND))
         panels.append(Panel("", "time [s]", label, tuple(curves)))
-    plots.draw(panels, 2, (9.0, 5.0)).savefig(out / "references-move.png", dpi=100, metadata={"Software": None})
+    save(panels, 2, (9.0, 5.0), out, "references-move")

@@ -1,4 +1,4 @@
-"""Figures of docs/robots.md: units and signs, the six-axis arm of examples/mujoco_arm.py, the quadruped of mujoco_quadruped.py."""
+"""Figures of docs/robots.md: the six-axis arm of examples/mujoco_arm.py, the quadruped of mujoco_quadruped.py."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.patches import Arc, Circle, FancyArrow, Rectangle
+from figure_files import save
 from PIL import Image
 
 from lostmotion.reports import plots
-from lostmotion.reports.looks import INK, LOOKS, MUTED, PALETTE
+from lostmotion.reports.looks import INK, LOOKS, MUTED
 from lostmotion.reports.panels import Curve, Panel
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -31,51 +31,6 @@ def example(name: str) -> Any:
     return module
 
 
-@plots.in_our_looks
-def signs(out: Path) -> None:
-    """A motor, a gearbox and a link, with every quantity and the direction in which it counts."""
-    figure = plots.Picture(figsize=(9.0, 3.3), layout="none")
-    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    axes.set(xlim=(0, 9), ylim=(0, 3.3), aspect="equal")
-    axes.axis("off")
-    ink, accent = INK, PALETTE["first"]
-    for x, y, width, height, text in ((0.5, 1.25, 1.3, 0.9, "motor"), (3.3, 1.05, 1.5, 1.3, "gearbox\nratio $i$")):
-        axes.add_patch(Rectangle((x, y), width, height, fill=False, edgecolor=ink, linewidth=1.4))
-        axes.text(x + 0.5 * width, y + 0.5 * height, text, ha="center", va="center")
-    axes.plot([1.8, 3.3], [1.7, 1.7], color=ink, linewidth=3)
-    axes.plot([4.8, 6.6], [1.7, 1.7], color=ink, linewidth=5)
-    axes.add_patch(Circle((6.75, 1.7), 0.16, fill=False, edgecolor=ink, linewidth=1.6))
-    axes.plot([6.9, 8.6], [1.75, 2.25], color=ink, linewidth=7, solid_capstyle="round")
-    axes.text(7.9, 1.62, "link (MuJoCo)", ha="center")
-
-    def turning(x: float, label: str) -> None:
-        axes.add_patch(Arc((x, 1.7), 0.34, 0.9, theta1=100, theta2=350, color=accent, linewidth=1.5))
-        axes.add_patch(
-            FancyArrow(x + 0.165, 1.62, 0.0, 0.1, width=0.004, head_width=0.11, head_length=0.12, color=accent)
-        )
-        axes.text(x, 2.48, label, ha="center", va="bottom", color=accent)
-
-    turning(2.55, "ctrl: torque of a torque source [N·m]\nmotor_speed [rad/s]")
-    turning(5.9, "arm.torque, on the joint [N·m]\nqvel = load_speed, qpos = load_angle")
-    axes.text(4.05, 0.78, "twist = motor angle / i - qpos  [rad]", ha="center", va="top", color=accent)
-    axes.text(
-        4.05,
-        0.42,
-        "output_torque, input_torque [N·m]; input_contact -1, 0 (stuck), +1",
-        ha="center",
-        va="top",
-        color=accent,
-    )
-    axes.text(
-        0.1,
-        3.1,
-        "All arrows are positive together: the motor turns as the joint does, i times as fast.",
-        va="top",
-        color=ink,
-    )
-    figure.savefig(out / "robots-signs.png", dpi=110, metadata={"Software": None})
-
-
 def tracking(out: Path) -> None:
     """How far the tip of the arm is from its reference, with ideal gears and with those of the catalogue."""
     arm = example("mujoco_arm")
@@ -84,7 +39,7 @@ def tracking(out: Path) -> None:
         times, errors = arm.track(ideal=ideal)
         curves.append(Curve(label, times, 1e3 * errors, style))
     panel = Panel("tip of the six-axis arm", "time [s]", "distance from the reference [mm]", tuple(curves))
-    plots.draw([panel], 1, (8.0, 3.4)).savefig(out / "robots-tracking.png", metadata={"Software": None})
+    save([panel], 1, (8.0, 3.4), out, "robots-tracking")
 
 
 def hunting(out: Path) -> None:
@@ -95,7 +50,7 @@ def hunting(out: Path) -> None:
         times, angles = arm.hunt(added_backlash=gap)
         curves.append(Curve(label, times[2000:], 1e3 * (angles[2000:] - arm.TARGET), style))
     panel = Panel("pan joint of the arm, encoder on the joint", "time [s]", "position error [mrad]", tuple(curves))
-    plots.draw([panel], 1, (8.0, 3.2)).savefig(out / "robots-hunting.png", metadata={"Software": None})
+    save([panel], 1, (8.0, 3.2), out, "robots-hunting")
 
 
 def quadruped(out: Path, trots: dict[str, Any], squats: dict[str, Any]) -> None:
@@ -112,7 +67,7 @@ def quadruped(out: Path, trots: dict[str, Any], squats: dict[str, Any]) -> None:
         times = next(iter(trots.values())).times
         curves = tuple(Curve(kind, times, y, KINDS[kind]) for kind, y in values.items())
         panels.append(Panel(title, "time [s]", unit, curves))
-    plots.draw(panels, 2, (9.0, 5.6)).savefig(out / "robots-quadruped.png", metadata={"Software": None})
+    save(panels, 2, (9.0, 5.6), out, "robots-quadruped")
 
 
 def outline(example: Any, model: Any, q: np.ndarray) -> dict[str, np.ndarray]:
@@ -189,7 +144,6 @@ def trot(out: Path, runs: dict[str, Any]) -> None:
 
 def write(out: Path) -> None:
     """All figures of the page into a directory."""
-    signs(out)
     tracking(out)
     hunting(out)
     legged = example("mujoco_quadruped")

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from figure_files import save
 
 import lostmotion as lm
 from lostmotion.data_sheets.components import gearbox_table
@@ -60,9 +61,7 @@ def histories(out: Path) -> None:
                 y_range=(-170.0, 250.0) if "chatter" in title else (-10.0, 70.0),
             )
         )
-    plots.draw([*speeds, *torques], 3, (11.0, 5.6)).savefig(
-        out / "self-locking-histories.png", dpi=100, metadata={"Software": None}
-    )
+    save([*speeds, *torques], 3, (11.0, 5.6), out, "self-locking-histories")
 
 
 def three_degrees(out: Path) -> None:
@@ -95,9 +94,7 @@ def three_degrees(out: Path) -> None:
             ),
         ),
     ]
-    plots.draw(drawn, 2, (10.0, 3.4)).savefig(
-        out / "self-locking-three-degrees.png", dpi=100, metadata={"Software": None}
-    )
+    save(drawn, 2, (10.0, 3.4), out, "self-locking-three-degrees")
 
 
 def lowering(

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from figure_files import save
 
 import lostmotion as lm
-from lostmotion.reports import plots
 from lostmotion.reports.looks import FIRST, SECOND, THIRD
 from lostmotion.reports.panels import Curve, Panel
 from lostmotion.units.practical import ARCMIN
@@ -45,7 +45,7 @@ def errors(out: Path, scenarios: dict[str, lm.Scenario]) -> None:
         error = scenario.controller.reference.at(t)[0] - run["load_angle"].to_numpy()  # type: ignore[union-attr]
         curves.append(Curve(name, t, ARCMIN * error, style))
     panel = Panel("there and back: reference less angle of the load", "time [s]", "error [arcmin]", tuple(curves))
-    _save(out, "servo-errors", [panel], 1, (8.0, 3.4))
+    save([panel], 1, (8.0, 3.4), out, "servo-errors")
 
 
 def loops(out: Path, scenario: lm.Scenario) -> None:
@@ -61,7 +61,7 @@ def loops(out: Path, scenario: lm.Scenario) -> None:
         Panel("open speed loop: gain", "frequency [Hz]", "|L| [-]", gains, log_x=True, log_y=True),
         Panel("open speed loop: phase", "frequency [Hz]", "phase [deg]", phases, log_x=True),
     ]
-    _save(out, "servo-loops", panels, 2, (10.0, 3.6))
+    save(panels, 2, (10.0, 3.6), out, "servo-loops")
 
 
 def hunting(out: Path, scenario: lm.Scenario) -> None:
@@ -77,13 +77,7 @@ def hunting(out: Path, scenario: lm.Scenario) -> None:
         Curve("motor angle / ratio", t, ARCMIN * (motor / ratio - middle), SECOND),
         Curve("load", t, ARCMIN * (load - middle), FIRST),
     )
-    _save(
-        out, "servo-hunting", [Panel("at rest, gap of 3 arcmin", "time [s]", "angle [arcmin]", curves)], 1, (8.0, 3.2)
-    )
-
-
-def _save(out: Path, name: str, panels: list[Panel], columns: int, size: tuple[float, float]) -> None:
-    plots.draw(panels, columns, size).savefig(out / f"{name}.png", metadata={"Software": None})
+    save([Panel("at rest, gap of 3 arcmin", "time [s]", "angle [arcmin]", curves)], 1, (8.0, 3.2), out, "servo-hunting")
 
 
 def write(out: Path) -> None:

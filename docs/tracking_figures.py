@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from figure_files import save
 
 import lostmotion as lm
-from lostmotion.reports import plots
 from lostmotion.reports.looks import FAINT, FIRST, SECOND, THIRD
 from lostmotion.reports.panels import Curve, Panel
 
@@ -65,7 +65,7 @@ def over_amplitude(out: Path) -> None:
         "sine of 0.25 Hz: peak error of the load", "peak speed of the load [rad/s]", "error [mrad]", curves,
         log_x=True, log_y=True,
     )  # fmt: skip
-    _save(out, "tracking-amplitude", [panel], 1, (8.0, 4.0))
+    save([panel], 1, (8.0, 4.0), out, "tracking-amplitude")
 
 
 def fly_by(out: Path) -> None:
@@ -85,7 +85,7 @@ def fly_by(out: Path) -> None:
         Panel("elevation of a fly-by: reference less load", "time [s]", "error [mrad]", tuple(errors)),
         Panel("factor on the losses in the controller", "time [s]", "factor [-]", tuple(factors)),
     ]
-    _save(out, "tracking-fly-by", panels, 2, (10.0, 3.6))
+    save(panels, 2, (10.0, 3.6), out, "tracking-fly-by")
 
 
 def by_camera(out: Path) -> None:
@@ -111,7 +111,7 @@ def by_camera(out: Path) -> None:
         Panel("elevation of a fly-by: target less load", "time [s]", "error [mrad]", tuple(errors)),
         Panel("rms error after 2 s", "latency of the camera [ms]", "error [mrad]", tuple(over)),
     ]
-    _save(out, "tracking-camera", panels, 2, (10.0, 3.6))
+    save(panels, 2, (10.0, 3.6), out, "tracking-camera")
 
 
 SETTLED = 2.0  # s, after which the tracker has found the target
@@ -127,10 +127,6 @@ def _error(scenario: Any) -> tuple[np.ndarray, np.ndarray]:
 def _rms(scenario: Any) -> float:
     t, error = _error(scenario)
     return float(np.sqrt(np.mean(error[t > SETTLED] ** 2)))
-
-
-def _save(out: Path, name: str, panels: list[Panel], columns: int, size: tuple[float, float]) -> None:
-    plots.draw(panels, columns, size).savefig(out / f"{name}.png", metadata={"Software": None})
 
 
 def write(out: Path) -> None:

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from figure_files import save
 
 import lostmotion as lm
-from lostmotion.reports import plots
 from lostmotion.reports.looks import FAINT, FIRST, POINTS, SECOND, THIRD
 from lostmotion.reports.panels import Curve, Panel
 from lostmotion.studies.table import read_table
@@ -35,11 +35,6 @@ def ring(losses: tuple[float, float] = (1.0, 1.0), friction: float = 0.0, **chan
     for name in NAMES:
         bare |= {f"motors.{name}_motor.friction_torque": friction, f"gears.{name}_gear.losses": mesh}
     return BASE.replace(**(bare | changes))
-
-
-def save(panels: list[Panel], columns: int, size: tuple[float, float], out: Path, name: str) -> None:
-    """Draws panels into a file."""
-    plots.draw(panels, columns, size).savefig(out / f"{name}.png", dpi=100, metadata={"Software": None})
 
 
 # --- lost motion at the ring ---
