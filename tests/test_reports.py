@@ -18,10 +18,11 @@ from lostmotion.reports.contours import contours
 from lostmotion.reports.looks import LOOKS, STYLES, look
 from lostmotion.reports.packed import packed
 from lostmotion.reports.page import Report, Table, render
+from lostmotion.reports.pages import write_report
 from lostmotion.reports.panels import Bars, Contacts, Curve, Flows, Ground, Group, Mark, Matrix, Panel
 from lostmotion.reports.pictures import endings
 from lostmotion.reports.run import run_report
-from lostmotion.reports.servo import servo_report, write_servo
+from lostmotion.reports.servo import servo_report
 from lostmotion.reports.static import svg_of
 from lostmotion.reports.thinning import simplified
 from lostmotion.units.practical import practical
@@ -189,7 +190,7 @@ def test_a_static_figure_has_its_points_where_the_axes_say() -> None:
 
 
 def test_figures_are_drawn_where_they_are_asked_for(axis: lm.servo.ServoReport, tmp_path: Path) -> None:
-    write_servo(tmp_path, "speed-axis", axis, endings("png, svg"))
+    write_report(tmp_path, servo_report("speed-axis", axis), endings("png, svg"))
     made = {p.name for p in tmp_path.iterdir()} - {"report.js"}
     assert made == {"servo.html", "margins.csv"} | {
         f"{n}.{e}" for n in ("axis", "loops", "steps") for e in ("csv", "png", "svg")

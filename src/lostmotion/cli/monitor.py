@@ -51,9 +51,10 @@ def monitor(
         print(f"All trends on a page: lostmotion monitor {' '.join(map(str, (file, *(logs or ())[:3])))} -o monitored")
     else:
         with writing(output), busy("Writing"):
-            from ..reports.monitor import write_monitor
+            from ..reports.monitor import monitor_report
+            from ..reports.pages import write_report
 
-            page = write_monitor(output, file.stem, result, pictures)
+            page = write_report(output, monitor_report(file.stem, result), pictures)
         print(f"Report written to {page}")
         print(f"Next: lostmotion identify {file} -o identified")
     if result.verdict.exit_code:

@@ -80,12 +80,13 @@ def rig(
     report, notes = _measured(name, sheet, overrides or ())
     from ..reports import rig as of_gearbox
     from ..reports import screw_rig as of_screw
+    from ..reports.pages import write_report
 
     pages: Any = of_screw if isinstance(sheet, ScrewSheet) else of_gearbox
     page = None
     if output is not None:
         with writing(output), busy("Writing"):
-            page = pages.write_sheet(output, sheet.name, report, sheet, notes, pictures)
+            page = write_report(output, pages.rig_report(sheet.name, report, sheet, notes), pictures)
     print(sheet.title or sheet.name)
     _print_comparisons(report.comparisons)
     for what, value in pages.summary_rows(report):

@@ -155,9 +155,11 @@ def servo(
         written.append(f"Tuned scenario written to {path}")
     for path in directories:
         with writing(path), busy("Writing"):
-            from ..reports.servo import write_servo
+            from ..reports.pages import write_report
+            from ..reports.servo import servo_report
 
-            written.append(f"Report written to {write_servo(path, Path(scenario).stem, report, pictures)}")
+            page = write_report(path, servo_report(Path(scenario).stem, report), pictures)
+            written.append(f"Report written to {page}")
     _print_summary(loaded.title or Path(scenario).stem, report)
     print_timed_moves(loaded)
     if tuned is not None:
@@ -185,7 +187,8 @@ def _certify(
 ) -> None:
     """Print whether an axis with a continuous controller hunts, with its page on request."""
     from ..errors import InputError
-    from ..reports.certificate import certificate_rows, verdict_of, write_certificate
+    from ..reports.certificate import certificate_report, certificate_rows, verdict_of
+    from ..reports.pages import write_report
     from ..servo.certificate import hunting_certificate
 
     if given := [option for option, value in asked.items() if value is not None]:
@@ -198,7 +201,9 @@ def _certify(
     _print_columns(certificate_rows(certificate))
     for path in directories:
         with writing(path), busy("Writing"):
-            print(f"Report: {write_certificate(path, Path(source).stem, loaded.title, certificate, pictures)}")
+            print(
+                f"Report: {write_report(path, certificate_report(Path(source).stem, loaded.title, certificate), pictures)}"
+            )
     if not directories:
         print(f"The map as a chart: lostmotion servo {source} -o sheet")
     conclude(verdict_of(certificate))

@@ -68,9 +68,10 @@ def track(
         print(f"All charts on a page: lostmotion track {scenario} -o track")
     else:
         with writing(output), busy("Writing"):
-            from ..reports.pointing import write_pointing
+            from ..reports.pages import write_report
+            from ..reports.pointing import pointing_report
 
-            page = write_pointing(output, Path(scenario).stem, budget, pictures)
+            page = write_report(output, pointing_report(Path(scenario).stem, budget), pictures)
         print(f"Report written to {page}")
         print(f"Next: lostmotion run {scenario} --report {Path(scenario).stem}.html")
     conclude(verdict_of(budget))

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -13,7 +11,6 @@ from ..units.practical import practical
 from ..verdict import State, Verdict
 from .looks import FAINT, look
 from .page import Prose, Report, Table
-from .pages import write_report
 from .panels import Curve, Group, Mark, Panel
 
 CAPTION = (
@@ -102,14 +99,5 @@ def certificate_report(name: str, title: str, certificate: HuntingCertificate) -
         verdict=verdict_of(certificate),
         main=Group("hunting", "From break-away to break-away", CAPTION, () if panel is None else (panel,), 1),
         parts=(Table("Hunting", ("quantity", "value"), rows), Prose("What is computed", COMPUTED)),
+        file="servo.html",
     )
-
-
-def write_certificate(
-    directory: Path, name: str, title: str, certificate: HuntingCertificate, pictures: Sequence[str] = ()
-) -> Path:
-    """``servo.html`` and its data as CSV in a directory, made if missing; on request pictures with these endings.
-
-    Returns the path of the page.
-    """
-    return write_report(directory, "servo.html", certificate_report(name, title, certificate), {}, pictures)

@@ -67,9 +67,7 @@ def write_identification(
         write_text(directory / "gearbox.toml", result.record_text())
     for file, text in tables.items():
         write_text(directory / file, text)
-    return write_report(
-        directory, "identified.html", identification_report(name, result, all_logs=all_logs), {}, pictures
-    )
+    return write_report(directory, identification_report(name, result, all_logs=all_logs), pictures)
 
 
 def identification_report(name: str, result: IdentificationResult, *, all_logs: bool = False) -> Report:
@@ -114,6 +112,7 @@ def identification_report(name: str, result: IdentificationResult, *, all_logs: 
             *([Table("Notes on the logs", ("log", "note"), notes)] if notes else []),
             *[group for group in groups if group.name.startswith("overlays")],
         ),
+        file="identified.html",
     )
 
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +14,7 @@ from ..units.conversion import si_factor
 from ..units.practical import printed
 from .looks import FAINT, PALETTE
 from .page import Prose, Report, Table
-from .pages import table_csv, write_report
+from .pages import table_csv
 from .panels import Curve, Group, Mark, Panel
 
 VALUES: dict[str, Any] = {"color": PALETTE["first"], "linestyle": "none", "marker": "o", "markersize": 5.0}
@@ -25,21 +23,8 @@ LIMIT: dict[str, Any] = {"color": PALETTE["second"], "linestyle": "--", "linewid
 EVIDENCE: dict[str, Any] = {"color": PALETTE["first"], "linestyle": "-", "linewidth": 1.6}
 LEAST = 1e-4  # evidence, below which it is not drawn
 LOGS = ("log", "order", "residual", "determined values", "reason for leaving it out")
+VALUES_OF_LOGS = ("log", "place", "residual", "parameter", "value", "low", "high", "told")
 WATCHED = ("value", "baseline", "now", "from", "to", "unit", "change", "limit")
-
-
-def write_monitor(directory: Path, name: str, result: MonitorResult, pictures: Sequence[str] = ()) -> Path:
-    """``monitor.html`` and tables (CSV) in a directory, made if missing; on request pictures.
-
-    Returns the path of the page.
-    """
-    tables = {
-        "values.csv": table_csv(
-            ["log", "place", "residual", "parameter", "value", "low", "high", "told"], _values(result)
-        ),
-        "watched.csv": table_csv(WATCHED, [_row(result, w) for w in result.watched.values()]),
-    }
-    return write_report(directory, "monitor.html", monitor_report(name, result), tables, pictures)
 
 
 def monitor_report(name: str, result: MonitorResult) -> Report:
@@ -48,6 +33,7 @@ def monitor_report(name: str, result: MonitorResult) -> Report:
     marked = frozenset(k for k, w in enumerate(watched) if w.alarm)
     rows = [[e.log, f"{e.at:g}", f"{e.residual:.3g}", ", ".join(sorted(e.told)) or "none", e.why] for e in result.logs]
     unused = frozenset(k for k, e in enumerate(result.logs) if e.why)
+    table = [_row(result, w) for w in watched]
     left_out = [list(pair) for pair in result.left_out.items()]
     return Report(
         title=result.task.title or name,
@@ -55,7 +41,7 @@ def monitor_report(name: str, result: MonitorResult) -> Report:
         verdict=result.verdict,
         main=Group("trends", "Trends", TRENDS, tuple(_trend(result, w) for w in watched)),
         parts=(
-            Table("Watched values", WATCHED, [_row(result, w) for w in watched], BLANK, marked),
+            Table("Watched values", WATCHED, table, BLANK, marked),
             Prose("Findings", [w.text for w in watched], listed=True),
             Group(
                 "evidence",
@@ -66,6 +52,8 @@ def monitor_report(name: str, result: MonitorResult) -> Report:
             Table("Logs", LOGS, rows, TELLS, unused),
             *([Table("Logs that are left out", ("log", "reason"), left_out)] if left_out else []),
         ),
+        file="monitor.html",
+        tables={"values.csv": table_csv(VALUES_OF_LOGS, _values(result)), "watched.csv": table_csv(WATCHED, table)},
     )
 
 

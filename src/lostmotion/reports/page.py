@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 import shutil
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 
@@ -70,6 +70,8 @@ class Report:
     """in at most three lines; lines alone where nothing is asked, so that there is nothing to judge"""
     main: Group
     parts: tuple[Table | Group | Prose, ...]
+    file: str = "report.html"  # its name in a directory
+    tables: Mapping[str, str] = field(default_factory=dict)  # text of the CSV files beside it, by their names
 
     def groups(self) -> list[Group]:
         """All groups of charts."""

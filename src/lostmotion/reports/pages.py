@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -50,26 +50,23 @@ def _row(*labels: str) -> str:
     return table_csv(map(plain, labels), ()).rstrip("\n")
 
 
-def write_report(
-    directory: Path, file: str, report: Report, tables: Mapping[str, str], pictures: Sequence[str] = ()
-) -> Path:
+def write_report(directory: Path, report: Report, pictures: Sequence[str] = ()) -> Path:
     """Write a page, the data of its charts and its tables into a directory, made if missing.
 
-    tables: text of further CSV files by their names.
     pictures: endings of the files in which matplotlib draws each group of charts: png, svg, pdf.
 
     Returns the path of the page.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    write_page(directory / file, report)
+    write_page(directory / report.file, report)
     data = {f"{group.name}.csv": panels_csv(group.charts) for group in report.groups() if _has_panels(group)}
-    for name, text in (data | dict(tables)).items():
+    for name, text in (data | dict(report.tables)).items():
         write_text(directory / name, text)
     if pictures:
         from .pictures import draw_all
 
         draw_all(directory, report.groups(), pictures)
-    return directory / file
+    return directory / report.file
 
 
 def _has_panels(group: Group) -> bool:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from ..units.practical import excess
 from ..verdict import Point, Verdict
 from .looks import look
 from .page import Prose, Report, Table
-from .pages import table_csv, write_report
+from .pages import table_csv
 from .panels import Bars, Curve, Group, Panel
 
 NUMBERS = ("rms", "peak", "probable", "mean", "measured, rms")
@@ -261,16 +260,9 @@ def pointing_report(name: str, budget: PointingBudget) -> Report:
         verdict=_verdict(budget),
         main=main,
         parts=(*more, _computed(budget)),
+        file="track.html",
+        tables={
+            "budget.csv": table_csv(header(budget), rows),
+            "contributions.csv": table_csv(contribution_header(budget), parts),
+        },
     )
-
-
-def write_pointing(directory: Path, name: str, budget: PointingBudget, pictures: Sequence[str] = ()) -> Path:
-    """``track.html``, tables and data as CSV in a directory, made if missing; on request pictures with these endings.
-
-    Returns the path of the page.
-    """
-    tables = {
-        "budget.csv": table_csv(header(budget), budget_rows(budget)),
-        "contributions.csv": table_csv(contribution_header(budget), contribution_rows(budget)),
-    }
-    return write_report(directory, "track.html", pointing_report(name, budget), tables, pictures)

@@ -179,9 +179,7 @@ def _verdict(response: xarray.Dataset, found: xarray.Dataset) -> tuple[str, ...]
 # --- the page ---
 
 
-def response_report(
-    responses: Mapping[str, xarray.Dataset], scenario: Scenario, output: str
-) -> tuple[Report, xarray.Dataset]:
+def response_report(responses: Mapping[str, xarray.Dataset], scenario: Scenario, output: str) -> Report:
     """The page of the first response, overlaid with the others, and its characteristics by amplitude."""
     name, response = next(iter(responses.items()))
     found = characteristics(response, scenario, output)
@@ -203,14 +201,20 @@ def response_report(
             f"Gain, phase and distortion are blank where the gain is {MAP_DEPTH:g} dB or more below its largest value."
         )
         parts.insert(0, Group("maps", "Over frequency and amplitude", note, tuple(grounds)))
-    report = Report(
+    names = ("amplitude", "bandwidth", "phase_crossover")
+    columns = zip(*(found[name].values.tolist() for name in names), strict=True)
+    return Report(
         title=scenario.title or name,
         lead=f"Frequency response of `{name}` from {source} to {output.replace('_', ' ')}.{compared}",
         verdict=_verdict(response, found),
         main=Group("bode", "Gain and phase", caption, tuple(bode(responses, output)), 1),
         parts=tuple(parts),
+        file="response.html",
+        tables={
+            "response.csv": points_csv(response, output),
+            "characteristics.csv": table_csv(["amplitude", "bandwidth [Hz]", "phase_crossover [Hz]"], columns),
+        },
     )
-    return report, found
 
 
 def write_response(
@@ -224,15 +228,8 @@ def write_response(
 
     Returns the path of the page.
     """
-    response = next(iter(responses.values()))
-    report, found = response_report(responses, scenario, output)
-    names = ("amplitude", "bandwidth", "phase_crossover")
-    rows = zip(*(found[name].values.tolist() for name in names), strict=True)
-    tables = {
-        "response.csv": points_csv(response, output),
-        "characteristics.csv": table_csv(["amplitude", "bandwidth [Hz]", "phase_crossover [Hz]"], rows),
-    }
-    page = write_report(directory, "response.html", report, tables, pictures)
+    page = write_report(directory, response_report(responses, scenario, output), pictures)
     if find_spec("h5netcdf") is not None:
+        response = next(iter(responses.values()))
         write_bytes(directory / "response.nc", bytes(for_file(response).to_netcdf(engine="h5netcdf")))
     return page

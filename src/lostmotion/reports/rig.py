@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from ..units.practical import RPM, counted, practical
 from ..verdict import Point, Verdict
 from .looks import DOTS, step
 from .page import Prose, Report, Table
-from .pages import table_csv, write_report
+from .pages import table_csv
 from .panels import Curve, Group, Panel
 from .sheet_rows import rows_of, rows_of_part
 
@@ -238,40 +237,27 @@ def compared_rows(comparisons: Sequence[Comparison]) -> str:
     return table_csv(header, ([c.quantity, c.unit, c.catalogue, c.rig, c.difference, c.remark] for c in comparisons))
 
 
+EFFICIENCY = ("relative_load", "input_speed [rpm]", "efficiency", "loss_torque at the input [N*m]")
+
+
 def rig_report(name: str, report: RigReport, sheet: GearboxSheet | None = None, notes: Iterable[str] = ()) -> Report:
     """The page of a gearbox on the rig."""
     kind = f"{sheet.manufacturer} {sheet.kind.replace('_', ' ')} gearbox, " if sheet is not None else ""
     own = rows_of_part(report.gearbox)
     caption = "Measured on the simulated gearbox; points: the catalogue."
+    table = report.map
+    found = table["efficiency"].values, table["loss_torque"].values
+    rows = [
+        [float(mu), RPM * float(n), float(eta), float(loss)]
+        for mu, etas, losses in zip(table["load"].values, *found, strict=True)
+        for n, eta, loss in zip(table["input_speed"].values, etas, losses, strict=True)
+    ]
     return Report(
         title=sheet.title if sheet is not None and sheet.title else name,
         lead=f"{kind}`{name}`, on the virtual test rig.",
         verdict=_verdict(report),
         main=Group("rig", "Measurements", caption, tuple(panels(report, sheet))),
         parts=rig_parts(report.comparisons, sheet, notes, summary_rows(report), MEASURED, own),
+        file="rig.html",
+        tables={"comparison.csv": compared_rows(report.comparisons), "efficiency.csv": table_csv(EFFICIENCY, rows)},
     )
-
-
-def write_sheet(
-    directory: Path,
-    name: str,
-    report: RigReport,
-    sheet: GearboxSheet | None,
-    notes: Iterable[str] = (),
-    pictures: Sequence[str] = (),
-) -> Path:
-    """``rig.html`` and the measurements as CSV in a directory, made if missing; on request pictures with these endings.
-
-    Returns the path of the page.
-    """
-    table = report.map
-    rows = [
-        [float(mu), RPM * float(n), float(eta), float(loss)]
-        for mu, etas, losses in zip(
-            table["load"].values, table["efficiency"].values, table["loss_torque"].values, strict=True
-        )
-        for n, eta, loss in zip(table["input_speed"].values, etas, losses, strict=True)
-    ]
-    head = ["relative_load", "input_speed [rpm]", "efficiency", "loss_torque at the input [N*m]"]
-    tables = {"comparison.csv": compared_rows(report.comparisons), "efficiency.csv": table_csv(head, rows)}
-    return write_report(directory, "rig.html", rig_report(name, report, sheet, notes), tables, pictures)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from pathlib import Path
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from ..units.practical import RPM
 from ..verdict import Verdict
 from .looks import DOTS, step
 from .page import Report
-from .pages import table_csv, write_report
+from .pages import table_csv
 from .panels import Curve, Group, Panel
 from .rig import agreement, compared_rows, rig_parts
 
@@ -99,35 +98,22 @@ def _verdict(report: ScrewReport) -> Verdict | tuple[str, ...]:
     return agreement(report.comparisons, lines)
 
 
-def screw_report(name: str, report: ScrewReport, sheet: ScrewSheet | None = None, notes: Iterable[str] = ()) -> Report:
+def rig_report(name: str, report: ScrewReport, sheet: ScrewSheet | None = None, notes: Iterable[str] = ()) -> Report:
     """The page of a screw on the rig."""
     caption = "Measured on the simulated screw; points: the catalogue."
     kind = f"{sheet.manufacturer} {sheet.kind.replace('_', ' ')}, " if sheet is not None else ""
-    return Report(
-        title=sheet.title if sheet is not None and sheet.title else name,
-        lead=f"{kind}`{name}`, on the virtual test rig at {report.load:.4g} N.",
-        verdict=_verdict(report),
-        main=Group("rig", "Measurements", caption, tuple(panels(report, sheet))),
-        parts=rig_parts(report.comparisons, sheet, notes, summary_rows(report), MEASURED),
-    )
-
-
-def write_sheet(
-    directory: Path,
-    name: str,
-    report: ScrewReport,
-    sheet: ScrewSheet | None,
-    notes: Iterable[str] = (),
-    pictures: Sequence[str] = (),
-) -> Path:
-    """``rig.html`` and the measurements as CSV in a directory, made if missing; on request pictures with these endings.
-
-    Returns the path of the page.
-    """
     rows = ([share * report.load, eta, back] for share, eta, back in zip(*report.efficiency, strict=True))
     head = ["axial force [N]", "efficiency, the screw drives", "efficiency, the slide drives"]
     tables = {"comparison.csv": compared_rows(report.comparisons), "efficiency.csv": table_csv(head, rows)}
     if report.first_loading is not None:
         table = zip(*report.first_loading, strict=True)
         tables["deflection.csv"] = table_csv(["deflection [m]", "axial force [N]"], table)
-    return write_report(directory, "rig.html", screw_report(name, report, sheet, notes), tables, pictures)
+    return Report(
+        title=sheet.title if sheet is not None and sheet.title else name,
+        lead=f"{kind}`{name}`, on the virtual test rig at {report.load:.4g} N.",
+        verdict=_verdict(report),
+        main=Group("rig", "Measurements", caption, tuple(panels(report, sheet))),
+        parts=rig_parts(report.comparisons, sheet, notes, summary_rows(report), MEASURED),
+        file="rig.html",
+        tables=tables,
+    )

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from pathlib import Path
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from ..units.practical import charted
 from .certificate import certificate_parts
 from .looks import FAINT, look
 from .page import Prose, Report, Table
-from .pages import table_csv, write_report
+from .pages import table_csv
 from .panels import Curve, Group, Mark, Panel
 
 DEGREES = 180.0 / math.pi
@@ -256,13 +255,6 @@ def servo_report(name: str, report: ServoReport) -> Report:
             *_stiffness_group(report),
             Prose("What is computed", COMPUTED),
         ),
+        file="servo.html",
+        tables={"margins.csv": table_csv(HEADER, rows)},
     )
-
-
-def write_servo(directory: Path, name: str, report: ServoReport, pictures: Sequence[str] = ()) -> Path:
-    """``servo.html`` and its data as CSV in a directory, made if missing; on request pictures with these endings.
-
-    Returns the path of the page.
-    """
-    tables = {"margins.csv": table_csv(HEADER, loop_rows(report))}
-    return write_report(directory, "servo.html", servo_report(name, report), tables, pictures)

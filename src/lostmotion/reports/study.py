@@ -179,15 +179,16 @@ def _counted(table: pa.Table, study: Study) -> str:
     return f"{table.num_rows} of {counted(study.total, 'run')}, {failed} failed"
 
 
-def _task_page(study: Study, table: pa.Table, name: str) -> tuple[Report, dict[str, str]]:
+def _task_page(study: Study, table: pa.Table, name: str) -> Report:
     """Page of a task: its ranking alone, since the varied values are names."""
     shown = show_selection(table, study)
     main, *parts = shown.parts if isinstance(shown.parts[0], Group) else (Group("none", "", "", ()), *shown.parts)
     assert isinstance(main, Group)
     lead = f"Selection of motor and gearbox for the task `{name}`: {_counted(table, study)}."
-    return Report(study.title or name, lead, shown.verdict, main, tuple(parts)), shown.tables
+    return Report(study.title or name, lead, shown.verdict, main, tuple(parts), FILE, shown.tables)
 
 
+FILE = "study.html"
 STATISTICS = ("mean", "std. dev.", "min", "5 %", "50 %", "95 %", "max")
 
 
@@ -210,7 +211,7 @@ def _whole_indices(table: pa.Table, study: Study) -> dict[str, dict[str, tuple[f
     return sobol_indices(table, study) if whole else {}
 
 
-def _study_page(study: Study, table: pa.Table, name: str) -> tuple[Report, dict[str, str]]:
+def _study_page(study: Study, table: pa.Table, name: str) -> Report:
     rows, failures = statistics(table, study), _failures(table)
     shown = [[row[0], *("" if np.isnan(x) else f"{x:.5g}" for x in row[1:])] for row in rows]
     parts: list[Any] = [Table("Statistics", ("value", *STATISTICS), shown, BLANK)]
@@ -229,7 +230,7 @@ def _study_page(study: Study, table: pa.Table, name: str) -> tuple[Report, dict[
     if failures:
         parts.append(Prose("Runs that failed", failures, listed=True))
     lead = f"Study `{name}`: {_counted(table, study)}."
-    return Report(study.title or name, lead, verdict, distributions(table, study), tuple(parts)), tables
+    return Report(study.title or name, lead, verdict, distributions(table, study), tuple(parts), FILE, tables)
 
 
 def _result(table: pa.Table, study: Study, ranks: dict[str, dict[str, float]]) -> tuple[str, ...]:
@@ -247,13 +248,6 @@ def _result(table: pa.Table, study: Study, ranks: dict[str, dict[str, float]]) -
             f"{labelled(table, name)}: mean {x.mean():.5g}, 90 % of the runs within {low:.5g} and {high:.5g}{depends}."
         )
     return f"{_counted(table, study)}.", *lines
-
-
-def study_report(directory: Path) -> tuple[Report, dict[str, str]]:
-    """The page of a study in a directory, and its tables as CSV by their names."""
-    study, table = study_of(directory), read_table(directory)
-    make = _study_page if study.axis is None else _task_page
-    return make(study, table, directory.resolve().name)
 
 
 def summary(directory: Path) -> tuple[list[str], Verdict | None]:
@@ -283,5 +277,6 @@ def write_study(directory: Path, target: Path, pictures: Sequence[str] = ()) -> 
     need("scipy", "The page of a study", "study")
     if target.resolve().is_relative_to(directory.resolve()):
         raise InputError(f"{target}: is within the directory of the runs; name another one with -o")
-    report, tables = study_report(directory)
-    return write_report(target, "study.html", report, tables, pictures)
+    study, table = study_of(directory), read_table(directory)
+    page = _study_page if study.axis is None else _task_page
+    return write_report(target, page(study, table, directory.resolve().name), pictures)
