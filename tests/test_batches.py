@@ -469,7 +469,7 @@ def test_a_train_of_one_gear_is_walked_under_its_own_names() -> None:
     ("use", "message"),
     [
         (lambda: lm.SimulationBatch(lm.load("given-motion"), STEP, count=2), "gives the motion of a shaft"),
-        (lambda: lm.SimulationBatch(lm.load("worm-lowering"), STEP, count=2, given_motion=True), "the shaft called load"),
+        (lambda: lm.SimulationBatch(lm.load("worm-lowering"), STEP, count=2, given_motion="lod"), "is no shaft or slide"),
         (lambda: lm.SimulationBatch(lm.load("two-motors-one-ring"), STEP, count=2).step(0.1), "command: there are several"),
         (lambda: lm.SimulationBatch(lm.load("two-motors-one-ring"), STEP, count=2).step(first_motor_command=0.1), "second_motor_command: missing"),
         (lambda: lm.SimulationBatch([lm.load("worm-lowering"), lm.load("speed-axis")], STEP), "different inputs"),
@@ -580,7 +580,7 @@ def test_a_given_motion_takes_the_torque_of_newtons_law() -> None:
     # (J + i^2 J_M) a = i M + drive torque
     assert batch["load_drive_torque"] == pytest.approx((1.0 + 2500 * 1e-4) * acceleration - 50 * 0.1, rel=1e-12)
     assert batch["load_angle"] == pytest.approx(0.5 * acceleration * 0.01**2, rel=1e-12, abs=1e-18)
-    with pytest.raises(lm.InputError, match="load_torque: does not act on a load whose motion is given"):
+    with pytest.raises(lm.InputError, match="load_torque: does not act on load, whose motion is given"):
         batch.step(0.1, 1.0, motion={"speed": 0.0})
     with pytest.raises(lm.InputError, match=r"motion\.speed: is missing"):
         batch.step(0.1, motion={"angle": 0.0})
@@ -616,6 +616,21 @@ def test_a_given_motion_moves_each_drive_as_alone() -> None:
         assert batch["twist"][k] == one["gearbox_twist"]
 
 
+def test_any_shaft_or_slide_may_have_a_given_motion() -> None:
+    """One behind a worm, one before it, a slide behind a screw: each as in a simulation alone."""
+    for name, shaft in (("worm-lowering", "worm"), ("two-motors-one-ring", "ring"), ("ball-screw-axis", "slide")):
+        scenario = lm.load(name).without_controllers()
+        batch = lm.SimulationBatch(scenario, STEP, count=2, given_motion=shaft)
+        alone = lm.Simulation(scenario, step=STEP, loaded=[], given=[shaft])
+        commands = {n: 0.1 for n in batch.inputs if n.endswith("command")}
+        for k in range(1, 51):
+            motion = {"speed": 0.01 * np.sin(20 * k * STEP)}
+            batch.step(**commands, motion=motion)
+            alone.advance(STEP, **commands, motion={shaft: motion})
+        variable = f"{shaft}_drive_{'force' if shaft == 'slide' else 'torque'}"
+        assert batch[variable][1] == alone[variable] != 0.0
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -632,5 +647,5 @@ def test_controllers_that_a_batch_does_not_run_are_refused(options: dict[str, ob
     with pytest.raises(lm.InputError, match=message) as raised:
         lm.SimulationBatch(lm.load("position-axis").drive(), STEP, count=2, **options)  # type: ignore[arg-type]
     assert "\n" not in str(raised.value)
-    with pytest.raises(lm.InputError, match="motion: is for a batch with given_motion=True"):
+    with pytest.raises(lm.InputError, match="motion: is for a batch with given_motion"):
         lm.SimulationBatch(simple_drive(), STEP, count=2).step(0.1, motion={"speed": 1.0})

@@ -5,7 +5,8 @@ namespace lostmotion::batch {
 ExactBatch::ExactBatch(const std::vector<Scenario>& kinds, std::span<const int> kind_of, double step) : step_(step) {
     for (const int kind : kind_of)
         drives_.push_back(std::make_unique<ScenarioSimulation>(kinds[static_cast<std::size_t>(kind)], step));
-    given_ = drives_[0]->given_shaft("load");
+    for (const model::Shaft& shaft : drives_[0]->train().assembly().train().shafts)
+        if (shaft.given_motion) given_ = drives_[0]->given_shaft(shaft.name);
     values_.resize(variables().size() * size());
 }
 

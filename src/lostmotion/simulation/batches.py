@@ -62,7 +62,7 @@ class SimulationBatch:
         A sampled controller for the one motor of all drives, or one for each, which runs at its own sample instants within the
         steps. It is tuned to the drives of `drives`, not to what varies.
     given_motion
-        Whether the motion of the shafts called ``load`` is given to `step`, as by a multibody engine.
+        The shaft or slide whose motion is given to `step`, as by a multibody engine; True: the last of the train, the load of a drive.
 
     Raises
     ------
@@ -101,7 +101,7 @@ class SimulationBatch:
         seed: int = 0,
         threads: Count | None = None,
         controllers: Controller | Sequence[Controller] | None = None,
-        given_motion: bool = False,
+        given_motion: bool | str = False,
     ) -> None:
         if not MIN_INTERVAL <= step <= MAX_INTERVAL:
             raise InputError(f"step {step} s must lie between {MIN_INTERVAL:g} s and {MAX_INTERVAL:g} s")
@@ -122,15 +122,16 @@ class SimulationBatch:
         check_free(TRAIN_BYTES * self._count, f"count: {self._count:.3g} drives", "take several batches")
         scenarios, initial = _under(controllers, scenarios, self._count), _starts(scenarios, self._count)
         columns = _columns(scenarios[0], vary or {}, self._count, np.random.default_rng(seed))
-        self._given = given_motion
+        last = list(scenarios[0].train().shafts)[-1]
+        self._given = last if given_motion is True else given_motion or None
         self._core: ExactBatch | WalkedBatch
         self._parameters = BatchParameters(scenarios, columns, self._count)
-        if not given_motion and WalkedBatch.takes(scenarios):
+        if self._given is None and WalkedBatch.takes(scenarios):
             self._core = WalkedBatch(scenarios, self._parameters, self._count, step)
         else:
             each = [self._parameters.scenario(k) for k in range(self._count)]
             tuned = scenarios * (self._count // len(scenarios))
-            self._core = ExactBatch(each, tuned, given_motion, step)
+            self._core = ExactBatch(each, tuned, self._given, step)
         self._train, self._time = scenarios[0].train(), np.zeros(self._count)
         loads = {self._train.load_torque_of(shaft) for shaft in self._train.shafts}
         self._required = {name for name in self._core.inputs if name not in loads}
@@ -187,7 +188,7 @@ class SimulationBatch:
         load_torque
             Where there is one load: the torque [N·m] or force [N] that it takes, in the same way.
         motion
-            With `given_motion`, of the loads at the end of the step: ``speed`` [rad/s], and if wanted ``angle`` [rad] and ``acceleration``
+            With `given_motion`, at the end of the step: ``speed`` [rad/s], and if wanted ``angle`` [rad] and ``acceleration``
             [rad/s²], each a number or an array. The course within the step is that of `Simulation.advance`. The torque
             that this takes is the variable ``load_drive_torque``.
         inputs
@@ -223,14 +224,14 @@ class SimulationBatch:
     def _the_only(self, word: str) -> str:
         """Name of the one input that `step` calls a command or a load torque."""
         if word == "load_torque" and self._given and self._required == set(self.inputs):
-            raise InputError("load_torque: does not act on a load whose motion is given; leave it out")
+            raise InputError(f"load_torque: does not act on {self._given}, whose motion is given; leave it out")
         return only_input(self._train, word, self.inputs)
 
     def _motion_of(self, motion: Mapping[str, Any] | None) -> dict[str, np.ndarray]:
         """The given motion, checked."""
         if not self._given:
             if motion is not None:
-                raise InputError("motion: is for a batch with given_motion=True")
+                raise InputError("motion: is for a batch with given_motion")
             return {}
         if motion is None:
             raise InputError('motion: is missing; give the speed at the end of the step, motion={"speed": ...}')

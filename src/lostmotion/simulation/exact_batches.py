@@ -10,12 +10,10 @@ import numpy as np
 from .. import _core
 from ..control.axis import OPEN_LOOP
 from ..errors import InputError
-from ..inputs.validation import shown
+from ..inputs.validation import did_you_mean, listed, shown
 from ..model.drive import DriveOfOneGear
 from .batch_parameters import BatchParameters
 from .scenario import Scenario
-
-JOINT = "load"  # the shaft whose motion is given
 
 
 class ExactBatch:
@@ -28,12 +26,14 @@ class ExactBatch:
     tuned
         Of each the scenario that its controllers are bound to.
     given
-        Whether the motion of the shaft `load` is given.
+        The shaft or slide whose motion is given, if there is one.
     step
         [s]
     """
 
-    def __init__(self, scenarios: Sequence[Scenario], tuned: Sequence[Scenario], given: bool, step: float) -> None:
+    def __init__(
+        self, scenarios: Sequence[Scenario], tuned: Sequence[Scenario], given: str | None, step: float
+    ) -> None:
         self._tuned = tuned
         kinds: dict[Any, int] = {}
         trains, controls, kind_of = [], [], []
@@ -41,7 +41,7 @@ class ExactBatch:
             key = one, base
             if key not in kinds:
                 kinds[key] = len(kinds)
-                trains.append(_with_given_load(one) if given else one.core())
+                trains.append(_train_of(one, given))
                 controls.append(_control_of(base))
             kind_of.append(kinds[key])
         self._core = _core.ExactBatch(trains, controls=controls, kind_of=kind_of, step=step)
@@ -51,7 +51,7 @@ class ExactBatch:
         rows = self._core.values
         self._variables: dict[str, np.ndarray] = dict(zip(self._core.variables, rows, strict=True))
         self._variables |= {name: self._variables[long] for name, long in self._long.items() if long in self._variables}
-        moved = (f"{JOINT}_given_speed", f"{JOINT}_given_acceleration") if given else ()
+        moved = (f"{given}_given_speed", f"{given}_given_acceleration") if given else ()
         self.inputs = tuple(name for name in self._core.inputs if name not in moved)
         self.reset(None, {})
 
@@ -68,9 +68,7 @@ class ExactBatch:
         """Take over what has been written under some keys for some trains."""
         for k in rows.tolist():
             one = parameters.scenario(k)
-            if not self._core.replace(
-                k, _with_given_load(one) if self._given else one.core(), _control_of(self._tuned[k])
-            ):
+            if not self._core.replace(k, _train_of(one, self._given), _control_of(self._tuned[k])):
                 raise InputError(
                     "adds or removes a part that has states; take a batch of its own", f"parameters.{keys[0]}"
                 )
@@ -95,7 +93,7 @@ class ExactBatch:
         """Take trains back to t = 0."""
         states = self._core.states
         start = np.zeros((self._count, len(states) + 1))
-        speed = f"{JOINT}_speed" if self._given else ""
+        speed = f"{self._given}_speed" if self._given else ""
         for name, values in initial.items():
             place = self._long.get(name, name)
             columns = [
@@ -115,7 +113,7 @@ class ExactBatch:
     @property
     def states(self) -> tuple[str, ...]:
         """Names of the state at t = 0."""
-        moved = (f"{JOINT}_speed",) if self._given else ()
+        moved = (f"{self._given}_speed",) if self._given else ()
         return tuple(
             dict.fromkeys(
                 (*(s for s, long in self._long.items() if long in self._core.states), *self._core.states, *moved)
@@ -131,19 +129,17 @@ class ExactBatch:
         self._core.restore(snapshot)
 
 
-def _with_given_load(scenario: Scenario) -> _core.Train:
-    """The solver's train, its load moved from outside.
-
-    Raises
-    ------
-    InputError
-        No shaft is called `load`.
-    """
-    if JOINT not in scenario.tables.shafts:
-        known = ", ".join(scenario.tables.shafts)
-        raise InputError(f"given_motion: is that of the shaft called {JOINT}, and the shafts are {known}; rename one")
-    loaded = [name for name in scenario.loaded() if name != JOINT]
-    return scenario.long().core(loaded=loaded, given=(JOINT,))
+def _train_of(scenario: Scenario, shaft: str | None) -> _core.Train:
+    """The solver's train, a shaft or slide of it moved from outside if one is named."""
+    if shaft is None:
+        return scenario.core()
+    if shaft not in scenario.train().shafts:
+        known = list(scenario.train().shafts)
+        raise InputError(
+            f"given_motion: {shown(shaft)} is no shaft or slide; {did_you_mean(shaft, known, listed(known))}"
+        )
+    loaded = [name for name in scenario.loaded() if name != shaft]
+    return scenario.long().core(loaded=loaded, given=(shaft,))
 
 
 def _control_of(scenario: Scenario) -> Any:
