@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import visible
-from ..simulation.results import RunArrays, energy_of, is_train_result, whole
+from ..simulation.results import RunArrays, energy_of, recorded_variables, whole
 from ..simulation.sampling import weights
 from ..simulation.scenario import Scenario
 from ..simulation.switchings import ATTRIBUTE as SWITCHINGS
@@ -28,41 +28,63 @@ MANY, SHOWN = 12, 6
 
 
 def summary(result: xarray.Dataset | RunArrays) -> str:
-    """A run in a few lines: the end, the extremes, the contacts, the energy."""
-    if is_train_result(result):
-        return train_summary(result)
+    """A run in a few lines: each element at the end and at its peak, which contacts are stuck, and the energy."""
+    scenario = Scenario.from_json(result.attrs["scenario"])
+    train = scenario.train()
 
-    def last(name: str) -> float:
-        return _end(np.asarray(result[name]))
+    def titled(kind: str, name: str) -> str:
+        return name if kind == name else f"{kind} {name}"
 
-    def peak(name: str) -> float:
-        return float(np.max(np.abs(np.asarray(result[name]))))
+    def end_and_peak(name: str, unit: str, *, small: bool = False) -> str:
+        shown, factor = charted(unit, small=small)
+        values = factor * np.asarray(result[name])
+        return f"{_end(values):.4g} {shown}, peak {np.max(np.abs(values)):.4g}"
 
-    stuck = float(np.mean(np.asarray(result["input_contact"]) == 0))
+    time = float(np.asarray(result["time"])[-1])
     lines = [
         visible(result.attrs["title"]) or "(no title)",
-        f"  {last('time'):g} s, {counted(result.attrs['switching_count'], 'event')}, solver {result.attrs['solver']}",
-        f"  at the end: motor {last('motor_speed'):.4g} rad/s, load {last('load_speed'):.4g} rad/s "
-        f"at {last('load_angle'):.4g} rad, twist {1e3 * last('twist'):.4g} mrad",
-        f"  peak: motor torque {peak('motor_torque'):.4g} N·m, output torque "
-        f"{peak('output_torque'):.4g} N·m, load speed {peak('load_speed'):.4g} rad/s",
-        f"  input shaft stuck for {100.0 * stuck:.1f} % of the samples",
+        f"  {time:g} s, {counted(result.attrs['switching_count'], 'event')}, solver {result.attrs['solver']}; at the end:",
     ]
+    for name in train.motors:
+        unit = train.torque_unit(train.motors[name].shaft)
+        lines.append(f"  {titled('motor', name)}: {end_and_peak(train.motor_torque_of(name), unit)}")
+    alike: dict[tuple[str, str], list[tuple[float, str]]] = {}  # lines of elements by kind and unit
+
+    def element(kind: str, name: str, variable: str, unit: str, more: str) -> None:
+        peak = float(np.max(np.abs(np.asarray(result[variable]))))
+        line = f"  {titled(kind, name)}: {end_and_peak(variable, unit)}{more}"
+        alike.setdefault((kind, unit), []).append((peak, line))
+
+    for name in train.shafts:
+        angle, (unit, factor) = train.angle_of(name), charted(train.angle_unit(name))
+        at = f"; at {factor * float(np.asarray(result[angle])[-1]):.4g} {unit}" if angle in result else ""
+        element("slide" if train.is_slide(name) else "shaft", name, train.speed_of(name), train.speed_unit(name), at)
+    for name, gear in train.gears.items():
+        twist, unit = train.twist_of(name), train.angle_unit(gear.output)
+        bends = twist.removeprefix(f"{name}_")
+        bent = "" if gear.stiffness.kind == "rigid" else f"; {bends} {end_and_peak(twist, unit, small=True)}"
+        element(scenario.kind_of(name), name, train.output_torque_of(name), train.torque_unit(gear.output), bent)
+    for name, shaft in train.shafts.items():
+        if (stops := shaft.end_stops) is not None:
+            more = "" if stops.stiffness is not None else "; between impacts"
+            element("end stop", name, train.stop_torque_of(name), train.torque_unit(name), more)
+    for (kind, unit), rows in alike.items():
+        shown, others = _most(rows)
+        lines += shown
+        if others:
+            name, factor = charted(unit)
+            lines.append(f"  {counted(len(others), f'other {kind}')}: peaks up to {factor * max(others):.4g} {name}")
+    stuck, _ = _most([(share, text) for share, text in _stuck(result) if share > 0.0])
+    lines += [f"  contacts stuck: {', '.join(stuck)} of the time"] if stuck else []
     if "energy" in result.attrs:
         e = energy_of(result)
-        names = (
-            "parametric_work",
-            "gear_losses",
-            "hysteresis",
-            "motor_friction",
-            "input_damper",
-            "load_damper",
-            "load_friction",
-            "load_work",
-        )
-        parts = [f"{name.replace('_', ' ')} {e[name]:.4g}" for name in names if e.get(name, 0.0) != 0.0]
-        ends = f"from the motor {e['source']:.4g}", f"stored {e['kinetic_change'] + e['elastic_change']:.4g}"
-        lines.append(f"  energy [J]: {', '.join([ends[0], *parts, ends[1]])}")
+        apart = ("residual", "turned_over")
+        found = [
+            (abs(v), f"{name.replace('_', ' ')} {v:.4g}") for name, v in e.items() if v != 0.0 and name not in apart
+        ]
+        parts, others = _most(found)
+        parts += [f"{counted(len(others), 'other')} of up to {max(others):.4g} each"] if others else []
+        lines.append(f"  energy [J]: {', '.join(parts) or 'none'}")
     return "\n".join([*lines, *_last_lines(result)])
 
 
@@ -122,60 +144,6 @@ def error_lines(result: xarray.Dataset | RunArrays) -> list[str]:
         for (name, bound), unit in zip(bounds.items(), ("A peak", "A peak", "N·m", "rad/s") * len(bounds), strict=False)
     )
     return [f"  error of the field-oriented control at most: {', '.join(shown)}"]
-
-
-def train_summary(result: xarray.Dataset | RunArrays) -> str:
-    """A run of a drive train in a few lines: each element at the end and at its peak, and the energy."""
-    scenario = Scenario.from_json(result.attrs["scenario"])
-    train = scenario.train()
-
-    def end_and_peak(name: str, unit: str, *, small: bool = False) -> str:
-        shown, factor = charted(unit, small=small)
-        values = factor * np.asarray(result[name])
-        return f"{_end(values):.4g} {shown}, peak {np.max(np.abs(values)):.4g}"
-
-    time = float(np.asarray(result["time"])[-1])
-    lines = [
-        visible(result.attrs["title"]) or "(no title)",
-        f"  {time:g} s, {counted(result.attrs['switching_count'], 'event')}, solver {result.attrs['solver']}; at the end:",
-    ]
-    for name in train.motors:
-        unit = train.torque_unit(train.motors[name].shaft)
-        lines.append(f"  motor {name}: {end_and_peak(train.motor_torque_of(name), unit)}")
-    alike: dict[tuple[str, str], list[tuple[float, str]]] = {}  # lines of elements by kind and unit
-
-    def element(kind: str, name: str, variable: str, unit: str, more: str) -> None:
-        peak = float(np.max(np.abs(np.asarray(result[variable]))))
-        line = f"  {kind} {name}: {end_and_peak(variable, unit)}{more}"
-        alike.setdefault((kind, unit), []).append((peak, line))
-
-    for name in train.shafts:
-        angle, (unit, factor) = train.angle_of(name), charted(train.angle_unit(name))
-        at = f"; at {factor * float(np.asarray(result[angle])[-1]):.4g} {unit}" if angle in result else ""
-        element("slide" if train.is_slide(name) else "shaft", name, train.speed_of(name), train.speed_unit(name), at)
-    for name, gear in train.gears.items():
-        twist, unit = train.twist_of(name), train.angle_unit(gear.output)
-        bends = twist.removeprefix(f"{name}_")
-        bent = "" if gear.stiffness.kind == "rigid" else f"; {bends} {end_and_peak(twist, unit, small=True)}"
-        element(scenario.kind_of(name), name, train.output_torque_of(name), train.torque_unit(gear.output), bent)
-    for name, shaft in train.shafts.items():
-        if (stops := shaft.end_stops) is not None:
-            more = "" if stops.stiffness is not None else "; between impacts"
-            element("end stop", name, train.stop_torque_of(name), train.torque_unit(name), more)
-    for (kind, unit), rows in alike.items():
-        shown, others = _most(rows)
-        lines += shown
-        if others:
-            name, factor = charted(unit)
-            lines.append(f"  {counted(len(others), f'other {kind}')}: peaks up to {factor * max(others):.4g} {name}")
-    if "energy" in result.attrs:
-        e = energy_of(result)
-        apart = ("residual", "turned_over")
-        found = [(abs(v), f"{name} {v:.4g}") for name, v in e.items() if v != 0.0 and name not in apart]
-        parts, others = _most(found)
-        parts += [f"{counted(len(others), 'other')} of up to {max(others):.4g} each"] if others else []
-        lines.append(f"  energy [J]: {', '.join(parts) or 'none'}")
-    return "\n".join([*lines, *_last_lines(result)])
 
 
 def _most(rows: list[tuple[float, str]]) -> tuple[list[str], list[float]]:
@@ -243,16 +211,21 @@ def verdict_of(result: xarray.Dataset | RunArrays) -> Verdict | None:
 
 def _motion_lines(result: xarray.Dataset) -> list[str]:
     """Errors of controlled axes, and which contacts are stuck."""
-    flanks = Scenario.from_json(result.attrs["scenario"]).train().flanks()
     errors = [line for found in loop_errors(result) for line in found.lines()]
-    share = weights(result["time"].values)
-    stuck = [
-        f"{name.removesuffix('_contact').replace('_', ' ')} {100.0 * float(np.average(result[name].values == 0, weights=share)):.0f} %"
-        for name in map(str, result)
-        if name.endswith("_contact") and name not in flanks
-    ]
+    stuck = [text for _, text in _stuck(result)]
     lines = [f"{'; '.join(errors)}."] if errors else []
     return lines + ([f"Share of the time in which contacts are stuck: {', '.join(stuck)}."] if stuck else [])
+
+
+def _stuck(result: xarray.Dataset | RunArrays) -> list[tuple[float, str]]:
+    """For which share of the time each contact that sticks is stuck, and the same in words."""
+    flanks = Scenario.from_json(result.attrs["scenario"]).train().flanks()
+    share, found = weights(np.asarray(result["time"])), []
+    names = (v.name for v in recorded_variables(result.attrs))
+    for name in (n for n in names if n.endswith("_contact") and n in result and n not in flanks):
+        stuck = float(np.average(np.asarray(result[name]) == 0, weights=share))
+        found.append((stuck, f"{name.removesuffix('_contact').replace('_', ' ')} {100.0 * stuck:.0f} %"))
+    return found
 
 
 def _variables(result: xarray.Dataset) -> Table:

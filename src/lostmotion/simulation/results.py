@@ -16,7 +16,7 @@ from ..inputs.arguments import checked
 from ..inputs.kept import kept
 from ..version import __version__
 from .ledger import largest_stored, ledger_of, with_energy
-from .scenario import Scenario, is_train
+from .scenario import Scenario
 from .switchings import ATTRIBUTE as SWITCHINGS
 from .switchings import COLUMNS, columns_of, packed
 from .train_variables import axis_variables, named_signals
@@ -195,11 +195,6 @@ def labelled(
         indexes={"time": xr.indexes.PandasIndex(time, "time")},
     )
     return xr.Dataset(shown, coords=coordinates, attrs=attributes)
-
-
-def is_train_result(result: xarray.Dataset | RunArrays) -> bool:
-    """Whether it is the run of a drive train."""
-    return is_train(json.loads(result.attrs.get("scenario", "{}")))
 
 
 @kept
