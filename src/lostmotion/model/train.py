@@ -11,7 +11,7 @@ from ..inputs.named import Elements, nothing
 from ..inputs.part import Part
 from ..inputs.validation import did_you_mean, shown
 from .angle_torques import AngleTorque, Gravity
-from .couplings import BetweenShafts, Brake, Clutch, Freewheel, Ratchet, TorqueLimiter
+from .couplings import BetweenShafts, Brake, Clutch, Commanded, Freewheel, Ratchet, TorqueLimiter
 from .dampers import Damper
 from .end_stops import END_STOP
 from .gear import Gear
@@ -56,8 +56,13 @@ class TrainElements(Part):
 
     def commanded(self) -> list[str]:
         """Names of what has a command: motors, brakes and friction clutches."""
-        clutches = (name for name, clutch in self.clutches.items() if clutch.kind == "friction")
-        return [*self.motors, *self.brakes, *clutches]
+        return [*self.motors, *self.switched()]
+
+    def switched(self) -> dict[str, str]:
+        """Keys of brakes and friction clutches by their names."""
+        elements = (*self.on_shafts(), *self.couplings())
+        keys = (key for key, e in elements if isinstance(e, Commanded) and getattr(e, "kind", "") != "safety")
+        return {key.partition(".")[2]: key for key in keys}
 
     def fixed_gears(self) -> dict[str, Gear]:
         """Gears whose housing stands: the speeds of their two shafts have the ratio."""

@@ -30,8 +30,8 @@ def without_weight(name: str, drive: Scenario, *, replace: bool, weighs: bool) -
 
     Raises InputError: the drive has such, and it is not to be replaced.
     """
-    weights = _weights(name, drive) if weighs else []
-    keys = [*loads_of(drive), *(weights_of(name, drive) if weighs else [])]
+    weights = weights_of(name, drive) if weighs else []
+    keys = [*loads_of(drive), *weights]
     if keys and not replace:
         raise InputError(
             "would count twice: load and weight of the joint come from the robot; give replace=True, or leave it out",
@@ -41,8 +41,8 @@ def without_weight(name: str, drive: Scenario, *, replace: bool, weighs: bool) -
     if not weights:
         return drive  # load torques of scenarios are not used
     changed = {
-        table: Named({key: part for key, part in getattr(drive, table).items() if (table, key) not in weights})
-        for table in ("gravity", "angle_torques")
+        table: Named({key: part for key, part in getattr(drive, table).items() if f"{table}.{key}" not in weights})
+        for table in {key.partition(".")[0] for key in weights}
     }
     return drive.model_copy(update=changed)
 
@@ -59,17 +59,10 @@ def loads_of(drive: Scenario) -> list[str]:
 
 def weights_of(name: str, drive: Scenario) -> list[str]:
     """Keys of what may be a weight on the shaft of the joint."""
-    return [".".join(key) for key in _weights(name, drive)]
-
-
-def _weights(name: str, drive: Scenario) -> list[tuple[str, str]]:
-    """Table and name of what may be a weight on the shaft of the joint."""
     train = drive.train()
+    torques = [(key, part) for key, part in train.on_shafts() if isinstance(part, PeriodicTorque)]
     shaft = output_of(name, train)
-    found = [("gravity", key) for key, part in train.gravity.items() if part.shaft == shaft]
-    torques = train.angle_torques.items()
-    found += [("angle_torques", key) for key, part in torques if part.shaft == shaft and _turns_once(part)]
-    return found
+    return [key for key, part in torques if part.shaft == shaft and _turns_once(part)]  # type: ignore[attr-defined]
 
 
 def _turns_once(torque: PeriodicTorque) -> bool:
@@ -77,7 +70,7 @@ def _turns_once(torque: PeriodicTorque) -> bool:
     order = getattr(torque, "order", None)
     if order is not None:
         return bool(abs(order) == 1.0)
-    turns = torque.period / (2.0 * math.pi)  # type: ignore[attr-defined]
+    turns = getattr(torque, "period", 2.0 * math.pi) / (2.0 * math.pi)
     if abs(turns - round(turns)) > 1e-9 * turns or round(turns) < 1:
         return False
     curve, count = torque.core(), POINTS * round(turns)

@@ -21,7 +21,7 @@ from ..response.standstill import Verdict
 from ..simulation.scenario import Scenario
 from ..simulation.units_of_keys import unit_for
 from ..worker_threads import thread_pool
-from .motion import PART, at_rest, without_backlash, without_friction
+from .motion import PART, at_rest, without, without_backlash, without_friction
 from .regimes import axis_of
 
 if TYPE_CHECKING:
@@ -154,17 +154,12 @@ def _causes(train: Scenario, found: Found) -> tuple[str, ...]:
 
 def without_static_friction(train: Scenario) -> Scenario | None:
     """With the friction in motion at rest, too; None where that changes nothing."""
-    new = {}
-    for table in ("shafts", "brakes", "clutches"):
-        elements = getattr(train, table)
-        changed = {
-            name: e.model_copy(update={"breakaway_torque": None}) if e.breakaway_torque is not None else e
-            for name, e in elements.items()
-            if getattr(e, "stribeck_speed", None) is None
-        }
-        if any(changed[name] is not elements[name] for name in changed):
-            new[table] = {**elements, **changed}
-    return train.model_copy(update=new) if new else None
+
+    def even(element: Any) -> dict[str, Any]:
+        keys = ("breakaway_torque", "breakaway_force") if getattr(element, "stribeck_speed", None) is None else ()
+        return {key: None for key in keys if getattr(element, key, None) is not None}
+
+    return without(train, even)
 
 
 def without_saturation(train: Scenario) -> Scenario | None:

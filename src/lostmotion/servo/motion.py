@@ -15,6 +15,10 @@ from .. import _core
 from ..control.loops import CurrentLoop, Feedforward, FieldOriented
 from ..control.turning import turns
 from ..inputs.part import Part
+from ..model.couplings import Commanded
+from ..model.gear import Gear
+from ..model.linear import LinearDrive
+from ..model.linear_train import LinearElements
 from ..model.torsion import TorsionCurve
 from ..response.closed_loop import slowest
 from ..response.standstill import Verdict, Watch, decide, moving_input
@@ -358,49 +362,40 @@ def watched_at_least(axis: Axis) -> float:
     return max(REST * slowest(axis.controller), 4.0 * step_duration(axis, "position"))
 
 
-def _changed_all(scenario: Scenario, table: str, change: Any) -> Scenario | None:
-    """With all elements of a table changed; None where that changes nothing."""
-    elements = getattr(scenario, table)
-    new: dict[str, Part] = {name: change(element) for name, element in elements.items()}
-    return None if new == dict(elements) else changed(scenario, **{table: new})
+def without(scenario: Scenario, values_of: Callable[[Any], dict[str, Any]]) -> Scenario | None:
+    """With other values of elements, shafts and slides; None where that changes nothing."""
+    new: dict[str, dict[str, Part]] = {}
+    for table in ("shafts", "slides", *LinearElements.model_fields):
+        elements = getattr(scenario, table)
+        other = {name: e.model_copy(update=values) for name, e in elements.items() if (values := values_of(e))}
+        if other:
+            new[table] = {**elements, **other}
+    return changed(scenario, **new) if new else None
 
 
 def without_backlash(scenario: Scenario) -> Scenario | None:
     """With all gaps closed; None where there are none."""
 
-    def change(gear: Any) -> Any:
-        stiffness = gear.stiffness
-        if not isinstance(stiffness, TorsionCurve) or not stiffness.has_gap:
-            return gear
-        return gear.model_copy(update={"stiffness": stiffness.closed()})
+    def closed(element: Any) -> dict[str, Any]:
+        if isinstance(element, LinearDrive):
+            return {"backlash": 0.0, "restitution": None} if element.backlash > 0.0 else {}
+        stiffness = element.stiffness if isinstance(element, Gear) else None
+        return {"stiffness": stiffness.closed()} if isinstance(stiffness, TorsionCurve) and stiffness.has_gap else {}
 
-    return _changed_all(scenario, "gears", change)
+    return without(scenario, closed)
 
 
 def without_friction(scenario: Scenario) -> Scenario | None:
     """Without dry friction and hysteresis; None where there are none."""
-    none = {
-        "friction_torque": 0.0,
-        "breakaway_torque": None,
-        "stribeck_speed": None,
-        "friction_curve": None,
-        "friction_error": None,
-    }
+    none = dict.fromkeys(("friction_torque", "friction_force", "drag_torque"), 0.0) | dict.fromkeys(
+        ("breakaway_torque", "breakaway_force", "stribeck_speed", "friction_curve", "friction_error", "hysteresis")
+    )
 
-    def change(part: Any) -> Any:
-        update = {
-            key: value for key, value in none.items() if key in type(part).model_fields and getattr(part, key) != value
-        }
-        return part.model_copy(update=update) if update else part
+    def smooth(element: Any) -> dict[str, Any]:
+        keys = () if isinstance(element, Commanded) else none.keys() & type(element).model_fields.keys()
+        return {key: none[key] for key in keys if getattr(element, key) != none[key]}
 
-    def smooth(gear: Any) -> Any:
-        return gear.model_copy(update={"hysteresis": None}) if gear.hysteresis is not None else gear
-
-    out, found = scenario, False
-    for table, how in (("shafts", change), ("motors", change), ("gears", smooth)):
-        new = _changed_all(out, table, how)
-        out, found = (out, found) if new is None else (new, True)
-    return out if found else None
+    return without(scenario, smooth)
 
 
 def without_steps(axis: Axis) -> Axis | None:

@@ -161,12 +161,8 @@ def _check_commands(name: str, scenario: Scenario) -> None:
     train = scenario.train()
     if len(train.motors) != 1:
         raise InputError(f"joint {name!r}: {len(train.motors) or 'no'} motors turn it, and a joint is turned by one")
-    others = [key for key in train.commanded() if key not in train.motors]
-    if others:
-        table = "brakes" if others[0] in train.brakes else "clutches"
-        raise InputError(
-            f"joint {name!r}: {table}.{others[0]} needs a command, and step gives one to the motor alone; leave it out"
-        )
+    for key in train.switched().values():
+        raise InputError(f"joint {name!r}: {key} needs a command, and step gives one to the motor alone; leave it out")
     if given := scenario.given():
         raise InputError(f"joint {name!r}: {scenario.given_key(given[0])} gives a motion, which the robot has")
     for motor, controller in scenario.continuous().items():

@@ -69,7 +69,7 @@ def _by_runs(
 ) -> list[Finding]:
     """One finding for the largest and one for the least load."""
     train, why = scenario.train(), None
-    switched = [f"{table}.{name}" for table in ("brakes", "clutches") for name in getattr(train, table)]
+    switched = [*train.switched().values()]
     if len(acting) > 1:
         why = f"loads act on {' and '.join(acting)}"
     elif scenario.given():
