@@ -174,9 +174,8 @@ def cubic_spline(times: Iterable[float], values: np.ndarray) -> np.ndarray:
     times: rising instants [s], two at least.
     values: (n,) or (n, channels).
 
-    Returns
-    -------
-    (4, n - 1, ...): value, first derivative, half the second and a sixth of the third at the beginning of each interval.
+    Returns (4, n - 1, ...): value, first derivative, half the second and a sixth of the third at the beginning of each
+        interval.
     """
     t, y = np.asarray(list(times), float), np.asarray(values, float)
     n = t.size
@@ -226,9 +225,7 @@ def fourier_sum(real: np.ndarray, imaginary: np.ndarray) -> tuple[np.ndarray, np
 
     real, imaginary: (..., n).
 
-    Returns
-    -------
-    Real and imaginary parts, (..., n).
+    Returns Real and imaginary parts, (..., n).
     """
     n = real.shape[-1]
     angle = 2.0 * math.pi * np.arange(n) / n

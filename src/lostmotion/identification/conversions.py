@@ -32,10 +32,8 @@ FUNCTIONS: dict[str, np.ufunc] = {
 def conversion_of(text: str) -> Callable[[np.ndarray], np.ndarray]:
     """Physical values by raw ones, of a formula such as ``0.01*X + 3``.
 
-    Parameters
-    ----------
-    text
-        Numbers, ``X`` or ``X1`` for the raw value, ``+ - * / **``, brackets, `FUNCTIONS` (``log`` and ``ln`` to the base e) and ``pi``.
+    text: numbers, ``X`` or ``X1`` for the raw value, ``+ - * / **``, brackets, `FUNCTIONS` (``log`` and ``ln`` to the
+        base e) and ``pi``.
 
     Returns callable: takes an array of raw values of any type of numbers, and computes in double precision.
 

@@ -37,10 +37,7 @@ class Formula:
     text: as written; a number is a constant.
     functions: functions that it may call; a NumPy ufunc takes its number of arguments.
 
-    Raises
-    ------
-    ValueError
-        It cannot be read, or has something else in it.
+    Raises ValueError: it cannot be read, or has something else in it.
     """
 
     def __init__(self, text: str | float, functions: Functions = FUNCTIONS) -> None:
@@ -113,9 +110,7 @@ class Formula:
 def formula(text: str) -> Formula:
     """Read once.
 
-    Raises
-    ------
-    ValueError
+    Raises ValueError
     """
     return Formula(text)
 

@@ -93,11 +93,8 @@ def odd_logs(
     start: where the search began.
     fit: where it ended, on this rung of the model sequence.
 
-    Returns
-    -------
-    list of OddLog
-        Empty if all logs agree, or if fewer than three were fitted.
-    Point
+    Returns list of OddLog: empty if all logs agree, or if fewer than three were fitted.
+    Returns Point
     """
     train = [log for log in logs if not log.held_out]
     if len(train) < FEWEST:

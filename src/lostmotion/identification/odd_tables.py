@@ -35,11 +35,7 @@ def odd_table_log(path: Path, rows: Sequence[Row], number: Number, comments: lis
 
     rows, number, comments, time: as in `table_log`.
 
-    Raises
-    ------
-    UnreadError
-        There is no table, or too much of it would be lost.
-    InputError
+    Raises UnreadError: there is no table, or too much of it would be lost.
     """
     begin = next((k for k in range(min(HEADER, len(rows))) if _begins(rows[k : k + IN_ROW], number)), None)
     if begin is None:

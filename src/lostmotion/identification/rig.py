@@ -77,10 +77,7 @@ class Rig:
     task: the identification.
     directory: that file names are relative to.
 
-    Raises
-    ------
-    InputError
-        The scenario cannot be used, or an input or a variable is none of it.
+    Raises InputError: the scenario cannot be used, or an input or a variable is none of it.
     """
 
     def __init__(self, task: Identification, directory: Path) -> None:

@@ -54,17 +54,10 @@ def read_mcap_log(path: Path, *, time: str = "") -> Log:
     All are at the publish times of one topic; those of others are read from straight lines between their messages. Metadata
     of the file are the header.
 
-    Parameters
-    ----------
-    time
-        The topic of the times; default: the topic of the first message. ``TOPIC.header.stamp`` takes the stamps in its messages
-        in place of their publish times.
+    time: the topic of the times; default: the topic of the first message. ``TOPIC.header.stamp`` takes the stamps in
+        its messages in place of their publish times.
 
-    Raises
-    ------
-    InputError
-    MissingLibraryError
-        mcap, or for messages of ROS rosbags, is not installed.
+    Raises MissingLibraryError: mcap, or for messages of ROS rosbags, is not installed.
     """
     need("mcap", "Reading MCAP files", "identify")
     recording = _read_mcap(path)
@@ -81,11 +74,7 @@ def read_ros_bag(path: Path, *, time: str = "") -> Log:
 
     Messages of ROS 2 bags that do not hold their definitions are taken for those of Humble.
 
-    Raises
-    ------
-    InputError
-    MissingLibraryError
-        rosbags is not installed.
+    Raises MissingLibraryError: rosbags is not installed.
     """
     need("rosbags", "Reading bags of ROS", "identify")
     recording = _read_bag(path)

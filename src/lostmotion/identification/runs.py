@@ -93,12 +93,8 @@ def run_logs(
 def run_log(rig: Rig, log: Prepared, values: Values, rung: int, extra: tuple[str, ...] = ()) -> dict[str, np.ndarray]:
     """Computed values of the measured channels of a log, by name, and more variables of the rig, at its instants.
 
-    Raises
-    ------
-    InputError
-        The values make no rig.
-    SolverError
-        The motion has no continuation.
+    Raises InputError: the values make no rig.
+    Raises SolverError: the motion has no continuation.
     """
     (seen,) = run_logs(rig, [(log, values)], rung, extra=extra)
     if seen.error is not None:

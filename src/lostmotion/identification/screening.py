@@ -253,10 +253,8 @@ def constant_stretches(x: np.ndarray) -> list[tuple[int, int]]:
 def frozen_stretches(x: np.ndarray, others: Sequence[np.ndarray] = ()) -> list[tuple[int, int]]:
     """Constant stretches in the middle of a motion; a load that comes to rest and begins to move again is not frozen.
 
-    Parameters
-    ----------
-    others
-        Other channels that show the motion: if they change as usual in a stretch the sensor is frozen, else the load is at rest.
+    others: other channels that show the motion: if they change as usual in a stretch the sensor is frozen, else the
+        load is at rest.
     """
     return [stretch for stretch in constant_stretches(x) if not _at_rest(x, *stretch, others)]
 

@@ -91,22 +91,13 @@ def table_log(
 ) -> Log:
     """The log that a table is.
 
-    Parameters
-    ----------
-    rows
-        Those with something in them; a heading first, unless the first row is numbers, and a row of units below it.
-    number
-        Value of a cell; None of a cell that is not a number.
-    comments
-        Those read so far; ``key: value``, ``key = value`` and ``unit COLUMN: deg`` are the header. More may be added with the rows.
-    time
-        Name of the column of the time; left out, ``time``, ``t``, ``timestamp``, or the first column.
+    rows: those with something in them; a heading first, unless the first row is numbers, and a row of units below it.
+    number: value of a cell; None of a cell that is not a number.
+    comments: those read so far; ``key: value``, ``key = value`` and ``unit COLUMN: deg`` are the header. More may be
+        added with the rows.
+    time: name of the column of the time; left out, ``time``, ``t``, ``timestamp``, or the first column.
 
-    Raises
-    ------
-    UnreadError
-        A row does not fit.
-    InputError
+    Raises UnreadError: a row does not fit.
     """
     first, cells = next(rows, (1, ()))
     above = comments[-1] if comments else ""

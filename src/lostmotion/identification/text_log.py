@@ -58,12 +58,9 @@ def read_text_log(path: Path, *, time: str = "", decimal: str = "") -> Log:
     as in ``load (5)``, is a part of the name. Without a heading the columns are ``column 1``, ``column 2`` and so on. Times are
     numbers, or time stamps of ISO 8601.
 
-    Parameters
-    ----------
-    time
-        Name of the column of the time; left out, ``time``, ``t``, ``timestamp``, or the first column.
-    decimal
-        What separates decimals. Left out, a comma is taken only where nothing else makes a table of the text, and is noted.
+    time: name of the column of the time; left out, ``time``, ``t``, ``timestamp``, or the first column.
+    decimal: what separates decimals. Left out, a comma is taken only where nothing else makes a table of the text, and
+        is noted.
     """
     try:
         text = path.read_text(encoding="utf-8-sig")

@@ -28,21 +28,13 @@ def virtual_log(
 ) -> Log:
     """The log that an experiment would give.
 
-    Parameters
-    ----------
-    rig
-        What is measured.
-    plan
-        Time, header and inputs of the experiment; the measured channels need not be there, but for what formulas take of them,
-        such as ``first_position``.
-    values
-        Of the parameters and nuisances, SI; others have their start values.
-    rung
-        Of the ladder; -1: the highest.
-    noise
-        Standard deviations of the measured channels by name, SI.
-    seed
-        Of the noise.
+    rig: what is measured.
+    plan: time, header and inputs of the experiment; the measured channels need not be there, but for what formulas take
+        of them, such as ``first_position``.
+    values: of the parameters and nuisances, SI; others have their start values.
+    rung: of the ladder; -1: the highest.
+    noise: standard deviations of the measured channels by name, SI.
+    seed: of the noise.
 
     Raises InputError: the values make no rig.
     """

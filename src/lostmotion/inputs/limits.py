@@ -99,11 +99,8 @@ def read_text(path: Path, *, per_byte: float = PER_BYTE, default: int = LOG) -> 
     per_byte: memory that each byte of the text will need in the end.
     default: limit where the user gives none [bytes].
 
-    Raises
-    ------
-    InputError
-        The file is too long.
-    OSError, UnicodeDecodeError
+    Raises InputError: the file is too long.
+    Raises OSError, UnicodeDecodeError
     """
     room = int(memory_limit(default) / per_byte)
     with path.open("rb") as file:

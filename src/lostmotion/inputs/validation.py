@@ -32,14 +32,9 @@ JOINED_CUTOFF = 0.92  # of two names, where words run together or fall apart
 def refusal(error: ValidationError, schema: Mapping[str, Any], subject: str, given: Any = None) -> InputError:
     """The error of a failed validation. Names all keys that are missing, and no key that follows from a misspelt one.
 
-    Parameters
-    ----------
-    schema
-        JSON Schema of the part that was to be made.
-    subject
-        What it is, as in ``"the scenario"``, for what is wrong with all of it.
-    given
-        What it was to be made of, so that a value is shown as it was written.
+    schema: JSON Schema of the part that was to be made.
+    subject: what it is, as in ``"the scenario"``, for what is wrong with all of it.
+    given: what it was to be made of, so that a value is shown as it was written.
     """
     found = error.errors(include_url=False)
     problems = [_Problem(p, schema, given) for p in found[:MAX_READ]]
@@ -69,10 +64,7 @@ def refusal(error: ValidationError, schema: Mapping[str, Any], subject: str, giv
 def unknown_key(key: str, known: Iterable[str], inner: Iterable[str] = ()) -> str:
     """Message for an unknown key.
 
-    Parameters
-    ----------
-    inner
-        Dotted keys of the tables within, where the key may belong.
+    inner: dotted keys of the tables within, where the key may belong.
     """
     known, inner = sorted(known), list(inner)
     together = [path for path in inner if path.replace(".", "_") == key]

@@ -30,10 +30,8 @@ def page(scenario: Scenario, name: str = "drive") -> str:
 
     name: by which downloads are called.
 
-    Raises
-    ------
-    InputError
-        A controller has a law of your own, which only Python can call; in a checkout, the page has not been built.
+    Raises InputError: a controller has a law of your own, which only Python can call; in a checkout, the page has not
+        been built.
     """
     core = core_of(scenario)
     if shutil.which("npm") is not None:

@@ -32,11 +32,8 @@ class Commanded(CommandedFields):
     def acting(self, command: Signal[Number]) -> Signal[Number]:
         """The command as it acts, after the delays.
 
-        Raises
-        ------
-        ValueError
-            It exceeds 1. With delays, the command is not made of steps, or a step would act before the one that
-            precedes it.
+        Raises ValueError: it exceeds 1. With delays, the command is not made of steps, or a step would act before the
+            one that precedes it.
         """
         if (greatest := command.upper_bound()) > FULL_COMMAND:
             raise ValueError(f"may reach {greatest:.6g}; it is a share, and 1 is the full torque, {self.torque:g} N*m")

@@ -60,17 +60,11 @@ def list_records(
 ) -> str:
     """The records that fit, a line each, with what they lack for a simulation.
 
-    Parameters
-    ----------
-    kind
-        A table of records, such as ``"gearbox"`` or ``"screw"``, or a kind within one, such as ``"worm"``.
-    ratio, torque, force, lead, current
-        ``MIN..MAX``; torque and force are the rated ones [N·m, N], of a screw the dynamic capacity, of a brake the holding torque.
-        The current is the continuous one of an amplifier [A].
-    complete
-        Only records that lack nothing.
-    every
-        All of them, or as many as a screen shows.
+    kind: a table of records, such as ``"gearbox"`` or ``"screw"``, or a kind within one, such as ``"worm"``.
+    ratio, torque, force, lead, current: ``MIN..MAX``; torque and force are the rated ones [N·m, N], of a screw the
+        dynamic capacity, of a brake the holding torque. The current is the continuous one of an amplifier [A].
+    complete: only records that lack nothing.
+    every: all of them, or as many as a screen shows.
 
     Raises InputError: unknown kind, or a range that is none.
     """

@@ -40,11 +40,9 @@ def run_charts(result: xarray.Dataset) -> list[Chart]:
 def figure_charts(result: xarray.Dataset, figure: str) -> list[Chart]:
     """Charts of a run on one subject.
 
-    Parameters
-    ----------
-    figure
-        ``"motion"``: references, errors, commands, speeds, torques, twists; ``"losses"``: torque over twist, and the way through the loss
-        maps; ``"contacts"``: what is stuck when; ``"energy"``: where it comes from and where it goes.
+    figure: ``"motion"``: references, errors, commands, speeds, torques, twists; ``"losses"``: torque over twist, and
+        the way through the loss maps; ``"contacts"``: what is stuck when; ``"energy"``: where it comes from and where
+        it goes.
 
     Raises InputError: the figure is unknown, or the drive has nothing that it shows.
     """

@@ -76,14 +76,10 @@ class StickSlip:
 def stick_slip(scenario: Scenario) -> StickSlip:
     """The regimes of a scenario with one continuous position controller.
 
-    Raises
-    ------
-    InputError
-        There is no such controller.
-    UndecidableError
-        The axis has other contacts or segments, an unstable loop, or winds up otherwise than in proportion to the error.
-    AtRestError
-        Nothing winds up while the contact is stuck, or its limit keeps the controller from freeing it.
+    Raises InputError: there is no such controller.
+    Raises UndecidableError: the axis has other contacts or segments, an unstable loop, or winds up otherwise than in
+        proportion to the error.
+    Raises AtRestError: nothing winds up while the contact is stuck, or its limit keeps the controller from freeing it.
     """
     motor, loop = _motor(scenario), Loop.of(scenario)
     if scenario.continuous()[motor].firmware is not None:

@@ -102,12 +102,8 @@ class Ramp:
     def of(cls, slip: SampledSlip) -> Ramp:
         """By following the stuck interval, for ever twice as long.
 
-        Raises
-        ------
-        AtRestError
-            Nothing winds up.
-        UndecidableError
-            It does not settle, or winds up otherwise than in proportion to the error.
+        Raises AtRestError: nothing winds up.
+        Raises UndecidableError: it does not settle, or winds up otherwise than in proportion to the error.
         """
         n = len(slip.held)
         maps = [S @ slip.stuck for S, _ in slip.samples]
@@ -145,14 +141,10 @@ class Ramp:
 def sampled_slip(axis: Axis) -> SampledSlip:
     """The matrices of an axis with a sampled position controller.
 
-    Raises
-    ------
-    InputError
-        There is no such controller.
-    UndecidableError
-        The axis has other contacts, soft gears, or a controller that is not linear within its limits.
-    AtRestError
-        A limit of the controller keeps it from freeing the contact.
+    Raises InputError: there is no such controller.
+    Raises UndecidableError: the axis has other contacts, soft gears, or a controller that is not linear within its
+        limits.
+    Raises AtRestError: a limit of the controller keeps it from freeing the contact.
     """
     controller, train = axis.controller, axis.train
     if controller.reference.kind != "position":

@@ -48,11 +48,8 @@ class Slips:
     def left(self, count: int, *, bounded: bool) -> set[int]:
         """Errors in steps with which the contact is stuck, once all has settled, after a slip forward from one in steps.
 
-        Parameters
-        ----------
-        bounded
-            Whether the rest of a slip is bounded as in `finish`, once all speeds exceed what readings can take from them. It is quicker
-            than to follow all readings to the end, and finds more errors.
+        bounded: whether the rest of a slip is bounded as in `finish`, once all speeds exceed what readings can take
+            from them. It is quicker than to follow all readings to the end, and finds more errors.
 
         Raises UndecidableError: the pieces become too many, or a limit of the controller may act.
         """

@@ -51,10 +51,7 @@ class BatchParameters(Mapping[str, np.ndarray]):
     def changes(self) -> tuple[tuple[str, ...], np.ndarray]:
         """Keys and numbers of the drives that have been written since the last call.
 
-        Raises
-        ------
-        InputError
-            A value is out of its range.
+        Raises InputError: a value is out of its range.
         """
         changed = {key: self._known[key] != column for key, column in self._columns.items()}
         keys = tuple(key for key, where in changed.items() if where.any())
@@ -78,10 +75,7 @@ class BatchParameters(Mapping[str, np.ndarray]):
 def check_range(scenario: Scenario, columns: Mapping[str, np.ndarray]) -> None:
     """Check the least and the largest of the values of each key: the range of a number is an interval.
 
-    Raises
-    ------
-    InputError
-        A value is out of its range.
+    Raises InputError: a value is out of its range.
     """
     with trusted():
         for pick in (np.min, np.max) if columns else ():

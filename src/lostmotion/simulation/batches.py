@@ -324,10 +324,7 @@ def _under(
 ) -> list[Scenario]:
     """The scenarios, their one motor under the controllers that are given.
 
-    Raises
-    ------
-    InputError
-        There are others than drives, or one calls functions of the user's own.
+    Raises InputError: there are others than drives, or one calls functions of the user's own.
     """
     if controllers is not None:
         each = [controllers] * len(scenarios) if isinstance(controllers, Controller) else list(controllers)
@@ -351,10 +348,7 @@ def _under(
 def _starts(scenarios: Sequence[Scenario], count: int) -> dict[str, Any]:
     """The state at t = 0 by name, as far as it is not rest.
 
-    Raises
-    ------
-    InputError
-        It has a hysteresis.
+    Raises InputError: it has a hysteresis.
     """
     if any(scenario.capacities() for scenario in scenarios):
         raise InputError("a batch begins without hysteresis; leave it out", "initial.hysteresis_capacity")

@@ -40,9 +40,7 @@ def check_continuous(reference: PositionReference | SlideReference, unit: str) -
 
     unit: of the position.
 
-    Raises
-    ------
-    ValueError
+    Raises ValueError
     """
     pieces = reference.pieces()
     for order, what, of in ((0, "position", unit), (1, "speed", f"{unit}/s")):

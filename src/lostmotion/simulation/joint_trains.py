@@ -119,11 +119,8 @@ class JointDrive:
 def joint_drive(name: str, drive: Driven, inertia: float, step: float) -> JointDrive:
     """A drive for a joint, with the inertia [kg·m²] of what the joint moves in place of the load's own.
 
-    Raises
-    ------
-    InputError
-        It is not clear which shaft the joint is, or it is a slide; another inertia than that of the robot moves with it; an element needs
-        a command that `step` does not give.
+    Raises InputError: it is not clear which shaft the joint is, or it is a slide; another inertia than that of the
+        robot moves with it; an element needs a command that `step` does not give.
     """
     scenario = Scenario.of_any(drive)
     train = scenario.train()
@@ -283,11 +280,8 @@ class JointTrains:
     def place(self, angles: Sequence[float], speeds: Sequence[float], held: Mapping[int, float]) -> None:
         """Put the joints at angles [rad] and speeds [rad/s], all meshes at rest.
 
-        Parameters
-        ----------
-        held
-            By the number of a joint the torque [N·m] that keeps it at rest, which its gear and its own springs give, with the
-            hysteresis that such a torque leaves.
+        held: by the number of a joint the torque [N·m] that keeps it at rest, which its gear and its own springs give,
+            with the hysteresis that such a torque leaves.
 
         Raises InputError: a train that is no chain of gears is held.
         """

@@ -41,10 +41,7 @@ def warned(attributes: Mapping[str, Any], text: str) -> dict[str, Any]:
 def with_energy(attributes: Mapping[str, Any], energy: Mapping[str, float], stored: float) -> dict[str, Any]:
     """The attributes of a run with its energy ledger, and a warning if the ledger does not close.
 
-    Parameters
-    ----------
-    stored
-        Bound on the elastic energy of a gear in the run [J]. Energies below its rounding belong to a drive that is
+    stored: bound on the elastic energy of a gear in the run [J]. Energies below its rounding belong to a drive that is
         stuck under load, and do not indicate an error.
     """
     residual = abs(energy["residual"])

@@ -203,12 +203,8 @@ def run_cases(
 def run_sensitivities(scenario: Scenario, keys: Sequence[str]) -> Sensitivities:
     """The derivatives of all result variables of a run with respect to values of its scenario.
 
-    Raises
-    ------
-    InputError
-        A key names no number that can be varied, or the scenario has what has no derivative.
-    SolverError
-        The motion has no continuation.
+    Raises InputError: a key names no number that can be varied, or the scenario has what has no derivative.
+    Raises SolverError: the motion has no continuation.
     """
     need_free_motion(scenario, "sensitivities")
     keys = list(keys)

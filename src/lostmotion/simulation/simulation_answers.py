@@ -74,20 +74,13 @@ class SimulationAnswers(SimulationReadings):
         interval, command, load_torque, inputs: as of `advance`.
         shaft: of a train the shaft that is the load. A load torque acts on it.
 
-        Returns
-        -------
-        LoadAnswer
-            Both are exact for all load torques that are shifted by a constant over the interval. The derivative passes
-            through switchings. It takes the commands of controllers at sample instants within the interval as
-            constant.
+        Returns LoadAnswer: both are exact for all load torques that are shifted by a constant over the interval. The
+            derivative passes through switchings. It takes the commands of controllers at sample instants within the
+            interval as constant.
 
-        Raises
-        ------
-        InputError
-            As of `advance`; the shaft has no load torque, its angle follows from that of another shaft, or a mass matrix
-            joins it to others.
-        SolverError
-            As of `advance`.
+        Raises InputError: as of `advance`; the shaft has no load torque, its angle follows from that of another shaft,
+            or a mass matrix joins it to others.
+        Raises SolverError: as of `advance`.
 
         Examples
         --------

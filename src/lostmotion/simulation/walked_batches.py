@@ -29,16 +29,10 @@ KEYS = tuple(
 class WalkedBatch:
     """The core of such a batch.
 
-    Parameters
-    ----------
-    scenarios
-        One for all trains, or one for each.
-    parameters
-        What differs from train to train, beside that.
-    count
-        Number of trains.
-    step
-        [s]
+    scenarios: one for all trains, or one for each.
+    parameters: what differs from train to train, beside that.
+    count: number of trains.
+    step: [s]
     """
 
     def __init__(self, scenarios: Sequence[Scenario], parameters: BatchParameters, count: int, step: float) -> None:

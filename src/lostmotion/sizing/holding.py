@@ -47,15 +47,10 @@ class Holding:
 def holding(scenario: Scenario, load: float, speed: float, shaft: str = "load") -> Holding:
     """Determine the motion of a drive with command 0 under a constant load.
 
-    Parameters
-    ----------
-    load
-        [N·m], of a slide [N]
-    speed
-        Magnitude of the load's speed at which the power fails [rad/s, m/s]; 0: a hundredth of a rated speed. Its direction is that in
-        which the load drives.
-    shaft
-        The shaft or slide that the load acts on.
+    load: [N·m], of a slide [N]
+    speed: magnitude of the load's speed at which the power fails [rad/s, m/s]; 0: a hundredth of a rated speed. Its
+        direction is that in which the load drives.
+    shaft: the shaft or slide that the load acts on.
 
     Raises SolverError: as `simulate`.
     """

@@ -134,16 +134,11 @@ def amplifier_rules(
 
     Source: definitions of data sheets.
 
-    Parameters
-    ----------
-    time, current
-        Current of the motor over the cycle [A], as the data sheet of the amplifier counts it; NaN where it is not known.
-    bus
-        Largest voltage of the DC bus before energy returns [V].
-    where
-        Table of the motor.
-    unit
-        Of the current: of a motor with a winding ``"A rms"``.
+    time, current: current of the motor over the cycle [A], as the data sheet of the amplifier counts it; NaN where it
+        is not known.
+    bus: largest voltage of the DC bus before energy returns [V].
+    where: table of the motor.
+    unit: of the current: of a motor with a winding ``"A rms"``.
     """
     what, continuous = "current, rms over the cycle", amplifier.continuous_current
     if np.isnan(current).any():

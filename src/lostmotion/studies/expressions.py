@@ -56,10 +56,7 @@ class Expression:
     text: as written.
     vocabulary: what it may name.
 
-    Raises
-    ------
-    ValueError
-        It cannot be read, uses what the grammar does not have, or leaves a value for each instant.
+    Raises ValueError: it cannot be read, uses what the grammar does not have, or leaves a value for each instant.
     """
 
     def __init__(self, text: str, vocabulary: Vocabulary = OF_DRIVES) -> None:

@@ -71,13 +71,9 @@ def names_a_record(tables: Mapping[str, Any], part: str) -> bool:
 def names_that_fit(table: str, wanted: Mapping[str, Any]) -> list[str]:
     """The names of all records that a filter lets through.
 
-    Parameters
-    ----------
-    table
-        The kind of records, such as ``"gearbox"``.
-    wanted
-        For each datum of a record a text in any case with ``*`` for anything (``kind``, ``manufacturer``, ``name``), or minimum and
-        maximum. A record that lacks the datum does not fit.
+    table: the kind of records, such as ``"gearbox"``.
+    wanted: for each datum of a record a text in any case with ``*`` for anything (``kind``, ``manufacturer``,
+        ``name``), or minimum and maximum. A record that lacks the datum does not fit.
 
     Raises ValueError: a key is no datum of such records, its value is neither, or nothing fits.
     """
@@ -152,15 +148,10 @@ def _is_text(key: str) -> bool:
 def names_of(table: str, given: Any, directory: Path = Path()) -> list[str]:
     """The names of all records that a list gives: names, files and directories of data sheets, and filters of the catalogue.
 
-    Parameters
-    ----------
-    table
-        The kind of records, such as ``"gearbox"``.
-    given
-        One of these, or a list: the name of a record; a file (``.toml``) or a directory of such files, of which all records of the kind
-        are taken; a filter as `names_that_fit` takes it. What is named twice is taken once.
-    directory
-        Files and directories are relative to it.
+    table: the kind of records, such as ``"gearbox"``.
+    given: one of these, or a list: the name of a record; a file (``.toml``) or a directory of such files, of which all
+        records of the kind are taken; a filter as `names_that_fit` takes it. What is named twice is taken once.
+    directory: files and directories are relative to it.
 
     Raises ValueError: there is no such file or record, or nothing fits.
     """

@@ -65,9 +65,7 @@ class Selection(Part):
 def check_bounds(selection: Selection, units: dict[str, str]) -> None:
     """Sees that the limits can be read in the units of their columns.
 
-    Raises
-    ------
-    ValueError
+    Raises ValueError
     """
     for column, bound in selection.limits.items():
         try:

@@ -39,11 +39,8 @@ _OPERATION = re.compile(r"\s*(\*\*|[*/+^-])\s*([0-9.]+)(?:\s*(?:\^|\*\*)\s*([+-]
 def to_si(text: str, unit: str) -> float:
     """Value of `text`, such as ``"3300 rpm"``, in `unit` (SI; ``""`` for a plain number).
 
-    Raises
-    ------
-    ValueError
-        The text is not one number with one unit, or its unit measures something else. The message shows what would be
-        right.
+    Raises ValueError: the text is not one number with one unit, or its unit measures something else. The message shows
+        what would be right.
     """
     if len(text) > MAX_LENGTH:
         raise ValueError(f"is too long for one number with one unit; write {_wanted(unit)}")
@@ -73,9 +70,7 @@ def to_si(text: str, unit: str) -> float:
 def si_value(text: str, unit: str) -> float:
     """Value as `to_si` returns it, for a text that cannot but be a string: a bare number is in `unit`.
 
-    Raises
-    ------
-    ValueError
+    Raises ValueError
     """
     number = plain(text)
     return float(number) if _NUMBER.fullmatch(number) and math.isfinite(float(number)) else to_si(text, unit)

@@ -176,9 +176,7 @@ def read_unit(text: str) -> Product:
 
     A slash divides by the next factor alone, as in every programming language. The text is `plain`.
 
-    Raises
-    ------
-    UnknownUnitError
+    Raises UnknownUnitError
     """
     text = re.sub(r"^(1\s*)?/", "1/", text)
     found: Product = {}
