@@ -55,10 +55,7 @@ def fail(text: str, code: int = 1) -> NoReturn:
 
 
 def conclude(verdict: Verdict | None) -> None:
-    """End a command with the exit code of its verdict; the last call of the command.
-
-    Raises typer.Exit
-    """
+    """End a command with the exit code of its verdict; the last call of the command. Raises typer.Exit."""
     if verdict is not None:
         raise typer.Exit(verdict.exit_code)
 

@@ -213,10 +213,7 @@ def find(reference: str, table: str) -> Sheet:
 
 
 def find_one_of(reference: str, tables: Sequence[str]) -> Sheet:
-    """Find a record of one of several kinds, as `find` does.
-
-    Raises InputError: there is none.
-    """
+    """Find a record of one of several kinds, as `find` does. Raises InputError: there is none."""
     if is_in_file(reference):
         of_file = {table_of(record) for record in read_again(Path(reference.partition("#")[0]))}
         return find(reference, next((table for table in tables if table in of_file), tables[0]))

@@ -55,10 +55,7 @@ class Formula:
             self._refuse(node)
 
     def value(self, values: Values) -> Any:
-        """With the values of its names.
-
-        Raises ValueError: a name has no value, or the result is no finite number.
-        """
+        """With the values of its names. Raises ValueError: a name has no value, or the result is no finite number."""
         for name in sorted(self.names):
             if name not in values:
                 meant = did_you_mean(name, values, f"known are {', '.join(sorted(values)) or 'none'}")
@@ -108,10 +105,7 @@ class Formula:
 
 @cache
 def formula(text: str) -> Formula:
-    """Read once.
-
-    Raises ValueError
-    """
+    """Read once. Raises ValueError."""
     return Formula(text)
 
 

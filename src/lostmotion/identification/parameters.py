@@ -11,10 +11,7 @@ from ..units.conversion import si_factor, si_value
 
 
 def in_unit(value: Any, unit: str, key: str) -> float | None:
-    """A number in SI, or text with a unit of the kind of `unit`, in SI.
-
-    Raises ValueError
-    """
+    """A number in SI, or text with a unit of the kind of `unit`, in SI. Raises ValueError."""
     if value is None or (isinstance(value, int | float) and not isinstance(value, bool)):
         return None if value is None else float(value)
     if not isinstance(value, str):

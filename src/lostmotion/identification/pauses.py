@@ -107,10 +107,7 @@ def _late(task: Identification, log: Prepared) -> int:
 
 
 def shown_by(rig: Rig, log: Prepared, known: Mapping[str, Any]) -> Restart:
-    """The channel that shows the state.
-
-    Raises InputError: none does: why.
-    """
+    """The channel that shows the state. Raises InputError: none does: why."""
     built = rig.built(rig.changes(known, 0, log.segments[0].phase))
     scenario = built.scenario
     if scenario.axes() or built.remembers:

@@ -103,10 +103,7 @@ def _error(rig: Rig, engine: Engine, logs: Sequence[Prepared], point: Point) -> 
 def _solved(
     rig: Rig, logs: Sequence[Prepared], point: Point, free: Mapping[str, FreeParameter], shown: Shown, width: int
 ) -> tuple[dict[str, float], dict[str, str]]:
-    """(values found, why others are not) with one filter.
-
-    Raises InputError: there is no regression.
-    """
+    """(values found, why others are not) with one filter. Raises InputError: there is no regression."""
     balance = _Balance(rig, logs, point, shown, width)
     delays = frozenset().union(*(names_in(i.delay) for i in rig.task.inputs.values()))
     kept: dict[str, str] = {}

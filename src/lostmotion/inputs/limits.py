@@ -19,10 +19,7 @@ PREFIXES = {"": 1.0, "k": 1e3, "M": 1e6, "G": 1e9, "T": 1e12}
 
 
 def size_of(text: str) -> int:
-    """Bytes of a size such as ``2 GB`` or ``800 MiB``.
-
-    Raises ValueError: the text is no size.
-    """
+    """Bytes of a size such as ``2 GB`` or ``800 MiB``. Raises ValueError: the text is no size."""
     match = re.fullmatch(r"\s*([0-9]+(?:\.[0-9]*)?)\s*([kKMGT]?)(i?)B?\s*", text)
     if match is None:
         raise ValueError("is no size of memory, such as 2 GB")

@@ -83,10 +83,7 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
 
 
 def shallow(data: dict[str, Any]) -> dict[str, Any]:
-    """Tables that can be walked by functions that call themselves.
-
-    Raises RecursionError: they have too many levels.
-    """
+    """Tables that can be walked by functions that call themselves. Raises RecursionError: they have too many levels."""
     level: list[Any] = [data]
     for _ in range(MAX_LEVELS):
         values = (value for entry in level for value in (entry.values() if isinstance(entry, dict) else entry))

@@ -13,10 +13,7 @@ if TYPE_CHECKING:
 
 
 def compiled(model: mujoco.MjSpec | mujoco.MjModel) -> mujoco.MjModel:
-    """An own copy of a model, compiled.
-
-    Raises InputError: MuJoCo refuses the specification.
-    """
+    """An own copy of a model, compiled. Raises InputError: MuJoCo refuses the specification."""
     import mujoco
 
     if not isinstance(model, mujoco.MjSpec):
@@ -28,10 +25,7 @@ def compiled(model: mujoco.MjSpec | mujoco.MjModel) -> mujoco.MjModel:
 
 
 def joint_id(model: mujoco.MjModel, name: str) -> int:
-    """The number of a hinge.
-
-    Raises InputError: the model has no such joint, or it is no hinge.
-    """
+    """The number of a hinge. Raises InputError: the model has no such joint, or it is no hinge."""
     import mujoco
 
     found = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)

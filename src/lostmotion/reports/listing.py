@@ -196,10 +196,7 @@ def _table_in_file(reference: str) -> str:
 
 
 def record_text(name: str) -> str:
-    """One record: data with the status of their source, sources, gaps.
-
-    Raises InputError: there is no such record.
-    """
+    """One record: data with the status of their source, sources, gaps. Raises InputError: there is no such record."""
     kinds = {r.name: table_of(r) for r in catalogue()}
     if not is_in_file(name) and name not in kinds:
         hint = names_like(name, kinds, "`lostmotion catalogue` lists them")

@@ -21,10 +21,7 @@ MANY = 6  # pictures from which on other processes help, which take a second to 
 
 
 def endings(text: str | None) -> tuple[str, ...]:
-    """Endings of pictures from the text of ``--figures``.
-
-    Raises InputError: one of them is not known.
-    """
+    """Endings of pictures from the text of ``--figures``. Raises InputError: one of them is not known."""
     found = tuple(dict.fromkeys(word.strip().lower() for word in (text or "").split(",") if word.strip()))
     if unknown := [word for word in found if word not in ENDINGS]:
         raise InputError(

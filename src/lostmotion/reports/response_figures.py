@@ -20,10 +20,7 @@ def bode_figure(responses: Mapping[str, xarray.Dataset], output: str) -> Figure:
 
 
 def maps_figure(response: xarray.Dataset, output: str) -> Figure:
-    """The maps of `maps` as contours.
-
-    Raises InputError: there are fewer than two amplitudes or frequencies.
-    """
+    """The maps of `maps` as contours. Raises InputError: there are fewer than two amplitudes or frequencies."""
     found = maps(response, output)
     if not found:
         raise InputError(

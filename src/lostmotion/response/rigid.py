@@ -139,10 +139,7 @@ def _at_motor(scenario: Scenario) -> tuple[ShaftMotor, float, float]:
 
 
 def _efficiency(key: str, gear: Gear) -> float:
-    """Efficiency of a gear that drives.
-
-    Raises InputError: it is not constant, or its housing turns.
-    """
+    """Efficiency of a gear that drives. Raises InputError: it is not constant, or its housing turns."""
     if gear.housing is not None:
         raise InputError("turns, and the closed form is for gears whose housing stands", f"{key}.housing")
     losses = gear.losses

@@ -80,10 +80,7 @@ def respond(
 
 
 def _period(signals: Iterable[Signal[Any]]) -> float:
-    """The common period [s] of signals that are sums of sines and constants.
-
-    Raises InputError: they have none.
-    """
+    """The common period [s] of signals that are sums of sines and constants. Raises InputError: they have none."""
     frequencies = []
     for s in signals:
         if s.steps or s.ramps or s.chirp is not None or s.samples is not None or getattr(s, "wind", None) is not None:

@@ -96,10 +96,7 @@ def bend_of(of: SampledSlip, sets: Any, noise: Callable[[np.ndarray], Any] = lam
 
 
 def need_within_limits(of: SampledSlip, sets: Any, noise: Callable[[np.ndarray], Any] = lambda _: 0.0) -> None:
-    """Refuses sets in which a limit of the controller may act.
-
-    Raises UndecidableError
-    """
+    """Refuses sets in which a limit of the controller may act. Raises UndecidableError."""
     for row, limit in of.limited:
         if len(sets) and (np.abs(sets.range_of(row)).max(axis=0) + noise(row)).max() >= limit:
             raise UndecidableError("the limit of the controller may act")

@@ -25,10 +25,7 @@ def is_axis(tables: Mapping[str, Any]) -> bool:
 
 
 def long_form(tables: Mapping[str, Any]) -> dict[str, Any]:
-    """The same tables in the long form.
-
-    Raises InputError: a table is missing, or is none of this form.
-    """
+    """The same tables in the long form. Raises InputError: a table is missing, or is none of this form."""
     kind = _kind_of(tables)
     table: dict[str, dict[str, Any]] = {
         key: {"from": value} if isinstance(value, str) else dict(value) for key, value in tables["axis"].items()
@@ -94,10 +91,7 @@ def _kind_of(tables: Mapping[str, Any]) -> str:
 
 
 def _carrying(slide: dict[str, Any], payload: dict[str, Any] | None) -> dict[str, Any]:
-    """The slide with the mass of its payload.
-
-    Raises InputError: the payload has no mass, or something else.
-    """
+    """The slide with the mass of its payload. Raises InputError: the payload has no mass, or something else."""
     if payload is None:
         return slide
     for key in payload:

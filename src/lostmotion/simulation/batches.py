@@ -346,10 +346,7 @@ def _under(
 
 
 def _starts(scenarios: Sequence[Scenario], count: int) -> dict[str, Any]:
-    """The state at t = 0 by name, as far as it is not rest.
-
-    Raises InputError: it has a hysteresis.
-    """
+    """The state at t = 0 by name, as far as it is not rest. Raises InputError: it has a hysteresis."""
     if any(scenario.capacities() for scenario in scenarios):
         raise InputError("a batch begins without hysteresis; leave it out", "initial.hysteresis_capacity")
     starts = [scenario.start() for scenario in scenarios]

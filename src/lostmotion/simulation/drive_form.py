@@ -19,10 +19,7 @@ def is_short(tables: Mapping[str, Any]) -> bool:
 
 
 def long_form(tables: Mapping[str, Any]) -> dict[str, Any]:
-    """The same tables in the long form, for what only drive trains have.
-
-    Raises InputError: a value cannot be used.
-    """
+    """The same tables in the long form, for what only drive trains have. Raises InputError: a value cannot be used."""
     continuous, of_shaft, strikes = _continuous(tables), _of_shaft(tables), _strikes(tables)
     if continuous:
         _check_continuous(tables)

@@ -66,10 +66,7 @@ def motion_given(name: str, values: Any, units: Mapping[str, str] = UNITS) -> di
 
 
 def check_motion(where: str, values: Any, units: Mapping[str, str] = UNITS) -> None:
-    """Refuse what names no motion.
-
-    Raises InputError: there is no speed among it, or something else.
-    """
+    """Refuse what names no motion. Raises InputError: there is no speed among it, or something else."""
     if not isinstance(values, Mapping):
         raise InputError(
             f'{where}: {shown(values)} must name what is given, such as {{"speed": 2.0, "acceleration": 0.0}}'

@@ -54,10 +54,7 @@ def find_scenario(name: str | Path, directory: Path = Path()) -> Path:
 
 
 def find_base(base: str, path: Path) -> Path:
-    """The file that the key `base` of another file means.
-
-    Raises InputError: there is none.
-    """
+    """The file that the key `base` of another file means. Raises InputError: there is none."""
     with prefixed(f"{path}: key base"):
         found = find_scenario(base, path.parent)
         if not os.path.lexists(found):

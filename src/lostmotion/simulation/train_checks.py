@@ -18,10 +18,7 @@ if TYPE_CHECKING:
 
 
 def check_train(scenario: Whole) -> None:
-    """Refuse what contradicts itself in the tables of a scenario in the long form.
-
-    Raises InputError, ValueError
-    """
+    """Refuse what contradicts itself in the tables of a scenario in the long form. Raises InputError, ValueError."""
     tables = scenario.tables
     _check_shafts(tables)
     train = scenario.train()

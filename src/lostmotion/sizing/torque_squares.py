@@ -63,10 +63,7 @@ class Squares:
 
 
 def squares_of(scenario: Scenario, motor: str, time: np.ndarray) -> Squares:
-    """The torque of a motor of a scenario between instants [s].
-
-    Raises SolverError: as `simulate`.
-    """
+    """The torque of a motor of a scenario between instants [s]. Raises SolverError: as `simulate`."""
     parts = parts_of(scenario)
     part = next(p for p in parts if motor in p.train().motors)
     control = scenario.control() if len(parts) == 1 else control_of_part(scenario.control(), scenario.long(), part)

@@ -236,10 +236,7 @@ def _up_to(motor: Motor, current: float) -> Motor:
 
 
 def reference_of(scenario: Scenario) -> PositionReference:
-    """The positions that the axis follows.
-
-    Raises ValueError: it follows something else.
-    """
+    """The positions that the axis follows. Raises ValueError: it follows something else."""
     reference = None if scenario.controller is None else scenario.controller.reference
     if not isinstance(reference, PositionReference):
         raise ValueError('lacks controller.reference of kind "position", the motion of one cycle; add it')
@@ -306,10 +303,7 @@ def repeated(reference: PositionReference, cycle: float, count: int) -> Position
 
 @lru_cache(maxsize=32)
 def repeated_torque(torque: TorqueSignal, cycle: float, count: int) -> TorqueSignal:
-    """The load torque of so many cycles.
-
-    Raises InputError: it cannot be repeated, or does not fit into the cycle.
-    """
+    """The load torque of so many cycles. Raises InputError: it cannot be repeated, or does not fit into the cycle."""
     _periodic(torque, cycle, "load.torque")
     if torque.samples is None:
         return torque

@@ -354,10 +354,7 @@ class Axes:
         return tuple(found)
 
     def measured(self, row: np.ndarray) -> tuple[Row, int]:
-        """The columns of a pair that is run, and its switchings.
-
-        Raises InputError, SolverError: it cannot be run.
-        """
+        """The columns of a pair that is run, and its switchings. Raises InputError, SolverError: it cannot be run."""
         made = until_it_repeats(self.study, row)
         columns = row_of(made, slides=self.study.slides_itself(row))
         found = self._after_run(row, made, columns["winding_temperature"])

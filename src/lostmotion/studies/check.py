@@ -27,10 +27,7 @@ TASK_COLUMNS: dict[str, float | str] = {f"{USE}{rule}": math.nan for rule in TAS
 
 
 def check_columns(scenario: Scenario) -> dict[str, float | str]:
-    """The columns of one run.
-
-    Raises InputError, SolverError: as `check_drive`.
-    """
+    """The columns of one run. Raises InputError, SolverError: as `check_drive`."""
     return columns_of(check_drive(scenario))
 
 

@@ -147,10 +147,7 @@ def damages_of(directory: Path, what: Study) -> dict[Path, str]:
 
 
 def refuse_damaged(directory: Path, damaged: Mapping[Path, str]) -> None:
-    """Refuse a directory with damaged parts.
-
-    Raises InputError: it names the first of them.
-    """
+    """Refuse a directory with damaged parts. Raises InputError: it names the first of them."""
     for path, reason in damaged.items():
         if reason in NO_REPAIR:
             raise InputError(f"{path}: {reason}; remove it")
@@ -255,10 +252,7 @@ def _together(text: str, tables: list[Future[Any]]) -> bytes:
 
 
 def study_of(directory: str | Path) -> Study:
-    """The study that a directory holds.
-
-    Raises InputError: it holds none.
-    """
+    """The study that a directory holds. Raises InputError: it holds none."""
     note = Path(directory) / NOTE
     if not note.is_file():
         raise InputError(f"{directory}: holds no study; run `lostmotion study STUDY.toml -o {directory}` first")

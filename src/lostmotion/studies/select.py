@@ -63,10 +63,7 @@ class Selection(Part):
 
 
 def check_bounds(selection: Selection, units: dict[str, str]) -> None:
-    """Sees that the limits can be read in the units of their columns.
-
-    Raises ValueError
-    """
+    """Sees that the limits can be read in the units of their columns. Raises ValueError."""
     for column, bound in selection.limits.items():
         try:
             low, high = bound.in_unit(units.get(column, ""))

@@ -411,10 +411,7 @@ def _entry_of(tables: dict[str, Any], kind: str) -> dict[str, Any]:
 
 
 def _beside_whole(tables: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """Values beside the records of whole drives.
-
-    Raises InputError: one is none of such a drive.
-    """
+    """Values beside the records of whole drives. Raises InputError: one is none of such a drive."""
     given = {kind: _table(tables, kind) for kind in WHOLE if kind in tables}
     for kind, table in given.items():
         for key in table:

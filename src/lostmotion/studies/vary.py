@@ -172,10 +172,7 @@ def _with_names(data: Mapping[str, Any], table: str) -> dict[str, Any]:
 
 
 def base_value(scenario: Scenario, key: str) -> Any:
-    """Value of a scenario at a dotted key.
-
-    Raises ValueError: there is nothing of that name.
-    """
+    """Value of a scenario at a dotted key. Raises ValueError: there is nothing of that name."""
     node: Any = scenario.written
     for part in key.split("."):
         try:

@@ -301,10 +301,7 @@ class Unit:
     unit: str
 
     def read(self, value: Any) -> Any:
-        """The value in SI.
-
-        Raises ValueError: it is not a number, or a string that is not one with a fitting unit.
-        """
+        """The value in SI. Raises ValueError: it is not a number, or a string that is not one with a fitting unit."""
         if type(value) is float:  # nearly always, and large tables are read often
             return value
         value = scalar(value)

@@ -75,10 +75,7 @@ def _unit(name: str) -> tuple[Decimal, dict[str, int]]:
 
 
 def factor_of(units: Mapping[str, int]) -> Decimal:
-    """One of a product of units in SI.
-
-    Raises ArithmeticError: it is beyond the range of numbers.
-    """
+    """One of a product of units in SI. Raises ArithmeticError: it is beyond the range of numbers."""
     factor = Decimal(1)
     for name, power in units.items():
         factor *= _unit(name)[0] ** power
