@@ -116,14 +116,15 @@ def of_code(code: str) -> Iterator[str]:
             yield f"line {node.lineno}: a message of {length} characters"
         if not isinstance(node, ast.FunctionDef | ast.ClassDef | ast.Module):
             continue
-        # Entries of sections are no sentences, and examples of commands neither.
-        text = re.split(r"^\w+\n-{3,}\n|\x08", ast.get_docstring(node) or "", flags=re.MULTILINE)[0]
+        # Entries of sections, lines of parameters and examples of commands are no sentences.
+        text = re.split(r"^\w+\n-{3,}\n|^[a-z_][\w, ]*: |\x08", ast.get_docstring(node) or "", flags=re.MULTILINE)[0]
         yield from of_prose(text)
         if text.partition(" ")[0].lower() in NO_SUBJECT:
             yield f"begins without its subject: {text.splitlines()[0]}"
         if (
             isinstance(node, ast.FunctionDef)
-            and (node.end_lineno or 0) - node.body[len(node.body) > 1 and bool(text)].lineno >= SCREEN
+            and (node.end_lineno or 0) - node.body[len(node.body) > 1 and bool(ast.get_docstring(node))].lineno
+            >= SCREEN
         ):
             yield f"line {node.lineno}: {node.name} does not fit on a screen"
 
