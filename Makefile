@@ -200,6 +200,7 @@ lint: $(VENV)/dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	@$(BIN)/clang-format --dry-run --Werror $(FORMATTED)
+	@$(BIN)/python docs/lines.py
 
 .PHONY: lint-words
 lint-words: $(VENV)/libraries
