@@ -52,8 +52,14 @@ TEST_CASE("an accumulation of switchings is reported with its contact or law, if
     const auto names = branch_names(a);
     REQUIRE(!names.empty());
     const auto text = [&a](int subject) { return train_status_text(a, Status::zeno, 0.5, subject, false); };
-    const std::string rest = "accumulate at t = 0.500000 s: infinitely many in finite time. The model ends here.";
-    CHECK(text(0) == "switching instants of the contact '" + contact_name(a, 0) + "' " + rest);
+    const std::string rest =
+        "accumulate at t = 0.500000 s: infinitely many in finite time. Damping there, such as viscous_friction or "
+        "mesh_damping, ends it.";
+    const std::string motor = a.train().shafts[0].name, load = a.train().shafts[1].name;
+    CHECK(text(0) == "switching instants of the contact '" + contact_name(a, 0) + "' of shaft '" + motor + "' " + rest);
+    const int twist = a.places().gears[0].contact;
+    CHECK(text(twist) == "switching instants of the contact '" + contact_name(a, twist) + "' of the shafts '" + motor +
+                             "' and '" + load + "' " + rest);
     CHECK(text(-2) == "switching instants of the law '" + names[0] + "' " + rest);
     CHECK(text(-1) == "switching instants " + rest);
     SparseRegime::Guard guard;

@@ -110,18 +110,20 @@ std::vector<TrainChannel> train_channels(const model::Assembly& a) {
             add({C::loss_coefficient, gear, loss, "1", "torque lost in the gear, at the output, / rated output torque",
                  "m_2B"});
     }
-    constexpr const char* meaning = "slips forward (+1) or backward (-1), or is stuck (0)";
+    constexpr const char* slips = "slips forward (+1) or backward (-1), or is stuck (0)";
+    constexpr const char* parts = "touches (0), or is apart (-1)";
     for (const model::ShownContact& c : model::shown_contacts(a)) {
         const bool gear = c.kind == model::ContactPlace::gear;
         if (c.contact == model::nowhere) {
-            out.push_back({gear ? C::twist_sign : C::shaft_sign, c.element, c.name, "1", meaning});
+            out.push_back({gear ? C::twist_sign : C::shaft_sign, c.element, c.name, "1", slips});
             continue;
         }
         const int shaft = model::contact_shaft(a, c.contact);
         if (c.kind != model::ContactPlace::stop)
             add({C::contact_torque, c.contact, c.name + "_" + model::torque_word(t, shaft),
                  model::torque_unit(t, shaft), "what the dry contact takes"});
-        out.push_back({C::contact_mode, c.contact, c.name, "1", meaning});
+        out.push_back({C::contact_mode, c.contact, c.name, "1",
+                       p.contacts[static_cast<std::size_t>(c.contact)].gap.present() ? parts : slips});
     }
     for (std::size_t k = 0; k < p.acting.size(); ++k) {
         const model::ShaftElement& e = *p.acting[k];

@@ -6,11 +6,21 @@ namespace lostmotion {
 
 namespace {
 
+std::string shaft_in(const model::Train& t, int s) { return "'" + t.shafts[static_cast<std::size_t>(s)].name + "'"; }
+
+// The contact, with the shafts that it acts on.
+std::string contact_in(const model::Assembly& a, int contact) {
+    const model::ContactPlace& c = a.places().contacts[static_cast<std::size_t>(contact)];
+    std::string on = "shaft " + shaft_in(a.train(), c.a);
+    if (c.b != model::nowhere) on = "the shafts " + shaft_in(a.train(), c.a) + " and " + shaft_in(a.train(), c.b);
+    return "the contact '" + model::contact_name(a, contact) + "' of " + on;
+}
+
 // Why no motion is consistent with a rigid gear that may lock: the reason, the instant, what can be done.
 std::string jam_text(const model::Assembly& a, double time, int contact) {
     const auto place = static_cast<std::size_t>(a.places().contacts[static_cast<std::size_t>(contact)].element);
     const model::Train& t = a.train();
-    const auto shaft = [&](int s) { return "'" + t.shafts[static_cast<std::size_t>(s)].name + "'"; };
+    const auto shaft = [&](int s) { return shaft_in(t, s); };
     const model::Gear& gear = t.gears[place];
     const std::string name = "gear '" + gear.name + "'",
                       at = "at t = " + std::to_string(time) + " s: the friction jams. ";
@@ -35,7 +45,7 @@ std::string train_status_text(const model::Assembly& a, Status status, double ti
         return jam_text(a, time, contact);
     std::string name;
     if (contact >= 0 && contact < a.layout().contacts)
-        name = "the contact '" + model::contact_name(a, contact) + "'";
+        name = contact_in(a, contact);
     else if (const int law = -2 - contact; law >= 0 && law < a.layout().branches)
         name = "the law '" + model::branch_names(a)[static_cast<std::size_t>(law)] + "'";
     return status_text(status, time, name);
