@@ -164,7 +164,10 @@ OVERRIDES = [
     ("gearbox.losses.mirrored=1", "key gearbox.losses.mirrored: 1 must be true or false"),
     ("gearbox.losses.mirrored=yes", 'key gearbox.losses.mirrored: "yes" must be true or false'),
     ("gearbox.losses.values=[[1, true]]", "key gearbox.losses.values[0][1]: true is a Boolean"),
-    ("gearbox.added_backlash=0.01", "key gearbox.added_backlash: acts on a record; give gearbox.from"),
+    (
+        "gearbox.added_backlash=0.01",
+        "key gearbox.added_backlash: is for gearboxes by name (gearbox.from); here change gearbox.stiffness.backlash",
+    ),
     ("title=5", "key title: 5 must be text"),
     ("motor.kind=torque-source", 'did you mean "torque_source"?'),
     ("motor.limits.max_winding_temperature=-300 degC", '"-300 degC" must be at least -273.15'),

@@ -208,7 +208,7 @@ def test_the_command_says_what_it_has_moved_and_what_does_not_repeat(tmp_path: P
     done = CliRunner().invoke(app, ["response", "position-axis", *options])
     assert done.exit_code == 0, done.output
     assert "1 of 2 frequencies moved to the nearest that fits the sample times" in done.output
-    assert "4 motions do not repeat, as the encoder has steps" in done.output
+    assert "4 responses averaged over many periods" in done.output
     assert {"response.html", "response.csv"} <= {p.name for p in (tmp_path / "r").iterdir()}
     assert ",spread,reason" in (tmp_path / "r" / "response.csv").read_text().splitlines()[0]
 

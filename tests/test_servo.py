@@ -647,7 +647,7 @@ def test_a_move_that_does_not_settle_is_explained_by_the_static_twist() -> None:
     assert math.isnan(move.time)
     assert move.unseen == pytest.approx(wanted, rel=1e-3)
     text = dict(report.summary())["settling"]
-    assert text.startswith("not within 1 arcmin: the error is still 13.")
+    assert text.startswith("not within 1 arcmin: 13.")
     assert text.endswith("as an encoder on the motor does not see 13.8 arcmin of twist")
 
 

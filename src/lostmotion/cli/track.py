@@ -25,7 +25,7 @@ def track(
             "--after",
             metavar="TIME",
             parser=number("s", "--after"),
-            help='From which on errors count, e.g. "2 s"; left out, from the end of the start-up transient.',
+            help='Leave out errors before this time, e.g. "2 s"; default: the end of the start-up transient.',
         ),
     ] = None,
     view: Annotated[

@@ -446,6 +446,13 @@ def accessories_in(directory: Path, task: Any) -> Any:
     return task | {kind: record_in(directory, task[kind]) for kind in ACCESSORIES if kind in task}
 
 
+def _without_record(key: str) -> str:
+    """Remedy of a condition that changes a gearbox without a record."""
+    if key == "added_backlash":
+        return "is for gearboxes by name (gearbox.from); here change gearbox.stiffness.backlash"
+    return "acts on a record; give gearbox.from, or leave it out"
+
+
 def use_records(data: dict[str, Any]) -> None:
     """Puts the values of a record in place of `from`; the other keys of the table go before them."""
     if "task" in data:
@@ -459,7 +466,7 @@ def use_records(data: dict[str, Any]) -> None:
         if "from" not in changes:
             for key in Conditions.model_fields if table == "gearbox" else ():
                 if key in changes:
-                    raise InputError("acts on a record; give gearbox.from, or leave it out", f"gearbox.{key}")
+                    raise InputError(_without_record(key), f"gearbox.{key}")
             continue
         changes = dict(changes)
         record = changes.pop("from")

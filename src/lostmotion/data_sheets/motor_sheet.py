@@ -74,7 +74,10 @@ class MotorSheet(MotorHeat, Record):
             if self.rated_voltage is None:
                 raise ValueError("lacks rated_voltage, at which its data hold")
         elif idle := [key for key in BLOCK_KEYS if getattr(self, key) is not None]:
-            raise ValueError(f"has {idle[0]}; of a synchronous motor winding and dc_voltage say it")
+            own = "torque_constant_rms or torque_constant_peak" if idle[0] == "torque_constant" else "its data"
+            raise ValueError(
+                f'has {idle[0]}; a motor of kind "synchronous" has [motor.winding] with {own}, and dc_voltage'
+            )
         return self
 
     def missing(self) -> dict[str, str]:

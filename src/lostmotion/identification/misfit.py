@@ -58,8 +58,9 @@ class Misfit:
             )
         if self.structured:
             found.append(
-                f"residuals are structured (correlation of neighbours {self.correlation:.2f}, {self.runs} runs of one sign "
-                f"instead of {self.expected:.0f})" + (f" and have a shape over {self.shape}" if self.shapes else "")
+                f"the errors are not random, so that true values may lie outside their intervals (correlation of neighbours "
+                f"{self.correlation:.2f}, {self.runs} runs of one sign instead of {self.expected:.0f})"
+                + (f" and have a shape over {self.shape}" if self.shapes else "")
             )
         wider = "; the intervals are widened by what such errors can hide" if self.large else ""
         return (

@@ -162,8 +162,8 @@ def _closed_loop_lines(result: xarray.Dataset) -> list[str]:
     spread = result["spread"].values
     if count := int((spread > 0.0).sum()):
         lines.append(
-            f"{counted(count, 'motion')} {'does' if count == 1 else 'do'} not repeat, as the encoder has steps: means over many periods, "
-            f"whose first harmonics vary by {spread[spread > 0.0].max():.2g} of their mean at most"
+            f"{counted(count, 'response')} averaged over many periods, as the steps of the encoder do not repeat: "
+            f"their first harmonics vary by {spread[spread > 0.0].max():.2g} of their mean at most"
         )
     return lines
 

@@ -15,8 +15,8 @@ from ..studies.nearest import Lacking, Miss, misses, not_judged, rules_not_judge
 from ..studies.select import TASK_SHARES, USE, Selection
 from ..studies.selection import NOT_RUN, Candidate, Price, candidates, pareto_front, prices
 from ..studies.study import Study
-from ..studies.table import labelled
-from ..units.practical import counted
+from ..studies.table import labelled, unit_of
+from ..units.practical import PRACTICAL, counted, printed
 from ..verdict import Point, Verdict
 from .looks import OTHERS, PALETTE, look
 from .page import Table
@@ -150,14 +150,14 @@ def _ranking_tables(table: pa.Table, ranked: list[Candidate], front: list[Candid
     if not fitting:
         return []
     numbers = {c.run: str(k) for k, c in enumerate(_in_order(front, select), 1)}
-    titles = [f"{labelled(table, column)}, {direction}" for column, direction in select.objectives.items()]
+    titles, factors = _objectives(table, select)
     beside = [name for name in CHOICE if name not in select.objectives and any(name in c.choice for c in fitting)]
     titles += [_choice_title(name) for name in beside]
     last = [ESTIMATED] if any(c.estimated for c in fitting) else []
     rows = [
         [
             c.name,
-            *(f"{v:.5g}" for v in c.values.values()),
+            *(f"{factor * v:.5g}" for factor, v in zip(factors, c.values.values(), strict=True)),
             *(f"{c.choice[n] / CHOICE[n].shown[1]:.5g}" if n in c.choice else "" for n in beside),
             numbers.get(c.run, ""),
             c.tightest,
@@ -172,6 +172,18 @@ def _ranking_tables(table: pa.Table, ranked: list[Candidate], front: list[Candid
         note = f"The best {MAX_ROWS} of {count}; all are in `selection.csv`. {note}".strip()
     header = ("candidate", *titles, "Pareto front", "most used limit", "not judged", *last)
     return [Table("Candidates that fit", header, rows, note)]
+
+
+def _objectives(table: pa.Table, select: Selection) -> tuple[list[str], list[float]]:
+    """Titles of the columns of objectives with the unit that is shown, and how many of these one SI unit is."""
+    titles, factors = [], []
+    for column, direction in select.objectives.items():
+        si = unit_of(table, column)
+        unit, factor = PRACTICAL.get(si, (printed(si), 1.0))
+        shown = f" [{unit}]" if unit not in ("", "1") else ""
+        titles.append(f"{column.replace('_', ' ')}{shown}, {'lower' if direction == 'least' else 'higher'} is better")
+        factors.append(factor)
+    return titles, factors
 
 
 def _estimated(candidate: Candidate) -> str:
@@ -245,7 +257,8 @@ def pareto_panel(table: pa.Table, ranked: list[Candidate], front: list[Candidate
             numbered=len(front) <= MAX_ROWS,
         ),
     )
-    label = [f"{labelled(table, name)}, {select.objectives[name]}" for name in (x, y)]
+    better = {"least": "lower is better", "largest": "higher is better"}
+    label = [f"{labelled(table, name)}, {better[select.objectives[name]]}" for name in (x, y)]
     return Panel("Objectives of all candidates", label[0], label[1], tuple(c for c in curves if len(c.x)))
 
 
@@ -285,12 +298,14 @@ def _ranking(table: pa.Table, ranked: list[Candidate], front: list[Candidate], s
     if not fitting:
         return lines
     width = max(len(c.name) for c in fitting[:MAX_LINES]) + 2
-    titles = [f"{labelled(table, column)}, {direction}" for column, direction in select.objectives.items()]
+    titles, factors = _objectives(table, select)
     columns = [max(12, len(title) + 2) for title in titles]
     lines.append(" " * (width + 2) + "".join(t.rjust(w) for t, w in zip(titles, columns, strict=True)))
     on_front = {c.run for c in front}
     for c in fitting[:MAX_LINES]:
-        values = "".join(f"{v:.5g}".rjust(w) for v, w in zip(c.values.values(), columns, strict=True))
+        values = "".join(
+            f"{factor * v:.5g}".rjust(w) for factor, v, w in zip(factors, c.values.values(), columns, strict=True)
+        )
         notes = ["Pareto front"] if len(select.objectives) > 1 and c.run in on_front else []
         notes += [f"tightest: {c.tightest}"] if c.tightest else []
         notes += [f"not judged: {c.not_judged}"] if c.not_judged else []

@@ -22,6 +22,7 @@ from ..simulation.explanation import explain
 from ..simulation.scenario import Scenario
 from ..simulation.simulation_state import SimulationState
 from ..simulation.stepping import Simulation
+from ..units.practical import practical
 from .closed_loop import running_slots
 from .closed_response import frame_of
 
@@ -414,8 +415,10 @@ def _why(watch: Watch, outlook: Outlook) -> str:
     if not len(moving):
         return "nothing moves by more than a billionth of a turn, but not all contacts are stuck, or the controllers still move"
     k = moving[0]
-    unit = "m" if watch.names[k].endswith("_position") else "rad"
-    return f"{watch.names[k]} still moves by {last[k]:.3g} {unit}, {last[k] / max(before[k], last[k] * 1e-9):.3g} of the time before"
+    ratio = last[k] / max(before[k], last[k] * 1e-9)
+    course = "as much as before" if 0.95 < ratio < 1.05 else f"{ratio:.3g} times as much as in the time before"
+    moved = practical(float(last[k]), "m" if watch.names[k].endswith("_position") else "rad", 3)
+    return f"{watch.names[k].replace('_', ' ')} still moves by {moved}, {course}"
 
 
 def moving_input(scenario: Scenario) -> str:

@@ -96,6 +96,8 @@ class HuntingCertificate:
 
 def certified_in_words(certificate: HuntingCertificate) -> str:
     """Verdict with its reason."""
+    if certificate.verdict == "not decided" and certificate.reason:
+        return f"not decided: no proof from every start, rely on the simulation ({certificate.reason})"
     return certificate.verdict + (f": {certificate.reason}" if certificate.reason else "")
 
 

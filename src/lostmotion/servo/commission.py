@@ -193,13 +193,23 @@ class ServoReport:
         if self.settling:
             rows.append(("settling", self._worst_settling()))
         if self.stiffness:
-            weakest = min(self.stiffness, key=lambda s: s.least[0])
-            least, at = weakest.least
-            rows.append(("stiffness", f"at least {weakest.shown(least)}, at {at:.3g} Hz ({weakest.regime})"))
+            rows.append(("stiffness", self._least_stiffness()))
         rows.append(("at rest", self.rest()))
         if self.certificate is not None:
             rows.append(("certificate", certified_in_words(self.certificate)))
         return rows
+
+    def _least_stiffness(self) -> str:
+        """The least stiffness while the flanks touch, and that within the backlash."""
+        open_gap = [s for s in self.stiffness if s.regime == "gap"]
+        weakest = min([s for s in self.stiffness if s not in open_gap] or open_gap, key=lambda s: s.least[0])
+        least, at = weakest.least
+        text = f"at least {weakest.shown(least)}, at {at:.3g} Hz ({weakest.regime})"
+        return (
+            f"{text}; {open_gap[0].shown(open_gap[0].least[0])} within the backlash"
+            if weakest.regime != "gap" and open_gap
+            else text
+        )
 
     def _regimes(self) -> str:
         names = ", ".join(self.regimes)
@@ -256,11 +266,11 @@ class ServoReport:
         if s.state == "not decided":
             return s.reason
         left, twist, unit = abs(s.remaining), abs(s.unseen), self.following.unit
-        when = s.reason if s.last else "before the next move"
+        when = s.reason if s.last else "when the next move begins"
         swing = f"swings by ±{_shown(s.swing, unit, 3)}"
         if self._swings(s) and s.last:
             return f"it still {swing}, {when}"
-        text = f"the error is still {_shown(left, unit, 3)} {when}"
+        text = f"{_shown(left, unit, 3)} left {when} (allowed {_shown(self.window, unit)})"
         if self._swings(s):
             return f"{text}, and {swing}"
         if twist > 0.5 * left:
@@ -268,7 +278,7 @@ class ServoReport:
             return f"{text}, as an encoder on {where} does not see {_shown(twist, unit, 3)} of twist"
         if s.reason == "at rest":
             return f"{text}, which the loop does not remove; add an integral gain, or a finer encoder"
-        return f"{text}, which the loop measures and is still removing; raise its gains, or allow more time"
+        return f"{text}; the loop is still removing it: raise K_v, or lengthen the dwell"
 
     def _place(self, position: float) -> str:
         return f"{math.degrees(position):.5g} deg" if self.load_unit == "rad" else f"{1e3 * position:.5g} mm"
