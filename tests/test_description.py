@@ -65,7 +65,9 @@ class Scenario:
         return Stepped(self.lib, c.c_void_p(made))
 
 
-@pytest.mark.parametrize("name", ["paper-2dof-nl-small", "position-axis", "field-weakening", "joint-under-gravity"])
+@pytest.mark.parametrize(
+    "name", ["paper-2dof-nl-small", "position-axis", "field-weakening", "joint-under-gravity", "stepper-belt-axis"]
+)
 def test_a_run_has_the_bits_of_python(library: c.CDLL, name: str) -> None:  # noqa: F811
     there = Scenario(library, lm.portable.description(lm.load(name), parameters=False)).run()
     here = lm.simulate(lm.load(name))

@@ -291,7 +291,10 @@ def test_a_worm_gear_that_locks_lowers_smoothly_or_chatters():
 
 
 def test_every_rule_is_tried_and_names_its_source():
-    assert set(OTHERWISE) | {"loss_map", "self_locking", "motor_peak_torque", "estimated_losses"} == set(RULES)
+    of_steppers = {"lost_steps", "stepper_torque", "step_resonance"}  # tests/test_stepper.py
+    assert set(OTHERWISE) | of_steppers | {"loss_map", "self_locking", "motor_peak_torque", "estimated_losses"} == set(
+        RULES
+    )
     for finding in check_drive(move()):
         assert finding.source
         assert f"[{finding.source}]" in str(finding)

@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import lostmotion as lm
+from conftest import ROOT
 from lostmotion.control.command import CommandSignal, Stepping
 from stepper_axes import departure
 
@@ -223,3 +224,151 @@ def test_a_command_that_is_not_all_steps_is_refused() -> None:
         CommandSignal(mean=0.1, stepping={"pulses": {"times": [0.1, 0.2], "values": [1, 1]}})
     with pytest.raises(lm.InputError, match="give one of reference, travel and pulses"):
         Stepping(reference=0.0, pulses={"times": [0.1, 0.2], "values": [1, 1]})
+
+
+NEMA_17 = {
+    **MOTOR,
+    "holding_torque": 0.44,
+    "rated_current": 1.7,
+    "resistance_phase": 1.5,
+    "inductance_phase": 2.8e-3,
+    "supply_voltage": 24.0,
+}
+
+
+def test_the_pull_out_torque_is_the_largest_of_all_currents_within_both_limits() -> None:
+    """A search over all currents i of the two-phase circuit, |i| <= sqrt(2) I and |(R + j n w L) i + j K w| <= U, at 12 speeds."""
+    motor = lm.Motor(**NEMA_17)
+    speeds = np.linspace(0.0, 330.0, 12)
+    size, K = math.sqrt(2.0) * 1.7, 0.44 / (math.sqrt(2.0) * 1.7)
+    found = lm.sizing.pull_out_torque(motor, speeds)
+    part = np.linspace(-size, size, 2001)
+    i = part[:, None] + 1j * part[None, :]
+    for w, torque in zip(speeds, found, strict=True):
+        within = (abs(i) <= size) & (abs((1.5 + 1j * 50 * w * 2.8e-3) * i + 1j * K * w) <= 24.0)
+        assert torque == pytest.approx(K * max(float(i.imag[within].max()), 0.0), abs=4.0 * K * size / 2000)
+    assert found[0] == pytest.approx(0.44, rel=1e-15)
+    assert np.all(np.diff(found) <= 0.0)
+
+
+def test_at_a_speed_with_plenty_of_current_the_pull_out_torque_is_the_closed_form() -> None:
+    """K (U/Z - K w R/Z^2) with Z^2 = R^2 + (n w L)^2, where the current is below its limit."""
+    w, K = 400.0, 0.44 / (math.sqrt(2.0) * 1.7)
+    Z = math.hypot(1.5, 50 * w * 2.8e-3)
+    motor = lm.Motor(**{**NEMA_17, "supply_voltage": 90.0})
+    expected = K * (90.0 / Z - K * w * 1.5 / Z**2)
+    assert float(lm.sizing.pull_out_torque(motor, w)) == pytest.approx(expected, rel=1e-14)
+    with pytest.raises(lm.InputError, match="supply_voltage"):
+        lm.sizing.pull_out_torque(lm.Motor(**{k: v for k, v in NEMA_17.items() if k != "supply_voltage"}), w)
+
+
+def test_lost_steps_are_those_of_an_integration_of_the_sine() -> None:
+    """A field that turns at once at 90 rad/s for 0.2 s pulls the rotor out: slips of DOP853 to 1e-12, by number and instant."""
+    speed, viscous = 90.0, 1e-4
+    scenario = alone(
+        {"ramps": [{"rise": speed * 0.2, "duration": 0.2}]},
+        viscous=viscous,
+        duration=0.3,
+        sample_interval=1e-4,
+        torque_error=1e-5 * T_H,
+    )
+    (found,) = lm.simulation.lost_steps(lm.simulate(scenario))
+
+    def lag(t, phi):
+        return N * (phi - speed * min(t, 0.2))
+
+    def rate(t, x):
+        return [x[1], (-T_H * math.sin(lag(t, x[0])) - viscous * x[1]) / J]
+
+    t = np.linspace(0.0, 0.3, 30_001)
+    phi = solve_ivp(rate, (0.0, 0.3), [0.0, 0.0], "DOP853", t_eval=t, rtol=1e-12, atol=1e-13, max_step=1e-4).y[0]
+    period = np.floor(np.array([lag(a, b) for a, b in zip(t, phi, strict=True)]) / (2.0 * math.pi) + 0.5)
+    at = np.nonzero(np.diff(period))[0]
+    assert len(found.times) == at.size > 10
+    assert found.lost == 4 * abs(int(period[-1]))
+    assert np.abs(np.array(found.times) - t[at + 1]).max() < 3e-5
+
+
+def test_a_run_that_loses_steps_does_not_fit() -> None:
+    from lostmotion.reports.run import summary, verdict_of
+
+    scenario = lm.load(ROOT / "scenarios" / "stepper-belt-axis.toml")
+    good = lm.simulate(scenario)
+    assert "steps of motor: none lost" in summary(good)
+    assert verdict_of(good) is None
+    lost = lm.simulate(
+        scenario.replace(**{"command.stepping.travel.acceleration": 150.0, "command.stepping.travel.speed": 0.8})
+    )
+    assert lm.simulation.lost_steps(lost)[0].times
+    verdict = verdict_of(lost)
+    assert verdict is not None
+    assert verdict.state == "does not fit"
+
+
+def test_the_belt_axis_rings_at_the_frequency_of_its_two_masses() -> None:
+    """Field and belt as springs, rotor and carriage as masses: the lower frequency, from a fit behind the ramp."""
+    radius = 20 * 2e-3 / (2.0 * math.pi)
+    field, belt, rotor, carriage = 50 * 0.44 / radius**2, 1e5, 54e-7 / radius**2, 0.5
+    matrix = np.array([[(field + belt) / rotor, -belt / rotor], [-belt / carriage, belt / carriage]])
+    expected = math.sqrt(min(np.linalg.eigvals(matrix).real)) / (2.0 * math.pi)
+    scenario = lm.load(ROOT / "scenarios" / "stepper-belt-axis.toml")
+    found = lm.simulate(scenario.replace(**{"simulation.sample_interval": 1e-4, "command.stepping.travel.speed": 0.15}))
+    t = found.time.values
+    within = (t > 0.0505) & (t < 0.2)
+    t, y = t[within] - 0.0505, found.slide_position.values[within]
+
+    def left(f: float) -> float:
+        wave = [np.exp(-20.0 * t) * shape(2.0 * math.pi * f * t) for shape in (np.cos, np.sin)]
+        return float(np.linalg.lstsq(np.stack([np.ones_like(t), t, *wave], 1), y, rcond=None)[1][0])
+
+    frequencies = np.arange(55.0, 80.0, 0.1)
+    assert frequencies[np.argmin([left(f) for f in frequencies])] == pytest.approx(expected, rel=5e-3)
+
+
+def test_a_mount_rests_while_its_worm_crosses_the_backlash() -> None:
+    """12 arcsec of backlash and twice the wind-up of 0.3 N·m on 20 kN·m/rad, at 7.5205 arcsec/s, from 4 s on."""
+    found = lm.simulate(lm.load(ROOT / "scenarios" / "stepper-equatorial-mount.toml"))
+    arcsec = math.pi / 648_000.0
+    turned = found.axis_angle.values
+    rests = found.time.values[np.abs(turned - turned.max()) < 0.1 * arcsec]
+    crossing = (12.0 + 2.0 * 0.3 / 20e3 / arcsec) / 7.5205
+    assert rests.max() - 4.0 == pytest.approx(crossing, abs=0.15)  # a step of the field, and the periodic error
+
+
+@pytest.mark.parametrize(
+    ("changes", "rule", "verdict"),
+    [
+        ({}, "lost_steps", "ok"),
+        (
+            {"command.stepping.travel.acceleration": 150.0, "command.stepping.travel.speed": 0.8},
+            "lost_steps",
+            "warning",
+        ),
+        ({}, "stepper_torque", "ok"),
+        ({"axis.motor.supply_voltage": 3.0}, "stepper_torque", "warning"),
+        ({"axis.motor.holding_torque": 0.12, "axis.motor.supply_voltage": 60.0}, "stepper_torque", "caution"),
+        ({"command.stepping.microsteps": 1}, "step_resonance", "caution"),
+        ({}, "step_resonance", "ok"),
+        ({"axis.slide.mass": 5.0}, "inertia_ratio", "caution"),
+    ],
+)
+def test_rules_of_steppers_turn(changes: dict, rule: str, verdict: str) -> None:
+    findings = lm.check_drive(lm.load(ROOT / "scenarios" / "stepper-belt-axis.toml", changes))
+    assert [f.verdict for f in findings if f.rule == rule] == [verdict]
+
+
+def test_the_derivative_by_the_holding_torque_is_that_of_differences() -> None:
+    """Central differences of step 1e-5 N·m, whose error is the third derivative's."""
+    base, key, h = lm.load(ROOT / "scenarios" / "stepper-belt-axis.toml"), "axis.motor.holding_torque", 1e-5
+    found = lm.simulate(base, sensitivities=[key]).slide_position_sensitivity.values.ravel()
+    after, before = (lm.simulate(base.replace(**{key: 0.44 + step})).slide_position.values for step in (h, -h))
+    assert np.abs(found - (after - before) / (2.0 * h)).max() < 1e-5 * np.abs(found).max()
+
+
+def test_step_by_step_the_field_and_the_current_are_named() -> None:
+    base = lm.load(ROOT / "scenarios" / "stepper-belt-axis.toml", {"axis.motor.standstill_current": 0.5})
+    simulation = lm.Simulation(base, step=1e-3)
+    with pytest.raises(lm.InputError, match="motor_command, motor_current_command"):
+        simulation.advance(0.01, command=0.01)
+    simulation.advance(0.5, motor_command=0.03, motor_current_command=1.0)
+    assert float(simulation["motor_angle"]) == pytest.approx(0.03, abs=2e-3)

@@ -14,6 +14,7 @@ from pydantic import Field, model_validator
 from ..inputs.part import Part
 from ..inputs.quantities import Frequency, Limit, Number, Positive, Time, Whole
 from ..model.signals import Breakpoint, Samples, Signal, taylor
+from ..recorded import real
 from ..reproducible import sin
 from .references import PositionReference, Reference, SlideReference
 
@@ -145,8 +146,9 @@ class FieldAngle(Signal[Number]):
 
     def breakpoint_list(self) -> list[Breakpoint]:
         times, counts = self.instants()
-        angles = self.start + self.step * self.stepping.table(counts)
-        return _held(self.start, times, angles)
+        turned = (self.step * self.stepping.table(counts)).tolist()
+        start = real(self.start)  # number by number: it may be one that is recorded
+        return _held(start, times, [start + angle for angle in turned])
 
 
 class CurrentLevel(Signal[Number]):
@@ -165,10 +167,11 @@ class CurrentLevel(Signal[Number]):
         return points
 
 
-def _held(start: float, times: np.ndarray, values: np.ndarray) -> list[Breakpoint]:
+def _held(start: float, times: np.ndarray, values: list[float]) -> list[Breakpoint]:
     """Values that are held from their instants on; of several at one instant the last."""
     last = np.append(times[1:] > times[:-1], True) if times.size else np.zeros(0, bool)
-    points: list[Breakpoint] = [(t, v, 0.0) for t, v in zip(times[last].tolist(), values[last].tolist(), strict=True)]
+    held = zip(times.tolist(), values, last, strict=True)
+    points: list[Breakpoint] = [(t, v, 0.0) for t, v, keep in held if keep]
     return points if points and points[0][0] == 0.0 else [(0.0, start, 0.0), *points]
 
 

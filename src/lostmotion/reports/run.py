@@ -11,6 +11,7 @@ from ..errors import visible
 from ..simulation.results import RunArrays, energy_of, recorded_variables, whole
 from ..simulation.sampling import weights
 from ..simulation.scenario import Scenario
+from ..simulation.step_losses import LostSteps, found_in
 from ..simulation.switchings import ATTRIBUTE as SWITCHINGS
 from ..simulation.switchings import MESH_STEP, names_in, unpacked
 from ..simulation.windings import errors_of
@@ -93,8 +94,16 @@ def _last_lines(result: xarray.Dataset | RunArrays) -> Iterator[str]:
     yield from (f"  {line}" for line in lines_of(loop_errors(result)))
     if "energy" in result.attrs and energy_of(result)["turned_over"] > 0.0:
         yield f"  energy balance closes to {closes_to(result)}"
+    yield from (f"  {found}" for found in steps_of(result))
     yield from (*contact_lines(result), *mesh_lines(result), *error_lines(result))
     yield from (f"  {kind}: {result.attrs[kind]}" for kind in ("warning", "note") if kind in result.attrs)
+
+
+def steps_of(result: xarray.Dataset | RunArrays) -> tuple[LostSteps, ...]:
+    """Steps that the steppers of a run have lost."""
+    if "scenario" not in result.attrs or '"stepper"' not in result.attrs["scenario"]:
+        return ()
+    return found_in(Scenario.from_json(result.attrs["scenario"]), result)
 
 
 def contact_lines(result: xarray.Dataset | RunArrays) -> list[str]:
@@ -205,6 +214,7 @@ def run_report(name: str, result: xarray.Dataset) -> Report:
 def verdict_of(result: xarray.Dataset | RunArrays) -> Verdict | None:
     """Verdict on a run whose loops do not work, or that warns; None where nothing is judged."""
     points = points_of(loop_errors(result))
+    points += [Point("does not fit", str(found)) for found in steps_of(result) if found.times]
     points += [Point("fits with a reservation", result.attrs["warning"])] if "warning" in result.attrs else []
     return Verdict.of(points) if points else None
 

@@ -8,6 +8,8 @@ from .results import scenario_of as scenario_of
 from .simulation_answers import LoadAnswer as LoadAnswer
 from .simulation_answers import SimulationSnapshot as SimulationSnapshot
 from .simulation_state import SimulationState as SimulationState
+from .step_losses import LostSteps as LostSteps
+from .step_losses import lost_steps as lost_steps
 from .train_tables import ShaftTable as ShaftTable
 from .train_tables import SlideTable as SlideTable
 from .train_tables import TrainTables as TrainTables

@@ -52,9 +52,8 @@ def _field(tables: TrainTables, name: str, stepping: Stepping) -> FieldAngle:
         )
     state = tables.initial.of_train()
     angles = angles_at_start(train, state.of_all("angles"), state.of_all("twists"), tables.given())
-    start = angles[motor.shaft]
-    field = FieldAngle(
-        stepping=stepping, turns=ratio, step=motor.full_step, start=start, until=tables.simulation.duration
-    )
+    until = tables.simulation.duration
+    field: FieldAngle = FieldAngle(stepping=stepping, turns=ratio, step=motor.full_step, start=0.0, until=until)
+    field = field.unchecked(start=angles[motor.shaft])  # as it is recorded
     field.instants()  # which refuses what the driver cannot give
     return field

@@ -130,6 +130,8 @@ def dead_zone(scenario: Scenario, result: RunArrays) -> Finding:
     if scenario.continuous():
         return not_judged("dead_zone", "a continuous controller turns the motor, which sees the smallest error")
     ((name, motor),) = train.motors.items()
+    if motor.kind == "stepper":
+        return not_judged("dead_zone", "the command of a stepper is an angle, which moves the load in steps")
     inputs = scenario.core(sampled=False).input_names()
     others = {n: float(result[n][0]) for n in inputs if n != train.command_of(name)}
     forward, backward = smallest_commands(scenario, others)

@@ -26,6 +26,8 @@ def holdings(scenario: Scenario, result: RunArrays) -> list[Finding]:
     if (why := _many_ways(scenario)) is not None:
         return [not_judged(rule, why) for rule in ("holding", *(() if brake is None else ("holding_brake",)))]
     (motor,) = train.motors.values()
+    if motor.kind == "stepper" and brake is None:
+        return [not_judged("holding", "a stepper holds by its current, or without it by its detents")]
     at_motor = [(turns(train, shaft, motor.shaft) or 0.0) * torque for shaft, torque in loads.items()]
     held: list[Finding] = []
     if brake is not None and brake.force is None and not train.is_slide(motor.shaft):
