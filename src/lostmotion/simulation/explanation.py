@@ -18,6 +18,7 @@ from ..model.end_stops import END_STOP
 from ..model.self_locking import SelfLocking, self_locking
 from ..model.signals import core_signal
 from ..model.train import DriveTrain
+from ..reproducible import sin
 from ..units.practical import charted
 from .core_runs import core_case
 from .scenario import Scenario
@@ -245,8 +246,7 @@ def _followed(scenario: Scenario, time: float) -> Simulation:
         for name, points in lists.items():
             piece = [point for point in points if point[0] <= begin][-1]
             sines = [
-                sum(a * math.sin(2.0 * math.pi * f * t + p) for a, f, p in signals[name].sine_list())
-                for t in (begin, end)
+                sum(a * sin(2.0 * math.pi * f * t + p) for a, f, p in signals[name].sine_list()) for t in (begin, end)
             ]
             given[name] = tuple(
                 piece[1] + piece[2] * (t - piece[0]) + s for t, s in zip((begin, end), sines, strict=True)
