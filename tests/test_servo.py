@@ -391,7 +391,7 @@ def test_tuning_refuses_what_it_cannot_do(position_axis: Any) -> None:
         lm.InputError, match="identical radius needs an inertia ratio of load to motor of at most 4, and it is 16"
     ):
         lm.tune(position_axis, rule="identical_radius")
-    with pytest.raises(lm.InputError, match="the scenario has no controller; add a"):
+    with pytest.raises(lm.InputError, match="the scenario has no sampled controller; add a"):
         lm.tune(lm.load("paper-2dof-nl-large"))
 
 
@@ -508,7 +508,7 @@ def test_the_command_names_the_file_that_has_no_controller(tmp_path: Path, comma
     for source in (str(file), "paper-2dof-nl-large"):
         done = lostmotion(command[0], source, *command[1:], cwd=tmp_path)
         assert (done.returncode, len(done.stderr.splitlines())) == (1, 1)
-        assert done.stderr.startswith(f"lostmotion: {source}: the scenario has no controller; add")
+        assert done.stderr.startswith(f"lostmotion: {source}: the scenario has no sampled controller; add")
 
 
 # --- gains that are kept ---

@@ -86,7 +86,8 @@ def attach(
     model
         A `mujoco.MjSpec`, a `mujoco.MjModel`, or an MJCF file. The drives are attached to a copy.
     drives
-        By the name of a hinge: a `Drive` or a `DriveTrain`, whose load's inertia the robot takes the place of; a scenario or its
+        By the name of a hinge: a `Drive` or a `DriveTrain`, whose load's inertia the robot takes the place of (of several ends the
+        shaft with the name of the hinge is the load); a scenario or its
         name, whose controller then turns the motor; what `from_mjcf` has returned; the name of an actuator of the catalogue; or
         the name of a gearbox, which an ideal torque source without inertia then turns.
     controllers

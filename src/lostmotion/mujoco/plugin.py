@@ -65,7 +65,7 @@ def write_drive(drive: Any, path: str | Path, *, controller: Controller | None =
     drive
         As of `attach`: a drive, a drive train, a scenario or its name, or a gearbox of the catalogue.
     path
-        Of the file.
+        Of the file. Of several ends of a train the shaft that is called as the file, without its extension, is that of the joint.
     controller
         A sampled controller of the motor.
     replace
@@ -90,9 +90,10 @@ def write_drive(drive: Any, path: str | Path, *, controller: Controller | None =
     <joint name="JOINT" armature="..."/>
     <plugin joint="JOINT" plugin="lostmotion.drive"><config key="scenario" value=".../elbow.drive"/></plugin>
     """
-    given = drive_of_joint(str(path), drive, controller)
-    given = without_weight(str(path), given, replace=replace, weighs=True)
-    joint = joint_drive(str(path), given, 1.0, 1e-3)
+    name = Path(path).stem
+    given = drive_of_joint(name, drive, controller)
+    given = without_weight(name, given, replace=replace, weighs=True)
+    joint = joint_drive(name, given, 1.0, 1e-3)
     core = joint.simulation._core_train
     still = [CommandSignal().core()] * len(core.input_names())
     start = joint.drive.start(TrainInitial(speeds=joint.ratios()))

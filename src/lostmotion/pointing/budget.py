@@ -272,7 +272,9 @@ def runs_of(scenario: Scenario) -> int:
 
 def _check(scenario: Scenario, after: float) -> None:
     if not scenario.axes():
-        raise InputError("the scenario has no controller; add [controller], or [controllers.MOTOR] for each axis")
+        raise InputError(
+            "the scenario has no sampled controller; add [controller], or [controllers.MOTOR] for each axis"
+        )
     for motor, controller in scenario.axes().items():
         if controller.reference.kind != "position":
             raise InputError(

@@ -123,7 +123,7 @@ def axis_of(scenario: Scenario, motor: str | None = None) -> Axis:
     names = list(scenario.axes())
     if not names:
         raise InputError(
-            "the scenario has no controller; add a [controller] table with reference, speed loop and encoder"
+            "the scenario has no sampled controller; add a [controller] table with reference, speed loop and encoder"
         )
     if motor is None and len(names) > 1:
         raise InputError(f"motor: there are several controllers; name one of {', '.join(names)}")

@@ -315,7 +315,7 @@ def _stepped(drive: Drive | Scenario | DriveTrain) -> Scenario:
         scenario = scenario.replace(**loads)
     if scenario.given():
         key = scenario.given_key(scenario.given()[0])
-        raise InputError(f"drives: key {key} gives the motion of a shaft; leave it out, or step it by lm.Simulation")
+        raise InputError(f"drives: key {key} gives the motion of a shaft; leave it out, and give given_motion its name")
     return scenario
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from .. import _core
 from ..control.turning import turns
 from ..errors import InputError
+from ..inputs.validation import listed
 from ..model.drive import Drive
 from ..model.torsion import Elastic
 from ..model.train import DriveTrain
@@ -170,14 +171,18 @@ def _check_commands(name: str, scenario: Scenario) -> None:
 
 
 def output_of(name: str, train: DriveTrain) -> str:
-    """The shaft that gears, clutches or freewheels turn and that turns none."""
+    """The end of the train, which turns no other shaft: the shaft of a joint; of several the one with the name of the joint."""
     joined = [(gear.input, gear.output) for gear in train.gears.values()]
     joined += [(one, other) for one, other, _ in train.held_together()]
-    inner = {one for one, _ in joined}
-    found = {other for _, other in joined if other not in inner}
+    inner, turned = (
+        {one for one, _ in joined},
+        {other for _, other in joined} | {m.shaft for m in train.motors.values()},
+    )
+    ends = [shaft for shaft in train.shafts if shaft in turned and shaft not in inner]
+    found = [shaft for shaft in ends if shaft == name] or ends
     if len(found) != 1:
         raise InputError(
-            f"joint {name!r}: {len(found) or 'no'} shafts are turned by gears and turn none themselves, and the joint is one of them"
+            f"joint {name!r}: the train ends at {listed(ends) or 'no shaft'}; call the shaft of the joint {name!r}"
         )
     (shaft,) = found
     if train.is_slide(shaft):
