@@ -25,7 +25,7 @@ from html_pages import Page, charts
 from lostmotion.cli import app
 from lostmotion.errors import InputError
 from lostmotion.paper import paper_scenario
-from lostmotion.reports.study import best_runs, influence, read_table, sobol_indices
+from lostmotion.reports.study import best_runs, influence, read_table, sobol_indices, write_study
 from lostmotion.simulation.variables import CHANNEL_NAMES
 from lostmotion.studies import chunk as study_chunk
 from lostmotion.studies.chunk import pieces, run_piece, scenario_of_run
@@ -655,8 +655,14 @@ def test_sobol_indices_of_a_closed_form(tmp_path: Path):
     )
     table = read_table(lm.study(study, tmp_path / "s"))
     indices = sobol_indices(table, study)["momentum"]
-    assert indices["command.mean"] == pytest.approx((0.9, 0.9), abs=0.02)
-    assert indices["load.torque.mean"] == pytest.approx((0.1, 0.1), abs=0.02)
+    for key, share in (("command.mean", 0.9), ("load.torque.mean", 0.1)):
+        first, total, *half = indices[key]
+        assert (first, total) == pytest.approx((share, share), abs=0.02)
+        assert abs(first - share) < 1.5 * half[0] and abs(total - share) < 1.5 * half[1]  # 95 % intervals
+        assert max(half) < 0.15
+    write_study(tmp_path / "s", tmp_path / "page")
+    rows = [line.split(",") for line in (tmp_path / "page" / "sobol.csv").read_text().splitlines()]
+    assert [float(x) for x in rows[1][2:]] == pytest.approx(list(indices["command.mean"]), rel=1e-4)
     ranks = influence(table, study)["momentum"]
     assert ranks["command.mean"] > 0.8
     assert ranks["load.torque.mean"] < -0.2

@@ -5,12 +5,14 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Iterable
 from pathlib import Path
 
 from ..errors import InputError
 
 CHECKOUT = Path(__file__).parents[3]
+EVERY = 10.0  # s, after which a compilation that goes on says so
 
 
 def made_here(target: str, made: Iterable[Path], what: str) -> None:
@@ -35,8 +37,19 @@ def made_here(target: str, made: Iterable[Path], what: str) -> None:
     if shutil.which("make") is None:
         return
     print(f"Compiling {what}; this takes a minute or two, once.", file=sys.stderr)
-    done = subprocess.run(["make", "-C", str(CHECKOUT), target], capture_output=True, text=True, check=False)
-    if done.returncode != 0:
-        raise InputError(
-            f"make {target}: failed in {CHECKOUT}; its last line: {done.stderr.strip().rpartition(chr(10))[2]}"
-        )
+    begin = time.monotonic()
+    with subprocess.Popen(
+        ["make", "-C", str(CHECKOUT), target], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as work:
+        while True:
+            try:
+                _, errors = work.communicate(timeout=EVERY)
+                break
+            except subprocess.TimeoutExpired:
+                waited = time.monotonic() - begin
+                print(
+                    f"  {waited:.0f} s: make {target} compiles, or waits for another make in {CHECKOUT}",
+                    file=sys.stderr,
+                )
+    if work.returncode != 0:
+        raise InputError(f"make {target}: failed in {CHECKOUT}; its last line: {errors.strip().rpartition(chr(10))[2]}")

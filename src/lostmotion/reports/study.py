@@ -74,8 +74,8 @@ def influence(table: pa.Table, study: Study) -> dict[str, dict[str, float]]:
     return out
 
 
-def sobol_indices(table: pa.Table, study: Study) -> dict[str, dict[str, tuple[float, float]]]:
-    """(first order, total) of each parameter for each kept value; for the design saltelli only.
+def sobol_indices(table: pa.Table, study: Study) -> dict[str, dict[str, tuple[float, float, float, float]]]:
+    """First order and total of each parameter for each kept value, and the half widths of their 95 % intervals; for the design saltelli.
 
     Raises InputError: runs are missing or failed.
     """
@@ -83,13 +83,14 @@ def sobol_indices(table: pa.Table, study: Study) -> dict[str, dict[str, tuple[fl
 
     names = [v.title for v in study.vary]
     problem = {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
-    out = {}
+    out: dict[str, dict[str, Any]] = {}
     for name in study.keep:
         y = table[name].to_numpy()
         if len(y) != study.total or not np.all(np.isfinite(y)):
             raise InputError(f"Sobol indices of {name} need all {study.total} runs, without failures")
-        found = sobol.analyze(problem, y, calc_second_order=True, seed=study.seed)
-        out[name] = {p: (float(found["S1"][k]), float(found["ST"][k])) for k, p in enumerate(names)}
+        found = sobol.analyze(problem, y, calc_second_order=True, seed=study.seed + 1)  # 0 is none
+        columns = [found[x].tolist() for x in ("S1", "ST", "S1_conf", "ST_conf")]
+        out[name] = dict(zip(names, zip(*columns, strict=True), strict=True))
     return out
 
 
@@ -200,12 +201,12 @@ def _study_lines(study: Study, table: pa.Table, name: str) -> list[str]:
     lines.append("  " + " " * width + "".join(h.rjust(12) for h in STATISTICS))
     lines += ["  " + r[0].ljust(width) + "".join(_short(x).rjust(12) for x in r[1:]) for r in rows]
     for kept, by_parameter in _whole_indices(table, study).items():
-        shares = ", ".join(f"{p} {s1:.3f} ({st:.3f})" for p, (s1, st) in by_parameter.items())
-        lines.append(f"  Sobol indices of {kept}, first order (total): {shares}")
+        shares = ", ".join(f"{p} {s:.3f} ± {a:.3f} ({t:.3f} ± {b:.3f})" for p, (s, t, a, b) in by_parameter.items())
+        lines.append(f"  Sobol indices of {kept}, first order (total), 95 % intervals: {shares}")
     return lines
 
 
-def _whole_indices(table: pa.Table, study: Study) -> dict[str, dict[str, tuple[float, float]]]:
+def _whole_indices(table: pa.Table, study: Study) -> dict[str, dict[str, tuple[float, float, float, float]]]:
     """Sobol indices of a study whose design is for them, if all of its runs are there."""
     whole = study.design == "saltelli" and table.num_rows == study.total and not _failures(table)
     return sobol_indices(table, study) if whole else {}
@@ -219,9 +220,15 @@ def _study_page(study: Study, table: pa.Table, name: str) -> Report:
     if ranks:
         parts.append(bars("tornado", "Influence of the parameters", ranks, "rank correlation [-]"))
     if indices := _whole_indices(table, study):
-        parts.append(bars("sobol", "Sobol indices", indices, "Sobol index [-]", ("first order", "total")))
+        shares = {kept: {p: found[:2] for p, found in by.items()} for kept, by in indices.items()}
+        parts.append(bars("sobol", "Sobol indices", shares, "Sobol index [-]", ("first order", "total")))
     parts.append(scatter(table, study))
     tables = {"statistics.csv": table_csv(["value", *STATISTICS], rows)}
+    if indices:
+        head = ["value", "parameter", "first order", "total", "first order, 95 % ±", "total, 95 % ±"]
+        tables["sobol.csv"] = table_csv(
+            head, [[kept, p, *found] for kept, by in indices.items() for p, found in by.items()]
+        )
     verdict: Verdict | tuple[str, ...] = _result(table, study, ranks)
     if study.select is not None:
         selected = show_selection(table, study)
