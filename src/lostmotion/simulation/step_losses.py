@@ -72,6 +72,11 @@ def lost_steps(result: xarray.Dataset) -> tuple[LostSteps, ...]:
     tuple of LostSteps
         One for each stepper, in the order of the motors.
 
+    Raises
+    ------
+    InputError
+        The dataset carries no scenario.
+
     Examples
     --------
     >>> import lostmotion as lm
