@@ -36,11 +36,16 @@ class Header:
         self._included: set[Path] = set()
 
     def without_includes(self, source: Path) -> str:
-        """The text of a source; what it includes goes into the header."""
-        text = source.read_text(encoding="utf-8")
-        for name in INCLUDED.findall(text):
-            self._include(path_of(name, source))
-        return INCLUDED.sub("", text).replace("#pragma once\n", "")
+        """The text of a source; what it includes goes into the header, or, where it is a part of a text, to its place."""
+
+        def moved(include: re.Match[str]) -> str:
+            path = path_of(include[1], source)
+            if "#pragma once" not in path.read_text(encoding="utf-8"):
+                return self.without_includes(path)
+            self._include(path)
+            return ""
+
+        return INCLUDED.sub(moved, source.read_text(encoding="utf-8")).replace("#pragma once\n", "")
 
     def _include(self, path: Path) -> None:
         if path in self._included:
