@@ -86,9 +86,9 @@ def result(task: Study) -> Any:
 
 
 def test_a_killed_selection_resumes_where_it_was(tmp_path: Path):
-    """1500 pairs that the rules refuse, in three chunks: those that were written are not computed again."""
+    """1002 pairs that the rules refuse, in three chunks: those that were written are not computed again."""
     file = tmp_path / "task.toml"
-    ratios = ", ".join(f"{3.0 + 0.02 * k:.2f}" for k in range(1500))
+    ratios = ", ".join(f"{3.0 + 0.02 * k:.2f}" for k in range(1002))
     moves = "[{ to = 1.2, dwell = 0.1 }, { to = 0.0 }]"
     file.write_text(
         f"""[task]
@@ -118,7 +118,7 @@ values = [{ratios}]
     kept = {p.name: p.stat().st_mtime_ns for p in directory.glob("part-*.parquet")}
     assert 1 <= len(kept) < 3
     again = lm.select(file, directory)
-    assert again.sizes["pair"] == 1500
+    assert again.sizes["pair"] == 1002
     assert {p.name: p.stat().st_mtime_ns for p in directory.glob("part-*.parquet")}.items() >= kept.items()
     assert again.equals(lm.select(file))
 
