@@ -372,3 +372,29 @@ def test_step_by_step_the_field_and_the_current_are_named() -> None:
         simulation.advance(0.01, command=0.01)
     simulation.advance(0.5, motor_command=0.03, motor_current_command=1.0)
     assert float(simulation["motor_angle"]) == pytest.approx(0.03, abs=2e-3)
+
+
+def test_a_telescope_s_stepper_turns_its_axis_by_the_steps_that_its_controller_counts() -> None:
+    """AstroEQ: 48 steps, 300:1 and 144:1. A step is 0.625 arcsec; at 15.041 arcsec/s the 24 that are due in the first second come each 41.55 ms."""
+    arcsec = math.pi / 648_000.0
+    scenario = lm.Scenario(
+        shafts={"motor": {"inertia": 0.0, "viscous_friction": 2e-5}, "axis": {"inertia": 2.0}},
+        motors={
+            "ra": {**MOTOR, "shaft": "motor", "steps_per_revolution": 48, "holding_torque": 0.03, "rotor_inertia": 5e-7}
+        },
+        gears={
+            "train": {
+                "input": "motor",
+                "output": "axis",
+                "ratio": 43200,
+                "stiffness": {"kind": "linear", "stiffness": 2e4},
+                "mesh_damping": 200.0,
+            }
+        },
+        command={"ra": {"stepping": {"reference": {"ramps": [{"duration": 1.0, "rise": 15.041 * arcsec}]}}}},
+        simulation={"duration": 2.0, "sample_interval": 1e-3},
+    )
+    times = np.array([time for time, *_ in scenario.signals()["ra_command"].breakpoint_list()][1:])
+    assert times.size == 24
+    assert np.diff(times) == pytest.approx(np.full(23, 0.625 / 15.041), rel=1e-9)
+    assert float(lm.simulate(scenario).axis_angle[-1]) == pytest.approx(24 * 0.625 * arcsec, rel=1e-4)
