@@ -398,3 +398,11 @@ def test_a_telescope_s_stepper_turns_its_axis_by_the_steps_that_its_controller_c
     assert times.size == 24
     assert np.diff(times) == pytest.approx(np.full(23, 0.625 / 15.041), rel=1e-9)
     assert float(lm.simulate(scenario).axis_angle[-1]) == pytest.approx(24 * 0.625 * arcsec, rel=1e-4)
+
+
+def test_a_loop_around_a_stepper_is_refused() -> None:
+    tables = lm.load("speed-axis").written.model_dump(exclude_none=True)
+    tables["motor"] = MOTOR
+    with pytest.raises(lm.InputError, match="turned without a loop") as refusal:
+        lm.Scenario(**tables)
+    assert refusal.value.problems[0].keys == ("controller",)

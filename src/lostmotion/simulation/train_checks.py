@@ -127,6 +127,11 @@ def _check_controllers(scenario: Whole) -> None:
         if name not in motors:
             meant = did_you_mean(name, motors, f"the motors are {', '.join(motors) or 'none'}")
             raise InputError(f"is no motor of this train; {meant}", f"controllers.{name}")
+        if motors[name].kind == "stepper":
+            raise InputError(
+                f"controls a stepper, which is turned without a loop; give command.{name}.stepping in its place",
+                f"controllers.{name}",
+            )
         if name in tables.command:
             raise InputError(
                 "both turn the same motor; leave one of them out", f"command.{name}", f"controllers.{name}"
