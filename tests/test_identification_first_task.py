@@ -69,6 +69,22 @@ def test_without_a_rig_the_file_is_whole_but_for_the_rig(logs: Path) -> None:
     assert lm.identify(logs / "identify.toml").values  # the mass of the rig is not that of the logs
 
 
+def test_without_any_rig_a_template_is_written_that_the_file_takes(logs: Path, tmp_path: Path) -> None:
+    """Of a length that of a slide, of an angle that of a shaft, whose variables the file names."""
+    for k, (name, unit) in enumerate((("slide", "mm"), ("load", "deg"))):
+        folder = tmp_path / str(k)
+        folder.mkdir()
+        rows = [f"{0.01 * n},{n % 7},{0.1 * (n % 3)}" for n in range(30)]
+        (folder / "log.csv").write_text("\n".join([f"time [s],pos [{unit}],torque [N*m]", *rows]))
+        code, said = invoke("identify", "new", str(folder))
+        assert code == 0, said
+        assert name in lm.load(folder / "rig.toml").to_json()
+        task = (folder / "identify.toml").read_text()
+        assert 'scenario = "rig.toml"' in task
+        assert "SHAFT" not in task and "SLIDE" not in task and "MOTOR" not in task
+        assert [v for v in lm.load(folder / "rig.toml").train().shafts if f'variable = "{v}_' in task]
+
+
 def test_no_file_is_overwritten(logs: Path) -> None:
     (logs / "identify.toml").write_text("mine")
     (logs / "link.toml").symlink_to(logs / "nowhere")
@@ -106,7 +122,7 @@ def test_what_is_in_doubt_is_said(logs: Path) -> None:
     [
         (["new"], 2, "needs the directory of the logs"),
         (["new", "nowhere"], 1, "nowhere: is no directory"),
-        (["new", "empty"], 1, "empty: has no log; logs end in .json, .csv"),
+        (["new", "empty"], 1, "empty: has no log; logs end in .json, .jsonl, .csv"),
         (["new", "bad"], 1, "none of its 1 logs can be read"),
         (["x.toml", "empty"], 2, "DIR goes with `identify new`"),
         (["x.toml", "--rig", "rig.toml"], 2, "--rig goes with `identify new`"),

@@ -61,7 +61,7 @@ def identify(
     an error. Exit code 3: the logs determine none of the parameters.
 
     `new` looks at the logs in DIR and writes a first identification file: channels, units, sample times, and what is in doubt about
-    them. A file that exists is never overwritten.
+    them. Without --rig it also writes rig.toml, a template of the rig. A file that exists is never overwritten.
 
     \b
     lostmotion identify new servo/logs --rig servo.toml
@@ -118,6 +118,10 @@ def _new(directory: Path | None, rig: str | None, output: Path | None) -> None:
         raise InputError(f"{path}: exists; name another file with -o")
     with busy("Reading logs") as tell:
         text = first_task(directory, home=path.parent, rig=rig or "", progress=tell)
+        template = path.parent / "rig.toml"
+        if rig is None and not os.path.lexists(template):
+            _write_template(template, "slide" if "SLIDE" in text else "rig")
+            text = first_task(directory, home=path.parent, rig=template, progress=tell)
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
@@ -128,6 +132,16 @@ def _new(directory: Path | None, rig: str | None, output: Path | None) -> None:
     doubts = text.count("# Doubt: ")
     print(f"First identification file written to {path}; {doubts} of its lines begin with Doubt:")
     print(f"Next, once they are settled: lostmotion identify {path} -o identified")
+
+
+def _write_template(path: Path, kind: str) -> None:
+    """Write a rig whose values are to be filled in."""
+    from importlib.resources import files
+
+    from ..reports.pages import write_text
+
+    write_text(path, (files("lostmotion") / "identification" / f"{kind}-template.toml").read_text(encoding="utf-8"))
+    print(f"Template of a rig written to {path}: put in what is known of yours")
 
 
 def _print_summary(result: IdentificationResult) -> None:
