@@ -106,8 +106,10 @@ def _elements(result: xarray.Dataset) -> Iterator[Chart]:
     motors = [(train.motor_torque_of(name), name, motor.shaft) for name, motor in train.motors.items()]
     twists = [(train.twist_of(n), n, g.output) for n, g in train.gears.items() if g.stiffness.kind != "rigid"]
     stops = [(train.stop_torque_of(name), name, name) for name, shaft in train.shafts.items() if shaft.end_stops]
+    steppers = [name for name, motor in train.motors.items() if motor.kind == "stepper"]
     wanted: list[tuple[str, str, list[Series]]] = [
-        ("Command", "command [-]", [(train.command_of(name), name, 1.0) for name in scenario.commanded()]),
+        ("Command", "command [-]", [(train.command_of(n), n, 1.0) for n in scenario.commanded() if n not in steppers]),
+        ("Fields of steppers", "angle [rad]", [(train.command_of(n), n, 1.0) for n in steppers]),
         *_by_domain(train, "{Torque} of motors", "{torque} [{unit}]", "torque", motors),
         *(_speeds(part.train()) for part in parts_of(scenario)),
         *_by_domain(train, "{Torque} at outputs and loads", "{torque} [{unit}]", "torque", outputs + loads),
