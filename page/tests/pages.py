@@ -93,7 +93,7 @@ def write_reports(directory: Path) -> None:
     (directory / "run.html").write_text(render(run_report("joint", lm.simulate(joint))))
     (directory / "check.html").write_text(render(check_report("joint", check_drive(joint), joint.title)))
     response = lm.frequency_response(joint, [1.0, 3.0, 9.0], [0.1, 0.5])
-    (directory / "response.html").write_text(render(response_report({"joint": response}, joint, "load_speed")[0]))
+    (directory / "response.html").write_text(render(response_report({"joint": response}, joint, "load_speed")))
     x = np.geomspace(0.1, 1000.0, 200)
     y = np.where(x > 100.0, np.nan, 10.0 / x)
     named = Curve("designs", np.arange(3.0), np.array([2.0, 1.0, 3.0]), DOTS, names=("first", "second", "third"))
