@@ -22,8 +22,8 @@ PER_SIGN = {"{": 64, "[": 64, ":": 100, ",": 32}
 def read_servo_json(path: Path, *, time: str = "") -> Log:
     """Read a file ``{"mass": 0.5, ..., "entries": [{"timestamp": 0.0, "position": 0.1, ...}, ...]}``; units are SI.
 
-    Or a file ``{"mass": 0.5, ..., "timestamps": [0.0, ...], "positions": [0.1, ...]}``, whose arrays of one length are the channels; or
-    a list of objects, one in each line (``.jsonl``), or of rows below a heading; or an object that has one of these within. Names may
+    Or a file ``{"mass": 0.5, ..., "timestamps": [0.0, ...], "positions": [0.1, ...]}``, whose arrays of one length are the channels.
+    Or a list of objects, one in each line (``.jsonl``), or of rows below a heading, or an object that has one of these within. Names may
     have units, such as ``"position [mm]"``. A
     file that was cut off is read up to there, and a few entries without a number are missing samples. Keys of the header with hyphens are read with underscores. Words and lists of the header are kept as they are.
 
