@@ -107,6 +107,13 @@ def test_options_print_bare_numbers_back_with_their_unit() -> None:
     assert "bare number" not in quiet
 
 
+def test_a_command_that_is_suggested_has_the_changes_of_this_one() -> None:
+    changes = ["--set", "load.inertia=2 kg*m^2"]
+    for command, then in (("run", "lostmotion run"), ("check", "lostmotion check")):
+        said = CliRunner().invoke(app, [command, JOINT, *changes]).output
+        assert f"page: {then} {JOINT} --set 'load.inertia=2 kg*m^2' --report" in said.replace("\n", " ")
+
+
 def test_the_bare_numbers_of_a_list_of_tables_are_printed_back() -> None:
     moves = 'controller.reference.moves=[{to=1.0}, {to="90 deg", dwell=0.1}]'
     said = CliRunner().invoke(app, ["run", "position-axis", "--set", moves]).output

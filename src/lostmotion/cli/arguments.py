@@ -66,6 +66,13 @@ def load_scenario(source: str, overrides: list[str] | None, missing: list[str] |
     return loaded
 
 
+def again(scenario: str, overrides: list[str] | None) -> str:
+    """Scenario and changes as a command line that is suggested names them."""
+    from shlex import join
+
+    return join([scenario, *(part for text in overrides or () for part in ("--set", text))])
+
+
 def _numbers_of(key: str, value: Any) -> Iterator[tuple[str, str]]:
     """The bare numbers of a value, as text, with their dotted keys: those of lists and tables too."""
     if isinstance(value, dict | list):

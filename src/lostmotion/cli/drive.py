@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .arguments import Overrides, SourceArgument, load_scenario
+from .arguments import Overrides, SourceArgument, again, load_scenario
 from .targets import try_page
 from .terminal import about, conclude, simulating
 
@@ -47,7 +47,9 @@ def check(
 
         write_page(report, check_report(Path(scenario).stem, findings, loaded.title))
         print(f"Report written to {report}")
-        print(f"Next: lostmotion run {scenario} --plot run.png")
+        print(f"Next: lostmotion run {again(scenario, overrides)} --plot run.png")
     else:
-        print(f"All rules with their sources on a page: lostmotion check {scenario} --report check.html")
+        print(
+            f"All rules with their sources on a page: lostmotion check {again(scenario, overrides)} --report check.html"
+        )
     conclude(findings.verdict)

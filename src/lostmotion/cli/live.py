@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .arguments import Overrides, SourceArgument, load_scenario
+from .arguments import Overrides, SourceArgument, again, load_scenario
 from .targets import try_file
 from .terminal import about, busy
 
@@ -39,7 +39,7 @@ def live(
     with about(scenario), busy("Writing"):
         write_page(path, loaded)
     print(f"Page written to {path}")
-    print(f"Next: lostmotion run {scenario} --plot run.png")
+    print(f"Next: lostmotion run {again(scenario, overrides)} --plot run.png")
     if show:
         import webbrowser
 

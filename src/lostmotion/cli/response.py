@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .arguments import FiguresOption, Overrides, ReportOption, SourceArgument, load_scenario, number
+from .arguments import FiguresOption, Overrides, ReportOption, SourceArgument, again, load_scenario, number
 from .targets import pictures_of, writing
 from .terminal import about, announce_response, busy, progress
 
@@ -101,7 +101,7 @@ def response(
     if more:
         print(f"  {more} more reasons are in response.csv")
     if output is None:
-        print(f"All charts on a page: lostmotion response {scenario} -o response")
+        print(f"All charts on a page: lostmotion response {again(scenario, overrides)} -o response")
         return
     with writing(output), busy("Writing"):
         from ..reports.response import write_response
@@ -110,7 +110,7 @@ def response(
     print(f"Report written to {page}")
     if not (output / "response.nc").exists():
         print('response.nc is left out: it needs h5netcdf; install it: pip install "lostmotion[netcdf]"')
-    print(f"Next: lostmotion run {scenario} --plot run.png")
+    print(f"Next: lostmotion run {again(scenario, overrides)} --plot run.png")
 
 
 def _titles(scenario: str, others: Iterable[str]) -> dict[str, str]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .arguments import Overrides, SourceArgument, load_scenario, number, print_timed_moves
+from .arguments import Overrides, SourceArgument, again, load_scenario, number, print_timed_moves
 from .targets import try_file, try_page
 from .terminal import about, busy, conclude, simulating
 
@@ -116,9 +116,9 @@ def run(
 
             write_page(report, run_report(Path(scenario).stem, result.dataset()))
         print(f"Report written to {report}")
-        print(f"Next: lostmotion live {scenario}")
+        print(f"Next: lostmotion live {again(scenario, overrides)}")
     else:
-        print(f"All charts on a page: lostmotion run {scenario} --report {Path(scenario).stem}.html")
+        print(f"All charts on a page: lostmotion run {again(scenario, overrides)} --report {Path(scenario).stem}.html")
     verdict = verdict_of(result)
     if verdict is not None:
         print(f"Verdict: {verdict}")

@@ -13,6 +13,7 @@ from .arguments import (
     FiguresOption,
     Overrides,
     SourceArgument,
+    again,
     decibels,
     load_scenario,
     number,
@@ -166,7 +167,7 @@ def servo(
         _print_tuned(tuned)
     if drive_units:
         _print_drive_units(loaded, motor)
-    print("\n".join([*written, _next(scenario, files, directories, rule, wanted)]))
+    print("\n".join([*written, _next(again(scenario, overrides), files, directories, rule, wanted)]))
     conclude(report.verdict)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .arguments import FiguresOption, Overrides, ReportOption, SourceArgument, load_scenario, number
+from .arguments import FiguresOption, Overrides, ReportOption, SourceArgument, again, load_scenario, number
 from .targets import pictures_of, writing
 from .terminal import about, busy, conclude, console, progress
 
@@ -65,7 +65,7 @@ def track(
         budget = pointing_budget(loaded, after=after, view=angles, progress=step)
     _print_summary(loaded.title or Path(scenario).stem, budget)
     if output is None:
-        print(f"All charts on a page: lostmotion track {scenario} -o track")
+        print(f"All charts on a page: lostmotion track {again(scenario, overrides)} -o track")
     else:
         with writing(output), busy("Writing"):
             from ..reports.pages import write_report
@@ -73,7 +73,7 @@ def track(
 
             page = write_report(output, pointing_report(Path(scenario).stem, budget), pictures)
         print(f"Report written to {page}")
-        print(f"Next: lostmotion run {scenario} --report {Path(scenario).stem}.html")
+        print(f"Next: lostmotion run {again(scenario, overrides)} --report {Path(scenario).stem}.html")
     conclude(verdict_of(budget))
 
 
