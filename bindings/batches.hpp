@@ -1,6 +1,7 @@
 // Many drives at once.
 #pragma once
 
+#include <cstring>
 #include <optional>
 
 #include "lostmotion/batch/drive_batch.hpp"
@@ -129,6 +130,35 @@ inline void bind_exact_batch(nb::module_& m) {
         .def_prop_ro("memory", &B::memory, "Bytes, without what the solvers keep of the regimes.");
 }
 
+// Laws and data sheet of a drive, as a kernel for graphics processors takes them.
+inline nb::dict laws_of_drive(const model::Train& train) {
+    const batch::DriveKind kind(train);
+    const batch::DriveLaws& l = kind.laws();
+    const batch::DriveSheet sheet = batch::sheet_of(train, kind.half_gap());
+    const auto list = [](const double* from, int n) { return std::vector<double>(from, from + n); };
+    nb::dict out;
+    for (const auto& [name, from] :
+         {std::pair("lower", l.lower), {"upper", l.upper}, {"slope", l.slope}, {"offset", l.offset}, {"root", l.root}})
+        out[name] = list(from, l.pieces);
+    out["speeds"] = list(l.map.speeds, l.map.n_speeds);
+    out["loads"] = list(l.map.loads, l.map.n_loads);
+    out["values"] = list(l.map.values, l.map.n_speeds * l.map.n_loads);
+    out["steepest"] = l.steepest;
+    out["zero"] = l.zero;
+    out["losses"] = l.losses;
+    for (const auto& [name, is] : {std::pair("has_gap", l.has_gap),
+                                   {"rigid", l.rigid},
+                                   {"delays_torque", l.delays_torque},
+                                   {"limits_damping", l.limits_damping},
+                                   {"torque_source", l.torque_source}})
+        out[name] = is;
+    out["half_gap"] = kind.half_gap();
+    std::vector<double> numbers(sizeof sheet / sizeof(double));
+    std::memcpy(numbers.data(), &sheet, sizeof sheet);
+    out["sheet"] = numbers;
+    return out;
+}
+
 inline void bind_batches(nb::module_& m) {
     bind_exact_batch(m);
     using B = batch::DriveBatch;
@@ -155,6 +185,10 @@ inline void bind_batches(nb::module_& m) {
         .def_static(
             "error", [](const TrainDescription& t) { return B::error(t.train); }, "train"_a,
             "What keeps a train from being stepped in a batch, or nothing.")
+        .def_static(
+            "laws", [](const TrainDescription& t) { return laws_of_drive(t.train); }, "train"_a,
+            nb::sig("def laws(train: Train) -> dict[str, Any]"),
+            "Laws and data sheet of a drive, by the names of the walk.")
         .def(
             "step",
             [](B& b, const BatchInput& command, const BatchInput& load_torque, unsigned threads) {

@@ -35,7 +35,7 @@ LAYERS = [
     {"sizing", "servo", "pointing"},
     {"studies", "identification"},
     {"portable"},
-    {"mujoco"},
+    {"mujoco", "warp"},
     {"live_page"},
     {"reports"},
     {"paper"},

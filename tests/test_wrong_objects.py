@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import is_dataclass
 from decimal import Decimal
 from fractions import Fraction
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +60,16 @@ RESTING = HUNTING.replace(
 )
 TRACKING = lm.load("tracking-loss-map", {"simulation.duration": 0.05})
 RESULT = lm.simulate(SCENARIO)
+STEPPER = lm.Motor(
+    kind="stepper",
+    rotor_inertia=5.4e-6,
+    steps_per_revolution=200,
+    holding_torque=0.44,
+    rated_current=1.7,
+    resistance_phase=1.5,
+    inductance_phase=2.8e-3,
+    supply_voltage=24.0,
+)
 THERMAL = {"winding_case": 1.0, "case_ambient": 2.0}
 HEATED = SCENARIO.replace(
     **{f"motor.limits.thermal_resistance_{key}": value for key, value in THERMAL.items()},
@@ -92,6 +103,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "energy_of": (lm.energy_of, {"dataset": RESULT}),
     "actuator": (lm.actuator, {"name": "t-motor-ak80-6", "rotor_inertia": None, "efficiency": None}),
     "explain": (lm.explain, {"what": SCENARIO, "time": 0.01}),
+    "lost_steps": (lm.simulation.lost_steps, {"result": RESULT}),
     "frequency_response": (lm.frequency_response, {"drive": SCENARIO, "frequencies": [10.0], "amplitudes": [1.0], "source": "command", "mean_command": 0.0, "mean_load_torque": 0.0, "harmonics": 1, "refine": None, "threads": 1, "max_periods": 5, "law": None, "progress": dangle}),
     "gearbox": (lm.gearbox, {"name": "paper-gearbox", "temperature": None, "added_backlash": 0.0, "loss_factor": 1.0}),
     "linearize": (lm.linearize, {"drive": SCENARIO, "state": lm.Initial(), "command": 0.0, "load_torque": 0.0, "command_rate": 0.0, "load_torque_rate": 0.0, "time": None, "inputs": None, "input_rates": None}),
@@ -103,6 +115,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "measure": (lm.test_rig.measure, {"gearbox": None, "sheet": None, "notes": (), "progress": dangle}),
     "motor": (lm.motor, {"name": "paper-motor", "voltage_limit": None}),
     "motor_current": (lm.sizing.motor_current, {"result": HEAT, "motor": None}),
+    "pull_out_torque": (lm.sizing.pull_out_torque, {"motor": STEPPER, "speed": 10.0}),
     "overrunning": (lm.sizing.overrunning, {"gear": SCENARIO.gearbox, "load_torque": 10.0, "input_speed": 100.0}),
     "self_locking": (lm.sizing.self_locking, {"train": SCENARIO.drive().train(), "gear": "gearbox", "load_torque": 10.0, "input_speed": 100.0}),
     "open_result": (lm.open_result, {"path": "none.csv"}),
@@ -179,6 +192,8 @@ if mujoco is not None:
         "write_drive": (lm.mujoco.write_drive, {"drive": SCENARIO, "path": "elbow.drive", "controller": None, "replace": False}),
         "reduce": (lm.mujoco.reduce, {"drive": SCENARIO, "amplitude": 0.5, "frequency": 1.0, "load_torque": 0.0}),
     }  # fmt: skip
+if find_spec("warp") is not None:
+    CALLS["Drives"] = (lm.warp.Drives, {"drive": SCENARIO.drive(), "count": 2, "vary": None, "dtype": "float64", "device": "cpu", "seed": 0})  # fmt: skip
 SLOW = {
     "live",  # needs the built page
     "description",
@@ -205,7 +220,8 @@ SLOW = {
 
 def names() -> list[str]:
     # `attach` alone makes an `Actuated`. MuJoCo is optional.
-    wanted = {n: path for n, path in PATHS.items() if mujoco is not None or not path.startswith("mujoco.")}
+    missing = tuple(f"{library}." for library in ("mujoco", "warp") if find_spec(library) is None)
+    wanted = {n: path for n, path in PATHS.items() if not path.startswith(missing)}
     return [name for name in wanted if name != "Actuated" and callable(public(name))]
 
 

@@ -13,6 +13,7 @@ from . import simulation as simulation
 from . import sizing as sizing
 from . import studies as studies
 from . import test_rig as test_rig
+from . import warp as warp
 from ._core import SolverError as SolverError
 from .control.command import CommandSignal as CommandSignal
 from .control.controller import Controller as Controller

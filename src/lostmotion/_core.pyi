@@ -506,6 +506,10 @@ class DriveBatch:
     def error(train: Train) -> str:
         """What keeps a train from being stepped in a batch, or nothing."""
 
+    @staticmethod
+    def laws(train: Train) -> dict[str, Any]:
+        """Laws and data sheet of a drive, by the names of the walk."""
+
     def step(self, command: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], load_torque: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], threads: int) -> None: ...
 
     def reset(self, which: Annotated[NDArray[numpy.bool_], dict(shape=(None,), order='C', device='cpu', writable=False)] | None, start: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)] | None) -> None: ...

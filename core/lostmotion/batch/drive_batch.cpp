@@ -58,7 +58,6 @@ DriveBatch::DriveBatch(const std::vector<model::Train>& kinds, std::vector<int> 
       step_(step),
       drives_(kind_of_.size()),
       inputs_(2 * kind_of_.size()),
-      locked_(kind_of_.size()),
       shown_(states * kind_of_.size()) {
     for (const model::Train& train : kinds) {
         const DriveKind& made = *kinds_.emplace_back(std::make_unique<const DriveKind>(train));
@@ -212,7 +211,7 @@ bool DriveBatch::solve(std::size_t k, double command, double load_torque, Worker
     if (gear.twist != model::nowhere) at(s.x, gear.twist) = x.d;
     at(s.x, n.coupled) = x.angle;
     if (gear.hysteresis != model::nowhere) at(s.memory, gear.hysteresis) = x.hysteresis;
-    if (locked != model::nowhere) at(s.memory, locked) = locked_[k];
+    if (locked != model::nowhere) at(s.memory, locked) = x.held;
     s.started = x.known;
     if (x.known) {
         if (first.contact != model::nowhere)
@@ -247,7 +246,7 @@ bool DriveBatch::solve(std::size_t k, double command, double load_torque, Worker
     if (gear.twist != model::nowhere) x.d = at(s.x, gear.twist);
     x.angle = at(s.x, n.coupled);
     if (gear.hysteresis != model::nowhere) x.hysteresis = at(s.memory, gear.hysteresis);
-    if (locked != model::nowhere) locked_[k] = at(s.memory, locked);
+    if (locked != model::nowhere) x.held = at(s.memory, locked);
     x.known = true;
     if (first.contact != model::nowhere) x.motor = static_cast<signed char>(p.turned * at(s.key.modes, first.contact));
     if (gear.contact != model::nowhere) x.twist = at(s.key.modes, gear.contact);
@@ -264,7 +263,7 @@ void DriveBatch::reset(const bool* which, const double* start) {
     for (std::size_t k = 0; k < size(); ++k) {
         if (which != nullptr && !which[k]) continue;
         DriveState& x = drives_[k] = {};
-        inputs_[2 * k] = inputs_[2 * k + 1] = locked_[k] = 0.0;
+        inputs_[2 * k] = inputs_[2 * k + 1] = 0.0;
         if (start != nullptr) {
             const double* from = start + k * states;
             x.q = numbers(k).turned * from[0];
@@ -280,7 +279,6 @@ void DriveBatch::reset(const bool* which, const double* start) {
 void DriveBatch::restore(const Snapshot& s) {
     drives_ = s.drives;
     inputs_ = s.inputs;
-    locked_ = s.locked;
     for (std::size_t k = 0; k < size(); ++k) {
         drives_[k].known = drives_[k].known && s.changes == changes_;
         show(k);
@@ -299,7 +297,7 @@ void DriveBatch::read(double* out, Read&& what) const {
     for (std::size_t k = 0; k < size(); ++k) {
         DriveWalk walk(kind(k).laws(), numbers(k), drives_[k], inputs_[2 * k], inputs_[2 * k + 1]);
         if (!walk.x.known) walk.begin();
-        out[k] = walk.make() ? what(walk, k) : locked_[k];
+        out[k] = walk.make() ? what(walk, k) : 0.0;
     }
 }
 
@@ -320,7 +318,7 @@ void DriveBatch::read_twist_contact(std::int8_t* out) const {
 }
 
 std::size_t DriveBatch::memory() const {
-    return size() * (sizeof(DriveState) + sizeof(int) + (3 + states + own_.size()) * sizeof(double)) +
+    return size() * (sizeof(DriveState) + sizeof(int) + (2 + states + own_.size()) * sizeof(double)) +
            numbers_.size() * sizeof(DriveNumbers);
 }
 

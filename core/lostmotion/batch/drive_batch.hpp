@@ -68,10 +68,10 @@ class DriveBatch {
     struct Snapshot {
         const DriveBatch* of;
         std::vector<DriveState> drives;
-        std::vector<double> inputs, locked;
+        std::vector<double> inputs;
         long changes;
     };
-    Snapshot snapshot() const { return {this, drives_, inputs_, locked_, changes_}; }
+    Snapshot snapshot() const { return {this, drives_, inputs_, changes_}; }
     void restore(const Snapshot& s);
 
     const Counts& counts() const { return counts_; }
@@ -105,7 +105,6 @@ class DriveBatch {
     double step_;
     std::vector<DriveState> drives_;
     std::vector<double> inputs_;  // of the last step: command and load torque of each drive
-    std::vector<double> locked_;  // torque that rest leaves open [N m]
     std::vector<double> shown_;
     std::vector<Own> own_;  // parameters that were set
     bool each_its_own_ = false;

@@ -29,18 +29,14 @@ std::vector<double> reaches() {
     return out;
 }
 
-// The most that T_1 |i| changes per T_2.
-double largest_share(const model::Gear& gear) {
-    if (gear.efficiencies)
-        return std::fmax(1.0 / gear.efficiencies->driving(), std::fabs(gear.efficiencies->overrunning()));
-    if (gear.law.losses != Gearbox::loss_map) return 1.0 / gear.law.efficiency;
-    const LossGrid map = gear.law.map.grid();
+// The most that losses of a map change per torque.
+double steepest(const LossGrid& map) {
     double largest = 0.0;
     for (int j = 0; j < map.load_intervals(); ++j)
         for (int i = 0; i < map.n_speeds; ++i)
             largest = std::fmax(largest,
                                 std::fabs(map.value(j + 1, i) - map.value(j, i)) / (map.loads[j + 1] - map.loads[j]));
-    return 1.0 + largest;
+    return largest;
 }
 
 }  // namespace
@@ -63,7 +59,7 @@ DriveKind::DriveKind(const model::Train& train) : train_(train), reach_(reaches(
         }
         laws_.zero = -curve.first_piece();
         laws_.has_gap = gear.has_backlash();
-        if (laws_.has_gap && curve.odd()) half_gap_ = curve.upper(0);
+        if (laws_.has_gap && curve.odd()) laws_.half_gap = curve.upper(0);
     }
     laws_.pieces = static_cast<int>(slope_.size());
     laws_.lower = lower_.data();
@@ -77,6 +73,8 @@ DriveKind::DriveKind(const model::Train& train) : train_(train), reach_(reaches(
                    : gear.law.losses == Gearbox::loss_map ? DriveLaws::by_map
                                                           : DriveLaws::constant;
     laws_.map = gear.law.map.grid();
+    if (laws_.losses == DriveLaws::by_map) laws_.steepest = steepest(laws_.map);
+    laws_.torque_source = train_.motors[0].law.kind == Motor::torque_source;
     laws_.reach = reach_.data();
     laws_.inverse = inverse.data();
     laws_.most_degree = most_degree;
@@ -96,49 +94,37 @@ std::string not_walked(const model::Train& train) {
     return "";
 }
 
-DriveNumbers numbers_of(const DriveKind& kind, const model::Train& train, double half_gap) {
+DriveSheet sheet_of(const model::Train& train, double half_gap) {
     const model::ShaftMotor& motor = train.motors[0];
     const model::Gear& gear = train.gears[0];
     const model::Shaft &first = train.shafts[0], &last = train.shafts[1];
-    const double i = gear.reduction();
-    DriveNumbers n{};
-    n.per_motor = 1.0 / (i * (motor.law.rotor_inertia + gear.law.inertia + first.inertia));
-    n.per_load = 1.0 / last.inertia;
-    n.motor_drag = i * (first.viscous_friction + gear.law.viscous_friction);
-    n.load_drag = last.viscous_friction;
-    n.motor_slips = motor.law.friction_torque + first.friction.sliding(0.0);
-    n.motor_holds = motor.law.friction_torque + first.friction.holding();
-    n.load_slips = last.friction.sliding(0.0);
-    n.load_holds = last.friction.holding();
-    n.stall_torque = motor.law.stall_torque();
-    if (motor.law.kind == Motor::dc)
-        n.back_torque =
-            i * motor.law.rated_torque * (motor.law.armature_voltage_constant - 1.0) / motor.law.rated_speed;
-    n.command_limit = motor.limited() ? motor.command_limit() : unlimited;
-    n.per_ratio = 1.0 / i;
-    n.driving = 1.0 / (gear.efficiencies ? gear.efficiencies->driving() : gear.law.efficiency);
-    n.overrunning = gear.efficiencies ? gear.efficiencies->overrunning() : 0.0;
-    n.rated_torque = gear.rated_torque();
-    n.per_rated = 1.0 / n.rated_torque;
-    n.speed_share = i / gear.law.rated_input_speed;
-    n.mesh_damping = gear.mesh_damping;
-    n.gap = half_gap - kind.half_gap();
-    n.turned = gear.sense() < 0.0 ? -1 : 1;
-    if (gear.has_dry_losses()) n.has |= DriveNumbers::dry_losses;
-    if (gear.has_dry_losses() || n.motor_holds > 0.0) n.has |= DriveNumbers::of_motor;
-    if (gear.law.has_hysteresis()) {
-        n.has |= DriveNumbers::of_twist;
-        n.hysteresis = 0.5 * (1.0 - gear.law.hysteresis_efficiency);
-    }
-    if (last.friction.present()) n.has |= DriveNumbers::of_load;
-    const double doubled = gear.damping_limited ? 2.0 : 1.0;
-    n.stiff = std::sqrt(doubled * (n.per_load + largest_share(gear) * n.per_ratio * n.per_motor));
-    if (kind.laws().delays_torque) {
-        n.delay = 1.0 / motor.law.electrical_time_constant;
-        n.torque_scale = n.back_torque > 0.0 ? std::sqrt(n.delay * n.back_torque / n.per_motor) : n.delay / n.per_motor;
-        n.per_torque_scale = 1.0 / n.torque_scale;
-    }
-    return n;
+    DriveSheet s{};
+    s.rotor_inertia = motor.law.rotor_inertia;
+    s.motor_friction = motor.law.friction_torque;
+    s.rated_torque = motor.law.rated_torque;
+    s.rated_speed = motor.law.rated_speed;
+    s.time_constant = motor.law.electrical_time_constant;
+    s.voltage_constant = motor.law.armature_voltage_constant;
+    s.command_limit = motor.limited() ? motor.command_limit() : unlimited;
+    s.motor_inertia = first.inertia;
+    s.motor_viscous = first.viscous_friction;
+    s.shaft_friction = first.friction.sliding(0.0);
+    s.shaft_breakaway = first.friction.breakaway_torque;
+    s.ratio = gear.law.ratio;
+    s.gear_inertia = gear.law.inertia;
+    s.gear_viscous = gear.law.viscous_friction;
+    s.hysteresis_efficiency = gear.law.has_hysteresis() ? gear.law.hysteresis_efficiency : 1.0;
+    s.rated_input_speed = gear.law.rated_input_speed;
+    s.rated_output_torque = gear.rated_torque();
+    s.drive_efficiency = gear.efficiencies ? gear.efficiencies->driving() : gear.law.efficiency;
+    s.backdrive_efficiency = gear.efficiencies ? gear.efficiencies->overrunning() : 0.0;
+    s.mesh_damping = gear.mesh_damping;
+    s.backlash = 2.0 * half_gap;
+    s.load_inertia = last.inertia;
+    s.load_viscous = last.viscous_friction;
+    s.load_friction = last.friction.sliding(0.0);
+    s.load_breakaway = last.friction.breakaway_torque;
+    return s;
 }
 
 }  // namespace lostmotion::batch

@@ -8,7 +8,7 @@
 
 namespace lostmotion::batch {
 
-inline constexpr double EPSILON = 0x1p-52;
+inline constexpr double ROUNDING = 0x1p-52;
 #include "drive_walk.hpp"
 
 // What drives of a kind share: their train, and its laws as the walk reads them.
@@ -20,19 +20,21 @@ class DriveKind {
     const model::Train& train() const { return train_; }
     const DriveLaws& laws() const { return laws_; }
     // The play of its flanks, half of it on each side [rad].
-    double half_gap() const { return half_gap_; }
+    double half_gap() const { return laws_.half_gap; }
 
  private:
     model::Train train_;
     std::vector<double> lower_, upper_, slope_, offset_, root_, reach_;
-    double half_gap_ = 0.0;
     DriveLaws laws_{};
 };
 
 // What keeps the walk from stepping a train that is one motor, one gear and a load, or nothing.
 std::string not_walked(const model::Train& train);
 
-// The numbers of a drive of a kind; its parameters are those of `train`, and half of its gap on each side [rad].
-DriveNumbers numbers_of(const DriveKind& kind, const model::Train& train, double half_gap);
+// The data sheet of a drive, with half of its gap on each side [rad].
+DriveSheet sheet_of(const model::Train& train, double half_gap);
+inline DriveNumbers numbers_of(const DriveKind& kind, const model::Train& train, double half_gap) {
+    return sheet_of(train, half_gap).numbers(kind.laws());
+}
 
 }  // namespace lostmotion::batch

@@ -19,8 +19,8 @@
 // rising. Whatever is not certain is said, and nothing of that step may be used.
 //
 // The text of this file is plain: it includes nothing, allocates nothing and calls nothing but what it defines, so that
-// it is also the body of a kernel for graphics processors. `real` is the type of its numbers, `EPSILON` their rounding;
-// `parts/loss_grid.hpp` stands before it.
+// it is also the body of a kernel for graphics processors. `real` is the type of its numbers, `ROUNDING` their
+// rounding; `parts/loss_grid.hpp` stands before it.
 
 // What drives of a kind share.
 struct DriveLaws {
@@ -29,12 +29,15 @@ struct DriveLaws {
     // `lower` and `upper`; root: of the slope.
     const real *lower, *upper, *slope, *offset, *root;
     int pieces, zero;
+    real half_gap;        // half of the backlash [rad]
     bool has_gap;         // piece `zero` has no stiffness
     bool rigid;           // no twist at all
     bool delays_torque;   // q is a state
     bool limits_damping;  // to the torque of the spring
+    bool torque_source;   // no voltage behind the torque
     int losses;
     LossGrid map;
+    real steepest;        // the most that losses of the map change per torque
     const real* reach;    // of a series of each degree: |A| t up to which what lies beyond is below rounding
     const real* inverse;  // 1/k
     int most_degree;
@@ -57,14 +60,74 @@ struct DriveNumbers {
     real gap;                             // by which flanks are further out than `laws` has them [rad]
     real stiff;                           // root of the largest twist acceleration per torque
     real torque_scale, per_torque_scale;  // of q over that of a, and its inverse
-    unsigned char has;                    // contacts
-    signed char turned;                   // -1: a ratio below zero
+    int has;                              // contacts
+    int turned;                           // -1: a ratio below zero
     enum Contact { of_motor = 1, of_twist = 2, of_load = 4, dry_losses = 8 };
+};
+
+// What data sheets and scenario files say of one drive [SI].
+struct DriveSheet {
+    real rotor_inertia, motor_friction, rated_torque, rated_speed, time_constant, voltage_constant, command_limit;
+    real motor_inertia, motor_viscous, shaft_friction, shaft_breakaway;  // of the motor's shaft
+    real ratio, gear_inertia, gear_viscous, hysteresis_efficiency, rated_input_speed, rated_output_torque;
+    real drive_efficiency, backdrive_efficiency, mesh_damping;
+    real backlash;
+    real load_inertia, load_viscous, load_friction, load_breakaway;
+
+    // The root of a number, or slightly more.
+    static real root(real of) {
+        real g = 1;
+        while (g * g < of) g *= 2;
+        while (g > 0 && g * g > 4 * of) g *= real(0.5);
+        for (int k = 0; k < 6 && g > 0; ++k) g = real(0.5) * (g + of / g);
+        return g;
+    }
+    DriveNumbers numbers(const DriveLaws& laws) const {
+        DriveNumbers n;
+        const real i = ratio < 0 ? -ratio : ratio;
+        n.turned = ratio < 0 ? -1 : 1;
+        n.per_ratio = 1 / i;
+        n.per_motor = 1 / (i * (rotor_inertia + gear_inertia + motor_inertia));
+        n.per_load = 1 / load_inertia;
+        n.motor_drag = i * (motor_viscous + gear_viscous);
+        n.load_drag = load_viscous;
+        n.motor_slips = motor_friction + shaft_friction;
+        n.motor_holds = motor_friction + (shaft_breakaway > shaft_friction ? shaft_breakaway : shaft_friction);
+        n.load_slips = load_friction;
+        n.load_holds = load_breakaway > load_friction ? load_breakaway : load_friction;
+        n.stall_torque = rated_torque * (laws.torque_source ? real(1) : voltage_constant);
+        n.back_torque = laws.torque_source ? 0 : i * rated_torque * (voltage_constant - 1) / rated_speed;
+        n.command_limit = command_limit;
+        n.driving = 1 / drive_efficiency;
+        n.overrunning = backdrive_efficiency;
+        n.rated_torque = rated_output_torque;
+        n.per_rated = 1 / rated_output_torque;
+        n.speed_share = i / rated_input_speed;
+        n.hysteresis = real(0.5) * (1 - hysteresis_efficiency);
+        n.mesh_damping = mesh_damping;
+        n.gap = real(0.5) * backlash - laws.half_gap;
+        n.has = laws.losses == DriveLaws::constant ? 0 : DriveNumbers::dry_losses | DriveNumbers::of_motor;
+        if (n.motor_holds > 0) n.has |= DriveNumbers::of_motor;
+        if (!laws.rigid && hysteresis_efficiency < 1) n.has |= DriveNumbers::of_twist;
+        if (n.load_holds > 0) n.has |= DriveNumbers::of_load;
+        const real back = backdrive_efficiency < 0 ? -backdrive_efficiency : backdrive_efficiency;
+        const real share = laws.losses == DriveLaws::by_map ? 1 + laws.steepest : n.driving > back ? n.driving : back;
+        n.stiff = root((laws.limits_damping ? 2 : 1) * (n.per_load + share * n.per_ratio * n.per_motor));
+        n.delay = laws.delays_torque ? 1 / time_constant : 0;
+        n.torque_scale = n.per_torque_scale = 1;
+        if (laws.delays_torque) {
+            const real pull = n.delay * n.back_torque;
+            n.torque_scale = pull > 0 ? root(pull / n.per_motor) : n.delay / n.per_motor;
+            n.per_torque_scale = 1 / n.torque_scale;
+        }
+        return n;
+    }
 };
 
 struct DriveState {
     real q, a, v, d, angle;
     real hysteresis;                 // capacity [N m]
+    real held;                       // torque of the mesh where all contacts rest, which the motion leaves open [N m]
     signed char motor, twist, load;  // modes of the contacts: 0 at rest, +1 or -1
     signed char flanks;              // 0 touch, 1 parted, 2 damping at its limit
     short piece, cell, back;         // of the torsion curve; of the losses; of those in the other direction, at rest
@@ -119,19 +182,31 @@ struct DriveWalk {
     DriveState x;
     Regime r;
     int switchings, degree;
+    // What was not certain. `bold`: the walk goes on all the same, as if it were the likelier of both.
+    enum Doubt { below_zero = 1, near_zero = 2, two_at_once = 4, too_long = 8, no_regime = 16 };
+    bool bold;
+    mutable int doubts;
     real y[4][longest_series + 1];  // terms of the series of q, a, v, d, in the share of its time
     real tail[4], slope_tail[4];    // of the terms beyond the cubic, and of its slope
 
+    // False: there is a doubt that the walk does not go on with.
+    bool goes_on_with(int doubt) const {
+        doubts |= doubt;
+        return bold;
+    }
     static real magnitude(real v) { return v < 0 ? -v : v; }
     static real least(real a, real b) { return a < b ? a : b; }
     static real most(real a, real b) { return a > b ? a : b; }
-    static real doubt() { return real(4e6) * EPSILON; }     // of a value over the sum of the magnitudes of its terms
-    static real on_zero() { return real(5e3) * EPSILON; }   // the same, where a guard begins on zero
-    static real together() { return real(4e6) * EPSILON; }  // of two zeros, in the time of the series
+    static bool is_single() { return ROUNDING > real(1e-10); }
+    // Of a value over the sum of the magnitudes of its terms; where a guard begins on zero; of two zeros, in the time
+    // of the series.
+    static real doubt() { return is_single() ? real(1e-5) : real(1e-9); }
+    static real on_zero() { return is_single() ? real(1e-6) : real(1e-12); }
+    static real together() { return is_single() ? real(1e-5) : real(1e-9); }
 
     DriveWalk(const DriveLaws& the_laws, const DriveNumbers& numbers, const DriveState& from, real to_motor,
               real to_load)
-        : laws(the_laws), p(numbers), load_torque(to_load), x(from), switchings(0), degree(0) {
+        : laws(the_laws), p(numbers), load_torque(to_load), x(from), switchings(0), degree(0), bold(false), doubts(0) {
         const real asked = p.turned < 0 ? -to_motor : to_motor;
         command = asked > p.command_limit ? p.command_limit : asked < -p.command_limit ? -p.command_limit : asked;
     }
@@ -140,6 +215,7 @@ struct DriveWalk {
     bool motor_rests() const { return has(DriveNumbers::of_motor) && x.motor == 0; }
     bool load_rests() const { return has(DriveNumbers::of_load) && x.load == 0; }
     bool tied() const { return laws.rigid || (has(DriveNumbers::of_twist) && x.twist == 0); }
+    static int contact_bit(int contact) { return 1 << contact; }
     signed char* mode(int contact) { return contact == motor ? &x.motor : contact == twist ? &x.twist : &x.load; }
 
     // Bounds of a piece, and its torque as a form.
@@ -189,14 +265,8 @@ struct DriveWalk {
         return out;
     }
 
-    // The regime of the modes, the piece and the cells. False: it is for the general solver.
-    bool make() {
-        r.n = 0;
-        r.twists = false;
-        const bool motor_at_rest = motor_rests(), load_at_rest = load_rests(), together = tied();
-        if (motor_at_rest && load_at_rest && has(DriveNumbers::of_twist)) return false;
-        if (together && (load_at_rest || (motor_at_rest && has(DriveNumbers::of_load)))) return false;
-        // The motor.
+    // The torque of the motor, and its rate.
+    void set_pull() {
         if (laws.delays_torque) {
             r.pull = {0, 1, 0, 0, 0};
             r.q = {p.delay * p.stall_torque * command, -p.delay, -p.delay * p.back_torque, 0, 0};
@@ -204,6 +274,84 @@ struct DriveWalk {
             r.pull = {p.stall_torque * command, 0, -p.back_torque, 0, 0};
             r.q = {0, 0, 0, 0, 0};
         }
+    }
+    // The contact that slips and stops together with this one, as the third one rests; -1: there is none.
+    int partner(int contact) const {
+        if (laws.rigid) return -1;
+        const int third = tied() ? twist : motor_rests() ? motor : load_rests() ? load : -1;
+        if (third < 0 || third == contact) return -1;
+        const int other = 3 - third - contact;
+        return has(contact_bit(other)) ? other : -1;
+    }
+    // All contacts rest: the motion does not determine what the mesh passes on.
+    bool rests() const {
+        return !laws.rigid && has(DriveNumbers::of_twist) && x.twist == 0 && motor_rests() && load_rests();
+    }
+    // What the mesh may pass on there, by the hysteresis and the friction of the load [N m].
+    real least_held() const { return most(spring_torque() - x.hysteresis, load_torque - p.load_holds); }
+    real most_held() const { return least(spring_torque() + x.hysteresis, load_torque + p.load_holds); }
+    real spring_torque() const { return spring(x.piece) + laws.slope[x.piece] * x.d; }
+    // What the motor holds ahead or back where the mesh passes on a torque [N m]; it grows with what the mesh takes.
+    real motor_held(real torque, int way) const {
+        const real mu = way * torque * p.per_rated;
+        real loss = (p.driving - 1) * way * torque;
+        if (has(DriveNumbers::dry_losses)) {
+            const bool map = laws.losses == DriveLaws::by_map;
+            const Plane m = loss_plane(map ? laws.map.load_interval(mu) : mu < 0 ? 0 : 1, true);
+            loss = p.rated_torque * (m.at_zero + m.per_load * mu);
+        }
+        return p.motor_holds + (way * torque + loss) * p.per_ratio;
+    }
+    // By how much less than they hold the contacts take under a torque of the motor [N m], with the torque of the mesh
+    // as near to what it was as they allow; it becomes that.
+    real spare_at_rest(real pull) {
+        const real low = least_held(), high = most_held();
+        if (low > high) return high - low;
+        real torque = least(most(x.held, low), high);
+        for (int way = 1; way >= -1; way -= 2) {
+            const auto spare = [&](real at) { return motor_held(at, way) - way * pull; };
+            if (spare(torque) >= 0) continue;
+            real within = way > 0 ? high : low, beyond = torque;
+            if (spare(within) < 0) return spare(within);
+            for (int n = 0; n < 60; ++n) {
+                const real middle = real(0.5) * (within + beyond);
+                (spare(middle) >= 0 ? within : beyond) = middle;
+            }
+            torque = within;
+        }
+        x.held = torque;
+        return least(motor_held(high, 1) - pull, motor_held(low, -1) + pull);
+    }
+
+    // Of three contacts two keep the third at rest, which therefore does not slip; one lets both others slip alike.
+    bool possible() const {
+        const bool of_motor = has(DriveNumbers::of_motor), of_twist = has(DriveNumbers::of_twist),
+                   of_load = has(DriveNumbers::of_load);
+        if (tied()) {
+            if (of_motor && of_load && !laws.rigid && x.motor != x.load) return false;
+            return !load_rests() || motor_rests();
+        }
+        if (motor_rests() && load_rests()) return !of_twist;
+        if (motor_rests()) return !of_twist || !of_load || x.twist == -x.load;
+        return !load_rests() || !of_twist || !of_motor || x.twist == x.motor;
+    }
+    // The regime of the modes, the piece and the cells. False: it is for the general solver.
+    bool make() {
+        r.n = 0;
+        r.twists = false;
+        const bool motor_at_rest = motor_rests(), load_at_rest = load_rests(), together = tied();
+        if (rests()) {
+            set_pull();
+            r.a = r.w = r.v = {0, 0, 0, 0, 0};
+            r.output = {x.held, 0, 0, 0, 0};
+            guard(over(r.pull, -1, motor_held(most_held(), 1)), capacity, motor, 1);
+            guard(over(r.pull, 1, motor_held(least_held(), -1)), capacity, motor, -1);
+            set_norm();
+            return true;
+        }
+        if (motor_at_rest && load_at_rest && has(DriveNumbers::of_twist)) return false;
+        if (together && (load_at_rest || (motor_at_rest && has(DriveNumbers::of_load)))) return false;
+        set_pull();
         // What the mesh passes on.
         const int k = x.piece;
         const Form P = laws.rigid ? Form{0, 0, 0, 0, 0} : Form{spring(k), 0, 0, 0, laws.slope[k]};
@@ -265,9 +413,9 @@ struct DriveWalk {
         // Contacts that slip.
         if (has(DriveNumbers::of_motor) && x.motor != 0)
             guard({0, 0, static_cast<real>(x.motor), 0, 0}, speed, motor, 0);
-        if (has(DriveNumbers::of_twist) && x.twist != 0)
+        if (has(DriveNumbers::of_twist) && x.twist != 0 && partner(twist) != motor)
             guard({0, 0, 0, static_cast<real>(x.twist), 0}, speed, twist, 0);
-        if (has(DriveNumbers::of_load) && x.load != 0) {
+        if (has(DriveNumbers::of_load) && x.load != 0 && partner(load) < 0) {
             const real s = x.load;
             guard({0, 0, s, -s, 0}, speed, load, 0);
         }
@@ -359,7 +507,8 @@ struct DriveWalk {
         if (!x.known) {
             if (!begin()) return false;
         } else {
-            if (!make()) return false;
+            if (!make()) return goes_on_with(no_regime);
+            if (rests() && spare_at_rest(r.pull.at(x)) < 0 && (!begin() || rests())) return false;
             int violated = -1;
             const Verdict v = verify(0, -1, true, violated);
             if (v == unsure || (v == no && !resolve(violated, true))) return false;
@@ -368,32 +517,32 @@ struct DriveWalk {
         while (left > 0) {
             int fired = -1;
             if (!go_on(left, fired)) return false;
+            if (rests()) spare_at_rest(r.pull.at(x));
             if (fired < 0) return true;
-            if (++switchings > most_switchings || !resolve(fired, false)) return false;
+            if (++switchings > most_switchings) return goes_on_with(too_long);
+            if (!resolve(fired, false)) return goes_on_with(no_regime);
         }
         return true;
     }
-
     // Finds the modes where only the states are known.
     bool begin() {
-        x.known = true;
         x.flanks = 0;
         if (!laws.rigid) locate_piece();
-        const real w = x.a - x.v;
-        const real speeds[3] = {x.a, x.v, w};
-        const int bits[3] = {DriveNumbers::of_motor, DriveNumbers::of_twist, DriveNumbers::of_load};
-        unsigned moving = 0;
-        int open = 0, opened[3] = {0, 0, 0};
+        if (!x.known) x.held = laws.rigid ? 0 : spring(x.piece) + laws.slope[x.piece] * x.d;
+        x.known = true;
+        const real speeds[3] = {x.a, x.v, x.a - x.v};
+        unsigned slipping = 0;
         for (int c = 0; c < 3; ++c) {
-            *mode(c) = 0;
-            if (!has(bits[c])) continue;
-            if (speeds[c] != 0) {
-                *mode(c) = speeds[c] > 0 ? 1 : -1;
-                moving |= 1u << c;
-            } else {
-                opened[open++] = c;
-            }
+            *mode(c) = static_cast<signed char>(speeds[c] > 0 ? 1 : speeds[c] < 0 ? -1 : 0);
+            if (*mode(c) != 0 && has(contact_bit(c))) slipping |= 1u << c;
         }
+        return find(slipping);
+    }
+    // The same where some contacts are known to slip on.
+    bool find(unsigned slipping) {
+        int open = 0, opened[3] = {0, 0, 0};
+        for (int c = 0; c < 3; ++c)
+            if (has(contact_bit(c)) && (slipping >> c & 1u) == 0) opened[open++] = c;
         int combinations = 1;
         for (int k = 0; k < open; ++k) combinations *= 3;
         const DriveState from = x;
@@ -402,7 +551,7 @@ struct DriveWalk {
             for (int k = 0, rest = n; k < open; ++k, rest /= 3)
                 *mode(opened[k]) = static_cast<signed char>(rest % 3 == 2 ? -1 : rest % 3);
             locate_losses(laws.rigid ? 0 : spring(x.piece) + laws.slope[x.piece] * x.d + x.twist * x.hysteresis);
-            const Verdict v = accept(moving, -1);
+            const Verdict v = accept(slipping, -1);
             if (v != no) return v == yes;
         }
         return false;
@@ -420,11 +569,14 @@ struct DriveWalk {
                 bool halve = false;
                 if (!see(s, fresh, first, halve)) return false;
                 if (!halve) break;
-                if (++halvings > most_halvings) return false;
+                if (++halvings > most_halvings) {
+                    if (!goes_on_with(too_long)) return false;
+                    break;
+                }
                 shorten();
                 s *= real(0.5);
             }
-            if (first.doubtful) return false;
+            if (first.doubtful && !goes_on_with(two_at_once)) return false;
             if (first.guard >= 0) {
                 move(s, first.at);
                 left -= first.at * s;
@@ -461,7 +613,7 @@ struct DriveWalk {
         const auto size = [&] {
             return most(most(magnitude(q) * r.per_q, magnitude(d) * r.per_d), most(magnitude(a), magnitude(v)));
         };
-        const real enough = real(0.0625) * EPSILON * size();
+        const real enough = real(0.0625) * ROUNDING * size();
         int k = 2;
         for (; k <= longest; ++k) {
             const real f = s * laws.inverse[k];
@@ -556,19 +708,27 @@ struct DriveWalk {
     Verdict judge(const Form& f, const real* c, real rest, real s, real before, bool fresh, real& at,
                   bool& halve) const {
         const real size = f.size(x), zero = on_zero() * size;
-        if (c[0] < -zero) return unsure;
+        if (c[0] < -zero) {
+            at = 0;
+            return goes_on_with(below_zero) ? no : unsure;
+        }
         if (c[0] <= zero) {  // it begins on zero: does it depart?
-            const real no_slope = 10 * on_zero() * s * size_of_rate(f);
+            if (c[1] == 0 && c[2] == 0 && c[3] == 0 && rest == 0) return yes;
+            const real no_slope = 10 * on_zero() * (s * size_of_rate(f) + magnitude(c[2]) + magnitude(c[3]) + rest);
             if (c[1] < -no_slope) {
                 at = 0;
-                return fresh ? unsure : no;
+                return !fresh || goes_on_with(near_zero) ? no : unsure;
             }
             if (c[1] > no_slope) {
                 halve = !(least(c[1], least(c[1] + real(0.5) * c[2], c[1] + c[2] + c[3])) > rest);
                 return yes;
             }
-            if (!(c[2] > no_slope)) return unsure;
-            halve = !(least(c[2], c[2] + c[3]) > rest);
+            if (c[2] > no_slope) {
+                halve = !(least(c[2], c[2] + c[3]) > rest);
+                return yes;
+            }
+            if (!(c[3] > no_slope && c[2] >= -no_slope)) return goes_on_with(near_zero) ? yes : unsure;
+            halve = !(c[3] > rest);
             return yes;
         }
         const real slope_rest = (magnitude(f.q) * slope_tail[0] + magnitude(f.a) * slope_tail[1]) +
@@ -585,7 +745,7 @@ struct DriveWalk {
         for (int k = 0; k < 4; ++k) all[k] = c[k];
         end += c[3] + c[2] + c[1] + c[0];
         if (end >= 0) return yes;
-        while (n > 3 && magnitude(all[n]) < real(1e-3) * EPSILON * size) --n;
+        while (n > 3 && magnitude(all[n]) < real(1e-3) * ROUNDING * size) --n;
         const auto value_at = [&](real t, int to, real& slope) {
             real value = all[to];
             slope = 0;
@@ -621,29 +781,42 @@ struct DriveWalk {
         return magnitude(f.q) * r.q.size(x) + magnitude(f.a) * r.a.size(x) +
                magnitude(f.v) * (r.twists ? r.v.size(x) : 0) + magnitude(f.d) * (r.twists ? magnitude(x.v) : 0);
     }
-    real rate(const Form& f) const {
-        return (f.q * r.q.at(x) + f.a * r.a.at(x)) + (r.twists ? f.v * r.v.at(x) + f.d * x.v : 0);
-    }
-    real second_rate(const Form& f, real& size) const {
-        const real q = r.q.at(x), a = r.a.at(x), v = r.twists ? r.v.at(x) : 0, d = r.twists ? x.v : 0;
-        const auto next = [&](const Form& of, real& magnitudes) {
-            magnitudes = magnitude(of.q) * r.q.size(x) + magnitude(of.a) * r.a.size(x) +
-                         magnitude(of.v) * (r.twists ? r.v.size(x) : 0) + magnitude(of.d) * magnitude(d);
-            return (of.q * q + of.a * a) + (of.v * v + of.d * d);
-        };
-        real of_q, of_a, of_v;
-        const real q2 = next(r.q, of_q), a2 = next(r.a, of_a), v2 = next(r.v, of_v), d2 = r.twists ? v : 0;
-        size = magnitude(f.q) * of_q + magnitude(f.a) * of_a +
-               (r.twists ? magnitude(f.v) * of_v + magnitude(f.d) * r.v.size(x) : 0);
-        return (f.q * q2 + f.a * a2) + (r.twists ? f.v * v2 + f.d * d2 : 0);
-    }
-    // Does a guard that is zero rise from there, by its first or second derivative?
-    Verdict departs(const Form& f) const {
-        const real first = rate(f);
-        if (magnitude(first) > doubt() * size_of_rate(f)) return first > 0 ? yes : no;
-        real size;
-        const real second = second_rate(f, size);
-        return second > doubt() * size ? yes : unsure;
+    // Does a guard that is zero rise from there, by the first of its derivatives that is not zero?
+    Verdict departs(const Guard& g) const {
+        const Form& f = g.form;
+        const real on = r.twists ? 1 : 0;
+        bool moves = false;
+        real t[4] = {r.q.at(x), r.a.at(x), on * r.v.at(x), on * x.v};
+        real m[4] = {r.q.size(x), r.a.size(x), on * r.v.size(x), on * magnitude(x.v)};
+        for (int k = 1; k <= 4; ++k) {
+            const real value = (f.q * t[0] + f.a * t[1]) + (f.v * t[2] + f.d * t[3]);
+            const real size =
+                (magnitude(f.q) * m[0] + magnitude(f.a) * m[1]) + (magnitude(f.v) * m[2] + magnitude(f.d) * m[3]);
+            moves = moves || size > 0;
+            if (magnitude(value) > doubt() * size) {
+                if (value > 0) return yes;
+                // A contact whose torque or speed only grazes its limit is another matter than an edge of a law.
+                const bool of_contact = g.kind == speed || g.kind == capacity;
+                return k == 1 || !of_contact || goes_on_with(near_zero) ? no : unsure;
+            }
+            const auto next = [&](const Form& of, real& magnitudes) {
+                magnitudes = (magnitude(of.q) * m[0] + magnitude(of.a) * m[1]) +
+                             (magnitude(of.v) * m[2] + magnitude(of.d) * m[3]);
+                return (of.q * t[0] + of.a * t[1]) + (of.v * t[2] + of.d * t[3]);
+            };
+            real n[4];
+            const real q = next(r.q, n[0]), a = next(r.a, n[1]), v = on * next(r.v, n[2]);
+            n[3] = on * m[2];
+            t[3] = on * t[2];
+            t[0] = q;
+            t[1] = a;
+            t[2] = v;
+            m[0] = n[0];
+            m[1] = n[1];
+            m[2] = on * n[2];
+            m[3] = n[3];
+        }
+        return !moves || goes_on_with(near_zero) ? yes : unsure;
     }
 
     // Finds the regime that follows where a guard has fallen, or, after the inputs have jumped, is below zero.
@@ -671,17 +844,39 @@ struct DriveWalk {
             locate_losses(mesh_torque());
             return accept(moving(), -1) == yes;
         }
+        const real torque = r.output.at(x);
         if (g.kind == capacity) {
+            // Others that it was held by may have to go along.
+            const int before = g.of == motor ? twist : motor, after = g.of == load ? twist : load;
+            const int along[2] = {before, after};
+            const int way[2] = {g.to, g.of == motor ? g.to : -g.to};
             const unsigned go = moving();
-            const real torque = r.output.at(x);
-            *mode(g.of) = static_cast<signed char>(g.to);
-            if (g.of == motor || tied()) locate_losses(torque);
-            return accept(jump ? go : go | 1u << g.of, -1) == yes;
+            const DriveState from = x;
+            for (int n = 0; n < 4; ++n) {
+                x = from;
+                *mode(g.of) = static_cast<signed char>(g.to);
+                bool well = true;
+                for (int k = 0; k < 2; ++k)
+                    if ((n >> k & 1) != 0) {
+                        well = well && *mode(along[k]) == 0 && has(contact_bit(along[k]));
+                        *mode(along[k]) = static_cast<signed char>(way[k]);
+                    }
+                if (!well) continue;
+                locate_losses(torque);
+                const Verdict v = accept(jump ? go : go | 1u << g.of, -1);
+                if (v != no) return v == yes;
+            }
+            return false;
         }
         if (jump) return false;
-        const real torque = r.output.at(x);
-        const unsigned go = moving() & ~(1u << g.of);
+        const int also = partner(g.of);
+        const unsigned go = moving() & ~(1u << g.of) & ~(also < 0 ? 0u : 1u << also);
+        x.held = torque;
         stop(g.of);
+        if (also >= 0) {
+            if (also == twist) stop(twist);
+            return find(go);
+        }
         const signed char was = *mode(g.of);
         const DriveState from = x;
         for (int n = 0; n < 3; ++n) {
@@ -691,7 +886,8 @@ struct DriveWalk {
             const Verdict v = accept(go, g.of);
             if (v != no) return v == yes;
         }
-        return false;
+        x = from;
+        return find(go);
     }
     // Torque that the spring of the mesh passes on where it slips.
     real mesh_torque() const {
@@ -728,7 +924,12 @@ struct DriveWalk {
     // the torque alone decides.
     Verdict accept(unsigned moving, int by_value) {
         for (int n = 0; n < longest_walk; ++n) {
+            if (!possible()) return no;
             if (!make()) return unsure;
+            if (rests()) {
+                const real spare = spare_at_rest(r.pull.at(x)), near = doubt() * (p.motor_holds + p.load_holds);
+                return spare > near ? yes : spare < -near ? no : goes_on_with(near_zero) ? yes : unsure;
+            }
             int violated = -1;
             const Verdict v = verify(moving, by_value, false, violated);
             if (v != no) return v;
@@ -762,8 +963,8 @@ struct DriveWalk {
             if (value > near) continue;
             if (!(value < -near)) {
                 if (lasting) continue;
-                if (it.kind == capacity && it.of == by_value) sure = false;
-                const Verdict rises = departs(it.form);
+                if (it.kind == capacity && it.of == by_value && !goes_on_with(near_zero)) sure = false;
+                const Verdict rises = departs(it);
                 if (rises == unsure) sure = false;
                 if (rises != no) continue;
             }

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..inputs.arguments import checked
+from ..inputs.validation import shown
 from .motor import Motor
 
 ELECTRIC = ("rated_current", "resistance_phase", "inductance_phase", "supply_voltage")
@@ -59,7 +60,14 @@ def pull_out_torque(motor: Motor, speed: Any) -> np.ndarray:
     assert motor.rated_current is not None
     assert motor.steps_per_revolution is not None
     assert motor.holding_torque is not None
-    w = np.abs(np.asarray(speed, float))
+    try:
+        if isinstance(speed, bool | str) or np.iscomplexobj(speed):
+            raise TypeError
+        w = np.abs(np.asarray(speed, float))
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"speed: {shown(speed)} must be a number [rad/s], or an array of them") from None
+    if not np.all(np.isfinite(w)):
+        raise InputError(f"speed: {shown(speed)} must be finite")
     largest = math.sqrt(2.0) * motor.rated_current
     K = motor.holding_torque / largest
     X = 0.25 * motor.steps_per_revolution * w * L

@@ -1,0 +1,3 @@
+"""Thousands of drives on a graphics processor. It needs the library `warp-lang`: ``pip install "lostmotion[warp]"``."""
+
+from .drives import Drives as Drives
