@@ -298,6 +298,7 @@ TOPICS = {
     ),
     "Servo axes": ("position-axis", "speed-axis", "joint-", "field-weakening", "hobby-servo"),
     "Linear axes": ("ball-screw-", "gantry-", "rack-", "vertical-"),
+    "Steppers": ("stepper-",),
     "Limit cycles": ("hunting-",),
     "Tracking and pointing": ("tracking-", "direction-finder"),
     "Drive trains": ("belt-", "bevel-", "conveyor-", "thruster-", "two-motors-", "two-link-", "given-motion"),

@@ -56,6 +56,8 @@ EXAMPLES = [name for name, value in {**FUNCTIONS, **CLASSES}.items() if ">>> " i
 def test_an_example_prints_what_it_shows(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     if name.startswith("mujoco."):
         pytest.importorskip("mujoco", reason='pip install "lostmotion[mujoco]"')
+    if name.startswith("warp."):
+        pytest.importorskip("warp", reason='pip install "lostmotion[warp]"')
     monkeypatch.chdir(ROOT)
     thing = inspect.unwrap({**FUNCTIONS, **CLASSES}[name])
     example = doctest.DocTestParser().get_doctest(inspect.getdoc(thing) or "", {"lm": lm}, name, None, None)

@@ -483,7 +483,7 @@ def test_no_output_has_a_unit_of_rotation_on_a_slide(tmp_path):
     assert "slide_position [m]" in head
     assert rotary(head.split(",")) == []
     text = summary(result)
-    assert "slide slide:" in text
+    assert "slide: " in text
     assert rotary(text.splitlines()) == []
     open_loop = scenario.replace(controllers={}, command={"motor": 0.1})
     assert rotary(str(lm.explain(open_loop, 0.1)).splitlines(), ("slide_contact", "deflection")) == []

@@ -20,7 +20,18 @@ from lostmotion.simulation.keys import set_values
 BASE = {"load.torque": "2 Nm", "gearbox.limits.peak_output_torque": "1 Nm", "motor.limits.max_current": "10 A"}
 
 # For each key another value. Refused are those that have no meaning here.
-OTHER = {
+OF_STEPPERS = {
+    "motor.steps_per_revolution": 400,
+    "motor.holding_torque": "0.4 Nm",
+    "motor.detent_torque": "10 mNm",
+    "motor.torque_error": "1 mNm",
+    "motor.standstill_current": 0.5,
+    "motor.rated_current": "1 A",
+    "motor.resistance_phase": "1 ohm",
+    "motor.inductance_phase": "1 mH",
+    "motor.supply_voltage": "24 V",
+}
+OTHER = OF_STEPPERS | {
     "motor.kind": "torque_source",
     "motor.rotor_inertia": "500 gcm2",
     "motor.friction_torque": "0.1 Nm",
@@ -89,6 +100,7 @@ OTHER = {
 # Judged where a task asks for it: test_axis_tasks.py.
 OF_TASKS = {f"gearbox.limits.{key}" for key in ("rated_life", "life_exponent", "max_radial_force", "max_axial_force")}
 REFUSED = {
+    **dict.fromkeys(OF_STEPPERS, 'kind "stepper"'),
     **{f"motor.{key}": "give both" for key in ("stall_torque", "no_load_speed", "stall_current", "no_load_current")},
     "motor.limits.thermal_resistance": "say the same",  # as both of its parts
     "motor.winding": "resistance_phase",

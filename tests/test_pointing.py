@@ -246,7 +246,7 @@ def test_the_command_writes_its_sheet(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("scenario", "options", "said"),
     [
-        ("paper-2dof-nl-small", {}, "no controller"),
+        ("paper-2dof-nl-small", {}, "no sampled controller"),
         ("speed-axis", {}, "not what an axis points by"),
         ("tracking-loss-map", {"after": 30.0}, "less than the duration"),
         ("tracking-loss-map", {"view": {"moter": 0.1}}, "moter"),

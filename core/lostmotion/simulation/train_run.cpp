@@ -36,7 +36,7 @@ TrainRun::TrainRun(const model::Train& train) : fault_(model::check(train)) {
     channels_ = std::make_unique<const std::vector<TrainChannel>>(train_channels(*assembly_));
     kernel_ = &Kernel::of(*assembly_);
     // The adaptive solver takes smooth laws as they are, by further inputs.
-    const model::Layout n = model::Places(train, true).layout;
+    const model::Layout n = AdaptiveKernel::all().empty() ? assembly_->layout() : model::Places(train, true).layout;
     const KernelSizes& widest = Kernel::all().back()->sizes();
     if (const std::string excess = widest.excess(train, n); !excess.empty())
         fault_.reason = "the train has " + excess + "; leave some out";

@@ -49,7 +49,7 @@ def pull_out_torque(motor: Motor, speed: Any) -> np.ndarray:
     ...     resistance_phase="1.5 ohm", inductance_phase="2.8 mH", supply_voltage="24 V",
     ... )
     >>> [round(float(torque), 3) for torque in lm.sizing.pull_out_torque(motor, [0.0, 30.0, 100.0])]
-    [0.44, 0.44, 0.284]
+    [0.44, 0.44, 0.287]
     """
     if motor.kind != "stepper":
         raise InputError('the motor is no stepper; only kind = "stepper" has a pull-out torque')

@@ -164,7 +164,7 @@ class SimulationBatch:
         return dict(zip(("steps", "with_events", "general", "switchings"), self._core.counts, strict=True))
 
     @property
-    def parameters(self) -> BatchParameters:
+    def parameters(self) -> Mapping[str, np.ndarray]:
         """Parameters of all drives, by their keys in a scenario file, as arrays that may be written between steps."""
         return self._parameters
 

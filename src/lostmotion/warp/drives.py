@@ -48,10 +48,12 @@ class Drives:
     Examples
     --------
     >>> import lostmotion as lm
-    >>> drives = lm.warp.Drives(lm.load("paper-2dof-nl-small").drive(), count=8, device="cpu")  # doctest: +SKIP
-    >>> drives.parameters["load.inertia"].fill_(1.5)  # doctest: +SKIP
-    >>> drives.step(0.1, 0.0, "1 ms")  # doctest: +SKIP
-    >>> drives["load_angle"].numpy().shape  # doctest: +SKIP
+    >>> import warp
+    >>> warp.config.log_level = warp.LOG_WARNING  # else it tells what it compiles
+    >>> drives = lm.warp.Drives(lm.load("paper-2dof-nl-small").drive(), count=8, device="cpu")
+    >>> drives.parameters["load.inertia"].fill_(1.5)
+    >>> drives.step(0.1, 0.0, "1 ms")
+    >>> drives["load_angle"].numpy().shape
     (8,)
 
     Notes
@@ -123,7 +125,7 @@ class Drives:
     @property
     def counts(self) -> dict[str, int]:
         """Numbers of steps since the beginning: ``steps``, ``switchings``, and ``doubtful``, those with something that was not certain."""
-        sums = {"switchings": self._switchings, "doubtful": self._doubtful}
+        sums: dict[str, Any] = {"switchings": self._switchings, "doubtful": self._doubtful}
         return {"steps": self._steps} | {name: int(each.numpy().sum()) for name, each in sums.items()}
 
     def __getitem__(self, name: str) -> Any:
