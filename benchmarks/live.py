@@ -52,7 +52,7 @@ def portable(core: Path, description: Path) -> float:
 def section(report: Report) -> None:
     """Left out where there is no node, or `make page` and `make c-library` have not run."""
     library = ROOT / "build" / "c" / "liblostmotion.so"
-    needed = (CHROMIUM, library, ROOT / "build" / "page-core" / "wide" / "core.wasm")
+    needed = (CHROMIUM, library, ROOT / "build" / "page-core" / "any" / "core.wasm")
     if not (shutil.which("node") and all(path.exists() for path in needed)):
         return
     report.section(
