@@ -36,7 +36,7 @@ RULES = {
     "estimated_losses": "the same check with the least and the largest losses of gearboxes of the kind",
     "loss_map": "the run, and the data of gearbox.losses",
     "lost_steps": "the run: a rotor slips where it is two full steps off its field",
-    "stepper_torque": "torque of the run with the pull-out torque of the two-phase circuit; safety 1.5 to 2: Oriental Motor, motor sizing",
+    "stepper_torque": "torque of the run with the pull-out torque of the two-phase circuit; 1.5 times it is a rule of thumb",
     "step_resonance": "sqrt(n T_H/J)/(2 pi), with the full steps of the run",
 }
 
