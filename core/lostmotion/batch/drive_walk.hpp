@@ -198,8 +198,8 @@ struct DriveWalk {
     static real least(real a, real b) { return a < b ? a : b; }
     static real most(real a, real b) { return a > b ? a : b; }
     static bool is_single() { return ROUNDING > real(1e-10); }
-    // Of a value over the sum of the magnitudes of its terms; where a guard begins on zero; of two zeros, in the time
-    // of the series.
+    // The rounding of a value over the sum of the magnitudes of its terms, and where a guard begins on zero; the
+    // distance below which two zeros coincide, in the time of the series.
     static real doubt() { return is_single() ? real(1e-5) : real(1e-9); }
     static real on_zero() { return is_single() ? real(1e-6) : real(1e-12); }
     static real together() { return is_single() ? real(1e-5) : real(1e-9); }
@@ -291,6 +291,10 @@ struct DriveWalk {
     real least_held() const { return most(spring_torque() - x.hysteresis, load_torque - p.load_holds); }
     real most_held() const { return least(spring_torque() + x.hysteresis, load_torque + p.load_holds); }
     real spring_torque() const { return spring(x.piece) + laws.slope[x.piece] * x.d; }
+    // What the mesh passes on while its twist slips.
+    real slipping_torque() const {
+        return has(DriveNumbers::of_twist) ? spring_torque() + x.twist * x.hysteresis : spring_torque();
+    }
     // What the motor holds ahead or back where the mesh passes on a torque [N m]; it grows with what the mesh takes.
     real motor_held(real torque, int way) const {
         const real mu = way * torque * p.per_rated;
@@ -352,7 +356,7 @@ struct DriveWalk {
         if (motor_at_rest && load_at_rest && has(DriveNumbers::of_twist)) return false;
         if (together && (load_at_rest || (motor_at_rest && has(DriveNumbers::of_load)))) return false;
         set_pull();
-        // What the mesh passes on.
+        // The torque T_2 of the mesh.
         const int k = x.piece;
         const Form P = laws.rigid ? Form{0, 0, 0, 0, 0} : Form{spring(k), 0, 0, 0, laws.slope[k]};
         const bool damped = p.mesh_damping > 0 && !in_gap() && !(motor_at_rest && load_at_rest);
@@ -528,7 +532,7 @@ struct DriveWalk {
     bool begin() {
         x.flanks = 0;
         if (!laws.rigid) locate_piece();
-        if (!x.known) x.held = laws.rigid ? 0 : spring(x.piece) + laws.slope[x.piece] * x.d;
+        if (!x.known) x.held = spring_torque();
         x.known = true;
         const real speeds[3] = {x.a, x.v, x.a - x.v};
         unsigned slipping = 0;
@@ -550,7 +554,7 @@ struct DriveWalk {
             x = from;
             for (int k = 0, rest = n; k < open; ++k, rest /= 3)
                 *mode(opened[k]) = static_cast<signed char>(rest % 3 == 2 ? -1 : rest % 3);
-            locate_losses(laws.rigid ? 0 : spring(x.piece) + laws.slope[x.piece] * x.d + x.twist * x.hysteresis);
+            locate_losses(slipping_torque());
             const Verdict v = accept(slipping, -1);
             if (v != no) return v == yes;
         }
@@ -671,7 +675,7 @@ struct DriveWalk {
         x.angle += s * (at * turned);
     }
 
-    // What the guards do over the series. False: not certain.
+    // Finds the first guard that falls within the series. False: it is not certain.
     bool see(real s, bool fresh, Crossing& first, bool& halve) const {
         first.guard = -1;
         first.at = 2;
@@ -836,12 +840,12 @@ struct DriveWalk {
             x.piece += g.to;
             if (!met && !in_gap() && !jump) return make();  // a continuous law
             if (in_gap()) x.flanks = 0;
-            locate_losses(mesh_torque());
+            locate_losses(slipping_torque());
             return accept(moving(), -1) == yes;
         }
         if (g.kind == flanks) {
             x.flanks = static_cast<signed char>(g.to);
-            locate_losses(mesh_torque());
+            locate_losses(slipping_torque());
             return accept(moving(), -1) == yes;
         }
         const real torque = r.output.at(x);
@@ -889,12 +893,6 @@ struct DriveWalk {
         x = from;
         return find(go);
     }
-    // Torque that the spring of the mesh passes on where it slips.
-    real mesh_torque() const {
-        if (laws.rigid) return r.output.at(x);
-        const real P = spring(x.piece) + laws.slope[x.piece] * x.d;
-        return has(DriveNumbers::of_twist) ? P + x.twist * x.hysteresis : P;
-    }
     // Contacts that slip: they go on in their direction, whatever their speed.
     unsigned moving() const {
         return (has(DriveNumbers::of_motor) && x.motor != 0 ? 1u : 0u) |
@@ -915,7 +913,7 @@ struct DriveWalk {
                 x.v = x.a;
         } else {
             x.v = 0;
-            x.hysteresis = p.hysteresis * magnitude(spring(x.piece) + laws.slope[x.piece] * x.d);
+            x.hysteresis = p.hysteresis * magnitude(spring_torque());
         }
     }
 
