@@ -1,11 +1,15 @@
 """What the core gave, to the last bit: `python tests/golden.py` compares it with golden.toml, `--record` renews that file.
 
+The file has a hash of each series. Where one differs, run `--save FILE.npz` with the build that gave the old bits and
+`--against FILE.npz` with the new one: this shows the first number that differs, and the one that is farthest off.
+
 Only numbers that the core itself computes are held to the bit. What numpy, scipy or LAPACK make of them is not, since their
 last bits may differ between machines and versions: the Floquet multipliers are compared within `TOLERANCE`.
 """
 
 from __future__ import annotations
 
+import argparse
 import hashlib
 import json
 import math
@@ -29,18 +33,15 @@ FILE = Path(__file__).with_name("golden.toml")
 
 HEADER = """\
 # What the core gave when this file was recorded: `python tests/golden.py --record`. CONTRIBUTING.md says when.
-# A number is written as a hexadecimal float, which is all its bits. A series has the SHA-256 of its numbers (8 bytes each, little
-# endian), their count and some of them by position (first, quarters, last, and the one of the largest magnitude), so that
-# a change of the last bit can be told from a wrong value. A list of decimals is compared within a tolerance.
-# Series of scenarios with quantised encoders also have a short hash of each of up to 64 blocks, which locates the first
-# difference. Another system's mathematical libraries change nothing: see src/lostmotion/reproducible.py.
+# A series has the first 16 digits of the SHA-256 of its numbers (8 bytes each, little endian). A list of decimals is
+# compared within a tolerance. `python tests/golden.py --against` shows the first number that differs from another build.
+# Another system's mathematical libraries change nothing: see src/lostmotion/reproducible.py.
 """
 
 # LAPACK's eigenvalues of a Jacobian J are those of a matrix within eps |J| of it, |J| < 1.5 here. Multipliers of zero may
 # belong to a defective pair, which that moves by sqrt(eps |J|) = 2e-8; all others move less.
 TOLERANCE = 1e-7
 
-BLOCKS = 64
 MANY = 100  # variables of a run: the series of a larger train are held as one
 
 MASSES = 8, 20, 30, 64  # of chains with friction on each and a gap at every third
@@ -156,55 +157,16 @@ def of_study(scenario: lm.Scenario) -> Values:
 # --- the file ----------------------------------------------------------------------------------------------
 
 
-def entry(value: Any, blocks: bool = False) -> Any:
-    """A value as it is recorded; with short hashes of its blocks if asked for."""
-    if isinstance(value, list):
-        return value
-    if not isinstance(value, np.ndarray):
-        return float(value).hex()
-    numbers = bits_of(value)
-    n = len(numbers)
-    if n == 0:
-        return {"sha256": hashlib.sha256(b"").hexdigest(), "count": 0, "at": {}}
-    largest = int(np.argmax(np.abs(np.nan_to_num(numbers, nan=0.0))))
-    places = sorted({0, n // 4, n // 2, 3 * n // 4, n - 1, largest})
-    out = {
-        "sha256": hashlib.sha256(numbers.tobytes()).hexdigest(),
-        "count": n,
-        "at": {str(k): float(numbers[k]).hex() for k in places},
-    }
-    return out | {"blocks": "".join(block_hashes(numbers))} if blocks else out
-
-
-def block_size(count: int) -> int:
-    return max(1, math.ceil(count / BLOCKS))
-
-
-def block_hashes(numbers: np.ndarray) -> list[str]:
-    """Four hexadecimal digits of each block."""
-    size = block_size(len(numbers))
-    return [hashlib.sha256(numbers[k : k + size].tobytes()).hexdigest()[:4] for k in range(0, len(numbers), size)]
-
-
-def quantised(scenario: str) -> bool:
-    """Whether an encoder of a scenario rounds: 1e-16 may then become one step of the encoder after seconds."""
-    path = ROOT / "scenarios" / f"{scenario}.toml"
-    axes = lm.load(path).axes().values() if path.exists() else ()
-    encoders = [e for c in axes for e in (getattr(c, "encoder", None), getattr(c, "position_encoder", None)) if e]
-    return any(not e.ideal and e.step > 0.0 for e in encoders)
-
-
-def bits_of(values: np.ndarray) -> np.ndarray:
-    """The numbers as they are hashed; one NaN is like another."""
-    numbers = np.ascontiguousarray(values, dtype="<f8").copy()
+def bits_of(value: Any) -> np.ndarray:
+    """The numbers of a value as they are hashed; one NaN is like another."""
+    numbers = np.array(value, dtype="<f8").ravel()
     numbers[np.isnan(numbers)] = math.nan
     return numbers
 
 
-def as_toml(value: Any) -> str:
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{k} = {as_toml(v)}" for k, v in value.items()) + " }"
-    return json.dumps(value)
+def entry(value: Any) -> Any:
+    """A value as it is recorded."""
+    return value if isinstance(value, list) else hashlib.sha256(bits_of(value).tobytes()).hexdigest()[:16]
 
 
 def as_key(name: str) -> str:
@@ -212,12 +174,13 @@ def as_key(name: str) -> str:
 
 
 def record(groups: Groups) -> None:
-    located = {name for name in groups if name.endswith(".samples") and quantised(name.removesuffix(".samples"))}
-    tables = (
-        "\n".join([f"[{name}]", *(f"{as_key(k)} = {as_toml(entry(v, name in located))}" for k, v in values.items())])
-        for name, values in groups.items()
-    )
-    FILE.write_text("\n\n".join([HEADER.rstrip(), *tables]) + "\n", encoding="utf-8")
+    tables: dict[str, list[str]] = {}
+    for name, values in groups.items():
+        table, _, what = name.rpartition(".")
+        entries = ", ".join(f"{as_key(k)} = {json.dumps(entry(v))}" for k, v in values.items())
+        tables.setdefault(table, []).append(f"{what} = {{ {entries} }}")
+    written = ("\n".join([f"[{table}]", *lines]) for table, lines in tables.items())
+    FILE.write_text("\n\n".join([HEADER.rstrip(), *written]) + "\n", encoding="utf-8")
 
 
 def recorded() -> Groups:
@@ -228,70 +191,46 @@ def recorded() -> Groups:
 # --- comparing ---------------------------------------------------------------------------------------------
 
 
+def flat(groups: Groups) -> Values:
+    return {f"{group}.{name}": value for group, values in groups.items() for name, value in values.items()}
+
+
 def differences(groups: Groups, golden: Groups) -> Iterator[str]:
-    """One line for each value that is not as recorded: which it is, and how far it is off."""
-    for group in {**golden, **groups}:
-        now, then = groups.get(group, {}), golden.get(group, {})
-        for name in {**then, **now}:
-            if name not in now:
-                yield f"{group}.{name}: is recorded and not computed"
-            elif name not in then:
-                yield f"{group}.{name}: is not recorded"
-            elif text := difference(then[name], now[name]):
-                yield f"{group}.{name}: {text}"
+    """One line for each value that is not as recorded."""
+    now, then = flat(groups), flat(golden)
+    for name in {**then, **now}:
+        if name not in now:
+            yield f"{name}: is recorded and not computed"
+        elif name not in then:
+            yield f"{name}: is not recorded"
+        elif isinstance(now[name], list):
+            off = max(abs(a - b) for a, b in zip(then[name], now[name], strict=True))
+            if off > TOLERANCE:
+                yield f"{name}: differs by {off:.2g}; {TOLERANCE:g} is allowed"
+        elif entry(now[name]) != then[name]:
+            yield f"{name}: differs"
 
 
-def difference(then: Any, now: Any) -> str:
-    """How far a value is from the recorded one; empty if it is the same."""
-    if isinstance(now, list):
-        off = max(abs(a - b) for a, b in zip(then, now, strict=True))
-        return f"differs by {off:.2g}; {TOLERANCE:g} is allowed" if off > TOLERANCE else ""
-    located = isinstance(then, dict) and "blocks" in then
-    if entry(now, located) == then:
-        return ""
-    if not isinstance(now, np.ndarray):
-        return off_by(float.fromhex(then), float(now))
-    parts = [] if then["count"] == now.size else [f"{then['count']} numbers recorded, {now.size} now"]
-    if located:
-        parts.append(first_difference(then["blocks"], now))
-    return "; ".join([*parts, farthest_off({int(k): float.fromhex(v) for k, v in then["at"].items()}, now)])
+def first_differences(then: Values, now: Values) -> Iterator[str]:
+    """One line for each series of two builds that differs: the first number that does, and the one that is farthest off.
 
-
-def first_difference(then: str, now: np.ndarray) -> str:
-    """Where a series of a scenario with quantised encoders first differs, which is the difference that counts."""
-    numbers = bits_of(now)
-    size, hashes = block_size(len(numbers)), block_hashes(numbers)
-    recorded = [then[k : k + 4] for k in range(0, len(then), 4)]
-    pairs = zip(recorded, hashes, strict=False)
-    k = next((k for k, (a, b) in enumerate(pairs) if a != b), min(len(recorded), len(hashes)))
-    here = ", ".join(float(v).hex() for v in numbers[k * size : k * size + 3])
-    return (
-        f"first difference in samples {k * size} to {min((k + 1) * size, len(numbers)) - 1} (now {here}, ...); this first "
-        "difference counts, since a quantised encoder turns a last bit into one of its steps later on"
-    )
-
-
-def farthest_off(then: dict[int, float], now: np.ndarray) -> str:
-    """Of the numbers that are recorded themselves the one that is farthest off."""
-    off = {k: float(now[k]) for k, v in then.items() if k < now.size and float(now[k]).hex() != v.hex()}
-    if not off:
-        return "the numbers recorded with their values are the same, others differ"
-    k = max(off, key=lambda k: distance(then[k], off[k]))
-    unit = math.ulp(max(abs(v) for v in then.values() if math.isfinite(v)))
-    return (
-        f"{len(off)} of {len(then)} recorded numbers differ, number {k} most: {off_by(then[k], off[k])}; "
-        f"that is {distance(then[k], off[k]) / unit:.3g} ulp of the largest"
-    )
-
-
-def distance(a: float, b: float) -> float:
-    return abs(a - b) if math.isfinite(a - b) else math.inf
+    The first one counts where an encoder is quantised: it turns a last bit into one of its steps later on.
+    """
+    for name in now.keys() & then.keys():
+        a, b = bits_of(then[name]), bits_of(now[name])
+        n = min(a.size, b.size)
+        other = np.flatnonzero(a[:n].view("<i8") != b[:n].view("<i8"))
+        said = [f"{a.size} numbers then, {b.size} now"] if a.size != b.size else []
+        if other.size:
+            most = other[np.argmax(np.abs(np.nan_to_num(a[other] - b[other], nan=math.inf)))]
+            said.append(f"{other.size} of {n} differ, first number {other[0]}: {off_by(a[other[0]], b[other[0]])}")
+            said.append(f"most number {most}: {off_by(a[most], b[most])}")
+        if said:
+            yield f"{name}: {'; '.join(said)}"
 
 
 def off_by(then: float, now: float) -> str:
-    if not (math.isfinite(then) and math.isfinite(now)):
-        return f"{then} recorded, {now} now"
-    return f"{ulps(then, now)} ulp ({then.hex()} recorded, {now.hex()} now: {then:.6g} and {now:.6g})"
+    return f"{ulps(then, now)} ulp ({float(then)!r} then, {float(now)!r} now)"
 
 
 def ulps(a: float, b: float) -> int:
@@ -305,14 +244,23 @@ def ulps(a: float, b: float) -> int:
 
 
 def main() -> int:
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("--record", action="store_true", help="renew golden.toml")
+    arguments.add_argument("--save", metavar="FILE.npz", help="write all numbers")
+    arguments.add_argument("--against", metavar="FILE.npz", help="compare with numbers that another build saved")
+    asked = arguments.parse_args()
     groups = compute()
     lines = list(differences(groups, recorded() if FILE.exists() else {}))
+    if asked.against:
+        with np.load(asked.against) as then:
+            lines = list(first_differences(dict(then), flat(groups)))
+    if asked.save:
+        np.savez_compressed(asked.save, **flat(groups))
+    if asked.record:
+        record(groups)
     for line in lines:
         print(line)
-    if "--record" in sys.argv[1:]:
-        record(groups)
-        return 0
-    return 1 if lines else 0
+    return 1 if lines and not asked.record else 0
 
 
 if __name__ == "__main__":
