@@ -14,7 +14,7 @@ from report import Report, best
 
 import lostmotion as lm
 from lostmotion import _core
-from lostmotion.simulation.core_runs import core_case
+from lostmotion.simulation.runs.core_runs import core_case
 
 CORES = os.cpu_count() or 1
 PLANE = {"speeds": [0.0, 10.0], "loads": [0.0, 10.0], "values": [[0.02, 0.42], [0.62, 1.02]], "mirrored": True}

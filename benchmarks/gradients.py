@@ -11,8 +11,8 @@ from report import Report, best
 import lostmotion as lm
 from lostmotion import _core
 from lostmotion.control.axis import Bound
-from lostmotion.simulation.core_runs import core_case
-from lostmotion.simulation.sensitivities import core_variation, neighbours, run_cases, sensitive_case
+from lostmotion.simulation.runs.core_runs import core_case
+from lostmotion.simulation.runs.sensitivities import core_variation, neighbours, run_cases, sensitive_case
 
 KEYS = (
     "shafts.rotor.inertia",

@@ -16,7 +16,7 @@ from report import Report, best
 
 import lostmotion as lm
 from lostmotion import _core
-from lostmotion.simulation.core_runs import core_case
+from lostmotion.simulation.runs.core_runs import core_case
 from lostmotion.studies.design import CHUNK
 from lostmotion.studies.file import to_json
 

@@ -28,8 +28,8 @@ from lostmotion.inputs.part import Part
 from lostmotion.inputs.schema import options, unit_in_schema
 from lostmotion.model import signals
 from lostmotion.namespace import homes_of
-from lostmotion.simulation.drive_tables import drive_schema
-from lostmotion.simulation.train_tables import train_schema
+from lostmotion.simulation.forms.drive_tables import drive_schema
+from lostmotion.simulation.forms.train_tables import train_schema
 from lostmotion.simulation.variables import VARIABLES
 from lostmotion.units.grammar import PREFIXED, SPELLINGS
 

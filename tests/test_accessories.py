@@ -12,7 +12,7 @@ import lostmotion as lm
 from lostmotion.model.angle_torques import STANDARD_GRAVITY as G
 from lostmotion.model.duty import Amplifier
 from lostmotion.reports.listing import list_records, record_text, template
-from lostmotion.simulation.drive_tables import drive_schema
+from lostmotion.simulation.forms.drive_tables import drive_schema
 from lostmotion.sizing.supply import amplifier_rules, longest_above
 from lostmotion.studies.axis_rows import Axes
 from lostmotion.studies.nearest import not_judged

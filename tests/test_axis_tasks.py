@@ -10,7 +10,7 @@ import lostmotion as lm
 from conftest import ROOT
 from lostmotion.model.duty import ArmGravity, Duty, Payload, Process, Supply
 from lostmotion.model.linear import RatedScrew
-from lostmotion.simulation.drive_tables import LoadTable
+from lostmotion.simulation.forms.drive_tables import LoadTable
 from lostmotion.sizing.axis_rules import (
     derated,
     emergency_stop,

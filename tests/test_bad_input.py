@@ -11,11 +11,11 @@ from time import process_time
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from lostmotion.simulation.scenario.scenario.scenario import Scenario
 
 import lostmotion as lm
 from conftest import ROOT, lostmotion
 from lostmotion.inputs.validation import listed, nearest
-from lostmotion.simulation.scenario import Scenario
 from lostmotion.studies.expressions import Expression
 from refusals import assert_file_refused, assert_plain, refused
 
@@ -669,7 +669,7 @@ def test_an_old_result_survives_a_failed_write(tmp_path: Path, monkeypatch: pyte
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("lostmotion.simulation.result_files._header", full)
+    monkeypatch.setattr("lostmotion.simulation.runs.result_files._header", full)
     with pytest.raises(lm.InputError, match="No space left"):
         lm.save(result, target)
     assert target.read_bytes() == old

@@ -17,7 +17,7 @@ from lostmotion import _core
 from lostmotion.model.angle_torques import TorqueCurve
 from lostmotion.model.shaft import DragCurve
 from lostmotion.model.torsion import Rigid
-from lostmotion.simulation.train_state import start_values
+from lostmotion.simulation.forms.initial_state import start_values
 
 LIBRARY = ROOT / "build" / "c" / "liblostmotion.so"
 STATES, INPUTS, VARIABLES, CAPACITIES = range(4)

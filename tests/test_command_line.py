@@ -20,8 +20,8 @@ from lostmotion.cli import app, terminal
 from lostmotion.data_sheets.records import table_of
 from lostmotion.reports import plots, thinning
 from lostmotion.reports.listing import list_records
-from lostmotion.simulation.forecast import forecast
-from lostmotion.simulation.run import run
+from lostmotion.simulation.runs.run import run
+from lostmotion.simulation.runs.run_time_forecast import forecast
 
 SMALL = "paper-2dof-nl-small"
 
@@ -223,7 +223,7 @@ def test_trying_leaves_nothing_behind(tmp_path: Path) -> None:
 
 # An exit takes the worker threads along.
 STOPS_AT_THE_FIRST_COMPUTATION = """
-import lostmotion._core, lostmotion.simulation.scenario
+import lostmotion._core, lostmotion.simulation.scenario.scenario
 def stop(*arguments, **options):
     print("computes", *sorted(sys.modules), flush=True)
     os._exit(0)
@@ -327,7 +327,7 @@ MAY_IMPORT = {
 def test_a_command_imports_what_it_needs_alone(tmp_path: Path) -> None:
     """Without dask and pint, which xarray imports by itself where they are installed."""
     (tmp_path / "study.toml").write_text(STUDY.format(design="random"))
-    before = "sys.modules.update(dask=None, pint=None); import lostmotion.simulation.scenario"
+    before = "sys.modules.update(dask=None, pint=None); import lostmotion.simulation.scenario.scenario"
     for done in forks(map(str.split, MAY_IMPORT), tmp_path, before):
         assert done.returncode in (0, 1, 3), done  # a verdict, which an error has not
         assert "lostmotion: " not in done.stderr

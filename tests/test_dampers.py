@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
-from lostmotion.simulation.train_parts import parts_of
+from lostmotion.simulation.runs.separate_trains import parts_of
 from test_c_interface import INPUTS, OK, VARIABLES, Train, library  # noqa: F401
 from test_description import Scenario
 from test_sensitivities import check_against_differences, derivative

@@ -15,7 +15,7 @@ import pytest
 import lostmotion as lm
 from conftest import ALL_SCENARIOS, ROOT, lostmotion
 from lostmotion.cli import app as lm_app
-from lostmotion.simulation.train_tables import TrainTables
+from lostmotion.simulation.forms.train_tables import TrainTables
 
 
 def test_the_tutorial_can_be_followed(tmp_path: Path) -> None:

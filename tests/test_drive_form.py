@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
-from lostmotion.simulation.axis_form import file_schema
+from lostmotion.simulation.forms.axis_form import file_schema
 
 MOVES = {"moves": [{"to": "90 deg"}], "speed": "3 rad/s", "acceleration": "20 rad/s^2", "jerk": "800 rad/s^3"}
 FLANKS = {"kind": "rigid", "backlash": "2 mrad", "restitution": 0.4}

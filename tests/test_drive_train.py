@@ -16,9 +16,9 @@ import pytest
 import lostmotion as lm
 from conftest import SCENARIOS, TRAINS
 from lostmotion.inputs.validation import shown
-from lostmotion.simulation.axis_form import file_schema
-from lostmotion.simulation.train_state import start_values
-from lostmotion.simulation.train_tables import TrainTables, train_schema
+from lostmotion.simulation.forms.axis_form import file_schema
+from lostmotion.simulation.forms.initial_state import start_values
+from lostmotion.simulation.forms.train_tables import TrainTables, train_schema
 
 TRAIN: dict[str, Any] = {
     "shafts": {

@@ -16,7 +16,7 @@ import lostmotion as lm
 from conftest import some
 from full_equations import Axis
 from lostmotion.reports.run import summary
-from lostmotion.simulation.run import whole_run
+from lostmotion.simulation.runs.run import whole_run
 
 T = 125e-6
 

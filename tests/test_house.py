@@ -42,6 +42,10 @@ LAYERS = [
     {"cli"},
     {"__init__", "__main__"},
 ]
+# The same within packages that have rooms of their own; modules beside the rooms count as rooms.
+INNER = {
+    "simulation": [{"variables"}, {"train_variables"}, {"forms"}, {"scenario"}, {"stepping"}, {"runs"}, {"batches"}]
+}
 MODULES = sorted(p.relative_to(PACKAGE).with_suffix("") for p in PACKAGE.rglob("*.py"))
 SOURCES = sorted(p for room in ("lostmotion", "kernels") for p in (ROOT / "core" / room).rglob("*.?pp"))
 HEADERS = [path for path in SOURCES if path.suffix == ".hpp"]
@@ -73,6 +77,18 @@ def test_imports_go_to_lower_layers_only() -> None:
         layer = next(k for k, names in enumerate(LAYERS) if room_of(module) in names)
         others = {room_of(m) for m in imports_of(module)} - {room_of(module)}
         upward[str(module)] = others - set().union(*LAYERS[:layer])
+    assert {module: rooms for module, rooms in upward.items() if rooms} == {}
+
+
+@pytest.mark.parametrize("package", INNER)
+def test_imports_within_a_package_go_to_lower_rooms_only(package: str) -> None:
+    own = [m for m in MODULES if m.parts[0] == package and m.name != "__init__"]
+    assert {m.parts[1] for m in own} == set.union(*INNER[package])
+    upward = {}
+    for module in own:
+        layer = next(k for k, names in enumerate(INNER[package]) if module.parts[1] in names)
+        others = {m.parts[1] for m in imports_of(module) if m in own} - {module.parts[1]}
+        upward[str(module)] = others - set().union(*INNER[package][:layer])
     assert {module: rooms for module, rooms in upward.items() if rooms} == {}
 
 

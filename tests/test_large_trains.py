@@ -19,7 +19,7 @@ from lostmotion.cli.terminal import announce_response
 from lostmotion.live_page.description import describe
 from lostmotion.model import LinearStiffness, Rigid, TorsionCurve
 from lostmotion.reports.run import summary
-from lostmotion.simulation.sensitivities import run_sensitivities
+from lostmotion.simulation.runs.sensitivities import run_sensitivities
 
 # Of the first three modes of the thruster [Hz], with rigid bevel gears: openTorsion 0.3.2, Assembly.modal_analysis().
 PEER = (29.6247, 39.6475, 77.6104)

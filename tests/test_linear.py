@@ -19,8 +19,8 @@ from lostmotion.portable.descriptions import numbers_of
 from lostmotion.reports.page import render
 from lostmotion.reports.run import summary
 from lostmotion.reports.servo import servo_report
-from lostmotion.simulation.keys import set_values
-from lostmotion.simulation.train_tables import train_schema
+from lostmotion.simulation.forms.dotted_keys import set_values
+from lostmotion.simulation.forms.train_tables import train_schema
 from lostmotion.units.conversion import to_si
 
 SCREW = """

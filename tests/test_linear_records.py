@@ -14,7 +14,7 @@ from lostmotion.data_sheets.records import KINDS, catalogue, find, parse_sheets,
 from lostmotion.data_sheets.train_components import RECORD_KINDS, RECORDS
 from lostmotion.model.train import DriveTrain
 from lostmotion.reports.listing import list_records, record_text, template
-from lostmotion.simulation.train_tables import TrainTables
+from lostmotion.simulation.forms.train_tables import TrainTables
 
 LINEAR = {kind: [r for r in catalogue() if table_of(r) == kind] for kind in ("screw", "rack", "belt", "linear_motor")}
 # What the axis decides.

@@ -19,7 +19,7 @@ from lostmotion.errors import InputError
 from lostmotion.live_page.description import describe
 from lostmotion.portable.derivation import derivation_of
 from lostmotion.portable.descriptions import numbers_of
-from lostmotion.simulation.keys import set_values
+from lostmotion.simulation.forms.dotted_keys import set_values
 
 AXIS = """title = "A slide with a linear motor"
 [slides.table]

@@ -17,7 +17,7 @@ from conftest import ALL_SCENARIOS
 from lostmotion import _core
 from lostmotion.inputs.kept import kept_while_used
 from lostmotion.inputs.part import Part
-from lostmotion.simulation.result_files import FORMATS
+from lostmotion.simulation.runs.result_files import FORMATS
 
 NAMED = {path.stem: path for path in ALL_SCENARIOS}
 BOTH_FORMS = ("paper-2dof-nl-small", "worm-lowering")
@@ -199,7 +199,7 @@ def test_a_balance_that_does_not_close_is_reported_in_files_and_summaries(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The limit is lowered below rounding, since scenarios whose balance fails are refused today or close."""
-    monkeypatch.setattr("lostmotion.simulation.ledger.MOST_RESIDUAL", 0.0)
+    monkeypatch.setattr("lostmotion.simulation.runs.energy_ledger.MOST_RESIDUAL", 0.0)
     result = lm.simulate(loaded("paper-2dof-nl-small"))
     assert "warning" not in result.attrs
     assert "this run is inaccurate" in result.lm.summary()

@@ -13,8 +13,8 @@ from lostmotion.model.gearbox import GearboxLimits
 from lostmotion.model.losses import LossMap
 from lostmotion.model.motor import MotorLimits
 from lostmotion.model.torsion import Hysteresis, TorsionCurve
-from lostmotion.simulation.drive_tables import LoadTable
-from lostmotion.simulation.keys import set_values
+from lostmotion.simulation.forms.dotted_keys import set_values
+from lostmotion.simulation.forms.drive_tables import LoadTable
 
 # A catalogue motor and gearbox near their limits, so that every limit is judged.
 BASE = {"load.torque": "2 Nm", "gearbox.limits.peak_output_torque": "1 Nm", "motor.limits.max_current": "10 A"}

@@ -70,7 +70,7 @@ def without(libraries: Collection[str]) -> str:
 
 def without_extras(*calls: str, cwd: Path, but: Collection[str] = ()) -> Iterator[Command]:
     """Commands in processes where the optional libraries cannot be imported, but for some."""
-    before = f"{without([name for name in OPTIONAL if name not in but])} import lostmotion.simulation.scenario"
+    before = f"{without([name for name in OPTIONAL if name not in but])} import lostmotion.simulation.scenario.scenario"
     return forks(map(shlex.split, calls), cwd, before)
 
 

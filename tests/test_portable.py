@@ -34,7 +34,7 @@ def native(path: Path) -> dict[str, np.ndarray]:
 
     Python solves parts of a train that nothing joins one after the other, the C interface as one train: so it is here, too.
     """
-    with patch("lostmotion.simulation.core_runs.parts_of", lambda scenario: [scenario]):
+    with patch("lostmotion.simulation.runs.core_runs.parts_of", lambda scenario: [scenario]):
         result = lm.simulate(loaded(path), energy=True)
     out = {f"{SAMPLES} {name}": result[name].values for name in result}
     out |= {f"{ENERGIES} {name}": np.array([v]) for name, v in lm.energy_of(result).items()}

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
-from lostmotion.simulation.core_runs import core_case
-from lostmotion.simulation.run import run
+from lostmotion.simulation.runs.core_runs import core_case
+from lostmotion.simulation.runs.run import run
 from lostmotion.studies.axis_columns import change
 from lostmotion.studies.axis_run import VARIABLES, until_it_repeats
 from lostmotion.studies.axis_scenario import begins_alike, cycles_of

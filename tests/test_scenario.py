@@ -9,7 +9,7 @@ import pytest
 
 import lostmotion as lm
 from conftest import ALL_SCENARIOS, ROOT, SCENARIOS
-from lostmotion.simulation.drive_tables import DriveTables, drive_schema
+from lostmotion.simulation.forms.drive_tables import DriveTables, drive_schema
 
 
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda p: p.stem)

@@ -13,8 +13,8 @@ import pytest
 import lostmotion as lm
 from conftest import ROOT, lostmotion
 from lostmotion.control.tuning import TwoInertias, suited
-from lostmotion.simulation.drive_tables import LoadTable
-from lostmotion.simulation.run import run
+from lostmotion.simulation.forms.drive_tables import LoadTable
+from lostmotion.simulation.runs.run import run
 from lostmotion.sizing.duty_cycle import DutyCycle
 from lostmotion.sizing.required_motion import check_motor, input_demand, required_motion
 from lostmotion.studies.axis import repeated

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.paper import paper_scenario
-from lostmotion.simulation.results import ENERGY
+from lostmotion.simulation.runs.results import ENERGY
 from lostmotion.simulation.variables import VARIABLES
 from lostmotion.studies.expressions import OF_THE_RUN, read_expression
 from lostmotion.studies.functions import FUNCTIONS, METHODS

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
-from lostmotion.simulation import core_runs
-from lostmotion.simulation.train_parts import parts_of
+from lostmotion.simulation.runs import core_runs
+from lostmotion.simulation.runs.separate_trains import parts_of
 
 MASSES: dict[str, Any] = {
     "shafts": {

@@ -13,7 +13,7 @@ from lostmotion.response.standstill import NOISE, Watch
 from lostmotion.servo.margins import instability
 from lostmotion.servo.motion import at_rest, limit_cycle
 from lostmotion.servo.regimes import axis_of, regimes
-from lostmotion.simulation.run import run
+from lostmotion.simulation.runs.run import run
 
 SEEDS = range(20_260_101, 20_260_101 + some(4, 2))
 AXES = some(50, 15)  # of each seed

@@ -8,7 +8,7 @@ import pytest
 import lostmotion as lm
 from lostmotion.model.duty import Duty, Supply
 from lostmotion.model.linear import RatedScrew
-from lostmotion.simulation.drive_tables import LoadTable
+from lostmotion.simulation.forms.drive_tables import LoadTable
 from lostmotion.sizing import formulas
 from lostmotion.sizing.axis_rules import axial_load, screw_mean_load, screw_rules
 from lostmotion.sizing.required_motion import RequiredMotion, required_motion

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from ..simulation.scenario import Scenario
+    from ..simulation.scenario.scenario import Scenario
 
 
 def number(unit: str = "", option: str = "") -> Callable[[str], float]:
@@ -49,11 +49,11 @@ def decibels(text: str) -> float:
 def load_scenario(source: str, overrides: list[str] | None, missing: list[str] | None = None) -> Scenario:
     """The scenario of a command, bare numbers of `--set` printed with the unit in which they are read. With a list for their keys
     its gains may be missing."""
-    from ..simulation.keys import key_and_value
-    from ..simulation.units_of_keys import unit_for
+    from ..simulation.forms.dotted_keys import key_and_value
+    from ..simulation.scenario.units_of_keys import unit_for
 
     if missing is None:
-        from ..simulation.sources import load
+        from ..simulation.runs.loading import load
 
         loaded = load(source, overrides or ())
     else:

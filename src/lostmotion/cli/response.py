@@ -13,7 +13,7 @@ from .targets import pictures_of, writing
 from .terminal import about, announce_response, busy, progress
 
 if TYPE_CHECKING:
-    from ..simulation.scenario import Scenario
+    from ..simulation.scenario.scenario import Scenario
 
 
 def response(

@@ -103,7 +103,7 @@ def _measured(name: str, sheet: Record, overrides: Sequence[str]) -> tuple[RigRe
     """Report of the rig, and the notes of a gearbox's loss map."""
     from ..data_sheets.gearbox_sheet import GearboxSheet
     from ..data_sheets.linear_sheets import ScrewSheet
-    from ..simulation.scenario_files import gearbox_from_record, screw_from_record
+    from ..simulation.scenario.scenario_files import gearbox_from_record, screw_from_record
 
     if isinstance(sheet, ScrewSheet):
         from ..model.notes import Notes
@@ -122,7 +122,7 @@ def _measured(name: str, sheet: Record, overrides: Sequence[str]) -> tuple[RigRe
 
 def _write_logs(name: str, sheet: Record, overrides: Sequence[str], directory: Path, ripple: str | None) -> None:
     from ..identification.campaign import write_campaign
-    from ..simulation.scenario_files import gearbox_from_record
+    from ..simulation.scenario.scenario_files import gearbox_from_record
 
     part, _ = gearbox_from_record(name, overrides)
     title = f"{sheet.title or sheet.name}: logs of the virtual rig"

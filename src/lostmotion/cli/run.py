@@ -12,8 +12,8 @@ from .targets import try_file, try_page
 from .terminal import about, busy, conclude, simulating
 
 if TYPE_CHECKING:
-    from ..simulation.results import RunArrays
-    from ..simulation.scenario import Scenario
+    from ..simulation.runs.results import RunArrays
+    from ..simulation.scenario.scenario import Scenario
 
 PICTURES = (".png", ".svg", ".pdf")
 
@@ -96,13 +96,13 @@ def run(
     print(summary(result))
     print_timed_moves(loaded)
     if explain is not None:
-        from ..simulation.explanation import explain as explain_instant
+        from ..simulation.runs.stuck_contacts import explain as explain_instant
 
         print(explain_instant(loaded, explain))
     if spectrum:
         _print_spectrum(loaded)
     if output is not None:
-        from ..simulation.result_files import save
+        from ..simulation.runs.result_files import save
 
         with busy("Writing"):
             save(result.dataset(), output)
@@ -129,8 +129,8 @@ def _simulated(loaded: Scenario, solver: str, tolerance: float | None) -> RunArr
     """The run; where it leaves the range of numbers, an error that names the loop that is unstable."""
     from .._core import SolverError
     from ..errors import InputError
-    from ..simulation.run import TOLERANCE
-    from ..simulation.run import run as work
+    from ..simulation.runs.run import TOLERANCE
+    from ..simulation.runs.run import run as work
 
     try:
         with simulating("Simulating", loaded, 0.0 if solver == "exact" else tolerance or TOLERANCE):
@@ -161,7 +161,7 @@ def _print_spectrum(scenario: Scenario) -> None:
 def _try_files(output: Path | None, plot: Path | None, report: Path | None) -> None:
     """See, before the work, that the files can be written."""
     from ..errors import InputError
-    from ..simulation.result_files import check_output
+    from ..simulation.runs.result_files import check_output
 
     if output is not None:
         try_file(check_output(output))
@@ -189,7 +189,7 @@ def _check_figure(figure: str | None, plot: Path | None) -> None:
 
 def _check_solver(solver: str, tolerance: float | None) -> None:
     from ..errors import InputError
-    from ..simulation.run import TOLERANCES
+    from ..simulation.runs.run import TOLERANCES
 
     if solver not in ("exact", "dormand-prince"):
         raise InputError(f"--solver {solver}: must be exact or dormand-prince")

@@ -19,7 +19,7 @@ def scenarios() -> None:
     lostmotion scenarios
     """
     from ..inputs.toml_files import read_toml
-    from ..simulation.shipped import shipped_scenarios
+    from ..simulation.scenario.shipped_scenarios import shipped_scenarios
 
     found = shipped_scenarios()
     width = max(map(len, found))
@@ -41,8 +41,8 @@ def new(
     """
     from ..atomic_writer import write_whole
     from ..errors import InputError, need
-    from ..simulation.scenario_files import find_scenario
-    from ..simulation.scenario_writer import changed_text
+    from ..simulation.scenario.scenario_files import find_scenario
+    from ..simulation.scenario.scenario_writer import changed_text
 
     need("tomlkit", "A copy with its comments", "control")
     for path in (Path(scenario), output):
@@ -70,6 +70,6 @@ def schema() -> None:
     """
     import json
 
-    from ..simulation.axis_form import file_schema
+    from ..simulation.forms.axis_form import file_schema
 
     print(json.dumps(file_schema(), indent=2))

@@ -26,7 +26,7 @@ from .terminal import about, busy, conclude, console, progress
 if TYPE_CHECKING:
     from ..servo.commission import ServoReport
     from ..servo.tuned import Tuning
-    from ..simulation.scenario import Scenario
+    from ..simulation.scenario.scenario import Scenario
 
 OF_RULES = ("--phase-margin", "--gain-margin", "--bandwidth", "--sensitivity-peak", "--feedforward")
 

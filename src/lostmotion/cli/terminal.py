@@ -199,7 +199,7 @@ def simulating(what: str, scenario: Any, tolerance: float = 0.0) -> Iterator[Cal
 
     tolerance: relative one of the adaptive solver; 0: the exact solver.
     """
-    from ..simulation.forecast import forecast
+    from ..simulation.runs.run_time_forecast import forecast
     from ..units.practical import counted
 
     with busy(what) as tell:

@@ -19,8 +19,8 @@ from ..model.gear import Gear
 from ..model.gearbox import Gearbox
 from ..model.losses import LossMap
 from ..model.torsion import TorsionCurve
-from ..simulation.scenario import Scenario
-from ..simulation.scenario_files import scenario_text
+from ..simulation.scenario.scenario import Scenario
+from ..simulation.scenario.scenario_files import scenario_text
 from .logs import Channel, Log
 from .rig import Rig
 from .task import Identification

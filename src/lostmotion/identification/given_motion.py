@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
-from ..simulation.scenario import Scenario
+from ..simulation.scenario.scenario import Scenario
 from .prepare import Prepared
 from .task import Identification
 

@@ -21,7 +21,7 @@ from ..errors import InputError
 from ..model.angle_torques import STANDARD_GRAVITY, Gravity, PositionHarmonic, TorqueHarmonic
 from ..model.losses import ConstantEfficiency, MeshEfficiency
 from ..model.motor import ShaftMotor
-from ..simulation.scenario import Scenario
+from ..simulation.scenario.scenario import Scenario
 from .acting import DELAY, course_of_input, numbers_of_input
 from .motion import Shown, measured_course
 from .prepare import Prepared

@@ -16,8 +16,8 @@ import numpy as np
 from ..errors import InputError, visible
 from ..inputs.arguments import checked
 from ..inputs.validation import listed
-from ..simulation.scenario import Scenario
-from ..simulation.scenario_files import find_scenario, load
+from ..simulation.scenario.scenario import Scenario
+from ..simulation.scenario.scenario_files import find_scenario, load
 from .logs import Log
 from .prepare import alike, channel_unit
 from .readers import ENDINGS, read_log

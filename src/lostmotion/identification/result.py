@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, field
 
 from ..errors import InputError
-from ..simulation.scenario import Scenario
-from ..simulation.scenario_files import scenario_text
+from ..simulation.scenario.scenario import Scenario
+from ..simulation.scenario.scenario_files import scenario_text
 from ..verdict import Point, Verdict
 from .errors_of_logs import LogError, total
 from .fit import Fit

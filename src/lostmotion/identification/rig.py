@@ -11,13 +11,13 @@ from typing import Any
 from .. import _core
 from ..errors import InputError
 from ..inputs.validation import did_you_mean
-from ..simulation.keys import set_values
-from ..simulation.linear_units import of_slides
-from ..simulation.needs import need_no_impacts
-from ..simulation.scenario import Scenario
-from ..simulation.scenario_files import find_scenario, load
-from ..simulation.sensitivities import channels_of
-from ..simulation.train_tables import TrainInitial
+from ..simulation.forms.dotted_keys import set_values
+from ..simulation.forms.slide_units import of_slides
+from ..simulation.forms.train_tables import TrainInitial
+from ..simulation.runs.sensitivities import channels_of
+from ..simulation.scenario.requirements import need_no_impacts
+from ..simulation.scenario.scenario import Scenario
+from ..simulation.scenario.scenario_files import find_scenario, load
 from .formulas import Formula, names_in
 from .prepare import Prepared
 from .shaft_angles import angle_terms

@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import _core
 from ..errors import InputError
-from ..simulation.sensitivities import CENTRAL, ONE_SIDED, run_cases
+from ..simulation.runs.sensitivities import CENTRAL, ONE_SIDED, run_cases
 from .acting import NUMBERS, Acting
 from .formulas import names_in, number
 from .given_motion import GIVEN_SPEED

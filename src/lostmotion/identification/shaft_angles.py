@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from ..model.torsion import Rigid
-from ..simulation.scenario import Scenario
+from ..simulation.scenario.scenario import Scenario
 
 
 def angle_terms(scenario: Scenario, shaft: str, recorded: Collection[str]) -> dict[str, float]:

@@ -13,9 +13,9 @@ from ..inputs.kept import keep
 from ..inputs.named import Named
 from ..model.shaft import Shaft
 from ..model.train import DriveTrain
-from ..simulation.keys import set_values
-from ..simulation.scenario import Scenario
-from ..simulation.train_tables import TrainTables
+from ..simulation.forms.dotted_keys import set_values
+from ..simulation.forms.train_tables import TrainTables
+from ..simulation.scenario.scenario import Scenario
 
 
 class Variants:

@@ -11,9 +11,9 @@ import numpy as np
 from ..model.signals import Signal
 from ..model.torsion import TorsionCurve
 from ..portable.descriptions import described
-from ..simulation.needs import need_free_motion
-from ..simulation.scenario import Scenario
-from ..simulation.units_of_keys import limit_in, unit_for
+from ..simulation.scenario.requirements import need_free_motion
+from ..simulation.scenario.scenario import Scenario
+from ..simulation.scenario.units_of_keys import limit_in, unit_for
 from ..units.practical import ARCMIN
 from ..version import __version__
 from . import sliders

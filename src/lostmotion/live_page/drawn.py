@@ -7,7 +7,7 @@ from typing import Any
 from ..control.controller import Controller
 from ..model.losses import LossMap
 from ..model.torsion import Rigid, TorsionCurve
-from ..simulation.scenario import Scenario
+from ..simulation.scenario.scenario import Scenario
 
 
 def drawn(scenario: Scenario) -> dict[str, Any]:

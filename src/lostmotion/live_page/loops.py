@@ -8,7 +8,7 @@ from typing import Any
 from ..errors import InputError
 from ..servo.commission import LoopSheet, loop_sheet
 from ..servo.regimes import axis_of, regimes
-from ..simulation.scenario import Scenario
+from ..simulation.scenario.scenario import Scenario
 
 
 def loop_views(scenario: Scenario, motor: str) -> list[dict[str, Any]]:

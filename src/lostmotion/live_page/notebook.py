@@ -9,7 +9,7 @@ from typing import Any
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count
-from ..simulation.scenario import Scenario
+from ..simulation.scenario.scenario import Scenario
 from .page import page, write_page
 
 HEIGHTS = (200, 10_000)  # of the page in a notebook, in pixels

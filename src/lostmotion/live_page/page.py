@@ -12,7 +12,7 @@ from ..atomic_writer import write_bytes
 from ..errors import InputError
 from ..portable.checkout import made_here
 from ..portable.descriptions import kernel_of
-from ..simulation.scenario import Scenario
+from ..simulation.scenario.scenario import Scenario
 from .description import describe
 
 # `make page` puts all beside this file, and the wheel carries them.

@@ -11,8 +11,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..inputs.validation import did_you_mean, listed, shown
-from ..simulation.joint_trains import JointDrive, JointTrains, joint_drive
-from ..simulation.scenario import Scenario
+from ..simulation.scenario.scenario import Scenario
+from ..simulation.stepping.robot_joints import JointDrive, JointTrains, joint_drive
 from .joints import acts, joint_id
 from .mjcf import JointActuator
 

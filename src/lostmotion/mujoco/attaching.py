@@ -18,9 +18,9 @@ from ..model.drive import Drive
 from ..model.load import Load
 from ..model.motor import Motor
 from ..model.train import DriveTrain
-from ..simulation.scenario import Scenario
-from ..simulation.shipped import shipped_scenarios
-from ..simulation.sources import load
+from ..simulation.runs.loading import load
+from ..simulation.scenario.scenario import Scenario
+from ..simulation.scenario.shipped_scenarios import shipped_scenarios
 from .actuated import MAX_SUBSTEPS, Actuated
 from .joints import acts, compiled, joint_id
 from .mjcf import JointActuator

@@ -20,8 +20,8 @@ from ..model.losses import ConstantEfficiency
 from ..model.motor import Motor
 from ..model.springs import Spring
 from ..model.torsion import LinearStiffness, Rigid
-from ..simulation.joint_trains import Driven
-from ..simulation.scenario import Scenario
+from ..simulation.scenario.scenario import Scenario
+from ..simulation.stepping.robot_joints import Driven
 from .joints import acts, actuator_name, actuators_of, compiled, joint_id
 
 if TYPE_CHECKING:

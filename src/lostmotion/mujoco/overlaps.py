@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from ..errors import InputError
 from ..inputs.named import Named
 from ..model.angle_torques import PeriodicTorque
-from ..simulation.joint_trains import output_of
-from ..simulation.scenario import Scenario
+from ..simulation.scenario.scenario import Scenario
+from ..simulation.stepping.robot_joints import output_of
 from .joints import actuator_name, actuators_of, joint_id
 
 if TYPE_CHECKING:

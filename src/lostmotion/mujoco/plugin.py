@@ -15,8 +15,8 @@ from ..inputs.arguments import checked
 from ..portable.checkout import made_here
 from ..portable.derivation import Derivation
 from ..portable.descriptions import written
-from ..simulation.joint_trains import joint_drive
-from ..simulation.train_tables import TrainInitial
+from ..simulation.forms.train_tables import TrainInitial
+from ..simulation.stepping.robot_joints import joint_drive
 from .attaching import drive_of_joint
 from .overlaps import without_weight
 

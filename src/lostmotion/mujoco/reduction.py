@@ -15,8 +15,8 @@ from ..inputs.validation import shown
 from ..model.drive import Drive
 from ..model.motor import ShaftMotor
 from ..model.train import DriveTrain
-from ..simulation.joint_trains import joint_drive, output_of
-from ..simulation.scenario import Scenario
+from ..simulation.scenario.scenario import Scenario
+from ..simulation.stepping.robot_joints import joint_drive, output_of
 from .overlaps import loads_of, weights_of, without_weight
 
 STEPS_PER_PERIOD = 2000

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 from ..errors import InputError
 from ..response.rigid import RigidConstants, rigid_constants
-from ..simulation.scenario import Scenario
-from ..simulation.sources import load
+from ..simulation.runs.loading import load
+from ..simulation.scenario.scenario import Scenario
 
 MODELS = ("1-DOF-L", "2-DOF-L", "2-DOF-NL")
 AMPLITUDES = {"large": 1.0275, "small": 0.025}

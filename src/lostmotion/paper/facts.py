@@ -9,7 +9,7 @@ import numpy as np
 
 from ..response.crossovers import three_decibels_down
 from ..response.rigid import rigid_constants
-from ..simulation.results import energy_of
+from ..simulation.runs.results import energy_of
 from .drive import AMPLITUDES, MODELS, paper_scenario
 from .runs import FREQUENCIES, Results, stuck_intervals
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..response.harmonic import frequency_response
-from ..simulation.run import simulate
-from ..simulation.switchings import switchings_of
+from ..simulation.runs.run import simulate
+from ..simulation.runs.switchings import switchings_of
 from ..test_rig.loop import Loop
 from ..test_rig.rig import TestRig
 from .drive import AMPLITUDES, MODELS, paper_scenario

@@ -15,10 +15,10 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import argument
 from ..inputs.validation import did_you_mean, shown
-from ..simulation.pointing_error import pointing_errors, pointing_names
-from ..simulation.run import run
-from ..simulation.sampling import weights
-from ..simulation.scenario import Scenario
+from ..simulation.runs.pointing_error import pointing_errors, pointing_names
+from ..simulation.runs.run import run
+from ..simulation.runs.sample_means import weights
+from ..simulation.scenario.scenario import Scenario
 from ..worker_threads import thread_pool
 from .causes import CAUSES, VARIANTS, present, without
 from .robustness import ROBUSTNESS, SPEEDS

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any, TypeVar
 
 from ..model.linear_train import LINEAR_DRIVES
-from ..simulation.scenario import Scenario
+from ..simulation.scenario.scenario import Scenario
 
 Tables = dict[str, Any]
 K = TypeVar("K")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 
 from ..model.train import COUPLINGS, ON_SHAFTS, DriveTrain
-from ..simulation.scenario import Scenario
+from ..simulation.scenario.scenario import Scenario
 
 
 def dependencies_of(scenario: Scenario, states: Collection[str], inputs: Collection[str]) -> dict[str, list[str]]:

@@ -13,9 +13,9 @@ from ..inputs.named import Named
 from ..inputs.part import Part
 from ..inputs.quantities import Limit
 from ..recorded import Tape
-from ..simulation.keys import CHANGES_OTHERS
-from ..simulation.scenario import Scenario
-from ..simulation.units_of_keys import limit_in, meaning_in, unit_for
+from ..simulation.forms.dotted_keys import CHANGES_OTHERS
+from ..simulation.scenario.scenario import Scenario
+from ..simulation.scenario.units_of_keys import limit_in, meaning_in, unit_for
 
 Numbers = Callable[[Scenario], np.ndarray]
 

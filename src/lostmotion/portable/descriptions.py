@@ -8,8 +8,8 @@ from .. import _core
 from ..control.axis import OPEN_LOOP
 from ..errors import InputError
 from ..inputs.arguments import checked
-from ..simulation.core_runs import core_case
-from ..simulation.scenario import Scenario
+from ..simulation.runs.core_runs import core_case
+from ..simulation.scenario.scenario import Scenario
 from .derivation import Derivation, derivation_of
 
 

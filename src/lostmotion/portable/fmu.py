@@ -21,10 +21,10 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Count
 from ..inputs.validation import did_you_mean, shown
 from ..model.train import DriveTrain
-from ..simulation.needs import need_no_impacts
-from ..simulation.results import variables_of
-from ..simulation.run import run
-from ..simulation.scenario import Scenario
+from ..simulation.runs.results import variables_of
+from ..simulation.runs.run import run
+from ..simulation.scenario.requirements import need_no_impacts
+from ..simulation.scenario.scenario import Scenario
 from ..simulation.train_variables import axis_variables
 from . import fmi2, fmi3
 from .checkout import made_here

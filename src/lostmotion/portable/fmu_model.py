@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from xml.etree import ElementTree as ET
 
-from ..simulation.results import installed_version
+from ..simulation.runs.results import installed_version
 from ..units.grammar import read_unit
 from .derivation import Parameter
 

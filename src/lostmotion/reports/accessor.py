@@ -10,8 +10,8 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.validation import shown
 from ..response.harmonic import of_output
-from ..simulation.results import energy_of, scenario_of, whole
-from ..simulation.scenario import Scenario
+from ..simulation.runs.results import energy_of, scenario_of, whole
+from ..simulation.scenario.scenario import Scenario
 from .run import summary
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from ..identification.result import IdentificationResult
 from ..model.gear import Gear
 from ..model.losses import LossMap, MeshEfficiency, WormMesh, efficiency_map
 from ..model.train import DriveTrain
-from ..simulation.scenario import Scenario
+from ..simulation.scenario.scenario import Scenario
 from ..units.conversion import si_factor
 from ..units.practical import printed
 from .looks import FAINT, MEASURED, PALETTE, look

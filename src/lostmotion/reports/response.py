@@ -12,7 +12,7 @@ import numpy as np
 
 from ..atomic_writer import write_bytes
 from ..response.crossovers import characteristics
-from ..simulation.scenario import Scenario
+from ..simulation.scenario.scenario import Scenario
 from ..units.practical import counted, printed
 from .looks import step
 from .page import Prose, Report, Table

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import visible
-from ..simulation.results import RunArrays, energy_of, recorded_variables, whole
-from ..simulation.sampling import weights
-from ..simulation.scenario import Scenario
-from ..simulation.step_losses import LostSteps, found_in
-from ..simulation.switchings import ATTRIBUTE as SWITCHINGS
-from ..simulation.switchings import MESH_STEP, names_in, unpacked
-from ..simulation.windings import errors_of
+from ..simulation.runs.lost_steps import LostSteps, found_in
+from ..simulation.runs.results import RunArrays, energy_of, recorded_variables, whole
+from ..simulation.runs.sample_means import weights
+from ..simulation.runs.switchings import ATTRIBUTE as SWITCHINGS
+from ..simulation.runs.switchings import MESH_STEP, names_in, unpacked
+from ..simulation.scenario.field_oriented_motors import errors_of
+from ..simulation.scenario.scenario import Scenario
 from ..units.practical import charted, counted, printed
 from ..verdict import Point, Verdict
 from .run_loops import lines_of, loop_errors, points_of

@@ -13,8 +13,8 @@ from ..inputs.validation import shown
 from ..live_page.drawn import axis_figures
 from ..model.losses import LossMap
 from ..model.train import DriveTrain
-from ..simulation.results import energy_of, scenario_of
-from ..simulation.train_parts import parts_of
+from ..simulation.runs.results import energy_of, scenario_of
+from ..simulation.runs.separate_trains import parts_of
 from ..units.practical import charted
 from .looks import FAINT, look
 from .panels import Chart, Contacts, Curve, Flows, Ground, Panel

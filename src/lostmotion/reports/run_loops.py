@@ -12,8 +12,8 @@ import numpy as np
 from ..control.turning import turns
 from ..errors import InputError
 from ..response.standstill import moving_input, rises_of
-from ..simulation.results import RunArrays
-from ..simulation.scenario import Scenario
+from ..simulation.runs.results import RunArrays
+from ..simulation.scenario.scenario import Scenario
 from ..units.practical import practical
 from ..verdict import Point
 

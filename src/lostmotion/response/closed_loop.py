@@ -21,8 +21,8 @@ from .. import _core
 from ..control.axis import Bound
 from ..control.controller import AnyReference, Controller
 from ..control.references import PositionReference
-from ..simulation.scenario import Scenario
-from ..simulation.stepping import Simulation
+from ..simulation.scenario.scenario import Scenario
+from ..simulation.stepping.simulation import Simulation
 from ..units.practical import counted
 from .plant import Plant
 from .windows import Window

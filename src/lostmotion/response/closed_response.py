@@ -12,7 +12,7 @@ import numpy as np
 from .. import _core
 from ..control.law import Law
 from ..model.train import DriveTrain
-from ..simulation.scenario import Scenario
+from ..simulation.scenario.scenario import Scenario
 from ..simulation.train_variables import signals_of
 from ..worker_threads import thread_pool
 from .closed_loop import AxisSignal, ClosedLoop, Motion, Search, mean_of

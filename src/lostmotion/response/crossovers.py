@@ -11,8 +11,8 @@ from ..errors import InputError, need
 from ..inputs.arguments import checked
 from ..inputs.quantities import Frequency, Number, Torque
 from ..model.drive import Drive
-from ..simulation.explanation import smallest_commands
-from ..simulation.scenario import Scenario
+from ..simulation.runs.stuck_contacts import smallest_commands
+from ..simulation.scenario.scenario import Scenario
 from .harmonic import of_output
 from .plant import plant_of
 from .shooting import MAX_PERIODS, reason_of, respond

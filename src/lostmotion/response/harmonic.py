@@ -15,7 +15,7 @@ from ..inputs.arguments import checked
 from ..inputs.limits import check_free
 from ..inputs.quantities import Count, Number, Torque, arguments
 from ..model.drive import Drive
-from ..simulation.scenario import Scenario
+from ..simulation.scenario.scenario import Scenario
 from .closed_response import respond_closed, windows_for
 from .linear import python_control
 from .plant import Plant, known_output, plant_or_loop

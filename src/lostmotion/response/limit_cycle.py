@@ -11,9 +11,9 @@ import numpy as np
 from .. import _core
 from ..errors import InputError
 from ..model.signals import core_signal
-from ..simulation.core_runs import core_case
-from ..simulation.needs import need_free_motion
-from ..simulation.scenario import Scenario
+from ..simulation.runs.core_runs import core_case
+from ..simulation.scenario.requirements import need_free_motion
+from ..simulation.scenario.scenario import Scenario
 from .shooting import PERIODICITY, SAMPLES_PER_PERIOD, reason_of
 from .standstill import FOREVER, NOTHING_MOVES, Outlook, Verdict, Watch, frequency_of
 

@@ -17,12 +17,12 @@ from ..model.drive import Drive
 from ..model.signals import core_signal
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
-from ..simulation.core_runs import core_case
-from ..simulation.drive_tables import Initial
-from ..simulation.needs import need_free_motion, need_open_loop
-from ..simulation.scenario import Scenario
-from ..simulation.stepping import Simulation
-from ..simulation.train_tables import TrainInitial
+from ..simulation.forms.drive_tables import Initial
+from ..simulation.forms.train_tables import TrainInitial
+from ..simulation.runs.core_runs import core_case
+from ..simulation.scenario.requirements import need_free_motion, need_open_loop
+from ..simulation.scenario.scenario import Scenario
+from ..simulation.stepping.simulation import Simulation
 from ..simulation.train_variables import only_input
 from ..simulation.variables import variables_of_core
 

@@ -15,8 +15,8 @@ from ..inputs.validation import listed, shown
 from ..model.drive import Drive
 from ..model.signals import Signal
 from ..model.train import DriveTrain
-from ..simulation.needs import need_free_motion, need_open_loop
-from ..simulation.scenario import Scenario
+from ..simulation.scenario.requirements import need_free_motion, need_open_loop
+from ..simulation.scenario.scenario import Scenario
 from ..simulation.train_variables import REFERENCE_UNITS, axis_variables, only_input
 from ..simulation.variables import Variable
 

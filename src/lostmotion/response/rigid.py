@@ -15,8 +15,8 @@ from ..model.gear import Gear
 from ..model.losses import ConstantEfficiency, TwoEfficiencies
 from ..model.motor import ShaftMotor
 from ..model.train import DriveTrain, TrainElements
-from ..simulation.needs import need_free_motion
-from ..simulation.scenario import Scenario
+from ..simulation.scenario.requirements import need_free_motion
+from ..simulation.scenario.scenario import Scenario
 
 OTHERS = tuple(table for table in TrainElements.model_fields if table not in ("motors", "gears"))
 

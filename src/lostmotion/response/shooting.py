@@ -15,9 +15,9 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Count, Number, Torque
 from ..model.drive import Drive
 from ..model.signals import Signal, TorqueSignal, constant_or
-from ..simulation.drive_tables import Initial
-from ..simulation.scenario import Scenario
-from ..simulation.train_tables import TrainInitial
+from ..simulation.forms.drive_tables import Initial
+from ..simulation.forms.train_tables import TrainInitial
+from ..simulation.scenario.scenario import Scenario
 from ..simulation.train_variables import only_input
 from ..units.practical import counted
 from .plant import Plant, plant_of

@@ -18,8 +18,8 @@ from ..inputs.quantities import Number, Time
 from ..inputs.validation import did_you_mean, shown
 from ..model.angle_torques import AngleCurve, Harmonic, PositionHarmonic
 from ..model.train import DriveTrain
-from ..simulation.run import run
-from ..simulation.scenario import Scenario
+from ..simulation.runs.run import run
+from ..simulation.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
     import xarray

@@ -18,10 +18,10 @@ from typing import Literal
 import numpy as np
 
 from ..control.turning import turns
-from ..simulation.explanation import explain
-from ..simulation.scenario import Scenario
-from ..simulation.simulation_state import SimulationState
-from ..simulation.stepping import Simulation
+from ..simulation.runs.stuck_contacts import explain
+from ..simulation.scenario.scenario import Scenario
+from ..simulation.stepping.simulation import Simulation
+from ..simulation.stepping.simulation_state import SimulationState
 from ..units.practical import practical
 from .closed_loop import running_slots
 from .closed_response import frame_of

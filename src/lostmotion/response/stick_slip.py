@@ -20,8 +20,8 @@ from ..control.turning import turns
 from ..errors import InputError
 from ..model.signals import core_signal
 from ..model.torsion import Rigid
-from ..simulation.scenario import Scenario
-from ..simulation.train_tables import TrainInitial
+from ..simulation.forms.train_tables import TrainInitial
+from ..simulation.scenario.scenario import Scenario
 from .limit_cycle import Loop
 from .linear import LinearModel, train_model
 

@@ -18,7 +18,7 @@ from ..response.limit_cycle import SAMPLES, Loop
 from ..response.return_map import Image, Transients, image
 from ..response.standstill import moving_input
 from ..response.stick_slip import AtRestError, StickSlip, UndecidableError, stick_slip
-from ..simulation.scenario import Scenario
+from ..simulation.scenario.scenario import Scenario
 from .motion import at_rest
 from .regimes import Axis, axis_of
 from .sampled_proof import map_without_steps, prove_sampled, reached_by_run

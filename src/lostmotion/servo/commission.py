@@ -14,7 +14,7 @@ from ..inputs.arguments import checked
 from ..inputs.doubts import doubt_window
 from ..inputs.validation import shown
 from ..response.standstill import moving_input
-from ..simulation.scenario import Scenario
+from ..simulation.scenario.scenario import Scenario
 from ..units.conversion import si_value
 from ..units.practical import practical
 from ..verdict import Point, State, Verdict

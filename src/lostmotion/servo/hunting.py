@@ -18,8 +18,8 @@ from ..response.limit_cycle import Found, Loop, find_limit_cycle
 from ..response.plant import known_output, plant_of
 from ..response.shooting import floquet_multipliers, is_stable, motion_of
 from ..response.standstill import Verdict
-from ..simulation.scenario import Scenario
-from ..simulation.units_of_keys import unit_for
+from ..simulation.scenario.scenario import Scenario
+from ..simulation.scenario.units_of_keys import unit_for
 from ..worker_threads import thread_pool
 from .motion import PART, at_rest, without, without_backlash, without_friction
 from .regimes import axis_of

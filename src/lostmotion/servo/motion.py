@@ -22,15 +22,15 @@ from ..model.linear_train import LinearElements
 from ..model.torsion import TorsionCurve
 from ..response.closed_loop import slowest
 from ..response.standstill import Verdict, Watch, decide, moving_input
-from ..simulation.run import run
-from ..simulation.sampling import weights
-from ..simulation.scenario import Scenario
+from ..simulation.runs.run import run
+from ..simulation.runs.sample_means import weights
+from ..simulation.scenario.scenario import Scenario
 from .data import inertias
 from .margins import unstable_pole
 from .regimes import Axis, speed_of
 
 if TYPE_CHECKING:
-    from ..simulation.results import RunArrays
+    from ..simulation.runs.results import RunArrays
 
 STEPPED = ("current", "speed", "position")  # loops that a reference can step; that of i_d has none of its own
 HALVINGS = 12  # of a step, until no limit acts on it

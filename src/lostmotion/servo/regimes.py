@@ -19,10 +19,10 @@ from ..model.gear import Gear
 from ..model.signals import ForceSignal, TorqueSignal, core_signal
 from ..model.torsion import Elastic, Rigid
 from ..response.linear import LinearModel, train_model
-from ..simulation.needs import need_free_motion
-from ..simulation.scenario import Scenario
-from ..simulation.train_state import start_values
-from ..simulation.train_tables import TrainInitial
+from ..simulation.forms.initial_state import start_values
+from ..simulation.forms.train_tables import TrainInitial
+from ..simulation.scenario.requirements import need_free_motion
+from ..simulation.scenario.scenario import Scenario
 from ..units.practical import charted, printed
 from .winding import OrientedWinding
 

@@ -23,8 +23,8 @@ from ..errors import InputError
 from ..response.linear import LinearModel
 from ..response.standstill import FOREVER
 from ..response.stick_slip import NONE, AtRestError, UndecidableError, only_contact, others
-from ..simulation.train_state import start_values
-from ..simulation.train_tables import TrainInitial
+from ..simulation.forms.initial_state import start_values
+from ..simulation.forms.train_tables import TrainInitial
 from .regimes import Axis, model_at
 
 SLIP_SPEED = 1e-9  # [rad/s] or [m/s], at which the matrices of the slip are taken

@@ -12,12 +12,12 @@ from typing import Any, Literal
 from ..errors import InputError, need
 from ..inputs.arguments import ScenarioName, checked
 from ..inputs.schema import follow, unit_in_schema
-from ..simulation.axis_form import file_schema
-from ..simulation.keys import parse_override
-from ..simulation.linear_units import unit_of_slides
-from ..simulation.scenario import Scenario
-from ..simulation.scenario_files import CHANGED, title_with
-from ..simulation.sources import load
+from ..simulation.forms.axis_form import file_schema
+from ..simulation.forms.dotted_keys import parse_override
+from ..simulation.forms.slide_units import unit_of_slides
+from ..simulation.runs.loading import load
+from ..simulation.scenario.scenario import Scenario
+from ..simulation.scenario.scenario_files import CHANGED, title_with
 from ..units.practical import printed
 
 GAINS = (".speed.gain", ".position.gain")  # ends of their keys, which a file may leave out
@@ -107,7 +107,7 @@ class Tuning:
         True
         """
         need("tomlkit", "Writing a tuned scenario", "control")
-        from ..simulation.scenario_writer import write_changed
+        from ..simulation.scenario.scenario_writer import write_changed
 
         if path.suffix != ".toml":
             raise InputError(f"{path}: a scenario is a TOML file; its name must end in .toml")

@@ -25,7 +25,7 @@ from ..errors import InputError, need
 from ..inputs.arguments import ScenarioName, checked
 from ..inputs.quantities import Angle, Frequency, Number
 from ..inputs.validation import did_you_mean, shown
-from ..simulation.scenario import Scenario
+from ..simulation.scenario.scenario import Scenario
 from ..units.practical import counted
 from .data import frictions, inertias, lag_sum, two_inertias
 from .margins import STABLE, bandwidth_of, frequencies, margins

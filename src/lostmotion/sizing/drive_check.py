@@ -11,10 +11,10 @@ from ..control.turning import turns
 from ..inputs.arguments import checked
 from ..model.linear import RatedScrew
 from ..model.losses import LossMap
-from ..simulation.needs import need_no_impacts
-from ..simulation.results import RunArrays
-from ..simulation.run import run
-from ..simulation.scenario import Scenario
+from ..simulation.runs.results import RunArrays
+from ..simulation.runs.run import run
+from ..simulation.scenario.requirements import need_no_impacts
+from ..simulation.scenario.scenario import Scenario
 from .axis_rules import HOUR, AxialLoad, missing, screw_life, screw_rules
 from .duty_cycle import MIN_REST, STANDSTILL, DutyCycle, duty_cycle
 from .finding import Finding, Findings

@@ -17,7 +17,7 @@ from ..errors import InputError
 if TYPE_CHECKING:
     import xarray
 
-    from ..simulation.results import RunArrays
+    from ..simulation.runs.results import RunArrays
 
 STANDSTILL = 1e-3  # below this share of its largest speed the motor is taken to be at rest
 MIN_REST = 0.01  # of the time in motion; a shorter standstill is no rest

@@ -15,7 +15,7 @@ from .duty_cycle import DutyCycle
 from .finding import Finding, within
 
 if TYPE_CHECKING:
-    from ..simulation.results import RunArrays
+    from ..simulation.runs.results import RunArrays
 
 
 def loads(g: Transmission, peak: float, cycle: DutyCycle, where: str = "gearbox") -> list[Finding]:

@@ -12,10 +12,10 @@ from ..inputs.named import Named
 from ..model.motor import ShaftMotor
 from ..model.signals import ForceSignal, Ramp, TorqueSignal
 from ..model.train import DriveTrain
-from ..simulation.run import run
-from ..simulation.scenario import Scenario
-from ..simulation.tables import SimulationTable
-from ..simulation.train_tables import TrainInitial
+from ..simulation.forms.common_tables import SimulationTable
+from ..simulation.forms.train_tables import TrainInitial
+from ..simulation.runs.run import run
+from ..simulation.scenario.scenario import Scenario
 
 MAX_DURATION = 1000.0  # [s]
 SAMPLES = 2000

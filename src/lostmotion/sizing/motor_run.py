@@ -14,7 +14,7 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Temperature
 from ..inputs.validation import did_you_mean
 from ..model.motor import Motor
-from ..simulation.results import RunArrays, scenario_of
+from ..simulation.runs.results import RunArrays, scenario_of
 from .motor_check import command_of_run, current_voltage_power
 from .thermal import COPPER, mean_square, need_two_bodies, rms
 from .torque_squares import squares_of

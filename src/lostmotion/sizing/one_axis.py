@@ -9,9 +9,9 @@ from ..model.gear import Gear
 from ..model.gearbox import Gearbox
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
-from ..simulation.explanation import smallest_commands
-from ..simulation.results import RunArrays
-from ..simulation.scenario import Scenario
+from ..simulation.runs.results import RunArrays
+from ..simulation.runs.stuck_contacts import smallest_commands
+from ..simulation.scenario.scenario import Scenario
 from .finding import Finding
 from .gearbox_check import lost_motion
 from .motion_check import inertia_ratio, resonance

@@ -14,7 +14,7 @@ from ..model.gearbox import Gearbox
 from ..model.losses import ConstantEfficiency
 from ..model.motor import Motor
 from ..model.signals import TimeFunction
-from ..simulation.drive_tables import LoadTable
+from ..simulation.forms.drive_tables import LoadTable
 from .duty_cycle import DutyCycle
 from .finding import Finding
 from .gearbox_check import input_speeds, loads

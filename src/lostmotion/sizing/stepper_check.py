@@ -8,9 +8,9 @@ import numpy as np
 
 from ..model.motor import Motor, ShaftMotor
 from ..model.stepper import ELECTRIC, pull_out_torque
-from ..simulation.results import RunArrays
-from ..simulation.scenario import Scenario
-from ..simulation.step_losses import PERIOD, found_in
+from ..simulation.runs.lost_steps import PERIOD, found_in
+from ..simulation.runs.results import RunArrays
+from ..simulation.scenario.scenario import Scenario
 from ..units.practical import RPM
 from .finding import Finding, Judgement
 

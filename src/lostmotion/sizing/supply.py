@@ -12,7 +12,7 @@ import numpy as np
 from ..model.duty import Amplifier, Bus
 from ..model.motor import Motor
 from ..model.task import Task
-from ..simulation.results import RunArrays
+from ..simulation.runs.results import RunArrays
 from .axis_rules import missing
 from .duty_cycle import integral
 from .finding import Finding, within

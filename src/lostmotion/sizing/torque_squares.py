@@ -16,10 +16,10 @@ import numpy as np
 
 from .. import _core
 from ..control.axis import Bound
-from ..simulation.core_runs import core_case
-from ..simulation.run import MAX_SWITCHINGS, check_memory
-from ..simulation.scenario import Scenario
-from ..simulation.train_parts import control_of_part, parts_of
+from ..simulation.runs.core_runs import core_case
+from ..simulation.runs.run import MAX_SWITCHINGS, check_memory
+from ..simulation.runs.separate_trains import control_of_part, parts_of
+from ..simulation.scenario.scenario import Scenario
 
 # Kronrod, Nodes and weights of quadrature formulas (1965); every second node is one of Gauss.
 INNER, MIDDLE, OUTER = 0.4342437493468025580, math.sqrt(0.6), 0.9604912687080202834

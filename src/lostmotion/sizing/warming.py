@@ -28,10 +28,10 @@ from ..model.losses import LossMap
 from ..model.motor import Motor
 from ..model.signals import core_signal
 from ..reproducible import interpolate, power
-from ..simulation.core_runs import core_case
-from ..simulation.results import raw_result
-from ..simulation.run import MAX_SWITCHINGS, check_memory
-from ..simulation.scenario import Scenario
+from ..simulation.runs.core_runs import core_case
+from ..simulation.runs.results import raw_result
+from ..simulation.runs.run import MAX_SWITCHINGS, check_memory
+from ..simulation.scenario.scenario import Scenario
 from .thermal import COPPER, TwoBodies, need_two_bodies
 from .torque_squares import squares
 

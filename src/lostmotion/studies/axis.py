@@ -34,8 +34,8 @@ from ..model.duty import Amplifier, Duty, HoldingBrake, Supply
 from ..model.motor import Motor, MotorLimits
 from ..model.signals import TimeFunction, TorqueSignal
 from ..model.task import Task
-from ..simulation.drive_tables import LoadTable
-from ..simulation.scenario import Scenario
+from ..simulation.forms.drive_tables import LoadTable
+from ..simulation.scenario.scenario import Scenario
 from ..sizing.finding import SOURCES
 from .select import Bound
 

@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 
 from ..model.motor import Motor
-from ..simulation.linear_units import of_slides
-from ..simulation.results import RunArrays
-from ..simulation.scenario import Scenario
+from ..simulation.forms.slide_units import of_slides
+from ..simulation.runs.results import RunArrays
+from ..simulation.scenario.scenario import Scenario
 from ..sizing.duty_cycle import DutyCycle
 from ..sizing.motor_check import rms_rise
 from ..sizing.thermal import TwoBodies

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..control.loops import FirstOrderCurrent, IdealCurrent
-from ..simulation.results import RunArrays
-from ..simulation.scenario import Scenario
+from ..simulation.runs.results import RunArrays
+from ..simulation.scenario.scenario import Scenario
 from ..sizing.motor_check import command_of_run, current_voltage_power
 from ..sizing.motor_run import oriented_amplitudes
 from ..sizing.thermal import mean_square

@@ -8,10 +8,10 @@ import numpy as np
 
 from .. import _core
 from ..control.axis import driven
-from ..simulation.results import RunArrays
-from ..simulation.run import BYTES_PER_VALUE, check_memory, run
-from ..simulation.scenario import Scenario
-from ..simulation.windings import oriented
+from ..simulation.runs.results import RunArrays
+from ..simulation.runs.run import BYTES_PER_VALUE, check_memory, run
+from ..simulation.scenario.field_oriented_motors import oriented
+from ..simulation.scenario.scenario import Scenario
 from .axis import FEWEST, REPEATS
 from .axis_columns import Repeated, change
 from .axis_scenario import Cycles, begins_alike, cycles_of, over

@@ -17,9 +17,9 @@ from ..model.gearbox import Gearbox
 from ..model.motor import Motor
 from ..model.signals import Samples, TimeFunction, TorqueSignal
 from ..servo.data import lag_sum, secant
-from ..simulation.drive_tables import Initial, LoadTable
-from ..simulation.scenario import Scenario
-from ..simulation.tables import SimulationTable
+from ..simulation.forms.common_tables import SimulationTable
+from ..simulation.forms.drive_tables import Initial, LoadTable
+from ..simulation.scenario.scenario import Scenario
 from ..sizing.required_motion import duty_torque, required_motion
 from .axis import AxisTask, reference_of, repeated, repeated_torque
 

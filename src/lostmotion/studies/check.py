@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 
-from ..simulation.scenario import Scenario
+from ..simulation.scenario.scenario import Scenario
 from ..sizing.drive_check import check_drive
 from ..sizing.finding import SOURCES, Finding
 from .select import SHARES, TASK_SHARES, USE

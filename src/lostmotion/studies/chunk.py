@@ -6,8 +6,8 @@ import io
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from ..simulation.results import installed_version
-from ..simulation.scenario import Scenario
+from ..simulation.runs.results import installed_version
+from ..simulation.scenario.scenario import Scenario
 from .axis_rows import run_axes
 from .columns import tabulate, units_of
 from .file import from_json

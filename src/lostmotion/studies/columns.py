@@ -11,7 +11,7 @@ import numpy as np
 from .. import _core
 from ..control.turning import turns
 from ..response.crossovers import bandwidth
-from ..simulation.scenario import Scenario
+from ..simulation.scenario.scenario import Scenario
 from ..worker_threads import thread_pool
 from .records import kind_of_record
 from .runs import Runs

@@ -9,11 +9,11 @@ from typing import Any, cast
 from ..errors import InputError, prefixed
 from ..inputs.arguments import checked
 from ..inputs.toml_files import read_toml
-from ..simulation.axis_form import is_axis, long_form
-from ..simulation.result_files import FORMATS
-from ..simulation.scenario import Scenario
-from ..simulation.scenario_files import find_base, read_tables
-from ..simulation.sources import load
+from ..simulation.forms.axis_form import is_axis, long_form
+from ..simulation.runs.loading import load
+from ..simulation.runs.result_files import FORMATS
+from ..simulation.scenario.scenario import Scenario
+from ..simulation.scenario.scenario_files import find_base, read_tables
 from .records import kind_of_record, names_of
 from .study import Study
 

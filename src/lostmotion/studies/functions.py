@@ -12,7 +12,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from .. import _core
-from ..simulation.sampling import last_share, weights
+from ..simulation.runs.sample_means import last_share, weights
 from .measures import Measure, measure, one_of, plain, power, product, reduced
 
 REDUCTIONS = tuple(_core.reductions())  # of a variable over time, as the core knows them

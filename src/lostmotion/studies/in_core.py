@@ -9,11 +9,11 @@ import numpy as np
 from .. import _core
 from ..errors import InputError
 from ..model.torsion import Rigid
-from ..simulation.core_runs import core_case
-from ..simulation.keys import renamed
-from ..simulation.one_gear import drive_keys, is_drive
-from ..simulation.scenario import Scenario
-from ..simulation.train_parts import parts_of
+from ..simulation.forms.dotted_keys import renamed
+from ..simulation.runs.core_runs import core_case
+from ..simulation.runs.separate_trains import parts_of
+from ..simulation.scenario.one_gear import drive_keys, is_drive
+from ..simulation.scenario.scenario import Scenario
 from .check import COLUMNS, check_columns
 from .functions import REDUCTIONS
 from .runs import Runs, spread

@@ -11,10 +11,10 @@ from ..inputs.schema import follow, unit_in_schema
 from ..inputs.validation import shown
 from ..model.linear_motor import LinearMotorData
 from ..model.motor import Motor
-from ..simulation.keys import list_index
-from ..simulation.linear_units import OF_REFERENCE, of_slides
-from ..simulation.train_tables import TrainTables
-from ..simulation.units_of_keys import in_si, unit_in, unit_of_key
+from ..simulation.forms.dotted_keys import list_index
+from ..simulation.forms.slide_units import OF_REFERENCE, of_slides
+from ..simulation.forms.train_tables import TrainTables
+from ..simulation.scenario.units_of_keys import in_si, unit_in, unit_of_key
 from ..sizing.stages import STAGES
 from ..sizing.whole_drives import WHOLE
 from .axis import AxisTask

@@ -15,8 +15,8 @@ from ..errors import InputError
 from ..inputs.schema import unit_in_schema
 from ..inputs.toml_files import is_in_file
 from ..inputs.validation import did_you_mean, listed, shown
-from ..simulation.scenario import Scenario
-from ..simulation.units_of_keys import in_si
+from ..simulation.scenario.scenario import Scenario
+from ..simulation.scenario.units_of_keys import in_si
 
 # Of keys that take the name of a record: the part that the record describes, and what kind of record it is.
 _RECORD_KEYS = {

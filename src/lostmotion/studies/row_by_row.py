@@ -6,9 +6,9 @@ import json
 
 import numpy as np
 
-from ..simulation.pointing_error import pointing_errors
-from ..simulation.run import run
-from ..simulation.windings import bound_values
+from ..simulation.runs.pointing_error import pointing_errors
+from ..simulation.runs.run import run
+from ..simulation.scenario.field_oriented_motors import bound_values
 from ..worker_threads import thread_pool
 from .check import COLUMNS, check_columns
 from .runs import Runs

@@ -6,7 +6,7 @@ from pydantic import Field, field_validator, model_validator
 
 from ..inputs.part import Part
 from ..inputs.quantities import Switch
-from ..simulation.units_of_keys import in_si
+from ..simulation.scenario.units_of_keys import in_si
 from ..sizing.finding import RULES, TASK_RULES
 
 Direction = Literal["least", "largest"]

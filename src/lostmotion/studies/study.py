@@ -16,8 +16,8 @@ from ..inputs.quantities import Whole
 from ..inputs.validation import did_you_mean, listed
 from ..model.duty import HoldingBrake
 from ..model.motor import Motor
-from ..simulation.scenario import Scenario
-from ..simulation.units_of_keys import unit_in, unit_of_key
+from ..simulation.scenario.scenario import Scenario
+from ..simulation.scenario.units_of_keys import unit_in, unit_of_key
 from ..sizing.stages import stage_of, together
 from ..sizing.whole_drives import LINEAR, WHOLE, whole_drive
 from .axis import FEWEST, ONE_WAY, AxisTask, reference_of, turns_back

@@ -20,10 +20,10 @@ from ..model.signals import ForceSignal, TorqueSignal
 from ..model.slide import Slide
 from ..model.task import Task
 from ..reproducible import sin
-from ..simulation.linear_units import in_si, of_slides
-from ..simulation.scenario import Scenario
-from ..simulation.scenario_files import read_series_files, units_of_series
-from ..simulation.train_tables import train_schema
+from ..simulation.forms.slide_units import in_si, of_slides
+from ..simulation.forms.train_tables import train_schema
+from ..simulation.scenario.scenario import Scenario
+from ..simulation.scenario.scenario_files import read_series_files, units_of_series
 from ..sizing.stages import DIRECT, STAGES, stage_of
 from ..sizing.whole_drives import BESIDE, LINEAR, WHOLE
 from .axis import AxisTask, InnerLoop, reference_of

@@ -18,10 +18,10 @@ from ..inputs.quantities import Switch
 from ..inputs.validation import shown
 from ..model.signals import Signal
 from ..reproducible import exp, log
-from ..simulation.keys import list_index
-from ..simulation.near_keys import near_key
-from ..simulation.scenario import Scenario
-from ..simulation.units_of_keys import in_si, unit_in, unit_of_key
+from ..simulation.forms.dotted_keys import list_index
+from ..simulation.scenario.key_suggestions import near_key
+from ..simulation.scenario.scenario import Scenario
+from ..simulation.scenario.units_of_keys import in_si, unit_in, unit_of_key
 from .records import check_names, is_condition, kind_of_record, names_of, names_that_fit
 
 MAX_LEVELS = 1_000_000  # of one parameter

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from ..control.turning import turns
-from ..simulation.pointing_error import pointing_names
-from ..simulation.results import ENERGY
-from ..simulation.scenario import Scenario
+from ..simulation.runs.pointing_error import pointing_names
+from ..simulation.runs.results import ENERGY
+from ..simulation.scenario.field_oriented_motors import bound_names
+from ..simulation.scenario.scenario import Scenario
 from ..simulation.train_variables import axis_variables
 from ..simulation.variables import CHANNEL_NAMES, VARIABLES
-from ..simulation.windings import bound_names
 
 OF_TRAINS = ("energy", "time")
 OF_THE_RUN = (*OF_TRAINS, "ideal_speed", "bandwidth")

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..simulation.results import RunArrays
-from ..simulation.switchings import names_in, unpacked
+from ..simulation.runs.results import RunArrays
+from ..simulation.runs.switchings import names_in, unpacked
 
 
 def segment(twist: Any, torque: Any, low: float, high: float) -> tuple[float, float]:

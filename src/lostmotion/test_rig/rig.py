@@ -25,10 +25,10 @@ from ..model.load import Load
 from ..model.motor import Motor
 from ..model.signals import Samples, TorqueSignal
 from ..model.torsion import Rigid
-from ..simulation.drive_tables import Initial
-from ..simulation.results import RunArrays
-from ..simulation.run import run
-from ..simulation.scenario import Scenario
+from ..simulation.forms.drive_tables import Initial
+from ..simulation.runs.results import RunArrays
+from ..simulation.runs.run import run
+from ..simulation.scenario.scenario import Scenario
 from .loop import Loop, break_away, gap, segment
 
 PAIR = 100.0  # bytes for a point of a map

@@ -16,9 +16,9 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Force, Number, Speed
 from ..model.linear import ScrewData
 from ..model.torsion import Rigid
-from ..simulation.results import RunArrays
-from ..simulation.run import run
-from ..simulation.scenario import Scenario
+from ..simulation.runs.results import RunArrays
+from ..simulation.runs.run import run
+from ..simulation.scenario.scenario import Scenario
 from .loop import Loop, break_away, gap, segment
 from .rig import LOST_MOTION_LOAD, RAMP, RigError
 

@@ -14,9 +14,9 @@ from ..inputs.quantities import Count, Time
 from ..inputs.validation import listed, shown
 from ..model.drive import Drive
 from ..model.train import DriveTrain
-from ..simulation.keys import renamed
-from ..simulation.one_gear import drive_keys
-from ..simulation.scenario import Scenario
+from ..simulation.forms.dotted_keys import renamed
+from ..simulation.scenario.one_gear import drive_keys
+from ..simulation.scenario.scenario import Scenario
 
 
 class Drives:

@@ -1,0 +1,1 @@
+"""Batches: many drives advanced together, each with its own parameters."""

@@ -1,0 +1,152 @@
+"""Trains of a batch that are a motor, a gear and a load: a walk from event to event, which begins anew at each step."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ... import _core
+from ...errors import InputError
+from ...model.torsion import Rigid, TorsionCurve
+from ..forms.dotted_keys import renamed
+from ..scenario.one_gear import drive_keys
+from ..scenario.scenario import Scenario
+from .batch_parameters import BatchParameters
+
+BACKLASH = "gearbox.stiffness.backlash"
+KEYS = tuple(
+    key
+    for key in _core.batch_fields()
+    if key.startswith(("motor.", "gearbox.", "load."))
+    and not key.startswith("load.torque.")
+    and key != "gearbox.stiffness.slopes"
+)
+"""numbers that the core changes by itself, by their keys in the short form"""
+
+
+class WalkedBatch:
+    """The core of such a batch.
+
+    scenarios: one for all trains, or one for each.
+    parameters: what differs from train to train, beside that.
+    count: number of trains.
+    step: [s]
+    """
+
+    def __init__(self, scenarios: Sequence[Scenario], parameters: BatchParameters, count: int, step: float) -> None:
+        first = scenarios[0]
+        train = first.train()
+        numbers: dict[Scenario, int] = {}
+        kinds = [numbers.setdefault(one, len(numbers)) for one in scenarios]
+        self._core = _core.DriveBatch(
+            [_core_of(one) for one in numbers], kind_of=kinds if len(kinds) == count else kinds * count, step=step
+        )
+        self._first, self._numbers = first, drive_keys(first)
+        self.change(parameters, tuple(parameters), np.arange(count))
+        ((motor, part),), ((gear, between),) = train.motors.items(), train.gears.items()
+        torque, output = train.motor_torque_of(motor), between.output
+        states = (
+            torque,
+            train.speed_of(part.shaft),
+            train.speed_of(output),
+            train.twist_of(gear),
+            train.angle_of(output),
+        )
+        self._states = dict(zip(states, self._core.states, strict=True))
+        self._computed = {
+            torque: self._core.motor_torque,
+            train.output_torque_of(gear): self._core.output_torque,
+            train.contact_of(part.shaft): self._core.input_contact,
+            train.twist_contact_of(gear): self._core.twist_contact,
+        }
+        self._rigid = any(isinstance(g.stiffness, Rigid) for one in numbers for g in one.train().gears.values())
+        self._angle = states[-1]
+        self._count = count
+        self._given = train.command_of(motor), train.load_torque_of(output)
+        self.inputs = self._given if first.loaded() else self._given[:1]
+
+    @staticmethod
+    def takes(scenarios: Sequence[Scenario]) -> bool:
+        """Whether the core takes these trains."""
+        if any(scenario.axes() or scenario.continuous() for scenario in scenarios):
+            return False
+        return not any(_core.DriveBatch.error(_core_of(scenario)) for scenario in dict.fromkeys(scenarios))
+
+    def change(self, parameters: BatchParameters, keys: Sequence[str], rows: np.ndarray) -> None:
+        """Take over what has been written under some keys for some trains."""
+        own = {key: renamed(key, self._numbers) for key in keys}
+        if all(self._is_number_of_core(key) for key in own.values()):
+            for key, number in own.items():
+                self._core.set(number, parameters[key])
+            return
+        for k in rows.tolist():
+            one = _core_of(parameters.scenario(k))
+            if error := _core.DriveBatch.error(one):
+                raise InputError(f"{error}; such drives have a batch of their own", f"parameters.{keys[0]}")
+            self._core.replace(k, one)
+
+    def _is_number_of_core(self, key: str) -> bool:
+        """Whether the core changes this number by itself. Of a synchronous motor its numbers follow from others."""
+        train = self._first.train()
+        if key == BACKLASH:
+            return _plain(next(iter(train.gears.values())).stiffness)
+        synchronous = next(iter(train.motors.values())).kind == "synchronous"
+        return key in KEYS and not (synchronous and key.startswith("motor."))
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """Names of its variables."""
+        return tuple(dict.fromkeys((*self.states, *self._computed)))
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the state at t = 0."""
+        return tuple(self._states)
+
+    def read(self, name: str) -> np.ndarray:
+        """Values of a variable; those of states each step writes anew."""
+        computed = self._computed.get(name)
+        return self._states[name] if computed is None else computed()
+
+    @property
+    def counts(self) -> tuple[int, int, int, int]:
+        """Numbers of steps, in the order of `SimulationBatch.counts`."""
+        return self._core.counts
+
+    @property
+    def memory(self) -> int:
+        """Memory [bytes] of states and parameters."""
+        return int(self._core.memory)
+
+    def step(self, values: Mapping[str, np.ndarray], threads: int) -> None:
+        """Advance all trains with these inputs."""
+        zero, (command, load) = np.zeros(1), self._given
+        self._core.step(values.get(command, zero), values.get(load, zero), threads)
+
+    def reset(self, which: np.ndarray | None, initial: Mapping[str, np.ndarray]) -> None:
+        """Take trains back to t = 0."""
+        for name, values in initial.items():
+            if self._rigid and name != self._angle and values.any():
+                raise InputError(f"initial.{name}: a rigid gearbox begins at rest in a batch; give {self._angle} alone")
+        zero = np.zeros(self._count)
+        start = np.column_stack([initial.get(name, zero) for name in self._states]) if initial else None
+        self._core.reset(which, start)
+
+    def snapshot(self) -> Any:
+        """State of all trains."""
+        return self._core.snapshot()
+
+    def restore(self, snapshot: Any) -> None:
+        """Return to a snapshot."""
+        self._core.restore(snapshot)
+
+
+def _core_of(scenario: Scenario) -> _core.Train:
+    """The solver's train, where nothing else than a load torque acts on the last shaft."""
+    return scenario.core(loaded=list(scenario.tables.shafts)[-1:], given=())
+
+
+def _plain(stiffness: Any) -> bool:
+    return isinstance(stiffness, TorsionCurve) and stiffness.core().odd

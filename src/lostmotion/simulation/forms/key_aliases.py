@@ -1,0 +1,75 @@
+"""Keys of the long form, and what files in the other forms call them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from .dotted_keys import renamed
+
+MOTOR, LOAD, GEARBOX, SLIDE, BRAKE = "motor", "load", "gearbox", "slide", "brake"  # names in the long form
+DRIVES = {"screw": "screws", "rack": "racks", "belt": "belts"}
+"""what moves the slide of an axis, called after its kind, and its table in the long form"""
+_DRIVE = {
+    f"controllers.{MOTOR}": "controller",
+    f"command.{MOTOR}": "command",
+    f"motors.{MOTOR}": MOTOR,
+    f"shafts.{LOAD}": LOAD,
+    f"gears.{GEARBOX}.gearbox": f"{GEARBOX}.from",
+    f"gears.{GEARBOX}": GEARBOX,
+    f"initial.speeds.{MOTOR}": "initial.motor_speed",
+    f"initial.speeds.{LOAD}": "initial.load_speed",
+    f"initial.angles.{LOAD}": "initial.load_angle",
+    f"initial.twists.{GEARBOX}": "initial.twist",
+    f"initial.motor_torques.{MOTOR}": "initial.motor_torque",
+    f"initial.hysteresis_capacities.{GEARBOX}": "initial.hysteresis_capacity",
+}
+_AXIS = {
+    **{f"{long}.{short}": f"axis.{short}" for short, long in DRIVES.items()},
+    **{f"shafts.{short}": f"axis.{short}" for short in DRIVES},
+    f"controllers.{MOTOR}": "controller",
+    f"command.{MOTOR}": "command",
+    f"command.{BRAKE}": f"axis.{BRAKE}.command",
+    f"brakes.{BRAKE}": f"axis.{BRAKE}",
+    f"motors.{MOTOR}": "axis.motor",
+    f"gears.{GEARBOX}.gearbox": "axis.gearbox.from",
+    f"gears.{GEARBOX}": "axis.gearbox",
+    f"slides.{SLIDE}": "axis.slide",
+}
+
+
+@dataclass(frozen=True)
+class Form:
+    """A form of files."""
+
+    keys: tuple[tuple[str, str], ...]  # keys of the long form, and what they are called
+    back: tuple[tuple[str, str], ...]
+    """keys of what is kept of it, and of the tables that a scenario is read from again"""
+
+    def in_file(self, key: str) -> str:
+        """A key of the long form as files have it; others as they are."""
+        return renamed(key, dict(self.keys))
+
+    def in_tables(self, key: str) -> str:
+        """A key of files, or of the long form, as it is in the tables that are read again."""
+        return key if key == "command" else renamed(key, dict(self.back))
+
+
+def _axis_back() -> Iterator[tuple[str, str]]:
+    yield from ((key, key) for key in (f"command.{MOTOR}", f"command.{BRAKE}"))
+    first: dict[str, str] = {}
+    for long, short in _AXIS.items():
+        first.setdefault(short, long)
+    yield from first.items()
+
+
+TRAIN = Form((), ())
+DRIVE = Form(tuple(_DRIVE.items()), tuple(_DRIVE.items()))
+AXIS = Form(tuple(_AXIS.items()), tuple(_axis_back()))
+
+
+def in_file(key: str, tables: Mapping[str, Any]) -> str:
+    """A key of the long form as a file with these tables has it; other keys as they are."""
+    form = AXIS if "axis" in tables else DRIVE if {MOTOR, GEARBOX, LOAD} <= tables.keys() else TRAIN
+    return form.in_file(key)

@@ -1,0 +1,1 @@
+"""Runs of scenarios, their results, and the files of these."""

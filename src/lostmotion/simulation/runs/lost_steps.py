@@ -1,0 +1,160 @@
+"""Steps that steppers lose in a run: when, and how many."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...inputs.arguments import checked
+from ...reproducible import sin
+from ..forms.key_aliases import GEARBOX, LOAD
+from ..scenario.scenario import Scenario
+from .results import RunArrays, scenario_of
+
+if TYPE_CHECKING:
+    import xarray
+
+HALVINGS = 50
+POINTS = 33
+"""between two samples, at which a slip is looked for"""
+PERIOD = 4
+"""full steps to a period of the field"""
+
+
+@dataclass(frozen=True)
+class LostSteps:
+    """Steps of one motor that a run has lost, or has run ahead by.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> lm.simulation.lost_steps(lm.simulate(lm.load("stepper-belt-axis")))[0].lost
+    0
+    """
+
+    motor: str
+    """name of the motor"""
+    times: tuple[float, ...]
+    """instants at which the rotor slips from one period of the field to the next [s]"""
+    slips: tuple[int, ...]
+    """way of each slip: -1 where the rotor falls behind in the direction of its angle, 1 where it runs ahead"""
+    largest_lag: float
+    """largest angle between rotor and field before the first slip, in full steps; from 2 on the rotor slips"""
+
+    @property
+    def lost(self) -> int:
+        """Full steps by which the rotor is off at the end, without sign."""
+        return PERIOD * abs(sum(self.slips))
+
+    def __str__(self) -> str:
+        if not self.times:
+            return f"steps of {self.motor}: none lost; largest lag {self.largest_lag:.3g} of 2 full steps"
+        slips = f"{len(self.times)} slips of {PERIOD} full steps, the first at {self.times[0]:.6g} s"
+        return f"steps of {self.motor}: {self.lost} full steps lost at the end; {slips}"
+
+
+@checked
+def lost_steps(result: xarray.Dataset) -> tuple[LostSteps, ...]:
+    """Return the steps that each stepper of a run has lost.
+
+    A rotor slips where it falls more than two full steps behind its field, half a period. The next rest of it is four steps away.
+
+    Parameters
+    ----------
+    result : xarray.Dataset
+        Result of a run. Slips that come and go between two samples are not seen.
+
+    Returns
+    -------
+    tuple of LostSteps
+        One for each stepper, in the order of the motors.
+
+    Raises
+    ------
+    InputError
+        The dataset carries no scenario.
+
+    Examples
+    --------
+    >>> import lostmotion as lm
+    >>> scenario = lm.load("stepper-belt-axis")
+    >>> print(lm.simulation.lost_steps(lm.simulate(scenario))[0])
+    steps of motor: none lost; largest lag 0.205 of 2 full steps
+    """
+    return found_in(scenario_of(result), result)
+
+
+def found_in(scenario: Scenario, result: xarray.Dataset | RunArrays) -> tuple[LostSteps, ...]:
+    """The same of a run of a known scenario, by names in its result."""
+    train = scenario.train()
+    found = []
+    for name, motor in train.motors.items():
+        if motor.kind != "stepper":
+            continue
+        time, speed = (np.asarray(result[key]) for key in ("time", train.speed_of(motor.shaft)))
+        field = scenario.signals()[train.command_of(name)]
+        lines = np.array(field.breakpoint_list())
+        course = _Course(time, _angle(scenario, motor.shaft, result), speed, lines, field.sine_list(), motor.full_step)
+        found.append(course.lost(name))
+    return tuple(found)
+
+
+def _angle(scenario: Scenario, shaft: str, result: xarray.Dataset | RunArrays) -> np.ndarray:
+    """Angle of a shaft over a run [rad]; in the short form from that of the load."""
+    if not scenario.is_drive:
+        return np.asarray(result[scenario.train().angle_of(shaft)])
+    gear = scenario.gears[GEARBOX]
+    turned = np.asarray(result[f"{LOAD}_angle"]) + np.asarray(result["twist"])
+    return np.asarray(gear.ratio * turned)
+
+
+@dataclass(frozen=True)
+class _Course:
+    """Angles of a rotor and of its field."""
+
+    time: np.ndarray
+    angle: np.ndarray
+    speed: np.ndarray
+    lines: np.ndarray
+    """breakpoints of the field: time, value, slope"""
+    sines: list[tuple[float, float, float]]
+    step: float
+
+    def lag(self, t: Any) -> np.ndarray:
+        """Rotor less field at instants, in full steps; the rotor by cubics through its samples."""
+        t = np.asarray(t, float)
+        k = np.clip(np.searchsorted(self.time, t, side="right") - 1, 0, self.time.size - 2)
+        h = self.time[k + 1] - self.time[k]
+        s = (t - self.time[k]) / h
+        rotor = self.angle[k] + s * s * (3.0 - 2.0 * s) * (self.angle[k + 1] - self.angle[k])
+        rotor += h * s * (1.0 - s) * ((1.0 - s) * self.speed[k] - s * self.speed[k + 1])
+        begin, value, slope = self.lines.T
+        j = np.searchsorted(begin, t, side="right") - 1
+        field = value[j] + slope[j] * (t - begin[j])
+        for amplitude, frequency, phase in self.sines:
+            field = field + amplitude * sin(2.0 * math.pi * frequency * t + phase)
+        return np.asarray((rotor - field) / self.step)
+
+    def lost(self, name: str) -> LostSteps:
+        begin = self.lines[:, 0]
+        inner = np.linspace(self.time[:-1], self.time[1:], POINTS, endpoint=False).ravel(order="F")
+        at = np.union1d(np.append(inner, self.time[-1]), begin[(begin >= self.time[0]) & (begin <= self.time[-1])])
+        lag = self.lag(at)
+        period = np.floor(lag / PERIOD + 0.5).astype(int)
+        changes = np.nonzero(np.diff(period))[0]
+        first = int(changes[0]) + 1 if changes.size else lag.size
+        times, slips = [], []
+        for k in changes:
+            low, high = float(at[k]), float(at[k + 1])
+            for _ in range(HALVINGS):
+                middle = 0.5 * (low + high)
+                same = math.floor(float(self.lag(middle)) / PERIOD + 0.5) == period[k]
+                low, high = (middle, high) if same else (low, middle)
+            way = int(np.sign(period[k + 1] - period[k]))
+            times += [high] * abs(int(period[k + 1] - period[k]))
+            slips += [way] * abs(int(period[k + 1] - period[k]))
+        largest = float(np.abs(lag[:first] - PERIOD * period[0]).max())
+        return LostSteps(name, tuple(times), tuple(slips), largest)

@@ -1,0 +1,1 @@
+"""Scenarios: their files, their keys and units, and what functions require of them."""

@@ -1,0 +1,52 @@
+"""Requirements of functions on scenarios, with the line that refuses another one."""
+
+from __future__ import annotations
+
+from ...errors import InputError
+from ...model.torsion import Rigid
+from ...model.train import DriveTrain
+from .scenario import Scenario
+
+
+def need_open_loop(scenario: Scenario, function: str) -> None:
+    """Refuses a scenario with controllers, for what follows given commands alone."""
+    if scenario.axes():
+        table = scenario.key_in_file(scenario.controller_key(next(iter(scenario.axes())))).partition(".")[0]
+        none = "None" if table == "controller" else "{}"
+        has = f"a {table}" if table == "controller" else table
+        raise InputError(
+            f"{function}: the scenario has {has}, and commands are to be given here; without controllers it is "
+            f"scenario.replace({table}={none}), or in a file [command] over its base"
+        )
+
+
+def need_no_impacts(scenario: Scenario | DriveTrain, function: str) -> None:
+    """Refuses a train with rigid flanks or end stops that strike, for what takes motions without impacts."""
+    if isinstance(scenario, Scenario):
+        gears = scenario.gears_by_key()
+    else:
+        gears = {f"gears.{name}": gear for name, gear in scenario.gears.items()}
+    for key, gear in gears.items():
+        if isinstance(gear.stiffness, Rigid) and gear.stiffness.strikes:
+            raise InputError(
+                f"{function}: {key}.stiffness has rigid flanks with backlash, and this takes no impacts; give a stiffness to the "
+                'backlash, kind = "curve"'
+            )
+    train = scenario.train() if isinstance(scenario, Scenario) else scenario
+    for key, coupling in train.couplings():
+        if coupling.strikes:
+            raise InputError(f"{function}: {key} strikes, and this takes no impacts; take a freewheel in its place")
+    for name, shaft in train.shafts.items():
+        if shaft.end_stops is not None and shaft.end_stops.stiffness is None:
+            key = f"{'slides' if train.is_slide(name) else 'shafts'}.{name}.end_stops"
+            key = scenario.key_in_file(key) if isinstance(scenario, Scenario) else key
+            raise InputError(f"{function}: {key} are rigid, and this takes no impacts; give them a stiffness")
+
+
+def need_free_motion(scenario: Scenario, function: str) -> None:
+    """Refuses a train in which the motion of a shaft is given or flanks strike, for what torques alone are to move."""
+    need_no_impacts(scenario, function)
+    if given := scenario.given():
+        raise InputError(
+            f"{function}: key {scenario.given_key(given[0])} gives the motion of a shaft, which torques are to move here; leave it out"
+        )
