@@ -55,9 +55,8 @@ def section(report: Report, programs: dict[str, list[list[str]]]) -> None:
 
 def two_masses(report: Report) -> None:
     """Sampled field-oriented control against motulator, a sampled speed loop against PathSim."""
-    from lostmotion.simulation.scenario.scenario.field_oriented_motors import errors_of
-
     import two_mass
+    from lostmotion.simulation.scenario.field_oriented_motors import errors_of
 
     oriented, mechanics = two_mass.axis(), two_mass.axis(torque_source=True)
     ours = best(5, lambda: lm.simulate(oriented, energy=False))

@@ -11,15 +11,15 @@ import cma
 import numpy as np
 from report import Report
 
-from lostmotion.identification.engine import Engine, Point
-from lostmotion.identification.fit import Problem, moved, search
+from lostmotion.identification.candidate_models import free_on, problem_of
+from lostmotion.identification.fit.least_squares import Problem, moved, search
 from lostmotion.identification.identify import identify_logs
-from lostmotion.identification.ladder import free_on, problem_of
-from lostmotion.identification.logs import Channel, Log
-from lostmotion.identification.prepare import Prepared, prepared
-from lostmotion.identification.rig import Rig
-from lostmotion.identification.task import load_identification
-from lostmotion.identification.virtual import virtual_log
+from lostmotion.identification.preparation.prepare import Prepared, prepared
+from lostmotion.identification.readers.log import Channel, Log
+from lostmotion.identification.rig.residuals import Engine, Point
+from lostmotion.identification.rig.rig_scenario import Rig
+from lostmotion.identification.task.identification_file import load_identification
+from lostmotion.identification.virtual_logs import virtual_log
 
 SERVO = Path(__file__).parent.parent / "examples" / "servo_logs"
 TRUTH = {

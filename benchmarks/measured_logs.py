@@ -31,12 +31,12 @@ from dry_friction import RIG
 from identification_logs import NOISE, SERVO, TRUTH, servo_plans, servo_task
 from lostmotion.errors import InputError
 from lostmotion.identification.identify import identify_logs, identify_task
-from lostmotion.identification.logs import Channel, Log
-from lostmotion.identification.monitor import watched
-from lostmotion.identification.prepare import prepared
-from lostmotion.identification.rig import Rig
-from lostmotion.identification.task import Identification, load_identification
-from lostmotion.identification.virtual import virtual_log, write_servo_json
+from lostmotion.identification.monitor.monitor import watched
+from lostmotion.identification.preparation.prepare import prepared
+from lostmotion.identification.readers.log import Channel, Log
+from lostmotion.identification.rig.rig_scenario import Rig
+from lostmotion.identification.task.identification_file import Identification, load_identification
+from lostmotion.identification.virtual_logs import virtual_log, write_servo_json
 
 ROOT = Path(__file__).parent.parent
 FITTED, HELD_OUT = 90, 160

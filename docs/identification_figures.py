@@ -8,7 +8,7 @@ import numpy as np
 from figure_files import save
 
 import lostmotion as lm
-from lostmotion.identification.runs import run_log
+from lostmotion.identification.rig.rig_runs import run_log
 from lostmotion.reports.looks import MEASURED, SECOND
 from lostmotion.reports.panels import Curve, Panel
 

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from conftest import ROOT
-from lostmotion.identification.logs import Channel, Log
-from lostmotion.identification.readers import find_logs, read_log
-from lostmotion.identification.rig import Rig
-from lostmotion.identification.task import Identification, load_identification
-from lostmotion.identification.virtual import virtual_log, write_servo_json
+from lostmotion.identification.readers.log import Channel, Log
+from lostmotion.identification.readers.log_files import find_logs, read_log
+from lostmotion.identification.rig.rig_scenario import Rig
+from lostmotion.identification.task.identification_file import Identification, load_identification
+from lostmotion.identification.virtual_logs import virtual_log, write_servo_json
 
 SERVO = ROOT / "examples" / "servo_logs"
 TRUTH = {

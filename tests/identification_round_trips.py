@@ -16,10 +16,10 @@ import numpy as np
 
 from identification_logs import SERVO, servo_plans, servo_task
 from lostmotion.identification.identify import identify_logs
-from lostmotion.identification.prepare import prepared
-from lostmotion.identification.rig import Rig
-from lostmotion.identification.task import Identification
-from lostmotion.identification.virtual import virtual_log
+from lostmotion.identification.preparation.prepare import prepared
+from lostmotion.identification.rig.rig_scenario import Rig
+from lostmotion.identification.task.identification_file import Identification
+from lostmotion.identification.virtual_logs import virtual_log
 
 FREE = ("torque_constant", "armature", "coulomb_friction", "viscous_friction", "dead_time")
 NOISE = 1e-3  # rad

@@ -11,11 +11,11 @@ from time import process_time
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from lostmotion.simulation.scenario.scenario.scenario import Scenario
 
 import lostmotion as lm
 from conftest import ROOT, lostmotion
 from lostmotion.inputs.validation import listed, nearest
+from lostmotion.simulation.scenario.scenario import Scenario
 from lostmotion.studies.expressions import Expression
 from refusals import assert_file_refused, assert_plain, refused
 

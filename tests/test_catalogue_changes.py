@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lostmotion.simulation.scenario.scenario.scenario_files import gearbox_from_record
 from typer.testing import CliRunner
 
 import lostmotion as lm
@@ -15,6 +14,7 @@ from lostmotion.data_sheets.motor_sheet import MotorSheet
 from lostmotion.data_sheets.records import parse_sheets
 from lostmotion.errors import InputError
 from lostmotion.reports.rig import summary_rows
+from lostmotion.simulation.scenario.scenario_files import gearbox_from_record
 from lostmotion.test_rig.rig import TestRig
 from sheets import ARCMIN, scenario_with, sheet
 

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from lostmotion.simulation.scenario.scenario.units_of_keys import unit_for
 from typer.testing import CliRunner
 
 import lostmotion as lm
 from conftest import ROOT, lostmotion
 from lostmotion.cli import app
 from lostmotion.inputs.doubts import LARGEST, ValueWarning, doubt_all
+from lostmotion.simulation.scenario.units_of_keys import unit_for
 
 JOINT = "catalogue-robot-joint"
 

@@ -15,12 +15,12 @@ import pytest
 import lostmotion as lm
 from fuzz.random_trains import train as fuzz_train
 from lostmotion.identification.identify import identify_logs
-from lostmotion.identification.logs import Log
-from lostmotion.identification.monitor import monitor_logs
-from lostmotion.identification.prepare import Prepared, prepared
-from lostmotion.identification.rig import Rig
-from lostmotion.identification.task import Identification
-from lostmotion.identification.virtual import virtual_log
+from lostmotion.identification.monitor.monitor import monitor_logs
+from lostmotion.identification.preparation.prepare import Prepared, prepared
+from lostmotion.identification.readers.log import Log
+from lostmotion.identification.rig.rig_scenario import Rig
+from lostmotion.identification.task.identification_file import Identification
+from lostmotion.identification.virtual_logs import virtual_log
 from lostmotion.inputs.toml_text import toml_text
 from lostmotion.live_page.description import describe
 from lostmotion.studies.table import read_table

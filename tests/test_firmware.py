@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 import lostmotion as lm
 from lostmotion.errors import InputError
-from lostmotion.identification.goal_shaping import shaped
+from lostmotion.identification.rig.servo_goal_limits import shaped
 
 J, B = 0.03, 0.02  # kg m2, N m s/rad
 T = 1e-3  # s

@@ -16,19 +16,19 @@ from conftest import ROOT
 from identification_logs import NOISE, SERVO, TRUTH, read_all, servo_plans, servo_task, write_servo_logs
 from identification_round_trips import round_trip
 from lostmotion.data_sheets.records import read_sheets
-from lostmotion.identification.engine import Engine, Point
-from lostmotion.identification.fit import search
-from lostmotion.identification.formulas import Formula
-from lostmotion.identification.identifiability import Undetermined
+from lostmotion.identification.candidate_models import RungResult, chosen, climb, free_on, problem_of, start_point
+from lostmotion.identification.fit.intervals import reach
+from lostmotion.identification.fit.least_squares import search
+from lostmotion.identification.fit.saved_progress import Progress
 from lostmotion.identification.identify import _notes, identify_task
-from lostmotion.identification.intervals import reach
-from lostmotion.identification.ladder import RungResult, chosen, climb, free_on, problem_of, start_point
-from lostmotion.identification.logs import Channel
-from lostmotion.identification.prepare import prepared
-from lostmotion.identification.progress import Progress
+from lostmotion.identification.preparation.prepare import prepared
+from lostmotion.identification.readers.log import Channel
 from lostmotion.identification.result import IdentificationResult
-from lostmotion.identification.rig import Rig
-from lostmotion.identification.task import Identification
+from lostmotion.identification.rig.residuals import Engine, Point
+from lostmotion.identification.rig.rig_scenario import Rig
+from lostmotion.identification.task.file_formulas import Formula
+from lostmotion.identification.task.identification_file import Identification
+from lostmotion.identification.verdicts.identifiability import Undetermined
 from lostmotion.reports import plots
 from lostmotion.reports.identification import (
     correlations,

@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from lostmotion.simulation.scenario.scenario.scenario_files import gearbox_from_record
 from typer.testing import CliRunner
 
 import lostmotion as lm
 from lostmotion.cli.entry import app
 from lostmotion.identification.campaign import OFF, experiments, parameters, rig_scenario
+from lostmotion.simulation.scenario.scenario_files import gearbox_from_record
 
 NAME = "schaeffler-rt1-h-20-100"
 

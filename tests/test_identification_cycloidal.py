@@ -11,11 +11,11 @@ import pytest
 import lostmotion as lm
 from conftest import ROOT
 from identification_logs import read_all
-from lostmotion.identification import ladder
-from lostmotion.identification.prepare import prepared
-from lostmotion.identification.rig import Rig
-from lostmotion.identification.runs import run_log
-from lostmotion.identification.task import Identification, load_identification
+from lostmotion.identification import candidate_models
+from lostmotion.identification.preparation.prepare import prepared
+from lostmotion.identification.rig.rig_runs import run_log
+from lostmotion.identification.rig.rig_scenario import Rig
+from lostmotion.identification.task.identification_file import Identification, load_identification
 
 EXAMPLE = ROOT / "examples" / "cycloidal"
 # Thesis of J. Volbeda: play [deg], compliance [deg/(N m)], Coulomb friction [N m].
@@ -44,7 +44,7 @@ def baseline() -> lm.identification.IdentificationResult:
 def split() -> lm.identification.IdentificationResult:
     """The shipped file and logs of the split pin wheel, identified from the start values alone; the baseline is sought from others, too."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(ladder, "_other_minima", lambda *arguments: (arguments[5], []))
+        patch.setattr(candidate_models, "_other_minima", lambda *arguments: (arguments[5], []))
         return lm.identify(EXAMPLE / "split-pinwheel.toml")
 
 
@@ -137,16 +137,16 @@ def test_the_angle_of_the_rotor_is_that_behind_its_gears() -> None:
 
 
 def test_weights_multiply_residuals_and_leave_the_errors_as_they_are() -> None:
-    from lostmotion.identification.engine import Engine
-    from lostmotion.identification.errors_of_logs import log_errors
+    from lostmotion.identification.fit.log_errors import log_errors
+    from lostmotion.identification.rig.residuals import Engine
 
     found = {}
     for weight in ("1", "1 + 4*(ramp < 2)"):
         task, rig = task_of(weight=weight)
         (log,) = [prepared(task, log, rig.units) for log in read_all(task, EXAMPLE)]
-        engine, point = Engine(rig, threads=1), ladder.start_point(task, [log])
+        engine, point = Engine(rig, threads=1), candidate_models.start_point(task, [log])
         (residual,) = engine.residuals([log], point, 0)
-        (J,) = engine.jacobians([log], point, 0, {"stiffness": ladder.free_on(task, 0)["stiffness"]})
+        (J,) = engine.jacobians([log], point, 0, {"stiffness": candidate_models.free_on(task, 0)["stiffness"]})
         found[weight] = residual, J, log_errors([log], [residual])[0].rmse
     one, other = found.values()
     five = np.where(log.log.values("ramp") < 2, 5.0, 1.0)

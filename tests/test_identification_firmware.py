@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from lostmotion.identification.identify import identify_logs
-from lostmotion.identification.logs import Channel, Log
-from lostmotion.identification.prepare import prepared
-from lostmotion.identification.rig import Rig
-from lostmotion.identification.task import Identification
+from lostmotion.identification.preparation.prepare import prepared
+from lostmotion.identification.readers.log import Channel, Log
+from lostmotion.identification.rig.rig_scenario import Rig
+from lostmotion.identification.task.identification_file import Identification
 
 J, B, WEIGHT = 0.03, 0.02, 0.6  # kg m2, N m s/rad, N m
 R, K, U = 7.0, 3.5, 12.0  # ohm, N m/A, V

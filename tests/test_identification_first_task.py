@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 import lostmotion as lm
 from identification_logs import AXIS
 from lostmotion.cli import app
-from lostmotion.identification.prepare import prepared
-from lostmotion.identification.rig import Rig
+from lostmotion.identification.preparation.prepare import prepared
+from lostmotion.identification.rig.rig_scenario import Rig
 
 TIME = np.arange(0.0, 2.0, 0.01)
 FORCE, MASS, VISCOUS = 400.0, 80.0, 150.0  # N, kg, N*s/m

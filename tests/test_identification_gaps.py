@@ -12,12 +12,12 @@ import pytest
 from identification_logs import AXIS, MASS, POSITION_NOISE, SERVO, released, servo_plans, servo_task, spring_task
 from lostmotion.errors import InputError
 from lostmotion.identification.identify import identify_task
-from lostmotion.identification.logs import Channel, Log
-from lostmotion.identification.pauses import split_at_pauses
-from lostmotion.identification.prepare import prepared
-from lostmotion.identification.readers import read_log
-from lostmotion.identification.rig import Rig
-from lostmotion.identification.task import Identification
+from lostmotion.identification.preparation.prepare import prepared
+from lostmotion.identification.preparation.recorder_pauses import split_at_pauses
+from lostmotion.identification.readers.log import Channel, Log
+from lostmotion.identification.readers.log_files import read_log
+from lostmotion.identification.rig.rig_scenario import Rig
+from lostmotion.identification.task.identification_file import Identification
 
 
 @pytest.mark.parametrize(("unit", "factor"), [("rad", 1.0), ("mrad", 1e3), ("deg", 180.0 / np.pi)])

@@ -14,10 +14,10 @@ import pytest
 import lostmotion as lm
 from identification_logs import SERVO
 from lostmotion.errors import InputError
-from lostmotion.identification.gather import distinct_names, gathered
-from lostmotion.identification.prepare import Prepared
-from lostmotion.identification.rig import Rig
-from lostmotion.identification.task import load_identification
+from lostmotion.identification.preparation.prepare import Prepared
+from lostmotion.identification.preparation.usable_logs import distinct_names, gathered
+from lostmotion.identification.rig.rig_scenario import Rig
+from lostmotion.identification.task.identification_file import load_identification
 
 FILE = (SERVO / "identify.toml").read_text()
 SHORT = (

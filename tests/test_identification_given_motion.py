@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
-from lostmotion.identification.engine import Engine
+from lostmotion.identification.candidate_models import start_point
 from lostmotion.identification.identify import identify_logs
-from lostmotion.identification.ladder import start_point
-from lostmotion.identification.logs import Channel, Log
-from lostmotion.identification.prepare import Prepared, prepared
-from lostmotion.identification.rig import Rig
-from lostmotion.identification.task import Identification
+from lostmotion.identification.preparation.prepare import Prepared, prepared
+from lostmotion.identification.readers.log import Channel, Log
+from lostmotion.identification.rig.residuals import Engine
+from lostmotion.identification.rig.rig_scenario import Rig
+from lostmotion.identification.task.identification_file import Identification
 
 RIG = """
 [shafts.crank]

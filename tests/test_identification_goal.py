@@ -12,13 +12,13 @@ import pytest
 
 from identification_logs import NOISE, SERVO, TRUTH, servo_plans, servo_task
 from lostmotion.errors import InputError
-from lostmotion.identification.goal_shaping import shaped
 from lostmotion.identification.identify import identify_logs
-from lostmotion.identification.logs import Channel
-from lostmotion.identification.prepare import prepared
-from lostmotion.identification.rig import Rig
-from lostmotion.identification.task import Identification
-from lostmotion.identification.virtual import virtual_log
+from lostmotion.identification.preparation.prepare import prepared
+from lostmotion.identification.readers.log import Channel
+from lostmotion.identification.rig.rig_scenario import Rig
+from lostmotion.identification.rig.servo_goal_limits import shaped
+from lostmotion.identification.task.identification_file import Identification
+from lostmotion.identification.virtual_logs import virtual_log
 
 NONE: dict[str, Any] = {"held": True, "rate": math.inf, "acceleration": math.inf, "filter_time": 0.0}
 

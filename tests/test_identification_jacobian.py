@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from identification_logs import SERVO, TRUTH, servo_plans, servo_task
-from lostmotion.identification.engine import Engine, Point
-from lostmotion.identification.ladder import free_on
-from lostmotion.identification.logs import Channel, Log
-from lostmotion.identification.parameters import FreeParameter
-from lostmotion.identification.prepare import Prepared, prepared
-from lostmotion.identification.rig import Rig
-from lostmotion.identification.task import Identification
-from lostmotion.identification.virtual import virtual_log
+from lostmotion.identification.candidate_models import free_on
+from lostmotion.identification.preparation.prepare import Prepared, prepared
+from lostmotion.identification.readers.log import Channel, Log
+from lostmotion.identification.rig.residuals import Engine, Point
+from lostmotion.identification.rig.rig_scenario import Rig
+from lostmotion.identification.task.free_parameters import FreeParameter
+from lostmotion.identification.task.identification_file import Identification
+from lostmotion.identification.virtual_logs import virtual_log
 
 
 def small_differences(

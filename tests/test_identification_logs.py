@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
-from lostmotion.identification.logs import Channel, Log
-from lostmotion.identification.prepare import channel_factor
-from lostmotion.identification.readers import find_logs, read_log
-from lostmotion.identification.screening import screened
+from lostmotion.identification.preparation.prepare import channel_factor
+from lostmotion.identification.preparation.screening import screened
+from lostmotion.identification.readers.log import Channel, Log
+from lostmotion.identification.readers.log_files import find_logs, read_log
 
 TIME = np.arange(200) * 0.01
 ANGLE = np.sin(3.0 * TIME)

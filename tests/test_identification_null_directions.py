@@ -11,12 +11,12 @@ import pytest
 
 from identification_logs import AXIS
 from lostmotion.identification.identify import identify_logs
-from lostmotion.identification.logs import Channel, Log
-from lostmotion.identification.prepare import prepared
+from lostmotion.identification.preparation.prepare import prepared
+from lostmotion.identification.readers.log import Channel, Log
 from lostmotion.identification.result import IdentificationResult
-from lostmotion.identification.rig import Rig
-from lostmotion.identification.task import Identification
-from lostmotion.identification.virtual import virtual_log
+from lostmotion.identification.rig.rig_scenario import Rig
+from lostmotion.identification.task.identification_file import Identification
+from lostmotion.identification.virtual_logs import virtual_log
 
 NOISE = 5e-3  # m/s
 TIME = 2e-3 * np.arange(1500)

@@ -13,13 +13,13 @@ import pytest
 from conftest import some
 from lostmotion.errors import InputError
 from lostmotion.identification.identify import identify_logs
-from lostmotion.identification.logs import Channel, Log
-from lostmotion.identification.prepare import prepared
+from lostmotion.identification.preparation.prepare import prepared
+from lostmotion.identification.preparation.screening import constant_stretches, wrapped_by
+from lostmotion.identification.readers.log import Channel, Log
 from lostmotion.identification.result import IdentificationResult
-from lostmotion.identification.rig import Rig
-from lostmotion.identification.screening import constant_stretches, wrapped_by
-from lostmotion.identification.task import Identification
-from lostmotion.identification.virtual import virtual_log
+from lostmotion.identification.rig.rig_scenario import Rig
+from lostmotion.identification.task.identification_file import Identification
+from lostmotion.identification.virtual_logs import virtual_log
 
 ARM = """
 [shafts.rotor]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
-from lostmotion.identification.readers import read_log
+from lostmotion.identification.readers.log_files import read_log
 
 TIME = np.round(np.arange(60) * 0.002, 3)
 X, Y = np.round(np.sin(20 * TIME), 6), np.round(np.cos(30 * TIME), 6)

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from identification_logs import POSITION_NOISE, released, spring_task
-from lostmotion.identification.engine import Point
-from lostmotion.identification.gather import gathered
+from lostmotion.identification.fit.saved_progress import Progress
 from lostmotion.identification.identify import identify_task
-from lostmotion.identification.progress import Progress
+from lostmotion.identification.preparation.usable_logs import gathered
 from lostmotion.identification.result import IdentificationResult
-from lostmotion.identification.rig import Rig
-from lostmotion.identification.task import Identification
+from lostmotion.identification.rig.residuals import Point
+from lostmotion.identification.rig.rig_scenario import Rig
+from lostmotion.identification.task.identification_file import Identification
 from lostmotion.reports.identification import write_identification
 
 SPEED_NOISE = 1e-3  # rad/s

@@ -10,20 +10,20 @@ import pytest
 
 from conftest import some
 from lostmotion import Simulation, load
-from lostmotion.identification.engine import Engine, Point
-from lostmotion.identification.fit import Fit, Problem
+from lostmotion.identification.candidate_models import problem_of, start_point
+from lostmotion.identification.fit.input_courses import course_of
+from lostmotion.identification.fit.intervals import bootstrap
+from lostmotion.identification.fit.least_squares import Fit, Problem
 from lostmotion.identification.identify import identify_logs
-from lostmotion.identification.intervals import bootstrap
-from lostmotion.identification.ladder import problem_of, start_point
-from lostmotion.identification.logs import Channel, Log
-from lostmotion.identification.misfit import misfits
-from lostmotion.identification.parameters import FreeParameter
-from lostmotion.identification.prepare import prepared
-from lostmotion.identification.recorded import course_of
+from lostmotion.identification.preparation.prepare import prepared
+from lostmotion.identification.readers.log import Channel, Log
 from lostmotion.identification.result import IdentificationResult
-from lostmotion.identification.rig import Rig
-from lostmotion.identification.task import FitOptions, Identification
-from lostmotion.identification.virtual import virtual_log
+from lostmotion.identification.rig.residuals import Engine, Point
+from lostmotion.identification.rig.rig_scenario import Rig
+from lostmotion.identification.task.free_parameters import FreeParameter
+from lostmotion.identification.task.identification_file import FitOptions, Identification
+from lostmotion.identification.verdicts.residual_tests import misfits
+from lostmotion.identification.virtual_logs import virtual_log
 from lostmotion.reports.identification import write_identification
 
 AXIS = """

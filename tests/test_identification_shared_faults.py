@@ -9,9 +9,9 @@ import pytest
 
 import lostmotion as lm
 from dry_friction import RIG, TASK, angles, write_log
-from lostmotion.identification.logs import Channel, Log
-from lostmotion.identification.screening import constant_stretches, frozen_stretches, screened
-from lostmotion.identification.shared_faults import _kinds_of
+from lostmotion.identification.preparation.screening import constant_stretches, frozen_stretches, screened
+from lostmotion.identification.readers.log import Channel, Log
+from lostmotion.identification.verdicts.shared_faults import _kinds_of
 
 TIME = np.arange(800) / 200
 

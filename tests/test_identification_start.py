@@ -11,16 +11,16 @@ import pytest
 
 import lostmotion as lm
 from identification_logs import SERVO, TRUTH, read_all, servo_plans, servo_task, write_servo_logs
-from lostmotion.identification.engine import Engine, Point
+from lostmotion.identification.candidate_models import free_on, start_point
+from lostmotion.identification.fit.start_values import regressed
 from lostmotion.identification.identify import identify_logs
-from lostmotion.identification.ladder import free_on, start_point
-from lostmotion.identification.logs import Channel, Log
-from lostmotion.identification.motion import windows
-from lostmotion.identification.prepare import Prepared, prepared
-from lostmotion.identification.rig import Rig
-from lostmotion.identification.start import regressed
-from lostmotion.identification.task import Identification
-from lostmotion.identification.virtual import virtual_log
+from lostmotion.identification.preparation.prepare import Prepared, prepared
+from lostmotion.identification.readers.log import Channel, Log
+from lostmotion.identification.rig.measured_motion import windows
+from lostmotion.identification.rig.residuals import Engine, Point
+from lostmotion.identification.rig.rig_scenario import Rig
+from lostmotion.identification.task.identification_file import Identification
+from lostmotion.identification.virtual_logs import virtual_log
 
 AXIS = """
 [shafts.rotor]

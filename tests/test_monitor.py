@@ -14,8 +14,8 @@ from typer.testing import CliRunner
 import lostmotion as lm
 from conftest import some
 from lostmotion.cli.entry import app
-from lostmotion.identification.changes import SIZES, _log_factors, find_change
-from lostmotion.identification.monitor import LogEstimate, _in_units_of_baseline
+from lostmotion.identification.monitor.change_detection import SIZES, _log_factors, find_change
+from lostmotion.identification.monitor.monitor import LogEstimate, _in_units_of_baseline
 
 JOINT = """
 [shafts.motor]

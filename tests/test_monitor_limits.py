@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 import lostmotion as lm
 from dry_friction import RIG, TASK, WEAR, angles, wear_logs, write_log
 from lostmotion.cli.entry import app
-from lostmotion.identification.changes import find_change
+from lostmotion.identification.monitor.change_detection import find_change
 
 MONITOR = """
 [parameters]

@@ -22,7 +22,7 @@ from lostmotion.control.controller import AnyReference
 from lostmotion.inputs.part import Part
 from lostmotion.live_page.references import reference_view
 from lostmotion.model.signals import taylor
-from lostmotion.simulation.scenario.scenario import scenario_files
+from lostmotion.simulation.scenario import scenario_files
 
 EPS = np.finfo(float).eps
 DEG = math.pi / 180.0

@@ -4,12 +4,12 @@ import math
 from pathlib import Path
 
 import pytest
-from lostmotion.simulation.scenario.scenario.scenario_files import screw_from_record
 from typer.testing import CliRunner
 
 import lostmotion as lm
 from lostmotion.cli import app
 from lostmotion.data_sheets.records import catalogue
+from lostmotion.simulation.scenario.scenario_files import screw_from_record
 from lostmotion.test_rig.screw_measurement import WORK, rig_load
 from lostmotion.test_rig.screw_rig import ScrewRig
 

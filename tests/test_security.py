@@ -25,9 +25,9 @@ from typer.testing import CliRunner
 import lostmotion as lm
 import test_identification_logs as logs
 from lostmotion.cli import app
-from lostmotion.identification import servo_json, spreadsheet_log, text_log
-from lostmotion.identification.conversions import conversion_of
-from lostmotion.identification.readers import TABLES, read_log
+from lostmotion.identification.readers import servo_json_logs, spreadsheet_logs, text_logs
+from lostmotion.identification.readers.channel_conversions import conversion_of
+from lostmotion.identification.readers.log_files import TABLES, read_log
 from lostmotion.inputs.limits import memory_limit, size_of
 
 TIME = np.arange(200) * 0.01
@@ -290,7 +290,7 @@ def as_parquet(path: Path, groups: int) -> Path:
 READS = """
 import resource, sys, time
 import lostmotion as lm, h5py, pyarrow.parquet, numpy, xarray, h5netcdf
-from lostmotion.identification.readers import read_log
+from lostmotion.identification.readers.log_files import read_log
 def peak():
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 lm.load("paper-2dof-nl-small")
@@ -528,7 +528,7 @@ def test_the_memory_of_logs_in_text_is_not_underestimated(tmp_path: Path, what: 
         tracemalloc.stop()
     estimate = []
     with pytest.MonkeyPatch.context() as patch:
-        for module in (text_log, servo_json):
+        for module in (text_logs, servo_json_logs):
             patch.setattr(module, "check_memory", lambda needed, *_: estimate.append(needed))
         read_log(path)
     assert 0.95 * taken < max(estimate) < 4.0 * taken
@@ -713,7 +713,7 @@ def test_the_memory_of_workbooks_is_not_underestimated(tmp_path: Path, what: str
     path = as_workbook(tmp_path / "log.xlsx", MEASURED[what])
     estimate = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(spreadsheet_log, "check_memory", lambda needed, *_: estimate.append(needed))
+        patch.setattr(spreadsheet_logs, "check_memory", lambda needed, *_: estimate.append(needed))
         read_log(path)
     gc.collect()
     tracemalloc.start(1)

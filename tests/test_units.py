@@ -11,12 +11,12 @@ import pint
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from lostmotion.simulation.scenario.scenario.scenario_files import gearbox_from_record
-from lostmotion.simulation.scenario.scenario.units_of_keys import unit_of_key
 
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.data_sheets.records import parse_sheets
+from lostmotion.simulation.scenario.scenario_files import gearbox_from_record
+from lostmotion.simulation.scenario.units_of_keys import unit_of_key
 from lostmotion.units.conversion import si_factor, to_si
 from lostmotion.units.grammar import PREFIXED, angle_of, plain, read_unit, symbols, written
 from lostmotion.units.table import PREFIXES, UNITS, dimension_of, factor_of

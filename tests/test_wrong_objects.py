@@ -19,7 +19,7 @@ import xarray as xr
 
 import lostmotion as lm
 from conftest import for_all
-from lostmotion.identification.parameters import FreeParameter
+from lostmotion.identification.task.free_parameters import FreeParameter
 from lostmotion.inputs.doubts import ValueWarning
 from lostmotion.inputs.part import Part
 from lostmotion.studies.select import Selection

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 import lostmotion as lm
-from lostmotion.identification.runs import run_log
+from lostmotion.identification.rig.rig_runs import run_log
 
 STEP = 5e-4  # [s] to which his analysis resamples
 LARGE = 100  # ramps from this number on are those to the largest torque

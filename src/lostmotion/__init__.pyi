@@ -25,7 +25,7 @@ from .data_sheets.records import catalogue as catalogue
 from .errors import InputError as InputError
 from .errors import MissingLibraryError as MissingLibraryError
 from .identification.identify import identify as identify
-from .identification.monitor import monitor as monitor
+from .identification.monitor.monitor import monitor as monitor
 from .live_page.notebook import live as live
 from .model.couplings import Brake as Brake
 from .model.couplings import Clutch as Clutch

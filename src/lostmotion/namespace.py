@@ -34,7 +34,7 @@ _WITH_DATASETS = (
 # Modules whose results notebooks show as the page that the command writes.
 _WITH_PAGES = (
     "identification.identify",
-    "identification.monitor",
+    "identification.monitor.monitor",
     "pointing.budget",
     "servo.commission",
     "sizing.drive_check",

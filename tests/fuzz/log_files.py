@@ -14,7 +14,7 @@ import numpy as np
 import test_identification_logs as logs
 from fuzz import mutation
 from fuzz.verdict import Failure, refused
-from lostmotion.identification.readers import read_log
+from lostmotion.identification.readers.log_files import read_log
 
 WRITERS: dict[str, Callable[[Path], Any]] = {
     "log.csv": logs.as_csv,

@@ -111,7 +111,7 @@ def _new(directory: Path | None, rig: str | None, output: Path | None) -> None:
     if directory is None:
         raise typer.BadParameter("`new` needs the directory of the logs, such as `lostmotion identify new logs`")
     from ..errors import InputError
-    from ..identification.new_task import first_task
+    from ..identification.preparation.new_identification_file import first_task
 
     path = output or directory / "identify.toml"
     if os.path.lexists(path):

@@ -36,7 +36,7 @@ def monitor(
     lostmotion monitor examples/wear/monitor.toml -o monitored
     """
     pictures = pictures_of(figures, output)
-    from ..identification.monitor import monitor as run
+    from ..identification.monitor.monitor import monitor as run
 
     with busy("Monitoring") as tell:
         result = run(file, logs or (), progress=lambda log, k, count: tell(f"log {k} of {count}, {log}"))

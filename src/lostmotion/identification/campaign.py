@@ -21,10 +21,10 @@ from ..model.losses import LossMap
 from ..model.torsion import TorsionCurve
 from ..simulation.scenario.scenario import Scenario
 from ..simulation.scenario.scenario_files import scenario_text
-from .logs import Channel, Log
-from .rig import Rig
-from .task import Identification
-from .virtual import virtual_log
+from .readers.log import Channel, Log
+from .rig.rig_scenario import Rig
+from .task.identification_file import Identification
+from .virtual_logs import virtual_log
 
 INTERVAL = 5e-3  # [s] between samples
 PERIOD = 4.0  # [s] of a ramp

@@ -12,25 +12,35 @@ import numpy as np
 from ..errors import prefixed
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count
-from .engine import Engine, Point
-from .fit import Fit, Problem, linearised, search
-from .gather import gathered
-from .identifiability import Undetermined, at_bounds, resting_on
-from .intervals import Interval, bootstrap, profile, widest
-from .ladder import RungResult, begun_with, chosen, climb, first_fit, free_on, is_rough, problem_of, start_point
-from .leave_out import left_out_errors
-from .misfit import Misfit, explained, hidden, misfits, with_shapes
-from .odd_logs import OddLog, odd_logs
-from .pauses import split_at_pauses
-from .prepare import Prepared, alike
-from .progress import Progress
-from .recorded import Way, as_recorded, nearer_ways
+from .candidate_models import (
+    RungResult,
+    begun_with,
+    chosen,
+    climb,
+    first_fit,
+    free_on,
+    is_rough,
+    problem_of,
+    start_point,
+)
+from .fit.input_courses import Way, as_recorded, nearer_ways
+from .fit.intervals import Interval, bootstrap, profile, widest
+from .fit.least_squares import Fit, Problem, linearised, search
+from .fit.saved_progress import Progress
+from .fit.start_values import Regression, regressed
+from .left_out_conditions import left_out_errors
+from .preparation.prepare import Prepared, alike
+from .preparation.recorder_pauses import split_at_pauses
+from .preparation.usable_logs import gathered
 from .result import IdentificationResult
-from .rig import Rig
-from .runs import run_logs
-from .shared_faults import SharedFault, family, kinds, shared_faults
-from .start import Regression, regressed
-from .task import Identification, load_identification
+from .rig.residuals import Engine, Point
+from .rig.rig_runs import run_logs
+from .rig.rig_scenario import Rig
+from .task.identification_file import Identification, load_identification
+from .verdicts.disagreeing_logs import OddLog, odd_logs
+from .verdicts.identifiability import Undetermined, at_bounds, resting_on
+from .verdicts.residual_tests import Misfit, explained, hidden, misfits, with_shapes
+from .verdicts.shared_faults import SharedFault, family, kinds, shared_faults
 
 Notify = Callable[[str, int, float], None]
 MANY = 10  # fitted logs for one that is left out: as many keep the models near to what they were

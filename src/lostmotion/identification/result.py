@@ -9,20 +9,20 @@ from ..errors import InputError
 from ..simulation.scenario.scenario import Scenario
 from ..simulation.scenario.scenario_files import scenario_text
 from ..verdict import Point, Verdict
-from .errors_of_logs import LogError, total
-from .fit import Fit
-from .identifiability import Undetermined
-from .intervals import Interval
-from .ladder import GAIN, RungResult
-from .leave_out import ConditionError
-from .misfit import Misfit
-from .odd_logs import OddLog
-from .prepare import Prepared
-from .record import gear_sheet, sheet_text
-from .rig import Rig
-from .shared_faults import KindError, SharedFault
-from .start import Regression
-from .task import Identification
+from .candidate_models import GAIN, RungResult
+from .fit.intervals import Interval
+from .fit.least_squares import Fit
+from .fit.log_errors import LogError, total
+from .fit.start_values import Regression
+from .left_out_conditions import ConditionError
+from .preparation.prepare import Prepared
+from .result_as_scenario import gear_sheet, sheet_text
+from .rig.rig_scenario import Rig
+from .task.identification_file import Identification
+from .verdicts.disagreeing_logs import OddLog
+from .verdicts.identifiability import Undetermined
+from .verdicts.residual_tests import Misfit
+from .verdicts.shared_faults import KindError, SharedFault
 
 HALF = 0.5  # of the standard deviation of what was measured: a model that leaves more does not describe the motion
 

@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from ..identification.candidate_models import RungResult, free_on
 from ..identification.identify import residual_table
-from ..identification.ladder import RungResult, free_on
-from ..identification.misfit import shape_variables
-from ..identification.prepare import Prepared
+from ..identification.preparation.prepare import Prepared
 from ..identification.result import IdentificationResult
+from ..identification.verdicts.residual_tests import shape_variables
 from ..model.gear import Gear
 from ..model.losses import LossMap, MeshEfficiency, WormMesh, efficiency_map
 from ..model.train import DriveTrain

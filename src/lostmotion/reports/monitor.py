@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ..identification.monitor import MonitorResult
-from ..identification.parameters import in_unit
-from ..identification.trends import RESIDUAL, Watched
+from ..identification.monitor.monitor import MonitorResult
+from ..identification.monitor.trends import RESIDUAL, Watched
+from ..identification.task.free_parameters import in_unit
 from ..units.conversion import si_factor
 from ..units.practical import printed
 from .looks import FAINT, PALETTE

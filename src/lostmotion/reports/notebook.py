@@ -9,7 +9,7 @@ from typing import Any
 # Module -> its class, the module here that makes a page of it, and the function that does.
 PAGES = {
     "identification.identify": ("IdentificationResult", "identification", "identification_report"),
-    "identification.monitor": ("MonitorResult", "monitor", "monitor_report"),
+    "identification.monitor.monitor": ("MonitorResult", "monitor", "monitor_report"),
     "pointing.budget": ("PointingBudget", "pointing", "pointing_report"),
     "servo.commission": ("ServoReport", "servo", "servo_report"),
     "sizing.drive_check": ("Findings", "drive_check", "check_report"),

@@ -1,0 +1,321 @@
+"""The ladder of models: each rung fitted from the one below, the one with the least held-out error taken."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..errors import InputError
+from .fit.intervals import CHI_SQUARE
+from .fit.least_squares import NORMAL, Fit, Problem, search
+from .fit.log_errors import LogError, log_errors
+from .fit.saved_progress import Models
+from .preparation.prepare import Prepared
+from .rig.measured_motion import windows
+from .rig.residuals import Engine, Point
+from .rig.rig_scenario import Rig
+from .task.file_formulas import number
+from .task.free_parameters import FreeParameter
+from .task.identification_file import Identification
+from .verdicts.identifiability import Undetermined, undetermined
+from .verdicts.residual_tests import explained
+
+ROUGH = re.compile(
+    r"(^|\.)(backlash|breaks|breakaway_(torque|force)|stribeck_speed|friction_curve)(\.|$)"
+)  # keys on which a motion does not depend smoothly
+SCAN = 9  # values of such a parameter at which the cost is computed
+SPAN = 8.0  # from an eighth of the value found to eight times it
+PARTS = (1 / 16, 1 / 8, 1 / 4, 1 / 2)  # of the logs, to which a fit is made before that to the whole
+LEAST = 50  # samples of the first
+LOWER = 0.02  # of the cost, by which another minimum must be lower: less is where a search happens to end
+TRIED = 2  # of the minima of the scan, from which a fit begins
+GAIN = 0.01  # of the held-out error, by which a higher rung must be better to be taken
+GAIN_UNDETERMINED = 0.05  # the same, where its parameters leave more directions undetermined
+Notify = Callable[[str, int, float], None]
+
+
+@dataclass
+class RungResult:
+    """One candidate model with its fit and its errors."""
+
+    name: str
+    fit: Fit
+    errors: list[LogError]
+    train: float
+    """mean absolute error in units of the deviations, or SI of the only channel"""
+    held_out: float
+    """the same of the logs held out that have a run; NaN without such"""
+    failed: dict[str, str]
+    """by log held out that has no run with the values of this rung: why"""
+    undetermined: list[Undetermined]
+    """unidentifiable parameters of this model"""
+    minima: list[Point] = field(default_factory=list)
+    """other minima of the cost that these logs do not tell from the one found"""
+
+    @property
+    def error(self) -> float:
+        """By which rungs are compared: that of the logs held out, or where there is none, of those fitted."""
+        return self.train if math.isnan(self.held_out) else self.held_out
+
+    @property
+    def loose(self) -> int:
+        """Number of directions that the logs do not determine."""
+        return sum(u.directions for u in self.undetermined)
+
+
+def free_on(task: Identification, rung: int) -> dict[str, FreeParameter]:
+    """Parameters that are sought on a rung."""
+    names = [name for entry in task.rungs()[: rung + 1] for name in entry.free]
+    return {name: p for name, p in task.parameters.items() if name in names and not p.fixed}
+
+
+def start_point(task: Identification, logs: Sequence[Prepared]) -> Point:
+    """Start values; parameters of higher rungs are off."""
+    first = free_on(task, 0)
+    values = {
+        name: p.start if name in first or p.fixed or p.off is None else p.off for name, p in task.parameters.items()
+    }
+    own = {name: p.start for name, p in task.nuisance.items()}
+    return Point(values, {log.name: dict(own) for log in logs})
+
+
+def problem_of(rig: Rig, engine: Engine, logs: Sequence[Prepared], rung: int) -> Problem:
+    """The fit of a rung to logs."""
+    task = rig.task
+    given = [m.deviation for m in task.measured.values()]
+    deviations = None if None in given else np.array(given, dtype=float)
+    resolution = np.array([number(m.resolution, {}, "measured.resolution") for m in task.measured.values()])
+    return Problem(engine, logs, rung, free_on(task, rung), task.nuisance, task.fit, deviations, resolution)
+
+
+def several(logs: Sequence[Prepared], count: int) -> list[Prepared]:
+    """Some of the logs, spread evenly over their list as sorted by their conditions."""
+    if len(logs) <= count:
+        return list(logs)
+    ordered = sorted(
+        logs,
+        key=lambda log: repr(sorted((k, v) for k, v in log.log.header.items() if isinstance(v, int | float | str))),
+    )
+    return [ordered[round(k * (len(ordered) - 1) / (count - 1))] for k in range(count)] if count > 1 else ordered[:1]
+
+
+def begun_with(task: Identification, train: Sequence[Prepared]) -> list[Prepared]:
+    """The logs with which a search begins."""
+    return [log for log in train if log.first] or several(train, task.fit.first_logs)
+
+
+def climb(
+    rig: Rig, engine: Engine, logs: Sequence[Prepared], start: Point, notify: Notify, models: Models
+) -> list[RungResult]:
+    """All rungs of the ladder.
+
+    models: those that an interrupted identification has fitted: the search goes on from their values.
+
+    Raises InputError: no log is left to fit, or the rig has no motion at the start.
+    """
+    task = rig.task
+    train = [log for log in logs if not log.held_out]
+    if not train:
+        raise InputError(
+            "holds for every log, so that none is left to fit; make the condition narrower", "logs.held_out"
+        )
+    found: list[RungResult] = []
+    point = start
+    for rung, entry in enumerate(task.rungs()):
+        kept = models.fitted(entry.name)
+        if kept is not None:
+            minima = kept[1]
+            best = search(problem_of(rig, engine, train, rung), kept[0], iterations=task.fit.iterations)
+        else:
+            best, minima = _rung(rig, engine, train, rung, point, found[-1].fit if found else None, notify)
+            models.keep(entry.name, best.point, minima)
+        point = best.point
+        best.point = point = with_own(rig, engine, logs, point, rung)
+        unsure = undetermined(problem_of(rig, engine, train, rung), best)
+        errors = log_errors(logs, engine.residuals(logs, point, rung))
+        means = mean_errors(task, errors, best)
+        found.append(RungResult(entry.name, best, errors, *means, engine.failed, unsure, minima))
+    return found
+
+
+def _rung(
+    rig: Rig, engine: Engine, train: list[Prepared], rung: int, point: Point, below: Fit | None, notify: Notify
+) -> tuple[Fit, list[Point]]:
+    """(fit of a rung, other minima) from where the rung below has ended."""
+    task, entry = rig.task, rig.rungs()[rung]
+    added = {n: p for n, p in free_on(task, rung).items() if rung == 0 or n not in free_on(task, rung - 1)}
+    if rung > 0:
+        point = replace(point, values=point.values | {n: p.start for n, p in added.items()})
+    best: Fit | None = None
+    problem = problem_of(rig, engine, train, rung)
+    for tried in _starts(point, entry.multi_start):
+        fit = _one(rig, engine, train, rung, tried, entry.name, notify)
+        if best is None or _cost(problem, fit, best) < best.cost:
+            best = fit
+    assert best is not None
+    if below is not None and _cost(problem_of(rig, engine, train, rung - 1), below, best) < best.cost * (1.0 - 1e-9):
+        # The rung should contain that below: begin there, with what is new switched off.
+        off = {n: p.off if p.off is not None else p.start for n, p in added.items()}
+        again = _one(
+            rig, engine, train, rung, replace(below.point, values=below.point.values | off), entry.name, notify
+        )
+        if _cost(problem, again, best) < best.cost:
+            best = again
+    rough = [name for name in added if name not in entry.multi_start and is_rough(rig, name, rung)]
+    return _other_minima(rig, engine, train, rung, point, best, rough, notify)
+
+
+def is_rough(rig: Rig, name: str, rung: int) -> bool:
+    """Whether the motion does not depend smoothly on a parameter: it enters a gap, a break of a law or sticking."""
+    phases = range(-1, len(rig.task.phases))
+    return any(ROUGH.search(key) for phase in phases for key in rig.leaves_of(name, rung, phase))
+
+
+def _other_minima(
+    rig: Rig,
+    engine: Engine,
+    train: list[Prepared],
+    rung: int,
+    first: Point,
+    best: Fit,
+    names: Sequence[str],
+    notify: Notify,
+) -> tuple[Fit, list[Point]]:
+    """(best fit, points of other minima that are as good) from several values of parameters on which the motion does not depend smoothly.
+
+    Nothing is tried where the residuals of the fit are the noise that the task states.
+    """
+    problem = problem_of(rig, engine, train, rung)
+    if not names or explained(problem, engine.residuals(train, best.point, rung)):
+        return best, []
+    others: list[Fit] = []
+
+    def starts() -> Iterator[Point]:
+        for k, name in enumerate(names):
+            if k == 0:
+                yield grown(problem, first)
+            for value in _promising(problem, best, name):
+                yield grown(problem, replace(best.point, values=best.point.values | {name: value}))
+
+    for start in starts():
+        fit = _one(rig, engine, train, rung, start, rig.rungs()[rung].name, notify)
+        others.append(fit)
+        if _cost(problem, fit, best) < best.cost * (1.0 - LOWER):
+            others[-1], best = best, fit
+        if explained(problem, engine.residuals(train, best.point, rung)):
+            break
+    scale = 1.0 if problem.given is None else max(1.0, (NORMAL * best.mae) ** 2)  # errors above those stated
+    return best, [fit.point for fit in others if _cost(problem, fit, best) - best.cost < CHI_SQUARE * scale]
+
+
+def grown(problem: Problem, start: Point) -> Point:
+    """Results of fits to growing first parts of the logs: there are few impacts in the first."""
+    for share in PARTS:
+        logs = [log.part(0, max(LEAST, round(share * len(log.time)))) for log in problem.logs]
+        if all(log.valid.any(axis=1).all() for log in logs):
+            start = search(replace(problem, logs=logs), start, iterations=problem.options.iterations).point
+    return start
+
+
+def _promising(problem: Problem, fit: Fit, name: str) -> list[float]:
+    """Values of a parameter at which a scan, all others as found, has its lowest other minima of the cost."""
+    p, value = problem.parameters[name], fit.point.values[name]
+    low, high = max(p.min, value / SPAN), min(p.max, SPAN * max(value, p.step))
+    grid = np.geomspace(low, high, SCAN) if low > 0.0 else np.linspace(low, high, SCAN)
+    grid = np.unique(np.append(grid, value))
+    costs = []
+    for x in grid.tolist():
+        point = replace(fit.point, values=fit.point.values | {name: x})
+        residuals = problem.engine.residuals(problem.logs, point, problem.rung)
+        costs.append(problem.cost(residuals, fit.deviations, point, fit.correlation))
+    c = np.nan_to_num(np.array(costs), nan=np.inf)
+    own = int(np.flatnonzero(grid == value)[0])
+    walls = np.pad(c, 1, constant_values=np.inf)
+    minima = np.flatnonzero((c < walls[:-2]) & (c < walls[2:]))
+    minima = minima[minima != own]
+    far = minima if len(minima) else np.array([max(0, own // 2), (own + len(grid)) // 2])  # no minimum: both sides
+    return [float(x) for x in grid[far[np.argsort(c[far])]][:TRIED] if x != value]
+
+
+def _cost(problem: Problem, fit: Fit, other: Fit) -> float:
+    """The cost of a fit in the units of another, so that the two can be compared: each has found deviations of its own."""
+    residuals = problem.engine.residuals(problem.logs, fit.point, problem.rung)
+    return problem.cost(residuals, other.deviations, fit.point, other.correlation)
+
+
+def with_own(rig: Rig, engine: Engine, logs: Sequence[Prepared], point: Point, rung: int) -> Point:
+    """Fit the nuisances of a held-out log, such as its zero; the parameters stay."""
+    held_out = [log for log in logs if log.held_out]
+    if not rig.task.nuisance or not held_out:
+        return point
+    engine.residuals(held_out, point, rung)
+    able = [log for log in held_out if log.name not in engine.failed]
+    if not able:
+        return point
+    return search(replace(problem_of(rig, engine, able, rung), parameters={}), point, iterations=10).point
+
+
+def _starts(point: Point, tried: dict[str, tuple[float, ...]]) -> Iterator[Point]:
+    for values in itertools.product(*tried.values()):
+        yield replace(point, values=point.values | dict(zip(tried, values, strict=True)))
+
+
+def _one(rig: Rig, engine: Engine, train: list[Prepared], rung: int, start: Point, name: str, notify: Notify) -> Fit:
+    """Some logs first, in windows that become longer where the task says so, then all."""
+    options = rig.task.fit
+    few = begun_with(rig.task, train)
+
+    def tell(iteration: int, cost: float) -> None:
+        notify(name, iteration, cost)
+
+    fit = _some(rig, engine, few, rung, start, tell)
+    if len(few) == len(train):
+        return fit
+    return search(problem_of(rig, engine, train, rung), fit.point, iterations=options.iterations, notify=tell)
+
+
+def _some(
+    rig: Rig, engine: Engine, few: Sequence[Prepared], rung: int, start: Point, tell: Callable[[int, float], None]
+) -> Fit:
+    options = rig.task.fit
+    for length in options.horizon:
+        cut = windows(rig, few, start, rung, length)
+        start = search(problem_of(rig, engine, cut, rung), start, iterations=options.iterations, notify=tell).point
+    return search(problem_of(rig, engine, few, rung), start, iterations=options.iterations, notify=tell)
+
+
+def first_fit(rig: Rig, engine: Engine, few: Sequence[Prepared], start: Point, notify: Notify) -> Fit:
+    """The lowest rung, fitted to the logs with which a search begins."""
+    return _some(rig, engine, few, 0, start, lambda iteration, cost: notify(rig.rungs()[0].name, iteration, cost))
+
+
+def mean_errors(task: Identification, errors: list[LogError], fit: Fit) -> tuple[float, float]:
+    """Mean absolute errors of the logs fitted and held out, over all channels."""
+    units = dict(zip(task.measured, fit.deviations if len(task.measured) > 1 else np.ones(1), strict=True))
+    means = []
+    for held_out in (False, True):
+        own = [e for e in errors if e.held_out == held_out and not math.isnan(e.mae)]
+        n = sum(e.samples for e in own)
+        means.append(sum(e.mae / units[e.channel] * e.samples for e in own) / n if n else math.nan)
+    return means[0], means[1]
+
+
+def chosen(rungs: Sequence[RungResult]) -> int:
+    """The lowest rung that no higher one betters by more than `GAIN` of the held-out error, or of the error where none is held out.
+
+    One that leaves more directions undetermined has to gain `GAIN_UNDETERMINED`: its error says little of values that the logs do
+    not tell. One with which fewer of the logs held out have no run is better, whatever its error.
+    """
+    taken = 0
+    for k, rung in enumerate(rungs):
+        best = rungs[taken]
+        less = len(rung.failed) - len(best.failed)
+        gain = GAIN_UNDETERMINED if rung.loose > best.loose else GAIN
+        if less < 0 or (less == 0 and rung.error < best.error * (1.0 - gain)):
+            taken = k
+    return taken

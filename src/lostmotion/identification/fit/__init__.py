@@ -1,0 +1,1 @@
+"""The fit of parameters to logs: start values, least squares, intervals."""

@@ -1,0 +1,91 @@
+"""Models that have been fitted so far, kept in a file, so that an interrupted identification continues with the next one."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ...atomic_writer import write_bytes
+from ...version import __version__
+from ..preparation.prepare import Prepared
+from ..rig.residuals import Point
+from ..task.identification_file import Identification
+
+
+class Progress:
+    """Fitted models of some logs.
+
+    path: file that keeps them; None: nothing is kept. A file of another task, of other logs or of another version is replaced.
+    """
+
+    def __init__(self, path: Path | None) -> None:
+        self._path = path
+        self._kept: dict[str, dict[str, Any]] = {}
+        if path is not None and path.is_file():
+            try:
+                data = json.loads(path.read_text(encoding="utf-8"))
+                self._kept = data["models"] if data["version"] == __version__ else {}
+            except (ValueError, KeyError, TypeError, OSError):
+                self._kept = {}  # of another program, or cut off: the work begins anew
+
+    def of(
+        self,
+        task: Identification,
+        logs: Sequence[Prepared],
+        others: Mapping[str, tuple[Point, list[Point]]] | None = None,
+    ) -> Models:
+        """Models of these logs; ``others``: values of models of almost the same logs, by name."""
+        digest = hashlib.sha256(task.model_dump_json().encode())
+        for log in logs:
+            digest.update(repr((log.name, log.held_out, len(log.time))).encode())
+            for values in (log.time, *log.inputs.values(), *log.measured.values()):
+                digest.update(values.tobytes())
+        return Models(self, digest.hexdigest(), others or {})
+
+    def names(self) -> list[str]:
+        """Names of the models that are kept."""
+        return list(dict.fromkeys(name for models in self._kept.values() for name in models))
+
+    def finish(self) -> None:
+        """Remove the file: the result is complete."""
+        if self._path is not None:
+            self._path.unlink(missing_ok=True)
+
+    def read(self, key: str, name: str) -> dict[str, Any] | None:
+        """Read what is kept of a model."""
+        return self._kept.get(key, {}).get(name)
+
+    def write(self, key: str, name: str, data: dict[str, Any]) -> None:
+        """Keep a model."""
+        if self._path is None:
+            return
+        self._kept.setdefault(key, {})[name] = data
+        self._path.parent.mkdir(parents=True, exist_ok=True)
+        write_bytes(self._path, json.dumps({"version": __version__, "models": self._kept}).encode())
+
+
+class Models:
+    """Models of one set of logs in a `Progress`."""
+
+    def __init__(self, progress: Progress, key: str, others: Mapping[str, tuple[Point, list[Point]]]) -> None:
+        self._progress, self._key, self._others = progress, key, others
+
+    def fitted(self, name: str) -> tuple[Point, list[Point]] | None:
+        """(values found, other minima) of a model; None if it is not kept."""
+        data = self._progress.read(self._key, name)
+        return (
+            self._others.get(name)
+            if data is None
+            else (Point(**data["point"]), [Point(**point) for point in data["minima"]])
+        )
+
+    def keep(self, name: str, point: Point, minima: Sequence[Point]) -> None:
+        """Keep a model that has been fitted."""
+
+        def plain(p: Point) -> dict[str, Any]:
+            return {"values": p.values, "nuisance": p.nuisance}
+
+        self._progress.write(self._key, name, {"point": plain(point), "minima": [plain(p) for p in minima]})

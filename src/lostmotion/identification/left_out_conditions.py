@@ -1,0 +1,122 @@
+"""Errors of logs under a condition that the fit has not seen: the model is fitted again without them, one condition after the other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ..errors import InputError
+from ..inputs.validation import did_you_mean, shortened
+from .candidate_models import mean_errors, problem_of, with_own
+from .fit.least_squares import Fit, search
+from .fit.log_errors import log_errors
+from .preparation.prepare import Prepared
+from .rig.residuals import Engine
+from .rig.rig_scenario import Rig
+from .task.identification_file import Identification
+
+Notify = Callable[[str, int, float], None]
+
+
+@dataclass(frozen=True)
+class ConditionError:
+    """Error of the logs of one condition, with these logs in the fit and without them.
+
+    Examples
+    --------
+    >>> from lostmotion.identification.left_out_conditions import ConditionError
+    >>> print(ConditionError("mass", 0.5, 3, 0.002, 0.0025, "").text("rad"))
+    mass = 0.5 (3 logs): mean absolute error 0.002 rad, 0.0025 rad when fitted without them
+    """
+
+    key: str  # key of the header, or `file` or `folder`
+    value: Any  # value of the key in these logs
+    logs: int  # number of these logs
+    fitted: float  # mean absolute error with these logs in the fit, in the unit by which models are compared
+    left_out: float  # mean absolute error of the model that was fitted to the other logs; NaN without a run
+    failed: str  # why there is no error; empty if there is one
+
+    @property
+    def name(self) -> str:
+        """Condition, such as ``mass = 0.5``."""
+        shown = f"{self.value:g}" if isinstance(self.value, float) else shortened(str(self.value))
+        return f"{self.key} = {shown}"
+
+    def text(self, unit: str) -> str:
+        """One line.
+
+        unit: of the errors.
+        """
+        unit = f" {unit}".rstrip()
+        without = self.failed or f"{self.left_out:.4g}{unit} when fitted without them"
+        logs = f"{self.logs} log{'' if self.logs == 1 else 's'}"
+        return f"{self.name} ({logs}): mean absolute error {self.fitted:.4g}{unit}, {without}"
+
+
+def refuse_leave_out(task: Identification, logs: Sequence[Prepared]) -> None:
+    """Refuse a key of ``fit.leave_out`` that does not divide the fitted logs."""
+    train = [log for log in logs if not log.held_out]
+    for key in task.fit.leave_out:
+        lacking = [log.name for log in train if key not in log.facts]
+        if lacking:
+            known = sorted(set().union(*(log.facts for log in train)))
+            meant = did_you_mean(key, known, "give it with logs.header")
+            raise InputError(f"{lacking[0]} has no {key!r} in its header; {meant}", "fit.leave_out")
+        values = {log.facts[key] for log in train}
+        if len(values) < 2:
+            only = ", ".join(map(str, values))
+            raise InputError(f"{key!r} is {only} in all fitted logs; leave it out of the list", "fit.leave_out")
+
+
+def left_out_errors(
+    rig: Rig, engine: Engine, logs: Sequence[Prepared], fit: Fit, rung: int, notify: Notify
+) -> list[ConditionError]:
+    """Errors of the fitted logs of each condition that ``fit.leave_out`` names, with and without them in the fit.
+
+    logs: all that were fitted or held out; those that were held out take no part.
+    fit: of the model that is taken: the search without some of the logs begins there.
+    """
+    train = [log for log in logs if not log.held_out]
+    found = []
+    for key in rig.task.fit.leave_out:
+        for value in sorted({log.facts[key] for log in train}, key=lambda v: (isinstance(v, str), v)):
+            out = [log for log in train if log.facts[key] == value]
+            rest = [log for log in train if log.facts[key] != value]
+            residuals = engine.residuals(out, fit.point, rung)
+            before, _ = mean_errors(rig.task, log_errors(out, residuals), fit)
+            own = ConditionError(key, value, len(out), before, math.nan, "no other log was fitted")
+            found.append(_fitted_without(rig, engine, own, out, rest, fit, rung, notify) if rest else own)
+    return found
+
+
+def _fitted_without(
+    rig: Rig,
+    engine: Engine,
+    condition: ConditionError,
+    out: Sequence[Prepared],
+    rest: Sequence[Prepared],
+    fit: Fit,
+    rung: int,
+    notify: Notify,
+) -> ConditionError:
+    """The condition with the error of the model that was fitted to the other logs."""
+    unseen = [replace(log, held_out=True) for log in out]
+    name = f"without {condition.name}"
+    try:
+        again = search(
+            problem_of(rig, engine, rest, rung),
+            fit.point,
+            iterations=rig.task.fit.iterations,
+            notify=lambda iteration, cost: notify(name, iteration, cost),
+        )
+        point = with_own(rig, engine, unseen, again.point, rung)
+        residuals = engine.residuals(unseen, point, rung)
+    except InputError as problem:
+        return replace(condition, failed=f"no fit without them: {problem}")
+    if engine.failed:
+        log, why = next(iter(engine.failed.items()))
+        return replace(condition, failed=f"no run when fitted without them ({log}: {why})")
+    _, error = mean_errors(rig.task, log_errors(unseen, residuals), fit)
+    return replace(condition, left_out=error, failed="")

@@ -1,0 +1,1 @@
+"""Log files of all formats, each read by its library as channels over time."""

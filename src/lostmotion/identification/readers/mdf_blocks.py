@@ -1,0 +1,154 @@
+"""The links between blocks of an MDF 4 file, checked before a library follows them.
+
+Layout: ASAM MDF 4.2, block header of 24 bytes (id, length, number of links), links of 8 bytes, then data.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+from ...errors import InputError
+from ...inputs.limits import check_memory
+
+FIRST = 64  # address of the header block
+MAX_DEPTH = 20  # lists inside of lists
+LINKS = 1_000_000  # of one block
+EXPANSION = 1032  # bytes that deflate makes of one, at most
+DATA = (b"##DT", b"##SD", b"##RD", b"##DV", b"##DI")
+DEFLATE = (0, 1)  # plain and transposed
+
+
+def check_mdf_blocks(path: Path) -> None:
+    """Refuse a file whose lists never end, or whose data need more memory than the limit."""
+    try:
+        with path.open("rb") as file:
+            if file.read(8).strip() not in (b"MDF", b"UnFinMF") or not file.read(8).startswith(b"4"):
+                raise InputError("is not an MDF 4 file; save it as MDF 4", where=path)
+            check_memory(_Blocks(path, file).needed(), str(path))
+    except OSError as error:
+        raise InputError(f"cannot be read: {error.strerror}", where=path) from None
+
+
+class _Blocks:
+    def __init__(self, path: Path, file: BinaryIO) -> None:
+        self.path, self.file = path, file
+
+    def damaged(self, why: str) -> InputError:
+        return InputError(f"is not an MDF file, or is damaged ({why}); record or copy it again", where=self.path)
+
+    def block(self, at: int) -> tuple[bytes, list[int], int]:
+        """Id, links and length of the data of a block."""
+        self.file.seek(at)
+        try:
+            name, _, length, count = struct.unpack("<4sIQQ", self.file.read(24))
+            if count > LINKS:
+                raise self.damaged(f"a block has {count} links")
+            links = list(struct.unpack(f"<{count}Q", self.file.read(8 * count)))
+        except struct.error:
+            raise self.damaged(f"there is no block at byte {at}") from None
+        return name, links, length - 24 - 8 * count
+
+    def chain(self, at: int) -> Iterator[list[int]]:
+        """Links of the blocks of a list, each of which names the next by its first link."""
+        seen = set()
+        while at:
+            if at in seen:
+                raise self.damaged("a list of blocks leads back into itself")
+            seen.add(at)
+            _, links, _ = self.block(at)
+            if not links:
+                raise self.damaged(f"the block at byte {at} has no links")
+            yield links
+            at = links[0]
+
+    def needed(self) -> int:
+        """Bytes of all data once they are decompressed."""
+        _, head, _ = self.block(FIRST)
+        for at in head[1:5]:  # history, hierarchy, attachments, events
+            self.tree(at, MAX_DEPTH)
+        total = 0
+        for group in self.chain(head[0]):
+            total += self.data(group[2], MAX_DEPTH)
+            for channels in self.chain(group[1]):
+                total += self.channels(channels[1], MAX_DEPTH)
+        return total
+
+    def tree(self, at: int, depth: int) -> None:
+        for links in self.chain(at):
+            if depth == 0:
+                raise self.damaged("its lists are nested too deeply")
+            if len(links) > 1 and links[1] and self.block(links[1])[0] == b"##CH":
+                self.tree(links[1], depth - 1)
+
+    def channels(self, at: int, depth: int) -> int:
+        if depth == 0:
+            raise self.damaged("channels are nested too deeply")
+        total = 0
+        for links in self.chain(at):
+            if len(links) < 6:
+                raise self.damaged("a channel lacks links")
+            self.conversion(links[4], MAX_DEPTH)
+            if links[5] and self.block(links[5])[0] != b"##CG":
+                total += self.data(links[5], MAX_DEPTH)
+            if links[1] and self.block(links[1])[0] == b"##CN":
+                total += self.channels(links[1], depth - 1)
+        return total
+
+    def conversion(self, at: int, depth: int) -> None:
+        if not at:
+            return
+        name, links, _ = self.block(at)
+        if name == b"##CC":
+            if depth == 0:
+                raise self.damaged("conversions are nested too deeply")
+            for inner in set(links[4:]):
+                self.conversion(inner, depth - 1)
+
+    def data(self, at: int, depth: int) -> int:
+        """Bytes of the data that a block holds or lists."""
+        if not at:
+            return 0
+        if depth == 0:
+            raise self.damaged("its lists of data are nested too deeply")
+        name, links, length = self.block(at)
+        if name in DATA:
+            return length
+        if name == b"##DZ":
+            return self.decompressed(at, links)
+        if name == b"##HL":
+            return self.data(links[0], depth - 1) if links else 0
+        if name in (b"##DL", b"##LD"):
+            sizes: dict[int, int] = {0: 0}
+            total = 0
+            for parts in self.chain(at):
+                for part in parts[1:]:
+                    if part not in sizes:
+                        sizes[part] = self.data(part, depth - 1)
+                    total += sizes[part]
+            return total
+        raise self.damaged(f"the block at byte {at} is no block of data")
+
+    def decompressed(self, at: int, links: list[int]) -> int:
+        """Announced length of a compressed block, which its content keeps to."""
+        self.file.seek(at + 24 + 8 * len(links))
+        try:
+            _, kind, _, _, announced, length = struct.unpack("<2sBBIQQ", self.file.read(24))
+        except struct.error:
+            raise self.damaged(f"the block at byte {at} is cut off") from None
+        if kind not in DEFLATE:
+            raise InputError(
+                "has data compressed by another method than deflate; save it with deflate", where=self.path
+            )
+        check_memory(max(announced, length), str(self.path))
+        if EXPANSION * length > announced:
+            try:
+                made = zlib.decompressobj().decompress(self.file.read(length), announced + 1)
+            except zlib.error as error:
+                raise self.damaged(f"a compressed block: {error}") from None
+            if len(made) > announced:
+                raise self.damaged("a compressed block is longer than it announces")
+        return int(announced)
