@@ -8,7 +8,7 @@ import numpy as np
 
 import lostmotion as lm
 from conftest import some
-from lostmotion.response.limit_cycle import Loop
+from lostmotion.servo.hunting.limit_cycles import Loop
 from lostmotion.servo.motion import without_backlash, without_friction
 
 AXES = some(24, 12)

@@ -9,7 +9,7 @@ import pytest
 
 import lostmotion as lm
 from conftest import some
-from lostmotion.response.standstill import NOISE, Watch
+from lostmotion.servo.hunting.standstill import NOISE, Watch
 from lostmotion.servo.margins import instability
 from lostmotion.servo.motion import at_rest, limit_cycle
 from lostmotion.servo.regimes import axis_of, regimes

@@ -190,7 +190,7 @@ def _certify(
     from ..errors import InputError
     from ..reports.certificate import certificate_report, certificate_rows, verdict_of
     from ..reports.pages import write_report
-    from ..servo.certificate import hunting_certificate
+    from ..servo.hunting.certificate import hunting_certificate
 
     if given := [option for option, value in asked.items() if value is not None]:
         raise InputError(

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ..servo.certificate import HuntingCertificate, certified_in_words
+from ..servo.hunting.certificate import HuntingCertificate, certified_in_words
 from ..units.practical import practical
 from ..verdict import State, Verdict
 from .looks import FAINT, look

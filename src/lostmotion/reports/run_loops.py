@@ -11,7 +11,7 @@ import numpy as np
 
 from ..control.turning import turns
 from ..errors import InputError
-from ..response.standstill import moving_input, rises_of
+from ..servo.hunting.standstill import moving_input, rises_of
 from ..simulation.runs.results import RunArrays
 from ..simulation.scenario.scenario import Scenario
 from ..units.practical import practical

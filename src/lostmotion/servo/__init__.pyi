@@ -1,12 +1,12 @@
 from ..verdict import Verdict as Verdict
-from .certificate import FixedPoint as FixedPoint
-from .certificate import HuntingCertificate as HuntingCertificate
 from .commission import LoopSheet as LoopSheet
 from .commission import ServoReport as ServoReport
 from .commission import Stiffness as Stiffness
-from .hunting import Hunting as Hunting
-from .hunting import hunting_map as hunting_map
-from .hunting import limit_cycle as limit_cycle
+from .hunting.certificate import FixedPoint as FixedPoint
+from .hunting.certificate import HuntingCertificate as HuntingCertificate
+from .hunting.hunting import Hunting as Hunting
+from .hunting.hunting import hunting_map as hunting_map
+from .hunting.hunting import limit_cycle as limit_cycle
 from .margins import Bandwidth as Bandwidth
 from .margins import Instability as Instability
 from .margins import Margins as Margins

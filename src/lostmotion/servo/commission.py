@@ -13,12 +13,12 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.doubts import doubt_window
 from ..inputs.validation import shown
-from ..response.standstill import moving_input
 from ..simulation.scenario.scenario import Scenario
 from ..units.conversion import si_value
 from ..units.practical import practical
 from ..verdict import Point, State, Verdict
-from .certificate import HuntingCertificate, certified, certified_in_words
+from .hunting.certificate import HuntingCertificate, certified, certified_in_words
+from .hunting.standstill import moving_input
 from .margins import Bandwidth, Instability, Margins, bandwidth_of, frequencies, instability, margins
 from .motion import STEPPED, Following, LimitCycle, StepResponse, following, limit_cycle, step_response
 from .regimes import Axis, Regime, axis_of, regimes

@@ -21,11 +21,11 @@ from ..model.linear import LinearDrive
 from ..model.linear_train import LinearElements
 from ..model.torsion import TorsionCurve
 from ..response.closed_loop import slowest
-from ..response.standstill import Verdict, Watch, decide, moving_input
 from ..simulation.runs.run import run
 from ..simulation.runs.sample_means import weights
 from ..simulation.scenario.scenario import Scenario
 from .data import inertias
+from .hunting.standstill import Verdict, Watch, decide, moving_input
 from .margins import unstable_pole
 from .regimes import Axis, speed_of
 

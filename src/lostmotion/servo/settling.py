@@ -11,7 +11,7 @@ import numpy as np
 
 from ..control.references import MovesReference
 from ..response.closed_response import frame_of
-from ..response.standstill import moving_input, rises_of
+from .hunting.standstill import moving_input, rises_of
 from .motion import AtRest, changed, errors_of, first_size, ran, settled, watched_at_least
 from .regimes import Axis
 

@@ -10,19 +10,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError
-from ..inputs.arguments import checked
-from ..inputs.quantities import Count
-from ..inputs.validation import shown
-from ..response.limit_cycle import Found, Loop, find_limit_cycle
-from ..response.plant import known_output, plant_of
-from ..response.shooting import floquet_multipliers, is_stable, motion_of
-from ..response.standstill import Verdict
-from ..simulation.scenario.scenario import Scenario
-from ..simulation.scenario.units_of_keys import unit_for
-from ..worker_threads import thread_pool
-from .motion import PART, at_rest, without, without_backlash, without_friction
-from .regimes import axis_of
+from ...errors import InputError
+from ...inputs.arguments import checked
+from ...inputs.quantities import Count
+from ...inputs.validation import shown
+from ...response.plant import known_output, plant_of
+from ...response.shooting import floquet_multipliers, is_stable, motion_of
+from ...simulation.scenario.scenario import Scenario
+from ...simulation.scenario.units_of_keys import unit_for
+from ...worker_threads import thread_pool
+from ..motion import PART, at_rest, without, without_backlash, without_friction
+from ..regimes import axis_of
+from .limit_cycles import Found, Loop, find_limit_cycle
+from .standstill import Verdict
 
 if TYPE_CHECKING:
     import xarray
@@ -178,7 +178,7 @@ def without_saturation(train: Scenario) -> Scenario | None:
 
 def _sampled(train: Scenario, motor: str | None, *, causes: bool) -> Hunting:
     """By a long run, as the servo report has it."""
-    from .motion import limit_cycle as watched
+    from ..motion import limit_cycle as watched
 
     axis = axis_of(train, motor)
     if axis.controller.position is None:

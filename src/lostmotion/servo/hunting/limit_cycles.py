@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from .. import _core
-from ..errors import InputError
-from ..model.signals import core_signal
-from ..simulation.runs.core_runs import core_case
-from ..simulation.scenario.requirements import need_free_motion
-from ..simulation.scenario.scenario import Scenario
-from .shooting import PERIODICITY, SAMPLES_PER_PERIOD, reason_of
+from ... import _core
+from ...errors import InputError
+from ...model.signals import core_signal
+from ...response.shooting import PERIODICITY, SAMPLES_PER_PERIOD, reason_of
+from ...simulation.runs.core_runs import core_case
+from ...simulation.scenario.requirements import need_free_motion
+from ...simulation.scenario.scenario import Scenario
 from .standstill import FOREVER, NOTHING_MOVES, Outlook, Verdict, Watch, frequency_of
 
 SAMPLES = 4000  # of the run that is watched

@@ -10,10 +10,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..response.stick_slip import UndecidableError
-from .sampled_slip import SampledSlip
-from .slip_boxes import Boxes
+from .sampled_stuck_contact import SampledSlip
+from .state_boxes import Boxes
 from .state_sets import bend_of, need_within_limits
+from .stuck_contact import UndecidableError
 
 LONGEST = 3000  # ticks of a slip
 SETTLING = 600  # ticks of a stuck interval that are looked at

@@ -1,4 +1,4 @@
-"""Sets of states under a sampled controller, row by row: how boxes (`slip_boxes`) and pieces (`pieces`) go through a tick alike."""
+"""Sets of states under a sampled controller: propagation of boxes (`state_boxes`) and slip starts (`slip_starts`) over a sample time."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any, Self
 
 import numpy as np
 
-from ..response.stick_slip import UndecidableError
-from .sampled_slip import SampledSlip
+from .sampled_stuck_contact import SampledSlip
+from .stuck_contact import UndecidableError
 
 
 @dataclass

@@ -15,16 +15,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..control.turning import turns
-from ..response.hunting_proof import MARGIN, WIDER, Proof
-from ..response.standstill import Watch
-from ..response.stick_slip import UndecidableError
-from ..units.practical import counted
-from .regimes import Axis
-from .sampled_slip import SampledSlip, never_rests
-from .slip_boxes import Flow, starts
-from .slip_noise import finish, loudest
-from .slip_pieces import Slips
+from ...control.turning import turns
+from ...units.practical import counted
+from ..regimes import Axis
+from .exact_slips import Slips
+from .proof import MARGIN, WIDER, Proof
+from .quantised_slip_end import finish, loudest
+from .sampled_stuck_contact import SampledSlip, never_rests
+from .standstill import Watch
+from .state_boxes import Flow, starts
+from .stuck_contact import UndecidableError
 
 CELLS, PARTS = 4, 2  # of the angle within a step, and of the torque within the ramp of a sample
 LAST = 3  # readings next to the reference that are followed one by one

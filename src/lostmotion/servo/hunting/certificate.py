@@ -9,20 +9,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import InputError
-from ..inputs.arguments import checked
-from ..inputs.quantities import argument
-from ..inputs.validation import shown
-from ..response.hunting_proof import Certainty, Proof, prove
-from ..response.limit_cycle import SAMPLES, Loop
-from ..response.return_map import Image, Transients, image
-from ..response.standstill import moving_input
-from ..response.stick_slip import AtRestError, StickSlip, UndecidableError, stick_slip
-from ..simulation.scenario.scenario import Scenario
-from .motion import at_rest
-from .regimes import Axis, axis_of
+from ...errors import InputError
+from ...inputs.arguments import checked
+from ...inputs.quantities import argument
+from ...inputs.validation import shown
+from ...simulation.scenario.scenario import Scenario
+from ..motion import at_rest
+from ..regimes import Axis, axis_of
+from .break_away_map import Image, Transients, image
+from .limit_cycles import SAMPLES, Loop
+from .proof import Certainty, Proof, prove
 from .sampled_proof import map_without_steps, prove_sampled, reached_by_run
-from .sampled_slip import SampledSlip, sampled_slip
+from .sampled_stuck_contact import SampledSlip, sampled_slip
+from .standstill import moving_input
+from .stuck_contact import AtRestError, StickSlip, UndecidableError, stick_slip
 
 if TYPE_CHECKING:
     import xarray

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .slip_boxes import Boxes
+from .state_boxes import Boxes
 from .state_sets import Sets
 
 ROUNDING = 1e-9  # of an encoder step, and of torque and speed, by which pieces overlap

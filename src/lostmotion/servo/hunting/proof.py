@@ -14,8 +14,8 @@ from typing import Literal
 
 import numpy as np
 
-from .return_map import Image, Transients, image
-from .stick_slip import StickSlip
+from .break_away_map import Image, Transients, image
+from .stuck_contact import StickSlip
 
 Certainty = Literal["hunts", "does not hunt", "not decided"]
 

@@ -15,17 +15,17 @@ from typing import Any
 
 import numpy as np
 
-from .. import _core
-from ..control.controller import Controller
-from ..control.loops import FirstOrderCurrent, IdealCurrent
-from ..control.turning import turns
-from ..errors import InputError
-from ..response.linear import LinearModel
-from ..response.standstill import FOREVER
-from ..response.stick_slip import NONE, AtRestError, UndecidableError, only_contact, others
-from ..simulation.forms.initial_state import start_values
-from ..simulation.forms.train_tables import TrainInitial
-from .regimes import Axis, model_at
+from ... import _core
+from ...control.controller import Controller
+from ...control.loops import FirstOrderCurrent, IdealCurrent
+from ...control.turning import turns
+from ...errors import InputError
+from ...response.linear import LinearModel
+from ...simulation.forms.initial_state import start_values
+from ...simulation.forms.train_tables import TrainInitial
+from ..regimes import Axis, model_at
+from .standstill import FOREVER
+from .stuck_contact import NONE, AtRestError, UndecidableError, only_contact, others
 
 SLIP_SPEED = 1e-9  # [rad/s] or [m/s], at which the matrices of the slip are taken
 DOUBLINGS = 40  # of the time until what is not the ramp of the integrator has settled

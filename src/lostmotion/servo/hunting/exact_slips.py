@@ -15,11 +15,11 @@ from functools import cached_property
 
 import numpy as np
 
-from ..response.stick_slip import UndecidableError
-from .pieces import ROUNDING, Pieces, kept_beside
-from .sampled_slip import SampledSlip
-from .slip_noise import finish, loudest
+from .quantised_slip_end import finish, loudest
+from .sampled_stuck_contact import SampledSlip
+from .slip_starts import ROUNDING, Pieces, kept_beside
 from .state_sets import along, bend_of, freed_within, need_within_limits, one_way, propagated
+from .stuck_contact import UndecidableError
 
 PIECES = 60_000  # at most at once
 WORK = 25_000_000  # pieces of all ticks together

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from ..response.stick_slip import UndecidableError
-from .sampled_slip import SampledSlip
+from .sampled_stuck_contact import SampledSlip
 from .state_sets import Sets, along, bend_of, freed_within, need_within_limits, one_way, propagated
+from .stuck_contact import UndecidableError
 
 UNKNOWNS = (
     3  # of a start: error, angle within the encoder step, torque within the ramp of a sample; others are added by stops

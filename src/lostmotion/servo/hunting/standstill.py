@@ -17,14 +17,14 @@ from typing import Literal
 
 import numpy as np
 
-from ..control.turning import turns
-from ..simulation.runs.stuck_contacts import explain
-from ..simulation.scenario.scenario import Scenario
-from ..simulation.stepping.simulation import Simulation
-from ..simulation.stepping.simulation_state import SimulationState
-from ..units.practical import practical
-from .closed_loop import running_slots
-from .closed_response import frame_of
+from ...control.turning import turns
+from ...response.closed_loop import running_slots
+from ...response.closed_response import frame_of
+from ...simulation.runs.stuck_contacts import explain
+from ...simulation.scenario.scenario import Scenario
+from ...simulation.stepping.simulation import Simulation
+from ...simulation.stepping.simulation_state import SimulationState
+from ...units.practical import practical
 
 Verdict = Literal["hunts", "at rest", "not decided"]
 

@@ -15,18 +15,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .. import _core
-from ..control.turning import turns
-from ..errors import InputError
-from ..model.signals import core_signal
-from ..model.torsion import Rigid
-from ..simulation.forms.train_tables import TrainInitial
-from ..simulation.scenario.scenario import Scenario
-from .limit_cycle import Loop
-from .linear import LinearModel, train_model
+from ... import _core
+from ...control.turning import turns
+from ...errors import InputError
+from ...model.signals import core_signal
+from ...model.torsion import Rigid
+from ...response.linear import LinearModel, train_model
+from ...simulation.forms.train_tables import TrainInitial
+from ...simulation.scenario.scenario import Scenario
+from .limit_cycles import Loop
 
 if TYPE_CHECKING:
-    from ..model.train import DriveTrain
+    from ...model.train import DriveTrain
 
 SLIP_SPEED = 1e-9  # [rad/s] or [m/s], at which the matrices of the slip are taken
 NONE = 1e-9  # of the largest singular value, below which one is none
