@@ -240,6 +240,7 @@ $(VENV)/extension: $(VENV)/tools $(SOURCES)
 	@rm -f $(PACKAGE)/_core_*.so $(PACKAGE)/_instruction_set*.so
 	@$(CMAKE) --install $(TREE) --prefix src >build/install.log
 	@ln -sfn ../../scenarios $(PACKAGE)/scenarios
+	@$(BIN)/python -m compileall -q src
 	touch $@
 # All extras, and what tests and checks need.
 $(VENV)/dev: $(VENV)/built

@@ -109,9 +109,10 @@ def test_the_description_of_every_scenario_is_valid(path: Path, tmp_path: Path) 
     platform = next(exporting.LIBRARIES.glob("*/all.*")).relative_to(exporting.LIBRARIES)
     (tmp_path / platform).parent.mkdir()
     (tmp_path / platform).write_bytes(b"")  # the library takes the longest to pack
+    scenario = lm.load(path)
     for version in (2, 3):
         out = tmp_path / f"{version}.fmu"
-        lm.export_fmu(lm.load(path), out, fmi=version, libraries=tmp_path)
+        lm.export_fmu(scenario, out, fmi=version, libraries=tmp_path)
         assert validate_fmu(str(out)) == []
 
 

@@ -280,7 +280,8 @@ def _at(piece: list[Breakpoint], time: float, derivatives: int) -> list[float]:
     if k < 0:
         return [0.0] * (derivatives + 1)
     begin, *given = piece[k]
-    return taylor([*given, *[0.0] * (derivatives + 1 - len(given))], time - begin)
+    given += [0.0] * (derivatives + 1 - len(given))
+    return given if begin is time else taylor(given, time - begin)
 
 
 def taylor(derivatives: Sequence[N], time: N) -> list[N]:

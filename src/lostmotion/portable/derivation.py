@@ -74,12 +74,17 @@ def derivation_of(scenario: Scenario, numbers: Numbers, without: Callable[[str],
         and unit_for(scenario, key) is not None
         and (value or _free(scenario, key))
     }
-    recording = _Recording(scenario, numbers)
-    # Where two do not fit together, such as a backlash that is 0 and a damping that is 0, that which is not 0 comes first.
-    found = set(recording.recordable(sorted(values, key=lambda key: values[key] == 0.0)))
-    places = recording.of([key for key in values if key in found])
-    assert places is not None
-    return recording.derivation(places)
+    made = scenario.kept_values()
+    what = derivation_of, numbers, tuple(values)
+    if what not in made:
+        recording = _Recording(scenario, numbers)
+        # Where two do not fit together, such as a backlash that is 0 and a damping that is 0, that which is not 0 comes first.
+        found = set(recording.recordable(sorted(values, key=lambda key: values[key] == 0.0)))
+        places = recording.of([key for key in values if key in found])
+        assert places is not None
+        made[what] = recording.derivation(places)
+    derivation: Derivation = made[what]
+    return derivation
 
 
 def values_of(node: Any, key: str = "") -> Iterator[tuple[str, float]]:
