@@ -1,6 +1,7 @@
 #include "batches.hpp"
 
 #include <cstring>
+#include <limits>
 #include <optional>
 
 #include "lostmotion/batch/drive_batch.hpp"
@@ -30,6 +31,22 @@ void step_batch(Step&& step) {
     }
     if (!failure.text.empty())
         throw SolverError("drive " + std::to_string(failure.drive) + " of the batch: " + failure.text);
+}
+
+// Torque on the load, its derivative by the acceleration, and the acceleration of each drive: all means over a step.
+template <class Inertia, class Load, class Step>
+Array answers_of(std::size_t size, Inertia&& inertia, Load&& load, Step&& step) {
+    std::vector<LoadAnswer> answers(size);
+    step_batch([&] { return step(answers.data()); });
+    auto data = std::make_unique_for_overwrite<double[]>(3 * size);
+    for (std::size_t k = 0; k < size; ++k) {
+        const LoadAnswer& a = answers[k];
+        data[k] = inertia(k) * a.acceleration + load(k);
+        data[size + k] =
+            a.compliance > 0.0 ? inertia(k) - 1.0 / a.compliance : -std::numeric_limits<double>::infinity();
+        data[2 * size + k] = a.acceleration;
+    }
+    return as_array(std::move(data), {3, size});
 }
 
 template <class Batch>
@@ -99,6 +116,19 @@ void bind_exact_batch(nb::module_& m) {
             },
             "inputs"_a, nb::kw_only(), "speed"_a = nb::none(), "angle"_a = nb::none(), "acceleration"_a = nb::none(),
             "threads"_a)
+        .def(
+            "answer",
+            [](B& b, const std::vector<BatchInput>& inputs, int shaft, std::size_t load, unsigned threads) {
+                std::vector<batch::Input> given;
+                for (const BatchInput& input : inputs) given.push_back(batch_input(input, b));
+                if (!b.load_shaft(0, shaft)) throw nb::value_error("the shaft has no load torque");
+                return answers_of(
+                    b.size(), [&](std::size_t k) { return b.load_shaft(k, shaft)->inertia; },
+                    [&](std::size_t k) { return given.at(load)[k]; },
+                    [&](LoadAnswer* to) { return b.step(given, {}, threads, B::Answers{shaft, to}); });
+            },
+            "inputs"_a, nb::kw_only(), "shaft"_a, "load"_a, "threads"_a,
+            "A step, with how a shaft answers its load torque: rows of torque, derivative and acceleration.")
         .def(
             "replace",
             [](B& b, std::size_t k, const TrainDescription& train, const BoundControl& control) {
@@ -199,6 +229,17 @@ void bind_batches(nb::module_& m) {
                 step_batch([&] { return b.step(first, second, threads); });
             },
             "command"_a, "load_torque"_a, "threads"_a)
+        .def(
+            "answer",
+            [](B& b, const BatchInput& command, const BatchInput& load_torque, unsigned threads) {
+                const batch::Input first = batch_input(command, b), second = batch_input(load_torque, b);
+                return answers_of(
+                    b.size(), [&](std::size_t k) { return b.load_inertia(k); },
+                    [&](std::size_t k) { return second[k]; },
+                    [&](LoadAnswer* to) { return b.step(first, second, threads, to); });
+            },
+            "command"_a, "load_torque"_a, "threads"_a,
+            "A step, with how the load answers its load torque: rows of torque, derivative and acceleration.")
         .def(
             "reset",
             [](B& b, const std::optional<BatchMask>& which, const std::optional<Values>& start) {

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -305,6 +308,39 @@ def test_a_step_that_is_not_left_to_the_general_solver_is_one_of_its() -> None:
     assert batch.counts["general"] < 0.02 * batch.counts["steps"]
 
 
+@pytest.mark.parametrize("make", [random_drive, odd_drive])
+def test_a_batch_answers_a_load_torque_as_its_drives_alone(make: Callable[[np.random.Generator], Any]) -> None:
+    generator = np.random.default_rng(8)
+    drives = [make(generator) for _ in range(40)]
+    commands, loads = random_commands(generator, 40, len(drives)), generator.uniform(-2.0, 2.0, (40, len(drives)))
+    batch, alone = lm.SimulationBatch(drives, STEP), [lm.Simulation(drive, step=STEP) for drive in drives]
+    short = isinstance(drives[0], lm.Drive)
+    names = ("command", "load_torque") if short else ("motor_command", "load_load_torque")
+    found = [batch.answer(commands[n], loads[n]) for n in range(40)]
+    assert batch.counts["switchings"] > 200
+    assert batch.counts["general"] < 0.05 * batch.counts["steps"]
+    for k, drive in enumerate(drives):
+        inertia = lm.Scenario.of_any(drive).train().shafts["load"].inertia
+        for n in range(40):
+            want = alone[k].answer(STEP, **dict(zip(names, (float(commands[n, k]), float(loads[n, k])), strict=True)))
+            assert found[n].torque[k] == pytest.approx(want.torque, abs=1e-6)
+            # By how much a torque changes the mean acceleration, as the derivative is the difference of two inertias.
+            compliance, wanted = (1.0 / (inertia - d) for d in (found[n].derivative[k], want.derivative))
+            assert compliance == pytest.approx(wanted, rel=1e-8, abs=1e-12)
+
+
+def test_a_batch_of_any_train_answers_a_load_torque() -> None:
+    scenario = lm.load("two-motors-one-ring")
+    batch, alone = lm.SimulationBatch(scenario, STEP, count=2), lm.Simulation(scenario, step=STEP)
+    given = {"first_motor_command": 0.3, "second_motor_command": 0.2}
+    for _ in range(5):
+        found, want = batch.answer(**given, shaft="ring"), alone.answer(STEP, **given, shaft="ring")
+        assert found.torque.tolist() == [want.torque] * 2
+        assert found.derivative.tolist() == [want.derivative] * 2
+    with pytest.raises(lm.InputError, match="shaft"):
+        batch.answer(**given, shaft="crown")
+
+
 @pytest.mark.parametrize(
     "key", ["load.inertia", "gearbox.stiffness.backlash", "gearbox.losses.efficiency", "gearbox.ratio"]
 )
@@ -426,7 +462,7 @@ AXIS = {
     ],
 )
 def test_trains_of_any_kind_move_as_alone(scenario: lm.Scenario, key: str) -> None:
-    value = lm.simulation.sensitivities.value_at(scenario, key)
+    value = lm.simulation.runs.sensitivities.value_at(scenario, key)
     values = np.array([1.0, 1.2]) * value
     batch = lm.SimulationBatch(scenario, STEP, vary={key: values})
     given = {name: 0.4 for name in batch.inputs if not name.endswith(("_load_torque", "_load_force"))}

@@ -68,7 +68,7 @@ def rig_of(scenario: lm.Scenario, path: Path, **more: Any) -> tuple[Rig, list[Pr
     long = scenario.long()
     (path / "rig.toml").write_text(toml_text(scenario.model_dump(exclude_none=True, mode="json")))
     key = next(inertias(long))
-    value = lm.simulation.sensitivities.value_at(long, key)
+    value = lm.simulation.runs.sensitivities.value_at(long, key)
     start = {"start": 1.02 * value, "min": 0.5 * value, "max": 2.0 * value}
     speed = long.train().speed_of(list(long.train().shafts)[-1])
     task = Identification(
@@ -337,7 +337,7 @@ def test_a_train_of_one_gear_moves_to_the_last_bit_as_the_drive_that_it_is(seed:
 )
 def test_a_key_of_the_file_and_that_of_the_long_form_are_one(name: str, own: str, long: str) -> None:
     scenario = lm.load(name).replace(**{"simulation.duration": 0.01, "simulation.sample_interval": 0.001})
-    value = 1.25 * lm.simulation.sensitivities.value_at(scenario, own)
+    value = 1.25 * lm.simulation.runs.sensitivities.value_at(scenario, own)
     changed = scenario.replace(**{own: value})
     assert changed == scenario.replace(**{long: value}) != scenario
     assert lm.load(name, {own: value}).written == lm.load(name, {long: value}).written

@@ -464,6 +464,11 @@ class ExactBatch:
 
     def step(self, inputs: Sequence[Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]], *, speed: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None, angle: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None, acceleration: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None, threads: int) -> None: ...
 
+    def answer(self, inputs: Sequence[Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]], *, shaft: int, load: int, threads: int) -> NDArray[numpy.float64]:
+        """
+        A step, with how a shaft answers its load torque: rows of torque, derivative and acceleration.
+        """
+
     def replace(self, k: int, train: Train, control: tuple[float, Sequence[Axis]]) -> bool:
         """Gives a drive other parameters; false: it has other states then."""
 
@@ -511,6 +516,11 @@ class DriveBatch:
         """Laws and data sheet of a drive, by the names of the walk."""
 
     def step(self, command: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], load_torque: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], threads: int) -> None: ...
+
+    def answer(self, command: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], load_torque: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], threads: int) -> NDArray[numpy.float64]:
+        """
+        A step, with how the load answers its load torque: rows of torque, derivative and acceleration.
+        """
 
     def reset(self, which: Annotated[NDArray[numpy.bool_], dict(shape=(None,), order='C', device='cpu', writable=False)] | None, start: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)] | None) -> None: ...
 

@@ -147,10 +147,10 @@ void DriveBatch::renew(std::size_t k) {
         std::erase_if(w->solvers, [k](const Worker::Kept& kept) { return kept.number == k; });
 }
 
-Failure DriveBatch::step(const Input& command, const Input& load_torque, unsigned threads) {
+Failure DriveBatch::step(const Input& command, const Input& load_torque, unsigned threads, LoadAnswer* answers) {
     while (workers_.size() < Team::needed(size(), threads)) workers_.push_back(std::make_unique<Worker>());
     team_.share(size(), threads, [&](std::size_t begin, std::size_t end, std::size_t who) {
-        step_range(begin, end, command, load_torque, *workers_[who]);
+        step_range(begin, end, command, load_torque, answers, *workers_[who]);
     });
     Failure first;
     for (const auto& w : workers_) {
@@ -161,15 +161,19 @@ Failure DriveBatch::step(const Input& command, const Input& load_torque, unsigne
 }
 
 void DriveBatch::step_range(std::size_t begin, std::size_t end, const Input& command, const Input& load_torque,
-                            Worker& worker) {
+                            LoadAnswer* answers, Worker& worker) {
     for (std::size_t k = begin; k < end; ++k) {
         ++worker.counts.steps;
         DriveWalk walk(kind(k).laws(), numbers(k), drives_[k], command[k], load_torque[k]);
+        if (answers != nullptr) walk.differ(0.0, 1.0);
         if (walk.advance(step_)) {
+            if (answers != nullptr)
+                answers[k] = {((walk.x.a - walk.x.v) - (drives_[k].a - drives_[k].v)) / step_, 0.0,
+                              (walk.tangent[2] - walk.tangent[1]) / step_};
             drives_[k] = walk.x;
             worker.counts.walked += walk.switchings > 0;
             worker.counts.switchings += walk.switchings;
-        } else if (!solve(k, command[k], load_torque[k], worker)) {
+        } else if (!solve(k, command[k], load_torque[k], answers == nullptr ? nullptr : answers + k, worker)) {
             continue;
         }
         inputs_[2 * k] = command[k];
@@ -179,7 +183,7 @@ void DriveBatch::step_range(std::size_t begin, std::size_t end, const Input& com
 }
 
 // By the general solver. False: the motion cannot go on.
-bool DriveBatch::solve(std::size_t k, double command, double load_torque, Worker& worker) {
+bool DriveBatch::solve(std::size_t k, double command, double load_torque, LoadAnswer* answer, Worker& worker) {
     ++worker.counts.general;
     const std::size_t number = each_its_own_ ? k : static_cast<std::size_t>(kind_of_[k]);
     auto kept = std::ranges::find(worker.solvers, number, &Worker::Kept::number);
@@ -233,7 +237,9 @@ bool DriveBatch::solve(std::size_t k, double command, double load_torque, Worker
     simulation.motion().restore(s);
     const std::array<double, 2> both{command, load_torque};
     const auto inputs = std::span(both).first(static_cast<std::size_t>(n.inputs));
-    const Status status = simulation.motion().advance(step_, inputs, inputs);
+    const Status status = answer == nullptr
+                              ? simulation.motion().advance(step_, inputs, inputs)
+                              : simulation.motion().answer(step_, inputs, inputs, *simulation.load_shaft(1), *answer);
     if (status != Status::done) {
         const Motion& m = simulation.motion();
         worker.failure.add({k, train_status_text(a, status, m.time(), m.stopped_at(), m.too_many_guards())});

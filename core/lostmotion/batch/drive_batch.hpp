@@ -49,8 +49,10 @@ class DriveBatch {
     bool set(const std::string& key, const double* values);
     // Gives one drive a train of its own, which `error` has passed; it goes on from the state that it is in.
     void replace(std::size_t k, const model::Train& train);
-    // Advances all drives. Those that cannot go on stay where they were; the first of them is reported.
-    Failure step(const Input& command, const Input& load_torque, unsigned threads);
+    // Advances all drives. Those that cannot go on stay where they were; the first of them is reported. answers: of
+    // each drive how it answers its load torque, or nullptr.
+    Failure step(const Input& command, const Input& load_torque, unsigned threads, LoadAnswer* answers = nullptr);
+    double load_inertia(std::size_t k) const { return 1.0 / numbers(k).per_load; }
     // To t = 0. which: for each drive whether it is meant; nullptr: all. start: of each drive its states; nullptr:
     // rest.
     void reset(const bool* which, const double* start);
@@ -85,8 +87,9 @@ class DriveBatch {
         std::vector<double> values;
     };
 
-    void step_range(std::size_t begin, std::size_t end, const Input& command, const Input& load_torque, Worker& worker);
-    bool solve(std::size_t k, double command, double load_torque, Worker& worker);
+    void step_range(std::size_t begin, std::size_t end, const Input& command, const Input& load_torque,
+                    LoadAnswer* answers, Worker& worker);
+    bool solve(std::size_t k, double command, double load_torque, LoadAnswer* answer, Worker& worker);
     model::Train train_of(std::size_t k) const;
     double half_gap_of(std::size_t k) const;
     void renew(std::size_t k);

@@ -18,6 +18,10 @@
 // stops or is overcome, the regime that follows has to hold strictly: each of its guards is positive, or zero and
 // rising. Whatever is not certain is said, and nothing of that step may be used.
 //
+// A tangent is carried along where it is asked for: the derivative of the state by the command, the load torque or a
+// mix of both. Within a regime it obeys the same linear equations. At a switching it takes the shift of the instant
+// along: from the rates before to the rates behind.
+//
 // The text of this file is plain: it includes nothing, allocates nothing and calls nothing but what it defines, so that
 // it is also the body of a kernel for graphics processors. `real` is the type of its numbers, `ROUNDING` their
 // rounding; `parts/loss_grid.hpp` stands before it.
@@ -148,6 +152,7 @@ struct DriveWalk {
             return magnitude(one) + magnitude(q * x.q) + magnitude(a * x.a) + magnitude(v * x.v) + magnitude(d * x.d);
         }
         bool varies() const { return q != 0 || a != 0 || v != 0 || d != 0; }
+        real along(const real* t) const { return (q * t[0] + a * t[1]) + (v * t[2] + d * t[3]); }
         void add(real s, const Form& f) {
             one += s * f.one;
             q += s * f.q;
@@ -179,6 +184,9 @@ struct DriveWalk {
     const DriveLaws& laws;
     const DriveNumbers& p;
     real command, load_torque;
+    bool has_tangent;
+    real by_command, by_load;        // its direction
+    real tangent[5], by_hysteresis;  // of q, a, v, d and the angle; of the capacity of the hysteresis
     DriveState x;
     Regime r;
     int switchings, degree;
@@ -206,9 +214,33 @@ struct DriveWalk {
 
     DriveWalk(const DriveLaws& the_laws, const DriveNumbers& numbers, const DriveState& from, real to_motor,
               real to_load)
-        : laws(the_laws), p(numbers), load_torque(to_load), x(from), switchings(0), degree(0), bold(false), doubts(0) {
+        : laws(the_laws),
+          p(numbers),
+          load_torque(to_load),
+          has_tangent(false),
+          by_command(0),
+          by_load(0),
+          x(from),
+          switchings(0),
+          degree(0),
+          bold(false),
+          doubts(0) {
+        set_command(to_motor);
+        differ(0, 0);
+        has_tangent = false;
+    }
+    void set_command(real to_motor) {
         const real asked = p.turned < 0 ? -to_motor : to_motor;
         command = asked > p.command_limit ? p.command_limit : asked < -p.command_limit ? -p.command_limit : asked;
+    }
+    // Begins a tangent: the derivative by a shift of the command and of the load torque.
+    void differ(real to_motor, real to_load) {
+        has_tangent = true;
+        const bool acts = command < p.command_limit && command > -p.command_limit;
+        by_command = acts ? p.turned * to_motor : 0;
+        by_load = to_load;
+        for (real& each : tangent) each = 0;
+        by_hysteresis = 0;
     }
 
     bool has(int contact) const { return (p.has & contact) != 0; }
@@ -259,9 +291,9 @@ struct DriveWalk {
         g.of = static_cast<short>(of);
         g.to = static_cast<short>(to);
     }
-    static Form over(const Form& f, real by, real one) {
+    static Form over(const Form& f, real share, real one) {
         Form out = {one, 0, 0, 0, 0};
-        out.add(by, f);
+        out.add(share, f);
         return out;
     }
 
@@ -297,12 +329,18 @@ struct DriveWalk {
     }
     // What the motor holds ahead or back where the mesh passes on a torque [N m]; it grows with what the mesh takes.
     real motor_held(real torque, int way) const {
+        real per_torque;
+        return motor_held(torque, way, per_torque);
+    }
+    real motor_held(real torque, int way, real& per_torque) const {
         const real mu = way * torque * p.per_rated;
         real loss = (p.driving - 1) * way * torque;
+        per_torque = p.driving * way * p.per_ratio;
         if (has(DriveNumbers::dry_losses)) {
             const bool map = laws.losses == DriveLaws::by_map;
             const Plane m = loss_plane(map ? laws.map.load_interval(mu) : mu < 0 ? 0 : 1, true);
             loss = p.rated_torque * (m.at_zero + m.per_load * mu);
+            per_torque = (1 + m.per_load) * way * p.per_ratio;
         }
         return p.motor_holds + (way * torque + loss) * p.per_ratio;
     }
@@ -524,7 +562,10 @@ struct DriveWalk {
             if (rests()) spare_at_rest(r.pull.at(x));
             if (fired < 0) return true;
             if (++switchings > most_switchings) return goes_on_with(too_long);
+            const real shift = has_tangent ? shift_of(r.guards[fired]) : 0;
+            follow(shift);
             if (!resolve(fired, false)) return goes_on_with(no_regime);
+            follow(-shift);
         }
         return true;
     }
@@ -583,11 +624,13 @@ struct DriveWalk {
             if (first.doubtful && !goes_on_with(two_at_once)) return false;
             if (first.guard >= 0) {
                 move(s, first.at);
+                if (has_tangent) move_tangent(s * first.at);
                 left -= first.at * s;
                 fired = first.guard;
                 return true;
             }
             move(s, 1);
+            if (has_tangent) move_tangent(s);
             left = s == left ? 0 : left - s;
         }
         return true;
@@ -673,6 +716,104 @@ struct DriveWalk {
         x.v = sum[2];
         x.d = sum[3];
         x.angle += s * (at * turned);
+    }
+
+    // The rates of the state.
+    void rates(real* to) const {
+        const real twists = r.twists ? 1 : 0;
+        to[0] = r.q.at(x);
+        to[1] = r.a.at(x);
+        to[2] = twists * r.v.at(x);
+        to[3] = twists * x.v;
+    }
+    // Derivatives of torques and rates by the inputs, in the direction of the tangent.
+    struct ByInputs {
+        real pull, output, q, a, w;
+    };
+    ByInputs by_inputs() const {
+        const real stall = p.stall_torque * by_command;
+        ByInputs by = {laws.delays_torque ? 0 : stall, 0, laws.delays_torque ? p.delay * stall : 0, 0, 0};
+        if (rests()) return by;
+        const real share =
+            has(DriveNumbers::dry_losses) && !motor_rests() ? 1 + loss_plane(x.cell, false).per_load : p.driving;
+        if (tied()) {
+            if (!motor_rests()) {
+                const real inertia = 1 / p.per_motor + share * p.per_ratio / p.per_load;
+                by.a = by.w = (by.pull - share * p.per_ratio * by_load) / inertia;
+            }
+            by.output = by.a / p.per_load + by_load;
+        } else {
+            if (has(DriveNumbers::of_twist) && x.flanks == 0) by.output = x.twist * by_hysteresis;
+            if (!motor_rests()) by.a = p.per_motor * (by.pull - share * p.per_ratio * by.output);
+            if (!load_rests()) by.w = p.per_load * (by.output - by_load);
+        }
+        return by;
+    }
+    // The same of a guard.
+    real by_inputs(const Guard& g) const {
+        const ByInputs by = by_inputs();
+        const int way = g.to;
+        if (g.kind == capacity && rests()) {
+            const real held = way > 0 ? most_held() : least_held();
+            real per_torque;
+            motor_held(held, way, per_torque);
+            return per_torque * (held == spring_torque() + way * x.hysteresis ? way * by_hysteresis : by_load);
+        }
+        if (g.kind == capacity && g.of == motor) {
+            const bool dry = has(DriveNumbers::dry_losses);
+            const real share = dry ? 1 + loss_plane(way > 0 ? x.cell : x.back, true).per_load : p.driving;
+            return way * (share * p.per_ratio * by.output - by.pull);
+        }
+        if (g.kind == capacity && g.of == twist) return by_hysteresis - way * by.output;
+        if (g.kind == capacity) return way * (by_load - by.output);
+        if (g.kind != cell && g.kind != back) return 0;
+        const bool map = laws.losses == DriveLaws::by_map;
+        real per_torque = 0;
+        if (motor_rests() || !map) {
+            const real s = !motor_rests() ? x.motor : g.kind == cell ? 1 : -1;
+            per_torque = g.to < (g.kind == cell ? x.cell : x.back) ? s : -s;
+        } else {
+            Edge edges[3];
+            const int n = laws.map.edges(x.cell, edges);
+            for (int e = 0; e < n; ++e)
+                if (edges[e].neighbour == g.to) per_torque = x.motor * edges[e].inside.per_load;
+        }
+        return per_torque * p.per_rated * by.output;
+    }
+    // By how much later a guard falls, per shift of the inputs.
+    real shift_of(const Guard& g) const {
+        real rate[4];
+        rates(rate);
+        const real fall = g.form.along(rate);
+        return fall < 0 ? -(by_inputs(g) + g.form.along(tangent)) / fall : 0;
+    }
+    // Takes the tangent along for a time.
+    void follow(real time) {
+        if (time == 0) return;
+        real rate[4];
+        rates(rate);
+        for (int c = 0; c < 4; ++c) tangent[c] += time * rate[c];
+    }
+    void move_tangent(real s) {
+        const real reached = r.norm * s, twists = r.twists ? 1 : 0;
+        int longest = 4;
+        while (longest < laws.most_degree && reached > laws.reach[longest]) ++longest;
+        const ByInputs inputs = by_inputs();
+        real z[4] = {tangent[0], tangent[1], tangent[2], tangent[3]}, f = s,
+             by[3] = {inputs.q, inputs.a, inputs.a - inputs.w};
+        tangent[4] += s * (z[1] - z[2]);
+        for (int k = 1; k <= longest; ++k) {
+            f = s * laws.inverse[k];
+            const real q = f * (by[0] + r.q.along(z)), a = f * (by[1] + r.a.along(z)),
+                       v = twists * f * (by[2] + r.v.along(z)), d = twists * f * z[2];
+            by[0] = by[1] = by[2] = 0;
+            z[0] = q;
+            z[1] = a;
+            z[2] = v;
+            z[3] = d;
+            for (int c = 0; c < 4; ++c) tangent[c] += z[c];
+            tangent[4] += s * laws.inverse[k + 1] * (z[1] - z[2]);
+        }
     }
 
     // Finds the first guard that falls within the series. False: it is not certain.
@@ -901,19 +1042,26 @@ struct DriveWalk {
     }
     // A contact has come to rest: its speed is zero to the last bit, and a turning point sets the hysteresis (16).
     void stop(int contact) {
+        real &by_a = tangent[1], &by_v = tangent[2];
         if (contact == motor) {
-            x.v = tied() ? 0 : load_rests() ? 0 : x.v - x.a;
-            x.a = 0;
+            const bool alone = tied() || load_rests();
+            x.v = alone ? 0 : x.v - x.a;
+            by_v = alone ? 0 : by_v - by_a;
+            x.a = by_a = 0;
         } else if (contact == load) {
-            if (motor_rests())
-                x.v = 0;
-            else if (tied())
-                x.a = 0;
-            else
+            if (motor_rests()) {
+                x.v = by_v = 0;
+            } else if (tied()) {
+                x.a = by_a = 0;
+            } else {
                 x.v = x.a;
+                by_v = by_a;
+            }
         } else {
-            x.v = 0;
-            x.hysteresis = p.hysteresis * magnitude(spring_torque());
+            x.v = by_v = 0;
+            const real held = spring_torque();
+            x.hysteresis = p.hysteresis * magnitude(held);
+            by_hysteresis = p.hysteresis * laws.slope[x.piece] * (held < 0 ? -tangent[3] : tangent[3]);
         }
     }
 

@@ -11,7 +11,7 @@ ExactBatch::ExactBatch(const std::vector<Scenario>& kinds, std::span<const int> 
 }
 
 void ExactBatch::step_one(std::size_t k, std::span<const Input> inputs, const std::optional<Motion>& motion,
-                          Worker& worker) {
+                          const std::optional<Answers>& answers, Worker& worker) {
     ScenarioSimulation& s = *drives_[k];
     worker.inputs.clear();
     for (const Input& input : inputs) worker.inputs.push_back(input[k]);
@@ -21,6 +21,8 @@ void ExactBatch::step_one(std::size_t k, std::span<const Input> inputs, const st
         if (motion->angle) course.to.angle = (*motion->angle)[k];
         if (motion->acceleration) course.to.acceleration = (*motion->acceleration)[k];
         status = s.advance(step_, worker.inputs, worker.inputs, {&course, 1});
+    } else if (answers) {
+        status = s.answer(step_, worker.inputs, worker.inputs, *load_shaft(k, answers->shaft), answers->of[k]);
     } else {
         status = s.advance(step_, worker.inputs, worker.inputs);
     }
@@ -30,10 +32,11 @@ void ExactBatch::step_one(std::size_t k, std::span<const Input> inputs, const st
     for (std::size_t v = 0; v < worker.values.size(); ++v) values_[v * size() + k] = worker.values[v];
 }
 
-Failure ExactBatch::step(std::span<const Input> inputs, const std::optional<Motion>& motion, unsigned threads) {
+Failure ExactBatch::step(std::span<const Input> inputs, const std::optional<Motion>& motion, unsigned threads,
+                         const std::optional<Answers>& answers) {
     workers_.resize(std::max(workers_.size(), Team::needed(size(), threads)));
     team_.share(size(), threads, [&](std::size_t begin, std::size_t end, std::size_t who) {
-        for (std::size_t k = begin; k < end; ++k) step_one(k, inputs, motion, workers_[who]);
+        for (std::size_t k = begin; k < end; ++k) step_one(k, inputs, motion, answers, workers_[who]);
     });
     Failure first;
     for (Worker& w : workers_) first.add(std::exchange(w.failure, {}));

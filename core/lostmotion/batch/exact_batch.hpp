@@ -28,8 +28,17 @@ class ExactBatch {
         std::optional<Input> angle, acceleration;
     };
     // Advances all drives with constant inputs, in the order of their names. Those that cannot go on stay where they
-    // were; the first of them is reported.
-    Failure step(std::span<const Input> inputs, const std::optional<Motion>& motion, unsigned threads);
+    // were; the first of them is reported. answers: of each drive how this shaft of it answers its load torque.
+    struct Answers {
+        int shaft;
+        LoadAnswer* of;
+    };
+    Failure step(std::span<const Input> inputs, const std::optional<Motion>& motion, unsigned threads,
+                 const std::optional<Answers>& answers = {});
+    // Nothing: the shaft has no load torque, or others are joined to it.
+    std::optional<LoadShaft> load_shaft(std::size_t k, int shaft) const {
+        return drives_[k]->train().load_shaft(shaft);
+    }
     // Gives a drive other parameters; it goes on from the state that it is in. False: it has other states.
     bool replace(std::size_t k, const Scenario& scenario);
     // To t = 0. which: for each drive whether it is meant; nullptr: all. start: of each drive its states, in the order
@@ -56,7 +65,8 @@ class ExactBatch {
         std::vector<double> inputs, values;
         Failure failure;
     };
-    void step_one(std::size_t k, std::span<const Input> inputs, const std::optional<Motion>& motion, Worker& worker);
+    void step_one(std::size_t k, std::span<const Input> inputs, const std::optional<Motion>& motion,
+                  const std::optional<Answers>& answers, Worker& worker);
 
     double step_;
     std::vector<std::unique_ptr<ScenarioSimulation>> drives_;

@@ -89,6 +89,14 @@ class ExactBatch:
         self._core.step([values.get(name, zero) for name in self._core.inputs], **motion, threads=threads)
         self._steps += self._count
 
+    def answer(self, values: Mapping[str, np.ndarray], load: str, shaft: int, threads: int) -> np.ndarray:
+        """Advance as `step` does; rows of torque, derivative and acceleration of a shaft."""
+        zero, names = np.zeros(1), self._core.inputs
+        inputs = [values.get(name, zero) for name in names]
+        found = self._core.answer(inputs, shaft=shaft, load=names.index(load), threads=threads)
+        self._steps += self._count
+        return found
+
     def reset(self, which: np.ndarray | None, initial: Mapping[str, np.ndarray]) -> None:
         """Take trains back to t = 0."""
         states = self._core.states

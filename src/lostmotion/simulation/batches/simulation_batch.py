@@ -20,6 +20,7 @@ from ...model.train import DriveTrain
 from ..forms.given_motion import check_motion
 from ..runs.sensitivities import value_at
 from ..scenario.scenario import Scenario
+from ..stepping.load_answers import LoadAnswer
 from ..stepping.step_inputs import MAX_INTERVAL, MIN_INTERVAL, no_input
 from ..train_variables import only_input
 from .batch_parameters import BatchParameters, check_range
@@ -205,21 +206,86 @@ class SimulationBatch:
         for word, value in (("command", command), ("load_torque", load_torque)):
             if value is not None and (word == "command" or np.any(value)):
                 inputs[self._the_only(word)] = value
+        values, course = self._checked_inputs(inputs), self._motion_of(motion)
+        self._take_parameters()
+        if isinstance(self._core, ExactBatch):
+            self._core.step(values, course, self._threads)
+        else:
+            self._core.step(values, self._threads)
+        self._time += self._step
+
+    @checked
+    def answer(
+        self, command: Any = None, load_torque: Any = 0.0, *, shaft: str | None = None, **inputs: Any
+    ) -> LoadAnswer:
+        """Advance as `step` does, and return the mean torque on the load with its derivative, as `Simulation.answer` does.
+
+        Parameters
+        ----------
+        command, load_torque, inputs
+            As of `step`.
+        shaft
+            The shaft that is the load; left out, the last one.
+
+        Returns
+        -------
+        LoadAnswer
+            Arrays with a number for each drive.
+
+        Raises
+        ------
+        InputError
+            As of `step`; the shaft has no load torque, or a mass matrix joins it to others.
+        SolverError
+            As of `step`.
+
+        Examples
+        --------
+        >>> import lostmotion as lm
+        >>> joints = lm.SimulationBatch(lm.load("catalogue-robot-joint").drive(), step="1 ms", count=2)
+        >>> found = joints.answer([0.5, 0.6], 0.0)
+        >>> found.torque.round(3), found.derivative.round(2)
+        (array([0.345, 0.414]), array([-1.64, -1.64]))
+        """
+        if self._given:
+            raise InputError(f"answer: the motion of {self._given} is given; use a load torque in its place")
+        shafts = list(self._train.shafts)
+        if (of := shafts[-1] if shaft is None else shaft) not in shafts:
+            raise InputError(f"shaft: {shown(of)} is none; {did_you_mean(of, shafts, f'those are {listed(shafts)}')}")
+        load = self._train.load_torque_of(of)
+        if load not in self.inputs or (isinstance(self._core, WalkedBatch) and of != shafts[-1]):
+            raise InputError(f"shaft: {shown(of)} has no load torque among {listed(self.inputs)}; give one that has")
+        if command is not None:
+            inputs[self._the_only("command")] = command
+        if np.any(load_torque):
+            inputs[load] = load_torque
+        values = self._checked_inputs(inputs)
+        self._take_parameters()
+        if isinstance(self._core, ExactBatch):
+            try:
+                rows = self._core.answer(values, load, shafts.index(of), self._threads)
+            except ValueError:
+                raise InputError(f"shaft: a mass matrix joins {shown(of)} to others; give one that is free") from None
+        else:
+            rows = self._core.answer(values, self._threads)
+        self._time += self._step
+        return LoadAnswer(*rows)
+
+    def _checked_inputs(self, inputs: Mapping[str, Any]) -> dict[str, np.ndarray]:
+        """Inputs by name as the core takes them."""
         values = {name: _numbers(name, value, self._count) for name, value in inputs.items()}
         for name in values:
             if name not in self.inputs:
                 raise no_input(self._train, self.inputs, name)
         if missing := self._required - values.keys():
             raise InputError(f"{', '.join(sorted(missing))}: missing; all commands and references are to be given")
-        course = self._motion_of(motion)
+        return values
+
+    def _take_parameters(self) -> None:
+        """Give the core what has been written into `parameters`."""
         keys, rows = self._parameters.changes()
         if keys:
             self._core.change(self._parameters, keys, rows)
-        if isinstance(self._core, ExactBatch):
-            self._core.step(values, course, self._threads)
-        else:
-            self._core.step(values, self._threads)
-        self._time += self._step
 
     def _the_only(self, word: str) -> str:
         """Name of the one input that `step` calls a command or a load torque."""

@@ -125,6 +125,11 @@ class WalkedBatch:
         zero, (command, load) = np.zeros(1), self._given
         self._core.step(values.get(command, zero), values.get(load, zero), threads)
 
+    def answer(self, values: Mapping[str, np.ndarray], threads: int) -> np.ndarray:
+        """Advance as `step` does; rows of torque, derivative and acceleration of the load."""
+        zero, (command, load) = np.zeros(1), self._given
+        return self._core.answer(values.get(command, zero), values.get(load, zero), threads)
+
     def reset(self, which: np.ndarray | None, initial: Mapping[str, np.ndarray]) -> None:
         """Take trains back to t = 0."""
         for name, values in initial.items():

@@ -27,13 +27,13 @@ class SimulationSnapshot:
 
 @dataclass(frozen=True)
 class LoadAnswer:
-    """Torque of a drive on its load over an interval, as `Simulation.answer` returns it."""
+    """Torque of a drive on its load over an interval, as `Simulation.answer` returns it; of a batch arrays of all drives."""
 
-    torque: float
+    torque: Any
     """mean torque of the drive on its load [N·m]: inertia times mean acceleration, plus mean load torque"""
-    derivative: float
+    derivative: Any
     """derivative of this torque by the mean acceleration [kg·m²]; minus infinity where dry friction holds the load"""
-    acceleration: float
+    acceleration: Any
     """mean acceleration of the load [rad/s²]"""
 
 
