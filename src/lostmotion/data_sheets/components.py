@@ -307,7 +307,11 @@ CLOSES = {
     "electrical_time_constant": ("electrical_time_constant", "inductance"),
     "dc_voltage": ("dc_voltage",),
     "rated_torque": ("rated_torque", "rated_current"),
+    "steps_per_revolution": ("steps_per_revolution",),
+    "holding_torque": ("holding_torque",),
+    "detent_torque": ("detent_torque",),
 }
+OF_STEPPERS = ("steps_per_revolution", "holding_torque", "detent_torque")
 
 
 def motor_table(reference: str, changes: Mapping[str, Any], where: str = "motor") -> dict[str, Any]:
@@ -324,6 +328,8 @@ def motor_table(reference: str, changes: Mapping[str, Any], where: str = "motor"
     gaps = {key: changes[key] for key in lacked if key in changes}
     if record.kind != "synchronous":
         gaps.pop("dc_voltage", None)  # there it stands beside the kind "synchronous"
+    for key in ("rated_torque", "electrical_time_constant") if record.kind == "stepper" else OF_STEPPERS:
+        gaps.pop(key, None)  # which the part refuses
     winding = changes.get("winding")
     if record.kind == "brushless" and isinstance(winding, Mapping) and "pole_pairs" in winding:
         gaps["pole_pairs"] = winding["pole_pairs"]

@@ -27,14 +27,18 @@ from .sheet import Record
 
 # At which level the data of a record let it run, from all to little.
 SYNCHRONOUS, DC_EQUIVALENT, TORQUE_SOURCE = "synchronous motor", "DC-equivalent motor", "torque source"
+STEPPER = "stepper"
 # What of a brushless motor with block commutation the winding of a synchronous one says in its own ways.
 BLOCK_KEYS = ("rated_voltage", "torque_constant", "resistance", "inductance", "pole_pairs")
+# Data of a stepper alone, and those that it shares with other motors.
+STEPPER_DATA = ("steps_per_revolution", "holding_torque", "detent_torque", "resistance_phase", "inductance_phase")
+SHARED_DATA = ("rotor_inertia", "rated_current", "friction_torque", "max_inertia_ratio", "max_speed")
 
 
 class MotorSheet(MotorHeat, Record):
-    """Data sheet of a DC motor, of a brushless one seen from its supply as a DC motor, or of a synchronous one."""
+    """Data sheet of a DC motor, of a brushless one seen from its supply as a DC motor, of a synchronous one, or of a stepper."""
 
-    kind: Literal["dc_brushed", "brushless", "synchronous"] = "dc_brushed"
+    kind: Literal["dc_brushed", "brushless", "synchronous", "stepper"] = "dc_brushed"
     """brushless: constants with block commutation, from terminal to terminal; synchronous: those of `winding`"""
     rated_voltage: Annotated[Voltage, Positive] | None = None
     rotor_inertia: Annotated[Inertia, Positive] | None = None
@@ -65,9 +69,26 @@ class MotorSheet(MotorHeat, Record):
     max_speed: Annotated[Speed, Positive] | None = None
     max_inertia_ratio: Annotated[Number, Positive] | None = None
     """largest inertia of the load relative to that of the rotor"""
+    steps_per_revolution: Annotated[Number, Positive] | None = None
+    """full steps of a stepper"""
+    holding_torque: Annotated[Torque, Positive] | None = None
+    """of a stepper, with rated_current in both phases"""
+    detent_torque: Annotated[Torque, NotNegative] | None = None
+    """of a stepper without current"""
+    resistance_phase: Annotated[Resistance, Positive] | None = None
+    """of a phase of a stepper"""
+    inductance_phase: Annotated[Inductance, Positive] | None = None
+    """of a phase of a stepper"""
 
     @model_validator(mode="after")
     def _fits_kind(self) -> Self:
+        given = set(self.given()) - {"total_mass", "overall_length", "price", "lead_time"}
+        if self.kind == "stepper":
+            if idle := sorted(given - {*STEPPER_DATA, *SHARED_DATA}):
+                raise ValueError(f"has {idle[0]}, which a stepper has no use for; leave it out")
+            return self
+        if idle := sorted(given & set(STEPPER_DATA)):
+            raise ValueError(f'has {idle[0]}, which only a motor of kind "stepper" has; leave it out')
         if self.kind != "synchronous":
             if self.winding is not None:
                 raise ValueError('has a winding, which only a motor of kind "synchronous" has')
@@ -82,16 +103,19 @@ class MotorSheet(MotorHeat, Record):
 
     def missing(self) -> dict[str, str]:
         """Data that a run requires and the record lacks."""
-        need = {
-            "rotor_inertia": self.rotor_inertia,
-            "rated_torque": self.rated_torque or (self.rated_current and self.torque_constant),
-        }
+        need = {"rotor_inertia": self.rotor_inertia}
+        if self.kind == "stepper":
+            need |= {"steps_per_revolution": self.steps_per_revolution, "holding_torque": self.holding_torque}
+        else:
+            need["rated_torque"] = self.rated_torque or (self.rated_current and self.torque_constant)
         return {key: f"see {self.where(key)}" for key, value in need.items() if not value}
 
     def level(self) -> str | None:
-        """Level of a run with these data: ``"synchronous motor"``, ``"DC-equivalent motor"``, ``"torque source"``, or None."""
+        """Level of a run with these data: ``"synchronous motor"``, ``"DC-equivalent motor"``, ``"torque source"``, ``"stepper"``, or None."""
         if self.missing():
             return None
+        if self.kind == "stepper":
+            return STEPPER
         if self.kind == "synchronous":
             return SYNCHRONOUS if self.winding is not None and self.dc_voltage is not None else TORQUE_SOURCE
         constants = self.torque_constant is not None and self.resistance is not None
@@ -104,6 +128,8 @@ class MotorSheet(MotorHeat, Record):
             out["kind"] = f"{self.name} runs as a torque source, since {lacks}: voltage and current are not judged."
         if self.friction_torque is None and (self.no_load_current is None or self.torque_constant is None):
             out["friction_torque"] = f"The friction of {self.name} is not given and taken as 0."
+        if level == STEPPER and self.detent_torque is None:
+            out["detent_torque"] = f"The detent torque of {self.name} is not given and taken as 0."
         if level == DC_EQUIVALENT and self.electrical_time_constant is None and self.inductance is None:
             out["electrical_time_constant"] = f"The inductance of {self.name} is not given and taken as 0."
         return out
@@ -116,6 +142,8 @@ class MotorSheet(MotorHeat, Record):
         """
         self._need_all()
         level = self.level()
+        if level == STEPPER:
+            return self._stepper()
         if level == SYNCHRONOUS:
             return self._synchronous(self.winding, self.dc_voltage, self.rated_torque, self._friction())
         if level == TORQUE_SOURCE:
@@ -145,6 +173,18 @@ class MotorSheet(MotorHeat, Record):
             note=self._notes(),
         )
 
+    def _stepper(self) -> Motor:
+        data = {key: getattr(self, key) for key in ("rotor_inertia", "rated_current", *STEPPER_DATA)}
+        given = {key: value for key, value in data.items() if value is not None}
+        limits = MotorLimits(max_speed=self.max_speed, max_inertia_ratio=self.max_inertia_ratio)
+        return Motor(
+            kind="stepper",
+            friction_torque=self._friction(),
+            limits=None if limits == MotorLimits() else limits,
+            note=self._notes(),
+            **given,
+        )
+
     def _torque_source(self) -> Motor:
         torque = self._field_torque()
         return Motor(
@@ -168,8 +208,9 @@ class MotorSheet(MotorHeat, Record):
         InputError
             The record is one of a motor with brushes, or lacks something.
         """
-        if self.kind == "dc_brushed":
-            raise InputError(f"{self.name}: has brushes, and cannot be of kind synchronous")
+        if self.kind in ("dc_brushed", "stepper"):
+            what = "has brushes" if self.kind == "dc_brushed" else "is a stepper"
+            raise InputError(f"{self.name}: {what}, and cannot be of kind synchronous")
         self._need_all()
         if self.kind == "synchronous":
             for key in ("winding", "dc_voltage"):

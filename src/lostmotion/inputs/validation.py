@@ -106,14 +106,19 @@ def nearest(given: str, choices: Iterable[str]) -> str:
     """The choice that was misspelt as what was given; empty if none was.
 
     A name with another word in it, or with one more, is that of another quantity: backlash is no added_backlash, and a
-    rated_current no rated_torque.
+    rated_current no rated_torque. One that is related to something else, or to nothing, is meant: steps are
+    steps_per_revolution, as are steps_per_rev.
     """
     if len(given) > MAX_NAME:
         return ""
     wanted = _words(given)
     likeness = {choice: _likeness(wanted, _words(choice)) for choice in choices if len(choice) <= MAX_NAME}
     best = max(likeness, key=lambda choice: likeness[choice], default="")
-    return best if best and likeness[best] > 0.0 else ""
+    if best and likeness[best] > 0.0:
+        return best
+    head = [*wanted[: wanted.index("per")], "per"] if "per" in wanted else [*wanted, "per"]
+    related = [choice for choice in likeness if _words(choice)[: len(head)] == head]
+    return related[0] if len(related) == 1 else ""
 
 
 def _words(name: str) -> list[str]:

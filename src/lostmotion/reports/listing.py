@@ -136,7 +136,7 @@ def _rated_torque(record: Sheet) -> float | None:
         return record.rated_output_torque
     if isinstance(record, BrakeSheet):
         return record.holding_torque
-    return record.rated_torque if isinstance(record, MotorSheet) else None
+    return (record.rated_torque or record.holding_torque) if isinstance(record, MotorSheet) else None
 
 
 def _rated_force(record: Sheet) -> float | None:
@@ -168,7 +168,7 @@ def _line(record: Sheet) -> str:
         speed = record.rated_speed
     first = f"{ratio:.4g}" if ratio else f"{1e3 * lead:.4g} mm" if lead else ""
     rated = f"{torque:.4g} N·m" if torque else f"{force:.4g} N" if force else f"{current:.4g} A rms" if current else "?"
-    turns = isinstance(record, GearboxSheet | MotorSheet)
+    turns = isinstance(record, GearboxSheet | MotorSheet) and record.kind != "stepper"
     rpm = f"{RPM * speed:.0f}" if speed else "?" if turns else ""
     missing = ", ".join(record.missing())
     state = record.level() or f"lacks {missing}"
@@ -250,7 +250,7 @@ def template(kind: str | None = None) -> str:
         known = (*KINDS, *of_kind)
         raise InputError(f"--kind {kind}: is not known; {did_you_mean(kind, known, 'take one of ' + ', '.join(known))}")
     table = "gearbox" if kind is None else of_kind.get(kind, kind)
-    name = "synchronous" if kind == "synchronous" else table
+    name = kind if kind in TEMPLATES else table
     text = files("lostmotion").joinpath(f"data_sheets/{TEMPLATES[name]}-template.toml").read_text(encoding="utf-8")
     if kind not in of_kind:
         return text
@@ -258,7 +258,9 @@ def template(kind: str | None = None) -> str:
 
 
 # The files with the templates, by tables of records and kinds with one of their own.
-TEMPLATES = {table: table.replace("_", "-") for table in KINDS} | {"synchronous": "synchronous-motor"}
+TEMPLATES = {table: table.replace("_", "-") for table in KINDS} | {
+    kind: f"{kind}-motor" for kind in ("synchronous", "stepper")
+}
 
 
 def _kinds(sheet: type[Sheet]) -> tuple[str, ...]:

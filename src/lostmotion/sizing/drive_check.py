@@ -24,7 +24,7 @@ from .motor_check import command_of_run, current, heat, largest_speed, peak_torq
 from .motor_run import oriented_amplitudes
 from .one_axis import OneAxis, axis_rules
 from .power_off import holdings
-from .stepper_check import stepper_rules
+from .stepper_check import speed_of_stepper, stepper_rules
 from .supply import amplifier_of_a_run, bus_findings, power_in_run
 
 POINTS = 40  # samples to a period of the fastest resonance, so that no peak is missed
@@ -180,7 +180,10 @@ def _motor(scenario: Scenario, name: str, result: RunArrays) -> tuple[list[Findi
     where = scenario.key_in_file(key)
     torque, speed = train.motor_torque_of(name), train.speed_of(motor.shaft)
     if motor.kind == "stepper":  # its current does not follow its torque
-        judged = [largest_speed(motor, float(abs(result[speed]).max()), where), *stepper_rules(scenario, name, result)]
+        judged = [
+            *speed_of_stepper(motor, float(abs(result[speed]).max()), where),
+            *stepper_rules(scenario, name, result),
+        ]
         return judged, np.zeros_like(result.time)
     cycle = duty_cycle(result, scenario.task.cycle, speed=speed, motor_torque=torque, output_torque=torque)
     command, T, w = (result[key] for key in (train.command_of(name), torque, speed))

@@ -20,9 +20,11 @@ from .finding import Finding
 from .gearbox_check import input_speeds, loads
 from .motion_check import INERTIA_RATIO, inertia_ratio
 from .motor_check import current, heat, largest_speed, needed_command, peak_torque, rms_rise, voltage
+from .stepper_check import speed_of_stepper, step_resonance, torque_reserve
 
 POINTS = 1000  # of a cycle at least
 LINES = 1e-3  # of the largest torque
+EVEN = 10_001  # instants of a cycle at which the rate of full steps is looked at
 WITHIN = 1e-9  # of an interval: so close to its ends, values are those on this side of a jump
 
 
@@ -170,13 +172,23 @@ def check_motor(
     largest: float | None = None,
     *,
     slides: bool = False,
+    microsteps: int = 1,
 ) -> list[Finding]:
     """The rules for a motor at this gearbox, or with `slides` for a linear motor, whose ratio of inertias is not judged. `largest` is
-    the largest wanted ratio of the inertias: left out, the limit of the motor's record, or else 10."""
+    the largest wanted ratio of the inertias: left out, the limit of the motor's record, or else 10. `microsteps` are those of the
+    driver of a stepper."""
     if largest is None and (motor.limits is None or motor.limits.max_inertia_ratio is None):
         largest = INERTIA_RATIO
     torque = demand.motor_torque(motor)
     cycle = demand.cycle(torque)
+    if motor.kind == "stepper":  # its current does not follow its torque
+        even = np.interp(np.linspace(0.0, demand.motion.cycle, EVEN), demand.motion.time, np.abs(demand.speed))
+        return [
+            *speed_of_stepper(motor, cycle.peak_input_speed),
+            torque_reserve(motor, np.abs(torque), np.abs(demand.speed)),
+            step_resonance(motor, demand.gearbox.inertia, even, microsteps),
+            inertia_ratio(motor, demand.whole, load_inertia, largest),
+        ]
     rise = rms_rise(motor, cycle.rms_motor_torque, ambient)
     return [
         largest_speed(motor, cycle.peak_input_speed, slides=slides),

@@ -6,16 +6,17 @@ import math
 
 import numpy as np
 
-from ..model.motor import Motor, ShaftMotor
+from ..model.motor import Motor
 from ..model.stepper import ELECTRIC, pull_out_torque
 from ..simulation.runs.lost_steps import PERIOD, found_in
 from ..simulation.runs.results import RunArrays
 from ..simulation.scenario.scenario import Scenario
 from ..units.practical import RPM
 from .finding import Finding, Judgement
+from .motor_check import largest_speed
 
 SAFETY = 1.5
-"""of the pull-out torque over the torque of a run, the smaller end of the range that makers give"""
+"""of the pull-out torque over the torque of a run, the smaller end of the range that manufacturers give"""
 NEAR = 1.5
 """ratio of two frequencies that are near each other"""
 DWELL = 0.02
@@ -39,13 +40,33 @@ def stepper_rules(scenario: Scenario, name: str, result: RunArrays) -> list[Find
     )
     return [
         Finding("lost_steps", "lost steps", value, verdict, lag, 0.5 * lost.largest_lag),
-        _torque(motor, torque, speed, where),
-        _resonance(scenario, name, motor, speed),
+        torque_reserve(motor, torque, speed, where),
+        step_resonance(motor, train.shafts[motor.shaft].inertia, speed, microsteps_of(scenario, name)),
     ]
 
 
-def _torque(motor: Motor, torque: np.ndarray, speed: np.ndarray, where: str) -> Finding:
-    """Largest share of the pull-out torque at the speed at which it is needed."""
+def speed_of_stepper(motor: Motor, speed: float, where: str = "motor") -> list[Finding]:
+    """Largest speed [rad/s] with that of the data sheet; nothing where none is given, as the pull-out curve then judges."""
+    limited = motor.limits is not None and motor.limits.max_speed is not None
+    return [largest_speed(motor, speed, where)] if limited else []
+
+
+def microsteps_of(scenario: Scenario, name: str) -> int:
+    """Parts of a full step in which the driver of a stepper turns its field."""
+    command = scenario.tables.command.get(name)
+    return 1 if command is None or command.stepping is None else command.stepping.microsteps
+
+
+def torque_reserve(motor: Motor, torque: np.ndarray, speed: np.ndarray, where: str = "motor") -> Finding:
+    """Largest share of the pull-out torque at the speed at which it is needed.
+
+    Parameters
+    ----------
+    torque, speed
+        Of the motor over a motion, without sign [N·m, rad/s].
+    where
+        Table of the motor, for what is missing.
+    """
     missing = [f"{where}.{key}" for key in ELECTRIC if getattr(motor, key) is None]
     assert motor.holding_torque is not None
     limit = np.full_like(torque, motor.holding_torque) if missing else pull_out_torque(motor, speed)
@@ -54,13 +75,13 @@ def _torque(motor: Motor, torque: np.ndarray, speed: np.ndarray, where: str) -> 
     k = int(np.argmax(use))
     what = "torque, largest share of the pull-out torque"
     value = f"{torque[k]:.4g} of {limit[k]:.4g} N·m at {RPM * speed[k]:.4g} rpm"
-    if missing:
+    share = float(use[k])
+    if missing and share <= 1.0:
         remark = f"of the holding torque, which falls with the speed; give {', '.join(missing)}"
         return Finding("stepper_torque", what, value, "unknown", remark)
-    share = float(use[k])
     verdict: Judgement = "ok" if share <= 1.0 / SAFETY else "caution" if share <= 1.0 else "warning"
     remark = (
-        "the current of the run is ideal: the rotor would fall out of step"
+        "the rotor falls out of step"
         if verdict == "warning"
         else f"safety {1.0 / share:.3g}, wanted {SAFETY:g}"
         if share > 0.0
@@ -69,16 +90,24 @@ def _torque(motor: Motor, torque: np.ndarray, speed: np.ndarray, where: str) -> 
     return Finding("stepper_torque", what, value, verdict, remark, share * SAFETY)
 
 
-def _resonance(scenario: Scenario, name: str, motor: ShaftMotor, speed: np.ndarray) -> Finding:
-    """Whether the run keeps full steps at the frequency at which the rotor swings in its field."""
+def step_resonance(motor: Motor, inertia: float, speed: np.ndarray, microsteps: int) -> Finding:
+    """Whether a motion keeps full steps at the frequency at which the rotor swings in its field.
+
+    Parameters
+    ----------
+    inertia
+        That is fixed to the rotor [kg·m²].
+    speed
+        Of the rotor at even instants, without sign [rad/s].
+    microsteps
+        Of the driver, to a full step.
+    """
     assert motor.steps_per_revolution is not None
     assert motor.holding_torque is not None
-    inertia = motor.rotor_inertia + scenario.train().shafts[motor.shaft].inertia
+    inertia = motor.rotor_inertia + inertia
     frequency = math.sqrt(0.25 * motor.steps_per_revolution * motor.holding_torque / inertia) / (2.0 * math.pi)
     rate = speed * motor.steps_per_revolution / (2.0 * math.pi)
     share = float(np.mean((rate > frequency / NEAR) & (rate < frequency * NEAR)))
-    command = scenario.tables.command.get(name)
-    microsteps = 1 if command is None or command.stepping is None else command.stepping.microsteps
     value = f"{frequency:.4g} Hz of the rotor in its field"
     if share <= DWELL:
         return Finding("step_resonance", "resonance of steps", value, "ok", "no full steps at that rate for long")

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from ..control.command import MOST_MICROSTEPS
 from ..control.controller import AnyCurrent
 from ..control.references import Move, PositionReference
 from ..control.sample_times import whole_multiple
@@ -31,7 +32,7 @@ from ..inputs.quantities import (
 from ..inputs.validation import unknown_key
 from ..model.angle_torques import STANDARD_GRAVITY
 from ..model.duty import Amplifier, Duty, HoldingBrake, Supply
-from ..model.motor import Motor, MotorLimits
+from ..model.motor import STEPPER_KEYS, Motor, MotorLimits
 from ..model.signals import TimeFunction, TorqueSignal
 from ..model.task import Task
 from ..simulation.forms.drive_tables import LoadTable
@@ -105,6 +106,9 @@ class AxisTask(Task, Duty):
     axial_force: Annotated[Force, NotNegative] | None = None  #: on the output bearing of the gearbox
     supply: Supply | None = None
     safety_factors: dict[str, Annotated[Number, Positive]] = Field(default={})  #: by rule
+    microsteps: Annotated[Whole, Field(ge=1, le=MOST_MICROSTEPS)] = 16
+    """parts of a full step that the driver of a stepper resolves"""
+    steppers: dict[str, Any] = Field(default={})  #: table `[motor]` where steppers are candidates
     current: AnyCurrent | None = None  #: current loop of `[controller]`; of a torque source a lag in its place
     linear: LinearAxis | None = None
     """tables `[slide]` and `[screw]`, `[rack]` or `[belt]`; all values of the load are then in units of translation"""
@@ -159,6 +163,10 @@ class AxisTask(Task, Duty):
             positions = reference.at(np.linspace(0.0, self.cycle, 1001))[0]
             doubt_window(self.settling_window, float(np.ptp(positions)), unit, where)
 
+    def of_stepper(self, key: str) -> bool:
+        """Whether it is a key of a motor that the base, in which no stepper is, may not have."""
+        return bool(self.steppers) and key.removeprefix("motor.") in STEPPER_KEYS
+
     def amplifier_of_task(self) -> Amplifier | None:
         """The amplifier, also where `supply` alone says its continuous current."""
         current = None if self.supply is None else self.supply.continuous_current
@@ -174,7 +182,9 @@ class AxisTask(Task, Duty):
             changes["rotor_inertia"] = motor.rotor_inertia + brake.inertia
         voltage = None if self.supply is None else self.supply.min_voltage
         if voltage is not None:
-            if motor.kind == "dc":
+            if motor.kind == "stepper":
+                changes["supply_voltage"] = voltage
+            elif motor.kind == "dc":
                 changes["voltage_limit"] = voltage if motor.voltage_limit is None else min(voltage, motor.voltage_limit)
             elif motor.winding is not None:
                 changes["dc_voltage"] = voltage
@@ -183,7 +193,7 @@ class AxisTask(Task, Duty):
         motor = motor.model_copy(update=changes) if changes else motor
         return (
             motor
-            if self.amplifier is None or self.amplifier.peak_current is None
+            if self.amplifier is None or self.amplifier.peak_current is None or motor.kind == "stepper"
             else _up_to(motor, self.amplifier.peak_current)
         )
 

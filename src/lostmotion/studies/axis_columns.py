@@ -163,10 +163,6 @@ def row_of(run: Repeated, *, slides: bool = False) -> dict[str, float]:
     torque = result["motor_torque"][here]
     power = torque * result["motor_speed"][here]
     given = 0.5 * (power[1:] + power[:-1]) * np.diff(time)
-    controller = scenario.controller
-    assert controller is not None
-    assert controller.position is not None
-    assert controller.speed is not None
     error = result["load_angle"][here] - run.cycles.position
     peak, mean = float(np.abs(torque).max()), math.sqrt(float(e.torque_square.mean()))
     effective = 1.0 if scenario.motor.winding is None else math.sqrt(0.5)  # of amplitudes
@@ -186,9 +182,7 @@ def row_of(run: Repeated, *, slides: bool = False) -> dict[str, float]:
         "energy": float(np.maximum(e.energy, 0.0).sum()),
         "energy_returned": float(-np.minimum(e.energy, 0.0).sum()),
         "mechanical_energy": float(np.maximum(given, 0.0).sum()),
-        "position_gain": controller.position.gain,
-        "speed_gain": controller.speed.gain,
-        "integral_gain": controller.speed.k_i,
+        **_gains(scenario),
         "cycles": float(run.cycles.count),
         "change": run.change,
     }
@@ -196,6 +190,17 @@ def row_of(run: Repeated, *, slides: bool = False) -> dict[str, float]:
         return columns
     forces = {"motor_force_peak": peak, "motor_force_rms": mean}
     return {name: value for name, value in columns.items() if name not in OF_ROTARY_MOTORS} | forces
+
+
+def _gains(scenario: Scenario) -> dict[str, float]:
+    """Gains of the loops; of a stepper, which has none, not known."""
+    controller = scenario.controller
+    if controller is None:
+        return dict.fromkeys(("position_gain", "speed_gain", "integral_gain"), math.nan)
+    assert controller.position is not None
+    assert controller.speed is not None
+    speed = controller.speed
+    return {"position_gain": controller.position.gain, "speed_gain": speed.gain, "integral_gain": speed.k_i}
 
 
 def _at_rest(cycles: Cycles, error: np.ndarray) -> dict[str, float]:

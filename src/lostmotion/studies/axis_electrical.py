@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..control.loops import FirstOrderCurrent, IdealCurrent
+from ..model.motor import Motor
 from ..simulation.runs.results import RunArrays
 from ..simulation.scenario.scenario import Scenario
 from ..sizing.motor_check import command_of_run, current_voltage_power
@@ -37,6 +38,8 @@ class Electrical:
         """
         m, step = scenario.motor, float(result.time[1] - result.time[0])
         torque = result["motor_torque"][here]
+        if m.kind == "stepper":
+            return cls._of_stepper(m, torque)
         oriented = oriented_amplitudes(result, "motor")
         if oriented is not None:
             assert m.winding is not None
@@ -60,6 +63,13 @@ class Electrical:
         to_one = current_voltage_power(m, np.zeros(1), np.ones(1), np.zeros(1))[0]
         rms = abs(float(to_one[0])) * math.sqrt(float(square.mean()))
         return cls(current, voltage, step * power, square, square, rms)
+
+    @classmethod
+    def _of_stepper(cls, m: Motor, torque: np.ndarray) -> Electrical:
+        """The driver holds the rated current, which is its effective value in microsteps; voltage and energy are not known."""
+        rms, unknown = m.rated_current or math.nan, np.full_like(torque, math.nan)
+        square = mean_square(torque)
+        return cls(np.full_like(torque, math.sqrt(2.0) * rms), unknown, unknown[:-1], square, square, rms)
 
 
 def _angle(scenario: Scenario, result: RunArrays, here: slice) -> np.ndarray:

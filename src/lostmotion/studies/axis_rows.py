@@ -16,6 +16,7 @@ from ..model.linear import RatedScrew
 from ..model.motor import Motor
 from ..servo.margins import unstable_pole
 from ..servo.regimes import axis_of
+from ..simulation.forms.key_aliases import MOTOR
 from ..sizing.axis_rules import (
     derated,
     emergency_stop,
@@ -44,6 +45,7 @@ from ..sizing.required_motion import (
     required_motion,
 )
 from ..sizing.stages import DIRECT, Stage, at_input, together
+from ..sizing.stepper_check import speed_of_stepper, stepper_rules
 from ..sizing.supply import amperes, amplifier_rules, effective_current, electrical_power, returned, supply_rules
 from ..worker_threads import thread_pool
 from .axis import AxisTask, reference_of
@@ -175,7 +177,15 @@ class Axes:
         if lacking:
             return InputError(problems=[Problem((), text) for text in lacking])
         task, load, slides = self.task, float(self.motion(row).inertia.max()), self.study.slides_itself(row)
-        found = check_motor(demand, motor, load, task.ambient_temperature, task.max_inertia_ratio, slides=slides)
+        found = check_motor(
+            demand,
+            motor,
+            load,
+            task.ambient_temperature,
+            task.max_inertia_ratio,
+            slides=slides,
+            microsteps=task.microsteps,
+        )
         if task.max_lost_motion is not None:
             found.append(self._lost_motion(row, demand, motor, task.max_lost_motion))
         if slides:
@@ -360,7 +370,7 @@ class Axes:
         found = self._after_run(row, made, columns["winding_temperature"])
         more: Row = {**columns, **self._without_run(row)}
         whole = columns_of(found, CHECKS) | more
-        if pole := unstable_pole(axis_of(made.scenario)):
+        if made.scenario.controller is not None and (pole := unstable_pole(axis_of(made.scenario))):
             why = f"{UNSTABLE}: {pole}"
             if self.over(whole):
                 whole["why"] = "; ".join(filter(None, [why, str(whole["why"])]))
@@ -372,8 +382,11 @@ class Axes:
         """The same rules, of the cycle that was run, and the temperature of its winding [°C]; those that only the required motion
         has are of that."""
         here, task, slides, result = made.cycles.last, self.task, self.study.slides_itself(row), made.result
-        duty, g, m = made.duty, made.scenario.gearbox, made.scenario.motor
+        duty, m = made.duty, made.scenario.motor
         command, torque, speed = (result[name][here] for name in ("command", "motor_torque", "motor_speed"))
+        if m.kind == "stepper":
+            of_motor = [*speed_of_stepper(m, duty.peak_input_speed), *stepper_rules(made.scenario, MOTOR, result)]
+            return self._with_others(row, of_motor, made)
         command = command_of_run(m, made.scenario.controller, command, torque, speed)
         oriented = oriented_amplitudes(result, "motor")
         of_motor = [
@@ -389,10 +402,15 @@ class Axes:
             voltage(m, command, torque, speed, oriented=None if oriented is None else oriented[1][here]),
             current(m, torque),
         ]
+        return self._with_others(row, of_motor, made)
+
+    def _with_others(self, row: np.ndarray, of_motor: list[Finding], made: Repeated) -> list[Finding]:
+        """Findings of the motor in a run with those of its gearbox, and with those that only the required motion has."""
+        g, duty = made.scenario.gearbox, made.duty
         of_gearbox: list[Finding] = []
-        if task.linear is None:
+        if self.task.linear is None:
             of_gearbox = [*loads(g, float(np.abs(duty.output_torque).max()), duty), *input_speeds(g, duty)]
-        found = self._under_task([*of_gearbox, *of_motor], m)
+        found = self._under_task([*of_gearbox, *of_motor], made.scenario.motor)
         again = {f.rule for f in found}
         before = self.judged(row)
         assert not isinstance(before, InputError)

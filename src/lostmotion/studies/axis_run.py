@@ -34,7 +34,8 @@ def until_it_repeats(study: Study, row: np.ndarray) -> Repeated:
         most = min(2 * count, task.max_cycles)
         shorter, longer = (cycles_of(base, task, n) for n in (count, most))
         scenario = study.axis_at(row, most)
-        if most > count and begins_alike(shorter, longer) and not any(oriented(scenario)):
+        continues = begins_alike(shorter, longer) and scenario.controller is not None and not any(oriented(scenario))
+        if most > count and continues:
             result = _run(scenario, shorter, longer)
             if len(result.time) > shorter.simulation.samples:
                 count = most

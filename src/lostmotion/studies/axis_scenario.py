@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..control.command import CommandSignal, Stepping
 from ..control.controller import AnyCurrent, Controller
 from ..control.loops import Feedforward, FirstOrderCurrent, SampledCurrent
 from ..control.references import PositionReference
@@ -47,7 +48,11 @@ def axis_scenario(base: Scenario, motor: Motor, gearbox: Gearbox, task: AxisTask
     """
     around = cycles_of(base, task, count)
     changes: dict[str, Any] = {"motor": motor, "gearbox": gearbox, "initial": around.initial}
-    changes["controller"] = tuned(base, motor, gearbox, task.current)
+    if motor.kind == "stepper":  # without a loop: its driver turns the reference into steps
+        stepping = Stepping(reference=around.reference, microsteps=task.microsteps)
+        changes |= {"controller": None, "command": CommandSignal(stepping=stepping)}
+    else:
+        changes["controller"] = tuned(base, motor, gearbox, task.current)
     found = over(base.unchecked(**changes), around)
     try:
         found.check()
@@ -134,7 +139,8 @@ def cycles_of(base: Scenario, task: AxisTask, count: int) -> Cycles:
 
 def over(scenario: Scenario, cycles: Cycles) -> Scenario:
     """The scenario over so many cycles."""
-    assert scenario.controller is not None
+    if scenario.controller is None:
+        return scenario.unchecked(load=cycles.load, simulation=cycles.simulation)
     controller = scenario.controller.unchecked(reference=cycles.reference)
     return scenario.unchecked(controller=controller, load=cycles.load, simulation=cycles.simulation)
 

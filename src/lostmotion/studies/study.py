@@ -30,6 +30,7 @@ from .expressions import Expression, read_expression
 from .own_keys import COMMON, with_value
 from .records import is_condition, kind_of_record, name_key, names_a_record, owner_of, with_records
 from .select import SHARES, TASK_SHARES, USE, Selection, check_bounds
+from .steppers import stepper_of
 from .vary import Vary, base_value, check_key, check_spelling, scaled, with_keys_of_tables
 from .vocabulary import Vocabulary, vocabulary_of
 
@@ -217,7 +218,7 @@ class Study(Part):
                 base_value(self.scenario, owner_of(key))  # so that it is there
         scenario = self._with_first_records() if owners else self.scenario
         for key, relative in keys:
-            if kind_of_record(key):
+            if kind_of_record(key) or (self.axis is not None and self.axis.of_stepper(key)):
                 continue
             if is_condition(key):
                 owner = owner_of(key)
@@ -353,11 +354,20 @@ class Study(Part):
                 assert linear.kind is not None
                 names = [self.vary[k].value(number) for k, number in key[1:]]
                 self.kept[key] = stage_of(linear.kind, {"from": names[0], **linear.stage} if names else linear.stage)
+            elif kind == "motor" and self.axis is not None and (stepper := self._stepper(key[1:])) is not None:
+                self.kept[key] = self.axis.fed(stepper, self.brake(row))
             else:
                 found = getattr(self.scenario_with(dict(key[1:])), kind)
                 motor = kind == "motor" and self.axis is not None
                 self.kept[key] = self._under(self.axis, found, self.brake(row)) if motor else found  # type: ignore[arg-type]
         return self.kept[key]
+
+    def _stepper(self, parameters: tuple[tuple[int, float], ...]) -> Motor | None:
+        """The stepper of a row of a task; None of another motor."""
+        assert self.axis is not None
+        if not self.axis.steppers:
+            return None
+        return stepper_of(self.axis.steppers, [(self.vary[k], number) for k, number in parameters])
 
     def brake(self, row: np.ndarray) -> HoldingBrake | None:
         """The holding brake of a row of a task.
@@ -409,7 +419,10 @@ class Study(Part):
         assert self.axis is not None
         linear = self.axis.linear
         found: dict[str, Sheet] = {}
-        tables = {"motor": self.tables.get("motor", {}), "gearbox": self.tables.get("gearbox", {})}
+        tables = {
+            "motor": self.axis.steppers or self.tables.get("motor", {}),
+            "gearbox": self.tables.get("gearbox", {}),
+        }
         if (whole := self.whole_drive(row)) is not None:
             kind, k = whole
             found[kind], tables = find(str(self.vary[k].value(row[k])), kind), {}

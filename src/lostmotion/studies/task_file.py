@@ -31,6 +31,7 @@ from .file import find_sheets
 from .own_keys import with_first
 from .records import kind_of_record, names_that_fit
 from .select import Selection
+from .steppers import is_stepper
 from .study import Study
 
 PLAIN = tuple(key for key in Task.model_fields if key not in ("supply", "amplifier", "brake"))
@@ -148,7 +149,12 @@ def task_of(tables: dict[str, Any], directory: Path = Path()) -> Study:
         "simulation": {"duration": task.cycle, "sample_interval": time},
     }
     if pairs:
+        own = dict(written["motor"])
         _with_parts(written, vary, linear=linear is not None)
+        if _any_stepper(written, vary):
+            task = task.model_copy(update={"steppers": own or {"kind": "stepper"}})
+        if is_stepper(written["motor"]):
+            written["motor"] = NO_PAIR
     else:
         written |= {"motor": NO_PAIR, "gearbox": DIRECT.model_dump()}
     return Study(
@@ -219,7 +225,7 @@ def _relative(tables: dict[str, Any], directory: Path) -> dict[str, Any]:
 def _torque_sources(written: dict[str, Any], vary: list[Any]) -> bool:
     """Whether a candidate of the motor runs as a torque source, so that only its mechanical energy is known."""
     from ..data_sheets.linear_sheets import FORCE_SOURCE
-    from ..data_sheets.motor_sheet import TORQUE_SOURCE, MotorSheet
+    from ..data_sheets.motor_sheet import STEPPER, TORQUE_SOURCE, MotorSheet
 
     whole = [entry for entry in vary if isinstance(entry, dict) and entry.get("key") in WHOLE]
     if any(
@@ -231,10 +237,18 @@ def _torque_sources(written: dict[str, Any], vary: list[Any]) -> bool:
     if not records:
         given = written["motor"]
         if "from" not in given:
-            return bool(given.get("kind") == "torque_source")
+            return given.get("kind") in ("torque_source", "stepper")
         names = [given["from"]]
     sheets = (find(name, "motor") for name in names)
-    return any(isinstance(sheet, MotorSheet) and sheet.level() == TORQUE_SOURCE for sheet in sheets)
+    return any(isinstance(sheet, MotorSheet) and sheet.level() in (TORQUE_SOURCE, STEPPER) for sheet in sheets)
+
+
+def _any_stepper(written: dict[str, Any], vary: list[Any]) -> bool:
+    """Whether a candidate of the motor is a stepper."""
+    records = [entry for entry in vary if isinstance(entry, dict) and kind_of_record(str(entry.get("key"))) == "motor"]
+    return is_stepper(written["motor"]) or any(
+        is_stepper({"from": name}) for entry in records for name in _names(entry)
+    )
 
 
 def _names(entry: dict[str, Any]) -> list[str]:
