@@ -17,8 +17,8 @@ from report import Report, best
 import lostmotion as lm
 from lostmotion import _core
 from lostmotion.simulation.runs.core_runs import core_case
-from lostmotion.studies.design import CHUNK
-from lostmotion.studies.file import to_json
+from lostmotion.studies.study.random_designs import CHUNK
+from lostmotion.studies.study.study_files import to_json
 
 CORES = os.cpu_count() or 1
 KEEP = {"peak": "peak(load_speed)", "rms": "rms(twist)"}

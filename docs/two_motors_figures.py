@@ -14,7 +14,7 @@ from figure_files import save
 import lostmotion as lm
 from lostmotion.reports.looks import FAINT, FIRST, POINTS, SECOND, THIRD
 from lostmotion.reports.panels import Curve, Panel
-from lostmotion.studies.table import read_table
+from lostmotion.studies.runs.read_table import read_table
 
 BASE = lm.load("two-motors-one-ring")
 GEAR = BASE.gears["first_gear"]

@@ -192,7 +192,7 @@ def rows_by_any_threads_and_executor(study: lm.studies.Study, directory: Path) -
     one = pq.ParquetDataset(lm.study(study, directory / "1", threads=1)).read()
     three = pq.ParquetDataset(lm.study(study, directory / "3", threads=3)).read()
     context = get_context("forkserver")
-    context.set_forkserver_preload(["lostmotion.studies.chunk"])
+    context.set_forkserver_preload(["lostmotion.studies.runs.chunk"])
     with ProcessPoolExecutor(2, mp_context=context) as pool:
         processes = pq.ParquetDataset(lm.study(study, directory / "p", executor=pool)).read()
     assert one.equals(three)

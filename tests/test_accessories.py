@@ -14,11 +14,11 @@ from lostmotion.model.duty import Amplifier
 from lostmotion.reports.listing import list_records, record_text, template
 from lostmotion.simulation.forms.drive_tables import drive_schema
 from lostmotion.sizing.supply import amplifier_rules, longest_above
-from lostmotion.studies.axis_rows import Axes
-from lostmotion.studies.nearest import not_judged
-from lostmotion.studies.selection import Candidate
-from lostmotion.studies.study import Study
-from lostmotion.studies.task_file import task_of
+from lostmotion.studies.runs.axis_pairs import Axes
+from lostmotion.studies.selection.nearest_misses import not_judged
+from lostmotion.studies.selection.ranking import Candidate
+from lostmotion.studies.selection.task_file import task_of
+from lostmotion.studies.study.study import Study
 
 ARM: dict[str, Any] = {
     "task": {"cycle": "2 s", "gravity": {"mass": 2.0, "radius": 0.2}, "hold_without_power": False},

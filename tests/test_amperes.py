@@ -15,7 +15,7 @@ from lostmotion.model.duty import Amplifier
 from lostmotion.reports.listing import record_text
 from lostmotion.servo.tuning import drive_units
 from lostmotion.sizing.supply import amperes, amplifier_rules
-from lostmotion.studies.task_file import task_of
+from lostmotion.studies.selection.task_file import task_of
 
 GAIN = 0.48  # N·m/(rad/s), of scenarios/field-weakening.toml
 RMS = 0.88  # N·m to one ampere rms, printed for its motor: 1FT7044-.AK7, (3/sqrt 2) p psi

@@ -19,13 +19,13 @@ from lostmotion.sizing.axis_rules import (
     output_bearing,
     with_safety,
 )
+from lostmotion.sizing.catalogue_formulas import derating
 from lostmotion.sizing.finding import TASK_RULES, within
-from lostmotion.sizing.formulas import derating
 from lostmotion.sizing.required_motion import duty_torque, input_demand, required_motion
 from lostmotion.sizing.stages import at_input, stage_of, together
 from lostmotion.sizing.supply import electrical_power, returned, supply_rules
-from lostmotion.studies.axis_rows import Axes
-from lostmotion.studies.task_file import task_of
+from lostmotion.studies.runs.axis_pairs import Axes
+from lostmotion.studies.selection.task_file import task_of
 
 G = 9.80665
 MOTOR: dict[str, Any] = {

@@ -16,7 +16,7 @@ import lostmotion as lm
 from conftest import ROOT, lostmotion
 from lostmotion.inputs.validation import listed, nearest
 from lostmotion.simulation.scenario.scenario import Scenario
-from lostmotion.studies.expressions import Expression
+from lostmotion.studies.expressions.expressions import Expression
 from refusals import assert_file_refused, assert_plain, refused
 
 GOOD = """

@@ -12,8 +12,8 @@ import lostmotion as lm
 from conftest import ROOT
 from lostmotion import _core
 from lostmotion.model.drive import Drive
-from lostmotion.studies.in_core import core_can
-from lostmotion.studies.table import read_table
+from lostmotion.studies.runs.read_table import read_table
+from lostmotion.studies.runs.runs_in_core import core_can
 from lostmotion.units.conversion import Unit
 
 # What the core has no use for as it stands in a file: ratings, texts, the two voltages of which it takes the ratio, and what

@@ -23,7 +23,7 @@ from lostmotion.identification.task.identification_file import Identification
 from lostmotion.identification.virtual_logs import virtual_log
 from lostmotion.inputs.toml_text import toml_text
 from lostmotion.live_page.description import describe
-from lostmotion.studies.table import read_table
+from lostmotion.studies.runs.read_table import read_table
 from test_random_axes import random_axis
 
 LARGE = ("conveyor-start", "gantry-two-screws", "thruster-in-ice")  # which only take longer

@@ -32,7 +32,8 @@ LAYERS = [
     {"data_sheets", "control"},
     {"simulation"},
     {"response", "test_rig"},
-    {"sizing", "servo", "pointing"},
+    {"servo"},
+    {"sizing", "pointing"},
     {"studies", "identification"},
     {"portable"},
     {"mujoco", "warp"},
@@ -45,6 +46,7 @@ LAYERS = [
 # The same within packages that have rooms of their own; modules beside the rooms count as rooms.
 INNER = {
     "simulation": [{"variables"}, {"train_variables"}, {"forms"}, {"scenario"}, {"stepping"}, {"runs"}, {"batches"}]
+    "studies": [{"expressions"}, {"study"}, {"runs"}, {"selection"}],
 }
 MODULES = sorted(p.relative_to(PACKAGE).with_suffix("") for p in PACKAGE.rglob("*.py"))
 SOURCES = sorted(p for room in ("lostmotion", "kernels") for p in (ROOT / "core" / room).rglob("*.?pp"))

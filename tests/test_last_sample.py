@@ -12,8 +12,8 @@ import pytest
 import lostmotion as lm
 from lostmotion.reports.run import summary
 from lostmotion.reports.study import read_table
-from lostmotion.studies.chunk import scenario_of_run
-from lostmotion.studies.functions import FUNCTIONS
+from lostmotion.studies.expressions.functions import FUNCTIONS
+from lostmotion.studies.runs.chunk import scenario_of_run
 
 END = 2.449489743  # a lift of 3 m with 1 m/s^2
 WINCH: dict[str, Any] = {

@@ -9,9 +9,9 @@ import pytest
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.model.angle_torques import STANDARD_GRAVITY as G
-from lostmotion.studies.axis_rows import Axes
-from lostmotion.studies.study import Study
-from lostmotion.studies.task_file import task_of
+from lostmotion.studies.runs.axis_pairs import Axes
+from lostmotion.studies.selection.task_file import task_of
+from lostmotion.studies.study.study import Study
 
 SCALE = {"grating_period": "20 um", "bits": 10}
 MOVES = {

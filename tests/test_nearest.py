@@ -9,16 +9,16 @@ import pytest
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.control.references import PositionReference
-from lostmotion.studies.axis import reference_of
-from lostmotion.studies.axis_rows import Axes
-from lostmotion.studies.check import UNSTABLE
-from lostmotion.studies.engine import study
-from lostmotion.studies.nearest import least_factor, misses, not_judged, slowed
-from lostmotion.studies.records import names_that_fit
-from lostmotion.studies.selection import candidates, prices
-from lostmotion.studies.study import Study
-from lostmotion.studies.table import read_table
-from lostmotion.studies.task_file import load_task, task_of
+from lostmotion.sizing.axis_task.axis_task import reference_of
+from lostmotion.studies.runs.axis_pairs import Axes
+from lostmotion.studies.runs.read_table import read_table
+from lostmotion.studies.runs.run_study import study
+from lostmotion.studies.selection.nearest_misses import least_factor, misses, not_judged, slowed
+from lostmotion.studies.selection.ranking import candidates, prices
+from lostmotion.studies.selection.task_file import load_task, task_of
+from lostmotion.studies.study.drive_check_columns import UNSTABLE
+from lostmotion.studies.study.records_that_vary import names_that_fit
+from lostmotion.studies.study.study import Study
 from test_axis_tasks import ARM, GEARBOX, MOTOR
 from test_task_keys import FORMS
 

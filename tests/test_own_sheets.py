@@ -9,15 +9,15 @@ import pytest
 import lostmotion as lm
 from lostmotion.model.losses import efficiency_map
 from lostmotion.reports.study_selection import show_selection
-from lostmotion.studies.axis_rows import HOLDS, Axes, run_axes
-from lostmotion.studies.check import ESTIMATED
-from lostmotion.studies.engine import study
-from lostmotion.studies.nearest import misses, not_judged
-from lostmotion.studies.records import names_of, names_that_fit
-from lostmotion.studies.selection import candidates, pareto_front
-from lostmotion.studies.study import Study
-from lostmotion.studies.table import read_table
-from lostmotion.studies.task_file import task_of
+from lostmotion.studies.runs.axis_pairs import HOLDS, Axes, run_axes
+from lostmotion.studies.runs.read_table import read_table
+from lostmotion.studies.runs.run_study import study
+from lostmotion.studies.selection.nearest_misses import misses, not_judged
+from lostmotion.studies.selection.ranking import candidates, pareto_front
+from lostmotion.studies.selection.task_file import task_of
+from lostmotion.studies.study.drive_check_columns import ESTIMATED
+from lostmotion.studies.study.records_that_vary import names_of, names_that_fit
+from lostmotion.studies.study.study import Study
 from test_select import ACCELERATION, FRICTION, TABLES, J
 
 GEARBOX = """

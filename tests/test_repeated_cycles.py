@@ -8,10 +8,10 @@ import pytest
 import lostmotion as lm
 from lostmotion.simulation.runs.core_runs import core_case
 from lostmotion.simulation.runs.run import run
-from lostmotion.studies.axis_columns import change
-from lostmotion.studies.axis_run import VARIABLES, until_it_repeats
-from lostmotion.studies.axis_scenario import begins_alike, cycles_of
-from lostmotion.studies.task_file import task_of
+from lostmotion.sizing.axis_task.candidate_scenario import begins_alike, cycles_of
+from lostmotion.sizing.axis_task.cycle_demands import change
+from lostmotion.studies.runs.axis_cycles import VARIABLES, until_it_repeats
+from lostmotion.studies.selection.task_file import task_of
 from test_axis_tasks import ARM, SLIDE
 from test_select import TABLES
 
@@ -50,7 +50,7 @@ def test_a_run_that_goes_on_is_a_run_of_its_own(name: str, least: float, monkeyp
     """`least`: the relative difference of two cycles that ends a run, so that all stop after two cycles, or none."""
     study = task_of(TASKS[name])
     row = study.parameters(study.total - 1, study.total)[0]
-    monkeypatch.setattr("lostmotion.studies.axis_run.REPEATS", least)
+    monkeypatch.setattr("lostmotion.studies.runs.axis_cycles.REPEATS", least)
     found = until_it_repeats(study, row)
     count = found.cycles.count
     assert count == (2 if least else 4)

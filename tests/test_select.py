@@ -15,14 +15,14 @@ from conftest import ROOT, lostmotion
 from lostmotion.control.tuning import TwoInertias, suited
 from lostmotion.simulation.forms.drive_tables import LoadTable
 from lostmotion.simulation.runs.run import run
+from lostmotion.sizing.axis_task.axis_task import repeated
+from lostmotion.sizing.axis_task.candidate_scenario import last_cycle
+from lostmotion.sizing.axis_task.cycle_demands import COLUMNS
+from lostmotion.sizing.axis_task.motor_per_sample_time import Electrical
 from lostmotion.sizing.duty_cycle import DutyCycle
 from lostmotion.sizing.required_motion import check_motor, input_demand, required_motion
-from lostmotion.studies.axis import repeated
-from lostmotion.studies.axis_columns import COLUMNS
-from lostmotion.studies.axis_electrical import Electrical
-from lostmotion.studies.axis_scenario import last_cycle
-from lostmotion.studies.study import Study
-from lostmotion.studies.task_file import task_of
+from lostmotion.studies.selection.task_file import task_of
+from lostmotion.studies.study.study import Study
 
 J, FRICTION, RATIO, CYCLE = 0.1, 0.5, 50.0, 1.0
 FINE = 40  # samples in a sample time of the controller

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from lostmotion.sizing.axis_rules import least, with_safety
 from lostmotion.sizing.finding import Finding, within
-from lostmotion.studies.nearest import Miss, _rounded_up
-from lostmotion.studies.selection import Candidate
+from lostmotion.studies.selection.nearest_misses import Miss, _rounded_up
+from lostmotion.studies.selection.ranking import Candidate
 from lostmotion.units.practical import ROUNDING, counted, excess, share_of_limit, told_apart
 
 LIMITS = st.floats(1e-6, 1e6)

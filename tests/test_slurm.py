@@ -12,7 +12,7 @@ import pytest
 
 import lostmotion as lm
 from conftest import ROOT
-from lostmotion.studies.table import read_table
+from lostmotion.studies.runs.read_table import read_table
 
 jobqueue = pytest.importorskip("dask_jobqueue", reason="dask-jobqueue is missing: pip install dask-jobqueue")
 

@@ -27,13 +27,13 @@ from lostmotion.errors import InputError
 from lostmotion.paper import paper_scenario
 from lostmotion.reports.study import best_runs, influence, read_table, sobol_indices, write_study
 from lostmotion.simulation.variables import CHANNEL_NAMES
-from lostmotion.studies import chunk as study_chunk
-from lostmotion.studies.chunk import pieces, run_piece, scenario_of_run
-from lostmotion.studies.design import CHUNK
-from lostmotion.studies.expressions import FUNCTIONS, REDUCTIONS
-from lostmotion.studies.in_core import core_can
-from lostmotion.studies.study import Study
-from lostmotion.studies.vary import Vary
+from lostmotion.studies.expressions.expressions import FUNCTIONS, REDUCTIONS
+from lostmotion.studies.runs import chunk as study_chunk
+from lostmotion.studies.runs.chunk import pieces, run_piece, scenario_of_run
+from lostmotion.studies.runs.runs_in_core import core_can
+from lostmotion.studies.study.random_designs import CHUNK
+from lostmotion.studies.study.study import Study
+from lostmotion.studies.study.vary import Vary
 
 SHORT = paper_scenario("2-DOF-NL", "large").replace(**{"simulation.duration": 0.2, "simulation.sample_interval": 2e-3})
 

@@ -16,8 +16,8 @@ from conftest import ROOT
 from lostmotion.paper import paper_scenario
 from lostmotion.simulation.runs.results import ENERGY
 from lostmotion.simulation.variables import VARIABLES
-from lostmotion.studies.expressions import OF_THE_RUN, read_expression
-from lostmotion.studies.functions import FUNCTIONS, METHODS
+from lostmotion.studies.expressions.expressions import OF_THE_RUN, read_expression
+from lostmotion.studies.expressions.functions import FUNCTIONS, METHODS
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import lostmotion as lm
-from lostmotion.studies.chunk import scenario_of_run
+from lostmotion.studies.runs.chunk import scenario_of_run
 
 CAMERA = {"sample_time": 5e-3, "latency": 10e-3, "noise": 1e-4, "seed": 4}
 

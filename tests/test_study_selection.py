@@ -17,10 +17,10 @@ from lostmotion.cli import app
 from lostmotion.reports.study import best_lines
 from lostmotion.reports.study_selection import pareto_figure
 from lostmotion.sizing.drive_check import check_drive
-from lostmotion.studies.chunk import scenario_of_run
-from lostmotion.studies.select import Selection
-from lostmotion.studies.selection import NOT_RUN, Candidate, candidates, pareto_front, prices
-from lostmotion.studies.table import read_table
+from lostmotion.studies.runs.chunk import scenario_of_run
+from lostmotion.studies.runs.read_table import read_table
+from lostmotion.studies.selection.ranking import NOT_RUN, Candidate, candidates, pareto_front, prices
+from lostmotion.studies.study.select_table import Selection
 
 EXAMPLE = ROOT / "examples" / "select-gearbox.toml"
 

@@ -13,14 +13,14 @@ from typer.testing import CliRunner
 import lostmotion as lm
 from conftest import ROOT, rows_by_any_threads_and_executor
 from lostmotion.cli import app
-from lostmotion.studies import chunk as study_chunk
-from lostmotion.studies.check import check_columns
-from lostmotion.studies.chunk import pieces, run_piece, scenario_of_run
-from lostmotion.studies.expressions import FUNCTIONS
-from lostmotion.studies.file import from_json, to_json
-from lostmotion.studies.functions import REDUCTIONS
-from lostmotion.studies.select import SHARES, USE
-from lostmotion.studies.table import read_table, unit_of
+from lostmotion.studies.expressions.expressions import FUNCTIONS
+from lostmotion.studies.expressions.functions import REDUCTIONS
+from lostmotion.studies.runs import chunk as study_chunk
+from lostmotion.studies.runs.chunk import pieces, run_piece, scenario_of_run
+from lostmotion.studies.runs.read_table import read_table, unit_of
+from lostmotion.studies.study.drive_check_columns import check_columns
+from lostmotion.studies.study.select_table import SHARES, USE
+from lostmotion.studies.study.study_files import from_json, to_json
 
 BELT = lm.load("belt-before-gearbox").replace(**{"simulation.duration": 0.3, "simulation.sample_interval": 2e-3})
 RING = lm.load("two-motors-one-ring").replace(**{"simulation.duration": 0.3, "simulation.sample_interval": 2e-3})

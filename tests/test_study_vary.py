@@ -10,7 +10,7 @@ import lostmotion as lm
 from conftest import ROOT, lostmotion
 from lostmotion.data_sheets.gearbox_sheet import GearboxSheet
 from lostmotion.reports.study import read_table
-from lostmotion.studies.chunk import scenario_of_run
+from lostmotion.studies.runs.chunk import scenario_of_run
 
 JOINT = ROOT / "scenarios" / "catalogue-robot-joint.toml"
 OVERRUNNING = ROOT / "scenarios" / "overrunning-load.toml"

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.model.synchronous_motor import Winding
-from lostmotion.studies.table import read_table
+from lostmotion.studies.runs.read_table import read_table
 
 RPM = math.pi / 30.0
 

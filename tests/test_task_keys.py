@@ -13,11 +13,11 @@ import lostmotion as lm
 from lostmotion.model.angle_torques import STANDARD_GRAVITY as G
 from lostmotion.model.duty import Supply
 from lostmotion.model.task import Task
+from lostmotion.sizing.axis_task.axis_task import AxisTask
 from lostmotion.sizing.finding import TASK_RULES
-from lostmotion.studies.axis import AxisTask
-from lostmotion.studies.axis_rows import Axes
-from lostmotion.studies.file import from_json, to_json
-from lostmotion.studies.task_file import task_of
+from lostmotion.studies.runs.axis_pairs import Axes
+from lostmotion.studies.selection.task_file import task_of
+from lostmotion.studies.study.study_files import from_json, to_json
 
 MOTOR: dict[str, Any] = {
     "kind": "torque_source",

@@ -5,10 +5,10 @@ from dataclasses import replace
 import pytest
 
 from lostmotion.reports.study_selection import _verdict
-from lostmotion.studies.axis_rows import HOLDS
-from lostmotion.studies.check import NO_DATA, UNSTABLE
-from lostmotion.studies.select import Selection
-from lostmotion.studies.selection import NOT_RUN, Candidate, prices
+from lostmotion.studies.runs.axis_pairs import HOLDS
+from lostmotion.studies.selection.ranking import NOT_RUN, Candidate, prices
+from lostmotion.studies.study.drive_check_columns import NO_DATA, UNSTABLE
+from lostmotion.studies.study.select_table import Selection
 from lostmotion.verdict import Verdict
 
 pa = pytest.importorskip("pyarrow")

@@ -9,7 +9,7 @@ import lostmotion as lm
 from lostmotion.model.duty import Duty, Supply
 from lostmotion.model.linear import RatedScrew
 from lostmotion.simulation.forms.drive_tables import LoadTable
-from lostmotion.sizing import formulas
+from lostmotion.sizing import catalogue_formulas
 from lostmotion.sizing.axis_rules import axial_load, screw_mean_load, screw_rules
 from lostmotion.sizing.required_motion import RequiredMotion, required_motion
 from lostmotion.sizing.supply import returned, supply_rules
@@ -51,8 +51,8 @@ def forces(motion: RequiredMotion) -> list[float]:
 
 def test_drive_torque_of_a_screw():
     """THK A-666: 14.7 N on a lead of 10 mm."""
-    assert formulas.screw_torque(14.7, 10e-3, 0.96) == pytest.approx(24e-3, rel=0.02)
-    assert formulas.screw_torque(14.7, 10e-3, 0.32) == pytest.approx(73e-3, rel=5e-3)
+    assert catalogue_formulas.screw_torque(14.7, 10e-3, 0.96) == pytest.approx(24e-3, rel=0.02)
+    assert catalogue_formulas.screw_torque(14.7, 10e-3, 0.32) == pytest.approx(73e-3, rel=5e-3)
     # The efficiency itself: lead angle 5 deg 30', mu 0.003.
     stage = RatedScrew(
         lead=10e-3, mean_diameter=10e-3 / math.pi / math.tan(math.radians(5.5)), friction_coefficient=3e-3
@@ -78,12 +78,14 @@ def test_loads_of_a_horizontal_screw(horizontal: RequiredMotion):
 
 def test_buckling_and_speeds_of_a_horizontal_screw():
     """THK A-731: with d1 17.5 mm over 1100 mm 15500 and 35500 N; 2180 and 3294 rpm; DN 3370 and 2240 rpm."""
-    assert formulas.buckling_force(17.5e-3, 1.1, "fixed-fixed") == pytest.approx(15500.0, rel=5e-3)
-    assert formulas.compression_force(17.5e-3) == pytest.approx(35500.0, rel=PRINTED)
+    assert catalogue_formulas.buckling_force(17.5e-3, 1.1, "fixed-fixed") == pytest.approx(15500.0, rel=5e-3)
+    assert catalogue_formulas.compression_force(17.5e-3) == pytest.approx(35500.0, rel=PRINTED)
     for diameter, speed in ((17.5e-3, 2180.0), (26.4e-3, 3294.0)):
-        assert RPM * formulas.critical_speed(diameter, 1.1, "fixed-supported") == pytest.approx(speed, rel=3e-3)
+        assert RPM * catalogue_formulas.critical_speed(diameter, 1.1, "fixed-supported") == pytest.approx(
+            speed, rel=3e-3
+        )
     for diameter, speed in ((20.75e-3, 3370.0), (31.25e-3, 2240.0)):
-        assert RPM * formulas.dn_speed(diameter) == pytest.approx(speed, rel=PRINTED)
+        assert RPM * catalogue_formulas.dn_speed(diameter) == pytest.approx(speed, rel=PRINTED)
 
 
 @pytest.mark.parametrize(
@@ -94,7 +96,7 @@ def test_life_of_a_horizontal_screw(
     horizontal: RequiredMotion, capacity: float, lead: float, life: float, hours: float
 ):
     """THK A-734: f_w 1.5 and 225 N; mean speeds of 400 and 267 rpm are 8 double strokes a minute on these leads."""
-    assert formulas.nominal_life(capacity, 225.0, load_factor=1.5) == pytest.approx(life, rel=5e-3)
+    assert catalogue_formulas.nominal_life(capacity, 225.0, load_factor=1.5) == pytest.approx(life, rel=5e-3)
     screw = RatedScrew(lead=lead, dynamic_capacity=capacity, load_factor=1.5)
     found = next(f for f in screw_rules(axial_load(horizontal), screw, 1e3 * 3600.0) if f.rule == "screw_life")
     assert 1e3 / found.use == pytest.approx(hours, rel=0.01)  # the mean load printed is rounded to 0.2 %, cubed
@@ -102,11 +104,11 @@ def test_life_of_a_horizontal_screw(
 
 def test_torques_of_a_horizontal_screw():
     """THK A-735: 4730 N mm for 0.15 s, 120 for 0.85 s, 4490 for 0.15 s, 0 for 2.6 s: 1305 N mm."""
-    friction = formulas.screw_torque(17.0, 40e-3, 0.9)
+    friction = catalogue_formulas.screw_torque(17.0, 40e-3, 0.9)
     acceleration = (3.39e-3 + 1e-3) * 1050.0
     assert friction == pytest.approx(0.120, abs=5e-4)
     assert [acceleration + friction, friction, friction - acceleration] == pytest.approx([4.73, 0.12, -4.49], abs=5e-3)
-    found = formulas.rms([4.73, 0.12, 4.49, 0.0], [0.15, 0.85, 0.15, 2.6])
+    found = catalogue_formulas.rms([4.73, 0.12, 4.49, 0.0], [0.15, 0.85, 0.15, 2.6])
     assert found == pytest.approx(1.305, abs=1e-3)
     times = np.cumsum([0.0, 0.15, 0.0, 0.85, 0.0, 0.15, 0.0, 2.6])  # the same, by the rule of the drive check
     torques = np.array([4.73, 4.73, 0.12, 0.12, 4.49, 4.49, 0.0, 0.0])
@@ -120,9 +122,11 @@ def test_a_vertical_screw():
     printed = [585.0, 510.0, 435.0, 395.0, 470.0, 545.0]
     assert forces(motion) == pytest.approx(printed, abs=1.0)
     assert screw_mean_load(axial_load(motion)) == pytest.approx(492.0, abs=1.0)
-    assert formulas.buckling_force(12.5e-3, 0.7, "fixed-fixed") == pytest.approx(9960.0, rel=5e-3)
-    assert formulas.compression_force(12.5e-3) == pytest.approx(18100.0, rel=PRINTED)
-    assert RPM * formulas.critical_speed(12.5e-3, 0.7, "fixed-supported") == pytest.approx(3852.0, rel=PRINTED)
+    assert catalogue_formulas.buckling_force(12.5e-3, 0.7, "fixed-fixed") == pytest.approx(9960.0, rel=5e-3)
+    assert catalogue_formulas.compression_force(12.5e-3) == pytest.approx(18100.0, rel=PRINTED)
+    assert RPM * catalogue_formulas.critical_speed(12.5e-3, 0.7, "fixed-supported") == pytest.approx(
+        3852.0, rel=PRINTED
+    )
     screw = RatedScrew(
         lead=10e-3,
         dynamic_capacity=9800.0,
@@ -133,7 +137,7 @@ def test_a_vertical_screw():
         mounting="fixed-fixed",
     )
     found = {f.rule: f for f in screw_rules(axial_load(motion), screw, 1e3 * 3600.0)}
-    assert formulas.nominal_life(9800.0, 492.0, load_factor=1.5) == pytest.approx(2.34e9, rel=2e-3)
+    assert catalogue_formulas.nominal_life(9800.0, 492.0, load_factor=1.5) == pytest.approx(2.34e9, rel=2e-3)
     assert 1e3 / found["screw_life"].use == pytest.approx(65000.0, rel=0.01)
     assert found["screw_static"].use == pytest.approx(585.0 / 12600.0, rel=PRINTED)
     assert found["buckling"].use == pytest.approx(585.0 / 9960.0, rel=5e-3)
@@ -143,20 +147,20 @@ def test_life_of_a_screw_under_a_spectrum():
     """Rexroth R310RU3301: 304 rpm, 8757 N, 1042e6 revolutions."""
     speeds, shares = [10.0, 30.0, 100.0, 1000.0], [0.06, 0.22, 0.47, 0.25]
     assert sum(n * q for n, q in zip(speeds, shares, strict=True)) == pytest.approx(304.0, abs=0.5)
-    mean = formulas.mean_load([50e3, 25e3, 8e3, 2e3], speeds, shares)
+    mean = catalogue_formulas.mean_load([50e3, 25e3, 8e3, 2e3], speeds, shares)
     mean *= (304.2 / 304.0) ** (1.0 / 3.0)  # the example goes on with the rounded mean speed
     assert mean == pytest.approx(8757.0, abs=1.0)
-    assert formulas.nominal_life(88.8e3, mean) == pytest.approx(1042e6, rel=1e-3)
+    assert catalogue_formulas.nominal_life(88.8e3, mean) == pytest.approx(1042e6, rel=1e-3)
 
 
 def test_critical_speed_and_buckling_read_from_a_graph():
     """Rexroth R310RU3301, p. 120 and 121: a 63 mm screw over 2.4 m, fixed and supported: 1850 rpm, 360 kN. The root of 63 x 10 is
     about 56 mm, by both of its own formulas within the reading of a graph."""
-    assert RPM * formulas.critical_speed(56e-3, 2.4, "fixed-supported") == pytest.approx(1480.0, rel=0.03)
-    assert formulas.buckling_force(56e-3, 2.4, "fixed-supported") == pytest.approx(180e3, rel=0.07)
+    assert RPM * catalogue_formulas.critical_speed(56e-3, 2.4, "fixed-supported") == pytest.approx(1480.0, rel=0.03)
+    assert catalogue_formulas.buckling_force(56e-3, 2.4, "fixed-supported") == pytest.approx(180e3, rel=0.07)
     factors = {"fixed-fixed": 40.6, "fixed-supported": 20.4, "supported-supported": 10.2, "fixed-free": 2.6}
     for mounting, factor in factors.items():  # of Fk, without a safety
-        found = 2.0 * formulas.buckling_force(1e-3, 1e-3, mounting)
+        found = 2.0 * catalogue_formulas.buckling_force(1e-3, 1e-3, mounting)
         # Printed with one decimal, the last from the rounded 10.2, and for E = 210 GPa in the place of 206.
         assert found == pytest.approx(factor * 1e4, abs=0.05e4 + 0.025 * factor * 1e4)
 
@@ -171,9 +175,11 @@ def test_critical_speed_and_buckling_by_the_formulas_of_hiwin():
         ("fixed-free", 0.0625, 0.157),  # printed: 0.147; the eigenvalues of the beam give (1.875/4.730)^2
     ):
         force = 0.5 * 4.072e5 * buckling * d**4 / length**2
-        assert formulas.buckling_force(1e-3 * d, 1e-3 * length, mounting) == pytest.approx(force, rel=0.025)
+        assert catalogue_formulas.buckling_force(1e-3 * d, 1e-3 * length, mounting) == pytest.approx(force, rel=0.025)
         speed = 0.8 * 2.71e8 * bending * d / length**2
-        assert RPM * formulas.critical_speed(1e-3 * d, 1e-3 * length, mounting) == pytest.approx(speed, rel=0.02)
+        assert RPM * catalogue_formulas.critical_speed(1e-3 * d, 1e-3 * length, mounting) == pytest.approx(
+            speed, rel=0.02
+        )
 
 
 def test_a_linear_motor():
@@ -198,7 +204,7 @@ def test_energy_that_a_linear_motor_returns():
     power = -force * (2.0 - 5.0 * time) + 1.5 * 2.0 * (force / 68.0) ** 2
     kinetic, heat = 0.5 * 86.0 * 2.0**2, 1.5 * 2.0 * (force / 68.0) ** 2 * 0.4
     start = 220.0 * math.sqrt(2.0)
-    taken = formulas.capacitor_energy(1880e-6, 390.0, start)
+    taken = catalogue_formulas.capacitor_energy(1880e-6, 390.0, start)
     assert taken == pytest.approx(51.98, abs=0.01)
     assert kinetic - heat - taken == pytest.approx(72.02, abs=0.05)
     back = returned(time, power, 0.4)

@@ -22,7 +22,7 @@ from conftest import for_all
 from lostmotion.identification.task.free_parameters import FreeParameter
 from lostmotion.inputs.doubts import ValueWarning
 from lostmotion.inputs.part import Part
-from lostmotion.studies.select import Selection
+from lostmotion.studies.study.select_table import Selection
 from public_names import PATHS, public
 
 try:

@@ -14,8 +14,8 @@ from lostmotion.reports.looks import STYLES
 from lostmotion.reports.panels import Curve, Panel
 from lostmotion.reports.rig import panels
 from lostmotion.reports.study_selection import pareto_figure
-from lostmotion.studies.selection import candidates, pareto_front
-from lostmotion.studies.table import read_table
+from lostmotion.studies.runs.read_table import read_table
+from lostmotion.studies.selection.ranking import candidates, pareto_front
 from lostmotion.test_rig.measurement import measure
 
 HERE = Path(__file__).parent

@@ -65,6 +65,6 @@ from .simulation.scenario.scenario import Scenario as Scenario
 from .simulation.scenario.shipped_scenarios import shipped_scenarios as shipped_scenarios
 from .simulation.stepping.simulation import Simulation as Simulation
 from .sizing.drive_check import check_drive as check_drive
-from .studies.engine import study as study
-from .studies.select_drive import select as select
+from .studies.runs.run_study import study as study
+from .studies.selection.select_drive import select as select
 from .version import __version__ as __version__

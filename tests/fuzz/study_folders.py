@@ -12,8 +12,8 @@ from typing import Any
 import lostmotion as lm
 from fuzz import mutation
 from fuzz.verdict import Failure, refused
-from lostmotion.studies.engine import study_of
-from lostmotion.studies.table import read_table
+from lostmotion.studies.runs.read_table import read_table
+from lostmotion.studies.runs.run_study import study_of
 
 RUNS = 1203  # three parts
 
@@ -79,7 +79,7 @@ def case(random: Random, folder: Path) -> None:
 
 
 def _resume(repair: bool) -> Any:
-    from lostmotion.studies.engine import restore_note
+    from lostmotion.studies.runs.run_study import restore_note
 
     if repair:
         restore_note(Path("study"))

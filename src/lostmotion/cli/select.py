@@ -30,7 +30,7 @@ def select(
     \b
     lostmotion select examples/select-axis.toml -o axis
     """
-    from ..studies.task_file import load_task
+    from ..studies.selection.task_file import load_task
 
     loaded = load_task(task)
     directory = runs_directory(output, f"select {task}", task)

@@ -13,7 +13,7 @@ from .terminal import busy, conclude, fail, progress
 from .workers import workers
 
 if TYPE_CHECKING:
-    from ..studies.study import Study
+    from ..studies.study.study import Study
 
 
 OutputOption = Annotated[
@@ -70,7 +70,7 @@ def study(
         _show(shown, best, output, figures)
         return
     if what == "resume" and shown is not None:
-        from ..studies.engine import restore_note, study_of
+        from ..studies.runs.run_study import restore_note, study_of
 
         if repair:
             restore_note(shown)
@@ -80,7 +80,7 @@ def study(
         return
     if shown is not None:
         raise InputError(f"study {what} {shown}: too many names; the directory is given by -o")
-    from ..studies.file import load_study
+    from ..studies.study.study_files import load_study
 
     loaded = load_study(what)
     directory = runs_directory(output, f"study {what}", what)
@@ -110,7 +110,7 @@ def compute(
     """Runs a study with a progress bar, or resumes it."""
     from contextlib import ExitStack
 
-    from ..studies.engine import study as work
+    from ..studies.runs.run_study import study as work
 
     try_directory(directory)
     with ExitStack() as stack:
@@ -143,7 +143,7 @@ def _show(directory: Path, best: str | None, output: Path | None, figures: str |
 def print_outcome(directory: Path, total: int) -> None:
     """Print the summary, the directory of the runs, and the failed ones; the exit code is that of the verdict, if runs are selected."""
     from ..reports.study import summary
-    from ..studies.table import failures
+    from ..studies.runs.read_table import failures
     from ..units.practical import counted
 
     lines, verdict = summary(directory)

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError, need
-from ..studies.engine import study_of
-from ..studies.study import Study
-from ..studies.table import labelled, read_table
-from ..studies.vary import Vary
+from ..studies.runs.read_table import labelled, read_table
+from ..studies.runs.run_study import study_of
+from ..studies.study.study import Study
+from ..studies.study.vary import Vary
 from ..units.practical import counted, printed
 from ..verdict import Verdict
 from .looks import PALETTE

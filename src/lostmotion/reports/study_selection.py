@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..studies.axis_rows import HOLDS
-from ..studies.check import ESTIMATED, NO_DATA
-from ..studies.choice import CHOICE
-from ..studies.nearest import Lacking, Miss, misses, not_judged, rules_not_judged
-from ..studies.select import TASK_SHARES, USE, Selection
-from ..studies.selection import NOT_RUN, Candidate, Price, candidates, pareto_front, prices
-from ..studies.study import Study
-from ..studies.table import labelled, unit_of
+from ..sizing.axis_task.mass_and_price import CHOICE
+from ..studies.runs.axis_pairs import HOLDS
+from ..studies.runs.read_table import labelled, unit_of
+from ..studies.selection.nearest_misses import Lacking, Miss, misses, not_judged, rules_not_judged
+from ..studies.selection.ranking import NOT_RUN, Candidate, Price, candidates, pareto_front, prices
+from ..studies.study.drive_check_columns import ESTIMATED, NO_DATA
+from ..studies.study.select_table import TASK_SHARES, USE, Selection
+from ..studies.study.study import Study
 from ..units.practical import PRACTICAL, counted, printed
 from ..verdict import Point, Verdict
 from .looks import OTHERS, PALETTE, look

@@ -16,9 +16,7 @@ from ..model.gearbox import Gearbox
 from ..model.linear import RatedScrew
 from ..model.motor import Motor
 from ..units.practical import ROUNDING, RPM, excess, share_of_limit, told_apart
-from .duty_cycle import integral
-from .finding import Finding, Judgement, within
-from .formulas import (
+from .catalogue_formulas import (
     belt_force,
     buckling_force,
     compression_force,
@@ -29,6 +27,8 @@ from .formulas import (
     nominal_life,
     tooth_forces,
 )
+from .duty_cycle import integral
+from .finding import Finding, Judgement, within
 from .required_motion import InputDemand, RequiredMotion
 from .stages import BeltStage, RackStage, Stage
 

@@ -14,9 +14,9 @@ from ..model.motor import Motor
 from ..model.task import Task
 from ..simulation.runs.results import RunArrays
 from .axis_rules import missing
+from .catalogue_formulas import bus_voltage, capacitor_energy
 from .duty_cycle import integral
 from .finding import Finding, within
-from .formulas import bus_voltage, capacitor_energy
 from .motor_check import current_voltage_power
 from .motor_run import phase_amplitudes
 from .required_motion import InputDemand

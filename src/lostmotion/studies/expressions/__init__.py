@@ -1,0 +1,1 @@
+"""Expressions of result variables that a study keeps of each run."""

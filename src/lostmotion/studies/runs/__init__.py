@@ -1,0 +1,1 @@
+"""Runs of a study, chunk by chunk, and their table on disk."""

@@ -1,0 +1,117 @@
+"""Parts of the directory of a study: their names, their checksums, and what is wrong with them."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from ...atomic_writer import unwritable, write_bytes
+from ...errors import InputError
+from ..study.random_designs import CHUNK
+
+CHECKSUMS = "_checksums.txt"  # as `sha256sum` writes and checks it; readers of Parquet directories pass it over
+
+STRAY = "is no part of this study"
+FOREIGN = "belongs to another study"
+FOLDER = "is a directory"
+NO_REPAIR = (STRAY, FOLDER)  # what repairing leaves to the user
+
+
+def chunks(total: int) -> Iterator[tuple[int, int]]:
+    """First run of each part, and the run after its last."""
+    return ((first, min(first + CHUNK, total)) for first in range(0, total, CHUNK))
+
+
+def part_of(directory: Path, first: int) -> Path:
+    """File of the part that begins with a run."""
+    return directory / f"part-{first // CHUNK:06d}.parquet"
+
+
+def write_part(directory: Path, first: int, content: bytes) -> None:
+    """Write a part whole or not at all. Its checksum comes first: a part without one would be made again.
+
+    Raises InputError: the part cannot be written.
+    """
+    part = part_of(directory, first)
+    try:
+        with (directory / CHECKSUMS).open("a", encoding="ascii") as file:
+            file.write(f"{hashlib.sha256(content).hexdigest()}  {part.name}\n")
+    except OSError as error:
+        raise unwritable(directory / CHECKSUMS, error) from None
+    write_bytes(part, content)
+
+
+def checksums(directory: Path) -> dict[str, str]:
+    """Checksums of parts by their names; lines that a kill or damage left unreadable are passed over.
+
+    Raises InputError: there is something else in place of their file.
+    """
+    path = directory / CHECKSUMS
+    if not os.path.lexists(path):
+        return {}
+    if not path.is_file():
+        raise InputError(f"{path}: is no file; remove it, and `lostmotion study resume {directory} --repair`")
+    try:
+        lines = path.read_text(encoding="ascii", errors="replace").splitlines()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    return {words[1]: words[0] for line in lines if len(words := line.split()) == 2 and len(words[0]) == 64}
+
+
+def forget_missing(directory: Path) -> None:
+    """Rewrite the checksums with those of parts that are there."""
+    kept = {name: sum_ for name, sum_ in checksums(directory).items() if (directory / name).is_file()}
+    write_bytes(directory / CHECKSUMS, "".join(f"{kept[name]}  {name}\n" for name in sorted(kept)).encode())
+
+
+def checksum_of(path: Path) -> str:
+    """Checksum of a file as it is now."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def carried(metadata: Mapping[bytes, bytes] | None) -> str:
+    """The study as JSON that a part carries; empty for other files."""
+    return (metadata or {}).get(b"lostmotion_study", b"").decode()
+
+
+def damages(directory: Path, text: str, total: int) -> dict[Path, str]:
+    """Parts that are damaged, or belong elsewhere, each with the reason.
+
+    text: the study as JSON.
+    total: number of its runs.
+    """
+    known = checksums(directory)
+    runs = {part_of(directory, first): (first, last) for first, last in chunks(total)}
+    found = {}
+    for path in sorted(directory.glob("part-*.parquet")):
+        reason = _damage(path, *runs[path], text, known.get(path.name)) if path in runs else STRAY
+        if reason:
+            found[path] = reason
+    return found
+
+
+def _damage(path: Path, first: int, last: int, text: str, checksum: str | None) -> str:
+    import pyarrow.parquet as pq
+
+    if path.is_dir():
+        return FOLDER
+    if not path.is_file():
+        return "is no file"
+    if checksum is None:
+        return f"has no line in {CHECKSUMS}"
+    try:
+        if checksum_of(path) != checksum:
+            return "is damaged: its checksum differs"
+        with pq.ParquetFile(path) as part:
+            if carried(part.schema_arrow.metadata) != text:
+                return FOREIGN
+            if part.read(["run"])["run"].to_pylist() != list(range(first, last)):
+                return f"does not hold the runs {first} to {last - 1}"
+    except OSError as error:
+        return f"cannot be read: {error.strerror or error}"
+    except Exception:  # the library raises what its parts raise
+        return "is no Parquet file of a study"
+    return ""

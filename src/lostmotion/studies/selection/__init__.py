@@ -1,0 +1,1 @@
+"""Selection of drives: task files, ranking, and nearest misses."""

@@ -1,0 +1,1 @@
+"""Studies: their files, what varies, and what is kept of each run."""
