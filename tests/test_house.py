@@ -45,7 +45,7 @@ LAYERS = [
 ]
 # The same within packages that have rooms of their own; modules beside the rooms count as rooms.
 INNER = {
-    "simulation": [{"variables"}, {"train_variables"}, {"forms"}, {"scenario"}, {"stepping"}, {"runs"}, {"batches"}]
+    "simulation": [{"variables"}, {"train_variables"}, {"forms"}, {"scenario"}, {"stepping"}, {"runs"}, {"batches"}],
     "studies": [{"expressions"}, {"study"}, {"runs"}, {"selection"}],
 }
 MODULES = sorted(p.relative_to(PACKAGE).with_suffix("") for p in PACKAGE.rglob("*.py"))
