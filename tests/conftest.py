@@ -106,11 +106,7 @@ def installed_builds() -> list[str]:
 def run_in_build(build: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     """Python in a process of its own, with the named build of the core."""
     return subprocess.run(
-        [sys.executable, *arguments],
-        env=os.environ | {"LOSTMOTION_CORE": build},
-        capture_output=True,
-        text=True,
-        check=False,
+        [sys.executable, *arguments], env=os.environ | {"LOSTMOTION_CORE": build}, capture_output=True, text=True, check=False
     )
 
 

@@ -209,8 +209,7 @@ class Controller:
         want_q = min(max(M / (1.5 * a.p * (a.psi + (a.L_d - a.L_q) * want_d)), -most), most)
         e = want_d - i_d, want_q - i_q
         u = complex(
-            self.K[0] * e[0] + self.integral[0] - w_e * a.L_q * i_q,
-            self.K[1] * e[1] + self.integral[1] + w_e * (a.L_d * i_d + a.psi),
+            self.K[0] * e[0] + self.integral[0] - w_e * a.L_q * i_q, self.K[1] * e[1] + self.integral[1] + w_e * (a.L_d * i_d + a.psi)
         )
         self.wanted = u
         limited = u if abs(u) <= a.u_max else a.u_max * u / abs(u)

@@ -94,9 +94,7 @@ def of_run(scenario: lm.Scenario) -> Groups:
         if isinstance(gear.losses, lm.model.LossMap):  # not of the core; where it differs, all else does
             groups["input"] = {"loss_map": np.ravel(gear.losses.values)}
     if len(groups["samples"]) > MANY:
-        return {
-            what: {"all": np.concatenate([np.ravel(v) for v in values.values()])} for what, values in groups.items()
-        }
+        return {what: {"all": np.concatenate([np.ravel(v) for v in values.values()])} for what, values in groups.items()}
     return groups
 
 

@@ -62,9 +62,7 @@ class Page(HTMLParser):
         selectors = re.findall(r"([^{}]+)\{", style)
         parts = [part.split(":")[0].split(".") for part in re.split(r"[\s,>]+", ",".join(selectors))]
         known = {(tag, word) for tag, *words in parts for word in words}
-        self.faults += [
-            f"<{t} class={c!r}> is not in the style sheet" for t, c in self.classes if not {(t, c), ("", c)} & known
-        ]
+        self.faults += [f"<{t} class={c!r}> is not in the style sheet" for t, c in self.classes if not {(t, c), ("", c)} & known]
         self.faults += [f"<{tag}> is not closed" for tag in self.open if tag != "html"]
 
     def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:

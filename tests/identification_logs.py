@@ -48,12 +48,7 @@ def servo_plans(count: int = 4, duration: float = 2.0, rate: float = 100.0) -> l
     plans = []
     for k in range(count):
         time = np.arange(0.0, duration, 1.0 / rate)
-        kinds = (
-            np.sin(4.0 * time),
-            np.sin(1.5 * time**2),
-            1.2 * np.minimum(1.5 * time, 1.0),
-            0.8 * np.sign(np.sin(5.0 * time + 0.1)),
-        )
+        kinds = (np.sin(4.0 * time), np.sin(1.5 * time**2), 1.2 * np.minimum(1.5 * time, 1.0), 0.8 * np.sign(np.sin(5.0 * time + 0.1)))
         enable = np.ones(len(time))
         if k % 4 == 2:
             enable[time > 0.6 * duration] = 0.0

@@ -55,11 +55,7 @@ class Chain:
                     "input": f"s{k}",
                     "output": f"s{k + 1}",
                     "ratio": float(self.ratios[k]),
-                    "stiffness": {
-                        "kind": "rigid",
-                        "backlash": float(self.backlash[k]),
-                        "restitution": float(self.restitution[k]),
-                    },
+                    "stiffness": {"kind": "rigid", "backlash": float(self.backlash[k]), "restitution": float(self.restitution[k])},
                 }
                 for k in range(n - 1)
             },
@@ -139,9 +135,7 @@ class Chain:
         """By all combinations of pressing, sticking and slipping: the one that is consistent."""
         n = len(self.inertias)
         u = self.approach(self.speeds)
-        self.touches = [
-            on or (self.gap[k] <= 0.0 and abs(u[k]) <= 1e-13 * self.size) for k, on in enumerate(self.touches)
-        ]
+        self.touches = [on or (self.gap[k] <= 0.0 and abs(u[k]) <= 1e-13 * self.size) for k, on in enumerate(self.touches)]
         near = [k for k in range(n - 1) if self.touches[k]]
         still = [s for s in self.rubbed if self.speeds[s] == 0.0]
         force = self.torques - self.friction * np.sign(self.speeds)
@@ -161,9 +155,7 @@ class Chain:
                 if len(rows) > 1 and np.linalg.matrix_rank(K, tol=1e-12 * np.abs(K).max()) < len(rows):
                     # Rest leaves torques open: any that are allowed.
                     limits = [(0.0, None)] * sum(presses)
-                    limits += [
-                        (-self.friction[s], self.friction[s]) for s, way in zip(still, ways, strict=True) if way == 0
-                    ]
+                    limits += [(-self.friction[s], self.friction[s]) for s, way in zip(still, ways, strict=True) if way == 0]
                     one = linprog(np.zeros(len(rows)), A_eq=K, b_eq=C @ (F / self.inertias), bounds=limits)
                     if one.status != 0:
                         continue
@@ -177,12 +169,7 @@ class Chain:
                     b = self.approach(a)[k]
                     bad = max(bad, -next(torques) / np.abs(F).max() if on else b / max(np.abs(a).max(), 1e-300))
                 for s, way in zip(still, ways, strict=True):
-                    bad = max(
-                        bad,
-                        (abs(next(torques)) / self.friction[s] - 1.0)
-                        if way == 0
-                        else -way * a[s] / max(abs(a).max(), 1e-300),
-                    )
+                    bad = max(bad, (abs(next(torques)) / self.friction[s] - 1.0) if way == 0 else -way * a[s] / max(abs(a).max(), 1e-300))
                 if bad < best - 1e-12:
                     best, chosen = bad, (a, dict(zip(near, presses, strict=True)), dict(zip(still, ways, strict=True)))
                 if bad <= 1e-12:

@@ -52,11 +52,7 @@ def join(made: dict[str, Any], k: int, random: Any, even: Any, spread: Any, stif
     a, b = int(random.integers(max(0, k - 2), k)), k
     if random.uniform() < 0.25:
         a, b = b, a
-    gear: dict[str, Any] = {
-        "input": f"s{a}",
-        "output": f"s{b}",
-        "ratio": spread(0.5, 50.0) * (1 if random.uniform() < 0.7 else -1),
-    }
+    gear: dict[str, Any] = {"input": f"s{a}", "output": f"s{b}", "ratio": spread(0.5, 50.0) * (1 if random.uniform() < 0.7 else -1)}
     kind = random.uniform()
     rigid = kind < 0.8 or k == 1
     if kind < 0.65 or k == 1:

@@ -7,9 +7,7 @@ import lostmotion as lm
 
 NAMESPACES = [name for name in lm.__all__ if isinstance(getattr(lm, name), ModuleType)]
 FLAT = [name for name in lm.__all__ if name not in NAMESPACES]
-PATHS = {name: name for name in FLAT} | {
-    name: f"{space}.{name}" for space in NAMESPACES for name in getattr(lm, space).__all__
-}
+PATHS = {name: name for name in FLAT} | {name: f"{space}.{name}" for space in NAMESPACES for name in getattr(lm, space).__all__}
 
 
 def public(name: str) -> Any:

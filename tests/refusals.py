@@ -11,9 +11,7 @@ import lostmotion as lm
 
 def assert_plain(message: str) -> None:
     """Nothing of the language or of a library shows through."""
-    assert not re.search(
-        r"Input should|https?:|pydantic|\b(tuple|dict|float|int|str|bool|NoneType|model)\b|[TF]alse|True", message
-    )
+    assert not re.search(r"Input should|https?:|pydantic|\b(tuple|dict|float|int|str|bool|NoneType|model)\b|[TF]alse|True", message)
 
 
 def refused(make: Callable[[], object]) -> str:

@@ -33,11 +33,7 @@ def arm_model(step: float, world: str = "", tip: str = "") -> Any:
 
 
 def drive(
-    stiffness: float = 2e4,
-    gap: float = 0.0,
-    friction: float = 0.0,
-    bearing: float = 0.0,
-    hysteresis: float | None = None,
+    stiffness: float = 2e4, gap: float = 0.0, friction: float = 0.0, bearing: float = 0.0, hysteresis: float | None = None
 ) -> lm.Drive:
     curve = lm.model.LinearStiffness(stiffness=stiffness)
     return lm.Drive(
@@ -71,10 +67,7 @@ def inertia_and_bias(q: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, np.ndarr
     turning = m2 * l1 * c2 * s
     outer = m2 * c2 * g * math.cos(q[0] + q[1])
     return np.array([[m11, m12], [m12, m22]]), np.array(
-        [
-            -turning * (2 * w[0] * w[1] + w[1] ** 2) + (m1 * c1 + m2 * l1) * g * math.cos(q[0]) + outer,
-            turning * w[0] ** 2 + outer,
-        ]
+        [-turning * (2 * w[0] * w[1] + w[1] ** 2) + (m1 * c1 + m2 * l1) * g * math.cos(q[0]) + outer, turning * w[0] ** 2 + outer]
     )
 
 
@@ -95,9 +88,7 @@ def reference(
         q, w, p = y[:2], y[2:4], y[4:6]
         mass, bias = inertia_and_bias(q, w)
         torque = stiffness * (p - q - 0.5 * gap * side) * (side != 0 if gap else 1.0)
-        return np.concatenate(
-            [w, np.linalg.solve(mass, torque - bias), y[6:8], (motor - torque / RATIO) / (ROTOR * RATIO)]
-        )
+        return np.concatenate([w, np.linalg.solve(mass, torque - bias), y[6:8], (motor - torque / RATIO) / (ROTOR * RATIO)])
 
     y = np.zeros(8)
     side = np.zeros(2)
@@ -118,14 +109,7 @@ def reference(
                     if side[j] in (0.0, outward):
                         events.append((crosses, j, outward))
             found = solve_ivp(
-                rates,
-                (t, step),
-                y,
-                method="DOP853",
-                rtol=1e-11,
-                atol=1e-12,
-                args=(motor, side),
-                events=[e for e, *_ in events] or None,
+                rates, (t, step), y, method="DOP853", rtol=1e-11, atol=1e-12, args=(motor, side), events=[e for e, *_ in events] or None
             )
             y, t = found.y[:, -1], float(found.t[-1])
             if found.status == 1:
@@ -141,9 +125,7 @@ def energy(arm: Any, stiffness: float, gap: float) -> float:
     mujoco.mj_energyPos(arm.model, arm.data)
     mujoco.mj_energyVel(arm.model, arm.data)
     twist = np.maximum(np.abs(arm["twist"]) - 0.5 * gap, 0.0)
-    return float(
-        sum(arm.data.energy) + (0.5 * stiffness * twist**2).sum() + (0.5 * ROTOR * arm["motor_speed"] ** 2).sum()
-    )
+    return float(sum(arm.data.energy) + (0.5 * stiffness * twist**2).sum() + (0.5 * ROTOR * arm["motor_speed"] ** 2).sum())
 
 
 WALL = '<geom name="wall" type="plane" pos="0.75 0 0" zaxis="-1 0 0" size="2 2 0.1" condim="1"/>'

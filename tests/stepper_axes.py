@@ -45,11 +45,7 @@ def random_axis(seed: int, error: float = 1e-6) -> lm.Scenario:
     speed = float(draw.uniform(2.0, 20.0))
     there = float(draw.uniform(0.3, 1.5)) / ratio
     stepping = {
-        "reference": {
-            "moves": [{"to": there}, {"to": 0.0}],
-            "speed": speed / ratio,
-            "acceleration": acceleration / ratio,
-        },
+        "reference": {"moves": [{"to": there}, {"to": 0.0}], "speed": speed / ratio, "acceleration": acceleration / ratio},
         "microsteps": int(draw.choice([1, 2, 4, 16, 64])),
         "table_error": float(draw.choice([0.0, 0.02])),
         "standstill_delay": 0.01,

@@ -125,9 +125,7 @@ def test_the_brake_of_the_motor():
 def test_a_brake_by_name(brake: Any):
     study = task_of({**task(brake=brake), **JOINT})
     torque = 1.5 if isinstance(brake, str) else 0.1
-    assert torque * rules(study, 1)["holding_brake"].use == pytest.approx(
-        2.0 * G * 0.2 * math.sin(1.0) / 20.0, rel=1e-9
-    )
+    assert torque * rules(study, 1)["holding_brake"].use == pytest.approx(2.0 * G * 0.2 * math.sin(1.0) / 20.0, rel=1e-9)
     assert study.part("motor", np.array([1.0])).rotor_inertia == pytest.approx(1.74e-4 + 5.8e-6)
 
 
@@ -140,9 +138,7 @@ def test_the_drive_check_judges_a_brake_and_an_amplifier():
         }
     )
     findings = {f.what: f for f in lm.check_drive(scenario)}
-    loads = [
-        abs(float(x)) for x in (lm.simulate(scenario)["load_torque"].max(), lm.simulate(scenario)["load_torque"].min())
-    ]
+    loads = [abs(float(x)) for x in (lm.simulate(scenario)["load_torque"].max(), lm.simulate(scenario)["load_torque"].min())]
     brake = findings["torque that the holding brake carries"]
     assert 0.5 * brake.use == pytest.approx(max(loads) / scenario.gearbox.ratio, rel=1e-9)
     assert "not in the run" in brake.remark
@@ -163,9 +159,7 @@ def test_the_drive_check_of_an_axis_names_the_keys_of_its_file():
     assert next(f for f in findings if f.rule == "amplifier_current").verdict == "unknown"
 
 
-@pytest.mark.parametrize(
-    ("brake", "valid"), [("of the motor", True), ({"from": "x"}, True), ({"torque": 1.0}, True), (3, False)]
-)
+@pytest.mark.parametrize(("brake", "valid"), [("of the motor", True), ({"from": "x"}, True), ({"torque": 1.0}, True), (3, False)])
 def test_the_schema_for_editors_takes_a_brake_by_name(brake: Any, valid: bool):
     schema = drive_schema()
     table = {"properties": {"task": schema["properties"]["task"]}, "$defs": schema["$defs"]}
@@ -221,9 +215,7 @@ def test_the_catalogue_lists_and_filters_them():
     assert {kind: len(found) for kind, found in of.items()} == {"actuator": 31, "brake": 22, "amplifier": 37}
     names = {r.name for found in of.values() for r in found}
     assert "tg-drives-tgz-d-48-13-26" not in names  # name and table contradict each other
-    assert all(
-        b.engage_time is None for b in of["brake"] if b.manufacturer == "Beckhoff"
-    )  # two sources exchange the times
+    assert all(b.engage_time is None for b in of["brake"] if b.manufacturer == "Beckhoff")  # two sources exchange the times
     motors = {r.name for r in records if isinstance(r, lm.data_sheets.MotorSheet)}
     assert all(set(b.motors) <= motors for b in of["brake"])
     assert sum(a.level() is not None for a in of["actuator"]) == 13

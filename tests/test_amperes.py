@@ -39,13 +39,7 @@ def test_gains_in_amperes_of_a_synchronous_motor_are_effective_values_with_the_a
 def test_the_constant_to_one_ampere_rms_is_that_of_the_flux_linkage() -> None:
     """1FT7042: (3/sqrt 2) p psi with psi = sqrt(2/3) 87 V/krpm/(104.72 p) is 1.439 N·m to one ampere rms."""
     psi = math.sqrt(2.0 / 3.0) * 87.0 / (1000.0 * 2.0 * math.pi / 60.0) / 3.0
-    winding = {
-        "poles": 6,
-        "resistance_phase": 3.66,
-        "inductance_phase": 21e-3,
-        "flux_linkage": psi,
-        "max_current_rms": 30.0,
-    }
+    winding = {"poles": 6, "resistance_phase": 3.66, "inductance_phase": 21e-3, "flux_linkage": psi, "max_current_rms": 30.0}
     data = lm.load("field-weakening").model_dump(exclude_none=True)
     motor = {**data["motors"]["m"], "winding": winding}
     found = drive_units(lm.Scenario(**{**data, "motors": {"m": motor}}))

@@ -11,14 +11,7 @@ from conftest import ROOT
 from lostmotion.model.duty import ArmGravity, Duty, Payload, Process, Supply
 from lostmotion.model.linear import RatedScrew
 from lostmotion.simulation.forms.drive_tables import LoadTable
-from lostmotion.sizing.axis_rules import (
-    derated,
-    emergency_stop,
-    gearbox_life,
-    holding_brake,
-    output_bearing,
-    with_safety,
-)
+from lostmotion.sizing.axis_rules import derated, emergency_stop, gearbox_life, holding_brake, output_bearing, with_safety
 from lostmotion.sizing.catalogue_formulas import derating
 from lostmotion.sizing.finding import TASK_RULES, within
 from lostmotion.sizing.required_motion import duty_torque, input_demand, required_motion
@@ -58,13 +51,7 @@ ARM: dict[str, Any] = {
 SLIDE: dict[str, Any] = {
     "task": {"cycle": "2 s", "settling_window": "0.02 mm", "brake": {"torque": "2 N m"}},
     "slide": {"mass": "12 kg", "friction_force": "30 N", "inclination": "90 deg"},
-    "screw": {
-        "lead": "10 mm",
-        "efficiency": 0.9,
-        "inertia": "3e-5 kg m^2",
-        "stiffness": "90 N/um",
-        "drag_torque": "0.03 N m",
-    },
+    "screw": {"lead": "10 mm", "efficiency": 0.9, "inertia": "3e-5 kg m^2", "stiffness": "90 N/um", "drag_torque": "0.03 N m"},
     "controller": {
         "encoder": {"bits": 20},
         "reference": {
@@ -120,16 +107,11 @@ def test_gravity_of_an_arm():
     motion = motion_of(Duty(gravity=ArmGravity(mass=2.0, radius=0.5)))
     assert at(motion, 1.7, motion.torque) == pytest.approx(2.0 * G * 0.5 * math.sin(1.2), rel=1e-9)
     assert at(motion, 0.0, motion.holding) == pytest.approx(0.0, abs=1e-9)
-    assert float(motion.torque[motion.time < 0.2][-1]) == pytest.approx(
-        0.8 * 5.0 + 2.0 * G * 0.5 * math.sin(0.1), rel=1e-6
-    )
+    assert float(motion.torque[motion.time < 0.2][-1]) == pytest.approx(0.8 * 5.0 + 2.0 * G * 0.5 * math.sin(0.1), rel=1e-6)
 
 
 def test_a_payload_adds_inertia_and_weight_while_it_is_carried():
-    duty = Duty(
-        gravity=ArmGravity(mass=2.0, radius=0.5),
-        payload=(Payload(begin=1.5, end=3.5, mass=1.0, radius=0.7, inertia=0.01),),
-    )
+    duty = Duty(gravity=ArmGravity(mass=2.0, radius=0.5), payload=(Payload(begin=1.5, end=3.5, mass=1.0, radius=0.7, inertia=0.01),))
     motion = motion_of(duty)
     assert float(motion.inertia.max() - 0.8) == pytest.approx(0.01 + 0.49, rel=1e-12)
     carried = motion.inertia > 0.8
@@ -307,11 +289,7 @@ def test_a_gearbox_and_a_screw_as_one():
         found = (force + law(force / rated, 0.5) * rated) / both.ratio
         assert found == pytest.approx(expected, rel=1e-9)
     motion = required_motion(
-        lm.PositionReference(samples={"times": [0.0, 1.0], "values": [0.0, 0.1]}),
-        LoadTable(inertia=1.0, torque=4000.0),
-        1.0,
-        Duty(),
-        0.0,
+        lm.PositionReference(samples={"times": [0.0, 1.0], "values": [0.0, 0.1]}), LoadTable(inertia=1.0, torque=4000.0), 1.0, Duty(), 0.0
     )
     of_both = input_demand(motion, both).torque
     assert input_demand(at_input(motion, screw), gearbox).torque == pytest.approx(of_both, rel=1e-9)

@@ -217,10 +217,7 @@ PARTS = [
     (lambda: lm.model.TorsionCurve(slopes=[1, 2]), "the torsion curve has 2 slopes and 0 breaks"),
     (lambda: lm.model.TorsionCurve(slopes=5), "key slopes: 5 must be a list"),
     (lambda: lm.CommandSignal(amplitude=3), "the command signal lacks frequency"),
-    (
-        lambda: lm.data_sheets.GearboxSheet(name="x", kind="magic", ratio=3),
-        'key kind: "magic" must be one of "strain_wave"',
-    ),
+    (lambda: lm.data_sheets.GearboxSheet(name="x", kind="magic", ratio=3), 'key kind: "magic" must be one of "strain_wave"'),
     (
         lambda: lm.data_sheets.GearboxSheet(name="My Gear", kind="other", ratio=3),
         "must consist of letters, digits, dots and dashes; capitals are read as small letters",
@@ -246,9 +243,7 @@ FUNCTIONS = [
     *(
         (
             lambda s, t=t: lm.simulate(s, solver="dormand-prince", relative_tolerance=t),
-            f"relative_tolerance {t:g} must lie"
-            if math.isfinite(t)
-            else f"relative_tolerance: {t:g} must be a finite number",
+            f"relative_tolerance {t:g} must lie" if math.isfinite(t) else f"relative_tolerance: {t:g} must be a finite number",
         )
         for t in (math.nan, math.inf, -1.0, 0.0, 1e-300, 1.0)
     ),
@@ -276,14 +271,9 @@ FUNCTIONS = [
     (lambda s: lm.Simulation(s.drive()).advance(-1.0, 0.0), "must lie between"),
     (lambda s: lm.frequency_response(s.drive(), [-1.0], [0.1]), "frequencies must be positive"),
     (lambda s: lm.periodic_motion(s.drive(), command=0.1), "needs at least one sine"),
+    (lambda s: lm.data_sheets.build_loss_map(lm.data_sheets.GearboxSheet(name="x", kind="other", ratio=3)), "lacks rated_output_torque"),
     (
-        lambda s: lm.data_sheets.build_loss_map(lm.data_sheets.GearboxSheet(name="x", kind="other", ratio=3)),
-        "lacks rated_output_torque",
-    ),
-    (
-        lambda s: lm.test_rig.TestRig(
-            s.replace(**{"gearbox.stiffness": {"kind": "rigid"}, "gearbox.hysteresis": None}).gearbox
-        ).loop(1.0),
+        lambda s: lm.test_rig.TestRig(s.replace(**{"gearbox.stiffness": {"kind": "rigid"}, "gearbox.hysteresis": None}).gearbox).loop(1.0),
         "rigid",
     ),
     (lambda s: s.replace(**{"load.inertia": "1 000 kg*m^2"}), 'key load.inertia: "1 000 kg*m^2" has separators'),
@@ -293,9 +283,7 @@ FUNCTIONS = [
 
 
 @pytest.mark.parametrize(("call", "sentence"), FUNCTIONS, ids=[s for _, s in FUNCTIONS])
-def test_functions_refuse_bad_input_with_the_same_error(
-    large: Path, call: Callable[[Scenario], object], sentence: str
-) -> None:
+def test_functions_refuse_bad_input_with_the_same_error(large: Path, call: Callable[[Scenario], object], sentence: str) -> None:
     with pytest.raises(lm.InputError) as caught:
         call(lm.load(large))
     assert sentence in str(caught.value)
@@ -327,25 +315,8 @@ def test_a_key_of_another_table_is_told_where_it_is_written(large: Path, changes
 
 def test_no_suggestion_leads_to_another_quantity() -> None:
     """A key with another word in it, or with one more, is that of another quantity."""
-    known = {
-        "added_backlash",
-        "rated_torque",
-        "rated_speed",
-        "rotor_inertia",
-        "friction_torque",
-        "max_speed",
-        "begin_time",
-    }
-    for wrong in (
-        "backlash",
-        "rated_current",
-        "rated_input_speed",
-        "inertia",
-        "torque",
-        "min_speed",
-        "end_time",
-        "speed",
-    ):
+    known = {"added_backlash", "rated_torque", "rated_speed", "rotor_inertia", "friction_torque", "max_speed", "begin_time"}
+    for wrong in ("backlash", "rated_current", "rated_input_speed", "inertia", "torque", "min_speed", "end_time", "speed"):
         assert nearest(wrong, known) == "", wrong
     for misspelt in ("aded_backlash", "rated_torqe", "ratedspeed", "RotorInertia", "torque_friction", "max-speed"):
         assert nearest(misspelt, known) in known, misspelt
@@ -408,11 +379,7 @@ def test_dots_within_texts_and_comments_are_no_levels(tmp_path: Path) -> None:
 
 def test_what_is_nested_too_deeply_is_refused_with_its_file(tmp_path: Path) -> None:
     path = tmp_path / "deep.toml"
-    for text in (
-        "x = " + "[" * 5000 + "]" * 5000,
-        "x = " + "{a = " * 900 + "1" + "}" * 900,
-        f"[{'.'.join('a' * 3000)}]",
-    ):
+    for text in ("x = " + "[" * 5000 + "]" * 5000, "x = " + "{a = " * 900 + "1" + "}" * 900, f"[{'.'.join('a' * 3000)}]"):
         path.write_text(text)
         assert refused(lambda: lm.load(path)).startswith(f"{path}: has more than 50 levels of tables and lists")
     deep: object = 1
@@ -431,22 +398,9 @@ def test_files_that_cannot_be_named_are_refused_by_their_names(tmp_path: Path, m
     monkeypatch.chdir(tmp_path)
     for one, other in (("a", "b"), ("b", "a")):
         Path(f"{one}.toml").symlink_to(f"{other}.toml")
-    for name in (
-        "n" * 5000,
-        "n" * 5000 + ".toml",
-        "n/" * 3000 + "x.toml",
-        "n" * 5000 + ".csv",
-        "a.toml",
-        "zero\0.toml",
-    ):
+    for name in ("n" * 5000, "n" * 5000 + ".toml", "n/" * 3000 + "x.toml", "n" * 5000 + ".csv", "a.toml", "zero\0.toml"):
         start = name[:20].replace("\0", r"\x00")
-        for call in (
-            lm.load,
-            lm.studies.load_study,
-            lm.studies.load_task,
-            lm.identification.load_identification,
-            lm.gearbox,
-        ):
+        for call in (lm.load, lm.studies.load_study, lm.studies.load_task, lm.identification.load_identification, lm.gearbox):
             message = refused(lambda call=call, name=name: call(name))
             assert start in message, message
     for base in ("n" * 5000 + ".toml", "a.toml", r"zero\u0000.toml"):
@@ -473,32 +427,9 @@ tables = st.recursive(
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
     max_leaves=6,
 )
-KEYS = [
-    "command",
-    "command.steps",
-    "motor",
-    "motor.kind",
-    "motor.limits",
-    "gearbox.stiffness",
-    "gearbox.stiffness.kind",
-]
-KEYS += [
-    "gearbox.stiffness.slopes",
-    "gearbox.losses.values",
-    "gearbox.losses.mirrored",
-    "load",
-    "load.torque",
-    "initial",
-]
-KEYS += [
-    "gearbox",
-    "gearbox.from",
-    "gearbox.ratio",
-    "load.torque.samples",
-    "command.chirp",
-    "simulation.duration",
-    "title",
-]
+KEYS = ["command", "command.steps", "motor", "motor.kind", "motor.limits", "gearbox.stiffness", "gearbox.stiffness.kind"]
+KEYS += ["gearbox.stiffness.slopes", "gearbox.losses.values", "gearbox.losses.mirrored", "load", "load.torque", "initial"]
+KEYS += ["gearbox", "gearbox.from", "gearbox.ratio", "load.torque.samples", "command.chirp", "simulation.duration", "title"]
 
 
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -514,17 +445,13 @@ def test_any_value_under_any_key_is_read_or_refused_in_one_plain_line(large: Pat
 
 def test_an_input_shaft_without_inertia_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "broken.toml"
-    path.write_text(
-        GOOD.replace("rotor_inertia = 8e-6", "rotor_inertia = 0").replace("inertia = 6.7e-6", "inertia = 0")
-    )
+    path.write_text(GOOD.replace("rotor_inertia = 8e-6", "rotor_inertia = 0").replace("inertia = 6.7e-6", "inertia = 0"))
     with pytest.raises(lm.InputError, match="no inertia on the input shaft"):
         lm.load(path)
 
 
 def test_a_jamming_gear_is_refused_with_the_advice_to_give_it_a_compliance(tmp_path: Path) -> None:
-    text = GOOD.replace(
-        'kind = "curve"\nbreaks = ["0.6 mrad", "3 mrad"]\nslopes = [2650, 21200, 26500]', 'kind = "rigid"'
-    )
+    text = GOOD.replace('kind = "curve"\nbreaks = ["0.6 mrad", "3 mrad"]\nslopes = [2650, 21200, 26500]', 'kind = "rigid"')
     text = text.replace("[gearbox.hysteresis]\nefficiency = 0.93\n", "").replace("inertia = 2.0", "inertia = 2000.0")
     text = text.replace("mirrored = true\nspeeds = [0, 1]\nloads = [0, 1]", "speeds = [0, 1]\nloads = [-1, 0, 1]")
     text = text.replace("[[0.02, 0.06], [0.08, 0.12]]", "[[1.4, 1.4], [0, 0], [2, 2]]")
@@ -546,11 +473,7 @@ CALLS = [
     ("an override of an unknown key", ["run", "good.toml", "--set", "gearbox.ration=3"], ["gearbox.ration", "ratio"]),
     ("an override with a wrong unit", ["run", "good.toml", "--set", "load.inertia=3 rad"], ["load.inertia", "3 rad"]),
     ("a number for a table", ["run", "good.toml", "--set", "gearbox.hysteresis=0.9"], ["gearbox.hysteresis", "0.9"]),
-    (
-        "an override into a value",
-        ["run", "good.toml", "--set", "gearbox.ratio.big=3"],
-        ["gearbox.ratio", "not a table"],
-    ),
+    ("an override into a value", ["run", "good.toml", "--set", "gearbox.ratio.big=3"], ["gearbox.ratio", "not a table"]),
     ("an unknown ending", ["run", "good.toml", "-o", "out.xlsx"], ["out.xlsx", ".parquet"]),
     ("no ending", ["run", "good.toml", "-o", "out"], ["ending"]),
     ("a directory as output", ["run", "good.toml", "-o", "folder.csv"], ["directory"]),
@@ -564,11 +487,7 @@ CALLS = [
         ["run", "good.toml", "--solver", "dormand-prince", "--tolerance", "1e-300"],
         ["--tolerance 1e-300", "between 1e-15 and 0.001"],
     ),
-    (
-        "a tolerance of the exact solver",
-        ["run", "good.toml", "--tolerance", "1e-9"],
-        ["--tolerance", "exact solver has none"],
-    ),
+    ("a tolerance of the exact solver", ["run", "good.toml", "--tolerance", "1e-9"], ["--tolerance", "exact solver has none"]),
     ("a report into a file", ["reproduce", "-o", "good.toml"], ["good.toml", "directory"]),
     ("a run that leaves all bounds", ["run", "good.toml", "--set", "command.amplitude=1e12"], ["t ="]),
     (
@@ -618,18 +537,13 @@ USAGE = [
     (["run", "good.toml", "--bogus"], ["--bogus"]),
     (["run", "good.toml", "--explain", "0,005"], ['--explain: "0,005" has a decimal comma; write "0.005 s"']),
     (["run", "good.toml", "--explain", "5 rpm"], ['--explain: "5 rpm" has the unit of something else']),
-    (
-        ["run", "good.toml", "--solver", "dormand-prince", "--tolerance", "small"],
-        ['--tolerance: "small" is not one number'],
-    ),
+    (["run", "good.toml", "--solver", "dormand-prince", "--tolerance", "small"], ['--tolerance: "small" is not one number']),
     (["study", "good.toml", "--threads", "two"], ['--threads: "two" must be a whole number above 0']),
 ]
 
 
 @pytest.mark.parametrize(("arguments", "words"), USAGE, ids=[" ".join(a) for a, _ in USAGE])
-def test_a_command_that_cannot_be_read_ends_in_one_line_and_exit_code_2(
-    tmp_path: Path, arguments: list[str], words: list[str]
-) -> None:
+def test_a_command_that_cannot_be_read_ends_in_one_line_and_exit_code_2(tmp_path: Path, arguments: list[str], words: list[str]) -> None:
     (tmp_path / "good.toml").write_text(GOOD)
     done = lostmotion(*arguments, cwd=tmp_path)
     assert done.returncode == 2

@@ -202,9 +202,7 @@ def test_reset_takes_back_those_that_are_meant() -> None:
 
 def test_what_varies_is_what_a_list_of_drives_has() -> None:
     gaps, inertias = np.array([1e-3, 2e-3, 1e-3]), np.array([0.5, 1.0, 0.5])
-    varied = lm.SimulationBatch(
-        simple_drive(), STEP, vary={"gearbox.stiffness.backlash": gaps, "load.inertia": inertias}
-    )
+    varied = lm.SimulationBatch(simple_drive(), STEP, vary={"gearbox.stiffness.backlash": gaps, "load.inertia": inertias})
     drives = []
     for gap, inertia in zip(gaps, inertias, strict=True):
         one = simple_drive(inertia=inertia)
@@ -216,9 +214,7 @@ def test_what_varies_is_what_a_list_of_drives_has() -> None:
 
 def test_a_seed_draws_the_same_drives() -> None:
     def batch(seed: int) -> lm.SimulationBatch:
-        return lm.SimulationBatch(
-            simple_drive(), STEP, count=5, seed=seed, vary={"load.inertia": lambda g, n: g.uniform(0.5, 2.0, n)}
-        )
+        return lm.SimulationBatch(simple_drive(), STEP, count=5, seed=seed, vary={"load.inertia": lambda g, n: g.uniform(0.5, 2.0, n)})
 
     commands = np.full((50, 5), 0.2)
     first = run(batch(1), commands)
@@ -233,10 +229,7 @@ def test_a_drive_of_its_own_takes_less_than_400_bytes_however_long_it_moves() ->
     batch = lm.SimulationBatch(
         lm.load("catalogue-robot-joint").drive(),
         STEP,
-        vary={
-            "motor.friction_torque": generator.uniform(0.005, 0.03, count),
-            "load.inertia": generator.uniform(0.3, 2.0, count),
-        },
+        vary={"motor.friction_torque": generator.uniform(0.005, 0.03, count), "load.inertia": generator.uniform(0.3, 2.0, count)},
     )
     run(batch, random_commands(generator, 200, count))
     assert batch.memory / count < 400.0
@@ -297,12 +290,7 @@ def test_a_step_that_is_not_left_to_the_general_solver_is_one_of_its() -> None:
                 )
             )
             alone[k].advance(STEP, motor_command=float(commands[n, k]), load_load_torque=0.0)
-            for name, scale in {
-                "motor_speed": 1e-8,
-                "load_speed": 1e-9,
-                "gearbox_twist": 1e-12,
-                "load_angle": 1e-12,
-            }.items():
+            for name, scale in {"motor_speed": 1e-8, "load_speed": 1e-9, "gearbox_twist": 1e-12, "load_angle": 1e-12}.items():
                 assert batch[name][k] == pytest.approx(alone[k][name], abs=scale, rel=1e-11), (k, n, name)
     assert batch.counts["switchings"] > 500
     assert batch.counts["general"] < 0.02 * batch.counts["steps"]
@@ -341,16 +329,9 @@ def test_a_batch_of_any_train_answers_a_load_torque() -> None:
         batch.answer(**given, shaft="crown")
 
 
-@pytest.mark.parametrize(
-    "key", ["load.inertia", "gearbox.stiffness.backlash", "gearbox.losses.efficiency", "gearbox.ratio"]
-)
+@pytest.mark.parametrize("key", ["load.inertia", "gearbox.stiffness.backlash", "gearbox.losses.efficiency", "gearbox.ratio"])
 def test_what_is_written_acts_from_the_next_step_on(key: str) -> None:
-    value = {
-        "load.inertia": 3.0,
-        "gearbox.stiffness.backlash": 5e-3,
-        "gearbox.losses.efficiency": 0.6,
-        "gearbox.ratio": 60.0,
-    }
+    value = {"load.inertia": 3.0, "gearbox.stiffness.backlash": 5e-3, "gearbox.losses.efficiency": 0.6, "gearbox.ratio": 60.0}
     batch = lm.SimulationBatch(simple_drive(), STEP, count=3)
     for _ in range(150):
         batch.step(0.2)
@@ -471,9 +452,7 @@ def test_trains_of_any_kind_move_as_alone(scenario: lm.Scenario, key: str) -> No
     for k, x in enumerate(values[: 1 if scenario.axes() else 2].tolist()):  # controllers are tuned to the first
         changed = scenario.replace(**{key: x})
         if scenario.axes():
-            held = {
-                m: c.model_copy(update={"reference": type(c.reference)(mean=0.4)}) for m, c in scenario.axes().items()
-            }
+            held = {m: c.model_copy(update={"reference": type(c.reference)(mean=0.4)}) for m, c in scenario.axes().items()}
             changed = changed.with_axes(held)
         alone = lm.Simulation(changed, step=STEP, initial=scenario.begin())
         for _ in range(20):
@@ -520,9 +499,7 @@ def test_trains_that_a_batch_does_not_step_are_refused(use: object, message: str
 
 def test_a_drive_that_cannot_go_on_stays_and_is_named() -> None:
     # A loss map ends far outside its data: a load torque that no gear carries.
-    drive = random_drive(np.random.default_rng(0)).model_copy(
-        update={"gearbox": lm.load("paper-2dof-nl-small").gearbox}
-    )
+    drive = random_drive(np.random.default_rng(0)).model_copy(update={"gearbox": lm.load("paper-2dof-nl-small").gearbox})
     batch = lm.SimulationBatch([drive, drive, drive], STEP)
     batch.step(0.0)
     with pytest.raises(lm.SolverError, match="drive 1 of the batch"):
@@ -542,9 +519,7 @@ def positioned(generator: np.random.Generator) -> lm.Drive:
     backlash = float(generator.uniform(0.2e-3, 1e-3))
     stiffness = lm.model.TorsionCurve(slopes=[float(generator.uniform(2e4, 5e4))], backlash=backlash)
     load = lm.Load(inertia=drive.load.inertia * float(generator.uniform(0.6, 1.4)), friction_torque=0.2)
-    return drive.model_copy(
-        update={"load": load, "gearbox": drive.gearbox.model_copy(update={"stiffness": stiffness, "hysteresis": None})}
-    )
+    return drive.model_copy(update={"load": load, "gearbox": drive.gearbox.model_copy(update={"stiffness": stiffness, "hysteresis": None})})
 
 
 def test_controllers_act_at_their_instants_as_on_a_drive_alone() -> None:
@@ -633,11 +608,7 @@ def test_a_given_motion_moves_each_drive_as_alone() -> None:
     batch.reset(initial={"load_speed": 0.2, "load_angle": 0.1})
     alone = [
         lm.Simulation(
-            drive.train(),
-            step=STEP,
-            loaded=[],
-            given=["load"],
-            initial=lm.TrainInitial(speeds={"load": 0.2}, angles={"load": 0.1}),
+            drive.train(), step=STEP, loaded=[], given=["load"], initial=lm.TrainInitial(speeds={"load": 0.2}, angles={"load": 0.1})
         )
         for drive in drives
     ]
@@ -673,10 +644,7 @@ def test_any_shaft_or_slide_may_have_a_given_motion() -> None:
         ({"controllers": "position"}, "must be a Controller, or a list"),
         ({"controllers": [lm.load("position-axis").controller]}, "controllers: there are 1 for 2 drives"),
         ({"controllers": [1, 2]}, "controllers: 1 must be a Controller"),
-        (
-            {"controllers": lm.load("speed-axis", {"controller.law": True, "controller.speed": None}).controller},
-            "a law of your own is for",
-        ),
+        ({"controllers": lm.load("speed-axis", {"controller.law": True, "controller.speed": None}).controller}, "a law of your own is for"),
     ],
 )
 def test_controllers_that_a_batch_does_not_run_are_refused(options: dict[str, object], message: str) -> None:

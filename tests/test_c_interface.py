@@ -33,12 +33,7 @@ class Curve(c.Structure):
 
 
 class PeriodicCurve(c.Structure):
-    _fields_ = [
-        ("period", c.c_double),
-        ("angles", c.POINTER(c.c_double)),
-        ("values", c.POINTER(c.c_double)),
-        ("n", c.c_size_t),
-    ]
+    _fields_ = [("period", c.c_double), ("angles", c.POINTER(c.c_double)), ("values", c.POINTER(c.c_double)), ("n", c.c_size_t)]
 
 
 class Signal(c.Structure):
@@ -123,13 +118,7 @@ class Train:
             self.add("lm_add_angle_torque", name, t.shaft, c.byref(curve))
         for name, s in train.springs.items():
             breaks, slopes = s.stiffness.pieces()
-            self.add(
-                "lm_add_spring",
-                name,
-                s.shaft,
-                c.byref(Curve(doubles(breaks), doubles(slopes), len(breaks))),
-                s.rest_angle,
-            )
+            self.add("lm_add_spring", name, s.shaft, c.byref(Curve(doubles(breaks), doubles(slopes), len(breaks))), s.rest_angle)
 
     def parameters(self, part: Any, table: str) -> tuple[Any, int]:
         keys = dict(_core.parameters())
@@ -316,17 +305,9 @@ class Motion(c.Structure):
 def test_a_given_motion_has_the_bits_of_python(library: c.CDLL) -> None:
     """Angle, speed and acceleration, and two of them; the torque that they take is a variable."""
     scenario = lm.Scenario(
-        shafts={
-            "crank": {"inertia": 0.02, "friction_torque": 0.5, "speed": 0.0},
-            "lever": {"inertia": 0.3, "friction_torque": 0.2},
-        },
+        shafts={"crank": {"inertia": 0.02, "friction_torque": 0.5, "speed": 0.0}, "lever": {"inertia": 0.3, "friction_torque": 0.2}},
         gears={
-            "mesh": {
-                "input": "crank",
-                "output": "lever",
-                "ratio": 2.0,
-                "stiffness": {"kind": "curve", "backlash": 0.01, "slopes": [800.0]},
-            }
+            "mesh": {"input": "crank", "output": "lever", "ratio": 2.0, "stiffness": {"kind": "curve", "backlash": 0.01, "slopes": [800.0]}}
         },
         simulation={"duration": 1.0, "sample_interval": 0.02},
     )

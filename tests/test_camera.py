@@ -58,17 +58,13 @@ def test_a_latency_costs_speed_times_latency_unless_it_is_predicted(latency: flo
 
 @pytest.mark.parametrize("gains", [(1.0, 1.0), (0.6, 0.4), (0.3, 0.05)])
 @pytest.mark.parametrize("latency", [0.0, 20e-3, 50e-3])
-def test_with_alpha_and_beta_an_acceleration_costs_what_the_closed_form_says(
-    gains: tuple[float, float], latency: float
-) -> None:
+def test_with_alpha_and_beta_an_acceleration_costs_what_the_closed_form_says(gains: tuple[float, float], latency: float) -> None:
     # Steady errors after a frame: angle a T^2 (1 - alpha)/beta, rate a T (2 alpha - beta)/(2 beta); then a straight line for the latency.
     a, (alpha, beta) = 0.8, gains
     reference = {"speed": 100.0, "acceleration": a, "moves": [{"to": 30.0}]}
     found, target = expected(scenario(reference, {"latency": latency}, {"alpha": alpha, "beta": beta}))
     angle, rate = a * T**2 * (1.0 - alpha) / beta, a * T * (2.0 * alpha - beta) / (2.0 * beta)
-    np.testing.assert_allclose(
-        (target - found)[LAST], angle + rate * latency + a * latency**2 / 2.0, rtol=0.0, atol=1e-11
-    )
+    np.testing.assert_allclose((target - found)[LAST], angle + rate * latency + a * latency**2 / 2.0, rtol=0.0, atol=1e-11)
     if gains == (1.0, 1.0) and latency > 0.0:
         assert (target - found)[-2] == pytest.approx(a * latency**2 / 2.0, rel=1.01 * T / latency)
     third, _ = expected(scenario(reference, {"latency": latency}, {"alpha": 0.6, "beta": 0.4, "gamma": 0.1}))
@@ -107,12 +103,8 @@ def test_the_tracking_index_gives_the_gains_of_the_kalman_filter(index: float) -
 
 def test_the_noise_is_white_and_normal() -> None:
     sigma = 1e-4
-    r = lm.simulate(
-        scenario({}, {"noise": sigma, "seed": 5}, {"alpha": 0.2, "beta": 0.02}, duration=20.0), energy=False
-    )
-    noise = (
-        r["m_target_direction"].values[:-1] / sigma
-    )  # the encoder adds what the table has turned, which the target is beside it by
+    r = lm.simulate(scenario({}, {"noise": sigma, "seed": 5}, {"alpha": 0.2, "beta": 0.02}, duration=20.0), energy=False)
+    noise = r["m_target_direction"].values[:-1] / sigma  # the encoder adds what the table has turned, which the target is beside it by
     n = len(noise)
     assert kstest(noise, "norm").pvalue > 1e-3
     assert abs(noise.mean()) < 4.0 / math.sqrt(n)
@@ -144,9 +136,7 @@ def test_a_frame_shows_whole_pixels_or_parts_of_them() -> None:
     target = s.controllers["m"].reference.at(r.time.values)[0]
     offset = target - r["table_angle"].values
     seen = r["m_target_direction"].values - r["table_angle"].values
-    np.testing.assert_allclose(
-        seen[:-1], pixel / 4.0 * np.floor(offset / (pixel / 4.0) + 0.5)[:-1], rtol=0.0, atol=1e-12
-    )
+    np.testing.assert_allclose(seen[:-1], pixel / 4.0 * np.floor(offset / (pixel / 4.0) + 0.5)[:-1], rtol=0.0, atol=1e-12)
     assert np.abs(offset).max() > 4.0 * pixel
 
 
@@ -170,11 +160,7 @@ def test_the_camera_makes_good_what_an_encoder_on_the_motor_does_not_see() -> No
     axis = lm.load("tracking-loss-map", {"simulation.duration": 3.0})
     c = axis.controller.model_dump(exclude_none=True)
     c.pop("position_encoder")
-    c |= {
-        "encoder": {"ideal": True},
-        "inverse_model": None,
-        "reference": {"kind": "position", "ramps": [{"rise": 0.9, "duration": 3.0}]},
-    }
+    c |= {"encoder": {"ideal": True}, "inverse_model": None, "reference": {"kind": "position", "ramps": [{"rise": 0.9, "duration": 3.0}]}}
     blind = axis.replace(controller=c, initial={})
     sees = blind.replace(controller=c | {"camera": {"sample_time": 5e-3}, "tracker": {"alpha": 0.3, "beta": 0.05}})
 
@@ -189,14 +175,8 @@ def test_the_camera_makes_good_what_an_encoder_on_the_motor_does_not_see() -> No
 def noisy() -> lm.Scenario:
     axis = lm.load("tracking-loss-map", {"simulation.duration": 1.0})
     camera = {"sample_time": "20 ms", "latency": "50 ms", "noise": "0.05 mrad", "field": "5 deg", "seed": 7}
-    c = axis.controller.model_dump(exclude_none=True) | {
-        "camera": camera,
-        "tracker": {"alpha": 0.5, "beta": 0.2, "gamma": 0.02},
-    }
-    c |= {
-        "encoder": {"ideal": True},
-        "position_encoder": {"ideal": True, "shaft": "load"},
-    }  # whose steps rounding decides
+    c = axis.controller.model_dump(exclude_none=True) | {"camera": camera, "tracker": {"alpha": 0.5, "beta": 0.2, "gamma": 0.02}}
+    c |= {"encoder": {"ideal": True}, "position_encoder": {"ideal": True, "shaft": "load"}}  # whose steps rounding decides
     return axis.replace(controller=c)
 
 

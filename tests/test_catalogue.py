@@ -87,10 +87,7 @@ BAD = [
     ({"losses": {"efficiency": [{"input_speed": "2000 rpm", "efficiency": 1.2}]}}, "efficiency"),
     ({"losses": {"efficiency": [{"input_speed": "2000 rpm", "efficiency": 0.0}]}}, "efficiency"),
     ({"losses": {"load_correction": [[0.5, 0.9]]}}, "exactly one efficiency at load 1"),
-    (
-        {"losses": {"efficiency": [{"input_speed": 200.0, "efficiency": 0.9}], "load_correction": [[1.5, 1.2]]}},
-        "above 1",
-    ),
+    ({"losses": {"efficiency": [{"input_speed": 200.0, "efficiency": 0.9}], "load_correction": [[1.5, 1.2]]}}, "above 1"),
     ({"losses": {"efficiency": [{"input_speed": 200.0, "efficiency": 0.9}] * 2}}, "twice"),
     ({"losses": {"starting_torqe": 0.1}}, "is not known"),
     ({"losses": {"lubricant": {"viscosity_40": 1e-5, "viscosity_100": 2e-5}}}, "thins"),
@@ -181,9 +178,7 @@ def test_a_loop_wider_than_the_torque_is_refused():
 def test_a_record_by_name_with_overrides_and_by_file(tmp_path: Path):
     by_name = lm.load(scenario_with(tmp_path, 'gearbox = "schaeffler-rt1-h-20-100"'))
     assert by_name.gearbox == lm.gearbox("schaeffler-rt1-h-20-100")
-    changed = lm.load(
-        scenario_with(tmp_path, '[gearbox]\nfrom = "schaeffler-rt1-h-20-100"\ninertia = "1 kg*cm^2"\nloss_factor = 2')
-    )
+    changed = lm.load(scenario_with(tmp_path, '[gearbox]\nfrom = "schaeffler-rt1-h-20-100"\ninertia = "1 kg*cm^2"\nloss_factor = 2'))
     assert changed.gearbox.inertia == pytest.approx(1e-4)
     assert changed.gearbox.losses.values[3][1] == pytest.approx(2 * by_name.gearbox.losses.values[3][1])
     (tmp_path / "own.toml").write_text(CliRunner().invoke(app, ["catalogue", "new"]).output)
@@ -191,9 +186,7 @@ def test_a_record_by_name_with_overrides_and_by_file(tmp_path: Path):
     assert own.gearbox.stiffness.backlash == pytest.approx(3 * ARCMIN)
     # A record takes the place of a base's gearbox, it is not mixed with it.
     child = tmp_path / "child.toml"
-    child.write_text(
-        f'base = "{(ROOT / "scenarios" / "paper-2dof-nl-large.toml")}"\n[gearbox]\nfrom = "wittenstein-tp010-mf-10"\n'
-    )
+    child.write_text(f'base = "{(ROOT / "scenarios" / "paper-2dof-nl-large.toml")}"\n[gearbox]\nfrom = "wittenstein-tp010-mf-10"\n')
     assert lm.load(child).gearbox == lm.gearbox("wittenstein-tp010-mf-10")
     assert lm.load(child, ["gearbox.from=paper-gearbox"]).gearbox == lm.gearbox("paper-gearbox")
 
@@ -237,9 +230,7 @@ def test_command_line(tmp_path: Path):
     assert "ask the manufacturer" in page
     checked = run(app, ["check", str(ROOT / "scenarios" / "catalogue-robot-joint.toml")])
     assert checked.exit_code == 0
-    assert (
-        "Verdict: fits, with a reservation: 3 of 16 points not judged" in checked.output
-    )  # it gives no limits for them
+    assert "Verdict: fits, with a reservation: 3 of 16 points not judged" in checked.output  # it gives no limits for them
 
 
 def test_a_name_that_is_none_is_answered_with_near_ones():

@@ -24,16 +24,7 @@ def own_sheet(tmp_path: Path, **changes) -> str:
     record = sheet(name="own", backlash="1 arcmin", hysteresis_loss="2 arcmin", **changes)
     given = {name: getattr(record, name) for name in record.model_fields_set}
     lines = ["[[gearbox]]"]
-    for key in (
-        "name",
-        "kind",
-        "ratio",
-        "rated_output_torque",
-        "rated_input_speed",
-        "inertia",
-        "backlash",
-        "hysteresis_loss",
-    ):
+    for key in ("name", "kind", "ratio", "rated_output_torque", "rated_input_speed", "inertia", "backlash", "hysteresis_loss"):
         lines.append(f"{key} = {given[key]!r}")
     lines += [f"stiffness = {{ slopes = {list(record.stiffness.slopes)}, torques = {list(record.stiffness.torques)} }}"]
     lines += ["losses = { efficiency = [{ input_speed = 200.0, efficiency = 0.77 }] }"]
@@ -74,9 +65,7 @@ def test_a_change_takes_the_place_of_what_it_names_and_of_nothing_else(tmp_path:
         assert changed["stiffness"].keys() == wanted.keys()
         for key in ("slopes", "breaks", "backlash", "preload"):
             assert changed["stiffness"][key] == pytest.approx(wanted[key], rel=1e-14)
-        assert {k: v for k, v in changed.items() if k != "stiffness"} == {
-            k: v for k, v in data.items() if k != "stiffness"
-        }
+        assert {k: v for k, v in changed.items() if k != "stiffness"} == {k: v for k, v in data.items() if k != "stiffness"}
     values = [[2 * x for x in row] for row in plain.losses.values]
     changed = lm.load(path, [f"gearbox.losses.values={values}"]).gearbox
     assert changed.losses.values == tuple(map(tuple, values))
@@ -117,14 +106,8 @@ def test_added_backlash_adds_to_a_changed_curve_too(tmp_path: Path):
 @pytest.mark.parametrize(
     ("overrides", "match"),
     [
-        (
-            ["gearbox.losses.efficiency=0.9", "gearbox.loss_factor=2"],
-            "gearbox.loss_factor: acts on the record's own losses",
-        ),
-        (
-            ['gearbox.losses={kind="constant_efficiency",efficiency=0.9}', "gearbox.temperature=40"],
-            "gearbox.temperature: acts",
-        ),
+        (["gearbox.losses.efficiency=0.9", "gearbox.loss_factor=2"], "gearbox.loss_factor: acts on the record's own losses"),
+        (['gearbox.losses={kind="constant_efficiency",efficiency=0.9}', "gearbox.temperature=40"], "gearbox.temperature: acts"),
         (['gearbox.stiffness={kind="linear",stiffness=1e4}', "gearbox.added_backlash=1e-3"], "needs a torsion curve"),
         (["gearbox.stiffness.slopes=[1e4]"], "gearbox.stiffness: has 1 slopes and 2 breaks"),
         (["gearbox.stiffness.slops=[1e4]"], "gearbox.stiffness.slops: is not known; did you mean slopes"),
@@ -184,9 +167,7 @@ def test_a_sheet_that_says_maker_for_the_manufacturer_is_read_as_before(tmp_path
     assert records == parse_sheets(tomllib.loads(text), "now.toml")
     assert {(r.manufacturer, r.sources[-1].status) for r in records} == {("NORD", "manufacturer")}
     with pytest.raises(lm.InputError, match="key maker: is not known"):
-        parse_sheets(
-            tomllib.loads('maker = "A"\nmanufacturer = "B"\n' + former.replace('maker = "NORD"', "")), "both.toml"
-        )
+        parse_sheets(tomllib.loads('maker = "A"\nmanufacturer = "B"\n' + former.replace('maker = "NORD"', "")), "both.toml")
 
 
 def test_the_rig_gives_no_figure_where_there_is_no_cause():

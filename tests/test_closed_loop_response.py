@@ -94,10 +94,7 @@ def axis(**changes: Any) -> lm.Scenario:
 def long_run(scenario: lm.Scenario, amplitude: float, frequency: float, periods: int, last: int) -> dict[str, complex]:
     """First harmonics of the last periods of a long run from rest, at the samples of the position loop of 1 ms."""
     reference = {"kind": "position", "amplitude": amplitude, "frequency": frequency}
-    changes = {
-        "controller.reference": reference,
-        "simulation": {"duration": periods / frequency, "sample_interval": 1e-3},
-    }
+    changes = {"controller.reference": reference, "simulation": {"duration": periods / frequency, "sample_interval": 1e-3}}
     result = lm.simulate(scenario.replace(**changes), energy=False)
     count = round(last / frequency / 1e-3)
     tail = result.isel(time=slice(-count - 1, -1))
@@ -142,9 +139,7 @@ def test_powers_are_those_of_the_energy_ledger() -> None:
     for duration in (20.0, 24.0):
         reference = {"kind": "position", "amplitude": 0.1, "frequency": 1.0}
         simulation = {"duration": duration, "sample_interval": 1e-3}
-        runs.append(
-            lm.energy_of(lm.simulate(scenario.replace(**{"controller.reference": reference, "simulation": simulation})))
-        )
+        runs.append(lm.energy_of(lm.simulate(scenario.replace(**{"controller.reference": reference, "simulation": simulation}))))
     lost = sum(runs[1][name] - runs[0][name] for name in ("gear_losses", "hysteresis")) / 4.0
     # From 250 samples a period, with jumps of the torques at ticks and turning points.
     assert float(response["gear_loss"].item()) == pytest.approx(lost, rel=5e-3)
@@ -213,9 +208,7 @@ def test_the_command_says_what_it_has_moved_and_what_does_not_repeat(tmp_path: P
     assert ",spread,reason" in (tmp_path / "r" / "response.csv").read_text().splitlines()[0]
 
 
-@pytest.mark.parametrize(
-    ("name", "time"), [("position-axis", 1.2), ("gantry-two-screws", 0.5), ("vertical-axis-with-brake", 0.4)]
-)
+@pytest.mark.parametrize(("name", "time"), [("position-axis", 1.2), ("gantry-two-screws", 0.5), ("vertical-axis-with-brake", 0.4)])
 def test_a_controlled_scenario_is_explained_in_the_state_of_its_run(name: str, time: float) -> None:
     scenario = lm.load(name)
     explained, run = lm.explain(scenario, time), lm.simulate(scenario, duration=time)

@@ -33,9 +33,7 @@ def test_shipped_scenarios_are_known_by_name(tmp_path: Path) -> None:
     assert list(lm.shipped_scenarios()) == [p.stem for p in ALL_SCENARIOS]
     for path in ALL_SCENARIOS:
         assert lm.load(path.stem) == lm.load(path)
-    by_name, by_file = (
-        lostmotion("run", what, cwd=tmp_path) for what in (SMALL, SCENARIOS[0].parent / f"{SMALL}.toml")
-    )
+    by_name, by_file = (lostmotion("run", what, cwd=tmp_path) for what in (SMALL, SCENARIOS[0].parent / f"{SMALL}.toml"))
     assert by_name.returncode == 0
     # But for the next command that is named: with what was given.
     assert by_name.stdout == by_file.stdout.replace(str(SCENARIOS[0].parent / f"{SMALL}.toml"), SMALL)
@@ -57,9 +55,7 @@ def test_a_copy_of_a_shipped_scenario_loads_anywhere_and_keeps_its_comments(tmp_
 
 
 def test_the_check_has_its_former_name_too() -> None:
-    outputs = [
-        CliRunner().invoke(app, [*name, "catalogue-robot-joint"]).output for name in (["check"], ["drive", "check"])
-    ]
+    outputs = [CliRunner().invoke(app, [*name, "catalogue-robot-joint"]).output for name in (["check"], ["drive", "check"])]
     assert outputs[0] == outputs[1]
 
 
@@ -85,15 +81,11 @@ def test_an_unknown_name_is_told_with_the_nearest(tmp_path: Path) -> None:
         lm.load("xyz")
 
 
-def test_a_directory_does_not_hide_a_shipped_scenario_and_its_file_name_leads_to_it(
-    tmp_path: Path, monkeypatch
-) -> None:
+def test_a_directory_does_not_hide_a_shipped_scenario_and_its_file_name_leads_to_it(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path(SMALL).mkdir()
     assert lm.load(SMALL) == lm.load(SCENARIOS[0].parent / f"{SMALL}.toml")
-    with pytest.raises(
-        lm.InputError, match=f"{SMALL}.toml: there is no such file; the shipped scenario is called {SMALL}"
-    ):
+    with pytest.raises(lm.InputError, match=f"{SMALL}.toml: there is no such file; the shipped scenario is called {SMALL}"):
         lm.load(f"{SMALL}.toml")
     Path("folder").mkdir()
     with pytest.raises(lm.InputError, match="folder: is a directory"):
@@ -104,11 +96,7 @@ def test_a_file_that_is_no_result_of_a_run_is_refused(tmp_path: Path) -> None:
     response = lm.frequency_response(lm.load(SMALL), [1.0], 0.1)[["efficiency", "angle_advance"]]
     response.to_netcdf(tmp_path / "response.nc", engine="h5netcdf")
     (tmp_path / "table.csv").write_text("a,b\n1,2\n")
-    for name, words in (
-        ("response.nc", "carries no scenario"),
-        ("table.csv", "no result"),
-        ("none.csv", "no such file"),
-    ):
+    for name, words in (("response.nc", "carries no scenario"), ("table.csv", "no result"), ("none.csv", "no such file")):
         done = lostmotion("run", name, cwd=tmp_path)
         assert done.returncode == 1
         assert done.stderr.startswith(f"lostmotion: {name}: ")
@@ -178,9 +166,7 @@ def test_the_template_of_a_synchronous_motor_can_be_used_as_it_is(tmp_path: Path
 def test_a_file_with_another_part_or_with_several_is_told_by_what_is_in_it(tmp_path: Path) -> None:
     assert lostmotion("catalogue", "new", "--kind", "motor", "-o", "my-motor.toml", cwd=tmp_path).returncode == 0
     done = lostmotion("rig", "my-motor.toml", cwd=tmp_path)
-    assert done.stderr == (
-        "lostmotion: my-motor.toml: a gearbox is wanted here, and this file has none; name a file with one\n"
-    )
+    assert done.stderr == ("lostmotion: my-motor.toml: a gearbox is wanted here, and this file has none; name a file with one\n")
     assert done.returncode == 1
 
 
@@ -194,9 +180,7 @@ def test_the_template_of_a_gearbox_sheet_takes_its_kind() -> None:
 
 
 def test_output_is_tried_before_the_work(tmp_path: Path) -> None:
-    (tmp_path / "study.toml").write_text(
-        (ROOT / "examples" / "tolerance.toml").read_text().replace("../scenarios/", "")
-    )
+    (tmp_path / "study.toml").write_text((ROOT / "examples" / "tolerance.toml").read_text().replace("../scenarios/", ""))
     (tmp_path / f"{SMALL}.toml").write_text(f'base = "{SMALL}"\n')
     calls = [
         ("run", SMALL, "-o", "/proc/result.csv"),
@@ -361,14 +345,7 @@ def test_the_shell_completes_scenarios_gearboxes_and_files(tmp_path: Path, typed
     (tmp_path / "my-drive.toml").touch()
     words = {"_LOSTMOTION_COMPLETE": "complete_bash", "COMP_WORDS": typed, "COMP_CWORD": str(len(typed.split()) - 1)}
     script = "from lostmotion.cli import app; app(prog_name='lostmotion')"
-    done = subprocess.run(
-        [sys.executable, "-c", script],
-        cwd=tmp_path,
-        env=os.environ | words,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, env=os.environ | words, capture_output=True, text=True, check=False)
     assert [name for name in done.stdout.split() if name in expected] == expected
     assert all(name.startswith(typed.rsplit(maxsplit=1)[-1]) for name in done.stdout.split())
 
@@ -376,9 +353,7 @@ def test_the_shell_completes_scenarios_gearboxes_and_files(tmp_path: Path, typed
 def on_a_terminal(script: str, cwd: Path) -> str:
     """What a script writes to its standard error while that is a terminal."""
     leader, follower = pty.openpty()
-    process = subprocess.Popen(
-        [sys.executable, "-c", script], cwd=cwd, stderr=follower, env=os.environ | {"TERM": "xterm"}
-    )
+    process = subprocess.Popen([sys.executable, "-c", script], cwd=cwd, stderr=follower, env=os.environ | {"TERM": "xterm"})
     os.close(follower)
     seen = b""
     while True:
@@ -418,9 +393,7 @@ def test_a_run_of_minutes_says_so_at_once_and_is_interrupted() -> None:
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stderr is not None
     line = process.stderr.readline()
-    assert re.fullmatch(
-        r"Simulating: takes [0-9.]+ (s|min|h) by estimate; its first [0-9.e+]+ s have [0-9]+ switchings\n", line
-    )
+    assert re.fullmatch(r"Simulating: takes [0-9.]+ (s|min|h) by estimate; its first [0-9.e+]+ s have [0-9]+ switchings\n", line)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
     assert (process.returncode, out, err) == (130, "", "lostmotion: interrupted; nothing was written\n")
@@ -470,9 +443,7 @@ def test_progress_is_told_in_words(passed: float, expected: float, text: str) ->
     assert terminal._progress(passed, expected) == text
 
 
-def test_work_that_takes_long_prints_a_line_now_and_then(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_work_that_takes_long_prints_a_line_now_and_then(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     with terminal.progress(3, "Runs") as step:
         step()
     assert capsys.readouterr().err == ""
@@ -527,6 +498,4 @@ def test_a_run_of_a_million_samples_is_drawn_in_seconds() -> None:
 def test_a_directory_that_takes_no_files_is_told() -> None:
     done = CliRunner().invoke(app, ["run", "paper-2dof-nl-small", "-o", "/proc/drive.csv"])
     assert isinstance(done.exception, lm.InputError)
-    assert str(done.exception) == (
-        "/proc/drive.csv: cannot be written: its directory takes no new files; name another one"
-    )
+    assert str(done.exception) == ("/proc/drive.csv: cannot be written: its directory takes no new files; name another one")

@@ -30,10 +30,7 @@ def inertia(friction: float, breakaway: float, duration: float, **controller: An
     return lm.Scenario(
         shafts={"axis": {"inertia": J, "friction_torque": friction, "breakaway_torque": breakaway}},
         motors={"servo": {"shaft": "axis", "kind": "torque_source", "rated_torque": 1.0, "rotor_inertia": 0.0}},
-        controllers={
-            "servo": {"kind": "continuous", "reference": {"kind": "position", "mean": 1.0}, "position": PID}
-            | controller
-        },
+        controllers={"servo": {"kind": "continuous", "reference": {"kind": "position", "mean": 1.0}, "position": PID} | controller},
         simulation={"duration": duration, "sample_interval": 0.01},
     )
 
@@ -42,9 +39,7 @@ def rests(run: xarray.Dataset) -> np.ndarray:
     """The errors at which it sticks, one after the other."""
     stuck = run["axis_contact"].values == 0
     error = run["servo_error"].values
-    return np.array(
-        [next(group)[1] for held, group in itertools.groupby(zip(stuck, error, strict=True), lambda p: p[0]) if held]
-    )
+    return np.array([next(group)[1] for held, group in itertools.groupby(zip(stuck, error, strict=True), lambda p: p[0]) if held])
 
 
 def slip(start: np.ndarray, before: float = 40.0) -> float:
@@ -112,10 +107,7 @@ def test_with_static_friction_it_hunts_in_proportion_to_the_excess() -> None:
 # --- linear, limited, random ---
 
 TWO_MASSES: dict[str, Any] = {
-    "shafts": {
-        "motor": {"inertia": 0.002, "viscous_friction": 0.01},
-        "load": {"inertia": 0.05, "viscous_friction": 0.02},
-    },
+    "shafts": {"motor": {"inertia": 0.002, "viscous_friction": 0.01}, "load": {"inertia": 0.05, "viscous_friction": 0.02}},
     "gears": {
         "belt": {
             "input": "motor",
@@ -132,21 +124,13 @@ TWO_MASSES: dict[str, Any] = {
 LOOP: dict[str, Any] = {
     "kind": "continuous",
     "reference": {"kind": "position", "mean": 0.4},
-    "position": {
-        "gain": 6.0,
-        "integral_gain": 9.0,
-        "derivative_gain": 0.6,
-        "filter_time": "20 ms",
-        "derivative_weight": 0.5,
-    },
+    "position": {"gain": 6.0, "integral_gain": 9.0, "derivative_gain": 0.6, "filter_time": "20 ms", "derivative_weight": 0.5},
 }
 
 
 def two_masses(duration: float = 2.0, interval: float = 0.05, **controller: Any) -> lm.Scenario:
     return lm.Scenario(
-        **TWO_MASSES,
-        controllers={"servo": LOOP | controller},
-        simulation={"duration": duration, "sample_interval": interval},
+        **TWO_MASSES, controllers={"servo": LOOP | controller}, simulation={"duration": duration, "sample_interval": interval}
     )
 
 
@@ -213,9 +197,7 @@ def test_limit_and_anti_windup_are_those_of_an_independent_integration(anti_wind
     t, x, side, crossings = 0.0, np.zeros(5), 1, []
     while t < 3.0:
         levels = [limit, -limit] if side == 0 else [side * limit]
-        found = solve_ivp(
-            rates(side), (t, 3.0), x, "DOP853", rtol=1e-12, atol=1e-13, max_step=2e-3, events=[event(v) for v in levels]
-        )
+        found = solve_ivp(rates(side), (t, 3.0), x, "DOP853", rtol=1e-12, atol=1e-13, max_step=2e-3, events=[event(v) for v in levels])
         t, x = float(found.t[-1]), found.y[:, -1]
         if t >= 3.0:
             break
@@ -271,18 +253,13 @@ def random_scenario(rng: np.random.Generator) -> lm.Scenario:
         gains = {"position": (6.0, 9.0, 0.6), "speed": (0.6, 2.0, 0.01)}[kind]
         k_p, k_i, k_d = (float(g * rng.uniform(0.3, 1.5)) for g in gains)
         controller[kind] = {"gain": k_p, "integral_gain": k_i, "derivative_gain": k_d, "filter_time": filter_time}
-        controller[kind] |= {
-            "derivative_weight": float(rng.uniform(0.0, 1.0)),
-            "proportional_weight": float(rng.uniform(0.0, 1.0)),
-        }
+        controller[kind] |= {"derivative_weight": float(rng.uniform(0.0, 1.0)), "proportional_weight": float(rng.uniform(0.0, 1.0))}
         if rng.random() < 0.5:
             controller["anti_windup_time"] = float(rng.uniform(0.05, 0.5))
     controller["limit"] = float(rng.uniform(0.5, 3.0))  # so that none grows without bound
     if rng.random() < 0.4:
         controller["current"] = {"kind": "first_order", "time_constant": 0.002}
-    return lm.Scenario(
-        **tables, controllers={"servo": controller}, simulation={"duration": 2.0, "sample_interval": 0.02}
-    )
+    return lm.Scenario(**tables, controllers={"servo": controller}, simulation={"duration": 2.0, "sample_interval": 0.02})
 
 
 def test_exact_and_adaptive_solver_agree_on_random_loops_and_the_energy_ledger_closes() -> None:
@@ -380,24 +357,17 @@ def play_loop(gain: float, small: float) -> lm.Scenario:
         "losses": {"kind": "constant_efficiency", "efficiency": 1.0},
     }
     return lm.Scenario(
-        shafts={
-            "motor": {"inertia": 1.0, "viscous_friction": 1.0 - small},
-            "load": {"inertia": 1e-8 * small, "viscous_friction": small},
-        },
+        shafts={"motor": {"inertia": 1.0, "viscous_friction": 1.0 - small}, "load": {"inertia": 1e-8 * small, "viscous_friction": small}},
         motors={"drive": {"shaft": "motor", "kind": "torque_source", "rated_torque": 1.0, "rotor_inertia": 0.0}},
         gears={"play": gear},
-        controllers={
-            "drive": {"kind": "continuous", "reference": {"kind": "position", "mean": 0.0}, "position": {"gain": gain}}
-        },
+        controllers={"drive": {"kind": "continuous", "reference": {"kind": "position", "mean": 0.0}, "position": {"gain": gain}}},
         initial={"angles": {"motor": 1.0}, "twists": {"play": 0.5}},
         simulation={"duration": 40.0, "sample_interval": 0.01},
     )
 
 
 @pytest.mark.parametrize(("gain", "amplitude", "frequency"), [(5.0, 0.980, 1.573), (10.0, 1.573, 2.699)])
-def test_limit_cycle_of_a_play_is_that_of_the_closed_form_and_the_published_one(
-    gain: float, amplitude: float, frequency: float
-) -> None:
+def test_limit_cycle_of_a_play_is_that_of_the_closed_form_and_the_published_one(gain: float, amplitude: float, frequency: float) -> None:
     """The load's friction and inertia go to zero together: the difference is of their first order."""
     X, period = play(gain)
     assert (round(X, 3), round(2.0 * np.pi / period, 3)) == (amplitude, frequency)
@@ -428,11 +398,7 @@ def test_systems_of_scipy_and_python_control_act_as_the_pid_that_they_equal() ->
 
     top, bottom = [6.0 * 0.02 + 0.6, 6.0 + 9.0 * 0.02, 9.0], [0.02, 1.0, 0.0]
     pid = LOOP["position"] | {"derivative_weight": 1.0}
-    reference = {
-        "kind": "position",
-        "amplitude": 0.4,
-        "frequency": 0.7,
-    }  # the derivative of a step would start the filter
+    reference = {"kind": "position", "amplitude": 0.4, "frequency": 0.7}  # the derivative of a step would start the filter
     wanted = lm.simulate(
         lm.Scenario(
             **TWO_MASSES,
@@ -489,9 +455,7 @@ def test_a_map_has_the_limit_cycles_of_its_points() -> None:
     assert "rest" in str(found["reason"][0, 0].values)
     for row, excess in ((1, 0.1), (2, 0.2)):
         assert float(found["amplitude"][row, 0]) == pytest.approx(hunting(excess)[0], rel=1e-9)
-        alone = lm.servo.limit_cycle(
-            inertia(0.3, 0.3 + excess, 100.0, position=PID | {"integral_gain": 2.0}), causes=False
-        )
+        alone = lm.servo.limit_cycle(inertia(0.3, 0.3 + excess, 100.0, position=PID | {"integral_gain": 2.0}), causes=False)
         assert float(found["frequency"][row, 1]) == alone.frequency
 
 
@@ -499,9 +463,7 @@ def test_the_period_is_the_shortest_one() -> None:
     # At the middle gain Newton's method is first led to four periods.
     hunting = lm.load("hunting-with-static-friction", {"shafts.table.breakaway_torque": 11.0})
     key = "controllers.servo.position.integral_gain"
-    found = [
-        lm.servo.limit_cycle(hunting.replace(**{key: k}), causes=False).frequency for k in (7.5, 8.615384615384617, 9.5)
-    ]
+    found = [lm.servo.limit_cycle(hunting.replace(**{key: k}), causes=False).frequency for k in (7.5, 8.615384615384617, 9.5)]
     assert np.diff(found).min() > 0.0
     assert found[1] == pytest.approx(0.157284, rel=1e-5)
 

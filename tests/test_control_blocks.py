@@ -19,12 +19,7 @@ J_M, J_L, B_M, B_L, C, RATIO = 4e-4, 3e-3, 2e-3, 4e-3, 90.0, 2.0  # two masses b
 STEPS = 1200  # ticks
 
 A = np.array(
-    [
-        [-B_M / J_M, 0.0, -C / (RATIO * J_M), 0.0],
-        [0.0, -B_L / J_L, C / J_L, 0.0],
-        [1.0 / RATIO, -1.0, 0.0, 0.0],
-        [0.0, 1.0, 0.0, 0.0],
-    ]
+    [[-B_M / J_M, 0.0, -C / (RATIO * J_M), 0.0], [0.0, -B_L / J_L, C / J_L, 0.0], [1.0 / RATIO, -1.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0]]
 )
 """of the speeds of motor and load, the twist at the load, the angle of the load; the torque of the motor acts on the first"""
 PHI = expm(np.block([[A, np.array([[1.0 / J_M], [0.0], [0.0], [0.0]])], [np.zeros((1, 5))]]) * T)[:4]
@@ -96,9 +91,7 @@ class SpeedLoop:
 class PositionLoop:
     """w* = sat(K_v e + I + k_ff rate), I += T k_i e but within the dead zone while the reference stands."""
 
-    def __init__(
-        self, K_v: float, every: int, k_i: float = 0.0, k_ff: float = 0.0, zone: tuple[float, float] = (0.0, 0.0)
-    ) -> None:
+    def __init__(self, K_v: float, every: int, k_i: float = 0.0, k_ff: float = 0.0, zone: tuple[float, float] = (0.0, 0.0)) -> None:
         self.K_v, self.time, self.k_i, self.k_ff, self.zone = K_v, every * T, k_i, k_ff, zone
         self.I, self.holds, self.held = 0.0, False, 0
 
@@ -115,9 +108,7 @@ class PositionLoop:
         return wanted
 
 
-def recomputed(
-    control: Callable[[int, np.ndarray], float], load: Callable[[float], float] = lambda _: 0.0
-) -> np.ndarray:
+def recomputed(control: Callable[[int, np.ndarray], float], load: Callable[[float], float] = lambda _: 0.0) -> np.ndarray:
     """States at the ticks, under a torque of the motor that acts one tick after it was computed; the load jumps at ticks only."""
     pushed = expm(np.block([[A, np.array([[0.0], [-1.0 / J_L], [0.0], [0.0]])], [np.zeros((1, 5))]]) * T)[:4, 4]
     x, acting, out = np.zeros(4), 0.0, []
@@ -139,14 +130,7 @@ def simulated(controller: dict[str, Any], torque: Any = None) -> Any:
                 "load": {"inertia": J_L, "viscous_friction": B_L, "torque": torque},
             },
             motors={"m": {"shaft": "motor", "kind": "torque_source", "rotor_inertia": 0.0, "rated_torque": 1.0}},
-            gears={
-                "gear": {
-                    "input": "motor",
-                    "output": "load",
-                    "ratio": RATIO,
-                    "stiffness": {"kind": "linear", "stiffness": C},
-                }
-            },
+            gears={"gear": {"input": "motor", "output": "load", "ratio": RATIO, "stiffness": {"kind": "linear", "stiffness": C}}},
             controllers={"m": base | controller},
             simulation={"duration": STEPS * T, "sample_interval": T},
         ),
@@ -181,11 +165,7 @@ def test_an_encoder_has_steps_an_error_and_a_delay() -> None:
         {
             "reference": {"kind": "speed", "amplitude": 6.0, "frequency": 7.0},
             "encoder": {"lines": 32, "error": 1e-3, "error_periods": 3, "error_phase": 0.4, "delay": 2},
-            "speed": {
-                "gain": 0.05,
-                "integral_gain": 1.0,
-                "estimate": {"kind": "difference", "span": 2, "time_constant": 1e-3},
-            },
+            "speed": {"gain": 0.05, "integral_gain": 1.0, "estimate": {"kind": "difference", "span": 2, "time_constant": 1e-3}},
         }
     )
     agree(result, states, measured_speed=shown)
@@ -338,9 +318,7 @@ def test_a_limit_of_the_voltage_does_not_wind_up_the_current_loop() -> None:
     J, b, M_R, w_R, k_N, tau, g, limit = 8e-4, 3e-3, 0.5, 300.0, 4.0, 1.3e-3, 1.0 / 3.0, 1.2
     a = math.exp(-T / tau)
     K, K_e = g / (k_N * (1.0 - a)), (k_N - 1.0) / (k_N * w_R)
-    plant = np.array(
-        [[-b / J, 1.0 / J, 0.0], [-(k_N - 1.0) * M_R / (w_R * tau), -1.0 / tau, k_N * M_R / tau], [0.0] * 3]
-    )
+    plant = np.array([[-b / J, 1.0 / J, 0.0], [-(k_N - 1.0) * M_R / (w_R * tau), -1.0 / tau, k_N * M_R / tau], [0.0] * 3])
     phi = expm(plant * T)[:2]
     loop, estimate = SpeedLoop(0.02, 0.4, limit=1.5), Difference(1, 0.0)
     angular = expm(np.block([[plant, np.zeros((3, 1))], [1.0, 0.0, 0.0, 0.0]]) * T)[3]

@@ -54,9 +54,7 @@ def test_the_record_changes_nothing(axis: lm.Scenario) -> None:
     coarse = lm.simulate(axis, sample_interval=6e-3)
     fine = lm.simulate(axis, sample_interval=1e-3, energy=False)
     assert coarse.attrs["switching_count"] == fine.attrs["switching_count"]
-    same(
-        coarse, fine.isel(time=slice(None, None, 6)), 1e-11
-    )  # within rounding: intervals are halved from the sample interval
+    same(coarse, fine.isel(time=slice(None, None, 6)), 1e-11)  # within rounding: intervals are halved from the sample interval
     part = lm.simulate(axis, duration=0.60003, sample_interval=6e-3)
     assert part["time"].to_numpy()[100:] == pytest.approx([0.6, 0.60003])  # the last sample is the end
     same(coarse.isel(time=slice(0, 101)), part.isel(time=slice(0, 101)), 1e-11)

@@ -20,9 +20,7 @@ from lostmotion.units.conversion import Unit
 # makes a synchronous motor a DC motor.
 # The line of a motor becomes its rated point.
 LINE = {"motor.stall_torque", "motor.no_load_speed", "motor.stall_current", "motor.no_load_current"}
-ELECTRIC = {
-    f"motor.{key}" for key in ("rated_current", "resistance_phase", "inductance_phase", "supply_voltage")
-}  # of a stepper
+ELECTRIC = {f"motor.{key}" for key in ("rated_current", "resistance_phase", "inductance_phase", "supply_voltage")}  # of a stepper
 NOT_OF_THE_CORE = {"motor.rated_voltage", "motor.voltage_limit", "motor.dc_voltage"} | LINE | ELECTRIC
 # A stiffness of the kind rigid has the flanks of a gear.
 OF_THE_CORE_ALONE = {"motor.command_limit", "gearbox.flanks.backlash", "gearbox.flanks.restitution"}
@@ -77,9 +75,7 @@ def test_the_states_are_variables_and_what_a_run_can_start_from() -> None:
 def test_a_constant_efficiency_varies_in_the_core_as_in_single_runs(tmp_path: Path) -> None:
     base = lm.load(ROOT / "scenarios" / "paper-2dof-l-large.toml", ["simulation.duration=0.2"])
     study = lm.studies.Study(
-        scenario=base,
-        vary=[{"key": "gearbox.losses.efficiency", "values": [0.6, 0.7]}],
-        keep={"end": "final(load_angle)"},
+        scenario=base, vary=[{"key": "gearbox.losses.efficiency", "values": [0.6, 0.7]}], keep={"end": "final(load_angle)"}
     )
     assert core_can(study)
     rows = read_table(lm.study(study, tmp_path / "s")).to_pydict()
@@ -93,9 +89,7 @@ def test_names_of_the_ledger_add_up_to_the_balance() -> None:
     result = lm.simulate(lm.load(ROOT / "scenarios" / "paper-2dof-nl-small.toml", ["simulation.duration=0.5"]))
     e = lm.energy_of(result)
     lost = sum(e[n] for n in _core.energy_entries()[1:8])
-    assert e["source"] - lost - e["kinetic_change"] - e["elastic_change"] == pytest.approx(
-        e["residual"], abs=1e-12 * e["turned_over"]
-    )
+    assert e["source"] - lost - e["kinetic_change"] - e["elastic_change"] == pytest.approx(e["residual"], abs=1e-12 * e["turned_over"])
 
 
 def test_a_cause_s_number_goes_with_what_the_contacts_do() -> None:

@@ -31,9 +31,7 @@ def pair(damper: dict[str, Any] | None = None, **tables: Any) -> lm.Scenario:
     return lm.Scenario(**base | {name: {**base.get(name, {}), **table} for name, table in tables.items()})
 
 
-FLUID: dict[str, Any] = {
-    "drag": {"kind": "curve", "speeds": [0.0, 5.0, 20.0, 40.0], "torques": [0.0, 0.005, 0.08, 0.32]}
-}
+FLUID: dict[str, Any] = {"drag": {"kind": "curve", "speeds": [0.0, 5.0, 20.0, 40.0], "torques": [0.0, 0.005, 0.08, 0.32]}}
 SPINNING = {"speeds": {"a": 50.0}, "angles": {"b": 0.3}}
 
 
@@ -101,9 +99,7 @@ def test_what_holds_a_shaft_behind_a_damper_is_explained() -> None:
     held = D * 20.0
     contact = next(c for c in told.contacts if c.name == "a_contact")
     assert contact.torque == pytest.approx(held, rel=EXACT)
-    assert (told.motors[0].command_forward, told.motors[0].command_backward) == pytest.approx(
-        (0.5 - held, -0.5 - held), rel=EXACT
-    )
+    assert (told.motors[0].command_forward, told.motors[0].command_backward) == pytest.approx((0.5 - held, -0.5 - held), rel=EXACT)
 
 
 def test_stepping_has_the_variables_and_values_of_a_run() -> None:

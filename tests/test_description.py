@@ -65,9 +65,7 @@ class Scenario:
         return Stepped(self.lib, c.c_void_p(made))
 
 
-@pytest.mark.parametrize(
-    "name", ["paper-2dof-nl-small", "position-axis", "field-weakening", "joint-under-gravity", "stepper-belt-axis"]
-)
+@pytest.mark.parametrize("name", ["paper-2dof-nl-small", "position-axis", "field-weakening", "joint-under-gravity", "stepper-belt-axis"])
 def test_a_run_has_the_bits_of_python(library: c.CDLL, name: str) -> None:  # noqa: F811
     there = Scenario(library, lm.portable.description(lm.load(name), parameters=False)).run()
     here = lm.simulate(lm.load(name))
@@ -146,10 +144,7 @@ def explained(scenario: Scenario, time: float) -> dict[int, dict[str, list[float
 @pytest.mark.parametrize("name", ["paper-2dof-nl-small", "worm-lowering", "two-motors-one-ring"])
 def test_an_explanation_is_that_of_python(library: c.CDLL, name: str) -> None:  # noqa: F811
     scenario, time = lm.load(name), 0.3
-    told, wanted = (
-        explained(Scenario(library, lm.portable.description(scenario, parameters=False)), time),
-        lm.explain(scenario, time),
-    )
+    told, wanted = (explained(Scenario(library, lm.portable.description(scenario, parameters=False)), time), lm.explain(scenario, time))
     contacts = {
         contact.name: [contact.mode, contact.speed, contact.torque, contact.capacity_forward, contact.capacity_backward]
         for contact in wanted.contacts
@@ -191,9 +186,7 @@ def test_signals_references_and_times_are_replaced(library: c.CDLL, axis: Scenar
         scale = float(np.abs(wanted[name]).max())
         assert np.allclose(told[name], wanted[name], rtol=0.0, atol=1e-9 * scale), name
     assert lib.lm_scenario_set_times(axis.handle, c.c_double(-1.0), c.c_double(1e-3)) == INVALID
-    assert (
-        lib.lm_scenario_set_reference(axis.handle, c.c_size_t(7), pieces, c.c_size_t(2), None, c.c_size_t(0)) == INVALID
-    )
+    assert lib.lm_scenario_set_reference(axis.handle, c.c_size_t(7), pieces, c.c_size_t(2), None, c.c_size_t(0)) == INVALID
     for times, wrong in (((0.1, 0.2), "begin at 0 s"), ((0.0, 0.0), "rise in time"), ((0.0, math.nan), "[1].time")):
         pieces = doubles([(t, 0.1, 0.0, 0.0, 0.0) for t in times])
         lib.lm_scenario_set_reference(axis.handle, c.c_size_t(0), pieces, c.c_size_t(2), None, c.c_size_t(0))
@@ -370,9 +363,7 @@ def test_keys_that_follow_by_any_law_are_parameters() -> None:
     }
     assert {"motor.electrical_time_constant", "controller.reference.jerk"} <= keys["position-axis"]
     assert {"screws.screw.core_diameter", "screws.screw.diameter"} <= keys["ball-screw-axis"]
-    assert {f"controllers.servo.speed.torque_filters.0.{key}" for key in ("frequency", "depth", "width")} <= keys[
-        "position-axis-with-belt"
-    ]
+    assert {f"controllers.servo.speed.torque_filters.0.{key}" for key in ("frequency", "depth", "width")} <= keys["position-axis-with-belt"]
     # A phase has no use without a sine, nor an error of an encoder without its periods.
     assert not any(key.endswith("torque.phase") for key in keys["position-axis"])
 

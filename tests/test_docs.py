@@ -56,9 +56,7 @@ def test_the_readme_s_python_prints_what_it_shows(tmp_path: Path) -> None:
     page = (ROOT / "README.md").read_text()
     code, shown = re.search(r"```python\n(.*?)```", page, re.S), re.search(r"```text\n(.*?)```", page, re.S)
     assert code is not None and shown is not None
-    done = subprocess.run(
-        [sys.executable, "-c", code.group(1)], cwd=tmp_path, check=True, capture_output=True, text=True
-    )
+    done = subprocess.run([sys.executable, "-c", code.group(1)], cwd=tmp_path, check=True, capture_output=True, text=True)
     assert done.stdout == shown.group(1)
 
 
@@ -84,9 +82,7 @@ def test_the_first_commands_run(tmp_path: Path) -> None:
     printed = []
     for command in commands:
         done = lostmotion(*shlex.split(command), cwd=tmp_path)
-        misses = (
-            "does not fit: stable, but misses the window" in done.stdout
-        )  # the verdict on the axis, which is no error
+        misses = "does not fit: stable, but misses the window" in done.stdout  # the verdict on the axis, which is no error
         assert misses == command.startswith("servo ")
         assert done.returncode == (1 if misses else 0), done.stderr
         printed.append(done.stdout)
@@ -124,23 +120,9 @@ def test_the_paper_is_cited_in_full_where_it_is_meant() -> None:
 
 def test_the_glossary_has_the_terms_that_the_pages_use() -> None:
     glossary = (ROOT / "docs" / "glossary.md").read_text()
-    terms = [
-        t.lower()
-        for line in re.findall(r"^([A-Z].*)$", glossary.split("```{glossary}")[1], re.M)
-        for t in line.split(", ")
-    ]
+    terms = [t.lower() for line in re.findall(r"^([A-Z].*)$", glossary.split("```{glossary}")[1], re.M) for t in line.split(", ")]
     assert len(terms) == len(set(terms)) > 20
-    for term in (
-        "backlash",
-        "event",
-        "lost motion",
-        "loss map",
-        "regime",
-        "segment",
-        "breakpoint",
-        "self-locking",
-        "twist",
-    ):
+    for term in ("backlash", "event", "lost motion", "loss map", "regime", "segment", "breakpoint", "self-locking", "twist"):
         assert term in terms
 
 
@@ -190,30 +172,14 @@ def test_generated_pages_name_every_key_and_variable(generate: Any) -> None:
         assert f"## `{name}`" in commands
         section = commands.split(f"## `{name}`\n")[1].split("\n## ")[0]
         for parameter in command.params:
-            for option in (
-                parameter.opts if parameter.param_type_name == "option" else [parameter.metavar.split(" ")[0]]
-            ):
+            for option in parameter.opts if parameter.param_type_name == "option" else [parameter.metavar.split(" ")[0]]:
                 assert option == "--help" or option in section
     for path in ALL_SCENARIOS:
         assert generate.introduction(path), f"{path} needs a comment below its title, for the gallery"
     reference = generate.scenario_reference()
-    for table in (
-        "command",
-        "motor",
-        "gearbox",
-        "gearbox.stiffness",
-        "gearbox.hysteresis",
-        "gearbox.losses",
-        "load",
-        "simulation",
-    ):
+    for table in ("command", "motor", "gearbox", "gearbox.stiffness", "gearbox.hysteresis", "gearbox.losses", "load", "simulation"):
         assert f"[{table}" in reference
-    for key in (
-        *lm.Motor.model_fields,
-        *lm.Gearbox.model_fields,
-        *lm.Load.model_fields,
-        *lm.model.LossMap.model_fields,
-    ):
+    for key in (*lm.Motor.model_fields, *lm.Gearbox.model_fields, *lm.Load.model_fields, *lm.model.LossMap.model_fields):
         assert f"| `{key}` |" in reference
     of_trains = generate.train_reference()
     parts = (
@@ -275,9 +241,7 @@ def test_the_readme_has_no_time_of_its_own(quotes: Any) -> None:
 
 
 THEORY = (ROOT / "docs" / "theory.md").read_text()
-ROWS = [
-    line.strip("| ").split(" | ") for line in THEORY.splitlines() if re.match(r"\| .*`\w+\.(hpp|py)`|\| .*`\w+/", line)
-]
+ROWS = [line.strip("| ").split(" | ") for line in THEORY.splitlines() if re.match(r"\| .*`\w+\.(hpp|py)`|\| .*`\w+/", line)]
 
 
 def test_every_numbered_equation_of_the_theory_is_in_its_table() -> None:

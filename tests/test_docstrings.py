@@ -62,9 +62,7 @@ def test_an_example_prints_what_it_shows(name: str, monkeypatch: pytest.MonkeyPa
     thing = inspect.unwrap({**FUNCTIONS, **CLASSES}[name])
     example = doctest.DocTestParser().get_doctest(inspect.getdoc(thing) or "", {"lm": lm}, name, None, None)
     told: list[str] = []
-    failed, tried = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE).run(
-        example, out=told.append
-    )
+    failed, tried = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE).run(example, out=told.append)
     assert tried and not failed, "".join(told)
 
 

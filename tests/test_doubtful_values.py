@@ -75,14 +75,10 @@ def test_no_shipped_file_is_doubted() -> None:
 
 def test_a_window_that_holds_the_whole_move_is_doubted() -> None:
     """The shipped axis moves by 45 degrees."""
-    with pytest.warns(
-        ValueWarning, match=r"window: 2 rad \(115 deg\) is no less than the whole motion, .* rad \(45 deg\)"
-    ):
+    with pytest.warns(ValueWarning, match=r"window: 2 rad \(115 deg\) is no less than the whole motion, .* rad \(45 deg\)"):
         lm.commission(lm.load("position-axis"), window=2.0)
     coarse = lm.load("position-axis-load-encoder", {"controller.position_encoder": {"shaft": "load", "bits": 4}})
-    with pytest.warns(
-        ValueWarning, match=r"window: 1\.5708 rad \(90 deg\) is no less than the whole motion"
-    ):  # 4 steps
+    with pytest.warns(ValueWarning, match=r"window: 1\.5708 rad \(90 deg\) is no less than the whole motion"):  # 4 steps
         found = lm.commission(coarse)
     assert found.settling[-1].time == 0.0  # and not the rounding of two instants
 
@@ -92,9 +88,7 @@ def test_the_settling_window_of_a_task_is_compared_with_its_motion(tmp_path: Pat
     wide = re.sub(r'settling_window = "[^"]*"', 'settling_window = "300 deg"', text)
     assert wide != text
     (tmp_path / "task.toml").write_text(wide)
-    with pytest.warns(
-        ValueWarning, match=r"key task.settling_window: 5\.23599 rad \(300 deg\) is no less than the whole"
-    ):
+    with pytest.warns(ValueWarning, match=r"key task.settling_window: 5\.23599 rad \(300 deg\) is no less than the whole"):
         lm.studies.load_task(tmp_path / "task.toml")
 
 

@@ -110,10 +110,7 @@ def test_the_cycle_of_the_task_brings_the_pause():
 
 def test_holding_a_load_heats_even_at_rest():
     """A vertical axis: 0.3 N·m hold it before and after the move; no pause cools the motor below that."""
-    scenario = move(
-        1.0,
-        **{"command.mean": 0.3, "load.torque": 15.0, "task.hold_without_power": False, "motor.friction_torque": 1e-3},
-    )
+    scenario = move(1.0, **{"command.mean": 0.3, "load.torque": 15.0, "task.hold_without_power": False, "motor.friction_torque": 1e-3})
     cycle = duty_cycle(lm.simulate(scenario), 100.0)
     assert cycle.rms_motor_torque == pytest.approx(0.3, rel=0.01)
     at_rest = duty_cycle(lm.simulate(move(1.0, command=0.0)), None)
@@ -180,8 +177,7 @@ def test_the_torque_that_is_held_at_rest_is_that_of_all_friction(sign: float):
 
 
 @pytest.mark.parametrize(
-    ("name", "speed", "verdict"),
-    [("nord-sk1si50-30", 0.0, "ok"), ("nord-sk1si50-30", 3.6, "warning"), ("motovario-sw050-100", 3.6, "ok")],
+    ("name", "speed", "verdict"), [("nord-sk1si50-30", 0.0, "ok"), ("nord-sk1si50-30", 3.6, "warning"), ("motovario-sw050-100", 3.6, "ok")]
 )
 def test_a_worm_gear_that_locks_at_rest_may_not_stop_a_moving_load(name: str, speed: float, verdict: str):
     """Static efficiencies 0.36 and 0.23: both lock at rest. Efficiency e in motion makes 2 - 1/e in reverse: 0.46 and below 0."""
@@ -262,9 +258,7 @@ def test_the_peak_torque_of_the_motor_is_judged_where_it_is_known():
 def test_verdicts_that_depend_on_estimated_losses_are_not_decided():
     losses = {"kind": "map", "speeds": [0, 1], "loads": [0, 1], "values": [[0, 0], [0.3, 0.3]], "mirrored": True}
     most = losses | {"values": [[0, 0], [0.39, 0.39]]}
-    torque, largest = (
-        float(abs(lm.simulate(move(**{"gearbox.losses": some}))["output_torque"]).max()) for some in (losses, most)
-    )
+    torque, largest = (float(abs(lm.simulate(move(**{"gearbox.losses": some}))["output_torque"]).max()) for some in (losses, most))
     assert largest > 1.01 * torque  # the same torque of the motor brakes the load harder the more the gearbox loses
     for limit, verdict in ((1.1 * largest, "ok"), (0.5 * (torque + largest), "unknown")):
         changes = {"gearbox.loss_range": [0.5, 1.3], "gearbox.limits.peak_output_torque": limit}
@@ -292,9 +286,7 @@ def test_a_worm_gear_that_locks_lowers_smoothly_or_chatters():
 
 def test_every_rule_is_tried_and_names_its_source():
     of_steppers = {"lost_steps", "stepper_torque", "step_resonance"}  # tests/test_stepper.py
-    assert set(OTHERWISE) | of_steppers | {"loss_map", "self_locking", "motor_peak_torque", "estimated_losses"} == set(
-        RULES
-    )
+    assert set(OTHERWISE) | of_steppers | {"loss_map", "self_locking", "motor_peak_torque", "estimated_losses"} == set(RULES)
     for finding in check_drive(move()):
         assert finding.source
         assert f"[{finding.source}]" in str(finding)
@@ -337,9 +329,7 @@ def test_nothing_judged_is_not_decided_and_what_is_not_judged_is_a_reservation()
 
 def test_a_verdict_that_depends_on_estimated_losses_is_not_decided():
     findings = lm.check_drive(lm.load("catalogue-robot-joint"))
-    turned = lm.sizing.Finding(
-        "estimated_losses", "estimated losses", "not decided by them: x (ok to warning)", "unknown"
-    )
+    turned = lm.sizing.Finding("estimated_losses", "estimated losses", "not decided by them: x (ok to warning)", "unknown")
     assert lm.sizing.Findings([*findings, turned]).verdict.state == "not decided"
 
 
@@ -421,8 +411,7 @@ def test_a_cycle_that_includes_the_sinking_is_judged():
 
 def test_a_load_that_is_only_slowed_down_by_friction_is_no_sinking_one():
     coasting = lm.load(
-        "catalogue-robot-joint",
-        {"command": {"steps": [{"height": 0.5}, {"height": -0.5, "time": 0.5}]}, "simulation.duration": 0.52},
+        "catalogue-robot-joint", {"command": {"steps": [{"height": 0.5}, {"height": -0.5, "time": 0.5}]}, "simulation.duration": 0.52}
     )
     for rule in MEANS:
         assert "with command 0" not in by_rule(coasting)[rule].remark
@@ -468,9 +457,7 @@ TRAVEL = 0.2 / (2.0 * math.pi)  # of a slide for a radian
     ],
 )  # fmt: skip
 def test_the_inertia_of_an_axis_is_all_that_its_rotor_moves(parts: dict, inertia: float) -> None:
-    axis = lm.Scenario(
-        axis={"motor": ROTOR, **parts}, command={"mean": 0.2}, simulation={"duration": 0.1, "sample_interval": 0.01}
-    )
+    axis = lm.Scenario(axis={"motor": ROTOR, **parts}, command={"mean": 0.2}, simulation={"duration": 0.1, "sample_interval": 0.01})
     ratio = next(f for f in lm.check_drive(axis) if f.rule == "inertia_ratio")
     assert ratio.use == pytest.approx(inertia / 2e-4 / 10.0, rel=1e-9)
     assert ratio.verdict == "ok" or "axis.motor.limits.max_inertia_ratio states" in ratio.remark
@@ -529,11 +516,7 @@ def test_a_drive_in_the_long_form_gets_the_judgements_of_the_short_one(name: str
     scenario = lm.load(name)
     assert scenario.is_drive
     short, long = (
-        [
-            (f.rule, f.value, f.verdict)
-            for f in lm.check_drive(s)
-            if f.rule in ("inertia_ratio", "resonance", "lost_motion")
-        ]
+        [(f.rule, f.value, f.verdict) for f in lm.check_drive(s) if f.rule in ("inertia_ratio", "resonance", "lost_motion")]
         for s in (scenario, scenario.long())
     )
     assert len(short) >= 2
@@ -661,16 +644,9 @@ sample_interval = 0.01
     assert bare["screw_life"].remark == "screws.screw.dynamic_capacity is missing"
 
 
-BRAKING = (
-    0.3125  # energy [J] that one axis of AXES returns: 0.5 N·m · w - 0.5 Ω · (5 A)² from 50 to 25 rad/s, at 500 rad/s²
-)
+BRAKING = 0.3125  # energy [J] that one axis of AXES returns: 0.5 N·m · w - 0.5 Ω · (5 A)² from 50 to 25 rad/s, at 500 rad/s²
 AXIS = {"steps": [{"height": 0.5}, {"height": -1.0, "time": 0.1}, {"height": 0.5, "time": 0.2}]}
-MOTOR = {
-    "kind": "torque_source",
-    "rotor_inertia": 5e-4,
-    "rated_torque": 1.0,
-    "limits": {"torque_constant": 0.1, "resistance": 0.5},
-}
+MOTOR = {"kind": "torque_source", "rotor_inertia": 5e-4, "rated_torque": 1.0, "limits": {"torque_constant": 0.1, "resistance": 0.5}}
 
 
 def axes(later: float = 0.0, cycle: float = 0.5, **supply) -> lm.Scenario:
@@ -681,10 +657,7 @@ def axes(later: float = 0.0, cycle: float = 0.5, **supply) -> lm.Scenario:
             "shafts": {"x": {"inertia": 5e-4}, "y": {"inertia": 5e-4}},
             "motors": {name: {**MOTOR, "shaft": name} for name in ("x", "y")},
             "command": {"x": AXIS, "y": second},
-            "task": {
-                "cycle": cycle,
-                "supply": {"max_voltage": 48.0, "voltage_limit": 60.0, "capacitance": 1e-3} | supply,
-            },
+            "task": {"cycle": cycle, "supply": {"max_voltage": 48.0, "voltage_limit": 60.0, "capacitance": 1e-3} | supply},
             "simulation": {"duration": 0.5, "sample_interval": 1e-3},
         }
     )
@@ -724,9 +697,7 @@ def test_a_drive_on_its_bus_is_the_train_of_one_axis():
         task={"cycle": 0.5, "supply": {"max_voltage": 48.0, "voltage_limit": 60.0, "capacitance": 1e-3}},
         simulation={"duration": 0.45, "sample_interval": 1e-3},
     )
-    assert by_rule(scenario)["bus_voltage"].use == pytest.approx(
-        math.sqrt(48.0**2 + 2.0 * BRAKING / 1e-3) / 60.0, rel=1e-4
-    )
+    assert by_rule(scenario)["bus_voltage"].use == pytest.approx(math.sqrt(48.0**2 + 2.0 * BRAKING / 1e-3) / 60.0, rel=1e-4)
 
 
 def test_a_bus_without_the_data_of_a_motor_is_not_judged():
@@ -740,9 +711,7 @@ def test_a_drive_has_the_same_findings_in_both_forms():
     """Keys in remarks are those of each form; all else is the same."""
     for scenario in (move(), move(**{"load.torque": 2.0, "task.max_lost_motion": 1e-3, "motor.rotor_inertia": 1e-5})):
         short, long = check_drive(scenario), check_drive(scenario.long())
-        assert [(f.rule, f.value, f.verdict, f.use) for f in short] == [
-            (f.rule, f.value, f.verdict, f.use) for f in long
-        ]
+        assert [(f.rule, f.value, f.verdict, f.use) for f in short] == [(f.rule, f.value, f.verdict, f.use) for f in long]
 
 
 @pytest.mark.parametrize(("efficiency", "verdict"), [(0.9, "warning"), (0.45, "ok")])
@@ -764,9 +733,7 @@ def test_a_brake_and_a_payload_of_an_axis_are_those_of_the_long_form():
     axis["screw"] = {"lead": 0.02, "efficiency": 0.9, "stiffness": 1e8, "damping": 2e4}
     axis["slide"] = {"mass": "30 kg", "inclination": math.pi / 2}
     times = {"duration": 0.1, "sample_interval": 0.01}
-    short = lm.Scenario(
-        axis=axis | {"payload": {"mass": 2.0}, "brake": {"torque": 0.8, "command": 1.0}}, simulation=times
-    )
+    short = lm.Scenario(axis=axis | {"payload": {"mass": 2.0}, "brake": {"torque": 0.8, "command": 1.0}}, simulation=times)
     long = lm.Scenario(axis=axis | {"slide": axis["slide"] | {"mass": 32.0}}, simulation=times).written
     assert short.slides == long.slides
     assert short.brakes["brake"] == lm.Brake(shaft="motor", torque=0.8)

@@ -167,10 +167,7 @@ def test_a_slide_of_an_axis_moves_as_it_is_given(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("keys", "message"),
     [
-        (
-            "",
-            'has backlash but is rigid; give it a stiffness, such as "200 N/um", or the restitution of its flanks, 0 to 1',
-        ),
+        ("", 'has backlash but is rigid; give it a stiffness, such as "200 N/um", or the restitution of its flanks, 0 to 1'),
         ('restitution = 0.5\nstiffness = "100 N/um"', "has a restitution and a stiffness"),
         ("restitution = 1.5", "axis.rack.restitution"),
     ],

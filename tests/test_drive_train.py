@@ -87,10 +87,7 @@ def test_a_file_in_the_long_form_gives_the_train_in_si(file: Path) -> None:
         ("motors.m1.shaft=x", 'key motors.m1.shaft: "x" is no shaft; the shafts are motor, worm, table'),
         ("gears.belt.outptu=x", "key gears.belt.outptu: is not known; did you mean output?"),
         ("gears.wrm.ratio=3", "keys gears.wrm.input, gears.wrm.output: are missing; add them"),
-        (
-            "gears.belt.ratio=0",
-            "key gears.belt.ratio: 0 is no ratio; give input speed / output speed, below 0 for a gear that reverses",
-        ),
+        ("gears.belt.ratio=0", "key gears.belt.ratio: 0 is no ratio; give input speed / output speed, below 0 for a gear that reverses"),
         (
             "shafts.table.inertia=2 kg",
             'key shafts.table.inertia: "2 kg" has the unit of something else (kg); it must be a value in kg*m^2, such as "1 kg*m^2"',
@@ -106,32 +103,14 @@ def test_a_file_in_the_long_form_gives_the_train_in_si(file: Path) -> None:
             "solved against the frame only; leave one of them out",
         ),
         ("gears.belt.output=motor", "key gears.belt: joins shaft 'motor' with itself; give it another output"),
-        (
-            "shafts.idle.inertia=1",
-            "key shafts.idle: is turned by nothing: no motor, gear or load torque acts on it; join it to the train",
-        ),
-        (
-            "command.m2=1",
-            "key command.m2: is no motor, brake or friction clutch of this train; those with a command are m1, hold",
-        ),
+        ("shafts.idle.inertia=1", "key shafts.idle: is turned by nothing: no motor, gear or load torque acts on it; join it to the train"),
+        ("command.m2=1", "key command.m2: is no motor, brake or friction clutch of this train; those with a command are m1, hold"),
         ("motor.rotor_inertia=1", "key motor: is not known; did you mean motors?"),
         ("initial.speeds.motr=1", "key initial.speeds.motr: is no shaft of this train; did you mean motor?"),
-        (
-            "initial.twists.belt=x",
-            'key initial.twists.belt: "x" is not one number with one unit; write a value in rad, such as "1 rad"',
-        ),
-        (
-            "gears.belt.gearbox=nix",
-            'key gears.belt.gearbox: gearbox "nix" is not in the catalogue; `lostmotion catalogue` lists them',
-        ),
-        (
-            "gears.belt.added_backlash=0.01",
-            "key gears.belt.added_backlash: acts on a record; give gears.belt.gearbox, or leave it out",
-        ),
-        (
-            "gears.belt.losses={kind='worm'}",
-            "key gears.belt.losses: lacks lead_angle, or module, starts and diameter; add it",
-        ),
+        ("initial.twists.belt=x", 'key initial.twists.belt: "x" is not one number with one unit; write a value in rad, such as "1 rad"'),
+        ("gears.belt.gearbox=nix", 'key gears.belt.gearbox: gearbox "nix" is not in the catalogue; `lostmotion catalogue` lists them'),
+        ("gears.belt.added_backlash=0.01", "key gears.belt.added_backlash: acts on a record; give gears.belt.gearbox, or leave it out"),
+        ("gears.belt.losses={kind='worm'}", "key gears.belt.losses: lacks lead_angle, or module, starts and diameter; add it"),
         (
             "gears.belt.losses={kind='worm',lead_angle=0.1}",
             "key gears.belt.losses: lacks friction_angle and friction_coefficient; give one of them",
@@ -162,9 +141,7 @@ def test_rigid_gears_in_a_loop_are_refused_with_their_key() -> None:
     gears = {name: gear | {"stiffness": {"kind": "rigid"}} for name, gear in TRAIN["gears"].items()}
     with pytest.raises(lm.InputError, match=r"^key gears.direct: closes a loop of rigid gears with the same ratio"):
         lm.Scenario(**TRAIN | {"gears": gears | {"direct": rigid}})
-    with pytest.raises(
-        lm.InputError, match=r"^key gears.direct: closes a loop of rigid gears with another ratio: nothing"
-    ):
+    with pytest.raises(lm.InputError, match=r"^key gears.direct: closes a loop of rigid gears with another ratio: nothing"):
         lm.Scenario(**TRAIN | {"gears": gears | {"direct": rigid | {"ratio": 90.0}}})
 
 
@@ -195,9 +172,7 @@ def test_angles_at_the_start_follow_through_the_gears() -> None:
     start = start_values(scenario.train(), scenario.initial)
     assert start["motor_angle"] == pytest.approx(2.0 * (10.0 + 0.1), rel=1e-14)
     assert start["table_angle"] == pytest.approx(10.0 / 50.0 - 0.02, rel=1e-14)
-    with pytest.raises(
-        lm.InputError, match=r"initial.angles.table: 0.2 rad does not fit motor = 1.0 rad through the gear"
-    ):
+    with pytest.raises(lm.InputError, match=r"initial.angles.table: 0.2 rad does not fit motor = 1.0 rad through the gear"):
         train(**{"initial.angles": {"motor": 1.0, "table": 0.2}})
 
 
@@ -217,9 +192,7 @@ def test_a_name_that_no_variable_can_have_is_refused() -> None:
 
 def test_records_of_the_catalogue_fit_at_any_place(file: Path) -> None:
     text = file.read_text() + '\n[gears.last]\ninput = "table"\noutput = "arm"\ngearbox = "schaeffler-rt1-h-20-100"\n'
-    text += (
-        'loss_factor = 1.5\n[shafts.arm]\ninertia = 1\n[motors.servo]\nshaft = "table"\nfrom = "maxon-ec-i-52-606793"\n'
-    )
+    text += 'loss_factor = 1.5\n[shafts.arm]\ninertia = 1\n[motors.servo]\nshaft = "table"\nfrom = "maxon-ec-i-52-606793"\n'
     file.write_text(text)
     scenario = lm.load(file)
     box = lm.gearbox("schaeffler-rt1-h-20-100", loss_factor=1.5)
@@ -235,9 +208,7 @@ def test_records_of_the_catalogue_fit_at_any_place(file: Path) -> None:
 
 def test_a_base_may_be_a_train(file: Path) -> None:
     changed = file.with_name("changed.toml")
-    changed.write_text(
-        'base = "train.toml"\n[gears.belt]\nratio = 3\n[gears.worm]\ngearbox = "schaeffler-rt1-h-20-100"\n'
-    )
+    changed.write_text('base = "train.toml"\n[gears.belt]\nratio = 3\n[gears.worm]\ngearbox = "schaeffler-rt1-h-20-100"\n')
     scenario = lm.load(changed)
     assert scenario.gears["belt"].ratio == 3.0
     assert scenario.gears["worm"].ratio == 100.0
@@ -255,9 +226,7 @@ def test_the_rated_voltage_of_a_motor_in_a_train_takes_its_speed_with_it() -> No
 
 def test_a_series_may_load_a_shaft(file: Path) -> None:
     (file.parent / "torque.csv").write_text("time [ms],torque [Ncm]\n0,0\n100,50\n")
-    text = file.read_text().replace(
-        '[shafts.table.torque]\nmean = "20 N*m"', '[shafts.table.torque.samples]\nfile = "torque.csv"'
-    )
+    text = file.read_text().replace('[shafts.table.torque]\nmean = "20 N*m"', '[shafts.table.torque.samples]\nfile = "torque.csv"')
     file.write_text(text)
     samples = lm.load(file).shafts["table"].torque.samples
     assert samples.times == pytest.approx((0.0, 0.1))
@@ -298,9 +267,7 @@ def test_gravity_is_a_sine_to_the_stated_error() -> None:
 
 def test_a_transmission_error_shifts_the_angles_at_the_start() -> None:
     error = {"kind": "sine", "amplitude": 1e-3, "order": 3}
-    scenario = train(
-        **{"gears.belt.transmission_error": error, "initial.angles": {"table": 0.2}, "initial.twists": {"belt": 1e-3}}
-    )
+    scenario = train(**{"gears.belt.transmission_error": error, "initial.angles": {"table": 0.2}, "initial.twists": {"belt": 1e-3}})
     start = start_values(scenario.train(), scenario.initial)
     phi = start["motor_angle"]
     e = scenario.gears["belt"].transmission_error.core()(phi)
@@ -351,9 +318,7 @@ def test_shipped_trains_load_and_survive_json(path: Path) -> None:
 def test_what_takes_one_gear_or_linear_friction_alone_says_so() -> None:
     with pytest.raises(lm.InputError, match=r"brakes\.hold.* acts too, and the closed form has inertia and viscous"):
         lm.response.rigid_constants(train())
-    with pytest.raises(
-        lm.InputError, match=r"gearbox: .* the test rig measures one gear; give one, such as scenario.gears"
-    ):
+    with pytest.raises(lm.InputError, match=r"gearbox: .* the test rig measures one gear; give one, such as scenario.gears"):
         lm.test_rig.TestRig(train())
 
 

@@ -121,19 +121,14 @@ def test_force_of_a_crash_is_that_of_an_own_integration() -> None:
 
     s = solve_ivp(rates, (0.0, 0.1), [0.0, 0.5, 0.0, 0.5], method="DOP853", rtol=1e-11, atol=1e-14, max_step=1e-5)
     result = lm.simulate(lm.Scenario.model_validate(tomllib.loads(CRASH)))
-    assert float(result["table_end_stop_force"].max()) == pytest.approx(
-        k * np.maximum(s.y[0] - 0.01, 0.0).max(), rel=1e-4
-    )
+    assert float(result["table_end_stop_force"].max()) == pytest.approx(k * np.maximum(s.y[0] - 0.01, 0.0).max(), rel=1e-4)
     assert float(result["screw_output_force"].max()) == pytest.approx(K * np.abs(s.y[2] - s.y[0]).max(), rel=1e-4)
 
 
 def test_what_is_rigid_behind_a_stop_strikes_as_one_mass() -> None:
     """With a rigid screw, the rotor strikes as well: both reverse, at e of their speed, and the impact takes (1 - e^2) of the energy."""
     scenario = lm.Scenario.model_validate(tomllib.loads(CRASH)).replace(
-        **{
-            "screws.screw.stiffness": None,
-            "slides.table.end_stops": {"lower": "-1 m", "upper": "10 mm", "restitution": 0.25},
-        }
+        **{"screws.screw.stiffness": None, "slides.table.end_stops": {"lower": "-1 m", "upper": "10 mm", "restitution": 0.25}}
     )
     result = lm.simulate(scenario)
     assert float(result["table_speed"][-1]) == pytest.approx(-0.125, rel=1e-10)
@@ -194,9 +189,7 @@ def test_each_form_takes_each_kind_and_both_solvers_agree(form: str, kind: str) 
     scenario = lm.Scenario.model_validate(tomllib.loads(text.replace("STOPS", stops)))
     exact, adaptive = lm.simulate(scenario), lm.simulate(scenario, solver="dormand-prince", relative_tolerance=1e-11)
     place, pressing, end = (
-        ("slide_position", "slide_end_stop_force", 0.02)
-        if form == "axis"
-        else ("load_angle", "load_end_stop_torque", math.radians(5.0))
+        ("slide_position", "slide_end_stop_force", 0.02) if form == "axis" else ("load_angle", "load_end_stop_torque", math.radians(5.0))
     )
     assert float(exact[place].max()) >= end
     assert float(exact[pressing].max()) > 0.0 or kind == "rigid"
@@ -210,9 +203,7 @@ def test_a_motor_presses_with_what_its_ratio_makes_of_its_torque(kind: str) -> N
     scenario = lm.Scenario.model_validate(tomllib.loads(DRIVE.replace("STOPS", STOPS[kind][1])))
     damped = {"gears.gearbox.viscous_friction": "0.02 N m s/rad", "simulation.duration": "30 s"}
     soft = {"kind": "linear", "stiffness": "1e4 N m/rad"}
-    scenario = scenario.replace(
-        **damped, **{"gears.gearbox.stiffness": soft, "gears.gearbox.mesh_damping": "20 N m s/rad"}
-    )
+    scenario = scenario.replace(**damped, **{"gears.gearbox.stiffness": soft, "gears.gearbox.mesh_damping": "20 N m s/rad"})
     result = lm.simulate(scenario)
     assert float(result["load_end_stop_torque"][-1]) == pytest.approx(0.2 * 50.0, rel=1e-9)
     assert "load_end_stop" in str(lm.explain(scenario, 30.0)) or kind != "rigid"
@@ -234,9 +225,7 @@ def test_what_is_no_stop_is_refused(stops: dict[str, Any], key: str) -> None:
     assert [problem.keys for problem in refused.value.problems] == [(key,)]
 
 
-@pytest.mark.parametrize(
-    ("height", "speed", "refused"), [(-0.1, 0.0, True), (0.0, -1.0, True), (0.0, 0.0, False), (0.0, 1.0, False)]
-)
+@pytest.mark.parametrize(("height", "speed", "refused"), [(-0.1, 0.0, True), (0.0, -1.0, True), (0.0, 0.0, False), (0.0, 1.0, False)])
 def test_a_run_begins_between_rigid_stops(height: float, speed: float, refused: bool) -> None:
     if not refused:
         assert np.isfinite(lm.simulate(ball({"restitution": 0.5}, height, speed, duration=0.01))["ball_position"][-1])
@@ -257,13 +246,7 @@ def test_a_run_goes_on_from_a_stop_that_it_rests_on() -> None:
 def test_friction_and_a_stop_share_what_rest_leaves_open() -> None:
     """The ram comes to the stop against 30 N of friction: what they hold together is the force of the motor."""
     scenario = lm.Scenario(
-        slides={
-            "ram": {
-                "mass": 3.0,
-                "friction_force": 30.0,
-                "end_stops": {"lower": -0.01, "upper": 0.02, "restitution": 0.0},
-            }
-        },
+        slides={"ram": {"mass": 3.0, "friction_force": 30.0, "end_stops": {"lower": -0.01, "upper": 0.02, "restitution": 0.0}}},
         linear_motors={"m": {"slide": "ram", "rated_force": 100.0}},
         command={"m": 1.0},
         simulation={"duration": 1.0, "sample_interval": 0.01},

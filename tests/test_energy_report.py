@@ -25,9 +25,7 @@ NAMED = {path.stem: path for path in ALL_SCENARIOS}
         ),
     ],
 )
-def test_breakpoints_that_the_solver_cannot_tell_apart_are_refused(
-    scenario: str, changes: dict[str, Any], key: str
-) -> None:
+def test_breakpoints_that_the_solver_cannot_tell_apart_are_refused(scenario: str, changes: dict[str, Any], key: str) -> None:
     with pytest.raises(lm.InputError, match=rf"{key}.*differ by less than 1e-09 of the largest.*leave one of them out"):
         lm.load(NAMED[scenario], changes)
 
@@ -46,9 +44,7 @@ def test_a_ledger_that_does_not_close_is_reported() -> None:
 @pytest.mark.parametrize("ratio", [1e-3, 1e-4, 1e-5])
 def test_the_motion_tends_to_a_limit_as_its_ratio_goes_to_zero(ratio: float) -> None:
     """The rotor reflects ratio^2 of its inertia and ratio of its friction: the motion differs from the limit by that."""
-    run, limit = (
-        lm.simulate(lm.load(NAMED["backlash-reversing-load"], {"gearbox.ratio": r}), energy=True) for r in (ratio, 1e-7)
-    )
+    run, limit = (lm.simulate(lm.load(NAMED["backlash-reversing-load"], {"gearbox.ratio": r}), energy=True) for r in (ratio, 1e-7))
     assert run.attrs["energy_residual"] < 1e-12
     assert "warning" not in run.attrs
     apart = float(abs(run["load_speed"] - limit["load_speed"]).max())
@@ -62,11 +58,7 @@ def test_the_ledger_of_a_locked_worm_keeps_changes_far_below_what_it_stores(rati
     energy = lm.energy_of(run)
     torque, friction, k = 0.15, 0.01, 500.0
     wound, left = (torque - friction) / k, friction / k
-    expected = {
-        "motor: motor": torque * wound,
-        "rotor: dry friction": friction * (2.0 * wound - left),
-        "stored_change": 0.5 * k * left**2,
-    }
+    expected = {"motor: motor": torque * wound, "rotor: dry friction": friction * (2.0 * wound - left), "stored_change": 0.5 * k * left**2}
     for name, per_square in expected.items():
         assert energy[name] == pytest.approx(per_square * ratio**2, rel=1e-9), name
     assert run.attrs["energy_residual"] < 1e-9

@@ -256,12 +256,7 @@ def train_of_couplings(r: random.Random) -> dict[str, Any]:
     ]
     for k, (table, joint) in enumerate(r.sample(joints, 2)):
         shafts |= {f"rotor_{k}": {}, f"middle_{k}": {"inertia": 0.01}}
-        made["motors"][f"m_{k}"] = {
-            "shaft": f"rotor_{k}",
-            "kind": "torque_source",
-            "rated_torque": 1.0,
-            "rotor_inertia": 1e-3,
-        }
+        made["motors"][f"m_{k}"] = {"shaft": f"rotor_{k}", "kind": "torque_source", "rated_torque": 1.0, "rotor_inertia": 1e-3}
         made["gears"][f"g_{k}"] = {"input": f"rotor_{k}", "output": f"middle_{k}", "ratio": r.choice([5.0, -7.0])}
         made.setdefault(table, {})[f"c_{k}"] = {"input": f"middle_{k}", "output": "drum", **joint}
         made["command"] |= {f"m_{k}": r.uniform(-1.0, 1.0)} | ({f"c_{k}": 1.0} if table == "clutches" else {})
@@ -306,8 +301,7 @@ def test_no_function_refuses_a_random_scenario_by_its_form(seed: int, tmp_path: 
 def test_a_train_of_one_gear_moves_to_the_last_bit_as_the_drive_that_it_is(seed: int) -> None:
     tables = random_gear(seed)
     motor, gear = (
-        {key: v for key, v in tables[t][n].items() if key not in ("shaft", "input", "output")}
-        for t, n in (("motors", "m"), ("gears", "g"))
+        {key: v for key, v in tables[t][n].items() if key not in ("shaft", "input", "output")} for t, n in (("motors", "m"), ("gears", "g"))
     )
     one = lm.Scenario(
         motor=motor,
@@ -367,12 +361,8 @@ def test_the_one_command_and_the_one_load_are_given_alike_in_each_form() -> None
         lambda s: lm.simulate(s, command=wave, load_torque=1.0, initial=state, **times)["load_speed"],
         lambda s: lm.simulate(s, initial=state.of_train(), **times)["load_speed"],
         lambda s: lm.periodic_motion(s, wave, 1.0)["load_speed"],
-        lambda s: lm.linearize(s, state, command=0.1, load_torque=1.0).response(
-            3.0, "load_speed", next(iter(s.signals()))
-        ),
-        lambda s: lm.frequency_response(s, [2.0], 0.2, mean_command=0.05, mean_load_torque=1.0)["response"].sel(
-            output="load_speed"
-        ),
+        lambda s: lm.linearize(s, state, command=0.1, load_torque=1.0).response(3.0, "load_speed", next(iter(s.signals()))),
+        lambda s: lm.frequency_response(s, [2.0], 0.2, mean_command=0.05, mean_load_torque=1.0)["response"].sel(output="load_speed"),
     ]
     for call in calls:
         assert np.array_equal(call(scenario), call(scenario.long()))
@@ -382,11 +372,7 @@ def test_a_study_of_a_train_of_one_gear_has_the_words_of_a_drive(tmp_path: Path)
     scenario = brief("catalogue-robot-joint")
     keep = {"ideal": "peak(ideal_speed)", "band": "bandwidth(0.2)"}
     tables = [
-        read_table(
-            lm.study(
-                lm.studies.Study(scenario=one, vary=[{"key": key, "values": [50.0, 100.0]}], keep=keep), tmp_path / key
-            )
-        )
+        read_table(lm.study(lm.studies.Study(scenario=one, vary=[{"key": key, "values": [50.0, 100.0]}], keep=keep), tmp_path / key))
         for one, key in ((scenario, "gearbox.ratio"), (scenario.long(), "gears.gearbox.ratio"))
     ]
     assert tables[0].to_pydict()["ideal"] == tables[1].to_pydict()["ideal"]

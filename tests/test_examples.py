@@ -28,9 +28,7 @@ def test_the_compiled_law_moves_the_axis_as_the_same_in_python() -> None:
     pytest.importorskip("numba", reason="pip install --group examples")
     numba_law = example("numba_law")
     scenario = numba_law.axis().replace(**{"simulation.duration": 0.4})
-    one, two = (
-        lm.simulate(scenario, law=lm.control.Law(law, states=1)) for law in (numba_law.compiled, numba_law.in_python)
-    )
+    one, two = (lm.simulate(scenario, law=lm.control.Law(law, states=1)) for law in (numba_law.compiled, numba_law.in_python))
     for name in ("motor_speed", "load_angle"):  # the compiler may contract products and sums
         assert np.abs(one[name] - two[name]).max() < 1e-9 * np.abs(one[name]).max()
     assert float(one["load_angle"][-1]) > 0.1
@@ -58,9 +56,7 @@ def test_the_environment_is_one_of_gymnasium() -> None:
 
 
 @pytest.mark.parametrize("installed", [True, False])
-def test_the_environment_is_the_drive_with_and_without_gymnasium(
-    installed: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_environment_is_the_drive_with_and_without_gymnasium(installed: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     if installed:
         pytest.importorskip("gymnasium", reason="pip install --group examples")
     else:

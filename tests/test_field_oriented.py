@@ -45,9 +45,7 @@ def scenario(a: Axis, ticks: int, **controller: Any) -> lm.Scenario:
         | ({} if math.isinf(a.torque_limit) else {"torque_limit": a.torque_limit})
     }
     kind = "torque" if a.speed_gain is None else "speed"
-    steps = [
-        {"time": t, "height": M - before} for (_, before), (t, M) in zip(a.load_torque, a.load_torque[1:], strict=False)
-    ]
+    steps = [{"time": t, "height": M - before} for (_, before), (t, M) in zip(a.load_torque, a.load_torque[1:], strict=False)]
     stiffness = {"kind": "curve", "slopes": [a.stiffness]} | ({"backlash": a.gap} if a.gap else {})
     return lm.Scenario(
         controller={
@@ -55,12 +53,7 @@ def scenario(a: Axis, ticks: int, **controller: Any) -> lm.Scenario:
             "encoder": {"ideal": True},
             "shaft": "motor",
             "reference": {"kind": kind, "mean": a.reference},
-            "current": {
-                "kind": "field_oriented",
-                "gain": a.gain,
-                "field_weakening": a.weakening,
-                "weakening_voltage": a.weakening_voltage,
-            },
+            "current": {"kind": "field_oriented", "gain": a.gain, "field_weakening": a.weakening, "weakening_voltage": a.weakening_voltage},
             **({} if a.speed_gain is None else speed),
             **controller,
         },
@@ -72,11 +65,7 @@ def scenario(a: Axis, ticks: int, **controller: Any) -> lm.Scenario:
             "stiffness": stiffness,
             "losses": {"kind": "constant_efficiency", "efficiency": 1.0},
         },
-        load={
-            "inertia": a.J_Z,
-            "viscous_friction": a.friction,
-            "torque": {"mean": a.load_torque[0][1], "steps": steps},
-        },
+        load={"inertia": a.J_Z, "viscous_friction": a.friction, "torque": {"mean": a.load_torque[0][1], "steps": steps}},
         initial={"motor_speed": a.x[1], "load_speed": a.x[3], "load_angle": a.x[2], "twist": a.x[0] / a.ratio - a.x[2]},
         simulation={"duration": ticks * a.tick, "sample_interval": a.tick},
     )
@@ -206,17 +195,13 @@ def test_the_current_of_a_salient_rotor_is_the_least_for_its_torque() -> None:
     assert float(end["motor_torque"]) == pytest.approx(7.0, rel=1e-9)
     # A minimum is known to half the digits of its value.
     assert float(end["direct_current"]) == pytest.approx(least.x, rel=1e-6)
-    assert math.hypot(float(end["direct_current"]), float(end["quadrature_current"])) == pytest.approx(
-        math.sqrt(least.fun), rel=1e-11
-    )
+    assert math.hypot(float(end["direct_current"]), float(end["quadrature_current"])) == pytest.approx(math.sqrt(least.fun), rel=1e-11)
 
 
 def test_the_largest_torque_is_that_of_the_current_circle() -> None:
     a = changed(ROUND, **SALIENT, reference=1e3)
     end = lm.simulate(scenario(a, 80)).isel(time=-1)
-    best = minimize_scalar(
-        lambda angle: -a.torque(a.i_max * math.sin(angle), a.i_max * math.cos(angle)), bounds=(-1.5, 0.0)
-    )
+    best = minimize_scalar(lambda angle: -a.torque(a.i_max * math.sin(angle), a.i_max * math.cos(angle)), bounds=(-1.5, 0.0))
     assert float(end["motor_torque"]) == pytest.approx(-best.fun, rel=1e-9)
     assert math.hypot(float(end["direct_current"]), float(end["quadrature_current"])) == pytest.approx(20.0, rel=1e-9)
 
@@ -293,15 +278,7 @@ def test_steps_of_any_length_are_the_run_and_a_state_goes_on_bit_for_bit() -> No
     a = random_axis(np.random.default_rng([7, 11]), 11)
     a.load_torque = ((0.0, 0.3),)
     one = scenario(a, TICKS)
-    names = (
-        "motor_speed",
-        "load_angle",
-        "twist",
-        "direct_current",
-        "quadrature_current",
-        "motor_torque",
-        "copper_heat",
-    )
+    names = ("motor_speed", "load_angle", "twist", "direct_current", "quadrature_current", "motor_torque", "copper_heat")
     whole = lm.simulate(one)
     stepped = lm.Simulation(one)
     for k in range(2 * TICKS):

@@ -200,12 +200,7 @@ def test_gears_that_reverse_the_motion_reverse_the_torque() -> None:
             shafts={"motor": {}, "arm": {"inertia": J, "viscous_friction": B}},
             motors={"servo": {"shaft": "motor", "kind": "torque_source", "rated_torque": 2.0, "rotor_inertia": 0.0}},
             gears={
-                "train": {
-                    "input": "motor",
-                    "output": "arm",
-                    "ratio": -5.0,
-                    "losses": {"kind": "constant_efficiency", "efficiency": 1.0},
-                }
+                "train": {"input": "motor", "output": "arm", "ratio": -5.0, "losses": {"kind": "constant_efficiency", "efficiency": 1.0}}
             },
             controllers={"servo": make(small)},
             simulation=on_arm.simulation.model_dump(),
@@ -230,11 +225,7 @@ def test_torque_in_python_is_that_of_the_core() -> None:
 @pytest.mark.parametrize(
     ("make", "changes", "message"),
     [
-        (
-            continuous,
-            {"supply_resistance": 1.0},
-            r"firmware\.supply_resistance: makes the torque depend on error and speed",
-        ),
+        (continuous, {"supply_resistance": 1.0}, r"firmware\.supply_resistance: makes the torque depend on error and speed"),
         (continuous, {"goal_rate_limit": 4.0}, r"firmware\.goal_rate_limit: acts from sample to sample"),
         (continuous, {"goal_acceleration_limit": 4.0}, r"firmware\.goal_acceleration_limit: acts from sample to"),
         (continuous, {"goal_filter_time": 4e-3}, r"firmware\.goal_filter_time: acts from sample to sample"),

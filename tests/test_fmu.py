@@ -15,9 +15,7 @@ from conftest import ALL_SCENARIOS, ROOT, jamming
 from lostmotion.portable import fmu as exporting
 
 fmpy: Any = pytest.importorskip("fmpy", reason="FMPy is missing: .venv/bin/pip install --group portable")
-pytestmark = pytest.mark.skipif(
-    sys.platform != "linux", reason="FMPy runs the library for this platform, tests know Linux alone"
-)
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="FMPy runs the library for this platform, tests know Linux alone")
 
 
 class Slave:
@@ -31,9 +29,7 @@ class Slave:
         self.reference = {v.name: v.valueReference for v in description.modelVariables}
         self.names = [v.name for v in description.modelVariables if v.causality == "output"]
         fmpy.extract(str(path), unzipdir=str(directory))
-        self.fmu = FMU2Slave(
-            guid=description.guid, unzipDirectory=str(directory), modelIdentifier="lostmotion", instanceName="drive"
-        )
+        self.fmu = FMU2Slave(guid=description.guid, unzipDirectory=str(directory), modelIdentifier="lostmotion", instanceName="drive")
         self.fmu.instantiate(callbacks=self.callbacks())
         self.fmu.setupExperiment(startTime=0.0)
         self.fmu.enterInitializationMode()
@@ -125,9 +121,7 @@ def test_an_fmu_with_its_parameters_is_valid_and_says_what_it_has(paper: Path) -
     assert variables["load.inertia"].variability == "tunable"
     assert float(variables["load.inertia"].start) == 2.0
     assert variables["load.inertia"].unit == "kg*m^2"
-    ranges = {
-        key: (variables[key].min, variables[key].max) for key in ("load.inertia", "gearbox.hysteresis.efficiency")
-    }
+    ranges = {key: (variables[key].min, variables[key].max) for key in ("load.inertia", "gearbox.hysteresis.efficiency")}
     assert ranges == {"load.inertia": ("0.0", None), "gearbox.hysteresis.efficiency": ("0.0", "1.0")}
     contacts = {name: variables[name].variability for name in ("input_contact", "twist_contact", "load_contact")}
     # Without friction on the load its "contact" is the sign of its speed.
@@ -142,11 +136,7 @@ def test_an_fmu_with_its_parameters_is_valid_and_says_what_it_has(paper: Path) -
         assert "load.inertia" in archive.read("documentation/index.html").decode()
 
 
-STEPS = {
-    "1e-5 s": [1e-5] * 200,
-    "0.1 s": [0.1] * 8,
-    "irregular": [1e-3 * (1.0 + 0.9 * math.sin(3.0 * k)) for k in range(150)],
-}
+STEPS = {"1e-5 s": [1e-5] * 200, "0.1 s": [0.1] * 8, "irregular": [1e-3 * (1.0 + 0.9 * math.sin(3.0 * k)) for k in range(150)]}
 
 
 @pytest.mark.parametrize("steps", STEPS.values(), ids=STEPS)
@@ -323,8 +313,7 @@ def test_a_jam_ends_in_an_error_with_the_sentence_of_python(tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
-    [(("drive.zip",), "must end in .fmu"), (("nowhere/drive.fmu",), "its directory does not exist")],
+    ("arguments", "said"), [(("drive.zip",), "must end in .fmu"), (("nowhere/drive.fmu",), "its directory does not exist")]
 )
 def test_a_path_that_cannot_be_written_is_refused(arguments: Any, said: str, tmp_path: Path) -> None:
     with pytest.raises(lm.InputError, match=said):
@@ -332,10 +321,7 @@ def test_a_path_that_cannot_be_written_is_refused(arguments: Any, said: str, tmp
 
 
 def test_without_a_library_there_is_no_fmu(tmp_path: Path) -> None:
-    with pytest.raises(
-        lm.InputError,
-        match="has no library of an FMU; install a wheel, or build it in a checkout by `make fmu-library`",
-    ):
+    with pytest.raises(lm.InputError, match="has no library of an FMU; install a wheel, or build it in a checkout by `make fmu-library`"):
         lm.export_fmu(lm.load("paper-2dof-nl-small"), tmp_path / "drive.fmu", libraries=tmp_path)
 
 
@@ -479,9 +465,7 @@ def test_more_indicators_than_there_can_be_are_refused(drum: Path, tmp_path: Pat
         names = tmp_path / count / "resources" / "names.txt"
         lines = [f"indicators {count}" if x.startswith("indicators") else x for x in names.read_text().splitlines()]
         names.write_text("\n".join(lines) + "\n")
-        fmu = FMU2Slave(
-            guid=guid, unzipDirectory=str(tmp_path / count), modelIdentifier="lostmotion", instanceName="drum"
-        )
+        fmu = FMU2Slave(guid=guid, unzipDirectory=str(tmp_path / count), modelIdentifier="lostmotion", instanceName="drum")
         with pytest.raises(Exception, match="instantiate"):
             fmu.instantiate()
 

@@ -24,9 +24,7 @@ class Slave3:
         self.reference = {v.name: v.valueReference for v in description.modelVariables}
         self.names = [v.name for v in description.modelVariables if v.causality == "output"]
         fmpy.extract(str(path), unzipdir=str(directory))
-        self.fmu = FMU3Slave(
-            guid=description.guid, unzipDirectory=str(directory), modelIdentifier="lostmotion", instanceName="drive"
-        )
+        self.fmu = FMU3Slave(guid=description.guid, unzipDirectory=str(directory), modelIdentifier="lostmotion", instanceName="drive")
         self.fmu.instantiate()
         self.fmu.enterInitializationMode(startTime=0.0)
         self.fmu.exitInitializationMode()

@@ -29,11 +29,7 @@ class Rates:
     def at(self, states: dict[str, float], inputs: dict[str, float]) -> list[np.ndarray]:
         x, u = [states.get(n, 0.0) for n in self.states], [inputs.get(n, 0.0) for n in self.all_inputs]
         dx, du = self.jacobians(x, u)
-        return [
-            np.array(self.rates(x, u)).ravel(),
-            np.array(dx),
-            np.array(du)[:, [self.all_inputs.index(n) for n in self.inputs]],
-        ]
+        return [np.array(self.rates(x, u)).ravel(), np.array(dx), np.array(du)[:, [self.all_inputs.index(n) for n in self.inputs]]]
 
 
 def expected(model: Rates, linear: lm.response.LinearModel) -> list[np.ndarray]:
@@ -108,9 +104,7 @@ def test_the_rest_to_rest_example_finds_the_least_squares_of_the_closed_form(mon
     """A rigid gearbox without losses but dry friction: two linear conditions on the commands, the least norm by linear algebra."""
     module = example("casadi_rest_to_rest")
     monkeypatch.setattr(module, "INTERVALS", 10)
-    scenario = module.DRIVE.replace(
-        **{"gears.gearbox.stiffness": {"kind": "rigid"}, "shafts.table.viscous_friction": 0.0}
-    )
+    scenario = module.DRIVE.replace(**{"gears.gearbox.stiffness": {"kind": "rigid"}, "shafts.table.viscous_friction": 0.0})
     found = module.optimal_commands(scenario, 0.5, 0.4)
     inertia, friction, h = 1e-4 + 0.5 / 50.0**2, 0.1, 0.04
     # Speeds rise by (u - friction) h / inertia in each interval; the angle of the motor is 25 rad at the end, its speed 0.

@@ -22,12 +22,7 @@ def closed_loop() -> lm.Scenario:
     """The drive of the paper, without the windings of its motor, under the loops of speed_controller.py."""
     scenario = lm.load("paper-2dof-nl-small")
     assert isinstance(scenario, lm.Scenario)
-    motor = {
-        "kind": "torque_source",
-        "rotor_inertia": 8.0e-5,
-        "rated_torque": law.RATED_TORQUE,
-        "friction_torque": 0.02,
-    }
+    motor = {"kind": "torque_source", "rotor_inertia": 8.0e-5, "rated_torque": law.RATED_TORQUE, "friction_torque": 0.02}
     controller = {
         "sample_time": law.SAMPLE_TIME,
         "delay": 1,
@@ -61,16 +56,12 @@ def coupled(
         {v.name.decode(): v.reference for v in execution.slave_variables(slave_index=index)} for index in slaves
     ]
     for source, output, target, name in connections:
-        failed = execution.connect_real_variables(
-            slaves[source], references[source][output], slaves[target], references[target][name]
-        )
+        failed = execution.connect_real_variables(slaves[source], references[source][output], slaves[target], references[target][name])
         assert not failed
     observer = CosimObserver.create_time_series(buffer_size=steps + 1)
     assert execution.add_observer(observer=observer)
     for name in names:
-        assert observer.start_time_series(
-            slave_index=slaves[0], value_reference=references[0][name], variable_type=CosimVariableType.REAL
-        )
+        assert observer.start_time_series(slave_index=slaves[0], value_reference=references[0][name], variable_type=CosimVariableType.REAL)
     assert execution.step(step_count=steps)
     out = {}
     for name in names:
@@ -84,9 +75,7 @@ def coupled(
 @pytest.fixture
 def builder() -> Any:
     pytest.importorskip("libcosimpy", reason="libcosimpy is missing: .venv/bin/pip install --group portable")
-    found: Any = pytest.importorskip(
-        "pythonfmu.builder", reason="pythonfmu is missing: .venv/bin/pip install --group portable"
-    )
+    found: Any = pytest.importorskip("pythonfmu.builder", reason="pythonfmu is missing: .venv/bin/pip install --group portable")
     return found.FmuBuilder
 
 
@@ -140,10 +129,7 @@ def test_a_drive_in_the_joint_of_a_pendulum_converges_to_the_equations_of_both(t
     for step in (2e-4, 1e-4):
         found = coupled(
             [tmp_path / "drive.fmu", Path(pendulum)],
-            [
-                *((1, name, 0, f"joint_given_{name}") for name in ("angle", "speed", "acceleration")),
-                (0, "joint_drive_torque", 1, "torque"),
-            ],
+            [*((1, name, 0, f"joint_given_{name}") for name in ("angle", "speed", "acceleration")), (0, "joint_drive_torque", 1, "torque")],
             ("joint_angle", "motor_speed"),
             step,
             round(DURATION / step),

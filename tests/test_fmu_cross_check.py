@@ -26,9 +26,7 @@ def written(tmp_path_factory: Any) -> Path:
     ("interface", "model", "error"),
     [("cs", "PaperDrive", 0.1), ("cs", "PositionAxis", 1e-11), ("me", "PaperDrive", 0.1), ("me", "PositionAxis", 0.1)],
 )
-def test_the_files_follow_the_rules_and_fmpy_gives_the_reference(
-    interface: str, model: str, error: float, written: Path
-) -> None:
+def test_the_files_follow_the_rules_and_fmpy_gives_the_reference(interface: str, model: str, error: float, written: Path) -> None:
     from fmpy.cross_check import validate_result
     from fmpy.cross_check.validate_vendor_repo import validate_test_fmu
     from fmpy.util import read_csv, read_ref_opt_file
@@ -36,10 +34,7 @@ def test_the_files_follow_the_rules_and_fmpy_gives_the_reference(
     (directory,) = written.glob(f"2.0/{interface}/*/lostmotion/*/{model}")
     assert validate_test_fmu(str(directory)) == []
     assert (directory / "README.md").read_text().strip()
-    reference, options = (
-        read_csv(str(directory / f"{model}_ref.csv")),
-        read_ref_opt_file(str(directory / f"{model}_ref.opt")),
-    )
+    reference, options = (read_csv(str(directory / f"{model}_ref.csv")), read_ref_opt_file(str(directory / f"{model}_ref.opt")))
     found = fmpy.simulate_fmu(
         str(directory / f"{model}.fmu"),
         fmi_type={"cs": "CoSimulation", "me": "ModelExchange"}[interface],

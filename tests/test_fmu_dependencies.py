@@ -23,9 +23,7 @@ def test_nothing_depends_on_what_is_not_declared(name: str) -> None:
         model = lm.linearize(scenario, time=float(time))
         declared = dependencies_of(scenario, states, model.inputs)
         rows = {f"der({n})": np.append(a, b) for n, a, b in zip(model.states, model.A, model.B, strict=True)}
-        rows |= {
-            n: np.append(c, d) for n, c, d in zip(model.outputs, model.C, model.D, strict=True) if n not in model.states
-        }
+        rows |= {n: np.append(c, d) for n, c, d in zip(model.outputs, model.C, model.D, strict=True) if n not in model.states}
         for unknown, row in rows.items():
             needed = {n for n, factor in zip((*model.states, *model.inputs), row, strict=True) if factor != 0.0}
             assert needed <= set(declared.get(unknown, needed)), (unknown, time)

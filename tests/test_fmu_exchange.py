@@ -118,9 +118,7 @@ class Model:
         description = fmpy.read_model_description(str(path))
         self.reference = {v.name: v.valueReference for v in description.modelVariables}
         fmpy.extract(str(path), unzipdir=str(directory))
-        self.fmu = FMU2Model(
-            guid=description.guid, unzipDirectory=str(directory), modelIdentifier="lostmotion", instanceName="drive"
-        )
+        self.fmu = FMU2Model(guid=description.guid, unzipDirectory=str(directory), modelIdentifier="lostmotion", instanceName="drive")
         self.fmu.instantiate()
         self.fmu.setupExperiment(startTime=0.0)
         self.fmu.enterInitializationMode()
@@ -147,9 +145,7 @@ class Model:
 @pytest.fixture
 def model(tmp_path: Path) -> Any:
     path = tmp_path / "drive.fmu"
-    scenario = lm.load(
-        "paper-2dof-nl-small", ["initial.motor_speed=20", "initial.load_speed=0.2", "initial.twist=2e-4"]
-    )
+    scenario = lm.load("paper-2dof-nl-small", ["initial.motor_speed=20", "initial.load_speed=0.2", "initial.twist=2e-4"])
     lm.export_fmu(scenario, path)
     model = Model(path, tmp_path / "open")
     yield model

@@ -13,9 +13,7 @@ from lostmotion.cli import app
 from test_fmu import Slave
 
 fmpy: Any = pytest.importorskip("fmpy", reason="FMPy is missing: .venv/bin/pip install --group portable")
-pytestmark = pytest.mark.skipif(
-    sys.platform != "linux", reason="FMPy runs the library for this platform, tests know Linux alone"
-)
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="FMPy runs the library for this platform, tests know Linux alone")
 
 J, K, W = 0.5, 200.0, 10.0  # crank, spring, resonance of a load of 2 kg m2
 NAMES = ("crank_given_angle", "crank_given_speed", "crank_given_acceleration")
@@ -25,9 +23,7 @@ def crank() -> lm.Scenario:
     """A crank and a load of 2 kg m2 on a spring."""
     return lm.Scenario(
         shafts={"crank": {"inertia": J}, "load": {"inertia": 2.0}},
-        gears={
-            "g": {"input": "crank", "output": "load", "ratio": 1.0, "stiffness": {"kind": "linear", "stiffness": K}}
-        },
+        gears={"g": {"input": "crank", "output": "load", "ratio": 1.0, "stiffness": {"kind": "linear", "stiffness": K}}},
         simulation={"duration": 2.0, "sample_interval": 0.01},
     )
 
@@ -106,9 +102,7 @@ def test_until_it_is_set_a_shaft_goes_on_with_its_speed_at_the_start(tmp_path: P
 
 def test_the_state_of_a_given_motion_goes_back(tmp_path: Path) -> None:
     fmu = slave(tmp_path, crank(), "crank")
-    steps = [
-        {name: (a, b) for name, a, b in zip(NAMES, cubic(0.1 * k), cubic(0.1 * k + 0.1), strict=True)} for k in range(6)
-    ]
+    steps = [{name: (a, b) for name, a, b in zip(NAMES, cubic(0.1 * k), cubic(0.1 * k + 0.1), strict=True)} for k in range(6)]
     for inputs in steps[:3]:
         fmu.step(0.1, **inputs)
     kept, time = fmu.fmu.getFMUState(), fmu.time

@@ -25,10 +25,7 @@ ARM_LIBRARIES = Path("/usr/aarch64-linux-gnu")
 # Platform, target of the Zig compiler, what runs its programs.
 RUNNERS: dict[str, tuple[str, list[str] | None]] = {
     "x86_64-linux": ("x86_64-linux-gnu.2.17", []),
-    "aarch64-linux": (
-        "aarch64-linux-gnu.2.17",
-        [QEMU, "-L", str(ARM_LIBRARIES)] if QEMU and ARM_LIBRARIES.exists() else None,
-    ),
+    "aarch64-linux": ("aarch64-linux-gnu.2.17", [QEMU, "-L", str(ARM_LIBRARIES)] if QEMU and ARM_LIBRARIES.exists() else None),
     "x86_64-windows": ("x86_64-windows-gnu", [WINE] if WINE else None),
 }
 STEPS, INTERVAL = 200, 1e-3
@@ -92,13 +89,7 @@ def test_other_platforms_give_the_bits_of_python(platform: str, tmp_path: Path) 
         drive = "Z:" if "windows" in platform else ""
         done = subprocess.run(
             [
-                *(
-                    *runner,
-                    str(driver),
-                    f"{drive}{library}",
-                    f"file:///{drive}{open_at / 'resources'}",
-                    description.guid,
-                ),
+                *(*runner, str(driver), f"{drive}{library}", f"file:///{drive}{open_at / 'resources'}", description.guid),
                 *(str(len(inputs)), str(len(outputs)), str(STEPS), str(INTERVAL)),
             ],
             check=False,
@@ -107,9 +98,7 @@ def test_other_platforms_give_the_bits_of_python(platform: str, tmp_path: Path) 
             env=os.environ | {"WINEDEBUG": "-all"},
         )
         assert done.returncode == 0, done.stderr
-        told = [
-            [struct.unpack(">d", bytes.fromhex(word))[0] for word in line.split()] for line in done.stdout.split("\n")
-        ]
+        told = [[struct.unpack(">d", bytes.fromhex(word))[0] for word in line.split()] for line in done.stdout.split("\n")]
         shared = [k for k, o in enumerate(outputs) if o in lm.Simulation(scenario).read()]
         assert len(shared) > 5
         wanted = of_python(scenario, [outputs[k] for k in shared])

@@ -60,9 +60,7 @@ def test_an_importer_finds_tolerance_step_start_and_stop(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("name", STATES)
-def test_the_load_in_model_exchange_with_the_defaults_of_the_importer_moves_as_in_the_run_to_a_millionth(
-    name: str, tmp_path: Path
-) -> None:
+def test_the_load_in_model_exchange_with_the_defaults_of_the_importer_moves_as_in_the_run_to_a_millionth(name: str, tmp_path: Path) -> None:
     scenario = lm.load(name)
     lm.export_fmu(scenario, tmp_path / "drive.fmu")
     there = fmpy.simulate_fmu(str(tmp_path / "drive.fmu"), fmi_type="ModelExchange")
@@ -154,19 +152,11 @@ class Calls:
         self.said: list[str] = []
         description = fmpy.read_model_description(str(path))
         fmpy.extract(str(path), unzipdir=str(directory))
-        self.fmu = fmi2.FMU2Model(
-            guid=description.guid, unzipDirectory=str(directory), modelIdentifier="lostmotion", instanceName="drive"
-        )
+        self.fmu = fmi2.FMU2Model(guid=description.guid, unzipDirectory=str(directory), modelIdentifier="lostmotion", instanceName="drive")
         callbacks = Slave.callbacks(self)  # type: ignore[arg-type]
         self.handle = c_void_p(
             self.fmu.fmi2Instantiate(
-                b"drive",
-                kind,
-                description.guid.encode(),
-                (directory / "resources").as_uri().encode(),
-                byref(callbacks),
-                0,
-                0,
+                b"drive", kind, description.guid.encode(), (directory / "resources").as_uri().encode(), byref(callbacks), 0, 0
             )
         )
         self.variable = {v.name: v.valueReference for v in description.modelVariables}
@@ -201,9 +191,7 @@ WRONG = {  # what leads there, and what is refused there
 
 
 @pytest.mark.parametrize("where", WRONG)
-def test_a_function_that_is_called_in_the_wrong_order_is_refused_and_changes_nothing(
-    where: str, tmp_path: Path
-) -> None:
+def test_a_function_that_is_called_in_the_wrong_order_is_refused_and_changes_nothing(where: str, tmp_path: Path) -> None:
     lm.export_fmu(lm.load("paper-2dof-nl-small"), tmp_path / "drive.fmu")
     call = Calls(tmp_path / "drive.fmu", tmp_path / "open", kind=1)
     lead, refused = WRONG[where]

@@ -60,9 +60,7 @@ def same_bits(found: Any, wanted: Any) -> None:
         assert found[name].tobytes() == wanted[name].tobytes(), name
 
 
-@pytest.mark.skipif(
-    None in (CMAKE, COMPILER, shutil.which("nm")), reason="there is no CMake, no C++ compiler, or no nm"
-)
+@pytest.mark.skipif(None in (CMAKE, COMPILER, shutil.which("nm")), reason="there is no CMake, no C++ compiler, or no nm")
 @pytest.mark.slow("the sources of an FMU are compiled")
 def test_sources_give_the_bits_of_the_library_and_share_no_names_with_another_fmu(tmp_path: Path) -> None:
     """By CMake in FMI 3, file by file in FMI 2, of which all but the interface is the same and compiled once.
@@ -74,15 +72,7 @@ def test_sources_give_the_bits_of_the_library_and_share_no_names_with_another_fm
     build = tmp_path / "build"
     flags = " ".join((*STRICT, "-DLOSTMOTION_PLAIN_VECTORS"))
     for command in (
-        [
-            CMAKE,
-            "-S",
-            three / "sources",
-            "-B",
-            build,
-            f"-DCMAKE_CXX_FLAGS={flags}",
-            "-DCMAKE_CXX_FLAGS_RELEASE=-DNDEBUG",
-        ],
+        [CMAKE, "-S", three / "sources", "-B", build, f"-DCMAKE_CXX_FLAGS={flags}", "-DCMAKE_CXX_FLAGS_RELEASE=-DNDEBUG"],
         [CMAKE, "--build", build, "--parallel", "2"],
     ):
         subprocess.run(list(map(str, command)), check=True, capture_output=True)
@@ -98,9 +88,7 @@ def test_sources_give_the_bits_of_the_library_and_share_no_names_with_another_fm
     assert {"axis_fmi2DoStep", "axis_lm_advance"} <= set(names)
     assert [name for name in names if "axis_" not in name] == []
 
-    objects += compiled(
-        two / "sources", tmp_path / "library", ["FMI2_OVERRIDE_FUNCTION_PREFIX"], ["fmi.cpp", "resources.cpp"]
-    )
+    objects += compiled(two / "sources", tmp_path / "library", ["FMI2_OVERRIDE_FUNCTION_PREFIX"], ["fmi.cpp", "resources.cpp"])
     library = next((two / "binaries").rglob("axis.*"))
     before = library.read_bytes()
     subprocess.run([str(COMPILER), "-shared", *map(str, objects), "-o", str(library)], check=True)

@@ -18,10 +18,7 @@ from lostmotion.model.signals import SpeedSignal
 
 SPRING = {"kind": "linear", "stiffness": 100.0}
 CASE: dict[str, Any] = {
-    "shafts": {
-        "crank": {"inertia": 1.0, "friction_torque": 0.5, "speed": {"amplitude": 1.0, "frequency": 1.0}},
-        "load": {"inertia": 1.0},
-    },
+    "shafts": {"crank": {"inertia": 1.0, "friction_torque": 0.5, "speed": {"amplitude": 1.0, "frequency": 1.0}}, "load": {"inertia": 1.0}},
     "gears": {"g": {"input": "crank", "output": "load", "ratio": 1.0, "stiffness": SPRING}},
     "simulation": {"duration": 1.0, "sample_interval": 0.01},
 }
@@ -64,18 +61,8 @@ def test_a_straight_line_of_speed_is_a_matrix_exponential() -> None:
             "third": {"inertia": J[1]},
         },
         gears={
-            "a": {
-                "input": "first",
-                "output": "second",
-                "ratio": 2.0,
-                "stiffness": {"kind": "linear", "stiffness": K[0]},
-            },
-            "b": {
-                "input": "second",
-                "output": "third",
-                "ratio": 1.0,
-                "stiffness": {"kind": "linear", "stiffness": K[1]},
-            },
+            "a": {"input": "first", "output": "second", "ratio": 2.0, "stiffness": {"kind": "linear", "stiffness": K[0]}},
+            "b": {"input": "second", "output": "third", "ratio": 1.0, "stiffness": {"kind": "linear", "stiffness": K[1]}},
         },
         simulation={"duration": 1.5, "sample_interval": 0.125},
     )
@@ -101,10 +88,7 @@ def test_rigid_gears_move_with_the_shaft_that_drives_them() -> None:
             "mid": {"inertia": 0.0, "speed": {"mean": 1.0, "amplitude": 3.0, "frequency": 2.0, "phase": 0.4}},
             "out": {"inertia": 5.0, "friction_torque": 2.0, "torque": {"mean": 1.5}},
         },
-        gears={
-            "up": {"input": "in", "output": "mid", "ratio": 4.0},
-            "down": {"input": "mid", "output": "out", "ratio": 10.0},
-        },
+        gears={"up": {"input": "in", "output": "mid", "ratio": 4.0}, "down": {"input": "mid", "output": "out", "ratio": 10.0}},
         simulation={"duration": 1.2, "sample_interval": 0.007},
     )
     r = lm.simulate(s)
@@ -129,11 +113,7 @@ def test_friction_takes_nothing_while_the_given_speed_is_zero() -> None:
     r = lm.simulate(s)
     t = r.time.values
     moves = (t > 0.5) & (t < 1.4)
-    torque = (
-        np.where(moves, 0.5, 0.0)
-        + np.where((t >= 0.5) & (t < 0.8), 1.0, 0.0)
-        - np.where((t >= 1.1) & (t < 1.4), 1.0, 0.0)
-    )
+    torque = np.where(moves, 0.5, 0.0) + np.where((t >= 0.5) & (t < 0.8), 1.0, 0.0) - np.where((t >= 1.1) & (t < 1.4), 1.0, 0.0)
     inside = np.min(np.abs(t[:, None] - np.array(points["times"])), axis=1) > 1e-9
     assert np.allclose(r.crank_drive_torque.values[inside], torque[inside], rtol=0.0, atol=1e-13)
     assert list(r.crank_contact.values[inside]) == list(np.where(moves, 1.0, 0.0)[inside])
@@ -152,14 +132,7 @@ def test_the_speed_is_its_signal_after_a_thousand_periods(friction: float) -> No
     assert np.allclose(r.crank_angle, angle, rtol=0.0, atol=1e-12 if friction else 1e-9)
 
 
-MOVES = {
-    "start": 0.5,
-    "begin": 0.1,
-    "moves": [{"to": 2.0}, {"to": -1.0, "jerk": 90.0}],
-    "speed": 4.0,
-    "acceleration": 20.0,
-    "dwell": 0.2,
-}
+MOVES = {"start": 0.5, "begin": 0.1, "moves": [{"to": 2.0}, {"to": -1.0, "jerk": 90.0}], "speed": 4.0, "acceleration": 20.0, "dwell": 0.2}
 
 
 def test_moves_drive_a_shaft_exactly() -> None:
@@ -248,11 +221,7 @@ def test_steps_move_a_slide_by_its_position() -> None:
 @pytest.mark.parametrize(
     ("crank", "initial", "says"),
     [
-        (
-            {"steps": [{"height": 1.0, "time": 0.5}]},
-            {},
-            "key shafts.crank.motion: its position jumps at 0.5 s from 0 to 1 rad",
-        ),
+        ({"steps": [{"height": 1.0, "time": 0.5}]}, {}, "key shafts.crank.motion: its position jumps at 0.5 s from 0 to 1 rad"),
         (
             {"ramps": [{"rise": 1.0, "duration": 0.5, "begin": 0.1}]},
             {},
@@ -345,9 +314,7 @@ def random_train(seed: int) -> lm.Scenario:
     free = [name for name in names if name not in driven]
     if free and draw.random() < 0.5:
         shafts[draw.choice(free)]["torque"] = {"amplitude": draw.uniform(0.5, 4.0), "frequency": draw.uniform(0.3, 2.0)}
-    return lm.Scenario(
-        shafts=shafts, gears=gears, clutches=clutches, simulation={"duration": 1.5, "sample_interval": 0.01}
-    )
+    return lm.Scenario(shafts=shafts, gears=gears, clutches=clutches, simulation={"duration": 1.5, "sample_interval": 0.01})
 
 
 def random_trains(seeds: range) -> list[lm.Scenario]:
@@ -370,9 +337,7 @@ def compared(name: str) -> bool:
 def test_both_solvers_agree_on_random_trains(block: int) -> None:
     for s in random_trains(range(40 * block, 40 * block + 40)):
         exact = lm.simulate(s)
-        coarse, fine = (
-            lm.simulate(s, solver="dormand-prince", relative_tolerance=tolerance) for tolerance in (1e-7, 1e-9)
-        )
+        coarse, fine = (lm.simulate(s, solver="dormand-prince", relative_tolerance=tolerance) for tolerance in (1e-7, 1e-9))
         for name in filter(compared, map(str, exact)):
             size = max(1e-3, float(abs(exact[name]).max()))
             open_by = float(abs(coarse[name] - fine[name]).max()) / size
@@ -431,9 +396,7 @@ def test_two_given_speeds_on_a_rigid_gear_are_refused() -> None:
             shafts={"crank": {"inertia": 1.0, "speed": 1.0}, "load": {"inertia": 1.0, "speed": 1.0}},
             gears={"g": {"input": "crank", "output": "load", "ratio": 1.0}},
         )
-    assert "key gears.g: is rigid and joins shafts whose motions are both given; give it a stiffness" in str(
-        caught.value
-    )
+    assert "key gears.g: is rigid and joins shafts whose motions are both given; give it a stiffness" in str(caught.value)
 
 
 def test_an_initial_speed_beside_a_given_one_is_refused() -> None:
@@ -478,10 +441,7 @@ def test_a_given_angle_begins_at_zero_or_where_it_is_told() -> None:
 def test_a_given_shaft_needs_no_inertia_behind_backlash(ratio: float) -> None:
     """Its speed follows from no balance: all others move as with any inertia of it, and its torque is what the mesh takes."""
     tables: dict[str, Any] = {
-        "shafts": {
-            "p": {"speed": {"amplitude": 5.0, "frequency": 1.3}},
-            "x": {"inertia": 15.0, "friction_torque": 1.0},
-        },
+        "shafts": {"p": {"speed": {"amplitude": 5.0, "frequency": 1.3}}, "x": {"inertia": 15.0, "friction_torque": 1.0}},
         "gears": {
             "g": {
                 "input": "p",
@@ -493,18 +453,14 @@ def test_a_given_shaft_needs_no_inertia_behind_backlash(ratio: float) -> None:
         },
     }
     alone = lm.simulate(scenario(**tables))
-    heavy = lm.simulate(
-        scenario(**tables | {"shafts": {**tables["shafts"], "p": {**tables["shafts"]["p"], "inertia": 2.0}}})
-    )
+    heavy = lm.simulate(scenario(**tables | {"shafts": {**tables["shafts"], "p": {**tables["shafts"]["p"], "inertia": 2.0}}}))
     for name in ("x_speed", "x_angle", "g_twist", "p_speed"):
         assert np.allclose(alone[name], heavy[name], rtol=1e-10, atol=1e-12)
     assert np.allclose(alone.p_drive_torque, alone.g_output_torque / ratio, rtol=1e-12, atol=1e-12)
 
 
 def test_a_wave_of_speed_is_continuous() -> None:
-    assert SpeedSignal(mean=2.0, amplitude=1.0, frequency=1.0, phase=0.5).at_start() == pytest.approx(
-        2.0 + math.sin(0.5)
-    )
+    assert SpeedSignal(mean=2.0, amplitude=1.0, frequency=1.0, phase=0.5).at_start() == pytest.approx(2.0 + math.sin(0.5))
 
 
 def test_steps_meet_the_motion_that_is_given_at_their_ends() -> None:
@@ -512,9 +468,7 @@ def test_steps_meet_the_motion_that_is_given_at_their_ends() -> None:
     simulation = lm.Simulation(scenario(), step=0.05)
     for k in range(1, 401):
         t = 0.05 * k
-        simulation.advance(
-            0.05, motion={"crank": {"angle": 1.0 - math.cos(t), "speed": math.sin(t), "acceleration": math.cos(t)}}
-        )
+        simulation.advance(0.05, motion={"crank": {"angle": 1.0 - math.cos(t), "speed": math.sin(t), "acceleration": math.cos(t)}})
         # The twist less the two angles is integrated beside them.
         load, twist = simulation["load_angle", "g_twist"]
         assert load + twist == pytest.approx(1.0 - math.cos(t), abs=1e-12)

@@ -20,17 +20,13 @@ RECORDED = {"some-scenario.samples": {"twist": golden.entry(SERIES), "end": gold
 def test_every_bit_is_as_recorded(build: str) -> None:
     done = run_in_build(build, golden.__file__)
     assert done.returncode == 0, (
-        f"the build '{build}' does not give what golden.toml holds (CONTRIBUTING.md says when it is renewed):\n"
-        f"{done.stdout}{done.stderr}"
+        f"the build '{build}' does not give what golden.toml holds (CONTRIBUTING.md says when it is renewed):\n{done.stdout}{done.stderr}"
     )
 
 
 # NumPy's and the C library's own choice of code for a processor, reduced to that of older ones.
 AVX_512 = [name for name in DISPATCHED if "512" in name or name == "X86_V4"]
-PROCESSORS = {
-    "without AVX-512": (AVX_512, "-AVX512F,-AVX512VL"),
-    "with SSE alone": (DISPATCHED, "-FMA,-FMA4,-AVX,-AVX2,-AVX512F,-BMI2"),
-}
+PROCESSORS = {"without AVX-512": (AVX_512, "-AVX512F,-AVX512VL"), "with SSE alone": (DISPATCHED, "-FMA,-FMA4,-AVX,-AVX2,-AVX512F,-BMI2")}
 
 
 @pytest.mark.parametrize("processor", PROCESSORS)
@@ -44,9 +40,7 @@ def test_every_processor_gives_the_same_bits(processor: str, monkeypatch) -> Non
 
 def test_masks_of_processors_change_what_numpy_computes(monkeypatch) -> None:
     """Otherwise the masks would show nothing. Only where this processor has features to mask."""
-    script = (
-        "import numpy as np; from numpy._core._multiarray_umath import __cpu_features__ as f; print(sum(f.values()))"
-    )
+    script = "import numpy as np; from numpy._core._multiarray_umath import __cpu_features__ as f; print(sum(f.values()))"
     counts = []
     for disabled in ("", " ".join(DISPATCHED)):
         monkeypatch.setenv("NPY_DISABLE_CPU_FEATURES", disabled)
@@ -94,8 +88,7 @@ def test_the_sign_of_zero_counts_and_the_payload_of_nan_does_not() -> None:
 
 
 @pytest.mark.parametrize(
-    ("a", "b", "apart"),
-    [(1.0, 1.0 + 2**-52, 1), (1.0, 1.0 - 2**-53, 1), (-5e-324, 5e-324, 2), (0.0, -0.0, 0), (1.0, 2.0, 2**52)],
+    ("a", "b", "apart"), [(1.0, 1.0 + 2**-52, 1), (1.0, 1.0 - 2**-53, 1), (-5e-324, 5e-324, 2), (0.0, -0.0, 0), (1.0, 2.0, 2**52)]
 )
 def test_units_of_rounding_are_counted(a: float, b: float, apart: int) -> None:
     assert golden.ulps(a, b) == golden.ulps(b, a) == apart

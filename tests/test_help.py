@@ -51,9 +51,7 @@ def can_run(words: list[str]) -> bool:
 
 
 @pytest.mark.parametrize("name", COMMANDS, ids=" ".join)
-def test_the_help_of_a_command_has_an_example_that_runs(
-    name: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_help_of_a_command_has_an_example_that_runs(name: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     examples = [words for words in examples_of(COMMANDS[name]) if can_run(words)]
     if name == ("study",):
         examples = [words for words in examples if "show" not in words and "resume" not in words]
@@ -116,9 +114,7 @@ def test_a_command_writes_only_what_it_is_asked_for_and_names_the_next_one(
     assert not re.search(r"[-+]?\d(\.\d+)?e-1[2-9]", done.stdout), "rounding is printed as 0"
 
 
-@pytest.mark.parametrize(
-    "call", [("study", "examples/tolerance.toml"), ("select", "examples/select-axis.toml")], ids=" ".join
-)
+@pytest.mark.parametrize("call", [("study", "examples/tolerance.toml"), ("select", "examples/select-axis.toml")], ids=" ".join)
 def test_commands_that_resume_need_the_directory_of_their_runs(
     call: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -160,14 +160,7 @@ def test_what_solves_is_bound_to_no_platform() -> None:
 
 
 def test_what_binds_to_a_platform_is_recognised() -> None:
-    for line in (
-        "thread_local int n;",
-        "#include <mutex>",
-        "throw 1;",
-        "y = std::sin(x);",
-        "std::pow(x, 3)",
-        "std::log(x)",
-    ):
+    for line in ("thread_local int n;", "#include <mutex>", "throw 1;", "y = std::sin(x);", "std::pow(x, 3)", "std::log(x)"):
         assert re.search(PLATFORM, line)
     for line in ("std::sqrt(x)", "std::floor(x)", "sine_cosine(x)", "#include <memory>", "// country"):
         assert not re.search(PLATFORM, line)
@@ -184,22 +177,7 @@ OUTSIDE = {
 }
 PERMITTED = {("control/continuous", "np.linalg"): "its eigenvalues decide whether a limit is refused, and enter no run"}
 ROUNDED_DIFFERENTLY = {
-    *(
-        "sin",
-        "cos",
-        "tan",
-        "arcsin",
-        "arccos",
-        "arctan",
-        "arctan2",
-        "asin",
-        "acos",
-        "atan",
-        "atan2",
-        "sinh",
-        "cosh",
-        "tanh",
-    ),
+    *("sin", "cos", "tan", "arcsin", "arccos", "arctan", "arctan2", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh"),
     *("exp", "exp2", "expm1", "log", "log2", "log10", "log1p", "pow", "power", "float_power", "cbrt", "hypot", "sinc"),
     *("linalg", "fft", "interp", "dot", "vdot", "inner", "matmul", "einsum", "tensordot", "convolve", "correlate"),
     *("polyfit", "polyval", "geomspace", "logspace", "trapezoid", "fsum", "sumprod", "dist", "gamma", "erf"),
@@ -238,15 +216,7 @@ def test_what_enters_the_core_is_rounded_alike_on_every_platform() -> None:
 
 
 def test_functions_that_platforms_round_differently_are_recognised() -> None:
-    for line in (
-        "np.sin(x)",
-        "math.log10(x)",
-        "x**2",
-        "x ** 0.5",
-        "a @ b",
-        "np.linalg.solve(a, b)",
-        "from scipy import x",
-    ):
+    for line in ("np.sin(x)", "math.log10(x)", "x**2", "x ** 0.5", "a @ b", "np.linalg.solve(a, b)", "from scipy import x"):
         assert rounded_differently(line), line
     for line in ("sin(x)", "x * x", "2.0**-11", "2**53", "10**6", "np.sqrt(x)", "math.ldexp(x, 2)", "f(**options)"):
         assert not rounded_differently(line), line
@@ -300,16 +270,7 @@ def test_a_loss_map_is_validated_once() -> None:
 
 
 def test_the_extension_s_stub_is_current(tmp_path: Path) -> None:
-    command = [
-        sys.executable,
-        "-m",
-        "nanobind.stubgen",
-        "-q",
-        "-m",
-        "lostmotion._core",
-        "-o",
-        str(tmp_path / "_core.pyi"),
-    ]
+    command = [sys.executable, "-m", "nanobind.stubgen", "-q", "-m", "lostmotion._core", "-o", str(tmp_path / "_core.pyi")]
     subprocess.run(command, check=True)
     assert (tmp_path / "_core.pyi").read_text() == (PACKAGE / "_core.pyi").read_text(), "run: make stub"
     assert described.stub() == (PACKAGE / "inputs" / "described.pyi").read_text(), "run: make stub"

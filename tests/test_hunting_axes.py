@@ -16,9 +16,7 @@ SLIPS = 30  # that a run of an axis which hunts has at least
 ROUNDING = 1e-9  # of the largest error, with which a run ends a slip that creeps to rest
 
 
-def geared(
-    inertia: float, load: dict[str, Any], gear: dict[str, Any], controller: dict[str, Any], w: float
-) -> lm.Scenario:
+def geared(inertia: float, load: dict[str, Any], gear: dict[str, Any], controller: dict[str, Any], w: float) -> lm.Scenario:
     """A torque source on a shaft of this inertia, as the load feels it, and the load behind a gear; w: poles of the axis [1/s]."""
     ratio, breakaway = gear["ratio"], load["breakaway_torque"]
     own = inertia / ratio**2
@@ -46,11 +44,7 @@ def random_axis(rng: random.Random) -> lm.Scenario:
     sliding = k_p * travel * log(0.01, 0.6)
     breakaway = sliding * rng.choice([1.0, 1.0, 1.1, 1.3, 1.6, 2.0])
     share = rng.uniform(0.2, 0.8)
-    load: dict[str, Any] = {
-        "inertia": (1.0 - share) * inertia,
-        "friction_torque": sliding,
-        "breakaway_torque": breakaway,
-    }
+    load: dict[str, Any] = {"inertia": (1.0 - share) * inertia, "friction_torque": sliding, "breakaway_torque": breakaway}
     if rng.random() < 0.5:
         load["viscous_friction"] = log(0.01, 0.5) * k_d
     gear: dict[str, Any] = {
@@ -146,9 +140,7 @@ def check_rests(scenario: lm.Scenario, found: Any, told: str) -> None:
         return
     errors = np.abs(errors_of(scenario, 10.0 * scenario.simulation.duration))
     inside = errors[errors <= found.largest_error]
-    assert np.all(inside[1:] <= inside[:-1] * found.factor * (1.0 + 1e-6) + ROUNDING * found.largest_error), (
-        f"{told}: {errors}"
-    )
+    assert np.all(inside[1:] <= inside[:-1] * found.factor * (1.0 + 1e-6) + ROUNDING * found.largest_error), f"{told}: {errors}"
 
 
 def checked_axes(seed: int, axes: int) -> dict[str, int]:

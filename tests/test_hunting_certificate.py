@@ -23,11 +23,7 @@ def rotor(breakaway: float, **position: Any) -> lm.Scenario:
         shafts={"rotor": {"friction_torque": SLIDING, "breakaway_torque": breakaway}},
         motors={"m": {"kind": "torque_source", "shaft": "rotor", "rotor_inertia": INERTIA, "rated_torque": 10.0}},
         controllers={
-            "m": {
-                "kind": "continuous",
-                "reference": {"kind": "position", "steps": [{"time": 0.1, "height": 0.2}]},
-                "position": gains,
-            }
+            "m": {"kind": "continuous", "reference": {"kind": "position", "steps": [{"time": 0.1, "height": 0.2}]}, "position": gains}
         },
         simulation={"duration": 20.0, "sample_interval": 1e-3},
     )
@@ -107,9 +103,7 @@ def test_what_keeps_an_axis_from_hunting_is_named() -> None:
     held = lm.hunting_certificate(scenario.replace(**{"controllers.servo.limit": 7.5 / 50.0}))
     assert held.verdict == "does not hunt"
     assert "limit of the controller" in held.reason
-    assert (
-        lm.hunting_certificate(scenario.replace(**{"controllers.servo.limit": 8.5 / 50.0})).verdict != "does not hunt"
-    )
+    assert lm.hunting_certificate(scenario.replace(**{"controllers.servo.limit": 8.5 / 50.0})).verdict != "does not hunt"
 
 
 @pytest.mark.parametrize(
@@ -119,10 +113,7 @@ def test_what_keeps_an_axis_from_hunting_is_named() -> None:
         ({"gravity": {"arm": {"shaft": "table", "mass": 1.0, "radius": 0.1}}}, "regime: it has gravity"),
         ({"shafts.table.stribeck_speed": 0.1}, "friction of table that varies with speed"),
         ({"controllers.servo.position.integral_gain": 80.0}, "the linear loop is unstable"),
-        (
-            {"gears.drive.stiffness": {"kind": "curve", "backlash": 1e-3, "slopes": [2e4], "breaks": []}},
-            "segments of drive",
-        ),
+        ({"gears.drive.stiffness": {"kind": "curve", "backlash": 1e-3, "slopes": [2e4], "breaks": []}}, "segments of drive"),
     ],
 )
 def test_what_is_not_decided_is_named(changes: dict[str, Any], reason: str) -> None:
@@ -132,17 +123,13 @@ def test_what_is_not_decided_is_named(changes: dict[str, Any], reason: str) -> N
 
 
 def test_other_controllers_and_a_wrong_error_are_refused() -> None:
-    with pytest.raises(
-        lm.InputError, match=r"reference\.kind: speed; the certificate is that of a position controller"
-    ):
+    with pytest.raises(lm.InputError, match=r"reference\.kind: speed; the certificate is that of a position controller"):
         lm.hunting_certificate(lm.load("speed-axis"))
     with pytest.raises(lm.InputError, match="the scenario has no controller"):
         lm.hunting_certificate(lm.load("step-to-standstill"))
     with pytest.raises(lm.InputError, match="largest_error: -1"):
         lm.hunting_certificate(lm.load("hunting-with-static-friction"), largest_error=-1.0)
-    assert (
-        lm.hunting_certificate(lm.load("hunting-with-static-friction"), largest_error="10 mrad").largest_error == 0.01
-    )
+    assert lm.hunting_certificate(lm.load("hunting-with-static-friction"), largest_error="10 mrad").largest_error == 0.01
 
 
 def test_the_command_prints_the_certificate_and_writes_its_page(tmp_path: Path) -> None:
@@ -153,9 +140,7 @@ def test_the_command_prints_the_certificate_and_writes_its_page(tmp_path: Path) 
     certificate = lm.hunting_certificate(lm.load("hunting-with-static-friction"))
     assert certificate.map is not None
     with (tmp_path / "hunting.csv").open() as file:
-        points = [
-            (float(row["x"]), float(row["y"])) for row in csv.DictReader(file) if row["curve"] == "after the slip"
-        ]
+        points = [(float(row["x"]), float(row["y"])) for row in csv.DictReader(file) if row["curve"] == "after the slip"]
     arcmin = np.degrees(certificate.map["image"].values) * 60.0
     assert np.array(points)[:, 1] == pytest.approx(arcmin)
     assert "From break-away to break-away" in (tmp_path / "servo.html").read_text()

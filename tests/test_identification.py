@@ -30,14 +30,7 @@ from lostmotion.identification.task.file_formulas import Formula
 from lostmotion.identification.task.identification_file import Identification
 from lostmotion.identification.verdicts.identifiability import Undetermined
 from lostmotion.reports import plots
-from lostmotion.reports.identification import (
-    correlations,
-    friction_curve,
-    friction_curves,
-    loop_curves,
-    loss_curves,
-    write_identification,
-)
+from lostmotion.reports.identification import correlations, friction_curve, friction_curves, loop_curves, loss_curves, write_identification
 from lostmotion.reports.panels import Matrix
 
 
@@ -88,9 +81,7 @@ def test_the_answer_is_a_scenario_and_a_data_sheet(found: IdentificationResult, 
     assert source is not None and source.status == "identified"
 
 
-def test_the_data_sheet_of_a_rigid_gear_makes_a_gearbox_and_is_measured(
-    found: IdentificationResult, tmp_path: Path
-) -> None:
+def test_the_data_sheet_of_a_rigid_gear_makes_a_gearbox_and_is_measured(found: IdentificationResult, tmp_path: Path) -> None:
     """The loss of the rung that is taken is load_friction T in both directions: efficiencies 1/(1 + c) and 1 - c."""
     from typer.testing import CliRunner
 
@@ -178,9 +169,7 @@ def test_laws_of_slides_and_screws_have_units_of_translation() -> None:
     curve = friction_curve(scenario, "slide", "friction")
     assert curve is not None
     assert curve.x[-1] <= 1.0  # m/s
-    assert 40.0 < curve.y[0] < 55.0 and curve.y[-1] == pytest.approx(
-        40.0, rel=0.02
-    )  # from the break-away to the friction in motion
+    assert 40.0 < curve.y[0] < 55.0 and curve.y[-1] == pytest.approx(40.0, rel=0.02)  # from the break-away to the friction in motion
     run = {"screw_deflection": np.array([0.0, 2e-6]), "screw_output_force": np.array([0.0, 50.0])}
     (loop,) = loop_curves(scenario.train(), "screw", {"ramp.csv": run})
     assert loop.x[-1] == pytest.approx(2.0) and loop.y[-1] == 50.0  # µm, N
@@ -295,9 +284,7 @@ def test_of_several_starts_the_fit_with_the_smallest_error_is_taken(starts: tupl
         task = Identification(**(data | {"ladder": [rung]}))
         rig = Rig(task, SERVO)
         read = [prepared(task, log, rig.units) for log in read_all(task, SERVO)]
-        (only,) = climb(
-            rig, Engine(rig, threads=1), read, start_point(task, read), lambda *_: None, Progress(None).of(task, read)
-        )
+        (only,) = climb(rig, Engine(rig, threads=1), read, start_point(task, read), lambda *_: None, Progress(None).of(task, read))
         return only.fit.mae
 
     alone = [error(value) for value in starts]
@@ -316,10 +303,7 @@ def test_a_product_that_alone_is_determined_is_named(logs: Path) -> None:
     data["ladder"] = [{"name": "two", "free": ["torque_constant", "resistance"]}]
     data["fit"]["iterations"] = 3
     result = identify_task(Identification(**data), SERVO, threads=1)
-    assert any(
-        "only the ratio" in u.text and "torque_constant" in u.text and "stall torque" in u.text
-        for u in result.undetermined
-    )
+    assert any("only the ratio" in u.text and "torque_constant" in u.text and "stall torque" in u.text for u in result.undetermined)
     for name in ("torque_constant", "resistance"):
         assert result.intervals[name].low <= TRUTH[name] <= result.intervals[name].high
 
@@ -361,8 +345,7 @@ def test_the_jacobian_is_that_of_a_larger_difference(logs: Path) -> None:
     h = 0.05 * free["viscous_friction"].step
     values = point.of(log)
     up, down = (
-        engine.residuals([log], Point(values | {"viscous_friction": values["viscous_friction"] + s * h}, {}), 0)[0]
-        for s in (1, -1)
+        engine.residuals([log], Point(values | {"viscous_friction": values["viscous_friction"] + s * h}, {}), 0)[0] for s in (1, -1)
     )
     assert J[..., 0] == pytest.approx((up - down) / (2 * h), abs=5e-3 * float(np.max(np.abs(J))))
 
@@ -372,18 +355,11 @@ def test_the_command_writes_the_page(logs: Path, tmp_path: Path) -> None:
 
     from lostmotion.cli.entry import app
 
-    text = (
-        (SERVO / "identify.toml")
-        .read_text()
-        .replace("logs/*.json", str(logs / "00[01].json"))
-        .replace('held_out = "kp == 8"', "")
-    )
+    text = (SERVO / "identify.toml").read_text().replace("logs/*.json", str(logs / "00[01].json")).replace('held_out = "kp == 8"', "")
     text = text.replace('scenario = "servo.toml"', f'scenario = "{SERVO / "servo.toml"}"')
     head = text[: text.index("[[ladder]]")]
     file = tmp_path / "identify.toml"
-    file.write_text(
-        head + '[[ladder]]\nname = "friction"\nfree = ["coulomb_friction", "dead_time"]\n[fit]\niterations = 2\n'
-    )
+    file.write_text(head + '[[ladder]]\nname = "friction"\nfree = ["coulomb_friction", "dead_time"]\n[fit]\niterations = 2\n')
     run = CliRunner().invoke(app, ["identify", str(file), "-o", str(tmp_path / "out")])
     assert run.exit_code == 0, run.output
     page = (tmp_path / "out" / "identified.html").read_text()
@@ -394,29 +370,19 @@ def test_the_command_writes_the_page(logs: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("text", "value"),
-    [
-        ("2*a + b**2", 13.0),
-        ("-a/b", -2.0 / 3.0),
-        ("max(a, b) - pi/pi", 2.0),
-        ("a < b and not b == 2", True),
-        ("word == 'x'", True),
-    ],
+    [("2*a + b**2", 13.0), ("-a/b", -2.0 / 3.0), ("max(a, b) - pi/pi", 2.0), ("a < b and not b == 2", True), ("word == 'x'", True)],
 )
 def test_formulas_compute(text: str, value: object) -> None:
     assert Formula(text).value({"a": 2.0, "b": 3.0, "word": "x"}) == value
 
 
-@pytest.mark.parametrize(
-    "text", ["__import__('os')", "a.b", "[x for x in y]", "lambda: 0", "a +", "f'{a}'", "a[0]", "open(a)"]
-)
+@pytest.mark.parametrize("text", ["__import__('os')", "a.b", "[x for x in y]", "lambda: 0", "a +", "f'{a}'", "a[0]", "open(a)"])
 def test_formulas_refuse_what_is_no_arithmetic(text: str) -> None:
     with pytest.raises(ValueError, match=r"cannot be read|something else"):
         Formula(text)
 
 
-@pytest.mark.parametrize(
-    "text", ["9**9**9", "a**9**9", "word * 10**10", "10**10 * word", "-" * 1900 + "a", "2**a**a**a**a"]
-)
+@pytest.mark.parametrize("text", ["9**9**9", "a**9**9", "word * 10**10", "10**10 * word", "-" * 1900 + "a", "2**a**a**a**a"])
 def test_formulas_that_no_memory_holds_are_refused(text: str) -> None:
     begin = time.process_time()
     with pytest.raises(ValueError, match=r"has no value|nested too deeply") as refused:
@@ -426,9 +392,7 @@ def test_formulas_that_no_memory_holds_are_refused(text: str) -> None:
 
 
 def test_mistakes_of_the_file_are_one_line(tmp_path: Path) -> None:
-    text = (
-        (SERVO / "identify.toml").read_text().replace('scenario = "servo.toml"', f'scenario = "{SERVO / "servo.toml"}"')
-    )
+    text = (SERVO / "identify.toml").read_text().replace('scenario = "servo.toml"', f'scenario = "{SERVO / "servo.toml"}"')
     for old, new, said in (
         ('variable = "arm_angle"', 'variable = "arm_angel"', "did you mean arm_angle"),
         ("[inputs.servo_reference]", "[inputs.servo_referense]", "did you mean servo_reference"),
@@ -465,9 +429,7 @@ def test_the_example_reads(tmp_path: Path) -> None:
 def test_an_experiment_with_the_motor_off_tells_friction_from_back_emf(found: IdentificationResult) -> None:
     """While the bridge is closed viscous friction and back-e.m.f. act alike; a swing without it shows the friction alone."""
     still, swing = servo_plans(4)[0], servo_plans(4)[2]
-    still = replace(
-        still, name="stands", channels={**still.channels, "goal_position": Channel(np.zeros(len(still.time)))}
-    )
+    still = replace(still, name="stands", channels={**still.channels, "goal_position": Channel(np.zeros(len(still.time)))})
     ranked = lm.identification.design_experiment(found, [still, swing])
     assert [c.name for c in ranked] == ["002.json", "stands"]
     assert ranked[0].widths["viscous_friction"] < ranked[1].widths["viscous_friction"] <= 1.0

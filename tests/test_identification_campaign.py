@@ -56,9 +56,7 @@ def test_a_gearbox_with_backlash_is_found_again(tmp_path: Path) -> None:
         assert result.values[name] == pytest.approx(value, rel=2e-3), name
 
 
-def test_hysteresis_is_chosen_by_the_loop_held_out_and_found_within_its_interval(
-    gearbox: lm.Gearbox, tmp_path: Path
-) -> None:
+def test_hysteresis_is_chosen_by_the_loop_held_out_and_found_within_its_interval(gearbox: lm.Gearbox, tmp_path: Path) -> None:
     lossy = gearbox.model_copy(update={"hysteresis": lm.model.Hysteresis(efficiency=0.9)})
     result = lm.identify(lm.identification.write_campaign(tmp_path, lossy))
     without, with_it = result.rungs
@@ -111,11 +109,7 @@ def test_the_rig_is_locked_driven_and_driven_back(gearbox: lm.Gearbox) -> None:
 @pytest.mark.parametrize(
     ("stiffness", "losses", "names"),
     [
-        (
-            lm.model.LinearStiffness(stiffness=1e4),
-            lm.model.ConstantEfficiency(efficiency=0.9),
-            ["stiffness", "efficiency"],
-        ),
+        (lm.model.LinearStiffness(stiffness=1e4), lm.model.ConstantEfficiency(efficiency=0.9), ["stiffness", "efficiency"]),
         (
             lm.model.TorsionCurve(slopes=(1e4,), backlash=1e-3),
             lm.model.ConstantEfficiency(efficiency=0.9),
@@ -124,9 +118,7 @@ def test_the_rig_is_locked_driven_and_driven_back(gearbox: lm.Gearbox) -> None:
         (lm.model.Rigid(), lm.model.ConstantEfficiency(efficiency=0.9), ["efficiency"]),
     ],
 )
-def test_every_law_of_a_gearbox_has_its_parameters(
-    stiffness: object, losses: object, names: list[str], gearbox: lm.Gearbox
-) -> None:
+def test_every_law_of_a_gearbox_has_its_parameters(stiffness: object, losses: object, names: list[str], gearbox: lm.Gearbox) -> None:
     changed = lm.Gearbox(**{**gearbox.model_dump(), "stiffness": stiffness, "losses": losses})
     assert [name for name in parameters(changed)[0] if name not in ("inertia", "mesh_damping")] == names
     assert rig_scenario(changed).gears["gearbox"].ratio == gearbox.ratio

@@ -12,15 +12,7 @@ import lostmotion as lm
 from conftest import ROOT
 
 EXAMPLE = ROOT / "examples" / "coupled_arm"
-TRUTH = {
-    "a": 1.1,
-    "b": 0.24,
-    "c": 0.16,
-    "shoulder_damping": 0.4,
-    "shoulder_friction": 0.9,
-    "elbow_damping": 0.12,
-    "elbow_friction": 0.35,
-}
+TRUTH = {"a": 1.1, "b": 0.24, "c": 0.16, "shoulder_damping": 0.4, "shoulder_friction": 0.9, "elbow_damping": 0.12, "elbow_friction": 0.35}
 NOISE = (0.02, 0.01)  # N m
 
 
@@ -42,10 +34,7 @@ def write_logs(directory: Path, *, couples: bool = True, poses: Sequence[float] 
         shoulder = motion(time, (0.5, 1.1, 2.3), (0.1 * k, 1.0, 2.0))
         elbow = motion(time, (0.7, 1.3, 1.9), (1.0, 0.5 * k, 0.3))
         coupling = (t["c"] + t["b"] * np.cos(pose)) if couples else 0.0
-        torques = (
-            (t["a"] + 2.0 * t["b"] * np.cos(pose)) * shoulder[2] + coupling * elbow[2],
-            t["c"] * elbow[2] + coupling * shoulder[2],
-        )
+        torques = ((t["a"] + 2.0 * t["b"] * np.cos(pose)) * shoulder[2] + coupling * elbow[2], t["c"] * elbow[2] + coupling * shoulder[2])
         rows = [time, shoulder[0], elbow[0]]
         for name, q, torque, noise in zip(("shoulder", "elbow"), (shoulder, elbow), torques, NOISE, strict=True):
             friction = t[f"{name}_damping"] * q[1] + t[f"{name}_friction"] * np.sign(q[1])

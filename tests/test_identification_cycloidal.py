@@ -103,9 +103,7 @@ def test_the_split_pin_wheel_comes_as_near_to_the_held_out_log_as_the_other_logs
     assert np.degrees(rmse) < 0.32
 
 
-def test_only_the_sum_of_two_frictions_shows_while_the_output_is_locked(
-    baseline: lm.identification.IdentificationResult,
-) -> None:
+def test_only_the_sum_of_two_frictions_shows_while_the_output_is_locked(baseline: lm.identification.IdentificationResult) -> None:
     widths = {name: i.high - i.low for name, i in baseline.intervals.items()}
     assert widths["friction"] > baseline.values["friction"]
     assert any("friction" in u.text and "disc_friction" in u.text for u in baseline.undetermined)
@@ -157,8 +155,7 @@ def test_weights_multiply_residuals_and_leave_the_errors_as_they_are() -> None:
 
 
 @pytest.mark.parametrize(
-    ("weight", "said"),
-    [("ramp", "is 0 at 0.026 s; it must be positive"), ("1 + (ramps < 3)", "'ramps' in .* has no value")],
+    ("weight", "said"), [("ramp", "is 0 at 0.026 s; it must be positive"), ("1 + (ramps < 3)", "'ramps' in .* has no value")]
 )
 def test_weights_that_are_none_are_refused(weight: str, said: str) -> None:
     task, rig = task_of(weight=weight)

@@ -33,13 +33,7 @@ FOUND = {
     "friction_speed": 0.01885073266082816,
 }
 # Of the description of the data, from inverse dynamics; the speed at which both logs begin is from the position.
-PUBLISHED = {
-    "mass": 95.1089,
-    "viscous_friction": 203.5034,
-    "coulomb_friction": 20.3935,
-    "offset": -3.1648,
-    "first_speed": 0.0079,
-}
+PUBLISHED = {"mass": 95.1089, "viscous_friction": 203.5034, "coulomb_friction": 20.3935, "offset": -3.1648, "first_speed": 0.0079}
 
 needs_data = pytest.mark.skipif(
     not all((Path(DATA) / name).is_file() for name in NAMES) or not DATA,
@@ -73,10 +67,7 @@ def test_the_regression_of_inverse_dynamics_is_that_of_the_description() -> None
 def test_the_axis_follows_its_voltage_in_open_loop() -> None:
     """25 s without any feedback; the best linear model of the benchmark reaches a fit of 25.4 %, a plain four-parameter drive 6.98 mm."""
     rig, logs = rig_and_logs("identify.toml")
-    rmse = [
-        float(np.sqrt(np.mean((log.measured["position"] - run_log(rig, log, FOUND, 2)["position"]) ** 2)))
-        for log in logs
-    ]
+    rmse = [float(np.sqrt(np.mean((log.measured["position"] - run_log(rig, log, FOUND, 2)["position"]) ** 2))) for log in logs]
     # As measured when these values were found, to the last figure given.
     assert rmse == pytest.approx([2.2621e-3, 4.2617e-3], abs=1e-5)
     assert [log.held_out for log in logs] == [False, True]

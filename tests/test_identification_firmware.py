@@ -59,9 +59,7 @@ def torque(error: float, speed: float, supply_resistance: float) -> float:
     t = TRUTH
     e = max(abs(error) - t["dead_band"], 0.0)
     share = min((e - CORNER) / (LAST - CORNER), 1.0)
-    duty = (
-        t["corner_duty"] * e / CORNER if e < CORNER else t["corner_duty"] + share * (t["max_duty"] - t["corner_duty"])
-    )
+    duty = t["corner_duty"] * e / CORNER if e < CORNER else t["corner_duty"] + share * (t["max_duty"] - t["corner_duty"])
     duty = math.copysign(duty, error)
     current = (duty * U - K * speed) / (R + duty * duty * supply_resistance)
     return K * min(max(current, -t["max_current"]), t["max_current"])
@@ -103,9 +101,7 @@ def log(k: int, *, sampled: bool) -> Log:
                 speed, angle = (
                     x + fine * rate
                     for x, rate in zip(
-                        (speed, angle),
-                        rates(speed + 0.5 * fine * middle[0], angle + 0.5 * fine * middle[1], r),
-                        strict=True,
+                        (speed, angle), rates(speed + 0.5 * fine * middle[0], angle + 0.5 * fine * middle[1], r), strict=True
                     )
                 )
     noise = np.random.default_rng(k).normal(size=len(time)) * NOISE
@@ -122,8 +118,7 @@ def identified(directory: Path, controller: str, starts: dict[str, float]) -> di
         logs={"files": ["*.json"]},
         inputs={"servo_reference": {"channel": "goal", "interpolation": "hold"}},
         measured={"position": {"channel": "position", "variable": "arm_angle", "deviation": NOISE}},
-        set={key: name for name, key in keys.items()}
-        | {"controllers.servo.firmware.duty.values": [0.0, "corner_duty", "max_duty"]},
+        set={key: name for name, key in keys.items()} | {"controllers.servo.firmware.duty.values": [0.0, "corner_duty", "max_duty"]},
         parameters={name: {"start": s, "min": 1e-4, "max": 10.0, "scale": s} for name, s in starts.items()},
     )
     rig = Rig(task, directory)

@@ -28,9 +28,7 @@ def speed(time: np.ndarray) -> np.ndarray:
 def logs(tmp_path: Path) -> Path:
     """Two logs of an axis under a constant force, without dry friction."""
     for name, share in (("a.csv", 1.0), ("b.csv", 0.5)):
-        rows = "\n".join(
-            f"{t!r},{share * FORCE!r},{share * v!r}" for t, v in zip(TIME.tolist(), speed(TIME).tolist(), strict=True)
-        )
+        rows = "\n".join(f"{t!r},{share * FORCE!r},{share * v!r}" for t, v in zip(TIME.tolist(), speed(TIME).tolist(), strict=True))
         (tmp_path / name).write_text(f"# share: {share}\ntime [s],force [N],carriage speed [m/s]\n{rows}\n")
     (tmp_path / "rig.toml").write_text(AXIS.replace("friction_force = 20.0\n", ""))
     return tmp_path
@@ -128,9 +126,7 @@ def test_what_is_in_doubt_is_said(logs: Path) -> None:
         (["x.toml", "--rig", "rig.toml"], 2, "--rig goes with `identify new`"),
     ],
 )
-def test_wrong_calls_end_in_one_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], code: int, said: str
-) -> None:
+def test_wrong_calls_end_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], code: int, said: str) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "empty").mkdir()
     (tmp_path / "bad").mkdir()
@@ -167,8 +163,7 @@ def test_a_length_is_that_of_a_slide_and_an_angle_that_of_a_shaft(tmp_path: Path
 
 
 @pytest.mark.parametrize(
-    ("variable", "unit", "other"),
-    [("slide_position", "mm", "deg"), ("slide_speed", "mm/s", "rpm"), ("motor_angle", "deg", "mm")],
+    ("variable", "unit", "other"), [("slide_position", "mm", "deg"), ("slide_speed", "mm/s", "rpm"), ("motor_angle", "deg", "mm")]
 )
 def test_no_length_is_fitted_to_an_angle_without_a_factor(tmp_path: Path, variable: str, unit: str, other: str) -> None:
     (tmp_path / "rig.toml").write_text(SCREW)

@@ -69,9 +69,7 @@ def axis_task(directory: Path, variables: tuple[str, ...] = ("angle", "speed"), 
         "scenario": "axis.toml",
         "logs": {"files": ["*.csv"]},
         "inputs": {"drive_command": {"channel": "force", "interpolation": "hold"}},
-        "measured": {
-            v: {"channel": v, "variable": f"carriage_{VARIABLES[v]}", "deviation": deviations[v]} for v in variables
-        },
+        "measured": {v: {"channel": v, "variable": f"carriage_{VARIABLES[v]}", "deviation": deviations[v]} for v in variables},
         "set": {
             "linear_motors.drive.mass": "mass",
             "slides.carriage.viscous_friction": "viscous_friction",
@@ -178,9 +176,7 @@ def test_a_pause_under_dead_time_and_a_late_channel_does_not_change_the_mass(tmp
     data["parameters"]["late"] = {"start": "8 ms", "max": "50 ms", "unit": "s", "scale": "5 ms"}
     data["set"]["initial.positions.carriage"] = "begin"
     data["set"]["initial.slide_speeds.carriage"] = "begin_speed"
-    data["nuisance"] = {
-        n: {"start": 0.0, "min": -1.0, "tolerance": 0.5, "scale": 0.01} for n in ("begin", "begin_speed")
-    }
+    data["nuisance"] = {n: {"start": 0.0, "min": -1.0, "tolerance": 0.5, "scale": 0.01} for n in ("begin", "begin_speed")}
     result = identify_task(Identification(**data), tmp_path, threads=1)
     assert len(result.logs) == 2
     assert result.values["late"] == pytest.approx(late * INTERVAL, abs=1e-5)
@@ -211,9 +207,7 @@ def test_a_log_whose_first_value_is_missing_begins_where_it_is_measured(tmp_path
 
 
 @pytest.mark.parametrize(("changes", "seconds"), [(True, 0.5), (False, 1.4)])
-def test_a_rig_whose_state_no_channel_shows_is_used_up_to_its_pause(
-    tmp_path: Path, changes: bool, seconds: float
-) -> None:
+def test_a_rig_whose_state_no_channel_shows_is_used_up_to_its_pause(tmp_path: Path, changes: bool, seconds: float) -> None:
     """The gear is compliant; a goal that is the same before and after the pause is taken as having stayed."""
     data = servo_task(tmp_path).model_dump()
     data["set"]["gears.train.stiffness"] = {"kind": "linear", "stiffness": 1e3}
@@ -224,9 +218,5 @@ def test_a_rig_whose_state_no_channel_shows_is_used_up_to_its_pause(
     log = replace(plan, channels={**plan.channels, "goal_position": Channel(goal)}).only(keep, "")
     _, (part,), left_out = split_at_pauses(rig, [prepared(rig.task, log, rig.units)])
     assert left_out == {} and part.time[-1] == pytest.approx(seconds - 0.01)
-    noted = [
-        note
-        for note in part.log.notes
-        if "used up to its pause at 0.49 s: no channel shows the twist of gears.train" in note
-    ]
+    noted = [note for note in part.log.notes if "used up to its pause at 0.49 s: no channel shows the twist of gears.train" in note]
     assert len(noted) == changes

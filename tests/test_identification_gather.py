@@ -21,8 +21,7 @@ from lostmotion.identification.task.identification_file import load_identificati
 
 FILE = (SERVO / "identify.toml").read_text()
 SHORT = (
-    FILE[: FILE.index("[[ladder]]")]
-    + '[[ladder]]\nname = "one"\nfree = ["torque_constant", "coulomb_friction"]\n[fit]\niterations = 2\n'
+    FILE[: FILE.index("[[ladder]]")] + '[[ladder]]\nname = "one"\nfree = ["torque_constant", "coulomb_friction"]\n[fit]\niterations = 2\n'
 )
 Change = Callable[[dict[str, Any]], Any]
 
@@ -97,16 +96,10 @@ UNUSABLE: dict[str, tuple[dict[str, Any] | str, str]] = {
     "no length": (servo_log(length=0), "key gravity.pendulum.radius: 0.0 must be greater than 0"),
     "no gain": (servo_log(kp=0), "key controllers.servo.position: has no gain; give gain"),
     "a gain that is not a number": (servo_log(kp=float("nan")), "has the value nan, which is no finite number"),
-    "a channel of the phases missing": (
-        without("torque_enable"),
-        "'torque_enable' in 'torque_enable == 0' has no value",
-    ),
+    "a channel of the phases missing": (without("torque_enable"), "'torque_enable' in 'torque_enable == 0' has no value"),
     "nothing but overflow": (each(position=lambda k: 1e308 * (-1) ** k), "has no number in any sample"),
     "times in ns since 1970": (each(timestamp=lambda k: 1.7e18 + 1e7 * k), "times are read in s: give their unit"),
-    "a clock that is set": (
-        each(timestamp=lambda k: 0.01 * k + 1.7e9 * (k > 30)),
-        "split the file where the clock jumps",
-    ),
+    "a clock that is set": (each(timestamp=lambda k: 0.01 * k + 1.7e9 * (k > 30)), "split the file where the clock jumps"),
 }
 
 
@@ -128,14 +121,8 @@ NOTED: dict[str, tuple[dict[str, Any], str]] = {
         changed(lambda log: log["entries"][0].update(position="x")),
         "entries[0].position: 'x' is not a number; its sample is missing there (1 in all)",
     ),
-    "a time that is infinite": (
-        changed(lambda log: log["entries"][5].update(timestamp=float("inf"))),
-        "dropped 1 sample without a time",
-    ),
-    "a time of 400 digits": (
-        changed(lambda log: log["entries"][5].update(timestamp=10**400)),
-        "dropped 1 sample without a time",
-    ),
+    "a time that is infinite": (changed(lambda log: log["entries"][5].update(timestamp=float("inf"))), "dropped 1 sample without a time"),
+    "a time of 400 digits": (changed(lambda log: log["entries"][5].update(timestamp=10**400)), "dropped 1 sample without a time"),
     "a value beyond all": (
         changed(lambda log: log["entries"][5].update(position=1e300)),
         "the residuals of 1 sample in which position is not a number are left out",
@@ -166,25 +153,13 @@ def test_numbers_written_as_words_and_a_byte_order_mark_are_read(servo: Path) ->
 WRONG_FILES: dict[str, tuple[str, str, str]] = {
     "pattern": ('"logs/*.json"', '"logs/**.json"', "is no pattern"),
     "no log held out": ("kp == 8", "kp == 9", "'kp == 9' holds for none of the logs, where kp is 16, 8; change"),
-    "no log to begin with": (
-        "[fit]",
-        '[fit]\nfirst = "mass > 5"',
-        "'mass > 5' holds for none of the logs, where mass is 0.5, 1",
-    ),
-    "a name in no header": (
-        'held_out = "kp == 8"',
-        'held_out = "kq == 8"',
-        "(the first of 3 of 3 logs that cannot be used)",
-    ),
+    "no log to begin with": ("[fit]", '[fit]\nfirst = "mass > 5"', "'mass > 5' holds for none of the logs, where mass is 0.5, 1"),
+    "a name in no header": ('held_out = "kp == 8"', 'held_out = "kq == 8"', "(the first of 3 of 3 logs that cannot be used)"),
     "a record of no gear": ('"gear.train"', '"gear.trian"', "'gear.trian' must be gear.NAME with one of train"),
     "a record of a motor": ('"gear.train"', '"motor.servo"', "'motor.servo' must be gear.NAME"),
     "a parameter called pi": ("[parameters]", "[parameters]\npi = 3\n", "formulas know as something else"),
     "a parameter called max": ("[parameters]", "[parameters]\nmax = 3\n", "formulas know as something else"),
-    "a parameter that enters nothing": (
-        '= "coulomb_friction"',
-        "= 0.1",
-        "key parameters.coulomb_friction: enters no formula",
-    ),
+    "a parameter that enters nothing": ('= "coulomb_friction"', "= 0.1", "key parameters.coulomb_friction: enters no formula"),
     "a start out of bounds": ("[fit]", "multi_start = { torque_constant = [1, 99] }\n[fit]", "99 outside of 0.2 to 6"),
     "starts of what is not free": ("[fit]", "multi_start = { resistance = [1] }\n[fit]", "is not free there; add it"),
     "no starts": ("[fit]", "multi_start = { torque_constant = [] }\n[fit]", "without values; give some"),
@@ -192,24 +167,16 @@ WRONG_FILES: dict[str, tuple[str, str, str]] = {
     "a filter below 0": ('"arm_angle"', '"arm_angle"\nfilter_time = -1', "filter_time is -1 s; it must be at least 0"),
     "steps below 0": ('"2*pi/4096"', "-0.1", "key measured.position.resolution: -0.1 must be at least 0"),
     "a phase that no log has": ("{ controllers = {},", "{ controlers = {},", "controlers"),
-    "a key of the time": (
-        'files = ["logs/*.json"]',
-        'files = ["logs/*.json"]\ntime = "clock"',
-        "entries[0] lacks clock",
-    ),
+    "a key of the time": ('files = ["logs/*.json"]', 'files = ["logs/*.json"]\ntime = "clock"', "entries[0] lacks clock"),
 }
 
 
 @pytest.mark.parametrize("what", WRONG_FILES)
-def test_a_task_that_is_wrong_is_refused_before_the_fit_in_one_line(
-    what: str, servo: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_task_that_is_wrong_is_refused_before_the_fit_in_one_line(what: str, servo: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before, after, text = WRONG_FILES[what]
     assert before in SHORT
     (servo / "identify.toml").write_text(SHORT.replace(before, after, 1))
-    monkeypatch.setattr(
-        "lostmotion.identification.identify.identify_logs", lambda *_, **__: pytest.fail("began the fit")
-    )
+    monkeypatch.setattr("lostmotion.identification.identify.identify_logs", lambda *_, **__: pytest.fail("began the fit"))
     with pytest.raises(InputError) as refused:
         lm.identify(servo / "identify.toml")
     assert str(refused.value).startswith(f"{servo / 'identify.toml'}: ")

@@ -43,11 +43,7 @@ def rig_of(directory: Path, **given: Any) -> Rig:
         logs={"files": ["*.csv"]},
         inputs={"crank_given_speed": {"channel": "motion", "smoothing": 0.04} | given},
         measured={"torque": {"channel": "torque", "variable": "crank_drive_torque", "deviation": NOISE}},
-        set={
-            "shafts.lever.inertia": "inertia",
-            "shafts.lever.friction_torque": "coulomb",
-            "shafts.lever.viscous_friction": "viscous",
-        },
+        set={"shafts.lever.inertia": "inertia", "shafts.lever.friction_torque": "coulomb", "shafts.lever.viscous_friction": "viscous"},
         parameters={
             "inertia": {"start": 3e-3, "min": 1e-5, "max": 1.0},
             "coulomb": {"start": 0.1, "max": 1.0},
@@ -75,15 +71,11 @@ def logs_of(rig: Rig, unit: str) -> list[Prepared]:
 
 
 @pytest.mark.parametrize(("unit", "given"), [("rad", {}), ("deg", {}), ("rad/s", {"smoothing": 0.0})])
-def test_inertia_and_friction_follow_from_measured_motion_and_torque(
-    tmp_path: Path, unit: str, given: dict[str, Any]
-) -> None:
+def test_inertia_and_friction_follow_from_measured_motion_and_torque(tmp_path: Path, unit: str, given: dict[str, Any]) -> None:
     """A local cubic over 40 ms errs by less than (20 ms)^2/6 of the fourth derivative: 0.5 mN*m of the fastest motion."""
     rig = rig_of(tmp_path, **given)
     result = identify_logs(rig, logs_of(rig, unit), threads=1)
-    assert result.error()[1] == pytest.approx(
-        NOISE, rel=0.06
-    )  # with 6000 samples the noise itself departs by 3 % at most
+    assert result.error()[1] == pytest.approx(NOISE, rel=0.06)  # with 6000 samples the noise itself departs by 3 % at most
     assert result.by_differences == {}
     for name, value in TRUTH.items():
         i = result.intervals[name]
@@ -101,10 +93,7 @@ def test_derivatives_with_a_given_motion_are_those_of_small_differences(tmp_path
     jacobians = engine.jacobians(logs, point, 0, rig.task.parameters)
     for n, name in enumerate(rig.task.parameters):
         h = 1e-5 * point.values[name]
-        up, down = (
-            engine.residuals(logs, type(point)({**point.values, name: point.values[name] + s * h}, {}), 0)
-            for s in (1.0, -1.0)
-        )
+        up, down = (engine.residuals(logs, type(point)({**point.values, name: point.values[name] + s * h}, {}), 0) for s in (1.0, -1.0))
         for J, a, b in zip(jacobians, up, down, strict=True):
             assert J[..., n] == pytest.approx((a - b) / (2.0 * h), abs=1e-6 * max(1e-3, np.abs(J[..., n]).max()))
 

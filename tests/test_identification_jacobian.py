@@ -19,9 +19,7 @@ from lostmotion.identification.task.identification_file import Identification
 from lostmotion.identification.virtual_logs import virtual_log
 
 
-def small_differences(
-    engine: Engine, log: Prepared, values: dict[str, float], rung: int, name: str, h: float
-) -> np.ndarray:
+def small_differences(engine: Engine, log: Prepared, values: dict[str, float], rung: int, name: str, h: float) -> np.ndarray:
     up, down = (engine.residuals([log], Point({**values, name: values[name] + s * h}, {}), rung)[0] for s in (1, -1))
     return (up - down) / (2.0 * h)
 
@@ -55,13 +53,7 @@ def test_the_jacobian_is_that_of_small_differences(kind: int) -> None:
 
 def test_scale_offset_delay_and_filter_of_channels_are_parameters_too() -> None:
     data = servo_task(Path()).model_dump()
-    data["measured"]["position"] |= {
-        "scale": "gain",
-        "offset": "zero",
-        "delay": "late",
-        "resolution": 0.0,
-        "deviation": 1e-3,
-    }
+    data["measured"]["position"] |= {"scale": "gain", "offset": "zero", "delay": "late", "resolution": 0.0, "deviation": 1e-3}
     data["measured"]["speed"] = {
         "channel": "speed",
         "variable": "arm_speed",
@@ -183,11 +175,7 @@ def test_logs_of_one_rig_at_once_are_the_logs_one_by_one() -> None:
     rig = Rig(task, SERVO)
     plan = servo_plans(1, duration=0.5)[0]
     logs = [
-        prepared(
-            task,
-            virtual_log(rig, replace(plan, name=str(k)), TRUTH, rung=1, noise={"position": 1e-3}, seed=k),
-            rig.units,
-        )
+        prepared(task, virtual_log(rig, replace(plan, name=str(k)), TRUTH, rung=1, noise={"position": 1e-3}, seed=k), rig.units)
         for k in range(12)
     ]
     values = {n: p.start for n, p in task.parameters.items()}

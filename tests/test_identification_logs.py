@@ -62,10 +62,7 @@ def as_parquet(path: Path) -> None:
 def as_tdms(path: Path) -> None:
     nptdms = pytest.importorskip("nptdms")
     channel = nptdms.ChannelObject(
-        "run",
-        "position",
-        np.degrees(ANGLE),
-        properties={"unit_string": "deg", "wf_increment": 0.01, "wf_start_offset": 0.0},
+        "run", "position", np.degrees(ANGLE), properties={"unit_string": "deg", "wf_increment": 0.01, "wf_start_offset": 0.0}
     )
     with nptdms.TdmsWriter(path) as writer:
         writer.write_segment([nptdms.RootObject({"mass": 0.5}), channel])
@@ -178,9 +175,7 @@ def test_messages_of_an_mcap_file_are_channels_at_the_times_of_one_topic(tmp_pat
 def test_an_mcap_file_that_is_neither_in_json_nor_of_ros_is_refused_in_one_line(tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"
     as_mcap(path, "protobuf")
-    with pytest.raises(
-        lm.InputError, match=r"has no topic in JSON or of ROS \(protobuf\); record in one of these"
-    ) as refused:
+    with pytest.raises(lm.InputError, match=r"has no topic in JSON or of ROS \(protobuf\); record in one of these") as refused:
         read_log(path)
     assert "\n" not in str(refused.value)
     as_mcap(path)
@@ -265,21 +260,16 @@ def test_messages_of_ros_are_channels(tmp_path: Path, kind: str) -> None:
     else:
         path = as_bag(tmp_path / ("log.bag" if kind.endswith("1") else "log"))
     log = read_log(path)
-    assert {
-        "servo/state.position[0]",
-        "servo/state.position[1]",
-        "servo/state.enabled",
-        "servo/state.header.stamp.sec",
-    } <= set(log.channels)
+    assert {"servo/state.position[0]", "servo/state.position[1]", "servo/state.enabled", "servo/state.header.stamp.sec"} <= set(
+        log.channels
+    )
     assert log.values("servo/state.position[1]").tolist() == (-ANGLE).tolist()
     assert log.time == pytest.approx(TIME + 1e-9 * (JITTER - JITTER[0]), abs=1e-9)
     assert read_log(path, time="/servo/state.header.stamp").time == pytest.approx(TIME, abs=1e-9)
     assert any("lists of more than 100 numbers are left out: servo/state.image" in note for note in log.notes)
 
 
-@pytest.mark.parametrize(
-    ("name", "content"), [("log.bag", b"something else"), ("log.db3", b"something else"), ("log.bag", b"")]
-)
+@pytest.mark.parametrize(("name", "content"), [("log.bag", b"something else"), ("log.db3", b"something else"), ("log.bag", b"")])
 def test_a_file_that_is_no_bag_is_refused_in_one_line(tmp_path: Path, name: str, content: bytes) -> None:
     pytest.importorskip("rosbags")
     path = tmp_path / name
@@ -440,9 +430,7 @@ def test_time_stamps_are_seconds_from_the_first(tmp_path: Path, separator: str, 
 
 
 def test_a_change_of_the_zone_is_no_step_of_the_time(tmp_path: Path) -> None:
-    (tmp_path / "log.csv").write_text(
-        "time,x\n2024-10-27T02:59:59.5+02:00,1\n2024-10-27T02:00:00+01:00,2\n2024-10-27T01:00:00.5Z,3\n"
-    )
+    (tmp_path / "log.csv").write_text("time,x\n2024-10-27T02:59:59.5+02:00,1\n2024-10-27T02:00:00+01:00,2\n2024-10-27T01:00:00.5Z,3\n")
     assert read_log(tmp_path / "log.csv").time.tolist() == [0.0, 0.5, 1.0]
 
 
@@ -481,9 +469,7 @@ def test_dates_and_other_sheets_of_a_workbook(tmp_path: Path) -> None:
         ("t,cell (-2.5),raw (counts)", {"cell (-2.5)": "", "raw": "counts"}),
     ],
 )
-def test_a_number_in_brackets_belongs_to_the_name_of_a_column(
-    tmp_path: Path, heading: str, channels: dict[str, str]
-) -> None:
+def test_a_number_in_brackets_belongs_to_the_name_of_a_column(tmp_path: Path, heading: str, channels: dict[str, str]) -> None:
     path = tmp_path / "log.csv"
     path.write_text(f"{heading}\n0,1,2\n1,3,4\n2,5,6\n")
     log = read_log(path)
@@ -516,17 +502,11 @@ def changed(values: np.ndarray, place: Any, to: Any) -> np.ndarray:
 
 SCREENED: dict[str, tuple[Log, str]] = {
     "glitch": (log_of(position=changed(ANGLE, 50, 9.0)), "residuals of 1 glitch of position, the first at 0.5 s"),
-    "many glitches": (
-        log_of(position=changed(ANGLE, slice(5, 195, 10), 9.0)),
-        "residuals of 19 glitches of position, the first at 0.05 s",
-    ),
+    "many glitches": (log_of(position=changed(ANGLE, slice(5, 195, 10), 9.0)), "residuals of 19 glitches of position, the first at 0.05 s"),
     "repeated time": (log_of(changed(TIME, 50, TIME[49])), "dropped 1 sample with the time stamp of the sample before"),
     "time goes back": (log_of(changed(TIME, 50, 0.2)), "dropped 1 sample whose time goes back"),
     "time is not a number": (log_of(changed(TIME, 50, np.nan)), "dropped 1 sample without a time"),
-    "coarse clock": (
-        log_of(np.floor(TIME / 0.04 + 1e-9) * 0.04),
-        "the clock moves in steps of 0.04 s with 4.0 samples each",
-    ),
+    "coarse clock": (log_of(np.floor(TIME / 0.04 + 1e-9) * 0.04), "the clock moves in steps of 0.04 s with 4.0 samples each"),
     "pause": (log_of(np.where(TIME > 1.0, TIME + 0.5, TIME)), "1 pause in the samples, the longest of 0.51 s"),
     "values missing": (
         log_of(position=changed(ANGLE, slice(20, 25), np.nan)),
@@ -534,22 +514,15 @@ SCREENED: dict[str, tuple[Log, str]] = {
     ),
     "stall": (
         log_of(
-            position=np.where((TIME > 0.5) & (TIME < 1.0), ANGLE[51], ANGLE),
-            goal=np.where((TIME > 0.5) & (TIME < 1.0), ANGLE[51], ANGLE),
+            position=np.where((TIME > 0.5) & (TIME < 1.0), ANGLE[51], ANGLE), goal=np.where((TIME > 0.5) & (TIME < 1.0), ANGLE[51], ANGLE)
         ),
         "no channel changes",
     ),
     "saturation": (log_of(position=np.clip(np.sin(20 * TIME), -0.6, 0.6)), "it may saturate"),
-    "contradiction": (
-        log_of(header={"vin": 7.4}, volts=np.full(200, 6.1)),
-        "the header says vin = 7.4, the channel volts is 6.1",
-    ),
+    "contradiction": (log_of(header={"vin": 7.4}, volts=np.full(200, 6.1)), "the header says vin = 7.4, the channel volts is 6.1"),
     "slow channel": (log_of(position=np.floor(TIME / 0.15)), "position changes only"),
     "constant": (log_of(position=np.full(200, 0.3)), "position stays at 0.3 all through"),
-    "constant with gaps": (
-        log_of(position=changed(np.full(200, 0.3), slice(50, 55), np.nan)),
-        "position stays at 0.3 all through",
-    ),
+    "constant with gaps": (log_of(position=changed(np.full(200, 0.3), slice(50, 55), np.nan)), "position stays at 0.3 all through"),
 }
 
 
@@ -578,10 +551,7 @@ REFUSED: dict[str, tuple[Log, str]] = {
     "mostly missing": (log_of(position=changed(ANGLE, slice(0, 150), np.nan)), "no number in 75% of the samples"),
     "time in disorder": (log_of(np.random.default_rng(0).permutation(TIME)), "goes back at sample"),
     "too short": (log_of(TIME[:5], position=ANGLE[:5], goal=ANGLE[:5]), "5 samples; 10 at least"),
-    "channel missing": (
-        Log("log.json", TIME, {"positoin": Channel(ANGLE), "goal": Channel(ANGLE)}),
-        "did you mean positoin",
-    ),
+    "channel missing": (Log("log.json", TIME, {"positoin": Channel(ANGLE), "goal": Channel(ANGLE)}), "did you mean positoin"),
 }
 
 
@@ -597,16 +567,8 @@ FILES: dict[str, tuple[str, bytes | str, str]] = {
     "cut off": ("a.json", '{"entries": [{"timestamp": 0.0, "posi', "is not JSON"),
     "no entries": ("b.json", "{}", "has no list of entries"),
     "empty entries": ("c.json", '{"entries": []}', "is empty"),
-    "entry without a channel": (
-        "d.json",
-        '{"entries": [{"timestamp": 0, "x": 1}, {"timestamp": 1}]}',
-        r"entries\[1\] lacks x",
-    ),
-    "text for a number": (
-        "e.json",
-        '{"entries": [{"timestamp": 0, "x": 1}, {"timestamp": 1, "x": "fast"}]}',
-        "is not a number",
-    ),
+    "entry without a channel": ("d.json", '{"entries": [{"timestamp": 0, "x": 1}, {"timestamp": 1}]}', r"entries\[1\] lacks x"),
+    "text for a number": ("e.json", '{"entries": [{"timestamp": 0, "x": 1}, {"timestamp": 1, "x": "fast"}]}', "is not a number"),
     "cut line": ("g.csv", "time,x\n0,1\n1\n", "line 3: has 1 values for 2 columns"),
     "word in a column": ("h.csv", "time,x\n0,1\n1,fast\n", "'fast' in column x is not a number"),
     "column twice": ("i.csv", "time,x,x\n0,1,1\n1,2,2\n", "twice"),
@@ -616,11 +578,7 @@ FILES: dict[str, tuple[str, bytes | str, str]] = {
         "time;x\n0,1;1\n1.2;2\n",
         "line 3: '1.2' in column time is not a number; write all numbers with decimal points",
     ),
-    "commas between columns and before decimals": (
-        "q.csv",
-        "time,x\n0,1,1,5\n0,2,2,5\n",
-        "line 2: has 4 values for 2 columns",
-    ),
+    "commas between columns and before decimals": ("q.csv", "time,x\n0,1,1,5\n0,2,2,5\n", "line 2: has 4 values for 2 columns"),
     "one column": ("r.csv", "time\n0\n1\n", "has one column; a log needs the time and one channel at least"),
     "a comma that may be one between thousands": (
         "s.csv",

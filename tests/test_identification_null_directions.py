@@ -30,9 +30,7 @@ def identified(directory: Path, values: dict[str, float], **tables: Any) -> Iden
         "scenario": "axis.toml",
         "logs": {"files": ["*.csv"]},
         "inputs": {"drive_command": {"channel": "force", "interpolation": "linear"} | tables.pop("input", {})},
-        "measured": {
-            "speed": {"channel": "speed", "variable": "carriage_speed", "deviation": NOISE} | tables.pop("measured", {})
-        },
+        "measured": {"speed": {"channel": "speed", "variable": "carriage_speed", "deviation": NOISE} | tables.pop("measured", {})},
         "parameters": {n: {"start": v, "min": -10.0 if n in "pq" else 1e-3, "max": 1e3} for n, v in values.items()},
         "fit": {"regression": False, "iterations": 8},
     }
@@ -45,12 +43,7 @@ def identified(directory: Path, values: dict[str, float], **tables: Any) -> Iden
 @pytest.mark.parametrize("late", [0.02, 0.022, 0.03])
 def test_two_delays_in_a_row_are_a_sum(tmp_path: Path, late: float) -> None:
     """What acts late and what is shown late shift the same speed; alike in size, they look like a product."""
-    result = identified(
-        tmp_path,
-        {"dead_time": 0.02, "speed_delay": late},
-        input={"delay": "dead_time"},
-        measured={"delay": "speed_delay"},
-    )
+    result = identified(tmp_path, {"dead_time": 0.02, "speed_delay": late}, input={"delay": "dead_time"}, measured={"delay": "speed_delay"})
     (said,) = [u.text for u in result.undetermined]
     assert said in {
         f"only the sum {a} + {b} is determined; fix one of them, or give a channel whose delay is known"
@@ -100,9 +93,7 @@ def test_one_value_of_three_is_one_sentence(tmp_path: Path, values: dict[str, fl
 def test_two_pairs_are_not_mixed(tmp_path: Path) -> None:
     """All directions of an eigenspace are alike to its decomposition; a pair has no part in the other."""
     values = {"a": 1.1, "b": 0.9, "own": 110.0, "guide": 90.0}
-    result = identified(
-        tmp_path, values, input={"scale": "a*b"}, set={"slides.carriage.viscous_friction": "own + guide"}
-    )
+    result = identified(tmp_path, values, input={"scale": "a*b"}, set={"slides.carriage.viscous_friction": "own + guide"})
     said = {u.text.partition(" is determined")[0] for u in result.undetermined}
     assert len(said) == 2
     assert said & {"only the product a*b", "only the product b*a"}

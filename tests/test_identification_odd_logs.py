@@ -134,8 +134,7 @@ def identified(directory: Path, seed: int, spoil: Callable[[Log], Log]) -> Ident
 
 
 @pytest.mark.parametrize(
-    ("fault", "seed"),
-    [(fault, seed) for fault in FAULTS for seed in ((2,) if fault == "times in ms" else (2, 1, 3)[: some(3, 1)])],
+    ("fault", "seed"), [(fault, seed) for fault in FAULTS for seed in ((2,) if fault == "times in ms" else (2, 1, 3)[: some(3, 1)])]
 )
 def test_a_spoiled_log_is_named_with_its_fault_and_left_out(tmp_path: Path, fault: str, seed: int) -> None:
     spoil, words = FAULTS[fault]

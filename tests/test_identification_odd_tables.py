@@ -32,9 +32,7 @@ def test_a_damaged_line_or_cell_costs_only_itself(tmp_path: Path, damage: str, s
     gone = {"cut": 59, "cut within a number": 59, "ERROR": 30, "short line": 30, "first cell": 0}[damage]
     cells = lines[gone].split(separator)
     lines[gone] = separator.join(
-        {"cut": cells[:2], "cut within a number": [*cells[:1], "-"], "short line": cells[:1]}.get(
-            damage, [cells[0], "ERROR", cells[2]]
-        )
+        {"cut": cells[:2], "cut within a number": [*cells[:1], "-"], "short line": cells[:1]}.get(damage, [cells[0], "ERROR", cells[2]])
     )
     log = read(tmp_path / "a.csv", [separator.join(["time", "x", "y"]), *lines])
     number = gone + 2

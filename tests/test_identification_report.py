@@ -72,10 +72,7 @@ def carriages(directory: Path, count: int) -> Identification:
         x = released(time, 0.05) + noise * np.random.default_rng(k).normal(size=len(time))
         rows = "\n".join(f"{t:.4f},{a:.9g}" for t, a in zip(time, x, strict=True))
         (directory / f"{k:02d}.csv").write_text(f"time [s],pos [rad]\n{rows}\n")
-    parameters = {
-        "mass": {"start": 90.0, "min": 1.0, "max": 1000.0},
-        "damping": {"start": 18.0, "max": 100.0, "off": 20.0},
-    }
+    parameters = {"mass": {"start": 90.0, "min": 1.0, "max": 1000.0}, "damping": {"start": 18.0, "max": 100.0, "off": 20.0}}
     ladder = ({"name": "mass", "free": ["mass"]}, {"name": "damping", "free": ["damping"]})
     task = spring_task(directory, parameters=parameters, ladder=ladder)
     return task.model_copy(update={"set": {**task.set, "shafts.carriage.viscous_friction": "damping"}})

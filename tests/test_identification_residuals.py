@@ -61,11 +61,7 @@ def axis_task(directory: Path, interpolation: str | None, start: float, **more: 
         "logs": {"files": ["*.csv"]},
         "inputs": {"drive_command": {"channel": "torque", "interpolation": interpolation}},
         "measured": {"angle": {"channel": "angle", "variable": "rotor_angle", "deviation": NOISE}},
-        "set": {
-            "gears.g.stiffness.backlash": "backlash",
-            "shafts.load.inertia": "inertia",
-            "shafts.rotor.friction_torque": "friction",
-        },
+        "set": {"gears.g.stiffness.backlash": "backlash", "shafts.load.inertia": "inertia", "shafts.rotor.friction_torque": "friction"},
         "parameters": {
             "backlash": {"start": start, "min": 1e-4, "max": 2e-2},
             "inertia": {"start": 0.51, "min": 0.01, "max": 5.0},
@@ -107,9 +103,7 @@ def test_backlash_is_found_from_other_starts_by_default(tmp_path: Path, start: f
 
 
 @pytest.mark.parametrize(("truth", "start"), [("hold", 0.8e-3), ("linear", 6e-3)][: some(2, 1)])
-def test_interpolation_and_backlash_are_found_together_from_far_starts(
-    tmp_path: Path, truth: str, start: float
-) -> None:
+def test_interpolation_and_backlash_are_found_together_from_far_starts(tmp_path: Path, truth: str, start: float) -> None:
     """At such starts the residuals of both interpolations say nothing; at the backlash that is found they do."""
     result = identified(tmp_path, truth, None, start)
     assert result.task.inputs["drive_command"].interpolation == truth
@@ -243,9 +237,7 @@ def test_a_wrong_friction_law_is_named_and_flagged_at_every_interval(tmp_path: P
     (misfit,) = wrong.misfits
     assert misfit.shapes[0][0] == "speed"
     assert "have a shape over speed (" in str(wrong)
-    assert all(
-        i.flag.startswith("may miss the value: structured residuals over speed") for i in wrong.intervals.values()
-    )
+    assert all(i.flag.startswith("may miss the value: structured residuals over speed") for i in wrong.intervals.values())
     page = write_identification(tmp_path / "out", "spindle", wrong).read_text()
     assert page.count("may miss the value: structured residuals over speed") >= 3
     assert right.misfits == []

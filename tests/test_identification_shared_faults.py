@@ -67,8 +67,7 @@ def test_a_sensor_that_stops_in_a_motion_is_frozen(noise: float, value: str) -> 
 def test_another_channel_that_moves_tells_a_frozen_sensor_from_a_load_at_rest() -> None:
     angle = stuck()
     begin, end = max(
-        ((a, b) for a in range(len(angle)) for b in (int(np.argmax(angle[a:] != angle[a])) + a,) if b - a > 25),
-        key=lambda s: s[1] - s[0],
+        ((a, b) for a in range(len(angle)) for b in (int(np.argmax(angle[a:] != angle[a])) + a,) if b - a > 25), key=lambda s: s[1] - s[0]
     )
     moving = np.sin(3.0 * TIME)
     assert (begin, end) in frozen_stretches(angle, [moving])

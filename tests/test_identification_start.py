@@ -44,14 +44,7 @@ radius = 0.1
 duration = "1 s"
 sample_interval = "1 ms"
 """
-DC = {
-    "shaft": "rotor",
-    "kind": "dc",
-    "rotor_inertia": 1e-4,
-    "rated_torque": 1.0,
-    "rated_speed": 300.0,
-    "rated_voltage": 24.0,
-}
+DC = {"shaft": "rotor", "kind": "dc", "rotor_inertia": 1e-4, "rated_torque": 1.0, "rated_speed": 300.0, "rated_voltage": 24.0}
 DC |= {"electrical_time_constant": 1e-3, "armature_voltage_constant": 5.0}
 NOISE = 1e-4  # rad
 VALUES = {"inertia": 0.03, "viscous": 0.02, "coulomb": 0.15, "weight": 0.8, "offset": 0.02, "radius": 0.1}
@@ -98,9 +91,7 @@ def free_swings(rig: Rig, values: dict[str, float]) -> list[Prepared]:
     return [axis_log(rig, values, time, np.zeros(len(time)), 1.0 + 0.5 * k, k) for k in range(2)]
 
 
-def axis_log(
-    rig: Rig, values: dict[str, float], time: np.ndarray, torque: np.ndarray, begin: float, seed: int
-) -> Prepared:
+def axis_log(rig: Rig, values: dict[str, float], time: np.ndarray, torque: np.ndarray, begin: float, seed: int) -> Prepared:
     plan = Log(f"{seed}", time, {"torque": Channel(torque), "angle": Channel(np.full(len(time), begin))})
     return prepared(rig.task, virtual_log(rig, plan, values, noise={"angle": NOISE}, seed=seed), rig.units)
 
@@ -121,11 +112,7 @@ def test_starts_ten_times_off_become_near_by_regression(tmp_path: Path, factor: 
 
 def test_parameters_of_which_the_torques_are_no_sum_keep_their_starts(tmp_path: Path) -> None:
     """Of mass and radius of the weight the first in the file enters linearly, and then the second does not."""
-    starts = {name: 3.0 * VALUES[name] for name in ("weight", "radius")} | {
-        "inertia": 0.03,
-        "coulomb": 0.15,
-        "viscous": 0.02,
-    }
+    starts = {name: 3.0 * VALUES[name] for name in ("weight", "radius")} | {"inertia": 0.03, "coulomb": 0.15, "viscous": 0.02}
     rig = axis_rig(tmp_path, {**starts, "offset": 0.02})
     data = rig.task.model_dump()
     data["set"]["gravity.weight.radius"] = "radius"
@@ -157,10 +144,7 @@ def test_a_weight_is_linear_however_many_straight_lines_its_torque_has(tmp_path:
 @pytest.mark.parametrize(
     ("change", "why"),
     [
-        (
-            {"gears.belt.losses": {"kind": "mesh_efficiency", "drive_efficiency": 0.9, "backdrive_efficiency": 0.8}},
-            "belt",
-        ),
+        ({"gears.belt.losses": {"kind": "mesh_efficiency", "drive_efficiency": 0.9, "backdrive_efficiency": 0.8}}, "belt"),
         ({"motors.drive.kind": "dc"}, "voltage as its command"),
         ({"shafts.arm.drag": {"kind": "quadratic", "coefficient": 0.1, "max_speed": 9.0}}, "drag"),
         ({"command.drive": {"amplitude": 1.0, "frequency": 1.0}}, "changes with time"),
@@ -258,9 +242,7 @@ def test_runs_in_windows_begin_at_what_was_measured_and_have_exact_derivatives(t
         assert NOISE < np.std(r) < np.hypot(NOISE, 0.25 * slope)
     free = {"weight": rig.task.parameters["weight"]}
     h = 1e-5
-    up, down = (
-        engine.residuals(cut, Point({**near.values, "weight": near.values["weight"] + s * h}, {}), 0) for s in (1, -1)
-    )
+    up, down = (engine.residuals(cut, Point({**near.values, "weight": near.values["weight"] + s * h}, {}), 0) for s in (1, -1))
     for J, a, b in zip(engine.jacobians(cut, near, 0, free), up, down, strict=True):
         assert J[..., 0] == pytest.approx((a - b) / (2.0 * h), abs=1e-4 * np.abs(J).max())
 
@@ -294,10 +276,7 @@ def test_values_of_multi_start_have_units_as_start_values_have(tmp_path: Path) -
     assert dict(read.multi_start) == {"offset": (5e-3, 0.01, 0.02), "weight": (0.5,)}
     for wrong, text in (
         ({"offset": ["5 deg"]}, r"ladder\[0\]\.multi_start\.offset = '5 deg'"),
-        (
-            {"inertia": ["1 kg*m^2"]},
-            r"ladder\[0\]\.multi_start\.inertia with '1 kg\*m\^2', but parameters.inertia has no unit",
-        ),
+        ({"inertia": ["1 kg*m^2"]}, r"ladder\[0\]\.multi_start\.inertia with '1 kg\*m\^2', but parameters.inertia has no unit"),
         ({"offset": ["90 N*m"]}, r"multi_start\.offset with 90 outside of"),
     ):
         data["ladder"] = [rung | {"multi_start": wrong}]

@@ -28,17 +28,9 @@ def pair(
 ) -> lm.Scenario:
     """Two shafts whose flanks strike; torques that drive them [N·m]."""
     return lm.Scenario(
-        shafts={
-            "a": {"inertia": inertias[0], "torque": torques[0]},
-            "b": {"inertia": inertias[1], "torque": torques[1]},
-        },
+        shafts={"a": {"inertia": inertias[0], "torque": torques[0]}, "b": {"inertia": inertias[1], "torque": torques[1]}},
         gears={
-            "mesh": {
-                "input": "a",
-                "output": "b",
-                "ratio": ratio,
-                "stiffness": {"kind": "rigid", "backlash": backlash, "restitution": e},
-            }
+            "mesh": {"input": "a", "output": "b", "ratio": ratio, "stiffness": {"kind": "rigid", "backlash": backlash, "restitution": e}}
         },
         initial=initial,
         simulation={"duration": duration, "sample_interval": duration / 200.0},
@@ -169,10 +161,7 @@ class Reference:
                 if root < 0.0:
                     continue
                 root = math.sqrt(root)
-                if speed + root <= 0.0:
-                    t = (-speed + root) / rate if rate > 0.0 else math.inf
-                else:
-                    t = 2.0 * gap / (speed + root)
+                t = ((-speed + root) / rate if rate > 0.0 else math.inf) if speed + root <= 0.0 else 2.0 * gap / (speed + root)
             if t < best[0]:
                 best = (t, way)
         return best
@@ -206,10 +195,7 @@ def random_case(draw: np.random.Generator) -> tuple[lm.Scenario, Reference, Vect
     def signal(column: int) -> dict[str, Any]:
         value = (-torques[:, column]).tolist()
         heights = np.diff(value).tolist()
-        return {
-            "mean": value[0],
-            "steps": [{"time": begins[k + 1], "height": height} for k, height in enumerate(heights)],
-        }
+        return {"mean": value[0], "steps": [{"time": begins[k + 1], "height": height} for k, height in enumerate(heights)]}
 
     scenario = pair(
         e,
@@ -297,14 +283,7 @@ def test_an_impact_keeps_the_momentum_that_a_mass_matrix_gives() -> None:
     e, J_b, ratio = 0.5, 2.0, 2.0
     scenario = lm.Scenario(
         shafts={"a": {}, "c": {"torque": 0.0}, "b": {"inertia": J_b}},
-        gears={
-            "mesh": {
-                "input": "a",
-                "output": "b",
-                "ratio": ratio,
-                "stiffness": {"kind": "rigid", "backlash": 0.02, "restitution": e},
-            }
-        },
+        gears={"mesh": {"input": "a", "output": "b", "ratio": ratio, "stiffness": {"kind": "rigid", "backlash": 0.02, "restitution": e}}},
         mass_matrices={"arm": {"shafts": ["a", "c"], "matrix": M.tolist()}},
         initial={"speeds": {"a": 2.0}},
         simulation={"duration": 0.015, "sample_interval": 1e-3},
@@ -346,10 +325,7 @@ def test_flanks_in_a_row_strike_at_once_without_a_gain_of_energy() -> None:
 def test_flanks_that_touch_part_where_they_would_pull() -> None:
     """Closed under a torque that falls to its opposite: they part where the torque between them is zero."""
     scenario = pair(
-        0.0,
-        torques=({"mean": -1.0, "ramps": [{"rise": 2.0, "begin": 0.2, "duration": 0.2}]}, 0.0),
-        duration=0.32,
-        twists={"mesh": 0.01},
+        0.0, torques=({"mean": -1.0, "ramps": [{"rise": 2.0, "begin": 0.2, "duration": 0.2}]}, 0.0), duration=0.32, twists={"mesh": 0.01}
     )
     result = lm.simulate(scenario)
     events = lm.switchings_of(result)["instant"].values

@@ -158,10 +158,7 @@ def worm(stiffness: float | None, *, eta_b: float = -0.3, mass: float = 2.0) -> 
     mesh: dict[str, Any] = {"kind": "rigid"} if stiffness is None else {"kind": "linear", "stiffness": stiffness}
     damping = {} if stiffness is None else {"mesh_damping": 0.6 * math.sqrt(stiffness * mass)}
     return lm.Scenario(
-        shafts={
-            "worm": {"inertia": 1e-4},
-            "drum": {"inertia": mass, "torque": {"mean": 5.0, "steps": [{"time": 0.1, "height": -25.0}]}},
-        },
+        shafts={"worm": {"inertia": 1e-4}, "drum": {"inertia": mass, "torque": {"mean": 5.0, "steps": [{"time": 0.1, "height": -25.0}]}}},
         motors={"motor": {"shaft": "worm", "kind": "torque_source", "rotor_inertia": 0.0}},
         gears={
             "gear": {
@@ -319,9 +316,7 @@ def test_gears_in_a_row_lock_together_where_no_motion_slows_them_down() -> None:
         t, first = result["time"].values, torque / driving * 0.1
         rests = 0.1 + (first * slowing / torque if slowing > 0.0 else 0.0)
         expected = np.where(
-            t < 0.1,
-            torque / driving * t,
-            np.where(t < rests, first - torque / slowing * (t - 0.1), -torque / driving * (t - rests)),
+            t < 0.1, torque / driving * t, np.where(t < rests, first - torque / slowing * (t - 0.1), -torque / driving * (t - rests))
         )
         np.testing.assert_allclose(result["s0_speed"].values, expected, rtol=1e-9, atol=1e-9 * first, err_msg=str(case))
         energy = lm.energy_of(result)

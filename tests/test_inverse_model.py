@@ -106,21 +106,14 @@ def test_the_lyapunov_function_of_the_adaptation_never_rises(adapted: str) -> No
     k_p = 1e-2
     s = rigid(
         CONSTANT_LOSS,
-        {
-            "reference": {"kind": "speed", "mean": 0.5},
-            "speed": {"gain": k_p, "estimate": {"kind": "exact"}},
-            "inverse_model": model,
-        },
+        {"reference": {"kind": "speed", "mean": 0.5}, "speed": {"gain": k_p, "estimate": {"kind": "exact"}}, "inverse_model": model},
         **{"simulation.duration": 3.0, "simulation.sample_interval": 5e-5, "initial.load_speed": 0.3},
     )
     r = lm.simulate(s)
     i, g = s.gearbox.ratio, s.gearbox
     J = s.motor.rotor_inertia + g.inertia + s.load.inertia / i**2
     e = i * s.controller.reference.at(r.time.values)[0] - r.motor_speed.values
-    if adapted == "losses":
-        missing = 1.0 - r.model_loss_factor.values
-    else:
-        missing = s.motor.friction_torque - r.model_friction_torque.values
+    missing = 1.0 - r.model_loss_factor.values if adapted == "losses" else s.motor.friction_torque - r.model_friction_torque.values
     e, missing = e[1:], missing[:-1]  # a tick shows what it has adapted, and acts by what it found
     V = 0.5 * J * e**2 + 0.5 * missing**2 / rate
     # dV/dt = -k_p e^2, and of second order in the tick what it holds.

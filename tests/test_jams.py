@@ -56,13 +56,7 @@ def flywheel(inertia: float, stiffness: float | None, beside: int = 0) -> lm.Sce
                 **damping,
             },
             **{
-                f"to_{b}": {
-                    "input": a,
-                    "output": b,
-                    "ratio": 2.0,
-                    "stiffness": hangs,
-                    "hysteresis": {"efficiency": 0.8},
-                }
+                f"to_{b}": {"input": a, "output": b, "ratio": 2.0, "stiffness": hangs, "hysteresis": {"efficiency": 0.8}}
                 for a, b in itertools.pairwise(["drum", *others])
             },
         },
@@ -101,9 +95,7 @@ def test_a_gear_that_a_flywheel_keeps_from_locking_is_refused_by_name() -> None:
 def test_shafts_that_an_event_does_not_reach_take_no_part_in_its_search() -> None:
     """3**16 to 3**32 combinations of their contacts stick and slip, and as many are tried with 16 as with 8 of them."""
     few, many = (lm.simulate(flywheel(1e-5, None, beside)) for beside in (8, 16))
-    assert at_end(few, "drum_angle") == pytest.approx(
-        at_end(lm.simulate(flywheel(1e-5, None)), "drum_angle"), rel=1e-12
-    )
+    assert at_end(few, "drum_angle") == pytest.approx(at_end(lm.simulate(flywheel(1e-5, None)), "drum_angle"), rel=1e-12)
     assert many.attrs["mode_trials"] == few.attrs["mode_trials"] < 600  # where one search gives up
 
 
@@ -215,10 +207,7 @@ def test_a_torque_between_shafts_at_rest_ends_with_the_capacity_that_holds_it() 
             mass_matrices={
                 "j": {
                     "shafts": ["c", "d"],
-                    "matrix": [
-                        [0.014768608594581978, 0.0003421195468940676],
-                        [0.0003421195468940676, 0.0011858531666905168],
-                    ],
+                    "matrix": [[0.014768608594581978, 0.0003421195468940676], [0.0003421195468940676, 0.0011858531666905168]],
                 }
             },
             simulation={"duration": 0.7, "sample_interval": 0.001},
@@ -247,8 +236,7 @@ def test_samples_of_a_large_train_are_right_though_matrices_are_given_up_between
         return lm.simulate(
             lm.Scenario(
                 shafts={
-                    s: {**load, "torque": {"amplitude": 0.3, "frequency": 1.0 + 0.137 * k, "phase": 0.7 * k}}
-                    for k, s in enumerate(names)
+                    s: {**load, "torque": {"amplitude": 0.3, "frequency": 1.0 + 0.137 * k, "phase": 0.7 * k}} for k, s in enumerate(names)
                 },
                 gears={
                     f"g{k}": {"input": a, "output": b, "ratio": 1.0, "stiffness": {"kind": "linear", "stiffness": 1.0}}
@@ -261,9 +249,7 @@ def test_samples_of_a_large_train_are_right_though_matrices_are_given_up_between
     coarse, fine = run(0.4), run(0.04)
     assert coarse.attrs["switching_count"] > 200  # matrices of 1.4 MB each, of which 256 MB are kept
     for name in names:
-        np.testing.assert_allclose(
-            coarse[f"{name}_speed"].values, fine[f"{name}_speed"].values[::10], rtol=0.0, atol=1e-9
-        )
+        np.testing.assert_allclose(coarse[f"{name}_speed"].values, fine[f"{name}_speed"].values[::10], rtol=0.0, atol=1e-9)
 
 
 # --- random trains with gears that lock themselves ---
@@ -296,9 +282,7 @@ def test_speeds_that_come_to_nothing_in_ever_shorter_times_are_at_rest() -> None
 @pytest.mark.parametrize("number", [130, 280])
 def test_wedged_gears_rest_where_ever_stiffer_meshes_come_to_rest(number: int) -> None:
     """The torques between shafts at rest change to the nearest that hold as an input jumps."""
-    assert all(
-        np.all(v.values == 0.0) for name, v in run_locking(number).data_vars.items() if str(name).endswith("_speed")
-    )
+    assert all(np.all(v.values == 0.0) for name, v in run_locking(number).data_vars.items() if str(name).endswith("_speed"))
     turned = []
     for stiffness in (1e5, 1e7, 1e9):
         soft = run_locking(number, stiffness)

@@ -120,13 +120,9 @@ sample_interval = 0.5
 
 @pytest.mark.parametrize("coulomb", [3.0, 5.0])
 @pytest.mark.parametrize("rise", [0.0, -1.0])
-def test_two_shafts_at_rest_break_away_when_both_have_given_what_they_hold(
-    rise: float, coulomb: float, tmp_path: Path
-) -> None:
+def test_two_shafts_at_rest_break_away_when_both_have_given_what_they_hold(rise: float, coulomb: float, tmp_path: Path) -> None:
     """Up to 5 N*m + 1.5 N*m, though one alone is at its limit from 5 N*m on; from there on the other takes the rest."""
-    result = joint_rest(
-        tmp_path, "ramps = [{ rise = 10, duration = 10 }]", f"ramps = [{{ rise = {rise}, duration = 10 }}]", coulomb
-    )
+    result = joint_rest(tmp_path, "ramps = [{ rise = 10, duration = 10 }]", f"ramps = [{{ rise = {rise}, duration = 10 }}]", coulomb)
     time = np.asarray(result["time"])
     away = 6.5 / (1.0 + 0.1 * rise)
     moves = np.asarray(result["a_speed"]) != 0.0

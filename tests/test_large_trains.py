@@ -30,10 +30,7 @@ def undamped(name: str, tmp_path: Path) -> lm.Scenario:
     text = (ROOT / "scenarios" / f"{name}.toml").read_text(encoding="utf-8")
     text = re.sub(r', mesh_damping = "[^"]*"', "", text)
     text = re.sub(
-        r'^(mesh_damping|damping|viscous_friction|losses|efficiency|drag_torque) = .*\n|, viscous_friction = "[^"]*"',
-        "",
-        text,
-        flags=re.M,
+        r'^(mesh_damping|damping|viscous_friction|losses|efficiency|drag_torque) = .*\n|, viscous_friction = "[^"]*"', "", text, flags=re.M
     )
     text = text.replace('{ viscous_friction = "3 mN*m*s/rad" }', "{}")
     (tmp_path / f"{name}.toml").write_text(text, encoding="utf-8")
@@ -126,9 +123,7 @@ def test_the_response_at_resonance_is_that_of_the_dynamic_stiffness(frequency: f
 LOOSE, RUBBING = chain(24, gaps=(11,)), chain(40, friction=0.05)
 
 
-def integrated(
-    scenario: lm.Scenario, forces: Any, guards: Any, modes: Any, change: Any, end: float
-) -> tuple[np.ndarray, int]:
+def integrated(scenario: lm.Scenario, forces: Any, guards: Any, modes: Any, change: Any, end: float) -> tuple[np.ndarray, int]:
     """States (speeds, twists) at the end by DOP853 from event to event, and how many events."""
     n = len(scenario.train().shafts)
     state, t, count = np.zeros(2 * n - 1), 0.0, 0

@@ -18,9 +18,7 @@ from lostmotion.studies.runs.chunk import scenario_of_run
 END = 2.449489743  # a lift of 3 m with 1 m/s^2
 WINCH: dict[str, Any] = {
     "shafts": {"drum": {"inertia": 0.8125, "friction_torque": 1300.0}},
-    "slides": {
-        "load": {"mass": 250.0, "inclination": math.pi / 2.0, "speed": {"ramps": [{"rise": END, "duration": END}]}}
-    },
+    "slides": {"load": {"mass": 250.0, "inclination": math.pi / 2.0, "speed": {"ramps": [{"rise": END, "duration": END}]}}},
     "racks": {"rope": {"input": "drum", "output": "load", "travel_per_turn": 0.4 * math.pi}},
     "simulation": {"duration": END, "sample_interval": 0.01},
 }
@@ -58,9 +56,7 @@ def test_samples_of_a_lift_end_where_its_energies_do(solver: Any) -> None:
         (100.0, 7.0, [91.0, 98.0, 100.0]),  # long steps
     ],
 )
-def test_instants_are_multiples_of_the_interval_and_the_end(
-    duration: float, interval: float, ends: list[float]
-) -> None:
+def test_instants_are_multiples_of_the_interval_and_the_end(duration: float, interval: float, ends: list[float]) -> None:
     result = lm.simulate(rising(duration, interval))
     assert result.time.values[-3:] == pytest.approx(ends, rel=1e-15, abs=0.0)
     assert np.allclose(result["s_speed"], result.time, rtol=1e-14, atol=0.0)
@@ -83,9 +79,7 @@ def test_other_samples_have_the_bits_of_a_run_without_it(level: float) -> None:
 def test_signals_of_a_controller_end_with_the_run() -> None:
     """They are what they are at that instant among samples of any interval."""
     coarse, fine = (
-        lm.simulate(
-            lm.load("position-axis").replace(**{"simulation.duration": 0.0505, "simulation.sample_interval": interval})
-        )
+        lm.simulate(lm.load("position-axis").replace(**{"simulation.duration": 0.0505, "simulation.sample_interval": interval}))
         for interval in (0.004, 0.0005)
     )
     assert float(coarse.time[-1]) == 0.0505
@@ -106,12 +100,7 @@ def test_a_mean_over_samples_weighs_the_last_by_its_interval(tmp_path: Path, eng
     vary = [{"key": "load.inertia", "values": [2.0, 3.0]}]
     if engine == "one by one":  # a key that the core does not know
         vary.append({"key": "gearbox.stiffness.breaks", "relative": True, "values": [1.0]})
-    keep = {
-        "end": "final(load_speed)",
-        "mean": "mean(load_speed)",
-        "rms": "rms(load_speed)",
-        "method": "load_speed.mean()",
-    }
+    keep = {"end": "final(load_speed)", "mean": "mean(load_speed)", "rms": "rms(load_speed)", "method": "load_speed.mean()"}
     rows = {}
     for duration in (0.2, 0.2 * (1.0 + 1e-9), 0.205):
         times = {"simulation.duration": duration, "simulation.sample_interval": 0.02}

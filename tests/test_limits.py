@@ -72,9 +72,7 @@ def motor(line: Line, kind: str, tau: float) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def axis(
-    line: Line, kind: str, mode: str, T: float, tau: float, turn: float, end: float, way: float, **changes: Any
-) -> dict[str, Any]:
+def axis(line: Line, kind: str, mode: str, T: float, tau: float, turn: float, end: float, way: float, **changes: Any) -> dict[str, Any]:
     """A scenario that asks for far more than there is, and from the time `turn` on for the opposite."""
     limited = line.most if math.isfinite(line.most) else 20.0 * line.stall
     far = {"torque": limited, "speed": 2.0 * line.no_load, "position": 50.0 * line.no_load * end}[mode] * way
@@ -265,9 +263,7 @@ def test_continuous_controllers_do_not_wind_up(mode: str, way: float) -> None:
         gains = {"gain": rng.uniform(0.5, 2.0) * limit / abs(far) * 30.0}
         gains["integral_gain"] = gains["gain"] * rng.uniform(0.3, 30.0) / turn
         reference = {"kind": mode, "mean": far, "steps": [{"time": turn, "height": -2.0 * far}]}
-        scenario = continuous(
-            Line(math.inf, 1.0, limit, J), {"limit": limit, "reference": reference, mode: gains}, turn, 2.5 * turn
-        )
+        scenario = continuous(Line(math.inf, 1.0, limit, J), {"limit": limit, "reference": reference, mode: gains}, turn, 2.5 * turn)
         run = lm.simulate(scenario, energy=False)
         t = run["time"].to_numpy()
         wanted = way * limit / J * np.where(t < turn, t, 2.0 * turn - t)
@@ -344,9 +340,7 @@ def test_the_largest_current_acts(kind: str, mode: str) -> None:
     per_ampere = 1.5 * PAIRS * winding["flux_linkage"]
     winding["max_current_peak"] = 0.5 / per_ampere
     run = seen(scenario)
-    assert largest(run, "m_torque_reference") <= (
-        0.5 + 1e-12 if mode != "torque" or kind != "field_oriented" else math.inf
-    )
+    assert largest(run, "m_torque_reference") <= (0.5 + 1e-12 if mode != "torque" or kind != "field_oriented" else math.inf)
     assert 0.48 < largest(run, "m_torque") < 0.5 * 28.0 / 27.0 + 0.02
 
 
@@ -387,11 +381,7 @@ def test_a_limit_of_the_voltage_acts(kind: str, mode: str, source: str) -> None:
 def controlled(kind: str = "ideal", **more: Any) -> dict[str, Any]:
     """A continuous controller of the speed, far beyond what there is."""
     current = {"kind": kind} | ({"time_constant": TAU} if kind == "first_order" else {})
-    return {
-        "reference": {"kind": "speed", "mean": 200.0},
-        "speed": {"gain": 0.2, "integral_gain": 1.0},
-        "current": current,
-    } | more
+    return {"reference": {"kind": "speed", "mean": 200.0}, "speed": {"gain": 0.2, "integral_gain": 1.0}, "current": current} | more
 
 
 @pytest.mark.parametrize("kind", ["ideal", "first_order"])
@@ -451,12 +441,7 @@ def test_ratings_are_no_limits_of_a_run() -> None:
     """What motor.limits states is compared by the drive check alone, as its description says."""
     scenario = run_up("pi", "speed")
     plain = seen(scenario)
-    scenario["motors"]["m"]["limits"] = {
-        "max_speed": 1.0,
-        "max_current": 0.1,
-        "torque_constant": 0.1,
-        "continuous_torque": 0.1,
-    }
+    scenario["motors"]["m"]["limits"] = {"max_speed": 1.0, "max_current": 0.1, "torque_constant": 0.1, "continuous_torque": 0.1}
     assert largest(seen(scenario), "rotor_speed") == largest(plain, "rotor_speed")
 
 

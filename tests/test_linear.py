@@ -109,9 +109,7 @@ def screw(**changes):
 def test_screw_axis_equals_the_rotary_train_bit_for_bit():
     """Of all variables, switching instants and energies: only names and units differ."""
     linear = lm.simulate(screw())
-    rotary = lm.simulate(
-        lm.Scenario.model_validate(tomllib.loads(ROTARY)).replace(**{"gears.screw.ratio": 2.0 * math.pi / 0.01})
-    )
+    rotary = lm.simulate(lm.Scenario.model_validate(tomllib.loads(ROTARY)).replace(**{"gears.screw.ratio": 2.0 * math.pi / 0.01}))
     assert {NAMES.get(name, name) for name in linear} == set(rotary)
     for name in linear:
         assert linear[name].values.tobytes() == rotary[NAMES.get(name, name)].values.tobytes(), name
@@ -174,10 +172,7 @@ def test_weight_of_an_inclined_slide_is_a_load():
         (lm.model.Screw(input="a", output="b", lead="10 mm"), 0.01),
         (lm.model.Screw(input="a", output="b", pitch="5 mm", starts=4), 0.02),
         (lm.model.Rack(input="a", output="b", module="2 mm", teeth=20), math.pi * 0.04),
-        (
-            lm.model.Rack(input="a", output="b", module="2 mm", teeth=20, helix_angle="19.5283 deg"),
-            math.pi * 0.04 / 0.94247,
-        ),
+        (lm.model.Rack(input="a", output="b", module="2 mm", teeth=20, helix_angle="19.5283 deg"), math.pi * 0.04 / 0.94247),
         (lm.model.Belt(input="a", output="b", teeth=20, pitch="5 mm"), 0.1),
         (lm.model.Belt(input="a", output="b", pulley_diameter="31.83098862 mm"), 0.1),
     ],
@@ -192,9 +187,7 @@ def test_efficiency_of_a_screw_follows_from_its_lead_angle_and_friction():
     """tan(g)/tan(g + r) and tan(g - r)/tan(g) of the friction angle r, as textbooks have it."""
     part = lm.model.Screw(input="a", output="b", lead="10 mm", mean_diameter="25 mm", friction_coefficient=0.1)
     g, r = math.atan(10.0 / (25.0 * math.pi)), math.atan(0.1)
-    assert part.efficiencies() == pytest.approx(
-        (math.tan(g) / math.tan(g + r), math.tan(g - r) / math.tan(g)), rel=1e-14
-    )
+    assert part.efficiencies() == pytest.approx((math.tan(g) / math.tan(g + r), math.tan(g - r) / math.tan(g)), rel=1e-14)
     assert lm.model.Screw(input="a", output="b", lead="10 mm", efficiency=0.8).efficiencies() == (0.8, 2.0 - 1.0 / 0.8)
 
 
@@ -225,12 +218,8 @@ def test_a_preloaded_belt_loses_half_of_its_stiffness_where_a_strand_goes_slack(
 
 
 def test_a_shaft_without_inertia_has_the_key_of_the_short_form():
-    with pytest.raises(
-        lm.InputError, match=r"key axis.screw: has no inertia, and screw_contact is a dry contact at it"
-    ):
-        axis(
-            **{"axis.gearbox": {"ratio": 3.0, "stiffness": {"kind": "linear", "stiffness": 1e4}, "mesh_damping": 10.0}}
-        )
+    with pytest.raises(lm.InputError, match=r"key axis.screw: has no inertia, and screw_contact is a dry contact at it"):
+        axis(**{"axis.gearbox": {"ratio": 3.0, "stiffness": {"kind": "linear", "stiffness": 1e4}, "mesh_damping": 10.0}})
 
 
 def test_inertia_of_a_screw_follows_from_its_size():
@@ -328,10 +317,7 @@ def test_bad_input_is_refused(changes, message):
 @pytest.mark.parametrize(
     ("changes", "key"),
     [
-        (
-            {"screws.screw.damping": "1 N s/m", "screws.screw.stiffness_curve": None, "screws.screw.hysteresis": None},
-            "screws.screw",
-        ),
+        ({"screws.screw.damping": "1 N s/m", "screws.screw.stiffness_curve": None, "screws.screw.hysteresis": None}, "screws.screw"),
         ({"slides.alone": {"mass": "1 kg"}}, "slides.alone"),
         ({"shafts.alone": {"inertia": "1 kg m^2"}}, "shafts.alone"),
     ],
@@ -504,10 +490,7 @@ def test_no_unit_of_rotation_on_a_slide_in_an_fmu_or_the_live_page():
         assert rotary(re.findall(r"<\w+[^>]*name=\"[^>]*>", described)) == []
         assert 'unit="m/s"' in described
     page = describe(scenario, "axis")
-    assert (
-        rotary(f"{s['key']} {s['unit']}" for s in page["sliders"] if "slides" in s["key"] or "reference" in s["key"])
-        == []
-    )
+    assert rotary(f"{s['key']} {s['unit']}" for s in page["sliders"] if "slides" in s["key"] or "reference" in s["key"]) == []
     assert [figure["unit"] for figure in page["figures"]] == ["m", "m"]
     assert [shaft["slide"] for shaft in page["shafts"]] == [False, True]
 
@@ -528,11 +511,7 @@ def test_schema_of_slides_has_no_unit_of_rotation():
     schema = train_schema()["$defs"]
     for part in ("SlideTable", "EndStops", "ForceCurve", "StiffnessCurve", "LinearMotor", "ForceSignal"):
         units = {key: unit_in_schema(node) for key, node in schema[part]["properties"].items()}
-        assert {k: u for k, u in units.items() if u and ROTARY_UNITS.search(u)} in (
-            {},
-            {"inclination": "rad"},
-            {"phase": "rad"},
-        ), part
+        assert {k: u for k, u in units.items() if u and ROTARY_UNITS.search(u)} in ({}, {"inclination": "rad"}, {"phase": "rad"}), part
 
 
 def test_the_tutorial_prints_what_the_run_prints(tmp_path):

@@ -169,9 +169,7 @@ def test_all_linear_motors_where_none_is_named():
     study = task_of({key: value for key, value in TASK.items() if key != "candidates"} | {"linear_motor": {}})
     assert study.total == sum(isinstance(r, lm.data_sheets.LinearMotorSheet) for r in lm.catalogue())
     beside = task_of({**TASK, "linear_motor": {"friction_force": "2 N"}})
-    assert rules(beside)["motor_peak_torque"].use == pytest.approx(
-        rules(task_of(TASK))["motor_peak_torque"].use + 2.0 / 187.0, rel=1e-9
-    )
+    assert rules(beside)["motor_peak_torque"].use == pytest.approx(rules(task_of(TASK))["motor_peak_torque"].use + 2.0 / 187.0, rel=1e-9)
 
 
 @pytest.mark.parametrize(

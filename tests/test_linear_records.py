@@ -18,12 +18,7 @@ from lostmotion.simulation.forms.train_tables import TrainTables
 
 LINEAR = {kind: [r for r in catalogue() if table_of(r) == kind] for kind in ("screw", "rack", "belt", "linear_motor")}
 # What the axis decides.
-BESIDE = {
-    "screw": {},
-    "rack": {"teeth": 20},
-    "belt": {"teeth": 20, "free_lengths": ["0.5 m", "1 m"]},
-    "linear_motor": {},
-}
+BESIDE = {"screw": {}, "rack": {"teeth": 20}, "belt": {"teeth": 20, "free_lengths": ["0.5 m", "1 m"]}, "linear_motor": {}}
 PLACES = {
     "screws": 'input = "motor"\noutput = "table"',
     "racks": 'input = "motor"\noutput = "table"',
@@ -132,21 +127,13 @@ def test_what_is_given_takes_the_place_of_what_says_the_same() -> None:
 @pytest.mark.parametrize(
     ("table", "text", "match"),
     [
-        (
-            "screws",
-            'from = "rexroth-25x10rx3-i5"',
-            'screws.part.from: screw "rexroth-25x10rx3-i5" is not in .* mean rexroth',
-        ),
+        ("screws", 'from = "rexroth-25x10rx3-i5"', 'screws.part.from: screw "rexroth-25x10rx3-i5" is not in .* mean rexroth'),
         ("screws", 'from = "elatech-at5-25"', "is a belt; a screw is wanted here"),
         ("screws", "from = 3", "screws.part.from: 3 must be the name of a record"),
         ("screws", 'from = "hiwin-r25-10t3-deb"', "lacks nut_stiffness, see HIWIN.*give screws.part.nut_stiffness"),
         ("screws", 'from = "thk-bnf2505-5"\nnut_preload = 3', "screws.part.nut_preload: scales .* has none"),
         ("screws", 'from = "thk-bnfn2505-5"\nnut_preload = "-3 N"', 'screws.part.nut_preload: "-3 N" must be greater'),
-        (
-            "screws",
-            'from = "thk-bnfn2505-5"\nstifness = 3',
-            "screws.part.stifness: is not known; did you mean stiffness",
-        ),
+        ("screws", 'from = "thk-bnfn2505-5"\nstifness = 3', "screws.part.stifness: is not known; did you mean stiffness"),
         ("screws", 'lead = "5 mm"\nnut_preload = "3 N"', "acts on a record; give screws.part.from"),
         ("screws", 'from = "thk-bnfn2505-5"\nsupported_length = "-1 m"', "screws.part.supported_length"),
         ("racks", 'from = "sati-cr28100"', r"give racks.part.teeth \(of the pinion\) beside"),

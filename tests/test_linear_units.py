@@ -187,9 +187,7 @@ def test_speeds_at_the_start_that_do_not_fit_a_rigid_screw_are_named_in_their_un
         "initial": {"speeds": {"motor": 1.0}, "slide_speeds": {"table": 5e-3}},
         "simulation": {"duration": 1.0, "sample_interval": 0.1},
     }
-    with pytest.raises(
-        InputError, match=r"slide_speeds\.table: 0\.005 m/s does not fit motor = 1 rad/s .* makes it 0\.00159\d* m/s"
-    ):
+    with pytest.raises(InputError, match=r"slide_speeds\.table: 0\.005 m/s does not fit motor = 1 rad/s .* makes it 0\.00159\d* m/s"):
         lm.Scenario.model_validate(tables)
 
 

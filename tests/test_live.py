@@ -58,12 +58,7 @@ def test_the_page_holds_the_core_and_the_scenario() -> None:
 
 def test_a_page_holds_the_smallest_kernel_of_its_train() -> None:
     names = ("paper-2dof-nl-small", "position-axis", "worm-lowering", "direction-finder")
-    assert [live_page.core_of(lm.load(name)).name for name in names] == [
-        "drive.wasm.gz",
-        "drive.wasm.gz",
-        "middle.wasm.gz",
-        "any.wasm.gz",
-    ]
+    assert [live_page.core_of(lm.load(name)).name for name in names] == ["drive.wasm.gz", "drive.wasm.gz", "middle.wasm.gz", "any.wasm.gz"]
 
 
 def test_margins_are_those_of_the_servo_sheet() -> None:

@@ -15,9 +15,7 @@ from conftest import ALL_SCENARIOS
 RATIO, ROTOR, LOAD = 80.0, 2e-5, 0.4
 
 
-def drive(
-    stiffness: lm.model.TorsionCurve | lm.model.Rigid, friction: float = 0.0, efficiency: float = 1.0
-) -> lm.Drive:
+def drive(stiffness: lm.model.TorsionCurve | lm.model.Rigid, friction: float = 0.0, efficiency: float = 1.0) -> lm.Drive:
     return lm.Drive(
         motor=lm.Motor(kind="torque_source", rotor_inertia=ROTOR, friction_torque=friction),
         gearbox=lm.Gearbox(
@@ -137,11 +135,7 @@ def test_a_controller_turns_the_motor_within_an_answer() -> None:
 
 @pytest.mark.parametrize(
     ("shaft", "message"),
-    [
-        ("lod", 'shaft "lod": is none; did you mean load'),
-        ("motor", "shaft 'motor': has no load torque"),
-        (5, "shaft 5: is none"),
-    ],
+    [("lod", 'shaft "lod": is none; did you mean load'), ("motor", "shaft 'motor': has no load torque"), (5, "shaft 5: is none")],
 )
 def test_wrong_use_of_an_answer_is_one_line(shaft: str, message: str) -> None:
     simulation = lm.Simulation(drive(lm.model.Rigid()))

@@ -15,11 +15,7 @@ from sheets import RPM, gearbox_of, sheet
 def test_measured_nodes_carry_their_figure_and_their_origin():
     built = build_loss_map(sheet())
     speeds, loads, values = built.losses.whole()
-    at = {
-        (round(mu, 4), round(v, 4)): (values[j][k], built.origin[j][k])
-        for j, mu in enumerate(loads)
-        for k, v in enumerate(speeds)
-    }
+    at = {(round(mu, 4), round(v, 4)): (values[j][k], built.origin[j][k]) for j, mu in enumerate(loads) for k, v in enumerate(speeds)}
     assert at[1.0, 1.0] == (pytest.approx(1 / 0.77 - 1), "efficiency (area 1)")
     assert at[0.0, 1.0] == (pytest.approx(100 * 0.105 / 52), "no-load torque (area 2)")
     assert at[0.0, 0.0] == (pytest.approx(100 * 0.037 / 52), "starting torque (area 3)")
@@ -122,9 +118,6 @@ def test_figures_of_different_temperatures_are_each_taken_at_their_own():
 
 
 def test_wear_adds_backlash_and_multiplies_losses():
-    new, worn = (
-        lm.gearbox("bonfiglioli-tr080-3-90"),
-        lm.gearbox("bonfiglioli-tr080-3-90", added_backlash=2e-3, loss_factor=1.5),
-    )
+    new, worn = (lm.gearbox("bonfiglioli-tr080-3-90"), lm.gearbox("bonfiglioli-tr080-3-90", added_backlash=2e-3, loss_factor=1.5))
     assert worn.stiffness.backlash - new.stiffness.backlash == pytest.approx(2e-3)
     assert worn.losses.core()(1.0, 1.0) == pytest.approx(1.5 * new.losses.core()(1.0, 1.0))

@@ -33,10 +33,7 @@ def scenario(**tables: Any) -> lm.Scenario:
 def test_two_links_move_as_the_matrix_exponential_says() -> None:
     """M w' = -b w - K phi - load from rest; with the constant load as a further state it is linear."""
     M, b, K, load = np.array([[2.6, 0.7], [0.7, 0.4]]), np.diag([0.3, 0.1]), np.diag([40.0, 15.0]), [-1.5, 0.7]
-    spring = {
-        n: {"shaft": n, "stiffness": {"kind": "linear", "stiffness": k}}
-        for n, k in (("shoulder", 40.0), ("elbow", 15.0))
-    }
+    spring = {n: {"shaft": n, "stiffness": {"kind": "linear", "stiffness": k}} for n, k in (("shoulder", 40.0), ("elbow", 15.0))}
     r = lm.simulate(scenario(springs=spring))
     A = np.zeros((5, 5))
     A[:2, :2], A[:2, 2:4], A[:2, 4] = (np.linalg.solve(M, -x) for x in (b, K, np.array(load)))
@@ -47,9 +44,7 @@ def test_two_links_move_as_the_matrix_exponential_says() -> None:
     ledger = lm.energy_of(r)
     assert abs(ledger["residual"]) <= 1e-12 * ledger["turned_over"]
     w = seen[-1, :2]
-    assert ledger["stored_change"] == pytest.approx(
-        0.5 * w @ M @ w, rel=1e-12
-    )  # springs to the frame are entries of their own
+    assert ledger["stored_change"] == pytest.approx(0.5 * w @ M @ w, rel=1e-12)  # springs to the frame are entries of their own
 
 
 def with_diagonals(s: lm.Scenario) -> lm.Scenario:
@@ -115,12 +110,7 @@ def random_tables(r: random.Random, names: list[str]) -> dict[str, Any]:
         if r.random() < 0.5:
             made["shafts"][other]["friction_torque"] = spread(r, 0.05, 0.5)
         if r.random() < 0.25:
-            made["clutches"][f"{name}_clutch"] = {
-                "input": name,
-                "output": other,
-                "torque": spread(r, 0.2, 2.0),
-                "kind": "safety",
-            }
+            made["clutches"][f"{name}_clutch"] = {"input": name, "output": other, "torque": spread(r, 0.2, 2.0), "kind": "safety"}
             continue
         gear: dict[str, Any] = {"input": name, "output": other, "ratio": spread(r, 0.5, 3.0)}
         kind = r.randrange(4)
@@ -134,12 +124,7 @@ def random_tables(r: random.Random, names: list[str]) -> dict[str, Any]:
         made["brakes"]["brake"] = {"shaft": r.choice(names), "torque": spread(r, 0.2, 2.0)}
         made["command"]["brake"] = {"mean": 0.5, "amplitude": 0.5, "frequency": 1.0, "phase": r.uniform(-3.0, 3.0)}
     if len(names) > 1 and r.random() < 0.3:
-        made["clutches"]["between"] = {
-            "input": names[0],
-            "output": names[1],
-            "torque": spread(r, 0.2, 2.0),
-            "kind": "safety",
-        }
+        made["clutches"]["between"] = {"input": names[0], "output": names[1], "torque": spread(r, 0.2, 2.0), "kind": "safety"}
     made["simulation"] = {"duration": 1.0, "sample_interval": 0.02}
     return made
 
@@ -207,10 +192,7 @@ def test_a_link_that_friction_holds_breaks_away_where_its_neighbour_asks_for_mor
     """While the elbow rests, w_1' = T/M_11, and it holds M_12 T/M_11; beyond its friction both move."""
     M = np.array([[2.6, 0.7], [0.7, 0.4]])
     holds, rate = 0.5, 4.0
-    shafts = {
-        "shoulder": {"torque": {"ramps": [{"rise": -rate, "duration": 1.0}]}},
-        "elbow": {"friction_torque": holds},
-    }
+    shafts = {"shoulder": {"torque": {"ramps": [{"rise": -rate, "duration": 1.0}]}}, "elbow": {"friction_torque": holds}}
     r = lm.simulate(scenario(shafts=shafts, simulation={"duration": 1.0, "sample_interval": 0.01}))
     at = holds * M[0, 0] / M[0, 1] / rate
     t = r.time.values
@@ -227,9 +209,7 @@ def test_a_link_that_friction_holds_breaks_away_where_its_neighbour_asks_for_mor
 
 def test_a_given_motion_drives_what_the_matrix_couples_to_it() -> None:
     """Shoulder speed sin W t: w_2 = -M_12/M_22 sin W t, and the drive feels M_11 - M_12^2/M_22."""
-    r = lm.simulate(
-        scenario(shafts={"shoulder": {"speed": {"amplitude": 1.0, "frequency": 1.0}}, "elbow": {"torque": 0.0}})
-    )
+    r = lm.simulate(scenario(shafts={"shoulder": {"speed": {"amplitude": 1.0, "frequency": 1.0}}, "elbow": {"torque": 0.0}}))
     W, t = 2.0 * np.pi, r.time.values
     assert np.allclose(r.elbow_speed, -0.7 / 0.4 * np.sin(W * t), rtol=0.0, atol=1e-13)
     assert np.allclose(r.shoulder_drive_torque, (2.6 - 0.49 / 0.4) * W * np.cos(W * t), rtol=0.0, atol=1e-12)
@@ -249,12 +229,7 @@ def test_a_cart_and_its_pendulum_take_units_by_domain() -> None:
     s = lm.Scenario(
         shafts={"pendulum": {"torque": -1.0}},
         slides={"cart": {}},
-        mass_matrices={
-            "cart_pole": {
-                "shafts": ["cart", "pendulum"],
-                "matrix": [["3000 g", "50 kg*cm"], ["50 kg*cm", "1800 kg*cm^2"]],
-            }
-        },
+        mass_matrices={"cart_pole": {"shafts": ["cart", "pendulum"], "matrix": [["3000 g", "50 kg*cm"], ["50 kg*cm", "1800 kg*cm^2"]]}},
         simulation={"duration": 1.0, "sample_interval": 0.25},
     )
     assert s.mass_matrices["cart_pole"].matrix == ((3.0, 0.5), (0.5, 0.18))
@@ -271,10 +246,7 @@ def test_a_cart_and_its_pendulum_take_units_by_domain() -> None:
 @pytest.mark.parametrize(
     ("matrices", "message"),
     [
-        (
-            {"m": {"shafts": ["shoulder", "elbow"], "matrix": [[1.0, 2.0], [2.0, 1.0]]}},
-            "mass_matrices.m: .*smallest eigenvalue is -1;",
-        ),
+        ({"m": {"shafts": ["shoulder", "elbow"], "matrix": [[1.0, 2.0], [2.0, 1.0]]}}, "mass_matrices.m: .*smallest eigenvalue is -1;"),
         ({"m": {"shafts": ["shoulder", "elbow"], "matrix": [[1.0, 1.0], [1.0, 1.0]]}}, "not positive definite"),
         (
             {"m": {"shafts": ["shoulder", "elbow"], "matrix": [[1.0, 0.0], [0.0, 0.0]]}},
@@ -283,15 +255,9 @@ def test_a_cart_and_its_pendulum_take_units_by_domain() -> None:
         ({"m": {"shafts": ["shoulder", "elbow"], "matrix": [[1.0, 0.5], [0.4, 1.0]]}}, "not symmetric: .* 0.5 and 0.4"),
         ({"m": {"shafts": ["shoulder", "elbow"], "matrix": [[1.0, 0.5]]}}, "give its matrix 2 rows of 2 numbers"),
         ({"m": {"shafts": ["shoulder", "shoulder"], "matrix": [[1.0, 0.5], [0.5, 1.0]]}}, "'shoulder' twice"),
+        ({"m": {"shafts": ["shoulder", "elbov"], "matrix": [[1.0, 0.5], [0.5, 1.0]]}}, "key mass_matrices.m.shafts.1: .elbov. is no shaft"),
         (
-            {"m": {"shafts": ["shoulder", "elbov"], "matrix": [[1.0, 0.5], [0.5, 1.0]]}},
-            "key mass_matrices.m.shafts.1: .elbov. is no shaft",
-        ),
-        (
-            {
-                "m": {"shafts": ["shoulder", "elbow"], "matrix": [[1.0, 0.5], [0.5, 1.0]]},
-                "n": {"shafts": ["elbow"], "matrix": [[1.0]]},
-            },
+            {"m": {"shafts": ["shoulder", "elbow"], "matrix": [[1.0, 0.5], [0.5, 1.0]]}, "n": {"shafts": ["elbow"], "matrix": [[1.0]]}},
             "mass_matrices.n: names shaft 'elbow', which is in mass matrix 'm' too",
         ),
     ],
@@ -303,10 +269,7 @@ def test_what_is_no_mass_matrix_is_refused(matrices: dict[str, Any], message: st
 
 def test_an_inertia_stated_twice_is_refused() -> None:
     shafts = {"shoulder": {"inertia": 1.5}, "elbow": {}}
-    with pytest.raises(
-        lm.InputError,
-        match=r"mass_matrices.arm: holds the inertia of shaft 'shoulder', .* its own, 1.5 kg\*m\^2; leave",
-    ):
+    with pytest.raises(lm.InputError, match=r"mass_matrices.arm: holds the inertia of shaft 'shoulder', .* its own, 1.5 kg\*m\^2; leave"):
         scenario(shafts=shafts)
 
 
@@ -421,11 +384,7 @@ def test_rules_that_take_one_inertia_alone_refuse_a_coupled_shaft() -> None:
     last = list(data["shafts"])[-1]
     inertia, data["shafts"][last]["inertia"] = data["shafts"][last]["inertia"], 0.0
     data["shafts"]["other"] = {"torque": 0.0}
-    data["mass_matrices"] = {
-        "m": {"shafts": [last, "other"], "matrix": [[inertia, 0.5 * inertia], [0.5 * inertia, inertia]]}
-    }
+    data["mass_matrices"] = {"m": {"shafts": [last, "other"], "matrix": [[inertia, 0.5 * inertia], [0.5 * inertia, inertia]]}}
     data["controllers"] = {n: c | {"shaft": c.get("shaft") or last} for n, c in data["controllers"].items()}
-    with pytest.raises(
-        lm.InputError, match=r"key mass_matrices.m: couples .*; rules for gains take the inertia of one axis alone"
-    ):
+    with pytest.raises(lm.InputError, match=r"key mass_matrices.m: couples .*; rules for gains take the inertia of one axis alone"):
         lm.tune(lm.Scenario(**data))

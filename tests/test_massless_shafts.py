@@ -155,9 +155,7 @@ def test_two_of_them_in_a_row_and_one_tied_to_another() -> None:
         simulation=times,
     )
     for name in ("a_speed", "b_speed"):
-        np.testing.assert_allclose(
-            lm.simulate(row)[name].values, lm.simulate(one)[name].values, rtol=0.0, atol=1e-11, err_msg=name
-        )
+        np.testing.assert_allclose(lm.simulate(row)[name].values, lm.simulate(one)[name].values, rtol=0.0, atol=1e-11, err_msg=name)
     result = lm.simulate(row)
     np.testing.assert_allclose(result["n2_speed"].values, -result["n1_speed"].values, rtol=0.0, atol=1e-14)
 
@@ -179,12 +177,8 @@ def test_between_shafts_that_a_mass_matrix_couples() -> None:
         scale = float(np.abs(expected).max())
         np.testing.assert_allclose(result[name].values, expected, rtol=0.0, atol=1e-11 * scale, err_msg=name)
     assert abs(lm.energy_of(result)["residual"]) < 1e-12 * lm.energy_of(result)["turned_over"]
-    with pytest.raises(
-        InputError, match=r"mass_matrices\.arm: has no inertia of shaft 'node' on its diagonal; give one"
-    ):
-        chain().replace(
-            **{"shafts.b": {}, "mass_matrices": {"arm": {"shafts": ["b", "node"], "matrix": [[0.3, 0.0], [0.0, 0.0]]}}}
-        )
+    with pytest.raises(InputError, match=r"mass_matrices\.arm: has no inertia of shaft 'node' on its diagonal; give one"):
+        chain().replace(**{"shafts.b": {}, "mass_matrices": {"arm": {"shafts": ["b", "node"], "matrix": [[0.3, 0.0], [0.0, 0.0]]}}})
 
 
 def test_step_by_step_and_as_a_whole_it_is_the_same() -> None:

@@ -19,9 +19,7 @@ MESH = {"teeth": TEETH, "contact_ratio": CONTACT_RATIO, "fewer_pairs": FEWER}
 
 def matrices(damping: float) -> tuple[np.ndarray, np.ndarray]:
     """Of (twist, its rate) about a shaft that turns evenly, with more pairs in mesh and with fewer."""
-    more, fewer = (
-        np.array([[0.0, 1.0], [-factor * STIFFNESS / INERTIA, -damping / INERTIA]]) for factor in (1.0, FEWER)
-    )
+    more, fewer = (np.array([[0.0, 1.0], [-factor * STIFFNESS / INERTIA, -damping / INERTIA]]) for factor in (1.0, FEWER))
     return more, fewer
 
 
@@ -98,10 +96,7 @@ def test_a_step_gives_the_energy_of_the_spring_times_the_step_and_every_step_is_
     speed = 10.0
     gear = {"input": "a", "output": "b", "ratio": RATIO, "stiffness": {"kind": "linear", "stiffness": STIFFNESS}}
     scenario = lm.Scenario(
-        shafts={
-            "a": {"inertia": 1e-4, "speed": {"mean": speed}},
-            "b": {"inertia": INERTIA, "speed": {"mean": speed / RATIO}},
-        },
+        shafts={"a": {"inertia": 1e-4, "speed": {"mean": speed}}, "b": {"inertia": INERTIA, "speed": {"mean": speed / RATIO}}},
         gears={"mesh": gear | {"mesh_stiffness": MESH}},
         initial={"twists": {"mesh": TWIST}, "angles": {"a": 0.0}},
         simulation={"duration": 2.0 * math.pi * (1.0 + 0.5 / TEETH) / speed, "sample_interval": 1e-3},
@@ -109,9 +104,7 @@ def test_a_step_gives_the_energy_of_the_spring_times_the_step_and_every_step_is_
     result = lm.simulate(scenario, energy=True)
     assert result.attrs["switching_count"] == 2 * TEETH + 1
     assert set(lm.switchings_of(result)["cause"].values) == {lm.simulation.switchings.MESH_STEP}
-    assert f"steps of the mesh stiffness: {2 * TEETH + 1} events; in a turn of the input shaft mesh {2 * TEETH}" in (
-        summary(result)
-    )
+    assert f"steps of the mesh stiffness: {2 * TEETH + 1} events; in a turn of the input shaft mesh {2 * TEETH}" in (summary(result))
     ledger = lm.energy_of(result)
     stored = 0.5 * STIFFNESS * TWIST**2
     assert ledger["mesh: parametric work"] == pytest.approx((FEWER - 1.0) * stored, rel=1e-9)
@@ -149,9 +142,7 @@ def test_derivatives_cross_the_steps() -> None:
     derivative = lm.simulate(scenario, sensitivities=[key])["mesh_twist_sensitivity"].sel(parameter=key).values
     h = 1e-5 * INERTIA
     beside = [lm.simulate(scenario.replace(**{key: INERTIA + s * h}))["mesh_twist"].values for s in (1, -1)]
-    assert np.allclose(
-        derivative, (beside[0] - beside[1]) / (2.0 * h), rtol=0.0, atol=1e-7 * np.max(np.abs(derivative))
-    )
+    assert np.allclose(derivative, (beside[0] - beside[1]) / (2.0 * h), rtol=0.0, atol=1e-7 * np.max(np.abs(derivative)))
 
 
 def test_a_linear_model_has_the_stiffness_of_its_angle() -> None:

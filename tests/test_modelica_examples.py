@@ -182,12 +182,7 @@ def test_first() -> None:
         },
         gears={
             "ideal": {"input": "motor", "output": "gear", "ratio": 10.0},
-            "spring": {
-                "input": "gear",
-                "output": "load",
-                "ratio": 1.0,
-                "stiffness": {"kind": "linear", "stiffness": 1e4},
-            },
+            "spring": {"input": "gear", "output": "load", "ratio": 1.0, "stiffness": {"kind": "linear", "stiffness": 1e4}},
         },
         simulation=simulation(1.0),
     )
@@ -212,10 +207,7 @@ def test_elastic_bearing(inertia: float) -> None:
     stiffness = {"stiffness": {"kind": "linear", "stiffness": 1e3}}
     ends = {"input": "shaft", "output": "output" if inertia else "load", "housing": "housing", "ratio": 3.0}
     bearing = {"stiffness": {"kind": "linear", "stiffness": 1e5}, "mesh_damping": 5.0}
-    gears = {
-        "gear": ends if inertia else ends | stiffness,
-        "bearing": {"input": "housing", "output": "ground", "ratio": 1.0} | bearing,
-    }
+    gears = {"gear": ends if inertia else ends | stiffness, "bearing": {"input": "housing", "output": "ground", "ratio": 1.0} | bearing}
     if inertia:
         gears["spring"] = {"input": "output", "output": "load", "ratio": 1.0} | stiffness
     scenario = lm.Scenario(
@@ -321,10 +313,7 @@ def coupled_clutches(peak: float) -> tuple[lm.Scenario, Hybrid]:
             "j1": {"inertia": 1.0, "torque": {"amplitude": 10.0, "frequency": 5.0, "phase": math.pi}},
             **{name: {"inertia": 1.0} for name in ("j2", "j3", "j4")},
         },
-        clutches={
-            f"c{k}": {"input": f"j{k}", "output": f"j{k + 1}", "torque": 10.0, "breakaway_torque": 10.0 * peak}
-            for k in (1, 2, 3)
-        },
+        clutches={f"c{k}": {"input": f"j{k}", "output": f"j{k + 1}", "torque": 10.0, "breakaway_torque": 10.0 * peak} for k in (1, 2, 3)},
         command={
             "c1": {"amplitude": 1.0, "frequency": 0.2, "phase": 0.5 * math.pi},
             "c2": {"steps": [{"height": 1.0, "time": 0.4}]},
@@ -374,10 +363,7 @@ def friction(**tables: Any) -> lm.Scenario:
 def test_friction() -> None:
     """A clutch and a brake, which closes at 0.5 s, when the torque ends."""
     shafts = {"inertia3": {"inertia": 1.0}, "inertia2": {"inertia": 0.05}, "inertia1": {"inertia": 1.0}}
-    driven = {
-        **shafts,
-        "inertia3": {"inertia": 1.0, "torque": {"amplitude": 200.0, "frequency": 50.0 / math.pi, "phase": math.pi}},
-    }
+    driven = {**shafts, "inertia3": {"inertia": 1.0, "torque": {"amplitude": 200.0, "frequency": 50.0 / math.pi, "phase": math.pi}}}
     idle = {**shafts, "inertia3": {"inertia": 1.0, "torque": 0.0}}
     names = ("inertia3", "inertia2", "inertia1")
     first = lm.simulate(
@@ -403,14 +389,9 @@ def test_friction() -> None:
         spring = 160.0 * y[3] + (y[1] - y[2])
         return np.array([200.0 * math.sin(100.0 * t) if t < 0.5 else 0.0, -spring, spring])
 
-    contacts = [
-        Contact(0, 1, lambda t: 80.0, lambda t: 80.0),
-        Contact(2, None, lambda t: 800.0 * (t >= 0.5), lambda t: 800.0 * (t >= 0.5)),
-    ]
+    contacts = [Contact(0, 1, lambda t: 80.0, lambda t: 80.0), Contact(2, None, lambda t: 800.0 * (t >= 0.5), lambda t: 800.0 * (t >= 0.5))]
     times = np.arange(301) * 0.01
-    expected, events = Hybrid([1.0, 0.05, 1.0], torque, contacts, [(1, 2)]).run(
-        np.array([100.0, 90.0, 90.0, 0.0]), times, [0.5]
-    )
+    expected, events = Hybrid([1.0, 0.05, 1.0], torque, contacts, [(1, 2)]).run(np.array([100.0, 90.0, 90.0, 0.0]), times, [0.5])
     assert events >= 4
     close(np.concatenate([np.array([first[f"{n}_speed"].values for n in names]).T, second[1:]]), expected[:, :3])
 
@@ -418,10 +399,7 @@ def test_friction() -> None:
 def test_one_way_clutch() -> None:
     """A freewheel and a clutch between the same shafts: while both are stuck, one torque serves for two."""
     scenario = lm.Scenario(
-        shafts={
-            "input": {"inertia": 1.0, "torque": {"amplitude": 10.0, "frequency": 3.0, "phase": math.pi}},
-            "output": {"inertia": 1.0},
-        },
+        shafts={"input": {"inertia": 1.0, "torque": {"amplitude": 10.0, "frequency": 3.0, "phase": math.pi}}, "output": {"inertia": 1.0}},
         clutches={"clutch": {"input": "input", "output": "output", "torque": 1.5, "breakaway_torque": 37.5}},
         freewheels={"freewheel": {"input": "input", "output": "output"}},
         command={"clutch": {"steps": [{"height": h, "time": t} for h, t in ((1.0, 0.3), (-1.0, 0.95), (1.0, 1.6))]}},
@@ -486,9 +464,7 @@ def test_lossy_gear_with_bearing_friction() -> None:
     expected, t, w, s, events = np.zeros(501), 0.0, 0.0, 0, 0
     s = 0 if min(margins(0.0)) >= 0.0 else 1 if margins(0.0)[0] < 0.0 else -1
     while t < 0.5:
-        guards: list[Any] = (
-            [lambda t, y: margins(t)[0], lambda t, y: margins(t)[1]] if s == 0 else [lambda t, y, s=s: s * y[0] + 0.0]
-        )
+        guards: list[Any] = [lambda t, y: margins(t)[0], lambda t, y: margins(t)[1]] if s == 0 else [lambda t, y, s=s: s * y[0] + 0.0]
         for g in guards:
             g.terminal, g.direction = True, -1
         rates = (lambda t, y: [0.0]) if s == 0 else (lambda t, y, s=s: [rate(t, y[0], s)])
@@ -552,9 +528,7 @@ def test_elastic_backlash(limited: bool) -> None:
         def pressed(t: float, y: Sequence[float], side: float = side) -> float:
             return spring(y) + d * side * y[1]
 
-        def spare(
-            t: float, y: Sequence[float], side: float = side, way: float = 1.0 if law == "both" else -1.0
-        ) -> float:
+        def spare(t: float, y: Sequence[float], side: float = side, way: float = 1.0 if law == "both" else -1.0) -> float:
             return way * (spring(y) - d * side * y[1])
 
         pressed.terminal, pressed.direction = True, -1  # type: ignore[attr-defined]

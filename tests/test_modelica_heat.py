@@ -80,14 +80,7 @@ class HeatLosses:
         matrix, right = np.zeros((11, 11)), np.zeros(11)
         for k, torque in enumerate((outer - first, first - between, between - second, second, 0.0, 0.0)):
             matrix[k, k], right[k] = J, torque
-        for k, unknown, sign in (
-            (2, T_B, 1.0),
-            (3, T_1, 1.0),
-            (4, T_2, -1.0),
-            (4, T_O, 1.0),
-            (5, T_O, -1.0),
-            (5, T_K, 1.0),
-        ):
+        for k, unknown, sign in ((2, T_B, 1.0), (3, T_1, 1.0), (4, T_2, -1.0), (4, T_O, 1.0), (5, T_O, -1.0), (5, T_K, 1.0)):
             matrix[k, unknown] = sign  # fmt: skip
         stuck = ({2: 1.0}, {3: 1.0}, {3: 1.0 / RATIO, 4: -1.0}, {4: 1.0, 5: -1.0}, {5: 1.0})
         slipping = (1.0, math.nan, 5.0 * force(t), 0.5 * force(t), force(t))
@@ -145,8 +138,7 @@ class HeatLosses:
                 continue
             rates = self.slips(found[A])
             if min(self.margins(t, found, modes).values(), default=0.0) > -1e-8 and all(
-                mode == 0 or abs(speeds[k]) > 1e-10 or mode * rates[k] > (-1e-6 if k in broken else 1e-7)
-                for k, mode in enumerate(modes)
+                mode == 0 or abs(speeds[k]) > 1e-10 or mode * rates[k] > (-1e-6 if k in broken else 1e-7) for k, mode in enumerate(modes)
             ):
                 return modes
         raise AssertionError(f"no consistent modes at {t}")
@@ -161,9 +153,7 @@ class HeatLosses:
                  found[T_1] * w[3] - found[T_2] * w[3] / RATIO, *dry[CLUTCH:]]  # fmt: skip
         return np.concatenate([found[A], w, heats])
 
-    def guards(
-        self, y: Vector, modes: Modes, flank: tuple[float, str], t: float
-    ) -> Iterator[tuple[str, Any, Callable[..., float]]]:
+    def guards(self, y: Vector, modes: Modes, flank: tuple[float, str], t: float) -> Iterator[tuple[str, Any, Callable[..., float]]]:
         side, law = flank
         for k, mode in enumerate(modes):
             if mode != 0:
@@ -172,17 +162,9 @@ class HeatLosses:
             yield "break", k, lambda t, y, k=k: self.margins(t, self.solve(t, y, modes, flank), modes)[k]
         if law == "gap":  # a flank pushes where it is pressed and the damper does not outweigh the spring
             for s in (1.0, -1.0):
-                yield (
-                    "hit",
-                    s,
-                    lambda t, y, s=s: -min(s * (y[7] - y[8]) - HALF, s * sum(self.flank_torques(y, s)) / FLANK),
-                )
+                yield ("hit", s, lambda t, y, s=s: -min(s * (y[7] - y[8]) - HALF, s * sum(self.flank_torques(y, s)) / FLANK))
             return
-        yield (
-            "part",
-            0,
-            lambda t, y: side * (sum(self.flank_torques(y, side)) if law == "both" else self.flank_torques(y, side)[0]),
-        )
+        yield ("part", 0, lambda t, y: side * (sum(self.flank_torques(y, side)) if law == "both" else self.flank_torques(y, side)[0]))
         way = 1.0 if law == "both" else -1.0
         yield "limit", 0, lambda t, y: way * side * (self.flank_torques(y, side)[0] - self.flank_torques(y, side)[1])  # fmt: skip
 
@@ -376,13 +358,7 @@ def test_eddy_current_brake_at_full_excitation() -> None:
     """At its reference temperature, with s = w/w_c, ln(s0/s) + (s0^2 - s^2)/2 = 2 T t/(J w_c); finer straight lines come nearer."""
     errors = []
     for error in (0.4, 0.1, 0.03):
-        drag = {
-            "kind": "eddy_current",
-            "peak_torque": PEAK,
-            "critical_speed": CRITICAL,
-            "max_speed": 20.0,
-            "error": error,
-        }
+        drag = {"kind": "eddy_current", "peak_torque": PEAK, "critical_speed": CRITICAL, "max_speed": 20.0, "error": error}
         result = lm.simulate(
             lm.Scenario(
                 shafts={"disc": {"inertia": 1.0, "torque": 0.0, "drag": drag}},
@@ -401,10 +377,5 @@ def test_eddy_current_brake_at_full_excitation() -> None:
 
 def test_an_error_that_takes_too_many_straight_lines_is_refused_with_its_key() -> None:
     drag = {"kind": "eddy_current", "peak_torque": PEAK, "critical_speed": CRITICAL, "max_speed": 20.0, "error": 1e-3}
-    with pytest.raises(
-        lm.InputError, match=r"key shafts.disc.drag: has an error of 0.001 N\*m, which takes more than 100"
-    ):
-        lm.Scenario(
-            shafts={"disc": {"inertia": 1.0, "torque": 0.0, "drag": drag}},
-            simulation={"duration": 1.0, "sample_interval": 0.1},
-        )
+    with pytest.raises(lm.InputError, match=r"key shafts.disc.drag: has an error of 0.001 N\*m, which takes more than 100"):
+        lm.Scenario(shafts={"disc": {"inertia": 1.0, "torque": 0.0, "drag": drag}}, simulation={"duration": 1.0, "sample_interval": 0.1})

@@ -52,11 +52,7 @@ TASK: dict[str, Any] = {
         "backlash": {"start": 0.58e-3, "min": 1e-5, "max": 5e-3, "unit": "mrad"},
         "friction": {"start": 0.0085, "max": 0.05, "unit": "N*m"},
     },
-    "monitor": {
-        "baseline": 8,
-        "order": "hours",
-        "watch": {"backlash": {"direction": "up", "max": "0.68 mrad"}, "friction": {}},
-    },
+    "monitor": {"baseline": 8, "order": "hours", "watch": {"backlash": {"direction": "up", "max": "0.68 mrad"}, "friction": {}}},
 }
 
 
@@ -126,9 +122,7 @@ def result(worn: Path) -> lm.identification.MonitorResult:
     return lm.monitor(worn)
 
 
-def test_backlash_that_grows_by_a_tenth_of_a_milliradian_is_found_from_the_motor_encoder(
-    result: lm.identification.MonitorResult,
-) -> None:
+def test_backlash_that_grows_by_a_tenth_of_a_milliradian_is_found_from_the_motor_encoder(result: lm.identification.MonitorResult) -> None:
     backlash = result.watched["backlash"]
     assert backlash.change is not None
     assert backlash.change.alarm is not None
@@ -217,9 +211,7 @@ def test_the_bayes_factor_is_the_quotient_of_two_integrals() -> None:
 
     def over_level_and_scale(size: float) -> float:
         squares = sum(((value - mu) / sigma - size * step) ** 2 for value, step in zip(x, d, strict=True))
-        return float(
-            np.sum(np.exp(-0.5 * squares) * sigma ** (1 - len(x)))
-        )  # d mu d sigma/sigma = sigma d(mu/sigma) d log sigma
+        return float(np.sum(np.exp(-0.5 * squares) * sigma ** (1 - len(x))))  # d mu d sigma/sigma = sigma d(mu/sigma) d log sigma
 
     s = SIZES[0]
     sizes = np.linspace(-7.0, 7.0, 141)  # both ends and 0 are in it

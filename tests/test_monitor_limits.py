@@ -26,9 +26,7 @@ max = 0.15
 NOISE = 1e-3
 
 
-def friction_logs(
-    directory: Path, worn: int, *, baseline: int = 5, deviation: str = "", noise: float = NOISE, spoil: float = 1.0
-) -> Path:
+def friction_logs(directory: Path, worn: int, *, baseline: int = 5, deviation: str = "", noise: float = NOISE, spoil: float = 1.0) -> Path:
     """Logs with a dry friction of 0.1 N·m, then of 0.2 N·m, each with a scatter of 0.002 N·m; returns the identification file.
 
     Parameters
@@ -90,9 +88,7 @@ def test_few_logs_do_not_decide_on_a_change_and_say_how_many_would(tmp_path: Pat
         (4, 1.0, 1, "does not fit: coulomb: changed since l05.csv"),
     ],
 )
-def test_the_command_ends_with_the_code_of_its_verdict(
-    tmp_path: Path, worn: int, spoil: float, code: int, words: str
-) -> None:
+def test_the_command_ends_with_the_code_of_its_verdict(tmp_path: Path, worn: int, spoil: float, code: int, words: str) -> None:
     path = friction_logs(tmp_path, worn, spoil=spoil)
     run = CliRunner().invoke(app, ["monitor", str(path)])
     assert run.exit_code == code, run.output

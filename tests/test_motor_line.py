@@ -55,16 +55,13 @@ def test_it_is_the_limit_of_a_short_time_constant() -> None:
     """The difference falls in proportion to the time constant."""
     line = lm.simulate(scenario())["joint_speed"]
     off = [
-        float(abs(lm.simulate(scenario(motors=motor(electrical_time_constant=tau)))["joint_speed"] - line).max())
-        for tau in (1e-4, 1e-5)
+        float(abs(lm.simulate(scenario(motors=motor(electrical_time_constant=tau)))["joint_speed"] - line).max()) for tau in (1e-4, 1e-5)
     ]
     assert off[0] / off[1] == pytest.approx(10.0, rel=0.05)
 
 
 def test_both_solvers_agree_with_a_voltage_limit_that_acts() -> None:
-    limited = scenario(
-        motors=motor(rated_voltage=14.8, voltage_limit=9.0), command={"m": {"amplitude": 1.5, "frequency": 0.7}}
-    )
+    limited = scenario(motors=motor(rated_voltage=14.8, voltage_limit=9.0), command={"m": {"amplitude": 1.5, "frequency": 0.7}})
     exact = lm.simulate(limited)
     other = lm.simulate(limited, solver="dormand-prince", relative_tolerance=1e-10)
     assert float(abs(exact["joint_speed"] - other["joint_speed"]).max()) < 1e-8
@@ -73,18 +70,13 @@ def test_both_solvers_agree_with_a_voltage_limit_that_acts() -> None:
 
 def test_currents_put_the_friction_into_the_line() -> None:
     """k_M I_0 = T and k_M I_S = M_S + T: with friction the motor stalls at M_S and runs without load at w_0, as its sheet says."""
-    own = lm.ShaftMotor(
-        shaft="s", rotor_inertia=1e-3, stall_torque=2.0, no_load_speed=50.0, stall_current=10.0, no_load_current=0.5
-    )
+    own = lm.ShaftMotor(shaft="s", rotor_inertia=1e-3, stall_torque=2.0, no_load_speed=50.0, stall_current=10.0, no_load_current=0.5)
     T = 2.0 * 0.5 / 9.5
     assert own.friction_torque == pytest.approx(T, rel=1e-15)
     assert own.armature_voltage_constant is not None
     assert own.rated_torque * own.armature_voltage_constant - T == pytest.approx(2.0, rel=1e-15)
     free = lm.Scenario(
-        shafts={"s": {}},
-        motors={"m": own},
-        command={"m": {"mean": 1.0}},
-        simulation={"duration": 20.0, "sample_interval": 0.1},
+        shafts={"s": {}}, motors={"m": own}, command={"m": {"mean": 1.0}}, simulation={"duration": 20.0, "sample_interval": 0.1}
     )
     assert float(lm.simulate(free)["s_speed"][-1]) == pytest.approx(50.0, rel=1e-9)
 
@@ -96,12 +88,7 @@ def test_the_short_form_and_the_rated_point_give_the_same_bits() -> None:
     for key in ("rated_torque", "rated_speed", "armature_voltage_constant", "electrical_time_constant"):
         data["motor"].pop(key, None)
     line = lm.Scenario(**data | {"motor": data["motor"] | {"stall_torque": 4.0, "no_load_speed": 300.0}})
-    point = {
-        "rated_torque": 2.0,
-        "rated_speed": 150.0,
-        "armature_voltage_constant": 2.0,
-        "electrical_time_constant": 0.0,
-    }
+    point = {"rated_torque": 2.0, "rated_speed": 150.0, "armature_voltage_constant": 2.0, "electrical_time_constant": 0.0}
     same = lm.Scenario(**data | {"motor": data["motor"] | point})
     assert np.array_equal(lm.simulate(line)["load_speed"], lm.simulate(same)["load_speed"])
     assert lm.Scenario(**line.model_dump(exclude_none=True)) == line
@@ -114,14 +101,8 @@ def test_the_short_form_and_the_rated_point_give_the_same_bits() -> None:
         ({"rated_speed": 3.0}, "has rated_speed, which stall_torque and no_load_speed say; leave it out"),
         ({"rated_torque": 3.2}, "has a rated_torque of 3.2 N*m, which must be below its stall_torque of 3.1 N*m"),
         ({"stall_current": 2.0}, "has stall_current without no_load_current; give both"),
-        (
-            {"stall_current": 2.0, "no_load_current": 2.0},
-            "no_load_current of 2 A, which must be below its stall_current",
-        ),
-        (
-            {"stall_current": 2.0, "no_load_current": 0.1, "friction_torque": 0.1},
-            "which say the same; give one of them",
-        ),
+        ({"stall_current": 2.0, "no_load_current": 2.0}, "no_load_current of 2 A, which must be below its stall_current"),
+        ({"stall_current": 2.0, "no_load_current": 0.1, "friction_torque": 0.1}, "which say the same; give one of them"),
         ({"kind": "torque_source"}, "has stall_torque, no_load_speed, of no use to a torque_source; leave them out"),
     ],
 )
@@ -217,9 +198,7 @@ def test_an_eddy_current_brake_slows_down_as_its_law_says() -> None:
 
 @pytest.mark.parametrize("error", [0.5, 0.05])
 def test_the_straight_lines_of_an_eddy_current_brake_keep_to_their_error(error: float) -> None:
-    drag = lm.model.EddyCurrentDrag(
-        kind="eddy_current", peak_torque=50.0, critical_speed=10.0, max_speed=300.0, error=error
-    )
+    drag = lm.model.EddyCurrentDrag(kind="eddy_current", peak_torque=50.0, critical_speed=10.0, max_speed=300.0, error=error)
     w = np.linspace(0.0, 300.0, 20001)
     core = drag.core()
     curve = np.array([core.torque(x) for x in w.tolist()])

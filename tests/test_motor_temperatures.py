@@ -109,9 +109,7 @@ def test_a_cycle_repeated_for_ever_ends_as_it_began_and_as_many_cycles_do() -> N
     # A constant torque heats by R_th P/(1 - alpha R_th P) at 25 °C, with the heat of 40 °C here.
     steady = lm.sizing.temperatures(lm.simulate(run(0.3, interval=1.0)), repeated=True)
     cold = (R_WC + R_CA) * LOSS * 0.09
-    assert float(steady["winding_temperature"][0]) == pytest.approx(
-        40 + cold * (1 + COPPER * 15) / (1 - COPPER * cold), abs=1e-9
-    )
+    assert float(steady["winding_temperature"][0]) == pytest.approx(40 + cold * (1 + COPPER * 15) / (1 - COPPER * cold), abs=1e-9)
 
 
 @pytest.mark.parametrize("interval", [0.01, 0.1, 0.5, 2.0])
@@ -149,9 +147,7 @@ def test_the_error_bound_holds_for_random_runs_that_are_sampled_coarsely(seed: i
             "simulation": {"duration": 10.0, "sample_interval": 1.0},
         }
     )
-    coarse, fine = (
-        lm.sizing.temperatures(lm.simulate(scenario, sample_interval=h), winding="40 degC") for h in (1.0, 5e-3)
-    )
+    coarse, fine = (lm.sizing.temperatures(lm.simulate(scenario, sample_interval=h), winding="40 degC") for h in (1.0, 5e-3))
     bounds = [found.attrs["error_bound"] for found in (coarse, fine)]
     for body in ("winding_temperature", "case_temperature"):
         assert float(abs(coarse[body] - fine[body].sel(time=coarse["time"], method="nearest")).max()) <= sum(bounds)
@@ -211,9 +207,7 @@ def test_voltage_under_a_current_loop_is_what_torque_and_speed_need(tau: float) 
     current = {"kind": "first_order", "time_constant": tau} if tau else {"kind": "ideal"}
     controller = {"sample_time": 1e-3, "delay": 0, "reference": {"kind": "torque", "mean": 4.0}, "current": current}
     scenario = run(0.0, duration=0.02, interval=1e-3)
-    result = lm.simulate(
-        lm.Scenario(**{**scenario.model_dump(), "command": 0.0, "motor": motor, "controller": controller})
-    )
+    result = lm.simulate(lm.Scenario(**{**scenario.model_dump(), "command": 0.0, "motor": motor, "controller": controller}))
     found, phase = lm.sizing.motor_current(result), motor.winding.phase_values()
     decay = np.exp(-result["time"].values / tau) if tau else np.zeros(result.sizes["time"])
     i, speed = 4.0 / phase.torque_constant * (1.0 - decay), result["motor_speed"].values

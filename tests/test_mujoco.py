@@ -13,20 +13,7 @@ import lostmotion as lm
 
 mujoco = pytest.importorskip("mujoco", reason='pip install "lostmotion[mujoco]"')
 
-from robot_arm import (  # noqa: E402  (it needs MuJoCo)
-    ARM,
-    HINGE,
-    RATIO,
-    ROTOR,
-    arm_model,
-    drive,
-    energy,
-    force_on_wall,
-    inertia_and_bias,
-    motor_torques,
-    reference,
-    robot,
-)
+from robot_arm import ARM, HINGE, RATIO, ROTOR, arm_model, drive, energy, force_on_wall, inertia_and_bias, motor_torques, reference, robot  # noqa: E402  (it needs MuJoCo)
 
 # --- accuracy ---
 
@@ -172,9 +159,7 @@ def test_torque_losses_and_states_are_read_by_name() -> None:
 
 def test_a_controller_moves_a_joint_to_its_reference() -> None:
     axis = lm.load("position-axis")
-    arm = lm.mujoco.attach(
-        mujoco.MjModel.from_xml_string(HINGE.format(step=1e-3)), {"hinge": axis.drive()}, {"hinge": axis.controller}
-    )
+    arm = lm.mujoco.attach(mujoco.MjModel.from_xml_string(HINGE.format(step=1e-3)), {"hinge": axis.drive()}, {"hinge": axis.controller})
     for _ in range(1500):
         arm.step([0.05])
     assert arm.data.qpos[0] == pytest.approx(0.05, abs=2e-3)
@@ -321,11 +306,7 @@ def test_a_train_of_two_stages_is_described_by_what_all_its_parts_are_at_the_joi
     """Armature: 400 times the rotor and 100 times the middle shaft; damping and friction of that shaft 100 and 10 times."""
     lossless = {"kind": "constant_efficiency", "efficiency": 1.0}
     train = lm.Scenario(
-        shafts={
-            "rotor": {},
-            "middle": {"inertia": 1e-3, "viscous_friction": 4e-3, "friction_torque": 0.05},
-            "arm": {"inertia": 0.5},
-        },
+        shafts={"rotor": {}, "middle": {"inertia": 1e-3, "viscous_friction": 4e-3, "friction_torque": 0.05}, "arm": {"inertia": 0.5}},
         motors={"m": {"shaft": "rotor", "kind": "torque_source", "rated_torque": 1.0, "rotor_inertia": 2e-4}},
         gears={
             "first": {"input": "rotor", "output": "middle", "ratio": -2.0, "losses": lossless},

@@ -99,9 +99,7 @@ def test_states_return_to_the_same_bits_in_contact(legged: Any) -> None:
     assert np.array_equal(stepped(other, 20, -0.3), first)
 
 
-def test_a_step_that_fails_leaves_robot_and_drives_where_they_were(
-    legged: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_step_that_fails_leaves_robot_and_drives_where_they_were(legged: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     robot = legged.robot("quasi-direct")
     stepped(robot, 5)
     before, twist = np.concatenate([robot.data.qpos, robot.data.qvel]), robot["twist"]
@@ -188,9 +186,7 @@ def test_a_value_of_the_trunk_that_is_no_number_is_named(legged: Any, name: str,
 
 def test_a_second_drive_of_a_joint_is_refused() -> None:
     """A dictionary has one drive a joint; the second would be an actuator of the model."""
-    text = ARM.format(step=1e-3, world="", tip="").replace(
-        "</mujoco>", "<actuator><motor name='again' joint='elbow'/></actuator></mujoco>"
-    )
+    text = ARM.format(step=1e-3, world="", tip="").replace("</mujoco>", "<actuator><motor name='again' joint='elbow'/></actuator></mujoco>")
     with pytest.raises(lm.InputError, match="joint 'elbow': has the actuator 'again', which would count twice"):
         lm.mujoco.attach(mujoco.MjModel.from_xml_string(text), {"elbow": drive()})
 

@@ -162,19 +162,7 @@ OTHERS: dict[str, Any] = {
     "velrange": [-0.1, 0.1],
 }
 # Attributes of an actuator that say which one it is, or are objects of the compiler.
-NAMES = {
-    "classname",
-    "compiler",
-    "id",
-    "info",
-    "name",
-    "plugin",
-    "refsite",
-    "signature",
-    "slidersite",
-    "target",
-    "type",
-}
+NAMES = {"classname", "compiler", "id", "info", "name", "plugin", "refsite", "signature", "slidersite", "target", "type"}
 
 
 def test_the_attributes_of_actuators_are_all_listed() -> None:

@@ -41,19 +41,8 @@ def scenario(**more: Any) -> Any:
 WEIGHT = {"shaft": "arm", "mass": MASS, "radius": RADIUS, "error": 1e-4}
 ONCE = {"shaft": "arm", "kind": "sine", "amplitude": MASS * G * RADIUS, "order": 1, "phase": math.pi, "error": 1e-4}
 POINTS = [k * math.pi / 6 for k in range(12)]
-CURVE = {
-    "shaft": "arm",
-    "kind": "curve",
-    "period": 2 * math.pi,
-    "angles": POINTS,
-    "torques": [math.sin(a) for a in POINTS],
-}
-CONTROLLER = {
-    "kind": "continuous",
-    "shaft": "arm",
-    "reference": {"kind": "position"},
-    "position": {"gain": 0.1, "derivative_gain": 0.01},
-}
+CURVE = {"shaft": "arm", "kind": "curve", "period": 2 * math.pi, "angles": POINTS, "torques": [math.sin(a) for a in POINTS]}
+CONTROLLER = {"kind": "continuous", "shaft": "arm", "reference": {"kind": "position"}, "position": {"gain": 0.1, "derivative_gain": 0.01}}
 WEIGHTS = {
     "gravity.arm": {"gravity": {"arm": WEIGHT}},
     "angle_torques.unbalance": {"angle_torques": {"unbalance": ONCE}},
@@ -156,18 +145,10 @@ ACTUATORS = {
 @pytest.mark.parametrize("kind", ACTUATORS)
 def test_nothing_of_an_actuator_stays_beside_its_drive(kind: str) -> None:
     tendon = '<tendon><fixed name="rope"><joint joint="arm" coef="9"/></fixed></tendon>'
-    given = model(
-        joint='damping="0.1 0.2 0.3" actuatorfrcrange="-1 1"',
-        actuator=f"{tendon}<actuator>{ACTUATORS[kind]}</actuator>",
-    )
-    with pytest.raises(
-        lm.InputError, match="damping and actuatorfrcrange and the actuator 'a', which would count twice"
-    ):
+    given = model(joint='damping="0.1 0.2 0.3" actuatorfrcrange="-1 1"', actuator=f"{tendon}<actuator>{ACTUATORS[kind]}</actuator>")
+    with pytest.raises(lm.InputError, match="damping and actuatorfrcrange and the actuator 'a', which would count twice"):
         lm.mujoco.attach(given, {"arm": scenario()})
-    arm, plain = (
-        lm.mujoco.attach(given, {"arm": scenario()}, replace=True),
-        lm.mujoco.attach(model(), {"arm": scenario()}),
-    )
+    arm, plain = (lm.mujoco.attach(given, {"arm": scenario()}, replace=True), lm.mujoco.attach(model(), {"arm": scenario()}))
     arm.data.ctrl[:] = 0.7
     for robot in (arm, plain):
         robot.data.qpos[0] = 1.0
@@ -180,10 +161,7 @@ def test_nothing_of_an_actuator_stays_beside_its_drive(kind: str) -> None:
 def test_an_actuator_without_a_name_is_named_by_its_number() -> None:
     motor = '<motor joint="arm"/>'
     unnamed = model(actuator=f"<actuator>{motor}{motor}</actuator>")
-    for refused in (
-        lambda: lm.mujoco.attach(unnamed, {"arm": scenario()}),
-        lambda: lm.mujoco.from_mjcf(unnamed, "arm"),
-    ):
+    for refused in (lambda: lm.mujoco.attach(unnamed, {"arm": scenario()}), lambda: lm.mujoco.from_mjcf(unnamed, "arm")):
         with pytest.raises(lm.InputError, match=r"\(number 1 of 2\) and the actuator without a name \(number 2 of 2\)"):
             refused()
 

@@ -48,19 +48,14 @@ def arm(
     """The arm of the tests of `attach`, its drives as plugins."""
     file = where / "drive"
     lm.mujoco.write_drive(given, file)
-    text = ARM.format(step=step, world="", tip="").replace(
-        'type="hinge"', f'type="hinge" armature="{armature!r}" {joint}'
-    )
+    text = ARM.format(step=step, world="", tip="").replace('type="hinge"', f'type="hinge" armature="{armature!r}" {joint}')
     config = f'<config key="scenario" value="{key or file}"/>'
     actuators = "".join(
-        f'<plugin name="{name}" joint="{name}" plugin="lostmotion.drive" {actuator}>{config}</plugin>'
-        for name in ("shoulder", "elbow")
+        f'<plugin name="{name}" joint="{name}" plugin="lostmotion.drive" {actuator}>{config}</plugin>' for name in ("shoulder", "elbow")
     )
     extension = '<extension><plugin plugin="lostmotion.drive"/></extension>'
     text = text.replace("<worldbody>", extension + "<worldbody>", 1)
-    return mujoco.MjModel.from_xml_string(
-        text.replace("</mujoco>", f"<actuator>{before}{actuators}</actuator></mujoco>")
-    )
+    return mujoco.MjModel.from_xml_string(text.replace("</mujoco>", f"<actuator>{before}{actuators}</actuator></mujoco>"))
 
 
 def swing(model: Any, duration: float) -> np.ndarray:
@@ -143,11 +138,7 @@ def test_controls_are_limited_and_found_behind_an_actuator_of_two(tmp_path: Path
     limited = arm(1e-3, drive(), tmp_path, actuator='ctrlrange="-0.1 0.1"')
     behind = arm(1e-3, drive(), tmp_path, before='<pid name="first" joint="elbow" kp="0" kv="0" input="pos vel"/>')
     ends = []
-    for model, controls in (
-        (limited, [3.0, -3.0]),
-        (behind, [0.0, 0.0, 0.1, -0.1]),
-        (arm(1e-3, drive(), tmp_path), [0.1, -0.1]),
-    ):
+    for model, controls in ((limited, [3.0, -3.0]), (behind, [0.0, 0.0, 0.1, -0.1]), (arm(1e-3, drive(), tmp_path), [0.1, -0.1])):
         data = mujoco.MjData(model)
         assert model.nu == len(controls)
         data.ctrl[:] = controls

@@ -63,16 +63,9 @@ def test_a_slower_cycle_has_the_same_path(task: Study):
 
 
 def test_sines_samples_payloads_and_processes_are_stretched():
-    duty = {
-        "payload": [{"begin": "1 s", "end": "2 s", "inertia": 0.1}],
-        "process": [{"times": [0.0, 1.0], "torques": [0.0, 1.0]}],
-    }
+    duty = {"payload": [{"begin": "1 s", "end": "2 s", "inertia": 0.1}], "process": [{"times": [0.0, 1.0], "torques": [0.0, 1.0]}]}
     reference = {"kind": "position", "amplitude": 0.3, "frequency": 0.5}
-    tables = {
-        **INERTIAL,
-        "task": {**INERTIAL["task"], **duty},
-        "controller": {**ARM["controller"], "reference": reference},
-    }
+    tables = {**INERTIAL, "task": {**INERTIAL["task"], **duty}, "controller": {**ARM["controller"], "reference": reference}}
     slow = slowed(task_of(tables), 2.0)
     assert slow.axis.payload[0].end == 4.0
     assert slow.axis.process[0].times == (0.0, 2.0)

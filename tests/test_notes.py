@@ -15,13 +15,7 @@ from conftest import ROOT
 from lostmotion.cli import app
 from lostmotion.inputs.toml_text import toml_text
 
-MAP = {
-    "kind": "map",
-    "speeds": [0.0, 1.0],
-    "loads": [0.0, 1.0],
-    "values": [[0.01, 0.02], [0.03, 0.05]],
-    "mirrored": True,
-}
+MAP = {"kind": "map", "speeds": [0.0, 1.0], "loads": [0.0, 1.0], "values": [[0.01, 0.02], [0.03, 0.05]], "mirrored": True}
 
 
 def train(tmp_path: Path, **changes: Any) -> lm.Scenario:
@@ -45,9 +39,7 @@ WAYS: dict[str, Callable[[Path], lm.Scenario]] = {
     "one key": lambda _: lm.load("paper-2dof-nl-small", {"gearbox.losses.values.0.0": 0.03}),
     "replace": lambda _: lm.load("paper-2dof-nl-small").replace(**{"gearbox.losses": MAP}),
     "base": with_base,
-    "beside its record": lambda _: lm.load(
-        "paper-2dof-nl-small", {"gearbox": {"from": "paper-gearbox", "losses": MAP}}
-    ),
+    "beside its record": lambda _: lm.load("paper-2dof-nl-small", {"gearbox": {"from": "paper-gearbox", "losses": MAP}}),
     "train": lambda path: train(path, losses=MAP),
     "train, override": lambda path: lm.load(train(path) and path / "train.toml", {"gears.stage.losses": MAP}),
     "train, replace": lambda path: train(path).replace(**{"gears.stage.losses": MAP}),
@@ -111,9 +103,7 @@ def test_what_is_said_of_a_friction_that_is_not_printed_goes_when_it_is_given() 
 
 
 def test_losses_that_replace_estimated_ones_are_no_estimate() -> None:
-    estimated = next(
-        r.name for r in lm.catalogue() if r.kind in ("planetary", "strain_wave") and r.level() == "estimated losses"
-    )
+    estimated = next(r.name for r in lm.catalogue() if r.kind in ("planetary", "strain_wave") and r.level() == "estimated losses")
     scenario = lm.load("catalogue-robot-joint", {"gearbox": {"from": estimated}})
     assert scenario.gearbox.loss_range is not None
     assert "estimated" in scenario.gearbox.note["losses"]

@@ -53,15 +53,10 @@ def test_a_changed_copy_is_run_as_if_it_had_been_loaded(name: str) -> None:
     scenario = loaded(name)
     lm.simulate(scenario)
     tables = json.loads(scenario.to_json())
-    changed = {
-        "duration": {"simulation": scenario.simulation.model_copy(update={"duration": 0.1})},
-        "title": {"title": "another"},
-    }
+    changed = {"duration": {"simulation": scenario.simulation.model_copy(update={"duration": 0.1})}, "title": {"title": "another"}}
     for fields in changed.values():
         copied = scenario.model_copy(update=fields)
-        fresh = type(scenario)(
-            **{**tables, **{k: getattr(v, "model_dump", lambda v=v: v)() for k, v in fields.items()}}
-        )
+        fresh = type(scenario)(**{**tables, **{k: getattr(v, "model_dump", lambda v=v: v)() for k, v in fields.items()}})
         assert same(lm.simulate(copied), lm.simulate(fresh))
         assert not same(lm.simulate(copied), lm.simulate(scenario))
     key = PARAMETER[name]
@@ -164,10 +159,7 @@ def test_arrays_cannot_be_changed() -> None:
     [
         ({"output": "array"}, r'output .array. is not known; it must be "dataset" or "arrays"'),
         ({"output": 3}, 'output: 3 must be the form of a result, "dataset" or "arrays"'),
-        (
-            {"output": "arrays", "sensitivities": ["load.inertia"]},
-            r'sensitivities, output="arrays": .* leave output out',
-        ),
+        ({"output": "arrays", "sensitivities": ["load.inertia"]}, r'sensitivities, output="arrays": .* leave output out'),
     ],
 )
 def test_another_form_of_the_result_is_refused(given: dict[str, Any], message: str) -> None:
@@ -195,9 +187,7 @@ def test_files_carry_the_ledger(ending: str, tmp_path: Path) -> None:
     assert found.attrs["energy_residual"] < 1e-9
 
 
-def test_a_balance_that_does_not_close_is_reported_in_files_and_summaries(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_balance_that_does_not_close_is_reported_in_files_and_summaries(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The limit is lowered below rounding, since scenarios whose balance fails are refused today or close."""
     monkeypatch.setattr("lostmotion.simulation.runs.energy_ledger.MOST_RESIDUAL", 0.0)
     result = lm.simulate(loaded("paper-2dof-nl-small"))

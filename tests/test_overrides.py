@@ -176,9 +176,9 @@ def test_half_the_command_at_twice_the_rated_voltage_is_the_same_motion(name: st
         size = float(abs(first[variable]).max())
         # The parameters differ by rounding, which breaking away at standstill amplifies somewhat.
         np.testing.assert_allclose(second[variable], first[variable], rtol=0.0, atol=1e-9 * size)
-    assert float(
-        abs(lm.simulate(scenario.replace(**{"motor.rated_voltage": 2.0 * voltage}))["load_speed"]).max()
-    ) > 1.5 * float(abs(first["load_speed"]).max())
+    assert float(abs(lm.simulate(scenario.replace(**{"motor.rated_voltage": 2.0 * voltage}))["load_speed"]).max()) > 1.5 * float(
+        abs(first["load_speed"]).max()
+    )
 
 
 def test_the_time_for_overrides_is_linear() -> None:

@@ -71,10 +71,7 @@ def sheets(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def task_with(sheets: Path, task: dict[str, Any], select: dict[str, Any] | None = None, **candidates_of: Any) -> Study:
     kept = {key: value for key, value in TABLES.items() if key not in ("vary", "motor")}
-    tables = kept | {
-        "task": {**TABLES["task"], **task},
-        "candidates": candidates_of or {"gearbox": "sheets/", "motor": "sheets/"},
-    }
+    tables = kept | {"task": {**TABLES["task"], **task}, "candidates": candidates_of or {"gearbox": "sheets/", "motor": "sheets/"}}
     if select is not None:
         tables["select"] = select
     return task_of(tables, sheets.parent)
@@ -125,10 +122,7 @@ def test_a_scenario_names_one_of_several_records(sheets: Path):
         ({"motor": "sheets/cheap.toml"}, "a motor is wanted here"),
         ({"motors": "sheets/"}, "did you mean motor"),
         ({"gearbox": 3}, "no name of a gearbox"),
-        (
-            {"gearbox": {"ratio": [1e6, 1e7]}},
-            "ratio = .*, which no gearbox of the catalogue has; they go from 3 to 1000",
-        ),
+        ({"gearbox": {"ratio": [1e6, 1e7]}}, "ratio = .*, which no gearbox of the catalogue has; they go from 3 to 1000"),
         ({"gearbox": {"kind": "planetry"}}, "kind = .*; did you mean planetary"),
         ({"gearbox": {"kind": "worm", "ratio": [3, 4]}}, r"no gearbox fits: \d+ without kind, \d+ without ratio"),
     ],
@@ -140,9 +134,7 @@ def test_what_is_no_candidate_is_refused(sheets: Path, given: dict[str, Any], sa
 
 
 def test_sums_over_the_parts(sheets: Path, tmp_path: Path):
-    task = task_with(
-        sheets, {}, {"objectives": {"mass": "least", "price": "least"}}, gearbox="sheets/both.toml", motor="sheets/"
-    )
+    task = task_with(sheets, {}, {"objectives": {"mass": "least", "price": "least"}}, gearbox="sheets/both.toml", motor="sheets/")
     ranked = ranked_of(task, tmp_path)
     found = {c.name.rpartition(", ")[2]: c.choice for c in ranked}
     for motor in ("m-one", "m-two"):
@@ -224,10 +216,7 @@ def test_a_torque_source_has_the_lag_of_a_current_loop(sheets: Path):
     # g/(z (z - 1)) with g = 1/3 lags by 3 T, of which one is the delay of the output.
     assert loop.kind == "first_order"
     assert loop.time_constant == pytest.approx(2 * 125e-6)
-    wrong = {
-        "controller": TABLES["controller"] | {"current": {"kind": "field_oriented"}},
-        "candidates": {"motor": "maxon-ec-i-52-606793"},
-    }
+    wrong = {"controller": TABLES["controller"] | {"current": {"kind": "field_oriented"}}, "candidates": {"motor": "maxon-ec-i-52-606793"}}
     both = {key: value for key, value in TABLES.items() if key not in ("vary", "motor")} | wrong
     task = task_of({**both, "gearbox": "schaeffler-rt1-h-20-100"})
     assert "field_oriented" in str(Axes(task).judged(task.parameters(0, 1)[0]))
@@ -257,12 +246,7 @@ def estimated(limit: float) -> Study:
         "limits": {"peak_torque": limit, "continuous_torque": 100.0, "max_speed": 600.0},
     }
     tables = {key: value for key, value in TABLES.items() if key not in ("vary", "motor")}
-    tables |= {
-        "task": {"cycle": "1 s", "max_inertia_ratio": 1e12},
-        "gearbox": gearbox,
-        "motor": motor,
-        "controller": SMOOTH,
-    }
+    tables |= {"task": {"cycle": "1 s", "max_inertia_ratio": 1e12}, "gearbox": gearbox, "motor": motor, "controller": SMOOTH}
     return task_of({**tables, "vary": [{"key": "gearbox.inertia", "values": [0.0]}]})
 
 
@@ -276,11 +260,7 @@ def peak(losses: float) -> float:
     ("limit", "nominal", "says"),
     [
         (1.2 * peak(3.0), "", HOLDS),
-        (
-            0.5 * (peak(1.0) + peak(3.0)),
-            "",
-            "fits with the least losses of its kind, violates motor_peak_torque with the largest",
-        ),
+        (0.5 * (peak(1.0) + peak(3.0)), "", "fits with the least losses of its kind, violates motor_peak_torque with the largest"),
         (0.98 * peak(1.0), "motor_peak_torque", "fits with the least losses"),
         (0.9 * peak(0.2), "motor_peak_torque", HOLDS),
     ],

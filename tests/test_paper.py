@@ -72,9 +72,7 @@ def found(results: Results) -> Facts:
     return facts(results)
 
 
-@pytest.mark.parametrize(
-    ("amplitude", "mean", "energy", "distortion"), [("large", 0.83, 0.886, 0.014), ("small", 0.18, 0.26, 0.64)]
-)
+@pytest.mark.parametrize(("amplitude", "mean", "energy", "distortion"), [("large", 0.83, 0.886, 0.014), ("small", 0.18, 0.26, 0.64)])
 def test_efficiencies_and_distortion_are_those_of_a_second_method(
     found: Facts, amplitude: str, mean: float, energy: float, distortion: float
 ) -> None:
@@ -127,10 +125,7 @@ def test_intervals_that_are_shaded_are_those_of_the_contact(results: Results, mo
 
 def test_stuck_intervals_are_shaded(results: Results, found: Facts) -> None:
     (spec,) = (s for s in figure_specs(results, found) if s.number == "11")
-    drawn = [
-        [patch.get_extents().transformed(axes.transData.inverted()) for patch in axes.patches]
-        for axes in draw(spec).axes
-    ]
+    drawn = [[patch.get_extents().transformed(axes.transData.inverted()) for patch in axes.patches] for axes in draw(spec).axes]
     for amplitude, boxes in zip(AMPLITUDES, drawn, strict=False):
         expected = stuck_intervals(results.runs["2-DOF-NL", amplitude])
         np.testing.assert_allclose([(box.x0, box.x1) for box in boxes], expected, atol=1e-9)
@@ -219,9 +214,7 @@ def test_figure_data_are_the_runs(report: tuple[Path, int]) -> None:
 
 def test_differences_are_those_of_the_runs(report: tuple[Path, int]) -> None:
     """Curves that coincide have a panel of their difference, and the small loop a panel without the torque of the spring."""
-    linear, other = (
-        lm.simulate(paper_scenario(model, "large"))["load_speed"].values for model in ("2-DOF-L", "1-DOF-L")
-    )
+    linear, other = (lm.simulate(paper_scenario(model, "large"))["load_speed"].values for model in ("2-DOF-L", "1-DOF-L"))
     shown = rows_of(report, "11", "difference from 2-DOF-L, amplitude 1.0275", "1-DOF-L")[1][: len(linear)]
     assert shown.tolist() == (other - linear).tolist()
     twist, hysteresis = rows_of(report, "14", "hysteresis, amplitude 0.025", "2-DOF-NL")
@@ -251,9 +244,7 @@ def test_the_hysteresis_loops_are_as_wide_as_16_says(report: tuple[Path, int]) -
 
 
 @pytest.mark.parametrize(("panel", "value"), [("amplitude 1.0275", 1.0275), ("amplitude 0.025", 0.025)])
-def test_the_frequency_response_shows_closed_form_models_and_cutoff(
-    report: tuple[Path, int], panel: str, value: float
-) -> None:
+def test_the_frequency_response_shows_closed_form_models_and_cutoff(report: tuple[Path, int], panel: str, value: float) -> None:
     """(10) from the constants by hand; 1-DOF-L beside it is the periodic motion with the friction of its bearings."""
     f, closed = rows_of(report, "17", panel, "1-DOF-L, closed form")
     x = f / EXPECTED["f_RC"][0]

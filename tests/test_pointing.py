@@ -136,10 +136,7 @@ def test_contributions_add_up_and_the_last_one_leaves_what_all_leave() -> None:
 
 def test_another_day_is_the_scenario_with_other_values_and_the_controller_does_not_know() -> None:
     s = lm.load("tracking-loss-map", {"simulation.duration": 3.0})
-    ideal = {
-        "encoder": IDEAL,
-        "position_encoder": IDEAL | {"shaft": "load"},
-    }  # of whose steps rounding would decide some
+    ideal = {"encoder": IDEAL, "position_encoder": IDEAL | {"shaft": "load"}}  # of whose steps rounding would decide some
     s = s.replace(controller=s.controller.model_dump(exclude_none=True) | ideal)
     budget = lm.pointing_budget(s, after=1.0)
     gearbox, motor, k = s.gearbox, s.motor, s.motor.armature_voltage_constant
@@ -158,10 +155,7 @@ def test_another_day_is_the_scenario_with_other_values_and_the_controller_does_n
             f"{knows}friction_torque": motor.friction_torque,
         },
         "losses in the controller x 0.6": {f"{knows}loss_factor": 0.6},
-        "wear: 1 arcmin more backlash": {
-            "gearbox.stiffness.backlash": math.radians(1.0 / 60.0),
-            f"{knows}twist_rate": 0.5,
-        },
+        "wear: 1 arcmin more backlash": {"gearbox.stiffness.backlash": math.radians(1.0 / 60.0), f"{knows}twist_rate": 0.5},
     }
     assert len(budget.robustness) == 12
     for name, change in by_hand.items():
@@ -178,9 +172,7 @@ def test_a_gap_is_taken_out_of_the_torsion_curve() -> None:
     )  # fmt: skip
     closed = gap.replace(**{"gearbox.stiffness.slopes": (2e4, 3e4), "gearbox.stiffness.breaks": (1e-3,)})
     found = lm.pointing_budget(gap, after=0.0, robustness=False).without["backlash"]["motor"]
-    assert found.peak == pytest.approx(
-        lm.pointing_budget(closed, after=0.0, robustness=False).whole["motor"].peak, rel=1e-12
-    )
+    assert found.peak == pytest.approx(lm.pointing_budget(closed, after=0.0, robustness=False).whole["motor"].peak, rel=1e-12)
 
 
 def test_the_field_of_view_counts_time_and_probability() -> None:
@@ -217,11 +209,7 @@ def test_two_axes_in_one_scenario_are_those_of_two() -> None:
 
 @pytest.mark.parametrize(
     ("share", "state", "said"),
-    [
-        (1.0, "fits", "all the time"),
-        (0.97, "does not fit", "for 3 % of"),
-        (1.0 - 2e-5, "does not fit", "for 0.002 % of"),
-    ],
+    [(1.0, "fits", "all the time"), (0.97, "does not fit", "for 3 % of"), (1.0 - 2e-5, "does not fit", "for 0.002 % of")],
 )
 def test_a_target_that_leaves_the_view_does_not_fit(share: float, state: str, said: str) -> None:
     found = verdict_of(SimpleNamespace(view=View(share, 0.5)))  # type: ignore[arg-type]
@@ -278,9 +266,7 @@ def test_the_start_up_transient_is_left_out_and_said_so() -> None:
     assert f"errors count from {budget.after:.4g} s on: the start-up transient before is left out" in budget.after_line
 
 
-@pytest.mark.parametrize(
-    ("times", "end"), [([], 0.0), ([0.1, 0.2, 0.8], 0.2), ([0.1, 0.55, 0.9, 1.5, 4.0], 1.5), ([0.6, 0.7], 0.0)]
-)
+@pytest.mark.parametrize(("times", "end"), [([], 0.0), ([0.1, 0.2, 0.8], 0.2), ([0.1, 0.55, 0.9, 1.5, 4.0], 1.5), ([0.6, 0.7], 0.0)])
 def test_a_transient_ends_before_the_first_gap_as_long_as_itself(times: list[float], end: float) -> None:
     """With at least 0.5 s of quiet."""
     assert first_gap(np.array(times), 0.5) == end

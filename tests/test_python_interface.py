@@ -36,9 +36,7 @@ def test_every_function_that_needs_a_drive_takes_a_scenario() -> None:
     ):
         assert np.array_equal(takes(drive), takes(SMALL), equal_nan=True)
     assert lm.response.rigid_constants(rigid) == lm.response.rigid_constants(rigid.drive())
-    assert lm.linearize(SMALL, lm.Initial(motor_speed=1.0)).contacts == (
-        lm.linearize(drive, lm.Initial(motor_speed=1.0)).contacts
-    )
+    assert lm.linearize(SMALL, lm.Initial(motor_speed=1.0)).contacts == (lm.linearize(drive, lm.Initial(motor_speed=1.0)).contacts)
     one, other = lm.periodic_motion(SMALL), lm.periodic_motion(drive, SMALL.command)
     assert np.array_equal(one["load_speed"], other["load_speed"])
     (only,) = lm.response.periodic_motions(SMALL, starts=[lm.Initial()])
@@ -56,9 +54,7 @@ def test_a_scenario_brings_its_constant_inputs_and_its_start_along() -> None:
 
 
 def test_what_is_no_drive_is_refused_in_plain_words() -> None:
-    with pytest.raises(
-        lm.InputError, match=r'drive: "drive.toml" must be a Drive, or a Scenario, such as load\(path\) returns'
-    ):
+    with pytest.raises(lm.InputError, match=r'drive: "drive.toml" must be a Drive, or a Scenario, such as load\(path\) returns'):
         lm.response.bandwidth("drive.toml", 1.0)
 
 
@@ -218,11 +214,7 @@ def test_reading_a_variable_costs_no_more_than_a_step() -> None:
 
 def test_variables_read_step_by_step_are_those_of_a_run() -> None:
     names = tuple(v.name for v in lm.simulation.VARIABLES)
-    constant = {
-        "command": -0.3,
-        "load.torque": 20.0,
-        "simulation.sample_interval": 0.01,
-    }  # driving, overrunning, reversal
+    constant = {"command": -0.3, "load.torque": 20.0, "simulation.sample_interval": 0.01}  # driving, overrunning, reversal
     scenario = lm.load("overrunning-load").replace(**constant)
     result = lm.simulate(scenario)
     assert {-1, 1} <= set(np.sign(result["output_torque"].values * result["motor_speed"].values))
@@ -301,9 +293,7 @@ def test_a_law_cannot_change_the_simulation_that_calls_it() -> None:
 
 
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda p: p.stem)
-@pytest.mark.parametrize(
-    "copied", [copy.copy, copy.deepcopy, lambda s: pickle.loads(pickle.dumps(s))], ids=["copy", "deepcopy", "pickle"]
-)
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda s: pickle.loads(pickle.dumps(s))], ids=["copy", "deepcopy", "pickle"])
 def test_a_copy_of_a_simulation_goes_on_by_itself(path, copied) -> None:
     scenario = lm.load(path)
     first = lm.Simulation(scenario)
@@ -379,11 +369,7 @@ def returned_by(thing: object) -> set[str]:
 
 
 def test_what_functions_return_is_exported() -> None:
-    own = {
-        name
-        for module in (ROOT / "src" / "lostmotion").rglob("*.py")
-        for name in re.findall(r"^class (\w+)", module.read_text(), re.M)
-    }
+    own = {name for module in (ROOT / "src" / "lostmotion").rglob("*.py") for name in re.findall(r"^class (\w+)", module.read_text(), re.M)}
     parts = {name for name in PATHS if inspect.isclass(thing := public(name)) and issubclass(thing, Part | lm.Scenario)}
     inner = {"IdentificationResult", "RungResult"}  # the fit itself is no public type
     for name in set(PATHS) - parts - inner:  # the fields of a part are keys of scenario files

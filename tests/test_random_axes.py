@@ -54,10 +54,7 @@ def random_axis(seed: int) -> lm.Scenario:
     if r.random() < 0.3:
         own, other = slides["slide"].pop("mass"), r.uniform(0.5, 5.0)
         slides["slide"].pop("inclination", None)
-        slides["other"] = {
-            "friction_force": r.uniform(0.0, 5.0),
-            "force": {"amplitude": r.uniform(0.0, 5.0), "frequency": 2.0},
-        }
+        slides["other"] = {"friction_force": r.uniform(0.0, 5.0), "force": {"amplitude": r.uniform(0.0, 5.0), "frequency": 2.0}}
         between = r.uniform(-0.8, 0.8) * float(np.sqrt(own * other))
         matrices["both"] = {"shafts": ["slide", "other"], "matrix": [[own, between], [between, other]]}
     kind = r.choice(list(TRAVEL))
@@ -70,10 +67,7 @@ def random_axis(seed: int) -> lm.Scenario:
     }
     command = {"mean": r.uniform(-0.2, 0.2), "amplitude": r.uniform(0.2, 1.0), "frequency": r.uniform(1.0, 5.0)}
     return lm.Scenario(
-        shafts={
-            "rotor": {},
-            "shaft": {"inertia": 10.0 ** r.uniform(-4.0, -3.0), "friction_torque": r.uniform(0.0, 0.1)},
-        },
+        shafts={"rotor": {}, "shaft": {"inertia": 10.0 ** r.uniform(-4.0, -3.0), "friction_torque": r.uniform(0.0, 0.1)}},
         slides=slides,
         mass_matrices=matrices,
         motors={"m": {"shaft": "rotor", "kind": "torque_source", "rotor_inertia": 3e-4, "rated_torque": 1.0}},
@@ -98,9 +92,7 @@ def test_both_solvers_agree_on_random_linear_axes(block: int) -> None:
         exact = lm.simulate(scenario)
         ledger = lm.energy_of(exact)
         assert abs(ledger["residual"]) <= 1e-9 * max(1.0, ledger["turned_over"]), seed
-        fine, coarse = (
-            lm.simulate(scenario, solver="dormand-prince", relative_tolerance=tolerance) for tolerance in (1e-11, 1e-9)
-        )
+        fine, coarse = (lm.simulate(scenario, solver="dormand-prince", relative_tolerance=tolerance) for tolerance in (1e-11, 1e-9))
         own = gap(fine, coarse)
         if own > 1e-5:  # a grazing contact: the adaptive runs differ from each other
             continue

@@ -52,14 +52,7 @@ def test_it_begins_where_the_axis_is() -> None:
     result = lm.simulate(axis(**{"initial.load_angle": 0.004}))
     assert result.position_reference.values[0] == pytest.approx(0.004, abs=1e-15)
     speed = {"kind": "speed", "mean": 2.0}
-    begun = axis(
-        **{
-            "controller.reference": speed,
-            "controller.position": None,
-            "initial.load_speed": 0.5,
-            "initial.motor_speed": 45.0,
-        }
-    )
+    begun = axis(**{"controller.reference": speed, "controller.position": None, "initial.load_speed": 0.5, "initial.motor_speed": 45.0})
     result = lm.simulate(begun)
     lag = 90.0 * (2.0 - 1.5 * np.exp(-result.time.values / TAU))
     assert result.speed_reference.values == pytest.approx(lag, rel=1e-12)
@@ -71,8 +64,7 @@ def test_a_reference_that_comes_later_takes_no_filter() -> None:
 
 def test_the_linear_loops_have_it_before_the_outermost_loop_alone() -> None:
     with_filter, without = (
-        axis_of(axis(**{"controller.position.feedforward": 0.0, "controller.reference_filter": f}))
-        for f in (FILTER, None)
+        axis_of(axis(**{"controller.position.feedforward": 0.0, "controller.reference_filter": f})) for f in (FILTER, None)
     )
     frequency = np.array([1.0, 5.0, 20.0])
     z, a = np.exp(2j * math.pi * frequency * T), math.exp(-T / TAU)
@@ -88,9 +80,7 @@ def test_a_time_constant_is_needed_and_positive() -> None:
 
 def test_its_derivative_by_the_time_constant_is_that_of_the_closed_form() -> None:
     key = "controller.reference_filter.time_constant"
-    result = lm.simulate(
-        axis(**{"controller.current": {"kind": "first_order", "time_constant": "1 ms"}}), sensitivities=[key]
-    )
+    result = lm.simulate(axis(**{"controller.current": {"kind": "first_order", "time_constant": "1 ms"}}), sensitivities=[key])
     t = result.time.values
     by_tau = result.position_reference_sensitivity.sel(parameter=key).values
     assert by_tau == pytest.approx(-0.01 * t / TAU**2 * np.exp(-t / TAU), abs=1e-9)

@@ -94,9 +94,7 @@ def ruckig_duration(move: tuple[float, ...]) -> float | None:
 def test_random_moves_take_the_time_that_ruckig_finds_shortest(moves: tuple[np.ndarray, ...]) -> None:
     theirs = np.array([ruckig_duration(move) for move in zip(*np.broadcast_arrays(*moves), strict=True)], float)
     solved = np.isfinite(theirs)
-    assert (
-        np.mean(solved) > 0.999
-    )  # where all is of like size it solves all, over 12 decades all but one in several thousands
+    assert np.mean(solved) > 0.999  # where all is of like size it solves all, over 12 decades all but one in several thousands
     assert segments(*moves)[0, -1][solved] == pytest.approx(theirs[solved], rel=1e-14)
 
 
@@ -137,11 +135,7 @@ def test_the_duration_of_a_move_is_its_closed_form(move: tuple[float, ...]) -> N
 
 
 def test_a_segment_that_a_move_does_not_have_takes_no_time() -> None:
-    for name, without in (
-        ("speed not reached", [3]),
-        ("acceleration not reached", [1, 5]),
-        ("neither reached", [1, 3, 5]),
-    ):
+    for name, without in (("speed not reached", [3]), ("acceleration not reached", [1, 5]), ("neither reached", [1, 3, 5])):
         durations = np.diff(segments(*CLOSED_FORMS[name][:4])[0])
         assert np.flatnonzero(durations == 0.0).tolist() == without
 
@@ -155,12 +149,7 @@ LIST = lm.PositionReference(
     acceleration="360 deg/s^2",
     jerk="7200 deg/s^3",
     dwell="0.2 s",
-    moves=[
-        {"to": "100 deg"},
-        {"to": "-20 deg", "speed": "10 deg/s", "dwell": "1 s"},
-        {"to": "-20 deg"},
-        {"to": "-19.9 deg"},
-    ],
+    moves=[{"to": "100 deg"}, {"to": "-20 deg", "speed": "10 deg/s", "dwell": "1 s"}, {"to": "-20 deg"}, {"to": "-19.9 deg"}],
 )
 
 
@@ -169,9 +158,7 @@ def test_a_list_of_moves_goes_from_rest_to_rest_with_its_dwells() -> None:
     # All seven segments; without the largest acceleration; no way at all; with jerk alone.
     durations = [1.0 + 0.25 + 0.05, 12.0 + 2.0 * math.sqrt(10.0 / 7200.0), 0.0, 4.0 * (0.1 / 14400.0) ** (1.0 / 3.0)]
     assert [end - begin for begin, end in between] == pytest.approx(durations, rel=1e-13)
-    assert [begin for begin, _ in between] == pytest.approx(
-        [0.1, *[e + w for (_, e), w in zip(between, (0.2, 1.0, 0.2), strict=False)]]
-    )
+    assert [begin for begin, _ in between] == pytest.approx([0.1, *[e + w for (_, e), w in zip(between, (0.2, 1.0, 0.2), strict=False)]])
     assert LIST.duration == between[-1][1] + 0.2
     positions = [10.0 * DEG, 100.0 * DEG, -20.0 * DEG, -20.0 * DEG, -19.9 * DEG]
     for (begin, end), origin, to in zip(between, positions, positions[1:], strict=False):
@@ -324,10 +311,7 @@ def test_pieces_and_sines_are_all_there_is() -> None:
 
 @pytest.mark.parametrize("reference", [LIST, SUM, *(reference for reference, _ in KINDS.values())])
 def test_references_survive_json_and_pickling(reference) -> None:
-    for copy in (
-        type(reference).model_validate_json(reference.model_dump_json()),
-        pickle.loads(pickle.dumps(reference)),
-    ):
+    for copy in (type(reference).model_validate_json(reference.model_dump_json()), pickle.loads(pickle.dumps(reference))):
         assert copy == reference
         assert copy.pieces() == reference.pieces()
 
@@ -476,9 +460,7 @@ def test_any_limits_and_moves_are_refused_in_one_plain_line_or_end_where_they_sh
 @example(times=[0.0, 1.0, 4e14], values=[0.0, 0.0, 0.0], interpolation="cubic")
 def test_any_series_is_refused_in_one_plain_line_or_passes_through_its_points(times, values, interpolation) -> None:
     try:
-        reference = lm.control.TorqueReference(
-            samples={"times": times, "values": values, "interpolation": interpolation}
-        )
+        reference = lm.control.TorqueReference(samples={"times": times, "values": values, "interpolation": interpolation})
     except lm.InputError as error:
         assert "\n" not in str(error)
         assert not re.search(r"Input should|https?:|pydantic|NoneType|dtype|array|dydx", str(error))
@@ -541,10 +523,7 @@ def test_a_duration_that_limits_forbid_names_the_least_one() -> None:
 def test_an_inertia_that_is_moved_by_a_law_takes_its_peak_acceleration() -> None:
     """J C_a D/T^2, with C_a = 5.5280 of the modified sine; the live page draws the same move."""
     motion = {"moves": [{"to": "90 deg", "duration": "0.4 s", "law": "modified_sine"}]}
-    table = {
-        "shafts": {"table": {"inertia": 0.02, "motion": motion}},
-        "simulation": {"duration": 0.5, "sample_interval": 1e-4},
-    }
+    table = {"shafts": {"table": {"inertia": 0.02, "motion": motion}}, "simulation": {"duration": 0.5, "sample_interval": 1e-4}}
     scenario = lm.Scenario(**table)
     torque = lm.simulate(scenario)["table_drive_torque"]
     assert float(np.abs(torque).max()) == pytest.approx(0.02 * 5.528 * math.radians(90.0) / 0.16, rel=3e-4)

@@ -17,9 +17,7 @@ from test_select import TABLES
 
 STEPS = TABLES["controller"]["reference"] | {"moves": [{"to": 1.2}]}  # it goes on from where it ends
 WITHOUT_REST = TABLES["controller"]["reference"] | {"acceleration": 8.0, "moves": [{"to": 0.5}, {"to": 0.0}]}
-JUMPS = {
-    "samples": {"times": [0.0, 0.3, 0.300001, 0.999], "values": [2.0, 2.0, -1.0, -1.0]}
-}  # also where the cycle ends
+JUMPS = {"samples": {"times": [0.0, 0.3, 0.300001, 0.999], "values": [2.0, 2.0, -1.0, -1.0]}}  # also where the cycle ends
 SAMPLES = {"times": [0.0, 0.25, 0.5, 0.75, 1.0], "values": [0.0, 0.3, 0.6, 0.3, 0.0]}
 
 WINDOWLESS = {"settling_window": None}  # there are no moves
@@ -38,9 +36,7 @@ TASKS = {
     "gravity and a payload": task(ARM, task={"payload": [{"begin": 0.0, "end": 1.5, "mass": 1.0, "radius": 0.4}]}),
     "a slide": SLIDE,
     "samples": task(task=WINDOWLESS, controller={"reference": {"kind": "position", "samples": SAMPLES}}),
-    "a spline": task(
-        task=WINDOWLESS, controller={"reference": {"kind": "position", "samples": SAMPLES | {"interpolation": "cubic"}}}
-    ),
+    "a spline": task(task=WINDOWLESS, controller={"reference": {"kind": "position", "samples": SAMPLES | {"interpolation": "cubic"}}}),
 }
 
 

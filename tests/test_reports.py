@@ -95,9 +95,7 @@ def test_a_page_is_well_formed_and_asks_for_nothing() -> None:
     assert [chart["kind"] for chart in charts(page)] == ["lines", "contacts", "flows"]
 
 
-def test_without_its_script_a_page_has_tables_and_figures_and_names_the_remedy(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_its_script_a_page_has_tables_and_figures_and_names_the_remedy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pages, "SCRIPT", tmp_path / "none.js")
     monkeypatch.setattr(pages, "made_here", lambda *_: None)  # as in an installed package
     page = render(report(PANEL, table=Table("Values", ("what", "value [N·m]"), [["a", "1.5"]])))
@@ -110,12 +108,8 @@ def test_without_its_script_a_page_has_tables_and_figures_and_names_the_remedy(
 def test_all_colours_of_figures_are_those_of_the_style_sheet() -> None:
     """No module draws in a colour of its own: neither a hexadecimal one nor a grey."""
     modules = [*(ROOT / "src" / "lostmotion").rglob("*.py"), *(ROOT / "docs").glob("*.py")]
-    own = re.compile(
-        r'["\'](?:#[0-9a-fA-F]{3,8}|(?:color|colour)=["\']0?\.\d+)["\']|"colou?r": "0?\.\d+"|color="(?:0?\.\d|black|grey)'
-    )
-    found = [
-        f"{m.name}: {n}" for m in modules for n, line in enumerate(m.read_text().splitlines(), 1) if own.search(line)
-    ]
+    own = re.compile(r'["\'](?:#[0-9a-fA-F]{3,8}|(?:color|colour)=["\']0?\.\d+)["\']|"colou?r": "0?\.\d+"|color="(?:0?\.\d|black|grey)')
+    found = [f"{m.name}: {n}" for m in modules for n, line in enumerate(m.read_text().splitlines(), 1) if own.search(line)]
     assert not found
     drawn = [m.name for m in modules if re.search(r"(?<!\w)Figure\(figsize", m.read_text())]
     assert not drawn, "plots.Picture has the looks"
@@ -178,10 +172,7 @@ def test_a_static_curve_stays_within_the_line_that_is_seen() -> None:
 def test_a_static_figure_has_its_points_where_the_axes_say() -> None:
     """Over logarithmic axes 10/x is a straight line from corner to corner, and the mark is at a third of it."""
     svg = svg_of(PANEL)
-    ends = [
-        tuple(map(float, p))
-        for p in re.findall(r"[ML]([\d.]+) ([\d.]+)", re.search(r'stroke-width="1.6" d="(.*?)"', svg)[1])
-    ]  # type: ignore[index]
+    ends = [tuple(map(float, p)) for p in re.findall(r"[ML]([\d.]+) ([\d.]+)", re.search(r'stroke-width="1.6" d="(.*?)"', svg)[1])]  # type: ignore[index]
     (x0, y0), (x1, y1) = ends
     cx, cy = map(float, re.search(r'<circle cx="([\d.]+)" cy="([\d.]+)"', svg).groups())  # type: ignore[union-attr]
     assert (cx - x0) / (x1 - x0) == pytest.approx(1.0 / 3.0, abs=2e-3)  # coordinates have one decimal
@@ -192,9 +183,7 @@ def test_a_static_figure_has_its_points_where_the_axes_say() -> None:
 def test_figures_are_drawn_where_they_are_asked_for(axis: lm.servo.ServoReport, tmp_path: Path) -> None:
     write_report(tmp_path, servo_report("speed-axis", axis), endings("png, svg"))
     made = {p.name for p in tmp_path.iterdir()} - {"report.js"}
-    assert made == {"servo.html", "margins.csv"} | {
-        f"{n}.{e}" for n in ("axis", "loops", "steps") for e in ("csv", "png", "svg")
-    }
+    assert made == {"servo.html", "margins.csv"} | {f"{n}.{e}" for n in ("axis", "loops", "steps") for e in ("csv", "png", "svg")}
     assert (tmp_path / "axis.png").read_bytes().startswith(b"\x89PNG")
     assert endings(None) == ()
     with pytest.raises(lm.InputError, match="gif is not known; write png, svg or pdf"):

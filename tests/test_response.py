@@ -145,9 +145,7 @@ def test_linearisation_holds_where_the_input_sticks():
 
 
 def test_without_an_operating_point_only_a_drive_of_one_regime_is_linearized():
-    with pytest.raises(
-        lm.InputError, match=r"\(dry contacts: input_contact, twist_contact, a torsion curve of .*give one"
-    ):
+    with pytest.raises(lm.InputError, match=r"\(dry contacts: input_contact, twist_contact, a torsion curve of .*give one"):
         lm.linearize(NONLINEAR)
     with pytest.raises(lm.InputError, match="depends on the operating point"):
         lm.linearize(NONLINEAR, command=0.4)
@@ -199,9 +197,7 @@ def test_shooting_agrees_with_long_transients():
         motion = lm.periodic_motion(NONLINEAR, command)
         assert motion.attrs["residual"] < 1e-12
         periods = 200
-        run = lm.simulate(
-            NONLINEAR, command=command, duration=periods / frequency, sample_interval=1.0 / (64 * frequency)
-        )
+        run = lm.simulate(NONLINEAR, command=command, duration=periods / frequency, sample_interval=1.0 / (64 * frequency))
         for name in ("motor_torque", "motor_speed", "load_speed", "twist"):
             last, own = run[name].values[-65:-1], motion[name].values[::32]
             assert np.max(np.abs(last - own)) < 1e-9 * np.max(np.abs(own)), (amplitude, name)
@@ -245,9 +241,7 @@ def test_floquet_multipliers_tell_decay():
     # Damped oscillator: multipliers exp((-xi +- i sqrt(1 - xi^2)) omega T).
     k, J, xi, f = 4.0, 0.01, 0.1, 5.0
     omega = math.sqrt(k / J)
-    motion = lm.periodic_motion(
-        oscillator(damping=2.0 * xi * omega * J), load_torque=lm.TorqueSignal(amplitude=0.1, frequency=f)
-    )
+    motion = lm.periodic_motion(oscillator(damping=2.0 * xi * omega * J), load_torque=lm.TorqueSignal(amplitude=0.1, frequency=f))
     size = math.exp(-xi * omega / f)
     found = np.hypot(motion.attrs["multipliers_real"], motion.attrs["multipliers_imag"])
     # motor speed stays what it is (1), twist and load speed decay; twist and angle of the flywheel are tied.
@@ -286,11 +280,7 @@ def test_coexisting_motions_and_subharmonics_of_a_load_in_backlash():
     m = tall[0]
     start = {name: m.attrs[f"start_{name}"] for name in STATES}
     run = lm.simulate(
-        drive,
-        load_torque=torque,
-        duration=30 * m.attrs["period"],
-        sample_interval=m.attrs["period"] / 64,
-        initial=lm.Initial(**start),
+        drive, load_torque=torque, duration=30 * m.attrs["period"], sample_interval=m.attrs["period"] / 64, initial=lm.Initial(**start)
     )
     assert np.max(np.abs(run["twist"].values[-65:-1] - m["twist"].values[::32])) < 1e-6 * 4e-3
 
@@ -319,9 +309,7 @@ def test_den_hartogs_oscillator_with_dry_friction(r: float):
 def stops(share: float) -> tuple[int, lm.Drive, "object"]:
     """Number of stretches in which a free mass under P sin(wt) is at rest, with friction F = share P."""
     drive = oscillator(stiffness=1e-9, friction=share)
-    drive = drive.model_copy(
-        update={"gearbox": drive.gearbox.model_copy(update={"stiffness": lm.model.TorsionCurve(slopes=(1e-9,))})}
-    )
+    drive = drive.model_copy(update={"gearbox": drive.gearbox.model_copy(update={"stiffness": lm.model.TorsionCurve(slopes=(1e-9,))})})
     motion = lm.periodic_motion(drive, load_torque=lm.TorqueSignal(amplitude=1.0, frequency=1.0))
     stuck = motion["load_contact"].values == 0
     return int(np.sum(stuck & ~np.roll(stuck, 1))), drive, motion
@@ -379,9 +367,7 @@ def test_load_torque_as_the_source_gives_compliance():
     # A linear oscillator: F(twist)/F(M_Z) = 1/(k - J w^2 + i b w), with the sign of a torque that pulls back.
     k, J, b = 4.0, 0.01, 0.02
     frequencies = np.array([0.5, 2.0, 6.0])
-    response = lm.frequency_response(
-        oscillator(stiffness=k, inertia=J, damping=b), frequencies, [0.1], source="load_torque"
-    )
+    response = lm.frequency_response(oscillator(stiffness=k, inertia=J, damping=b), frequencies, [0.1], source="load_torque")
     w = 2.0 * np.pi * frequencies
     own = response["response"].sel(output="twist", amplitude=0.1).values
     assert np.max(np.abs(own * (k - J * w**2 + 1j * b * w) - 1.0)) < 1e-9
@@ -421,9 +407,7 @@ def test_bandwidth_is_where_the_gain_has_fallen_by_three_decibels():
 def test_control_gets_the_response_as_data():
     response = lm.frequency_response(NONLINEAR, [0.5, 1.0, 5.0], [0.025, 1.0275])
     data = lm.response.to_control(response, 1.0275)
-    assert np.allclose(
-        data.frequency_response(2 * np.pi * np.array([1.0])).frdata.ravel(), load_response(response, 1.0275)[1]
-    )
+    assert np.allclose(data.frequency_response(2 * np.pi * np.array([1.0])).frdata.ravel(), load_response(response, 1.0275)[1])
 
 
 @pytest.mark.parametrize(
@@ -441,8 +425,7 @@ def test_control_gets_the_response_as_data():
         ),
         (
             lambda: lm.periodic_motion(
-                NONLINEAR,
-                lm.CommandSignal(sines=[{"amplitude": 1, "frequency": 1}, {"amplitude": 1, "frequency": math.pi}]),
+                NONLINEAR, lm.CommandSignal(sines=[{"amplitude": 1, "frequency": 1}, {"amplitude": 1, "frequency": math.pi}])
             ),
             "no common period",
         ),
@@ -470,16 +453,7 @@ def test_a_motion_that_does_not_settle_is_reported_and_not_made_up():
 
 def test_the_command_writes_figures_and_tables(tmp_path: Path):
     linear = ROOT / "scenarios" / "paper-2dof-l-large.toml"
-    words = [
-        "--amplitudes",
-        "0.01,0.1,1",
-        "--frequencies",
-        "0.5..20:6",
-        "--compare",
-        str(linear),
-        "-o",
-        str(tmp_path / "out"),
-    ]
+    words = ["--amplitudes", "0.01,0.1,1", "--frequencies", "0.5..20:6", "--compare", str(linear), "-o", str(tmp_path / "out")]
     done = CliRunner().invoke(app, ["response", str(ROOT / "scenarios" / "paper-2dof-nl-large.toml"), *words])
     assert done.exit_code == 0, done.output
     assert "18 of 18 motions found" in done.output

@@ -74,9 +74,7 @@ def test_what_nothing_holds_starts_at_once(stiffness: dict):
     """Losses in proportion to the load alone: no torque is needed to start; driven backwards it holds only if it is self-locking."""
     for eta_b, torque in ((0.7, 0.0), (-0.2, None)):
         losses = efficiency_map(0.8, eta_b)
-        rig = TestRig(
-            lm.Gearbox(ratio=2, rated_input_speed=1, rated_output_torque=1, stiffness=stiffness, losses=losses)
-        )
+        rig = TestRig(lm.Gearbox(ratio=2, rated_input_speed=1, rated_output_torque=1, stiffness=stiffness, losses=losses))
         assert rig.starting_torque() == 0.0 and rig.backdriving_torque() == torque
 
 
@@ -107,16 +105,13 @@ def worm(name: str) -> lm.Gearbox:
 
 
 @pytest.mark.parametrize(
-    ("name", "holds"),
-    [("nord-sk1si50-60", True), ("motovario-sw050-60", True), ("motovario-sw050-10", False), ("nord-sk1si50-5", False)],
+    ("name", "holds"), [("nord-sk1si50-60", True), ("motovario-sw050-60", True), ("motovario-sw050-10", False), ("nord-sk1si50-5", False)]
 )
 def test_a_worm_holds_its_load_without_power_if_its_static_efficiency_is_below_one_half(name: str, holds: bool):
     gearbox = worm(name)
     assert (find(name, "gearbox").losses.static_efficiency < 0.5) is holds
     drive = lm.Drive(
-        motor=lm.Motor(kind="torque_source", rotor_inertia=1e-4),
-        gearbox=gearbox,
-        load=lm.Load(inertia=0.5, viscous_friction=20.0),
+        motor=lm.Motor(kind="torque_source", rotor_inertia=1e-4), gearbox=gearbox, load=lm.Load(inertia=0.5, viscous_friction=20.0)
     )
     result = lm.simulate(drive, load_torque=-70.0, duration=2.0, sample_interval=0.01)
     turned = abs(float(result["motor_speed"][-1]))

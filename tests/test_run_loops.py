@@ -98,16 +98,12 @@ def test_both_errors_of_a_speed_are_at_the_shaft_of_its_reference() -> None:
 
 def test_an_error_that_grows_while_the_reference_moves_on_is_said_to_diverge() -> None:
     ramp = {"reference": {"kind": "position", "samples": {"times": [0.0, 10.0], "values": [0.0, 0.1]}}}
-    verdict = verdict_of(
-        lm.simulate(two_mass(SLUGGISH, position={"gain": 30.0}, **ramp), duration=2.0, sample_interval=1e-3)
-    )
+    verdict = verdict_of(lm.simulate(two_mass(SLUGGISH, position={"gain": 30.0}, **ramp), duration=2.0, sample_interval=1e-3))
     assert verdict is not None
     assert verdict.lines[0].startswith("unstable: the position error of m diverges, up to ")
 
 
-def test_an_axis_whose_motion_leaves_the_range_of_numbers_is_said_to_be_unstable_with_the_loop_that_causes_it(
-    tmp_path: Path,
-) -> None:
+def test_an_axis_whose_motion_leaves_the_range_of_numbers_is_said_to_be_unstable_with_the_loop_that_causes_it(tmp_path: Path) -> None:
     """A speed loop of 40 times the gain of the stable one has a pole outside the unit circle; no limit holds its motion."""
     scenario = axis({"gain": 44.0, "integral_gain": 45.0}).replace(**{"controllers.m.speed.torque_limit": None})
     assert all(instability(axis_of(scenario), regime) is not None for regime in regimes(axis_of(scenario)))
@@ -125,8 +121,7 @@ def test_true_and_measured_errors_have_their_names(shipped: Any) -> None:
     reference = lm.load("position-axis").controller.reference.at(shipped["time"].values)[0]
     errors = {
         "true (reference less load)": reference - shipped["load_angle"].values,
-        "measured (reference less encoder on motor)": shipped["position_reference"].values
-        - shipped["measured_position"].values,
+        "measured (reference less encoder on motor)": shipped["position_reference"].values - shipped["measured_position"].values,
     }
     page = render(run_report("position-axis", shipped))
     for name, error in errors.items():
@@ -139,10 +134,7 @@ def test_true_and_measured_errors_have_their_names(shipped: Any) -> None:
 def test_pages_of_run_and_servo_give_no_name_to_both_errors(shipped: Any) -> None:
     titles = [
         {panel.title for group in page.groups() for panel in group.charts if "rror" in panel.title}
-        for page in (
-            run_report("position-axis", shipped),
-            servo_report("position-axis", lm.commission(lm.load("position-axis"))),
-        )
+        for page in (run_report("position-axis", shipped), servo_report("position-axis", lm.commission(lm.load("position-axis"))))
     ]
     assert titles == [{"Measured following error"}, {"following error over the run, reference less true value"}]
 

@@ -103,14 +103,7 @@ def test_a_turn_is_not_looked_for_beyond_the_end_of_a_motion_that_grows() -> Non
             }
         },
         command={"m": {"mean": -0.18}},
-        gears={
-            "x1": {
-                "input": "s0",
-                "output": "s1",
-                "ratio": 20.0,
-                "stiffness": {"kind": "curve", "backlash": 2.4e-4, "slopes": [200.0]},
-            }
-        },
+        gears={"x1": {"input": "s0", "output": "s1", "ratio": 20.0, "stiffness": {"kind": "curve", "backlash": 2.4e-4, "slopes": [200.0]}}},
         clutches={"x2": {"input": "s1", "output": "s2", "torque": 6.0, "kind": "safety"}},
         mass_matrices={"j": {"shafts": ["s2", "s4"], "matrix": [[500.0, 0.002], [0.002, 1.3e-8]]}},
         simulation={"duration": 2e-3, "sample_interval": 1e-4},
@@ -131,9 +124,7 @@ def test_energies_of_a_motion_through_a_wall_of_losses_are_integrated_in_long_pa
     energy = lm.energy_of(run)
     assert abs(energy["residual"]) <= 1e-6 * energy["turned_over"]
     # What the motor gave, by another rule: the mean of power over many samples.
-    fine = lm.simulate(
-        lm.load(NAMED["step-to-standstill"], {"gearbox.losses.values.0.1": 1e6}), sample_interval=1e-4, energy=False
-    )
+    fine = lm.simulate(lm.load(NAMED["step-to-standstill"], {"gearbox.losses.values.0.1": 1e6}), sample_interval=1e-4, energy=False)
     power = fine["motor_torque"].values * fine["motor_speed"].values
     assert energy["source"] == pytest.approx(float(np.trapezoid(power, fine["time"].values)), rel=2e-3)
 
@@ -222,9 +213,7 @@ def a_pointing_budget(_: Path) -> None:
 
 
 @pytest.mark.parametrize("in_threads", [a_study, a_study_row_by_row, a_hunting_map, a_pointing_budget])
-def test_an_interruption_ends_runs_in_threads_within_a_second(
-    in_threads: Callable[[Path], None], tmp_path: Path
-) -> None:
+def test_an_interruption_ends_runs_in_threads_within_a_second(in_threads: Callable[[Path], None], tmp_path: Path) -> None:
     begin = time.perf_counter()
     with interrupted_after(1.0), pytest.raises(AlarmError):
         in_threads(tmp_path)

@@ -178,10 +178,7 @@ def test_what_keeps_a_sampled_axis_from_hunting_is_named(changes: dict[str, Any]
     [
         ({"shafts/rotor/stribeck_speed": 0.1, "shafts/rotor/breakaway_torque": 3.0}, "friction of rotor that varies"),
         ({"controllers/m/position_encoder": {"resolution": 1e-5}}, "a position_encoder (give one encoder to both"),
-        (
-            {"controllers/m/position": {"gain": K_V, "integral_gain": 1.0, "dead_zone": [1e-4, 2e-4]}},
-            "a dead zone of the integrator",
-        ),
+        ({"controllers/m/position": {"gain": K_V, "integral_gain": 1.0, "dead_zone": [1e-4, 2e-4]}}, "a dead zone of the integrator"),
         ({"controllers/m/position/integral_gain": 1.0}, "does not wind up in proportion to the error"),
     ],
 )

@@ -54,11 +54,7 @@ def random_axis(rng: random.Random) -> lm.Scenario:
         controller["position"]["sample_time"] = tick * rng.choice([2, 4])
     if rng.random() < 0.3:
         controller["current"] = {"kind": "first_order", "time_constant": tick * log(rng, 0.3, 3.0)}
-    load: dict[str, Any] = {
-        "inertia": (1.0 - share) * inertia,
-        "friction_torque": sliding,
-        "breakaway_torque": breakaway,
-    }
+    load: dict[str, Any] = {"inertia": (1.0 - share) * inertia, "friction_torque": sliding, "breakaway_torque": breakaway}
     if rng.random() < 0.5:
         load["viscous_friction"] = log(rng, 0.01, 0.5) * k_d
     losses = {"kind": "constant_efficiency", "efficiency": 1.0}
@@ -79,9 +75,7 @@ def settled_errors(scenario: lm.Scenario, duration: float) -> np.ndarray:
     """Errors of the load in the stuck intervals of an exact run after its step that last until all but the integrator has settled."""
     of = sampled_slip(axis_of(scenario))
     count = min(math.ceil(duration / of.tick), SAMPLES)
-    run = lm.simulate(
-        scenario.replace(**{"simulation.duration": count * of.tick, "simulation.sample_interval": of.tick})
-    )
+    run = lm.simulate(scenario.replace(**{"simulation.duration": count * of.tick, "simulation.sample_interval": of.tick}))
     angle, mode = run["load_angle"].values, run["load_contact"].values
     time = run["time"].values
     ends = np.flatnonzero((mode[:-1] == 0) & (mode[1:] != 0))
@@ -104,9 +98,7 @@ def check_band(scenario: lm.Scenario, found: Any, told: str) -> int:
     ratio = scenario.gears["gear"].ratio
     for size in (low * 1.01, math.sqrt(low * high), high * 0.99):
         error = of.step * (round(size / of.step - of.offset) + of.offset)
-        if (
-            c.speed.gain * ratio**2 * c.position.gain * error < 0.9 * friction
-        ):  # it is stuck until the integrator frees it
+        if c.speed.gain * ratio**2 * c.position.gain * error < 0.9 * friction:  # it is stuck until the integrator frees it
             begun = scenario.replace(**{"controllers.m.reference.steps": [{"time": 0.1, "height": error}]})
             period = 4.0 * friction / (c.speed.k_i * ratio**2 * c.position.gain * low)
             sizes = np.abs(settled_errors(begun, 0.1 + SLIPS * period))
@@ -131,9 +123,7 @@ def checked_axes(seed: int, axes: int) -> dict[str, int]:
             seen += check_band(scenario, found, told)
         else:
             watched = lm.servo.limit_cycle(scenario, causes=False)
-            assert watched.verdict in (
-                ("at rest",) if found.verdict == "does not hunt" else ("hunts", "not decided")
-            ), f"{told}: {watched}"
+            assert watched.verdict in (("at rest",) if found.verdict == "does not hunt" else ("hunts", "not decided")), f"{told}: {watched}"
     print(counts, f"{seen} slips within bands", flush=True)
     return counts
 

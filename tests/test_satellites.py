@@ -110,9 +110,7 @@ def test_the_pieces_follow_the_satellite() -> None:
 
 def test_a_scenario_with_a_satellite_is_written_and_read_back() -> None:
     axis = lm.load("tracking-loss-map")
-    c = axis.controller.model_dump(exclude_none=True) | {
-        "reference": {"kind": "position", "target": PASS | {"axis": "elevation"}}
-    }
+    c = axis.controller.model_dump(exclude_none=True) | {"reference": {"kind": "position", "target": PASS | {"axis": "elevation"}}}
     s = axis.replace(controller=c, initial={"on_reference": True}, **{"simulation.duration": 0.5})
     assert lm.Scenario.from_json(s.to_json()) == s
     r = lm.simulate(s, energy=False)

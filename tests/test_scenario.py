@@ -46,9 +46,7 @@ def test_units_are_converted_to_si(small: Path) -> None:
     assert s.gearbox.rated_input_speed == pytest.approx(3630 * math.pi / 30, rel=1e-14)
     assert s.load.inertia == pytest.approx(2.0, rel=1e-14)
     stiff = {"kind": "linear", "stiffness": "23 N*m/arcmin"}
-    assert lm.load(small, {"gearbox.stiffness": stiff}).gearbox.stiffness.stiffness == pytest.approx(
-        23 * 10800 / math.pi
-    )
+    assert lm.load(small, {"gearbox.stiffness": stiff}).gearbox.stiffness.stiffness == pytest.approx(23 * 10800 / math.pi)
     assert lm.load(small, {"gearbox.hysteresis.efficiency": "93 percent"}).gearbox.hysteresis.efficiency == 0.93
 
 

@@ -51,9 +51,7 @@ def test_lost_motion_is_the_play_and_the_deflection_both_ways() -> None:
 
 
 def test_nut_bearing_and_screw_are_in_series() -> None:
-    part = screw(
-        nut_stiffness=4e8, bearing_stiffness=2e8, supported_length=0.5, core_diameter=0.02, support="both ends"
-    )
+    part = screw(nut_stiffness=4e8, bearing_stiffness=2e8, supported_length=0.5, core_diameter=0.02, support="both ends")
     bar = 4 * 206e9 * math.pi / 4 * 0.02**2 / 0.5
     series = 1 / (1 / 4e8 + 1 / 2e8 + 1 / bar)
     assert ScrewRig(part, load=1000.0).stiffness() == pytest.approx([series], rel=1e-9)
@@ -87,13 +85,7 @@ def test_a_self_locking_screw_is_not_driven_back_and_a_rigid_one_has_no_deflecti
 
 def test_the_rig_returns_the_data_of_the_records() -> None:
     """One of each family; printed with two or three digits, so a thousandth is finer than half a unit of the last."""
-    for name in (
-        "rexroth-40x10rx6-i4",
-        "hiwin-r25-10k4-fsc",
-        "hiwin-r32-10k5-fdc-ball-6.35",
-        "thk-bnf2505-5",
-        "thk-sbn3210-7",
-    ):
+    for name in ("rexroth-40x10rx6-i4", "hiwin-r25-10k4-fsc", "hiwin-r32-10k5-fdc-ball-6.35", "thk-bnf2505-5", "thk-sbn3210-7"):
         sheet = next(r for r in catalogue() if r.name == name)
         steps = Steps()
         report = lm.test_rig.measure_screw(screw_from_record(name), sheet, progress=steps)
@@ -111,13 +103,7 @@ def test_command_line(tmp_path: Path) -> None:
     assert done.exit_code == 0, done.output
     assert "axial stiffness [N/µm]" in done.output and "lost motion at ±3 % of 1570 N" in done.output
     assert "of the nut in series with screw and bearings" in done.output
-    assert {p.name for p in out.iterdir()} == {
-        "rig.html",
-        "comparison.csv",
-        "efficiency.csv",
-        "deflection.csv",
-        "rig.csv",
-    }
+    assert {p.name for p in out.iterdir()} == {"rig.html", "comparison.csv", "efficiency.csv", "deflection.csv", "rig.csv"}
     page = (out / "rig.html").read_text()
     assert "back-driving force" in page and "R310RU3301" in page and "µm" in page
     for word in ("arcmin", "mrad", "N·m/rad"):
@@ -130,15 +116,9 @@ def test_command_line(tmp_path: Path) -> None:
     ("arguments", "match"),
     [
         (["elatech-at5-25"], "elatech-at5-25 is a belt; a gearbox or screw is wanted here"),
-        (
-            ["rexroth-25x10rx3"],
-            'gearbox or screw "rexroth-25x10rx3" is not in the catalogue; did you mean rexroth-25x10',
-        ),
+        (["rexroth-25x10rx3"], 'gearbox or screw "rexroth-25x10rx3" is not in the catalogue; did you mean rexroth-25x10'),
         (["rexroth-25x10rx3-i4", "--logs", "logs"], "--logs: rexroth-25x10rx3-i4 is a screw"),
-        (
-            ["rexroth-25x10rx3-i4", "--set", "nut_prelod=3"],
-            "key screw.nut_prelod: is not known; did you mean nut_preload",
-        ),
+        (["rexroth-25x10rx3-i4", "--set", "nut_prelod=3"], "key screw.nut_prelod: is not known; did you mean nut_preload"),
         (["hiwin-r25-10t3-deb"], "lacks nut_stiffness"),
     ],
 )

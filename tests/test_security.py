@@ -76,9 +76,7 @@ def as_mdf(path: Path, conversion: Any, *, master: Any = None, compression: int 
     with asammdf.MDF(version="4.10") as file:
         file.append([asammdf.Signal(RAW, TIME, unit="rad", name="position", conversion=conversion)])
         if master is not None:
-            file.groups[0].channels[0].conversion = asammdf.blocks.v4_blocks.ChannelConversion(
-                conversion_type=3, formula=master
-            )
+            file.groups[0].channels[0].conversion = asammdf.blocks.v4_blocks.ChannelConversion(conversion_type=3, formula=master)
         file.save(path, compression=compression)
     return path
 
@@ -171,11 +169,7 @@ DEFINITIONS = {
     "list of no entries": ("a_msgs/A", "ros1msg", f"b_msgs/F[] x\n{ROS}F\nfloat64[0] e\n"),
     "itself": ("a_msgs/msg/A", "ros2msg", "A x\nfloat64 y\n"),
     "shift": ("a_msgs/msg/A", "ros2idl", "module a_msgs { module msg { const long N = 1 << 9999999999; }; };"),
-    "product": (
-        "a_msgs/msg/A",
-        "ros2idl",
-        "module a_msgs { module msg { const long N = 100000*100000; struct A { string x[N]; }; }; };",
-    ),
+    "product": ("a_msgs/msg/A", "ros2idl", "module a_msgs { module msg { const long N = 100000*100000; struct A { string x[N]; }; }; };"),
     "length": ("a_msgs/msg/A", "ros2msg", "float64 x\n" + "# a\n" * 100_000),
 }
 
@@ -195,9 +189,7 @@ def as_mcap(path: Path, messages: list[bytes], *, kind: tuple[str, str, str] | N
 
 
 @pytest.mark.parametrize("what", DEFINITIONS)
-def test_definitions_of_messages_run_no_code_and_end(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str
-) -> None:
+def test_definitions_of_messages_run_no_code_and_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str) -> None:
     pytest.importorskip("rosbags")
     monkeypatch.chdir(tmp_path)
     message = b"\xff\xff\xff\xff" + bytes(64)
@@ -313,10 +305,7 @@ def test_files_without_end_are_refused_before_they_take_memory(tmp_path: Path) -
     assert max(huge.stat().st_size, result.stat().st_size) < 10_000
     assert parquet.stat().st_size < 1_000_000  # and 800 MB once it is read
     done = subprocess.run(
-        [sys.executable, "-c", READS, huge, parquet, result, "/dev/zero", "/dev/zero"],
-        capture_output=True,
-        text=True,
-        check=True,
+        [sys.executable, "-c", READS, huge, parquet, result, "/dev/zero", "/dev/zero"], capture_output=True, text=True, check=True
     )
     *lines, peak = done.stdout.splitlines()
     assert [line.split(": ")[0] for line in lines] == [str(huge), str(parquet), str(result), "/dev/zero", "/dev/zero"]
@@ -365,9 +354,7 @@ def test_every_command_refuses_a_file_without_end(tmp_path: Path) -> None:
     (tmp_path / "based.toml").write_text('base = "/dev/zero"')
     (tmp_path / "record.toml").write_text('base = "paper-2dof-nl-small"\n[gearbox]\nfrom = "zero.toml"')
     (tmp_path / "series.toml").write_text('base = "paper-2dof-nl-small"\n[command]\nsamples = { file = "/dev/zero" }')
-    done = subprocess.run(
-        [sys.executable, "-c", CALLS, *WITHOUT_END], cwd=tmp_path, capture_output=True, text=True, check=True
-    )
+    done = subprocess.run([sys.executable, "-c", CALLS, *WITHOUT_END], cwd=tmp_path, capture_output=True, text=True, check=True)
     *codes, peak = done.stdout.split()
     assert codes == ["1"] * len(WITHOUT_END)
     lines = done.stderr.splitlines()
@@ -457,9 +444,7 @@ def test_announced_lengths_of_mdf_files_are_bounded(tmp_path: Path) -> None:
 def test_chunks_of_mcap_files_are_bounded(tmp_path: Path, method: str) -> None:
     mcap = pytest.importorskip("mcap.writer")
     message = b'{"x":' + b" " * 3_000_000 + b"1}"
-    path = as_mcap(
-        tmp_path / "log.mcap", [message], compression=getattr(mcap.CompressionType, method), chunk_size=10**9
-    )
+    path = as_mcap(tmp_path / "log.mcap", [message], compression=getattr(mcap.CompressionType, method), chunk_size=10**9)
     refused(path, "needs 3 MB of memory")
     size = next(
         n for n in range(3_000_000, 3_010_000) if struct.pack("<Q", n) in path.read_bytes()
@@ -676,10 +661,7 @@ def test_workbooks_are_bounded_and_hold_values(tmp_path: Path, small_limit: int,
 
 def test_values_of_formulas_are_read(tmp_path: Path) -> None:
     pytest.importorskip("openpyxl")
-    rows = b"".join(
-        row(k, b'<c r="A%d"><v>%d</v></c><c r="B%d"><f>2*A%d</f><v>%d</v></c>' % (k, k, k, k, 2 * k))
-        for k in range(2, 9)
-    )
+    rows = b"".join(row(k, b'<c r="A%d"><v>%d</v></c><c r="B%d"><f>2*A%d</f><v>%d</v></c>' % (k, k, k, k, 2 * k)) for k in range(2, 9))
     log = read_log(as_workbook(tmp_path / "log.xlsx", {"xl/worksheets/sheet1.xml": SHEET % rows}))
     assert log.time.tolist() == list(range(2, 9)) and log.values("x").tolist() == list(range(4, 18, 2))
 
@@ -699,10 +681,7 @@ MEASURED: dict[str, dict[str, bytes]] = {
     },
     "texts": {
         "xl/sharedStrings.xml": b'<sst xmlns="%s">%s</sst>'
-        % (
-            b"http://schemas.openxmlformats.org/spreadsheetml/2006/main",
-            b"".join(b"<si><t>%d</t></si>" % k for k in range(30_000)),
-        )
+        % (b"http://schemas.openxmlformats.org/spreadsheetml/2006/main", b"".join(b"<si><t>%d</t></si>" % k for k in range(30_000)))
     },
 }
 
@@ -729,9 +708,7 @@ def test_a_log_that_is_cut_off_says_so(tmp_path: Path, capfd: pytest.CaptureFixt
     nptdms = pytest.importorskip("nptdms")
     path = tmp_path / "log.tdms"
     with nptdms.TdmsWriter(path) as writer:
-        channel = nptdms.ChannelObject(
-            "run", "position", TIME, properties={"wf_increment": 0.01, "wf_start_offset": 0.0}
-        )
+        channel = nptdms.ChannelObject("run", "position", TIME, properties={"wf_increment": 0.01, "wf_start_offset": 0.0})
         writer.write_segment([channel])
     assert read_log(path).notes == ()
     path.write_bytes(path.read_bytes()[:-80])
@@ -755,13 +732,7 @@ def test_a_device_is_no_log(tmp_path: Path) -> None:
 
 
 def test_the_limit_is_an_option_and_a_variable(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    assert [size_of(text) for text in ("5", "2 GB", "1.5kB", "3 MiB", "2G")] == [
-        5,
-        2 * 10**9,
-        1500,
-        3 * 2**20,
-        2 * 10**9,
-    ]
+    assert [size_of(text) for text in ("5", "2 GB", "1.5kB", "3 MiB", "2G")] == [5, 2 * 10**9, 1500, 3 * 2**20, 2 * 10**9]
     assert memory_limit() == 2**29
     monkeypatch.setenv("LOSTMOTION_MEMORY", "much")
     with pytest.raises(lm.InputError, match="LOSTMOTION_MEMORY: 'much' is no size of memory, such as 2 GB"):

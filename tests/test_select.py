@@ -108,9 +108,7 @@ values = [{ratios}]
 """
     )
     directory = tmp_path / "rows"
-    process = subprocess.Popen(
-        [sys.executable, "-m", "lostmotion", "select", str(file), "-o", str(directory)], stdout=subprocess.DEVNULL
-    )
+    process = subprocess.Popen([sys.executable, "-m", "lostmotion", "select", str(file), "-o", str(directory)], stdout=subprocess.DEVNULL)
     while not list(directory.glob("part-*.parquet")) and process.poll() is None:
         time.sleep(0.01)
     process.kill()
@@ -137,19 +135,12 @@ def phases() -> list[tuple[float, float, float]]:
     """Of a move there: duration [s], mean speed of the load over it, and torque at the gearbox output [N*m]."""
     t_a = SPEED / ACCELERATION
     t_c = DISTANCE / SPEED - t_a
-    return [
-        (t_a, SPEED / 2, J * ACCELERATION + FRICTION),
-        (t_c, SPEED, FRICTION),
-        (t_a, SPEED / 2, -J * ACCELERATION + FRICTION),
-    ]
+    return [(t_a, SPEED / 2, J * ACCELERATION + FRICTION), (t_c, SPEED, FRICTION), (t_a, SPEED / 2, -J * ACCELERATION + FRICTION)]
 
 
 def motor_torques() -> list[float]:
     own = (MOTOR.rotor_inertia + INERTIA_1) * RATIO * ACCELERATION
-    return [
-        MOTOR.friction_torque + T / (RATIO * EFFICIENCY) + sign * own
-        for (_, _, T), sign in zip(phases(), (1, 0, -1), strict=True)
-    ]
+    return [MOTOR.friction_torque + T / (RATIO * EFFICIENCY) + sign * own for (_, _, T), sign in zip(phases(), (1, 0, -1), strict=True)]
 
 
 def test_rms_torque_of_trapezoidal_moves(demand: Any):
@@ -245,9 +236,7 @@ def test_samples_repeat():
 
 
 def test_a_row_is_the_run_of_its_scenario(task: Study, result: Any):
-    runs = [
-        k for k in range(task.total) if not math.isnan(float(result["cycles"].values[result["run"].values == k][0]))
-    ]
+    runs = [k for k in range(task.total) if not math.isnan(float(result["cycles"].values[result["run"].values == k][0]))]
     assert runs
     for k in runs:
         row = result.isel(pair=int(np.flatnonzero(result["run"].values == k)[0]))
@@ -302,9 +291,7 @@ def test_under_field_oriented_control_they_are_those_of_the_winding():
     train = lm.load("field-weakening")
     base = lm.load("position-axis")
     motor = train.motors["m"].model_dump(exclude_none=True)
-    scenario = lm.Scenario(
-        **{**base.model_dump(exclude_none=True), "motor": {k: v for k, v in motor.items() if k != "shaft"}}
-    )
+    scenario = lm.Scenario(**{**base.model_dump(exclude_none=True), "motor": {k: v for k, v in motor.items() if k != "shaft"}})
     scenario = scenario.replace(**{"controller.current": {"kind": "field_oriented"}, "controller.speed.torque_limit": 2.0,
                                    "simulation.duration": 0.3, "simulation.sample_interval": 125e-6})  # fmt: skip
     result = run(scenario, energy=False)
@@ -313,10 +300,7 @@ def test_under_field_oriented_control_they_are_those_of_the_winding():
     assert found.torque_square.mean() == pytest.approx(np.mean(torque[:-1] ** 2), rel=0.02)
     assert found.heating_square == pytest.approx(found.torque_square, rel=1e-2, abs=1e-4 * found.torque_square.max())
     heat = 1.5 * phase.resistance * found.current_rms**2 * 0.3
-    stored = 0.75 * (
-        phase.inductance_d * result["direct_current"][-1] ** 2
-        + phase.inductance_q * result["quadrature_current"][-1] ** 2
-    )
+    stored = 0.75 * (phase.inductance_d * result["direct_current"][-1] ** 2 + phase.inductance_q * result["quadrature_current"][-1] ** 2)
     work = np.sum(0.5 * (torque[1:] * speed[1:] + torque[:-1] * speed[:-1])) * 125e-6
     assert found.energy.sum() == pytest.approx(heat + stored + work, rel=1e-3)
 
@@ -407,24 +391,15 @@ def test_the_last_cycle_has_both_of_its_ends():
         ({"task": {"cycle": "1 s", "max_reversal_error": "1 s"}}, "max_reversal_error"),
         ({"load": 3}, r"key load: must be a table \[load\]"),
         ({"controller": {"reference": {"kind": "speed", "mean": 1.0}}}, "position"),
-        (
-            {"controller": TABLES["controller"] | {"speed": {"gain": 1.0}}},
-            "controller.speed.gain: follows from the rule",
-        ),
-        (
-            {"controller": {"reference": {"kind": "position", "amplitude": 1.0, "frequency": 1.3}}},
-            "1.3 periods in the cycle",
-        ),
+        ({"controller": TABLES["controller"] | {"speed": {"gain": 1.0}}}, "controller.speed.gain: follows from the rule"),
+        ({"controller": {"reference": {"kind": "position", "amplitude": 1.0, "frequency": 1.3}}}, "1.3 periods in the cycle"),
         ({"load": {"inertia": J, "torque": {"steps": [{"height": 1.0}]}}}, r"load.torque.steps: acts once"),
         ({"vary": [{"key": "load.inertia", "values": [1.0]}]}, "of a task motor and gearbox vary|lacks|motor"),
         ({"vary": [{"key": "gearbox", "values": ["schaefler-rt1-h-20-100"]}]}, "did you mean schaeffler"),
         ({"select": {"objectives": {"beauty": "least"}}}, "'beauty' is no column of numbers"),
         ({"select": {"objectives": {"reversal_error": "least"}}, "controller": ONE_WAY}, "moves .* go one way"),
         ({"task": {"cycle": "1 s", "max_reversal_error": "1 deg"}, "controller": ONE_WAY}, "moves .* go one way"),
-        (
-            {"task": {"cycle": "1 s"}, "select": {"objectives": {"settling_time": "least"}}},
-            "needs task.settling_window",
-        ),
+        ({"task": {"cycle": "1 s"}, "select": {"objectives": {"settling_time": "least"}}}, "needs task.settling_window"),
         ({"select": 3}, "key select"),
     ],
 )

@@ -105,25 +105,12 @@ def test_the_rate_is_that_of_the_classic_drive_with_a_dc_motor_and_a_loss_map(sh
     """Against `linearize`, whose core shares no equation with that of trains."""
     values = ((0.1, 0.08, 0.1), (0.75, 0.7, 0.66), (2.3, 2.2, 2.1))  # steeper at high load: the slope is not eta_b
     losses = lm.model.LossMap(
-        speeds=(0.0, 0.5, 1.2),
-        loads=(0.0, 0.5, 1.5),
-        values=tuple(tuple(share * m for m in row) for row in values),
-        mirrored=True,
+        speeds=(0.0, 0.5, 1.2), loads=(0.0, 0.5, 1.5), values=tuple(tuple(share * m for m in row) for row in values), mirrored=True
     )
     gearbox = lm.Gearbox(
-        ratio=60.0,
-        rated_input_speed=150.0,
-        rated_output_torque=70.0,
-        stiffness=lm.model.LinearStiffness(stiffness=2e4),
-        losses=losses,
+        ratio=60.0, rated_input_speed=150.0, rated_output_torque=70.0, stiffness=lm.model.LinearStiffness(stiffness=2e4), losses=losses
     )
-    motor = lm.Motor(
-        rotor_inertia=2e-5,
-        rated_torque=0.5,
-        rated_speed=300.0,
-        electrical_time_constant=1e-3,
-        armature_voltage_constant=8.0,
-    )
+    motor = lm.Motor(rotor_inertia=2e-5, rated_torque=0.5, rated_speed=300.0, electrical_time_constant=1e-3, armature_voltage_constant=8.0)
     drive = lm.Drive(motor=motor, gearbox=gearbox, load=lm.Load(inertia=5.0))
     M, w = 60.0, 100.0
     found = lm.sizing.self_locking(drive.train(), "gearbox", M, w)
@@ -147,12 +134,7 @@ def test_a_disturbance_grows_at_the_rate_that_is_said():
     }
     tables = worm_tables()
     run = lm.simulate(
-        scenario(
-            tables,
-            command={"motor": -0.2 * LOAD / RATIO},
-            initial=start,
-            simulation={"duration": 0.15, "sample_interval": 1e-3},
-        )
+        scenario(tables, command={"motor": -0.2 * LOAD / RATIO}, initial=start, simulation={"duration": 0.15, "sample_interval": 1e-3})
     )
     grown = run["gear_output_torque"].values - LOAD
     assert grown == pytest.approx(first * np.exp(rate * run["time"].values), rel=1e-7)
@@ -169,10 +151,7 @@ def lowered(eta_b: float, speed: float, **values: Any) -> tuple[str, float]:
         scenario(
             worm_tables(eta_b, **values),
             command={"motor": eta_b * load / ratio - values["viscous"] * speed},
-            initial={
-                "speeds": {"worm": -speed, "drum": -0.98 * speed / ratio},
-                "twists": {"gear": load / values["stiffness"]},
-            },
+            initial={"speeds": {"worm": -speed, "drum": -0.98 * speed / ratio}, "twists": {"gear": load / values["stiffness"]}},
             simulation={"duration": duration, "sample_interval": duration / 4000},
         ),
         energy=False,
@@ -316,9 +295,7 @@ def test_a_gear_of_a_train_is_measured_on_the_rig_as_its_losses_say():
     eta_f, _ = gear.losses.efficiencies()
     assert rig.efficiency(100.0, 0.7) == pytest.approx(eta_f, rel=1e-9)
     assert rig.backdriving_torque() is None
-    assert lm.sizing.overrunning(rig.gearbox).backward_efficiency == pytest.approx(
-        gear.losses.efficiencies()[1], rel=1e-12
-    )
+    assert lm.sizing.overrunning(rig.gearbox).backward_efficiency == pytest.approx(gear.losses.efficiencies()[1], rel=1e-12)
 
 
 def test_the_drive_check_takes_a_train_and_says_how_it_lowers():
@@ -337,9 +314,7 @@ def test_the_drive_check_takes_a_train_and_says_how_it_lowers():
 
 def test_explain_says_that_a_gearbox_locks():
     drive = lm.Drive(
-        motor=lm.Motor(kind="torque_source", rotor_inertia=1e-5),
-        gearbox=catalogue_worm("nord-sk1si50-100"),
-        load=lm.Load(inertia=0.5),
+        motor=lm.Motor(kind="torque_source", rotor_inertia=1e-5), gearbox=catalogue_worm("nord-sk1si50-100"), load=lm.Load(inertia=0.5)
     )
     simulation = lm.Simulation(drive)
     simulation.advance(1e-3, command=0.0, load_torque=30.0)
@@ -392,10 +367,7 @@ def test_a_drive_as_a_train_has_the_same_input_torque_at_rest():
     [
         ({"worm": 100.0, "drum": 0.0}, ".drum: 0 rad/s does not fit worm = 100 rad/s .* makes it 2 rad/s"),
         ({"worm": 100.0, "drum": 2.1}, ".drum: 2.1 rad/s does not fit worm = 100 rad/s .* makes it 2 rad/s"),
-        (
-            {"handle": 1.0},
-            ": handle = 1 rad/s and worm = 0 rad/s do not fit the freewheel hand, whose input cannot be faster",
-        ),
+        ({"handle": 1.0}, ": handle = 1 rad/s and worm = 0 rad/s do not fit the freewheel hand, whose input cannot be faster"),
     ],
 )
 def test_speeds_that_contradict_each_other_are_refused(speeds: dict[str, float], message: str):
@@ -435,9 +407,7 @@ def test_the_table_of_the_page_has_every_worm_gear_and_what_is_said_below_it():
         verdict = "locks" if eta_b < 0.0 else "holds" if static < 0.0 else "overruns"
         assert row[5].startswith(verdict)
         assert (row[6] == "none") is (verdict == "overruns")
-    ratios = {
-        kind: [float(row[1]) for row in rows if row[5].startswith(kind)] for kind in ("overruns", "holds", "locks")
-    }
+    ratios = {kind: [float(row[1]) for row in rows if row[5].startswith(kind)] for kind in ("overruns", "holds", "locks")}
     assert max(ratios["overruns"]) == 25.0
     assert min(ratios["locks"]) == 80.0
     assert "Up to a ratio of 25 or 15 the load drives the gear" in PAGE

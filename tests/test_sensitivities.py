@@ -54,9 +54,7 @@ def check_against_differences(scenario: lm.Scenario, values: dict[str, float], n
 
 
 def test_an_inertia_that_a_constant_torque_turns() -> None:
-    result = lm.simulate(
-        shaft(0.5), sensitivities=["shafts.table.inertia", "command.motor", "motors.motor.rated_torque"]
-    )
+    result = lm.simulate(shaft(0.5), sensitivities=["shafts.table.inertia", "command.motor", "motors.motor.rated_torque"])
     t, J, M = result.time.to_numpy(), 0.02, 1.0
     by_inertia = derivative(result, "table_angle", "shafts.table.inertia")
     assert by_inertia == pytest.approx(-M * t**2 / (2 * J**2), rel=EXACT)
@@ -98,9 +96,7 @@ def test_a_step_that_comes_later() -> None:
 
 
 def test_the_published_drive_with_play_and_hysteresis() -> None:
-    scenario = lm.load("paper-2dof-nl-small").replace(
-        **{"simulation.duration": 1.0, "simulation.sample_interval": 0.02}
-    )
+    scenario = lm.load("paper-2dof-nl-small").replace(**{"simulation.duration": 1.0, "simulation.sample_interval": 0.02})
     values = {"load.inertia": scenario.load.inertia, "gearbox.ratio": scenario.gearbox.ratio}
     check_against_differences(scenario, values, 1e-7)
 
@@ -115,14 +111,8 @@ def test_a_parameter_that_sets_a_shaft_at_rest_in_motion_has_no_derivative() -> 
 def test_what_cannot_be_varied_is_refused_by_one_line() -> None:
     scenario = shaft(0.5)
     for keys, words in (
-        (
-            ["shafts.table.inerta"],
-            "shafts.table.inerta: the scenario has nothing of that name; did you mean shafts.table.inertia?",
-        ),
-        (
-            ["shafts.tabel.inertia"],
-            "shafts.tabel.inertia: the scenario has nothing of that name; did you mean shafts.table.inertia?",
-        ),
+        (["shafts.table.inerta"], "shafts.table.inerta: the scenario has nothing of that name; did you mean shafts.table.inertia?"),
+        (["shafts.tabel.inertia"], "shafts.tabel.inertia: the scenario has nothing of that name; did you mean shafts.table.inertia?"),
         (["motors.motor.kin"], "motors.motor.kin: the scenario has nothing of that name; give the key of a number"),
         (["x" * 5000], "xxx...: the scenario has nothing of that name; give the key of a number"),
         (["motors.motor.kind"], 'motors.motor.kind: the scenario has "torque_source" there'),
@@ -135,9 +125,7 @@ def test_what_cannot_be_varied_is_refused_by_one_line() -> None:
 
 
 def test_the_parameter_without_derivatives_is_data_of_the_error() -> None:
-    scenario = lm.load("position-axis").replace(
-        **{"simulation.duration": 0.01, "controller.position.sample_time": None}
-    )
+    scenario = lm.load("position-axis").replace(**{"simulation.duration": 0.01, "controller.position.sample_time": None})
     keys = ["load.inertia", "controller.sample_time"]
     with pytest.raises(lm.InputError, match=r"^sensitivities: key controller\.sample_time: ") as caught:
         lm.simulate(scenario, sensitivities=keys)

@@ -23,12 +23,7 @@ LINKS: dict[str, Any] = {
     "mass_matrices": {"arm": {"shafts": ["shoulder", "elbow"], "matrix": [[2.6, 0.7], [0.7, 0.4]]}},
     "springs": {"stop": {"shaft": "elbow", "stiffness": {"kind": "curve", "backlash": 0.6, "slopes": [200.0]}}},
     "gears": {
-        "mesh": {
-            "input": "shoulder",
-            "output": "wheel",
-            "ratio": 0.5,
-            "stiffness": {"kind": "curve", "backlash": 0.02, "slopes": [300.0]},
-        }
+        "mesh": {"input": "shoulder", "output": "wheel", "ratio": 0.5, "stiffness": {"kind": "curve", "backlash": 0.02, "slopes": [300.0]}}
     },
     "simulation": {"duration": 2.0, "sample_interval": 0.05},
 }

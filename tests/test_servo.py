@@ -12,13 +12,7 @@ import pytest
 import lostmotion as lm
 from conftest import ROOT, lostmotion
 from html_pages import charts
-from lostmotion.control.tuning import (
-    TwoInertias,
-    identical_damping,
-    identical_radius,
-    identical_real_part,
-    symmetrical_optimum,
-)
+from lostmotion.control.tuning import TwoInertias, identical_damping, identical_radius, identical_real_part, symmetrical_optimum
 from lostmotion.reports.servo import servo_report
 from lostmotion.servo.data import lag_sum, two_inertias
 from lostmotion.servo.margins import bandwidth_of, frequencies, margins
@@ -76,9 +70,7 @@ def test_margins_of_a_position_loop_that_is_slower_are_those_of_python_control()
     found = margins(sampled(scenario, "position", True), sampled(scenario, "position", False))
     plant = motor_speed_over_torque()
     plant = control.c2d(control.ss(plant.A, plant.B, [[1.0, 0, 0, 0], [0, 0, 0, 1.0]], 0), T, "zoh")
-    A = np.block(
-        [[plant.A, plant.B], [np.array([[-k_p, 0, 0, 0]]), np.zeros((1, 1))]]
-    )  # the last state: torque to come
+    A = np.block([[plant.A, plant.B], [np.array([[-k_p, 0, 0, 0]]), np.zeros((1, 1))]])  # the last state: torque to come
     B = np.array([0, 0, 0, 0, k_p])
     slow = sum(np.linalg.matrix_power(A, j) @ B for j in range(n))
     loop = K_v * control.ss(np.linalg.matrix_power(A, n), slow[:, None], [[0, 0, 0, 1.0, 0]], 0, n * T)
@@ -113,9 +105,7 @@ def test_the_current_loop_has_its_closed_form_margins() -> None:
     assert band.ninety_degrees * T == pytest.approx(0.0791, abs=5e-5)
 
 
-@pytest.mark.parametrize(
-    ("estimate", "limit", "share"), [("difference", 2.0 * (math.sqrt(2.0) - 1.0), 8.0), ("exact", 1.0, 6.0)]
-)
+@pytest.mark.parametrize(("estimate", "limit", "share"), [("difference", 2.0 * (math.sqrt(2.0) - 1.0), 8.0), ("exact", 1.0, 6.0)])
 def test_the_proportional_speed_loop_of_a_rigid_drive_is_stable_up_to_its_closed_form_limit(
     estimate: str, limit: float, share: float
 ) -> None:
@@ -149,13 +139,7 @@ def test_the_closed_loop_answers_a_sine_as_the_simulator_does() -> None:
     }  # fmt: skip
     wave = {"reference": {"kind": "position", "amplitude": 0.02, "frequency": f}}
     more: dict[str, Any] = {
-        "position": {
-            "gain": 30.0,
-            "integral_gain": 300.0,
-            "feedforward": 0.9,
-            "sample_time": 4 * T,
-            "reference_delay": 2e-3,
-        },
+        "position": {"gain": 30.0, "integral_gain": 300.0, "feedforward": 0.9, "sample_time": 4 * T, "reference_delay": 2e-3},
         "feedforward": {"inertia": 5e-3, "viscous_friction": 0.02},
         "position_encoder": {"ideal": True, "shaft": "load", "delay": 3},
         "blend_time": 5e-3,
@@ -175,9 +159,7 @@ def test_the_closed_loop_answers_a_sine_as_the_simulator_does() -> None:
 def test_stiffness_is_that_of_a_run_under_a_sine_of_load_torque() -> None:
     f = 30.0
     scenario = two_mass(
-        {"gain": 1.1, "integral_gain": 45.0},
-        reference={"kind": "position", "mean": 0.0},
-        position={"gain": 30.0, "sample_time": 4 * T},
+        {"gain": 1.1, "integral_gain": 45.0}, reference={"kind": "position", "mean": 0.0}, position={"gain": 30.0, "sample_time": 4 * T}
     )
     loaded = scenario.replace(**{"shafts.load.torque": {"amplitude": 0.5, "frequency": f}})
     run = lm.simulate(loaded, duration=2.0, sample_interval=4 * T)
@@ -219,9 +201,7 @@ def poles(drive: TwoInertias, gains: Any) -> np.ndarray:
 
 def test_identical_damping_of_the_papers_drive() -> None:
     gains = identical_damping(PAPER, 0.7)
-    assert gains.gain == pytest.approx(
-        8.29e-3, rel=5e-3
-    )  # the figures of the paper's drive, with three and four digits
+    assert gains.gain == pytest.approx(8.29e-3, rel=5e-3)  # the figures of the paper's drive, with three and four digits
     assert gains.integral_gain == pytest.approx(0.1266, rel=5e-3)
     found = poles(PAPER, gains)
     assert -found.real / np.abs(found) == pytest.approx(np.full(4, 0.7), rel=1e-9)
@@ -270,11 +250,7 @@ def test_the_sum_of_the_lags_is_the_slope_of_the_phase() -> None:
     }  # fmt: skip
     scenario = two_mass(speed, current={"kind": "first_order", "time_constant": 4e-4})
     rigid = scenario.replace(
-        **{
-            "gears.coupling.stiffness": {"kind": "rigid"},
-            "shafts.motor.viscous_friction": 0.0,
-            "shafts.load.viscous_friction": 0.0,
-        }
+        **{"gears.coupling.stiffness": {"kind": "rigid"}, "shafts.motor.viscous_friction": 0.0, "shafts.load.viscous_friction": 0.0}
     )
     f = 0.1
     L = sampled(rigid, "speed", True).open_loop(f)[0]
@@ -297,11 +273,7 @@ def test_tuning_gives_a_scenario_that_carries_the_gains(position_axis: Any) -> N
     assert d.antiresonance / (2.0 * math.pi) == pytest.approx(14.8, abs=0.1)
     assert (tuned.gain, tuned.integral_gain) == pytest.approx((8.29e-3, 0.1266), rel=0.02)
     speed = tuned.scenario.controller.speed
-    assert (speed.gain, speed.k_i, tuned.scenario.controller.position.gain) == (
-        tuned.gain,
-        tuned.integral_gain,
-        tuned.position_gain,
-    )
+    assert (speed.gain, speed.k_i, tuned.scenario.controller.position.gain) == (tuned.gain, tuned.integral_gain, tuned.position_gain)
     assert {**position_axis.model_dump(), "controller": 0} == {**tuned.scenario.model_dump(), "controller": 0}
     rows = {value.split()[1]: float(value.split()[0]) for _, value, _ in tuned.conventions()}
     assert rows["ms"] == pytest.approx(1e3 * tuned.gain / tuned.integral_gain, rel=1e-4)
@@ -387,9 +359,7 @@ def test_the_gains_of_a_formula_say_what_margins_they_leave() -> None:
 def test_tuning_refuses_what_it_cannot_do(position_axis: Any) -> None:
     with pytest.raises(lm.InputError, match='rule: "best" is not known; take one of suited, symm'):
         lm.tune(position_axis, rule="best")
-    with pytest.raises(
-        lm.InputError, match="identical radius needs an inertia ratio of load to motor of at most 4, and it is 16"
-    ):
+    with pytest.raises(lm.InputError, match="identical radius needs an inertia ratio of load to motor of at most 4, and it is 16"):
         lm.tune(position_axis, rule="identical_radius")
     with pytest.raises(lm.InputError, match="the scenario has no sampled controller; add a"):
         lm.tune(lm.load("paper-2dof-nl-large"))
@@ -398,14 +368,10 @@ def test_tuning_refuses_what_it_cannot_do(position_axis: Any) -> None:
 def test_the_sheet_of_the_shipped_axis(position_axis: Any) -> None:
     report = lm.commission(position_axis)
     assert list(report.regimes) == ["first stiffness", "last stiffness", "twist stuck"]
-    assert {(row.loop, row.regime) for row in report.loops} == {
-        (a, b) for a in ("current", "speed", "position") for b in report.regimes
-    }
+    assert {(row.loop, row.regime) for row in report.loops} == {(a, b) for a in ("current", "speed", "position") for b in report.regimes}
     assert report.stable
     held = next(row for row in report.loops if (row.loop, row.regime) == ("current", "twist stuck"))
-    assert math.degrees(held.margins.phase_margin) == pytest.approx(
-        61.2, abs=0.3
-    )  # the inertia is large, the back-e.m.f. compensated
+    assert math.degrees(held.margins.phase_margin) == pytest.approx(61.2, abs=0.3)  # the inertia is large, the back-e.m.f. compensated
     assert [s.limited for s in report.steps] == [False] * 3
     run = lm.simulate(position_axis)
     error = position_axis.controller.reference.at(run["time"].to_numpy())[0] - run["load_angle"].to_numpy()
@@ -443,13 +409,9 @@ def test_backlash_is_found_as_the_cause_of_a_limit_cycle() -> None:
 
 def test_loops_whose_sample_times_do_not_nest_are_refused() -> None:
     scenario = two_mass(
-        {"gain": 1.1, "sample_time": 2 * T},
-        reference={"kind": "position", "mean": 0.0},
-        position={"gain": 30.0, "sample_time": 3 * T},
+        {"gain": 1.1, "sample_time": 2 * T}, reference={"kind": "position", "mean": 0.0}, position={"gain": 30.0, "sample_time": 3 * T}
     )
-    with pytest.raises(
-        lm.InputError, match=r"position\.sample_time: 3 ticks are no whole multiple of the 2 of the loop speed"
-    ):
+    with pytest.raises(lm.InputError, match=r"position\.sample_time: 3 ticks are no whole multiple of the 2 of the loop speed"):
         sampled(scenario, "position", True)
 
 
@@ -463,9 +425,7 @@ def test_an_axis_is_named_where_there_are_several() -> None:
 
 
 def test_the_command_writes_one_page_that_needs_nothing_else(tmp_path: Any) -> None:
-    done = lostmotion(
-        "servo", str(ROOT / "scenarios" / "position-axis.toml"), "--window", "6 arcmin", "-o", "sheet", cwd=tmp_path
-    )
+    done = lostmotion("servo", str(ROOT / "scenarios" / "position-axis.toml"), "--window", "6 arcmin", "-o", "sheet", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     title, *rows = done.stdout.splitlines()
     assert title == "Position axis: the paper's drive under a servo cascade, there and back"
@@ -475,9 +435,7 @@ def test_the_command_writes_one_page_that_needs_nothing_else(tmp_path: Any) -> N
     assert rows[0].split(maxsplit=1)[1].startswith("fits: stable in all 3 regimes")
     assert "no limit cycle" in rows[6]
     page = (tmp_path / "sheet" / "servo.html").read_text()
-    assert (
-        len(charts(page)) == 18
-    )  # gain and phase of three loops, open and closed; three steps, the run and its error, stiffness
+    assert len(charts(page)) == 18  # gain and phase of three loops, open and closed; three steps, the run and its error, stiffness
     assert not re.search(r'(src|href)="(?!data:)', page)
     rows = (tmp_path / "sheet" / "margins.csv").read_text().splitlines()
     assert len(rows) == 1 + 9
@@ -490,11 +448,7 @@ def test_the_command_says_what_is_unstable_and_fails(tmp_path: Any) -> None:
     scenario = str(ROOT / "scenarios" / "position-axis.toml")
     done = lostmotion("servo", scenario, "--set", "controller.position.gain=2000 1/s", cwd=tmp_path)
     assert done.returncode == 1
-    assert (
-        done.stdout.splitlines()[1]
-        .split(maxsplit=1)[1]
-        .startswith("does not fit: unstable: position (first stiffness)")
-    )
+    assert done.stdout.splitlines()[1].split(maxsplit=1)[1].startswith("does not fit: unstable: position (first stiffness)")
     assert list(tmp_path.iterdir()) == []  # no directory was asked for
     done = lostmotion("servo", scenario, "--tune", "identical_radius", cwd=tmp_path)
     assert (done.returncode, len(done.stderr.splitlines())) == (1, 1)
@@ -680,14 +634,7 @@ def inertia_alone(speed: dict[str, Any]) -> lm.Scenario:
     return lm.Scenario(
         shafts={"motor": {"torque": 0.0}},
         motors={"m": {"shaft": "motor", "kind": "torque_source", "rotor_inertia": J_M, "rated_torque": 1.0}},
-        controllers={
-            "m": {
-                "sample_time": T,
-                "reference": {"kind": "speed", "mean": 3.0},
-                "encoder": {"ideal": True},
-                "speed": speed,
-            }
-        },
+        controllers={"m": {"sample_time": T, "reference": {"kind": "speed", "mean": 3.0}, "encoder": {"ideal": True}, "speed": speed}},
         simulation={"duration": 0.1, "sample_interval": T},
     )
 
@@ -713,12 +660,7 @@ def test_the_search_finds_the_best_gains_of_all(peak: float) -> None:
     tuned = lm.tune(inertia_alone({"gain": 1.0, "integral_gain": 1.0}), rule="search", sensitivity_peak=peak)
     found_peak, found = peak_and_bandwidth(tuned.gain, tuned.gain / tuned.integral_gain)
     assert found_peak <= 1.002 * peak
-    grid = [
-        (K_p, T_i)
-        for K_p in J_M / T * 1.05 ** np.arange(-70, 0)
-        for T_i in T * 1.2 ** np.arange(8, 45)
-        if is_stable(K_p, T_i)
-    ]
+    grid = [(K_p, T_i) for K_p in J_M / T * 1.05 ** np.arange(-70, 0) for T_i in T * 1.2 ** np.arange(8, 45) if is_stable(K_p, T_i)]
     peaks, bandwidths = peak_and_bandwidth(*np.array(grid).T)
     best = bandwidths[peaks <= peak].max()
     assert found >= 0.97 * best

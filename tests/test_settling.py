@@ -31,9 +31,7 @@ def slide_axis(drive: dict[str, Any], **changes: Any) -> lm.Scenario:
     }
     motor = {"kind": "torque_source", "rotor_inertia": 6e-6, "rated_torque": 0.4}
     axis = {"motor": motor, "slide": {"mass": 2.0, "friction_force": 5.0}, **drive}
-    return lm.Scenario(
-        axis=axis, controller=controller | changes, simulation={"duration": 1.0, "sample_interval": 1e-3}
-    )
+    return lm.Scenario(axis=axis, controller=controller | changes, simulation={"duration": 1.0, "sample_interval": 1e-3})
 
 
 SCREW = {"screw": {"lead": 8e-3, "stiffness": 2e7, "damping": 500.0}}
@@ -44,9 +42,7 @@ BELT = {"belt": {"travel_per_turn": 0.1, "stiffness": 2e6, "damping": 500.0}}
 @pytest.mark.parametrize("bits", [8, 14])
 @pytest.mark.parametrize("named", [False, True])
 @pytest.mark.parametrize(("drive", "travel"), [(SCREW, 8e-3), (BEHIND_A_GEAR, 8e-3 / 5.0), (BELT, 0.1)])
-def test_the_window_of_a_slide_is_four_steps_of_its_encoder_in_metres(
-    drive: dict[str, Any], travel: float, named: bool, bits: int
-) -> None:
+def test_the_window_of_a_slide_is_four_steps_of_its_encoder_in_metres(drive: dict[str, Any], travel: float, named: bool, bits: int) -> None:
     """An encoder on the motor has a step of the travel of a turn / 2**bits; the longest move is 1 mm. The key may be written or not."""
     own: dict[str, Any] = {"encoder": {"bits": bits}}
     if named:
@@ -77,9 +73,7 @@ def test_the_window_of_a_shaft_is_four_steps_through_the_gear_ratio(shaft: str, 
 def test_an_encoder_of_a_train_that_names_no_shaft_is_on_the_motor() -> None:
     """As the solver reads it: a step behind a ratio of 40 is a fortieth at the load."""
     own = {"reference": MOVES, "position": {"gain": 30.0}, "position_encoder": {"bits": 6}}
-    scenario = two_mass({"gain": 1.1}, **own).replace(
-        **{"gears.coupling.ratio": 40.0, "gears.coupling.stiffness.stiffness": k * 1600.0}
-    )
+    scenario = two_mass({"gain": 1.1}, **own).replace(**{"gears.coupling.ratio": 40.0, "gears.coupling.stiffness.stiffness": k * 1600.0})
     axis = axis_of(scenario)
     assert axis.position_encoder == ("motor", pytest.approx(2.0 * math.pi / 64 / 40.0))
     assert default_window(axis) == pytest.approx(4.0 * 2.0 * math.pi / 64 / 40.0, rel=1e-12)
@@ -94,12 +88,7 @@ def floating(**changes: Any) -> lm.Scenario:
     scenario = two_mass(loop, reference=MOVES, position={"gain": 30.0, "feedforward": 1.0})
     curve = {"kind": "curve", "slopes": [k], "backlash": 3.0 * ARCMIN}
     return scenario.replace(
-        **{
-            "gears.coupling.stiffness": curve,
-            "shafts.load.viscous_friction": 0.0,
-            "simulation.duration": 1.0,
-            **changes,
-        }
+        **{"gears.coupling.stiffness": curve, "shafts.load.viscous_friction": 0.0, "simulation.duration": 1.0, **changes}
     )
 
 
@@ -281,11 +270,7 @@ def random_axis(seed: int) -> tuple[lm.Scenario, float]:
             "motors": {"m": {"shaft": "rotor", **table}},
             "gears": {
                 "first": {"input": "rotor", "output": "between", "ratio": 1.0, "stiffness": {"kind": "rigid"}},
-                "second": {
-                    "input": "between",
-                    "output": "load",
-                    **{key: v for key, v in gearbox.items() if key != "inertia"},
-                },
+                "second": {"input": "between", "output": "load", **{key: v for key, v in gearbox.items() if key != "inertia"}},
             },
             "controllers": {"m": controller},
         }

@@ -25,9 +25,7 @@ from conftest import SCENARIOS
 def test_both_solvers_agree_on_every_scenario(path: Path) -> None:
     scenario = lm.load(path)
     exact = lm.simulate(scenario)
-    coarse, fine = (
-        lm.simulate(scenario, solver="dormand-prince", relative_tolerance=tolerance) for tolerance in (1e-8, 1e-11)
-    )
+    coarse, fine = (lm.simulate(scenario, solver="dormand-prince", relative_tolerance=tolerance) for tolerance in (1e-8, 1e-11))
     for name in ("motor_speed", "load_speed", "twist", "load_angle"):
         size = float(abs(exact[name]).max()) or 1.0
         # What the adaptive solver's own two results differ by is what its tolerance leaves open.
@@ -61,15 +59,8 @@ def test_shift_the_time_and_the_motion_shifts(small: Path) -> None:
 
 
 @settings(max_examples=40, deadline=None)
-@given(
-    amplitude=st.floats(0.005, 1.2),
-    frequency=st.floats(0.3, 30.0),
-    mean=st.floats(-0.3, 0.3),
-    torque=st.floats(-20.0, 20.0),
-)
-def test_mirror_the_command_and_the_motion_mirrors(
-    amplitude: float, frequency: float, mean: float, torque: float
-) -> None:
+@given(amplitude=st.floats(0.005, 1.2), frequency=st.floats(0.3, 30.0), mean=st.floats(-0.3, 0.3), torque=st.floats(-20.0, 20.0))
+def test_mirror_the_command_and_the_motion_mirrors(amplitude: float, frequency: float, mean: float, torque: float) -> None:
     scenario = lm.load(SCENARIOS[0].parent / "paper-2dof-nl-large.toml", {"simulation.duration": 0.5})
     command = lm.CommandSignal(mean=mean, amplitude=amplitude, frequency=frequency)
     a = lm.simulate(scenario, command=command, load_torque=torque)
@@ -179,9 +170,7 @@ def test_ctrl_c_ends_a_long_run_at_once(small: Path) -> None:
         print("running", flush=True)
         lm.simulate(scenario)
     """)
-    process = subprocess.Popen(
-        [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
+    process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert process.stdout is not None
     assert process.stdout.readline() == "running\n"
     time.sleep(1.0)
@@ -323,10 +312,7 @@ def test_stepping_and_sampled_constants_change_nothing_at_constant_speed():
     whole = lm.simulate(scenario, command=0.3, duration=2.0, sample_interval=1e-3)
     times = [0.0, *(k * 1e-3 for k in range(1, 2000))]
     sampled = lm.simulate(
-        scenario,
-        command=lm.CommandSignal(samples={"times": times, "values": [0.3] * len(times)}),
-        duration=2.0,
-        sample_interval=1e-3,
+        scenario, command=lm.CommandSignal(samples={"times": times, "values": [0.3] * len(times)}), duration=2.0, sample_interval=1e-3
     )
     np.testing.assert_array_equal(sampled["output_torque"].values, whole["output_torque"].values)
     simulation = lm.Simulation(scenario.drive(), step=1e-3)

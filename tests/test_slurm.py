@@ -62,13 +62,7 @@ def test_the_recipe_gives_the_rows_of_this_machine(tmp_path: Path) -> None:
     environment = os.environ | {"PATH": f"{tmp_path}:{os.environ['PATH']}", "JOBS": str(jobs)}
     try:
         done = subprocess.run(
-            [sys.executable, "recipe.py"],
-            cwd=tmp_path,
-            env=environment,
-            capture_output=True,
-            text=True,
-            timeout=200,
-            check=False,
+            [sys.executable, "recipe.py"], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=200, check=False
         )
     finally:
         for job in jobs.read_text().split() if jobs.exists() else ():

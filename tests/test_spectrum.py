@@ -50,10 +50,7 @@ def turning(gears: dict[str, Any], duration: float, **more: Any) -> lm.Scenario:
 def test_errors_of_two_gears_are_found_with_order_amplitude_and_part() -> None:
     """Amplitude at the output: that of the first gear over the ratio of the second. Orders per turn of each shaft by the ratios."""
     first, second = 2.0 * ARCMIN, 0.5 * ARCMIN
-    gears = {
-        "bevel": gear("motor", "middle", 2.0, sine(3, first)),
-        "worm": gear("middle", "load", 3.0, sine(1, second)),
-    }
+    gears = {"bevel": gear("motor", "middle", 2.0, sine(3, first)), "worm": gear("middle", "load", 3.0, sine(1, second))}
     found = lm.spectrum(turning(gears, 80.0))
     assert found.turns == pytest.approx({"motor": 6.0, "middle": 3.0, "load": 1.0})
     a, b = found.lines
@@ -137,10 +134,7 @@ def test_the_command_prints_the_spectrum_and_draws_one_subject(tmp_path: Path) -
     assert re.search(r"transmission error of load: (119\.\d|120(\.\d)?) arcsec peak to peak", done.stdout)
     assert re.search(r"60 arcsec +3 +3 +tooth mesh: transmission error of pair", done.stdout)
     assert (tmp_path / "motion.svg").exists()
-    for words, problem in (
-        (("--figure", "energy"), "add --plot"),
-        (("--plot", "x.png", "--figure", "all"), "take one of motion, losses"),
-    ):
+    for words, problem in ((("--figure", "energy"), "add --plot"), (("--plot", "x.png", "--figure", "all"), "take one of motion, losses")):
         refused = call("run.csv", *words)
         assert (refused.returncode, len(refused.stderr.splitlines())) == (1, 1)
         assert problem in refused.stderr

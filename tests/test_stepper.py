@@ -15,9 +15,7 @@ J, T_H, N = 5e-6, 0.3, 50
 MOTOR = {"kind": "stepper", "steps_per_revolution": 200, "holding_torque": T_H, "rotor_inertia": J}
 
 
-def alone(
-    command=None, torque=0.0, angle=0.0, duration=0.02, sample_interval=1e-4, viscous=0.0, **motor
-) -> lm.Scenario:
+def alone(command=None, torque=0.0, angle=0.0, duration=0.02, sample_interval=1e-4, viscous=0.0, **motor) -> lm.Scenario:
     """A rotor with nothing on it."""
     return lm.Scenario(
         shafts={"motor": {"inertia": 0.0, "viscous_friction": viscous, "torque": torque}},
@@ -84,12 +82,7 @@ def test_the_motion_is_that_of_an_integration_of_the_sine() -> None:
     exact = solve_ivp(rate, (0.0, 0.02), [0.0, 0.0], "DOP853", t_eval=found.time.values, rtol=1e-12, atol=1e-14).y[0]
     off = np.abs(found.motor_angle.values - exact).max()
     assert off < 20.0 * error / N
-    assert (
-        np.abs(
-            lm.simulate(scenario, solver="dormand-prince", relative_tolerance=1e-11).motor_angle.values - exact
-        ).max()
-        < 1e-6 / N
-    )
+    assert np.abs(lm.simulate(scenario, solver="dormand-prince", relative_tolerance=1e-11).motor_angle.values - exact).max() < 1e-6 / N
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -127,9 +120,7 @@ def test_microsteps_have_the_error_of_the_table() -> None:
 
 
 def test_a_step_rate_beyond_that_of_the_driver_is_refused() -> None:
-    command = {
-        "stepping": {"reference": {"moves": [{"to": 1.0}], "speed": 10.0, "acceleration": 1e3}, "max_step_rate": 300.0}
-    }
+    command = {"stepping": {"reference": {"moves": [{"to": 1.0}], "speed": 10.0, "acceleration": 1e3}, "max_step_rate": 300.0}}
     with pytest.raises(lm.InputError, match=r"asks for 318\.3 microsteps a second") as refusal:
         alone(command)
     assert refusal.value.problems[0].keys == ("command.m",)
@@ -162,9 +153,7 @@ def test_keys_of_steppers_and_their_steps_belong_to_steppers() -> None:
 def test_current_is_reduced_after_the_delay() -> None:
     """At rest under load the error is asin(T/(s T_H))/N with the share s of the current."""
     pulses = {"pulses": {"times": [0.01, 0.02], "values": [1, -1]}, "standstill_delay": 0.1}
-    found = lm.simulate(
-        alone({"stepping": pulses}, torque=0.3 * T_H, viscous=2e-3, duration=0.4, standstill_current=0.5)
-    )
+    found = lm.simulate(alone({"stepping": pulses}, torque=0.3 * T_H, viscous=2e-3, duration=0.4, standstill_current=0.5))
     held = -found.motor_angle.sel(time=[0.11, 0.4], method="nearest").values * N
     assert held == pytest.approx([math.asin(0.3), math.asin(0.6)], abs=3e-3)
 
@@ -195,17 +184,8 @@ def test_both_forms_of_one_drive_give_the_same_bits() -> None:
 
 def test_a_slide_moves_by_the_travel_of_its_motor() -> None:
     axis = lm.Scenario(
-        axis={
-            "motor": MOTOR,
-            "screw": {"lead": "10 mm", "stiffness": "100 N/um"},
-            "slide": {"mass": 5, "friction_force": "20 N"},
-        },
-        command={
-            "stepping": {
-                "travel": {"moves": [{"to": "50 mm"}], "speed": "100 mm/s", "acceleration": "1 m/s^2"},
-                "microsteps": 16,
-            }
-        },
+        axis={"motor": MOTOR, "screw": {"lead": "10 mm", "stiffness": "100 N/um"}, "slide": {"mass": 5, "friction_force": "20 N"}},
+        command={"stepping": {"travel": {"moves": [{"to": "50 mm"}], "speed": "100 mm/s", "acceleration": "1 m/s^2"}, "microsteps": 16}},
         simulation={"duration": 0.9, "sample_interval": 1e-3},
     )
     assert float(lm.simulate(axis).slide_position[-1]) == pytest.approx(0.05, abs=10e-3 / 200 / 2)
@@ -266,11 +246,7 @@ def test_lost_steps_are_those_of_an_integration_of_the_sine() -> None:
     """A field that turns at once at 90 rad/s for 0.2 s pulls the rotor out: slips of DOP853 to 1e-12, by number and instant."""
     speed, viscous = 90.0, 1e-4
     scenario = alone(
-        {"ramps": [{"rise": speed * 0.2, "duration": 0.2}]},
-        viscous=viscous,
-        duration=0.3,
-        sample_interval=1e-4,
-        torque_error=1e-5 * T_H,
+        {"ramps": [{"rise": speed * 0.2, "duration": 0.2}]}, viscous=viscous, duration=0.3, sample_interval=1e-4, torque_error=1e-5 * T_H
     )
     (found,) = lm.simulation.lost_steps(lm.simulate(scenario))
 
@@ -296,9 +272,7 @@ def test_a_run_that_loses_steps_does_not_fit() -> None:
     good = lm.simulate(scenario)
     assert "steps of motor: none lost" in summary(good)
     assert verdict_of(good) is None
-    lost = lm.simulate(
-        scenario.replace(**{"command.stepping.travel.acceleration": 150.0, "command.stepping.travel.speed": 0.8})
-    )
+    lost = lm.simulate(scenario.replace(**{"command.stepping.travel.acceleration": 150.0, "command.stepping.travel.speed": 0.8}))
     assert lm.simulation.lost_steps(lost)[0].times
     verdict = verdict_of(lost)
     assert verdict is not None
@@ -339,11 +313,7 @@ def test_a_mount_rests_while_its_worm_crosses_the_backlash() -> None:
     ("changes", "rule", "verdict"),
     [
         ({}, "lost_steps", "ok"),
-        (
-            {"command.stepping.travel.acceleration": 150.0, "command.stepping.travel.speed": 0.8},
-            "lost_steps",
-            "warning",
-        ),
+        ({"command.stepping.travel.acceleration": 150.0, "command.stepping.travel.speed": 0.8}, "lost_steps", "warning"),
         ({}, "stepper_torque", "ok"),
         ({"axis.motor.supply_voltage": 3.0}, "stepper_torque", "warning"),
         ({"axis.motor.holding_torque": 0.12, "axis.motor.supply_voltage": 60.0}, "stepper_torque", "caution"),
@@ -379,9 +349,7 @@ def test_a_telescope_s_stepper_turns_its_axis_by_the_steps_that_its_controller_c
     arcsec = math.pi / 648_000.0
     scenario = lm.Scenario(
         shafts={"motor": {"inertia": 0.0, "viscous_friction": 2e-5}, "axis": {"inertia": 2.0}},
-        motors={
-            "ra": {**MOTOR, "shaft": "motor", "steps_per_revolution": 48, "holding_torque": 0.03, "rotor_inertia": 5e-7}
-        },
+        motors={"ra": {**MOTOR, "shaft": "motor", "steps_per_revolution": 48, "holding_torque": 0.03, "rotor_inertia": 5e-7}},
         gears={
             "train": {
                 "input": "motor",

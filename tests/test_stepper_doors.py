@@ -129,10 +129,7 @@ def test_what_a_record_of_a_stepper_lacks_is_said_and_given_beside_it():
 
 @pytest.mark.parametrize(
     ("changes", "key"),
-    [
-        ({"kind": "stepper", "rated_torque": 1.0}, "rated_torque"),
-        ({"kind": "brushless", "holding_torque": 1.0}, "holding_torque"),
-    ],
+    [({"kind": "stepper", "rated_torque": 1.0}, "rated_torque"), ({"kind": "brushless", "holding_torque": 1.0}, "holding_torque")],
 )
 def test_data_of_another_kind_of_motor_are_refused(changes: dict, key: str):
     with pytest.raises(lm.InputError, match=key):
@@ -218,21 +215,9 @@ def test_the_run_of_a_chosen_stepper_is_that_of_the_long_form(tmp_path: Path):
     record = find("trinamic-qsh5718-76-28-189", "motor")
     train = lm.Scenario(
         shafts={"m": {}, "load": {"inertia": 1e-3, "friction_torque": 0.2}},
-        motors={
-            "m": {
-                **record.motor().model_dump(exclude_none=True, exclude={"note"}),
-                "shaft": "m",
-                "supply_voltage": 24.0,
-            }
-        },
+        motors={"m": {**record.motor().model_dump(exclude_none=True, exclude={"note"}), "shaft": "m", "supply_voltage": 24.0}},
         gears={
-            "g": {
-                "input": "m",
-                "output": "load",
-                "ratio": 5,
-                "stiffness": {"kind": "linear", "stiffness": 2000.0},
-                "mesh_damping": 2.0,
-            }
+            "g": {"input": "m", "output": "load", "ratio": 5, "stiffness": {"kind": "linear", "stiffness": 2000.0}, "mesh_damping": 2.0}
         },
         command={
             "m": {
@@ -241,12 +226,7 @@ def test_the_run_of_a_chosen_stepper_is_that_of_the_long_form(tmp_path: Path):
                     "reference": {
                         "speed": 10.0,
                         "acceleration": 100.0,
-                        "moves": [
-                            {"to": 1.0, "dwell": 0.1},
-                            {"to": 0.0, "dwell": 0.5},
-                            {"to": 1.0, "dwell": 0.1},
-                            {"to": 0.0},
-                        ],
+                        "moves": [{"to": 1.0, "dwell": 0.1}, {"to": 0.0, "dwell": 0.5}, {"to": 1.0, "dwell": 0.1}, {"to": 0.0}],
                     },
                 }
             }
@@ -290,9 +270,7 @@ def test_a_slide_on_a_belt_is_chosen_with_steppers_alone(tmp_path: Path):
     assert bool(pairs.fits[0])
     assert float(pairs.inertia_ratio[0]) == pytest.approx(0.5 * radius**2 / 44e-7, rel=1e-9)
     assert 1.5 * torque / 0.23 < share < 1.0
-    assert (
-        float(pairs.rest_error[0]) < 0.04 / 400 / 16 + 2.0 / 1e5 + radius * math.asin(2.0 * radius / 0.23) / 100
-    )  # and friction
+    assert float(pairs.rest_error[0]) < 0.04 / 400 / 16 + 2.0 / 1e5 + radius * math.asin(2.0 * radius / 0.23) / 100  # and friction
 
 
 def test_shipped_examples_of_tasks_are_as_before():

@@ -46,12 +46,7 @@ def make(**changes) -> Study:
         "seed": 3,
         "vary": [
             {"key": "load.inertia", "uniform": [1.0, 3.0]},
-            {
-                "name": "stiffness",
-                "key": "gearbox.stiffness.slopes",
-                "relative": True,
-                "normal": {"mean": 1.0, "deviation": 0.1},
-            },
+            {"name": "stiffness", "key": "gearbox.stiffness.slopes", "relative": True, "normal": {"mean": 1.0, "deviation": 0.1}},
             {"key": "command.amplitude", "log_uniform": [0.02, 1.0]},
         ],
         "keep": {
@@ -129,10 +124,7 @@ def test_bandwidth_and_tracking_error_of_each_run(tmp_path: Path):
     study = make(
         design="list",
         runs=None,
-        vary=[
-            {"key": "gearbox.ratio", "values": [90.0, 60.0, 90.0]},
-            {"key": "command.amplitude", "values": [1.0, 0.5, 1e-3]},
-        ],
+        vary=[{"key": "gearbox.ratio", "values": [90.0, 60.0, 90.0]}, {"key": "command.amplitude", "values": [1.0, 0.5, 1e-3]}],
         keep={"own": "bandwidth()", "small": "bandwidth(0.1)", "lag": "tracking_error(load_speed, ideal_speed)"},
     )
     rows = rows_of(lm.study(study, tmp_path / "s"))
@@ -194,9 +186,7 @@ def test_parquet_opens_directly_with_study_and_parameters(tmp_path: Path):
     for schema in (pq.read_schema(directory / "part-000000.parquet"), read_table(directory).schema):
         units = {f.name: (f.metadata or {}).get(b"units", b"").decode() for f in schema}
         assert units["load.inertia"] == "kg*m^2"
-        assert (
-            units["stiffness"] == units["lost"] == units["efficiency_driving"] == "1"
-        )  # relative; a share of energies
+        assert units["stiffness"] == units["lost"] == units["efficiency_driving"] == "1"  # relative; a share of energies
         assert (units["peak_speed"], units["rms_twist"], units["starts"]) == ("rad/s", "rad", "s")
 
 
@@ -213,11 +203,7 @@ def test_values_with_the_unit_of_something_else_are_refused():
 
 
 def test_designs_cover_what_they_say():
-    grid = make(
-        design="grid",
-        runs=None,
-        vary=[{"key": "load.inertia", "grid": [1, 2, 3]}, {"key": "command.phase", "values": [0, 1]}],
-    )
+    grid = make(design="grid", runs=None, vary=[{"key": "load.inertia", "grid": [1, 2, 3]}, {"key": "command.phase", "values": [0, 1]}])
     assert grid.total == 6
     assert grid.parameters(0, 6).tolist() == [[1, 0], [1, 1], [1.5, 0], [1.5, 1], [2, 0], [2, 1]]
     latin = make(design="latin_hypercube", runs=50, vary=[{"key": "load.inertia", "uniform": [0.5, 1.5]}])
@@ -238,12 +224,7 @@ def test_distributions_have_their_tails():
         {"key": "load.viscous_friction", "triangular": [1.0, 2.0, 5.0]},
     ]
     x = make(design="random", runs=5000, vary=vary, seed=1).parameters(0, 5000)
-    laws = [
-        stats.uniform(1.0, 2.0),
-        stats.norm(0.016, 0.002),
-        stats.loguniform(0.01, 1.0),
-        stats.triang(0.25, 1.0, 4.0),
-    ]
+    laws = [stats.uniform(1.0, 2.0), stats.norm(0.016, 0.002), stats.loguniform(0.01, 1.0), stats.triang(0.25, 1.0, 4.0)]
     for k, law in enumerate(laws):
         assert stats.kstest(x[:, k], law.cdf).pvalue > 0.01
         for tail in (0.01, 0.99):
@@ -252,14 +233,7 @@ def test_distributions_have_their_tails():
 
 
 def test_coupled_keys_go_together(tmp_path: Path):
-    vary = [
-        {
-            "name": "friction",
-            "keys": ["motor.friction_torque", "load.viscous_friction"],
-            "relative": True,
-            "values": [0.5, 2.0],
-        }
-    ]
+    vary = [{"name": "friction", "keys": ["motor.friction_torque", "load.viscous_friction"], "relative": True, "values": [0.5, 2.0]}]
     study = make(design="list", runs=None, vary=vary)
     scenario = scenario_of_run(study, 1)
     assert scenario.motor.friction_torque == 2.0 * SHORT.motor.friction_torque
@@ -305,9 +279,7 @@ def started(study: Path, directory: Path, parts: int) -> subprocess.Popen:
 
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
-def test_killed_and_started_again_it_goes_on_where_it_was(
-    long_study: Path, whole: pa.Table, tmp_path: Path, how: signal.Signals
-):
+def test_killed_and_started_again_it_goes_on_where_it_was(long_study: Path, whole: pa.Table, tmp_path: Path, how: signal.Signals):
     directory = tmp_path / "killed"
     process = started(long_study, directory, 2)
     os.kill(process.pid, how)
@@ -405,10 +377,7 @@ def forget(directory: Path) -> None:
         (empty, "part-000001.parquet: is damaged: its checksum differs"),
         (swap, r"part-000000.parquet: is damaged: its checksum differs \(1 more parts are damaged\)"),
         (swap_with_checksums, "part-000000.parquet: does not hold the runs 0 to 499"),
-        (
-            from_another_study,
-            "part-000001.parquet: (is damaged|belongs to another study)|part-000000.parquet: is damaged",
-        ),
+        (from_another_study, "part-000001.parquet: (is damaged|belongs to another study)|part-000000.parquet: is damaged"),
         (forget, "part-000000.parquet: has no line in _checksums.txt"),
     ],
 )
@@ -484,9 +453,7 @@ def test_a_damaged_note_is_restored_from_a_part(tmp_path: Path, content: bytes):
     whole = read_table(directory)
     (directory / "_study.json").write_bytes(content)
     for call in (lambda: read_table(directory), lambda: lm.study(make(runs=4), directory)):
-        with pytest.raises(
-            InputError, match=r"_study\.json: is damaged; `lostmotion study resume .* --repair` restores it"
-        ):
+        with pytest.raises(InputError, match=r"_study\.json: is damaged; `lostmotion study resume .* --repair` restores it"):
             call()
     done = CliRunner().invoke(app, ["study", "resume", str(directory), "--repair"])
     assert done.exit_code == 0, done.output
@@ -502,9 +469,7 @@ def test_a_note_of_another_study_is_restored_and_no_part_made_again(tmp_path: Pa
         lambda: read_table(directory),
         lambda: lm.study(make(design="random", runs=2 * CHUNK + 1, seed=5), directory, repair=True),
     ):
-        with pytest.raises(
-            InputError, match=r"_study\.json: is of another study than part-000000\.parquet; `lost.*--repair"
-        ):
+        with pytest.raises(InputError, match=r"_study\.json: is of another study than part-000000\.parquet; `lost.*--repair"):
             call()
     done = CliRunner().invoke(app, ["study", "resume", str(directory), "--repair"])
     assert done.exit_code == 0, done.output
@@ -679,9 +644,7 @@ def test_show_and_best_from_the_command_line(tmp_path: Path):
     assert within.exit_code == 1
     assert isinstance(within.exception, lm.InputError)
     assert "is within the directory of the runs" in str(within.exception)
-    shown = CliRunner().invoke(
-        app, ["study", "show", str(out), "--best", "stuck_share", "-o", str(tmp_path / "page"), "--figures", "png"]
-    )
+    shown = CliRunner().invoke(app, ["study", "show", str(out), "--best", "stuck_share", "-o", str(tmp_path / "page"), "--figures", "png"])
     assert shown.exit_code == 0, shown.output
     assert "256 of 256 runs, 0 failed" in shown.output
     assert {p.name for p in (tmp_path / "page").iterdir()} >= {
@@ -775,9 +738,7 @@ def test_a_saved_result_can_be_the_base_of_a_study(tmp_path: Path):
 def test_a_saved_result_is_refused_where_a_file_of_text_is_wanted(tmp_path: Path):
     lm.save(lm.simulate(lm.load("step-to-standstill")), tmp_path / "result.csv")
     (tmp_path / "s.toml").write_text('base = "result.csv"\n')
-    with pytest.raises(
-        InputError, match=r'key base: "result.csv" has the ending of a saved result; name a scenario file'
-    ):
+    with pytest.raises(InputError, match=r'key base: "result.csv" has the ending of a saved result; name a scenario file'):
         lm.load(tmp_path / "s.toml")
     with pytest.raises(InputError, match=r"result.csv: has the ending of a saved result; a study is a TOML file"):
         lm.studies.load_study(tmp_path / "result.csv")

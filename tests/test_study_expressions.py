@@ -273,9 +273,7 @@ HARMFUL = [
 
 
 @pytest.mark.parametrize("expression", HARMFUL, ids=lambda text: repr(text[:40]))
-def test_what_is_not_in_the_grammar_is_refused_before_anything_runs(
-    expression: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_what_is_not_in_the_grammar_is_refused_before_anything_runs(expression: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
     begun = time.process_time()
     with pytest.raises(ValueError, match=r".") as caught:
@@ -297,9 +295,7 @@ def test_a_study_file_with_such_an_expression_is_refused_as_a_whole(tmp_path: Pa
     assert os.listdir() == ["s.toml"]
     scenario = paper_scenario("2-DOF-NL", "large")
     with pytest.raises(ValueError, match="must not use"):
-        lm.studies.Study(
-            scenario=scenario, vary=[{"key": "load.inertia", "values": [1]}], keep={"bad": "load_speed.values"}
-        )
+        lm.studies.Study(scenario=scenario, vary=[{"key": "load.inertia", "values": [1]}], keep={"bad": "load_speed.values"})
 
 
 NAMES = (*(v.name for v in VARIABLES), *FUNCTIONS, *OF_THE_RUN, *METHODS, "to_netcdf", "values", "__class__", "open")

@@ -35,16 +35,11 @@ CASES: list[tuple[Any, str, str]] = [
 
 
 @pytest.mark.parametrize(("make", "prefix", "error"), CASES, ids=["two", "one"])
-def test_rows_are_those_of_single_runs_for_any_number_of_workers(
-    make: Any, prefix: str, error: str, tmp_path: Path
-) -> None:
+def test_rows_are_those_of_single_runs_for_any_number_of_workers(make: Any, prefix: str, error: str, tmp_path: Path) -> None:
     signal = error.replace("pointing_error", "target_direction")
     study = lm.studies.Study(
         scenario=make(),
-        vary=[
-            {"key": f"{prefix}reference.target.speed", "values": [60.0, 120.0]},
-            {"key": f"{prefix}camera.seed", "grid": [1, 2, 2]},
-        ],
+        vary=[{"key": f"{prefix}reference.target.speed", "values": [60.0, 120.0]}, {"key": f"{prefix}camera.seed", "grid": [1, 2, 2]}],
         keep={"rms": f"rms({error})", "peak": f"peak({error}.where(time > 0.1))", "last": f"final({signal})"},
     )
     with ProcessPoolExecutor(2) as workers:

@@ -72,18 +72,9 @@ def test_a_slow_study_shows_progress_within_a_chunk(tmp_path: Path):
 
 def test_the_command_line_shows_the_selection(selection: tuple[lm.studies.Study, Path]):
     _, directory = selection
-    done = CliRunner().invoke(
-        app, ["study", "show", str(directory), "--best", "energy:largest", "-o", str(directory.with_name("page"))]
-    )
+    done = CliRunner().invoke(app, ["study", "show", str(directory), "--best", "energy:largest", "-o", str(directory.with_name("page"))])
     assert done.exit_code == 0, done.output
-    for text in (
-        "Selection: ",
-        " fit, ",
-        "Pareto front",
-        "What each limit costs:",
-        "best without it",
-        "Largest energy [J]",
-    ):
+    for text in ("Selection: ", " fit, ", "Pareto front", "What each limit costs:", "best without it", "Largest energy [J]"):
         assert text in done.output
     figures = directory.with_name("page")
     assert {"study.html", "selection.csv", "limits.csv"} <= {p.name for p in figures.iterdir()}
@@ -102,14 +93,7 @@ def test_the_command_line_shows_the_selection(selection: tuple[lm.studies.Study,
 
 def made(*rows: tuple[str, str, float, float]) -> list[Candidate]:
     return [
-        Candidate(
-            k,
-            name,
-            (NOT_RUN,) if violated == NOT_RUN else tuple(violated.split()),
-            violated,
-            "",
-            {"cost": cost, "speed": speed},
-        )
+        Candidate(k, name, (NOT_RUN,) if violated == NOT_RUN else tuple(violated.split()), violated, "", {"cost": cost, "speed": speed})
         for k, (name, violated, cost, speed) in enumerate(rows)
     ]
 
@@ -224,9 +208,7 @@ def test_best_takes_a_direction(selection: tuple[lm.studies.Study, Path]):
         best_lines(directory, "gearbox")
 
 
-def test_the_points_of_the_pareto_front_are_numbered_within_the_axes_and_named_below(
-    selection: tuple[lm.studies.Study, Path],
-):
+def test_the_points_of_the_pareto_front_are_numbered_within_the_axes_and_named_below(selection: tuple[lm.studies.Study, Path]):
     study, directory = selection
     table = read_table(directory)
     ranked = candidates(table, study)

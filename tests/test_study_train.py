@@ -44,9 +44,7 @@ KEEP = {
 
 
 def make(**changes) -> lm.studies.Study:
-    return lm.studies.Study(
-        **({"scenario": BELT, "design": "sobol", "runs": 48, "seed": 5, "vary": VARY, "keep": KEEP} | changes)
-    )
+    return lm.studies.Study(**({"scenario": BELT, "design": "sobol", "runs": 48, "seed": 5, "vary": VARY, "keep": KEEP} | changes))
 
 
 def rows_of(study: lm.studies.Study, directory: Path, **how) -> dict[str, list]:
@@ -172,9 +170,7 @@ def test_a_gearbox_and_a_motor_of_the_catalogue_vary_at_their_place(tmp_path: Pa
     assert rows["error"] == [""] * 8
     for run in range(8):
         own = scenario_of_run(study, run)
-        gearbox = lm.gearbox(
-            rows["gears.strain_wave.gearbox"][run], loss_factor=rows["gears.strain_wave.loss_factor"][run]
-        )
+        gearbox = lm.gearbox(rows["gears.strain_wave.gearbox"][run], loss_factor=rows["gears.strain_wave.loss_factor"][run])
         assert own.gears["strain_wave"].losses == gearbox.losses
         assert own.gears["strain_wave"].stiffness == gearbox.stiffness
         assert own.gears["strain_wave"].input == "wave_generator"
@@ -195,9 +191,7 @@ def test_a_record_takes_the_place_of_a_gear_that_is_written_out(tmp_path: Path):
 
 def test_each_run_of_a_selection_goes_through_the_drive_check(tmp_path: Path):
     vary = [{"key": "shafts.joint.inertia", "values": [0.5, 5.0, -1.0]}]
-    study = make(
-        design="list", runs=None, vary=vary, keep={"x": "peak(joint_speed)"}, select={"objectives": {"x": "least"}}
-    )
+    study = make(design="list", runs=None, vary=vary, keep={"x": "peak(joint_speed)"}, select={"objectives": {"x": "least"}})
     rows = rows_of(study, tmp_path / "s")
     for run in range(2):
         for name, value in check_columns(scenario_of_run(study, run)).items():
@@ -281,12 +275,8 @@ def test_a_motor_named_as_a_key_of_the_short_form_is_not_mistaken():
     data = json.loads(BELT.to_json())
     data["motors"]["frequency"] = data["motors"].pop("servo")
     data["command"]["frequency"] = data["command"].pop("servo")
-    with pytest.raises(
-        lm.InputError, match=r"varies command\.frequency, which is a key of the short form, too; rename"
-    ):
-        lm.studies.Study(
-            scenario=data, vary=[{"key": "command.frequency", "values": [1.0]}], keep={"x": "peak(frequency_torque)"}
-        )
+    with pytest.raises(lm.InputError, match=r"varies command\.frequency, which is a key of the short form, too; rename"):
+        lm.studies.Study(scenario=data, vary=[{"key": "command.frequency", "values": [1.0]}], keep={"x": "peak(frequency_torque)"})
 
 
 def test_a_run_that_cannot_be_is_a_row_that_says_why(tmp_path: Path):
@@ -413,9 +403,7 @@ def smallest_bias(tmp_path: Path, torque: float, losses: tuple[float, float], wa
 @pytest.mark.parametrize("way", [1.0, -1.0], ids=["accelerated", "braked"])
 @pytest.mark.parametrize("losses", [(1.0, 1.0), (0.94, 0.93), (0.8, 0.7)], ids=str)
 @pytest.mark.parametrize("torque", [0.1, 0.3])
-def test_the_bias_that_a_study_finds_is_that_of_the_closed_form(
-    tmp_path: Path, torque: float, losses: tuple[float, float], way: float
-):
+def test_the_bias_that_a_study_finds_is_that_of_the_closed_form(tmp_path: Path, torque: float, losses: tuple[float, float], way: float):
     # One flank parts where the other gear carries all of J alpha: i T_B = J alpha/(2 eta_f) accelerated, eta_b J |alpha|/2 braked,
     # where both rotors still have the same speed.
     efficiency = losses[0] if way > 0.0 else 1.0 / losses[1]

@@ -38,9 +38,7 @@ def test_a_row_of_a_gearbox_equals_the_single_run_with_it(tmp_path: Path, key: s
     for run, name in enumerate(GEARBOXES):
         part = lm.gearbox(name).model_copy(update={"hysteresis": lm.model.Hysteresis(efficiency=0.95)})  # beside `from`
         single = lm.load(JOINT, short).model_copy(update={"gearbox": part})
-        assert scenario_of_run(study, run).gearbox.model_copy(update={"note": ""}) == part.model_copy(
-            update={"note": ""}
-        )
+        assert scenario_of_run(study, run).gearbox.model_copy(update={"note": ""}) == part.model_copy(update={"note": ""})
         result = lm.simulate(single)
         assert rows["peak"][run] == float(abs(result["twist"]).max())
         assert rows["lost"][run] == lm.energy_of(result)["gear_losses"]
@@ -123,9 +121,7 @@ uniform = [1.0, 2.0]
 
 
 def test_a_constant_load_torque_varies_in_its_own_unit(tmp_path: Path):
-    study, rows = rows_of(
-        write(tmp_path, '[[vary]]\nkey = "load.torque"\nvalues = ["3 N*m", "500 N*cm"]', OVERRUNNING), tmp_path
-    )
+    study, rows = rows_of(write(tmp_path, '[[vary]]\nkey = "load.torque"\nvalues = ["3 N*m", "500 N*cm"]', OVERRUNNING), tmp_path)
     assert rows["load.torque"] == [3.0, 5.0]
     assert [scenario_of_run(study, run).load.torque.mean for run in range(2)] == [3.0, 5.0]
     assert study.vary[0].unit == "N*m"
@@ -148,21 +144,12 @@ def test_runs_that_fail_are_counted_on_the_command_line(tmp_path: Path):
     [
         ('key = "gearbox"\ncatalogue = { ratio = [120, 50] }', "has catalogue.ratio = [120, 50], which is reversed"),
         ('key = "gearbox"\ncatalogue = { ratio = [120] }', "has catalogue.ratio = [120]; it must be a list of minimum"),
-        (
-            'key = "gearbox"\ncatalogue = { kind = ["worm", true] }',
-            'catalogue.kind = ["worm", true]; it must be a text',
-        ),
+        ('key = "gearbox"\ncatalogue = { kind = ["worm", true] }', 'catalogue.kind = ["worm", true]; it must be a text'),
         ('key = "gearbox"\ncatalogue = ["worm"]', 'has catalogue = ["worm"]; it must be a table'),
         ('key = "gearbox"\nvalues = [true]', "has the value true, which is no name of a gearbox"),
         ('key = "temperature"\nvalues = [20]', "did you mean gearbox.temperature?"),
-        (
-            'key = "inertja"\nvalues = [20]',
-            "varies inertja, which the base scenario does not know (there is no inertja)",
-        ),
-        (
-            'key = "motor.inertia"\nvalues = [20]',
-            "does not know (there is no inertia)",
-        ),  # that of the load is another one
+        ('key = "inertja"\nvalues = [20]', "varies inertja, which the base scenario does not know (there is no inertja)"),
+        ('key = "motor.inertia"\nvalues = [20]', "does not know (there is no inertia)"),  # that of the load is another one
         ('key = "gearbox.backlash"\nvalues = [0]', "did you mean gearbox.stiffness.backlash?"),
         ('key = "load.inertai"\nvalues = [20]', "did you mean load.inertia?"),
     ],
@@ -175,9 +162,7 @@ def test_what_is_wrong_with_a_parameter_is_said_in_the_words_of_the_file(tmp_pat
 
 
 def test_the_catalogue_is_filtered_by_figures(tmp_path: Path):
-    filters = (
-        '{ kind = "strain_wave", ratio = [90, 110], rated_output_torque = ["20 N*m", "60 N*m"], maker = "Schae*" }'
-    )
+    filters = '{ kind = "strain_wave", ratio = [90, 110], rated_output_torque = ["20 N*m", "60 N*m"], maker = "Schae*" }'
     study = lm.studies.load_study(write(tmp_path, f'[[vary]]\nkey = "gearbox"\ncatalogue = {filters}'))
     fitting = {
         r.name
@@ -207,9 +192,7 @@ def test_a_record_with_gaps_is_a_row_that_says_what_it_lacks(tmp_path: Path):
 def test_a_sheet_of_one_s_own_stands_beside_the_study(tmp_path: Path):
     sheet = (ROOT / "src" / "lostmotion" / "data_sheets" / "gearbox-template.toml").read_text()
     (tmp_path / "own.toml").write_text(sheet)
-    study = lm.studies.load_study(
-        write(tmp_path, f'[[vary]]\nkey = "gearbox"\nvalues = ["own.toml", "{GEARBOXES[0]}"]')
-    )
+    study = lm.studies.load_study(write(tmp_path, f'[[vary]]\nkey = "gearbox"\nvalues = ["own.toml", "{GEARBOXES[0]}"]'))
     assert study.vary[0].names == (str(tmp_path / "own.toml"), GEARBOXES[0])
     assert scenario_of_run(study, 0).gearbox.ratio == 100.0
 
@@ -241,10 +224,7 @@ values = [1.0, 1.2]
 @pytest.mark.parametrize(
     ("text", "match"),
     [
-        (
-            'key = "gearbox.stiffness"\nrelative = true\nvalues = [1, 2]',
-            "is a table; vary one of its keys: gearbox.stif",
-        ),
+        ('key = "gearbox.stiffness"\nrelative = true\nvalues = [1, 2]', "is a table; vary one of its keys: gearbox.stif"),
         ('key = "gearbox.stiffness"\nvalues = [1, 2]', "gearbox.stiffness.slopes"),
         ('key = "command"\nrelative = true\nvalues = [1, 2]', "is a table"),
         ('key = "load"\nvalues = [1, 2]', "is a table"),

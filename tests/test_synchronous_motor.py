@@ -20,13 +20,7 @@ WINDING = {
     "inductance_q": "9 mH",
     "voltage_constant_line_to_line_rms": "60 V/krpm",
 }
-MOTOR = {
-    "kind": "synchronous",
-    "rotor_inertia": "8 kgcm2",
-    "rated_torque": 4.0,
-    "dc_voltage": "560 V",
-    "winding": WINDING,
-}
+MOTOR = {"kind": "synchronous", "rotor_inertia": "8 kgcm2", "rated_torque": 4.0, "dc_voltage": "560 V", "winding": WINDING}
 
 
 def motor(**changes) -> lm.Motor:
@@ -87,9 +81,7 @@ def test_resistance_and_inductance_of_a_phase_are_half_of_those_between_two_term
     L_d, L_q = 5e-3, 7e-3
     over_angle = (L_d + L_q) + (L_q - L_d) * np.cos(2.0 * np.linspace(0.0, math.pi, 101))
     salient = Winding(
-        **lines,
-        inductance_line_to_line_min=float(over_angle.min()),
-        inductance_line_to_line_max=float(over_angle.max()),
+        **lines, inductance_line_to_line_min=float(over_angle.min()), inductance_line_to_line_max=float(over_angle.max())
     ).phase_values()
     assert (salient.inductance_d, salient.inductance_q) == pytest.approx((L_d, L_q), rel=1e-15)
 
@@ -165,13 +157,9 @@ def test_stall_torque_no_load_speed_and_time_constant() -> None:
     m, u = motor(), 560.0 / math.sqrt(3.0)
     phase = m.winding.phase_values()
     dc = m.as_dc()
-    assert dc.armature_voltage_constant * m.rated_torque == pytest.approx(
-        1.5 * 4 * phase.flux_linkage * u / 1.0, rel=1e-15
-    )
+    assert dc.armature_voltage_constant * m.rated_torque == pytest.approx(1.5 * 4 * phase.flux_linkage * u / 1.0, rel=1e-15)
     assert m.unloaded_speed == pytest.approx(u / (4 * phase.flux_linkage), rel=1e-14)
-    assert m.unloaded_speed == pytest.approx(
-        560.0 / math.sqrt(2.0) / 60.0 * 1000.0 * RPM, rel=1e-14
-    )  # line to line, rms
+    assert m.unloaded_speed == pytest.approx(560.0 / math.sqrt(2.0) / 60.0 * 1000.0 * RPM, rel=1e-14)  # line to line, rms
     # The rotor is as good as locked: 1e12 kg·m².
     result = lm.simulate(axis(m, 0.3, load_inertia=1e12, duration=0.05))
     expected = 1.5 * 4 * phase.flux_linkage * 0.3 * u * (1.0 - np.exp(-result["time"].values / 9e-3))
@@ -194,11 +182,7 @@ def test_it_follows_the_equations_in_d_and_q_with_ideal_decoupling() -> None:
         u_d = R * i_d - w_e * L_q * i_q  # decoupling, and nothing that drives i_d
         u_q = 0.7 * u * math.sin(2.0 * math.pi * 8.0 * t)
         torque = 1.5 * p * (psi * i_q + (L_d - L_q) * i_d * i_q)
-        return [
-            (u_d - R * i_d + w_e * L_q * i_q) / L_d,
-            (u_q - R * i_q - w_e * (L_d * i_d + psi)) / L_q,
-            (torque - 30.0 / 20.0) / J,
-        ]
+        return [(u_d - R * i_d + w_e * L_q * i_q) / L_d, (u_q - R * i_q - w_e * (L_d * i_d + psi)) / L_q, (torque - 30.0 / 20.0) / J]
 
     scenario = axis(m, {"amplitude": 0.7, "frequency": 8.0}, torque=30.0, duration=0.3)
     result = lm.simulate(scenario)
@@ -265,11 +249,7 @@ def test_its_voltage_is_changed_by_dc_voltage_and_by_nothing_else(tmp_path) -> N
 
 @pytest.mark.parametrize(
     ("key", "values"),
-    [
-        ("motor.rated_torque", [3.0, 5.0]),
-        ("motor.dc_voltage", [300.0, 560.0]),
-        ("motor.winding.resistance_line_to_line", [1.5, 2.5]),
-    ],
+    [("motor.rated_torque", [3.0, 5.0]), ("motor.dc_voltage", [300.0, 560.0]), ("motor.winding.resistance_line_to_line", [1.5, 2.5])],
 )
 def test_a_study_varies_it_as_single_runs_do(tmp_path, key, values) -> None:
     """The numbers of the core follow from these keys, so none is written into it by itself."""

@@ -134,10 +134,7 @@ def test_a_target_and_moves_are_two_things() -> None:
 def test_an_axis_follows_a_target() -> None:
     axis = lm.load("position-axis-load-encoder")
     controller = axis.controller.model_dump(exclude_none=True)
-    controller["reference"] = {
-        "kind": "position",
-        "target": FLY_BY | {"axis": "traverse", "crossing_time": 3.0, "duration": 6.0},
-    }
+    controller["reference"] = {"kind": "position", "target": FLY_BY | {"axis": "traverse", "crossing_time": 3.0, "duration": 6.0}}
     controller["inverse_model"] = {"twist_rate": 0.5}
     start = lm.PositionReference(**controller["reference"]).at(0.0)
     s = axis.replace(
@@ -157,10 +154,7 @@ def test_a_path_too_fast_to_follow_is_refused_before_memory_is_taken(speed: floa
 
     tracemalloc.start()
     try:
-        with (
-            np.errstate(all="ignore"),
-            pytest.raises(ValueError, match="more than 2000000 pieces over 60 s; lower its speed"),
-        ):
+        with np.errstate(all="ignore"), pytest.raises(ValueError, match="more than 2000000 pieces over 60 s; lower its speed"):
             reference(FLY_BY, "traverse", distance=100.0, speed=speed).target.breakpoints()
         assert tracemalloc.get_traced_memory()[1] < 10_000_000
     finally:

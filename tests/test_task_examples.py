@@ -200,9 +200,7 @@ def test_the_pair_of_an_example_fits(name: str):
     """In the run, too; its rms torque is near that of the rules, which know no tuning."""
     study = task(name)
     found = lm.select(study)
-    names = [
-        ", ".join(filter(None, (str(found[v.title].values[k]) for v in study.vary))) for k in range(found.sizes["pair"])
-    ]
+    names = [", ".join(filter(None, (str(found[v.title].values[k]) for v in study.vary))) for k in range(found.sizes["pair"])]
     pair = found.isel(pair=names.index(FITS[name]))
     assert bool(pair["fits"]), str(pair["why"].values)
     row = study.parameters(int(pair["run"]), int(pair["run"]) + 1)[0]

@@ -109,11 +109,7 @@ RULE_OF: dict[str, tuple[Any, str]] = {
     "life": ("20000 h", "gearbox_life screw_life"),
     "safety_factors": ({"holding": 2.0}, "holding"),
 }
-COLUMN_OF = {
-    "max_tracking_error": "tracking_error_peak",
-    "max_reversal_error": "reversal_error",
-    "max_settling_time": "settling_time",
-}
+COLUMN_OF = {"max_tracking_error": "tracking_error_peak", "max_reversal_error": "reversal_error", "max_settling_time": "settling_time"}
 ELSEWHERE = {  # each has a test of its own; linear, current, whole and pairs are no keys of files
     "cycle", "ambient_temperature", "hold_without_power", "max_cycles", "settling_window", "altitude", "gravity", "payload",
     "process", "linear", "current", "whole", "pairs",
@@ -228,12 +224,7 @@ def test_the_inertia_ratio_has_all_that_is_not_the_rotor_and_the_limit_of_the_ma
 
 VERTICAL: dict[str, Any] = {
     "axis": {
-        "motor": {
-            "kind": "torque_source",
-            "rotor_inertia": 3e-4,
-            "rated_torque": 2.4,
-            "limits": {"torque_constant": 0.4},
-        },
+        "motor": {"kind": "torque_source", "rotor_inertia": 3e-4, "rated_torque": 2.4, "limits": {"torque_constant": 0.4}},
         "gearbox": {"ratio": 2.0, "inertia": 1e-5, "stiffness": {"kind": "rigid"}},
         "screw": {"lead": "20 mm", "inertia": 2e-5, "efficiency": 0.9, "stiffness": "100 N/um"},
         "slide": {"mass": "30 kg", "inclination": "30 deg"},
@@ -286,9 +277,7 @@ def test_an_axis_is_judged_by_the_rules_of_drives(form: str, brake: dict[str, fl
     assert 10.0 * found["inertia_ratio"].use == pytest.approx(ratio, rel=1e-9)
     before = (3e-4 + 1e-5 + 2e-5 / 4.0) * (2.0 / s) ** 2
     resonance = math.sqrt(1e8 * (1.0 / before + 1.0 / 30.0)) / (2.0 * math.pi)
-    assert found["resonance"].value.startswith(
-        f"{resonance:.4g} Hz, anti-resonance {math.sqrt(1e8 / 30.0) / 2.0 / math.pi:.4g}"
-    )
+    assert found["resonance"].value.startswith(f"{resonance:.4g} Hz, anti-resonance {math.sqrt(1e8 / 30.0) / 2.0 / math.pi:.4g}")
     assert found["lost_motion"].remark
 
 
@@ -345,9 +334,7 @@ def written(tables: dict[str, Any], key: str, value: Any) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(("form", "key", "values", "column"), VARIED, ids=[f"{f}-{k}" for f, k, *_ in VARIED])
-def test_a_varied_key_has_the_results_of_tasks_that_write_it(
-    form: str, key: str, values: list[Any], column: str
-) -> None:
+def test_a_varied_key_has_the_results_of_tasks_that_write_it(form: str, key: str, values: list[Any], column: str) -> None:
     energy = {"select": {"objectives": {"mechanical_energy": "least"}}}
     tables = {**FORMS[form], **energy}
     study = task_of({**tables, "vary": [{"key": key, "values": values}]})

@@ -18,12 +18,8 @@ def wound_up(k: float, J: float, v: float, duration: float, **limiter: Any) -> l
     """A spring that is wound up at a constant speed turns a hub, which the limiter holds to a wall."""
     return lm.Scenario(
         shafts={"drive": {"speed": {"mean": v}}, "hub": {"inertia": J}, "wall": {"speed": {"mean": 0.0}}},
-        gears={
-            "spring": {"input": "drive", "output": "hub", "ratio": 1.0, "stiffness": {"kind": "linear", "stiffness": k}}
-        },
-        torque_limiters={
-            "limiter": {"input": "hub", "output": "wall", "release_torque": T_1, "slip_torque": T_2, **limiter}
-        },
+        gears={"spring": {"input": "drive", "output": "hub", "ratio": 1.0, "stiffness": {"kind": "linear", "stiffness": k}}},
+        torque_limiters={"limiter": {"input": "hub", "output": "wall", "release_torque": T_1, "slip_torque": T_2, **limiter}},
         simulation={"duration": duration, "sample_interval": 1e-3},
     )
 
@@ -54,9 +50,7 @@ def test_it_releases_the_energy_between_both_torques() -> None:
 def slipping(**limiter: Any) -> lm.Scenario:
     return lm.Scenario(
         shafts={"a": {"inertia": 0.3}, "b": {"inertia": 0.6, "torque": {"steps": [{"height": -10.0, "time": 5.0}]}}},
-        torque_limiters={
-            "limiter": {"input": "a", "output": "b", "release_torque": T_1, "slip_torque": T_2, **limiter}
-        },
+        torque_limiters={"limiter": {"input": "a", "output": "b", "release_torque": T_1, "slip_torque": T_2, **limiter}},
         initial={"speeds": {"a": 60.0}},
         simulation={"duration": 6.0, "sample_interval": 1e-3},
     )

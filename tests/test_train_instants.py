@@ -25,18 +25,11 @@ def chain(inertias: list[float], stiffnesses: list[float], damping: float = 0.0)
     """Masses joined by springs, turned by a torque source on the first."""
     names = [f"s{k}" for k in range(len(inertias))]
     return lm.DriveTrain(
-        shafts={
-            name: lm.Shaft(inertia=J - (ROTOR if name == "s0" else 0.0))
-            for name, J in zip(names, inertias, strict=True)
-        },
+        shafts={name: lm.Shaft(inertia=J - (ROTOR if name == "s0" else 0.0)) for name, J in zip(names, inertias, strict=True)},
         motors={"m": lm.ShaftMotor(shaft="s0", kind="torque_source", rotor_inertia=ROTOR)},
         gears={
             f"g{k}": lm.Gear(
-                input=names[k],
-                output=names[k + 1],
-                ratio=1.0,
-                stiffness=lm.model.LinearStiffness(stiffness=c),
-                mesh_damping=damping,
+                input=names[k], output=names[k + 1], ratio=1.0, stiffness=lm.model.LinearStiffness(stiffness=c), mesh_damping=damping
             )
             for k, c in enumerate(stiffnesses)
         },
@@ -59,9 +52,7 @@ def test_a_train_stepped_follows_its_run(path: Path) -> None:
     # Commands and loads as straight lines over the steps, in both.
     levels = {name: np.array([_value(signals[name], h * k) for k in range(n + 1)]) for name in names}
     simulation = lm.Simulation(scenario, step=h)
-    speeds = {
-        name: np.array([_value(scenario.shafts[name].speed, h * k) for k in range(n + 1)]) for name in simulation.given
-    }
+    speeds = {name: np.array([_value(scenario.shafts[name].speed, h * k) for k in range(n + 1)]) for name in simulation.given}
     for k in range(n):
         motion = {name: {"speed": w[k + 1]} for name, w in speeds.items()}
         simulation.advance(h, motion=motion, **{name: (u[k], u[k + 1]) for name, u in levels.items()})
@@ -159,9 +150,7 @@ def test_a_train_alone_may_be_loaded_everywhere() -> None:
     assert lm.Simulation(train).inputs == ("m_command", "s0_load_torque", "s1_load_torque")
     only = lm.Simulation(train, loaded=["s1"])
     assert only.inputs == ("m_command", "s1_load_torque")
-    only.advance(
-        0.5, m_command=0.0, s1_load_torque=-3.0
-    )  # free: the middle of the masses gains 3 N·m/(3 kg·m²) * 0.5 s
+    only.advance(0.5, m_command=0.0, s1_load_torque=-3.0)  # free: the middle of the masses gains 3 N·m/(3 kg·m²) * 0.5 s
     assert (only["s0_speed"] + 2.0 * only["s1_speed"]) / 3.0 == pytest.approx(0.5, rel=1e-12)
 
 
@@ -205,9 +194,7 @@ def test_what_does_not_go_together_is_said_in_one_line(call: Any, sentence: str)
 
 def test_where_a_train_jams_the_message_names_the_contact() -> None:
     # The load sits on a rigid gear that locks itself: with this inertia there is no motion, or there are several.
-    jamming = WORM.replace(
-        **{"gears.worm_gear.stiffness": {"kind": "rigid"}, "gears.worm_gear.mesh_damping": 0.0, "initial.twists": {}}
-    )
+    jamming = WORM.replace(**{"gears.worm_gear.stiffness": {"kind": "rigid"}, "gears.worm_gear.mesh_damping": 0.0, "initial.twists": {}})
     simulation = lm.Simulation(jamming, initial=lm.TrainInitial(speeds={"worm": -50.0, "rotor": -50.0, "drum": -1.0}))
     before = simulation.state
     with pytest.raises(lm.SolverError, match=r"the friction jams|accumulate"):
@@ -270,9 +257,7 @@ def test_a_chain_has_the_matrices_and_eigenvalues_of_the_textbook() -> None:
     # Units come with the names; an angle that the solver does not integrate is an output, too: phi_0 = sum of twists + phi_3.
     assert {model.units[name] for name in twists} == {"rad"}
     row = model.C[model.outputs.index("s0_angle")]
-    assert dict(zip(model.states, row, strict=True)) == dict.fromkeys(speeds, 0.0) | dict.fromkeys(
-        (*twists, "s3_angle"), 1.0
-    )
+    assert dict(zip(model.states, row, strict=True)) == dict.fromkeys(speeds, 0.0) | dict.fromkeys((*twists, "s3_angle"), 1.0)
     assert np.allclose(model.C[model.outputs.index("g1_output_torque")], c[1] * A[0] * 0 + _spring_row(c[1], d))
 
 
@@ -284,10 +269,7 @@ def test_the_linear_model_of_a_train_is_that_of_the_drive() -> None:
     scenario = lm.load("paper-2dof-nl-small")
     start = lm.Initial(motor_speed=100.0, load_speed=1.2, twist=2e-3, hysteresis_capacity=1.0, motor_torque=0.1)
     same = lm.TrainInitial(
-        speeds={"motor": 100.0, "load": 1.2},
-        twists={"gearbox": 2e-3},
-        motor_torques={"motor": 0.1},
-        hysteresis_capacities={"gearbox": 1.0},
+        speeds={"motor": 100.0, "load": 1.2}, twists={"gearbox": 2e-3}, motor_torques={"motor": 0.1}, hysteresis_capacities={"gearbox": 1.0}
     )
     drive = lm.linearize(scenario, start, command=0.4, load_torque=3.0)
     train = lm.linearize(scenario.long(), same, inputs={"motor_command": 0.4, "load_load_torque": "3 N*m"})
@@ -397,16 +379,10 @@ def test_two_motors_hold_each_other_by_hand() -> None:
 
 @pytest.mark.parametrize(
     ("scenario", "motor", "held"),
-    [
-        (WORM, "motor", HOLDING),
-        (RING, "first_motor", {"second_motor_command": -0.4, "ring_load_torque": 0.0}),
-        (BELT, "servo", {}),
-    ],
+    [(WORM, "motor", HOLDING), (RING, "first_motor", {"second_motor_command": -0.4, "ring_load_torque": 0.0}), (BELT, "servo", {})],
     ids=["worm", "ring", "belt"],
 )
-def test_the_smallest_command_turns_a_motor_for_good_and_less_does_not(
-    scenario: lm.Scenario, motor: str, held: dict[str, float]
-) -> None:
+def test_the_smallest_command_turns_a_motor_for_good_and_less_does_not(scenario: lm.Scenario, motor: str, held: dict[str, float]) -> None:
     command, angle = f"{motor}_command", f"{scenario.motors[motor].shaft}_angle"
     for way in (+1, -1):
         middle = {"first_motor": 0.4}.get(motor, 0.0)

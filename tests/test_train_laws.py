@@ -47,8 +47,7 @@ ELEMENTS = {
     "freewheel": two_shafts(freewheels={"f": {"input": "a", "output": "b"}}),
     "damper": two_shafts(dampers={"d": {"input": "a", "output": "b", "viscous_friction": 5e-3}}),
     "fluid coupling": two_shafts(
-        dampers={"d": {"input": "a", "output": "b", "drag": FLUID}},
-        shafts={"b": {"inertia": 2e-3, "torque": 0.0, "friction_torque": 0.05}},
+        dampers={"d": {"input": "a", "output": "b", "drag": FLUID}}, shafts={"b": {"inertia": 2e-3, "torque": 0.0, "friction_torque": 0.05}}
     ),
     "damper beside a clutch": two_shafts(
         clutches={"c": {"input": "a", "output": "b", "torque": 0.3}},
@@ -56,14 +55,11 @@ ELEMENTS = {
         command={"c": {"ramps": [{"rise": 1.0, "duration": 0.3, "begin": 0.1}]}},
     ),
     "vibration damper": two_shafts(
-        gears={"g": SOFT},
-        shafts={"ring": {"inertia": 1e-3}},
-        dampers={"d": {"input": "b", "output": "ring", "viscous_friction": 5e-3}},
+        gears={"g": SOFT}, shafts={"ring": {"inertia": 1e-3}}, dampers={"d": {"input": "b", "output": "ring", "viscous_friction": 5e-3}}
     ),
     "gravity": two_shafts(gears={"g": SOFT}, gravity={"arm": {"shaft": "b", "mass": 0.5, "radius": 0.2}}),
     "cogging": two_shafts(
-        gears={"g": STIFF},
-        angle_torques={"cog": {"kind": "sine", "shaft": "a", "amplitude": 0.02, "order": 12, "error": 0.001}},
+        gears={"g": STIFF}, angle_torques={"cog": {"kind": "sine", "shaft": "a", "amplitude": 0.02, "order": 12, "error": 0.001}}
     ),
     "spring": two_shafts(gears={"g": SOFT}, springs={"pivot": {"shaft": "b", "stiffness": PIVOT, "rest_angle": 0.3}}),
     "end stops": two_shafts(gears={"g": SOFT}, springs={"stops": {"shaft": "b", "stiffness": STOPS}}),
@@ -85,16 +81,14 @@ ELEMENTS = {
         shafts={"h": {"inertia": 4e-3, "friction_torque": 0.02}},
     ),
     "planetary gear": two_shafts(
-        gears={"g": STIFF | {"ratio": 4.0, "housing": "ring"}},
-        shafts={"ring": {"inertia": 4e-3, "friction_torque": 0.1}},
+        gears={"g": STIFF | {"ratio": 4.0, "housing": "ring"}}, shafts={"ring": {"inertia": 4e-3, "friction_torque": 0.1}}
     ),
     "friction over speed": two_shafts(gears={"g": SOFT}, shafts={"b": {"inertia": 2e-3, "torque": 0.0, **STRIBECK}}),
     "drag": two_shafts(gears={"g": STIFF}, shafts={"b": {"inertia": 2e-3, "torque": 0.0, "drag": FAN}}),
     "damped play": two_shafts(gears={"g": SOFT | {"stiffness": GAP, "mesh_damping": 0.2}}),
     "limited damping": two_shafts(gears={"g": SOFT | {"stiffness": GAP, "mesh_damping": 0.2, "damping_limited": True}}),
     "torque limit": two_shafts(
-        gears={"g": STIFF},
-        motors={"m": {"shaft": "a", "kind": "torque_source", "rotor_inertia": 1e-4, "torque_limit": 0.5}},
+        gears={"g": STIFF}, motors={"m": {"shaft": "a", "kind": "torque_source", "rotor_inertia": 1e-4, "torque_limit": 0.5}}
     ),
     "worm and brake": train(),
 }
@@ -113,9 +107,7 @@ def chords(scenario: lm.Scenario) -> float:
 def test_both_solvers_agree_on_every_element(scenario: lm.Scenario) -> None:
     """The adaptive solver takes sines as they are, the exact one by chords."""
     exact = lm.simulate(scenario)
-    coarse, fine = (
-        lm.simulate(scenario, solver="dormand-prince", relative_tolerance=tolerance) for tolerance in (1e-8, 1e-10)
-    )
+    coarse, fine = (lm.simulate(scenario, solver="dormand-prince", relative_tolerance=tolerance) for tolerance in (1e-8, 1e-10))
     for name in exact:
         if str(name).endswith(("_speed", "_angle", "_twist")):
             size = float(abs(exact[name]).max()) or 1.0
@@ -143,14 +135,8 @@ def test_a_pendulum_swings_with_its_period() -> None:
 @pytest.mark.parametrize(
     ("elements", "where"),
     [
-        (
-            {"angle_torques": {"cog": {"kind": "sine", "shaft": "a", "amplitude": 1.0, "error": 1e-9}}},
-            "angle_torques.cog:",
-        ),
-        (
-            {"gears": {"g": SOFT | {"transmission_error": ERROR | {"error": 1e-12}}}},
-            "gears.g: with its transmission error",
-        ),
+        ({"angle_torques": {"cog": {"kind": "sine", "shaft": "a", "amplitude": 1.0, "error": 1e-9}}}, "angle_torques.cog:"),
+        ({"gears": {"g": SOFT | {"transmission_error": ERROR | {"error": 1e-12}}}}, "gears.g: with its transmission error"),
         ({"shafts": {"b": {"inertia": 2e-3, "drag": FAN | {"error": 1e-12}}}}, "shafts.b: with its drag"),
     ],
 )
@@ -260,8 +246,7 @@ def test_a_brake_acts_after_its_delays() -> None:
         (
             {"steps": [{"height": 1, "time": 0.5}, {"height": -1, "time": 0.51}]},
             {"engagement_delay": 0.03},
-            "key command.b: steps at 0.5 s and at 0.51 s, which after the delays would act in reverse order; leave more time "
-            "between them",
+            "key command.b: steps at 0.5 s and at 0.51 s, which after the delays would act in reverse order; leave more time between them",
         ),
     ],
 )
@@ -304,15 +289,7 @@ def test_a_safety_clutch_has_no_delays() -> None:
     with pytest.raises(lm.InputError, match="is a safety clutch, which has no command; remove engagement_delay"):
         lm.DriveTrain(
             shafts={"a": {"inertia": 1.0}, "b": {"inertia": 1.0}},
-            motors={
-                "m": {
-                    "shaft": "a",
-                    "kind": "torque_source",
-                    "rotor_inertia": 0.1,
-                    "rated_speed": 100.0,
-                    "rated_torque": 1.0,
-                }
-            },
+            motors={"m": {"shaft": "a", "kind": "torque_source", "rotor_inertia": 0.1, "rated_speed": 100.0, "rated_torque": 1.0}},
             clutches={"c": clutch},
         )
 

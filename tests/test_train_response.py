@@ -26,12 +26,7 @@ TWO_STAGES: dict[str, Any] = {
     },
     "motors": {"m": {"shaft": "motor", "kind": "torque_source", "rotor_inertia": 1e-4, "rated_torque": 1.0}},
     "gears": {
-        "belt": {
-            "input": "motor",
-            "output": "middle",
-            "ratio": 2.0,
-            "stiffness": {"kind": "curve", "slopes": [40.0], "backlash": 4e-3},
-        },
+        "belt": {"input": "motor", "output": "middle", "ratio": 2.0, "stiffness": {"kind": "curve", "slopes": [40.0], "backlash": 4e-3}},
         "gearbox": {
             "input": "middle",
             "output": "table",
@@ -67,9 +62,7 @@ def test_a_drive_in_the_long_form_has_the_same_motion_and_response_to_the_last_b
     for short, long in names.items():
         assert np.array_equal(one[short], two[long])
     multipliers = [[m for m in x.attrs["multipliers_real"] if m not in (0.0, 1.0)] for x in (one, two)]
-    assert (
-        multipliers[0] == multipliers[1]
-    )  # a train without hysteresis has no component that is always zero, or as it was
+    assert multipliers[0] == multipliers[1]  # a train without hysteresis has no component that is always zero, or as it was
     of_drive = lm.frequency_response(drive, [0.5, 5.0], [0.025, 1.0])
     of_train = lm.frequency_response(train, [0.5, 5.0], [0.025, 1.0])
     for short, long in names.items():
@@ -82,9 +75,7 @@ def test_a_drive_in_the_long_form_has_the_same_motion_and_response_to_the_last_b
 def test_a_chain_of_four_masses_follows_its_transfer_function_over_four_decades() -> None:
     inertias, friction = [1e-3, 4e-4, 2e-3, 1e-2], [2e-3, 1e-3, 3e-3, 5e-3]
     stiffness, ratios = [30.0, 200.0, 80.0], [1.0, 2.0, 0.5]
-    shafts = {
-        f"s{k}": {"inertia": J, "viscous_friction": b} for k, (J, b) in enumerate(zip(inertias, friction, strict=True))
-    }
+    shafts = {f"s{k}": {"inertia": J, "viscous_friction": b} for k, (J, b) in enumerate(zip(inertias, friction, strict=True))}
     shafts["s3"]["torque"] = {"mean": 0.0}  # type: ignore[assignment]
     gears = {
         f"g{k}": {"input": f"s{k}", "output": f"s{k + 1}", "ratio": i, "stiffness": {"kind": "linear", "stiffness": c}}
@@ -99,12 +90,9 @@ def test_a_chain_of_four_masses_follows_its_transfer_function_over_four_decades(
         columns = []
         for f in frequencies:
             s = 2j * math.pi * f
-            Z = np.diag(
-                [
-                    (J + (1e-5 if k == 0 else 0.0)) * s + b
-                    for k, (J, b) in enumerate(zip(inertias, friction, strict=True))
-                ]
-            ).astype(complex)
+            Z = np.diag([(J + (1e-5 if k == 0 else 0.0)) * s + b for k, (J, b) in enumerate(zip(inertias, friction, strict=True))]).astype(
+                complex
+            )
             for k, (c, i) in enumerate(zip(stiffness, ratios, strict=True)):
                 twist = np.zeros(4)  # rate of the twist by the speeds
                 twist[k], twist[k + 1] = 1.0 / i, -1.0
@@ -128,9 +116,7 @@ def test_shooting_on_two_stages_with_backlash_agrees_with_a_long_transient() -> 
     assert np.ptp(motion["belt_twist"].values) > 4e-3  # through all of the gap
     samples, periods = motion.sizes["time"], 100
     interval = float(motion.attrs["period"]) / samples
-    long = lm.simulate(
-        scenario.replace(**{"simulation.duration": float(periods), "simulation.sample_interval": interval})
-    )
+    long = lm.simulate(scenario.replace(**{"simulation.duration": float(periods), "simulation.sample_interval": interval}))
     for name in ("motor_speed", "middle_speed", "table_speed", "belt_twist", "gearbox_twist", "m_torque"):
         last = long[name].values[(periods - 1) * samples : periods * samples]
         assert np.allclose(last, motion[name].values, rtol=0.0, atol=1e-9 * np.max(np.abs(last))), name
@@ -148,11 +134,7 @@ def test_an_arm_that_turns_over_each_period_moves_periodically() -> None:
     begin = {name: motion.attrs[f"start_arm_{name}"] for name in ("speed", "angle")}
     run = lm.simulate(
         scenario.replace(
-            **{
-                "initial.speeds": {"arm": begin["speed"]},
-                "initial.angles": {"arm": begin["angle"]},
-                "simulation.duration": 3.0 * period,
-            }
+            **{"initial.speeds": {"arm": begin["speed"]}, "initial.angles": {"arm": begin["angle"]}, "simulation.duration": 3.0 * period}
         )
     )
     speed, angle, each = run["arm_speed"].values, run["arm_angle"].values, round(period / RUN["sample_interval"])
@@ -169,14 +151,7 @@ def test_newton_keeps_the_assembly_of_shafts_whose_angles_both_matter() -> None:
     scenario = lm.Scenario(
         shafts={"motor": {"viscous_friction": 2e-3}, "arm": {"inertia": 0.2, "viscous_friction": 0.3}},
         motors={"m": {"shaft": "motor", "kind": "torque_source", "rotor_inertia": 1e-3, "rated_torque": 1.0}},
-        gears={
-            "gear": {
-                "input": "motor",
-                "output": "arm",
-                "ratio": 10.0,
-                "stiffness": {"kind": "linear", "stiffness": 80.0},
-            }
-        },
+        gears={"gear": {"input": "motor", "output": "arm", "ratio": 10.0, "stiffness": {"kind": "linear", "stiffness": 80.0}}},
         gravity={"weight": {"shaft": "arm", "mass": 1.0, "radius": 0.2, "error": 1e-2}},
         angle_torques={"cogging": {"shaft": "motor", "kind": "sine", "amplitude": 0.02, "order": 7, "error": 1e-3}},
         command={"m": {"mean": 0.05, "amplitude": 0.2, "frequency": 2.0}},
@@ -200,19 +175,10 @@ def test_several_threads_give_the_same_bits() -> None:
 
 
 REFUSED = [
-    (
-        lambda t: lm.frequency_response(t, [1.0], [0.1]),
-        "source is missing, and there is not one motor alone; name an input: ",
-    ),
+    (lambda t: lm.frequency_response(t, [1.0], [0.1]), "source is missing, and there is not one motor alone; name an input: "),
     (lambda t: lm.frequency_response(t, [1.0], [0.1], source="command"), 'source "command" is not known; it must be '),
-    (
-        lambda t: lm.response.bandwidth(t, 0.1, source="left_command", output="load_speed"),
-        'output "load_speed" is not known',
-    ),
-    (
-        lambda t: lm.frequency_response(t, [1.0], [0.1], source="left_command", mean_command=0.1),
-        "mean_command: there are several",
-    ),
+    (lambda t: lm.response.bandwidth(t, 0.1, source="left_command", output="load_speed"), 'output "load_speed" is not known'),
+    (lambda t: lm.frequency_response(t, [1.0], [0.1], source="left_command", mean_command=0.1), "mean_command: there are several"),
     (lambda t: lm.periodic_motion(t, 0.1), "command: there are several"),
     (lm.periodic_motion, "needs at least one sine"),
 ]
@@ -228,9 +194,7 @@ def test_what_a_response_of_a_train_refuses(call: Any, message: str) -> None:
 
 def test_rest_is_the_same_start_in_both_words() -> None:
     scenario = lm.Scenario(**TWO_STAGES)
-    assert lm.periodic_motion(scenario, start=lm.Initial()).equals(
-        lm.periodic_motion(scenario, start=lm.TrainInitial())
-    )
+    assert lm.periodic_motion(scenario, start=lm.Initial()).equals(lm.periodic_motion(scenario, start=lm.TrainInitial()))
 
 
 def test_different_starts_lead_to_one_motion_of_a_train_once() -> None:

@@ -278,9 +278,7 @@ def test_decimal_prefixes_keep_every_digit(digits: int, exponent: int):
     assert to_si(f"{digits}e{exponent} ms", "s") == float(f"{digits}e{exponent - 3}")
 
 
-@pytest.mark.parametrize(
-    ("text", "unit", "value"), [("3 gcm2", "kg*m^2", 3e-7), ("5 cSt", "m^2/s", 5e-6), ("7 mN*mm", "N*m", 7e-6)]
-)
+@pytest.mark.parametrize(("text", "unit", "value"), [("3 gcm2", "kg*m^2", 3e-7), ("5 cSt", "m^2/s", 5e-6), ("7 mN*mm", "N*m", 7e-6)])
 def test_products_of_decimal_units_keep_every_digit(text: str, unit: str, value: float):
     assert to_si(text, unit) == value
 
@@ -443,9 +441,7 @@ def test_scenarios_studies_sheets_overrides_and_constructors_read_alike(tmp_path
     text, value = "3000 1/min", 3000 * RPM
     key = "gearbox.rated_input_speed"
     (tmp_path / "s.toml").write_text(f'base = "{base}"\n[gearbox]\nrated_input_speed = "{text}"\n')
-    (tmp_path / "study.toml").write_text(
-        f'base = "{base}"\n[[vary]]\nkey = "{key}"\nvalues = ["{text}"]\n[keep]\na = "peak(twist)"\n'
-    )
+    (tmp_path / "study.toml").write_text(f'base = "{base}"\n[[vary]]\nkey = "{key}"\nvalues = ["{text}"]\n[keep]\na = "peak(twist)"\n')
     gearbox = lm.load(base).gearbox
     (sheet,) = parse_sheets({"gearbox": [{"name": "x", "kind": "other", "ratio": 10, "rated_input_speed": text}]}, "")
     assert isinstance(sheet, lm.data_sheets.GearboxSheet)

@@ -32,9 +32,7 @@ def test_a_pair_that_keeps_all_limits_fits() -> None:
 
 def test_what_was_judged_for_no_pair_is_a_reservation() -> None:
     """Voltage is judged for none of those that fit."""
-    found = verdict(
-        candidate(0, not_judged="voltage"), candidate(1, not_judged="voltage current"), candidate(2, "current")
-    )
+    found = verdict(candidate(0, not_judged="voltage"), candidate(1, not_judged="voltage current"), candidate(2, "current"))
     assert (found.state, found.exit_code) == ("fits with a reservation", 0)
     assert "not judged: voltage (of none that fits)" in found.lines[0]
 
@@ -45,9 +43,7 @@ def test_a_reservation_names_the_first_pair_that_has_none() -> None:
     assert "the first without a reservation is pair 1" in found.lines[0]
 
 
-@pytest.mark.parametrize(
-    ("estimated", "state"), [(HOLDS, "fits"), ("not decided: fits to violates", "fits with a reservation")]
-)
+@pytest.mark.parametrize(("estimated", "state"), [(HOLDS, "fits"), ("not decided: fits to violates", "fits with a reservation")])
 def test_estimated_losses_that_turn_the_verdict_are_a_reservation(estimated: str, state: str) -> None:
     assert verdict(candidate(0, estimated=estimated)).state == state
 

@@ -29,13 +29,7 @@ OIL = lm.data_sheets.Lubricant(viscosity_40="220 mm^2/s", viscosity_100="19 mm^2
 
 def scenario(**changes: Any) -> lm.Scenario:
     """A torque source that turns a fan through a gear with viscous friction and a loss map."""
-    losses = {
-        "kind": "map",
-        "speeds": [0.0, 1.0],
-        "loads": [0.0, 1.0],
-        "values": [[0.02, 0.05], [0.06, 0.1]],
-        "mirrored": True,
-    }
+    losses = {"kind": "map", "speeds": [0.0, 1.0], "loads": [0.0, 1.0], "values": [[0.02, 0.05], [0.06, 0.1]], "mirrored": True}
     gear = {
         "input": "rotor",
         "output": "fan",
@@ -60,10 +54,7 @@ def test_constant_heat_in_both_bodies_has_the_closed_form_and_no_joule_is_lost()
     square, losses, start = 0.9, 3.0, np.array([10.0, 4.0])
     C = np.array([20.0 / 2.0, 300.0 / 5.0])
     A = np.array(
-        [
-            [(COPPER * BODIES.loss * square - 1.0 / 2.0) / C[0], 1.0 / 2.0 / C[0]],
-            [1.0 / 2.0 / C[1], -(1.0 / 2.0 + 1.0 / 5.0) / C[1]],
-        ]
+        [[(COPPER * BODIES.loss * square - 1.0 / 2.0) / C[0], 1.0 / 2.0 / C[0]], [1.0 / 2.0 / C[1], -(1.0 / 2.0 + 1.0 / 5.0) / C[1]]]
     )
     b = np.array([BODIES.loss * square * (1.0 + COPPER * (20.0 - 25.0)), losses]) / C
     times = np.array([0.1, 7.0, 90.0, 2000.0])
@@ -96,9 +87,7 @@ def test_heat_into_the_bodies_is_stored_or_leaves_them() -> None:
 
 def test_the_heat_of_a_ripple_does_not_depend_on_the_samples() -> None:
     """A sine of 0.3 Hz with a mean, over five periods: mean square 0.1² + 0.03²/2, whatever the samples."""
-    fine, coarse = (
-        lm.sizing.warm_up(scenario(**{"simulation.sample_interval": h}), update=4.0, winding=25.0) for h in (0.02, 2.0)
-    )
+    fine, coarse = (lm.sizing.warm_up(scenario(**{"simulation.sample_interval": h}), update=4.0, winding=25.0) for h in (0.02, 2.0))
     heats = [json.loads(found.attrs["heat"])["winding"] for found in (fine, coarse)]
     assert heats[1] == pytest.approx(heats[0], rel=1e-9)
     t = 16.0 * 2.0 * math.pi * 0.3
@@ -127,10 +116,7 @@ def test_the_error_of_freezing_is_stated_and_falls_linearly_with_the_interval() 
     even = even.replace(**{"initial.speeds": speeds, "initial.twists": {"gear": float(end["gear_twist"])}})
     runs = {update: lm.sizing.warm_up(even, update=update, **given) for update in (4.0, 2.0, 1.0, 0.04)}
     exact = runs[0.04]
-    errors = {
-        update: float(abs(hot["housing_temperature"] - exact["housing_temperature"]).max())
-        for update, hot in runs.items()
-    }
+    errors = {update: float(abs(hot["housing_temperature"] - exact["housing_temperature"]).max()) for update, hot in runs.items()}
     assert errors[4.0] > 1e-3
     for update in (4.0, 2.0):
         assert errors[update] / errors[0.5 * update] == pytest.approx(2.0, rel=0.1)
@@ -141,9 +127,7 @@ def test_the_error_of_freezing_is_stated_and_falls_linearly_with_the_interval() 
 def test_gears_follow_the_viscosity_of_their_lubricant() -> None:
     """At constant speed the losses without load go with the viscosity to the power 2/3."""
     cold, warm = (
-        lm.sizing.warm_up(
-            scenario(), update=0.4, lubricant=OIL, lubricant_temperature=40.0, housing=housing, ambient=housing
-        )
+        lm.sizing.warm_up(scenario(), update=0.4, lubricant=OIL, lubricant_temperature=40.0, housing=housing, ambient=housing)
         for housing in (10.0, 70.0)
     )
     factor = (OIL.viscosity(10.0) / OIL.viscosity(40.0)) ** (2.0 / 3.0)
@@ -213,11 +197,7 @@ def test_a_sampled_controller_is_refused() -> None:
 def test_temperatures_reach_an_end_that_is_no_multiple_of_the_interval() -> None:
     """As with an interval that the duration is a multiple of: heat over the same intervals of frozen temperatures."""
     part, whole = (
-        lm.sizing.warm_up(
-            scenario(command={"motor": 0.1}, simulation={"duration": 15.99, "sample_interval": h}),
-            update=0.4,
-            lubricant=OIL,
-        )
+        lm.sizing.warm_up(scenario(command={"motor": 0.1}, simulation={"duration": 15.99, "sample_interval": h}), update=0.4, lubricant=OIL)
         for h in (0.02, 0.01)
     )
     assert part.time.values[-2:].tolist() == [15.98, 15.99]

@@ -30,9 +30,7 @@ def geared(gap: float) -> lm.Drive:
 def commands(steps: int, count: int, step: float, noise: float) -> np.ndarray:
     generator = np.random.default_rng(1)
     t = step * np.arange(steps)[:, None]
-    amplitude, frequency, phase = (
-        generator.uniform(low, high, count) for low, high in ((0.1, 0.4), (0.5, 3.0), (0.0, 6.0))
-    )
+    amplitude, frequency, phase = (generator.uniform(low, high, count) for low, high in ((0.1, 0.4), (0.5, 3.0), (0.0, 6.0)))
     return amplitude * np.sin(2 * np.pi * frequency * t + phase) + generator.normal(0.0, noise, (steps, count))
 
 
@@ -46,9 +44,7 @@ def exact(drive: lm.Drive, inertias: np.ndarray, given: np.ndarray, step: float)
 @pytest.mark.parametrize(("step", "steps"), [(1e-3, 400), (5e-3, 80)])
 @pytest.mark.parametrize("noise", [0.0, 0.05])
 @pytest.mark.parametrize(("dtype", "median", "most"), [("float64", 1e-13, 1e-9), ("float32", 1e-6, 3e-3)])
-def test_drives_move_as_in_the_core(
-    step: float, steps: int, noise: float, dtype: str, median: float, most: float
-) -> None:
+def test_drives_move_as_in_the_core(step: float, steps: int, noise: float, dtype: str, median: float, most: float) -> None:
     inertias = np.random.default_rng(2).uniform(0.5, 2.0, COUNT)
     given = commands(steps, COUNT, step, noise)
     drives = lm.warp.Drives(geared(2e-3), count=COUNT, vary={"load.inertia": inertias}, dtype=dtype, device="cpu")

@@ -76,9 +76,7 @@ def test_an_installed_wheel_gives_the_same_bits(version: str, abi: str, tmp_path
     candidates = [f"python{version}", *map(str, Path.home().glob(f".pyenv/versions/{version}.*/bin/python"))]
     here = "import sys; print('{}.{}'.format(*sys.version_info))"
     for python in candidates:
-        told = shutil.which(python) and subprocess.run(
-            [python, "-c", here], capture_output=True, text=True, check=False
-        )
+        told = shutil.which(python) and subprocess.run([python, "-c", here], capture_output=True, text=True, check=False)
         if told and told.stdout.strip() == version:
             break
     else:

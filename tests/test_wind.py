@@ -12,14 +12,7 @@ from scipy.special import gamma
 
 import lostmotion as lm
 
-ON_AREA: dict[str, Any] = {
-    "speed": 12.0,
-    "drag_coefficient": 1.3,
-    "area": 2.0,
-    "lever": 0.4,
-    "duration": 100.0,
-    "max_frequency": 4.0,
-}
+ON_AREA: dict[str, Any] = {"speed": 12.0, "drag_coefficient": 1.3, "area": 2.0, "lever": 0.4, "duration": 100.0, "max_frequency": 4.0}
 WINDS: dict[str, dict[str, Any]] = {
     "davenport": ON_AREA | {"kind": "davenport", "surface_drag": 0.008},
     "von_karman": ON_AREA | {"kind": "von_karman", "turbulence": 0.18, "length_scale": 90.0},
@@ -106,9 +99,7 @@ def test_a_seed_is_a_wind_and_a_longer_spectrum_keeps_its_phases() -> None:
     np.testing.assert_array_equal(one, same)
     assert abs(np.corrcoef(one, other)[0, 1]) < 0.5
     long = wind("kaimal", seed=7, max_frequency=8.0)
-    assert np.fft.rfft(long.samples()[1][:-1])[3] * one.size / long.samples()[1].size == pytest.approx(
-        np.fft.rfft(one[:-1])[3], rel=2e-3
-    )
+    assert np.fft.rfft(long.samples()[1][:-1])[3] * one.size / long.samples()[1].size == pytest.approx(np.fft.rfft(one[:-1])[3], rel=2e-3)
 
 
 def test_a_wind_turns_around_with_its_signal() -> None:

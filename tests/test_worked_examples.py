@@ -20,14 +20,10 @@ GRAVITY = 9.807  # that of THK's examples
 PRINTED = 2e-3  # relative: values are printed with three digits, from rounded ones
 
 
-def there_and_back(
-    mass: float, friction: float, weight: float, stroke: float, speed: float, time: float, cycle: float
-) -> RequiredMotion:
+def there_and_back(mass: float, friction: float, weight: float, stroke: float, speed: float, time: float, cycle: float) -> RequiredMotion:
     """The motion of a THK example: there, and back from the middle of the cycle on."""
     reference = lm.PositionReference(
-        speed=speed,
-        acceleration=speed / time,
-        moves=[{"to": stroke, "dwell": 0.5 * cycle - stroke / speed - time}, {"to": 0.0}],
+        speed=speed, acceleration=speed / time, moves=[{"to": stroke, "dwell": 0.5 * cycle - stroke / speed - time}, {"to": 0.0}]
     )
     load = LoadTable(inertia=mass, friction_torque=friction, torque=weight)
     return required_motion(reference, load, cycle, Duty(), 0.0)
@@ -54,9 +50,7 @@ def test_drive_torque_of_a_screw():
     assert catalogue_formulas.screw_torque(14.7, 10e-3, 0.96) == pytest.approx(24e-3, rel=0.02)
     assert catalogue_formulas.screw_torque(14.7, 10e-3, 0.32) == pytest.approx(73e-3, rel=5e-3)
     # The efficiency itself: lead angle 5 deg 30', mu 0.003.
-    stage = RatedScrew(
-        lead=10e-3, mean_diameter=10e-3 / math.pi / math.tan(math.radians(5.5)), friction_coefficient=3e-3
-    )
+    stage = RatedScrew(lead=10e-3, mean_diameter=10e-3 / math.pi / math.tan(math.radians(5.5)), friction_coefficient=3e-3)
     assert stage.efficiencies()[0] == pytest.approx(0.96, abs=0.01)
 
 
@@ -81,9 +75,7 @@ def test_buckling_and_speeds_of_a_horizontal_screw():
     assert catalogue_formulas.buckling_force(17.5e-3, 1.1, "fixed-fixed") == pytest.approx(15500.0, rel=5e-3)
     assert catalogue_formulas.compression_force(17.5e-3) == pytest.approx(35500.0, rel=PRINTED)
     for diameter, speed in ((17.5e-3, 2180.0), (26.4e-3, 3294.0)):
-        assert RPM * catalogue_formulas.critical_speed(diameter, 1.1, "fixed-supported") == pytest.approx(
-            speed, rel=3e-3
-        )
+        assert RPM * catalogue_formulas.critical_speed(diameter, 1.1, "fixed-supported") == pytest.approx(speed, rel=3e-3)
     for diameter, speed in ((20.75e-3, 3370.0), (31.25e-3, 2240.0)):
         assert RPM * catalogue_formulas.dn_speed(diameter) == pytest.approx(speed, rel=PRINTED)
 
@@ -92,9 +84,7 @@ def test_buckling_and_speeds_of_a_horizontal_screw():
     ("capacity", "lead", "life", "hours"),
     [(5400.0, 40e-3, 4.1e9, 171e3), (6600.0, 40e-3, 7.47e9, 311e3), (11800.0, 60e-3, 4.27e10, 2.67e6), (14500.0, 60e-3, 7.93e10, 4.95e6)],
 )  # fmt: skip
-def test_life_of_a_horizontal_screw(
-    horizontal: RequiredMotion, capacity: float, lead: float, life: float, hours: float
-):
+def test_life_of_a_horizontal_screw(horizontal: RequiredMotion, capacity: float, lead: float, life: float, hours: float):
     """THK A-734: f_w 1.5 and 225 N; mean speeds of 400 and 267 rpm are 8 double strokes a minute on these leads."""
     assert catalogue_formulas.nominal_life(capacity, 225.0, load_factor=1.5) == pytest.approx(life, rel=5e-3)
     screw = RatedScrew(lead=lead, dynamic_capacity=capacity, load_factor=1.5)
@@ -124,9 +114,7 @@ def test_a_vertical_screw():
     assert screw_mean_load(axial_load(motion)) == pytest.approx(492.0, abs=1.0)
     assert catalogue_formulas.buckling_force(12.5e-3, 0.7, "fixed-fixed") == pytest.approx(9960.0, rel=5e-3)
     assert catalogue_formulas.compression_force(12.5e-3) == pytest.approx(18100.0, rel=PRINTED)
-    assert RPM * catalogue_formulas.critical_speed(12.5e-3, 0.7, "fixed-supported") == pytest.approx(
-        3852.0, rel=PRINTED
-    )
+    assert RPM * catalogue_formulas.critical_speed(12.5e-3, 0.7, "fixed-supported") == pytest.approx(3852.0, rel=PRINTED)
     screw = RatedScrew(
         lead=10e-3,
         dynamic_capacity=9800.0,
@@ -177,9 +165,7 @@ def test_critical_speed_and_buckling_by_the_formulas_of_hiwin():
         force = 0.5 * 4.072e5 * buckling * d**4 / length**2
         assert catalogue_formulas.buckling_force(1e-3 * d, 1e-3 * length, mounting) == pytest.approx(force, rel=0.025)
         speed = 0.8 * 2.71e8 * bending * d / length**2
-        assert RPM * catalogue_formulas.critical_speed(1e-3 * d, 1e-3 * length, mounting) == pytest.approx(
-            speed, rel=0.02
-        )
+        assert RPM * catalogue_formulas.critical_speed(1e-3 * d, 1e-3 * length, mounting) == pytest.approx(speed, rel=0.02)
 
 
 def test_a_linear_motor():
@@ -213,9 +199,7 @@ def test_energy_that_a_linear_motor_returns():
     all_of_it = (force * 2.0 - heat / 0.4) ** 2 / (2.0 * force * 5.0)
     assert back.largest == pytest.approx(all_of_it, rel=1e-5)
     assert 0.0 < all_of_it - (kinetic - heat) < 0.03 * all_of_it
-    supply = Supply(
-        max_voltage=start, voltage_limit=390.0, capacitance=1880e-6, brake_resistance=844.77, brake_power=400.0
-    )
+    supply = Supply(max_voltage=start, voltage_limit=390.0, capacitance=1880e-6, brake_resistance=844.77, brake_power=400.0)
     found = {f.what: f for f in supply_rules(back, supply)}
     assert 400.0 * found["brake resistor, mean power"].use == pytest.approx((all_of_it - taken) / 0.4, rel=1e-4)
     assert pytest.approx(180.05, rel=1e-3) == 390.0**2 / 844.77

@@ -30,22 +30,7 @@ try:
 except ImportError:
     mujoco = None
 
-WRONG: list[Any] = [
-    5,
-    None,
-    "x",
-    "1,5 m",
-    [],
-    [None],
-    (),
-    xr.Dataset(),
-    {},
-    {"a": 1},
-    {5: 3},
-    object(),
-    np.zeros(2),
-    True,
-]
+WRONG: list[Any] = [5, None, "x", "1,5 m", [], [None], (), xr.Dataset(), {}, {"a": 1}, {5: 3}, object(), np.zeros(2), True]
 WRONG += [-1, 0, float("nan"), 10**30, Path("none"), lambda: None, lm.Load(inertia=1)]
 # What is nearly a number.
 WRONG += [np.array([0.1]), xr.DataArray([0.1, 0.2], dims="x"), np.complex128(1.0), 10**400, np.timedelta64(1, "ns")]
@@ -82,9 +67,7 @@ LINEAR = lm.linearize(SCENARIO, lm.Initial())
 SHEET = next(r for r in lm.catalogue() if r.name == "schaeffler-rt1-h-20-100")
 RIG = lm.test_rig.TestRig(SCENARIO.gearbox)
 SCREW = lm.model.Screw(input="motor", output="table", lead="10 mm", stiffness="200 N/um", efficiency=0.9)
-STUDY = lm.studies.Study(
-    scenario=SCENARIO, vary=[{"key": "load.inertia", "values": [1.0]}], keep={"top": "peak(load_speed)"}
-)
+STUDY = lm.studies.Study(scenario=SCENARIO, vary=[{"key": "load.inertia", "values": [1.0]}], keep={"top": "peak(load_speed)"})
 
 
 def dangle(*_: object, **__: object) -> None:
@@ -240,9 +223,9 @@ def refused_plainly(call: Callable[[], Any], where: str) -> None:
         return
     assert message, where
     assert "\n" not in message, where
-    assert not re.search(
-        r"<class|<xarray|<lost|NoneType|object at 0x|pydantic|\bdict\b|ndarray|incompatible|_core|\\n", message
-    ), f"{where}: {message}"
+    assert not re.search(r"<class|<xarray|<lost|NoneType|object at 0x|pydantic|\bdict\b|ndarray|incompatible|_core|\\n", message), (
+        f"{where}: {message}"
+    )
 
 
 @pytest.fixture(autouse=True)
@@ -277,9 +260,7 @@ def test_each_argument_of_a_function_is_checked(name: str) -> None:
         for wrong in WRONG:
             if name in SLOW and wrong is good[key]:
                 continue
-            refused_plainly(
-                lambda key=key, wrong=wrong: function(**good | {key: wrong}), f"{name}({key}={wrong!r:.30})"
-            )
+            refused_plainly(lambda key=key, wrong=wrong: function(**good | {key: wrong}), f"{name}({key}={wrong!r:.30})")
 
 
 SCALARS: list[Callable[[Any], Any]] = [
@@ -322,14 +303,10 @@ def test_a_number_of_any_library_is_the_same_number_everywhere() -> None:
         assert SCENARIO.replace(**{"load.inertia": number}).load.inertia == 0.25
         assert SCENARIO.replace(command=number, **{"command.frequency": 1, "command.amplitude": 1}).command.mean == 0.25
         assert lm.load("paper-2dof-nl-small", {"load.inertia": number}).load.inertia == 0.25
-        assert lm.gearbox("paper-gearbox", added_backlash=made(2**-6)) == lm.gearbox(
-            "paper-gearbox", added_backlash=2**-6
-        )
+        assert lm.gearbox("paper-gearbox", added_backlash=made(2**-6)) == lm.gearbox("paper-gearbox", added_backlash=2**-6)
         assert lm.motor("paper-motor", voltage_limit=number).voltage_limit == 0.25
         vary = [{"key": "load.inertia", "values": [number]}, {"key": "load.torque", "uniform": (0, number)}]
-        study = lm.studies.Study(
-            scenario=SCENARIO, vary=vary, keep={"top": "peak(load_speed)"}, design="sobol", runs=np.int64(2)
-        )
+        study = lm.studies.Study(scenario=SCENARIO, vary=vary, keep={"top": "peak(load_speed)"}, design="sobol", runs=np.int64(2))
         assert (study.vary[0].values, study.vary[1].uniform, study.runs) == ((0.25,), (0.0, 0.25), 2)
         assert Selection(objectives={"x": "least"}, limits={"x": {"max": number}}).limits["x"].max == 0.25
         assert FreeParameter(start=number, max=1.0).start == 0.25
@@ -337,10 +314,7 @@ def test_a_number_of_any_library_is_the_same_number_everywhere() -> None:
 
 NEARLY = [
     (np.array([0.25]), "[0.25] is a list of one; give its entry"),
-    (
-        xr.DataArray(0.25, attrs={"units": "deg"}),
-        '0.25 has units = "deg", and bare numbers are in SI; give its float()',
-    ),
+    (xr.DataArray(0.25, attrs={"units": "deg"}), '0.25 has units = "deg", and bare numbers are in SI; give its float()'),
     (np.array([0.25, 0.5]), "[0.25, 0.5] must be a number"),
     (np.complex128(0.25), "(0.25+0j) must be a number"),
     (np.ma.masked, "nan must be a finite number"),
@@ -371,9 +345,7 @@ def test_what_is_nearly_a_number_is_refused_with_the_reason(value: Any, sentence
 def test_every_function_and_argument_is_tried() -> None:
     for name in names():
         exported = public(name)
-        own = inspect.isclass(exported) and (
-            is_dataclass(exported) or issubclass(exported, Part | Exception | lm.Scenario)
-        )
+        own = inspect.isclass(exported) and (is_dataclass(exported) or issubclass(exported, Part | Exception | lm.Scenario))
         assert own or name in CALLS, name
         if name in CALLS and not own:
             parameters = inspect.signature(exported).parameters

@@ -20,33 +20,14 @@ from lostmotion.cli.entry import app, main
 SECONDS = 4.0  # of processor time until the command is interrupted
 EXCLUDED = ("reproduce", "live", "scheduler", "processes", "open", "libraries")  # take minutes, processes or compilers
 OLD = b"an old file"
-OUTPUTS = (
-    "out.nc",
-    "out.csv",
-    "out.parquet",
-    "out.png",
-    "out.svg",
-    "out.fmu",
-    "out",
-    "none/out.csv",
-    ".",
-    "drive.toml/x",
-)
+OUTPUTS = ("out.nc", "out.csv", "out.parquet", "out.png", "out.svg", "out.fmu", "out", "none/out.csv", ".", "drive.toml/x")
 VALUES = {
     "SCENARIO": ("drive.toml", "drive.toml", "broken.toml", "position-axis", "paper-2dof-nl-small", "none.toml", "."),
     "OTHER": ("drive.toml", "broken.toml", "position-axis", "none"),
     "GEARBOX": ("schaeffler-rt1-h-20-100", "drive.toml", "broken.toml", "none"),
     "NAME": ("exact", "dormand-prince", "command", "load_speed", "load_torque", "motor", "none"),
     "LIST": ("0.1,1,10", "0.1..10:4", "1..0", "1,5", "0.1..1e9:100000000", "-1", "1 Hz,2 Hz"),
-    "KEY=VALUE": (
-        "load.inertia=3",
-        "simulation.duration=0.1",
-        "command.amplitude=1e9",
-        "x=1",
-        "=",
-        "a.b.c=[",
-        "gearbox=none",
-    ),
+    "KEY=VALUE": ("load.inertia=3", "simulation.duration=0.1", "command.amplitude=1e9", "x=1", "=", "a.b.c=[", "gearbox=none"),
     "TIME": ("0.1", "1 s", "-1", "1e9", "3 m"),
     "DIR": ("out", "study", ".", "drive.toml", "none/none"),
     "STUDY.toml | show | resume": ("study.toml", "show", "resume", "drive.toml"),
@@ -86,9 +67,7 @@ def commands() -> dict[tuple[str, ...], list[Any]]:
 
 def word(random: Random, parameter: Any) -> str:
     """A value of an argument or option."""
-    known = VALUES.get(
-        parameter.metavar or "", OUTPUTS if "-o" in parameter.opts or parameter.metavar == "FILE" else ()
-    )
+    known = VALUES.get(parameter.metavar or "", OUTPUTS if "-o" in parameter.opts or parameter.metavar == "FILE" else ())
     if known and random.random() < 0.85:
         return random.choice(known)
     made = random.choice((*mutation.TEXTS, *map(str, mutation.NUMBERS)))
@@ -105,9 +84,7 @@ def line(random: Random) -> list[str]:
             value = [] if getattr(parameter, "is_flag", False) else [word(random, parameter)]
             words += [random.choice(parameter.opts), *value] if option else value
     if random.random() < 0.1:
-        words.insert(
-            random.randrange(len(words) + 1), random.choice(("--", "-x", "--none", "", "--memory", "1 MB", "-h"))
-        )
+        words.insert(random.randrange(len(words) + 1), random.choice(("--", "-x", "--none", "", "--memory", "1 MB", "-h")))
     return words
 
 

@@ -23,13 +23,7 @@ Free = c.CFUNCTYPE(None, c.c_void_p)
 
 
 class Callbacks(c.Structure):
-    _fields_ = (
-        ("logger", Log),
-        ("allocate", Allocate),
-        ("free", Free),
-        ("finished", c.c_void_p),
-        ("environment", c.c_void_p),
-    )
+    _fields_ = (("logger", Log), ("allocate", Allocate), ("free", Free), ("finished", c.c_void_p), ("environment", c.c_void_p))
 
 
 said: list[bytes] = []
@@ -106,9 +100,7 @@ class Caller:
         return (c.c_double * 1000)(), c.c_size_t(count)
 
 
-log3 = c.CFUNCTYPE(None, c.c_void_p, c.c_int, c.c_char_p, c.c_char_p)(
-    lambda e, s, g, message: said.append(message or b"")
-)
+log3 = c.CFUNCTYPE(None, c.c_void_p, c.c_int, c.c_char_p, c.c_char_p)(lambda e, s, g, message: said.append(message or b""))
 
 
 def _step(x: Caller) -> tuple[Any, ...]:

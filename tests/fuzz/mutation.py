@@ -39,22 +39,7 @@ TEXTS = (
     "position-axis",
     "schaeffler-rt1-h-20-100",
 )
-PIECES = (
-    b"\x00",
-    b"\xff\xfe",
-    b"\xef\xbb\xbf",
-    b"[[",
-    b"]",
-    b"'''",
-    b'"',
-    b"= ",
-    b"\r",
-    b"1e999",
-    b"-",
-    b"\xf0\x9f",
-    b"{}",
-    b"#",
-)
+PIECES = (b"\x00", b"\xff\xfe", b"\xef\xbb\xbf", b"[[", b"]", b"'''", b'"', b"= ", b"\r", b"1e999", b"-", b"\xf0\x9f", b"{}", b"#")
 
 
 def value(random: Random) -> Any:

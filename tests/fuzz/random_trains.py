@@ -66,12 +66,7 @@ def train(random: Random) -> dict[str, Any]:
 
 
 def harmonic(random: Random, amplitude: float) -> dict[str, Any]:
-    return {
-        "kind": "sine",
-        "amplitude": amplitude,
-        "order": random.choice((1, 2, 7)),
-        "phase": random.uniform(-3.0, 3.0),
-    }
+    return {"kind": "sine", "amplitude": amplitude, "order": random.choice((1, 2, 7)), "phase": random.uniform(-3.0, 3.0)}
 
 
 def matrix(random: Random, coupled: list[str], shafts: dict[str, Any]) -> list[list[float]]:

@@ -69,6 +69,4 @@ def check_result(result: Any) -> None:
         check_message(result.attrs["warning"])
     share = result.attrs.get("energy_residual", 0.0)
     if not share <= 1e-6 and "energy" not in result.attrs.get("warning", ""):
-        raise Failure(
-            f"the energy balance fails by {share:.2g} without a warning: {json.loads(result.attrs['energy'])}"
-        )
+        raise Failure(f"the energy balance fails by {share:.2g} without a warning: {json.loads(result.attrs['energy'])}")
