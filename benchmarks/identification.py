@@ -11,14 +11,14 @@ import cma
 import numpy as np
 from report import Report
 
-from lostmotion.identification.candidate_models import free_on, problem_of
-from lostmotion.identification.fit.least_squares import Problem, moved, search
+from lostmotion.identification.fit.least_squares import Problem, moved, problem_of, search
 from lostmotion.identification.identify import identify_logs
-from lostmotion.identification.preparation.prepare import Prepared, prepared
+from lostmotion.identification.preparation.prepare import prepared
+from lostmotion.identification.prepared_log import Prepared
 from lostmotion.identification.readers.log import Channel, Log
 from lostmotion.identification.rig.residuals import Engine, Point
 from lostmotion.identification.rig.rig_scenario import Rig
-from lostmotion.identification.task.identification_file import load_identification
+from lostmotion.identification.task.identification_file import free_on, load_identification
 from lostmotion.identification.virtual_logs import virtual_log
 
 SERVO = Path(__file__).parent.parent / "examples" / "servo_logs"

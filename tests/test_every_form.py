@@ -16,7 +16,8 @@ import lostmotion as lm
 from fuzz.random_trains import train as fuzz_train
 from lostmotion.identification.identify import identify_logs
 from lostmotion.identification.monitor.monitor import monitor_logs
-from lostmotion.identification.preparation.prepare import Prepared, prepared
+from lostmotion.identification.preparation.prepare import prepared
+from lostmotion.identification.prepared_log import Prepared
 from lostmotion.identification.readers.log import Log
 from lostmotion.identification.rig.rig_scenario import Rig
 from lostmotion.identification.task.identification_file import Identification

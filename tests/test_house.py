@@ -47,6 +47,30 @@ LAYERS = [
 INNER = {
     "simulation": [{"variables"}, {"train_variables"}, {"forms"}, {"scenario"}, {"stepping"}, {"runs"}, {"batches"}],
     "studies": [{"expressions"}, {"study"}, {"runs"}, {"selection"}],
+    "identification": [
+        {"task"},
+        {"readers"},
+        {"prepared_log"},
+        {"rig"},
+        {"preparation"},
+        {"fit"},
+        {"verdicts"},
+        {"candidate_models"},
+        {"left_out_conditions", "result_as_scenario", "virtual_logs", "monitor"},
+        {"result", "campaign"},
+        {"identify", "experiment_design"},
+    ],
+    "servo": [
+        {"winding"},
+        {"regimes"},
+        {"data", "sampled"},
+        {"margins"},
+        {"motion"},
+        {"hunting"},
+        {"settling", "tuned"},
+        {"tuning"},
+        {"commission"},
+    ],
 }
 MODULES = sorted(p.relative_to(PACKAGE).with_suffix("") for p in PACKAGE.rglob("*.py"))
 SOURCES = sorted(p for room in ("lostmotion", "kernels") for p in (ROOT / "core" / room).rglob("*.?pp"))

@@ -8,8 +8,8 @@ import numpy as np
 
 import lostmotion as lm
 from conftest import some
+from lostmotion.servo.hunting.at_rest import without_backlash, without_friction
 from lostmotion.servo.hunting.limit_cycles import Loop
-from lostmotion.servo.motion import without_backlash, without_friction
 
 AXES = some(24, 12)
 SLIPS = 30  # that a run of an axis which hunts has at least

@@ -16,18 +16,18 @@ from conftest import ROOT
 from identification_logs import NOISE, SERVO, TRUTH, read_all, servo_plans, servo_task, write_servo_logs
 from identification_round_trips import round_trip
 from lostmotion.data_sheets.records import read_sheets
-from lostmotion.identification.candidate_models import RungResult, chosen, climb, free_on, problem_of, start_point
+from lostmotion.identification.candidate_models import RungResult, chosen, climb
 from lostmotion.identification.fit.intervals import reach
-from lostmotion.identification.fit.least_squares import search
+from lostmotion.identification.fit.least_squares import problem_of, search
 from lostmotion.identification.fit.saved_progress import Progress
 from lostmotion.identification.identify import _notes, identify_task
 from lostmotion.identification.preparation.prepare import prepared
 from lostmotion.identification.readers.log import Channel
 from lostmotion.identification.result import IdentificationResult
-from lostmotion.identification.rig.residuals import Engine, Point
+from lostmotion.identification.rig.residuals import Engine, Point, start_point
 from lostmotion.identification.rig.rig_scenario import Rig
 from lostmotion.identification.task.file_formulas import Formula
-from lostmotion.identification.task.identification_file import Identification
+from lostmotion.identification.task.identification_file import Identification, free_on
 from lostmotion.identification.verdicts.identifiability import Undetermined
 from lostmotion.reports import plots
 from lostmotion.reports.identification import correlations, friction_curve, friction_curves, loop_curves, loss_curves, write_identification

@@ -10,14 +10,14 @@ import pytest
 
 from conftest import ROOT
 from identification_logs import read_all
-from lostmotion.identification.candidate_models import free_on, start_point
 from lostmotion.identification.fit.start_values import regressed
 from lostmotion.identification.identify import identify_logs
-from lostmotion.identification.preparation.prepare import Prepared, prepared
-from lostmotion.identification.rig.residuals import Engine, Point
+from lostmotion.identification.preparation.prepare import prepared
+from lostmotion.identification.prepared_log import Prepared
+from lostmotion.identification.rig.residuals import Engine, Point, start_point
 from lostmotion.identification.rig.rig_runs import run_log
 from lostmotion.identification.rig.rig_scenario import Rig
-from lostmotion.identification.task.identification_file import Identification, load_identification
+from lostmotion.identification.task.identification_file import Identification, free_on, load_identification
 
 EMPS = ROOT / "examples" / "emps"
 DATA = os.environ.get("LOSTMOTION_EMPS", "")

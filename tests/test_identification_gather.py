@@ -14,8 +14,8 @@ import pytest
 import lostmotion as lm
 from identification_logs import SERVO
 from lostmotion.errors import InputError
-from lostmotion.identification.preparation.prepare import Prepared
 from lostmotion.identification.preparation.usable_logs import distinct_names, gathered
+from lostmotion.identification.prepared_log import Prepared
 from lostmotion.identification.rig.rig_scenario import Rig
 from lostmotion.identification.task.identification_file import load_identification
 

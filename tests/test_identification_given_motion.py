@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
-from lostmotion.identification.candidate_models import start_point
 from lostmotion.identification.identify import identify_logs
-from lostmotion.identification.preparation.prepare import Prepared, prepared
+from lostmotion.identification.preparation.prepare import prepared
+from lostmotion.identification.prepared_log import Prepared
 from lostmotion.identification.readers.log import Channel, Log
-from lostmotion.identification.rig.residuals import Engine
+from lostmotion.identification.rig.residuals import Engine, start_point
 from lostmotion.identification.rig.rig_scenario import Rig
 from lostmotion.identification.task.identification_file import Identification
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from identification_logs import SERVO, TRUTH, servo_plans, servo_task
-from lostmotion.identification.candidate_models import free_on
-from lostmotion.identification.preparation.prepare import Prepared, prepared
+from lostmotion.identification.preparation.prepare import prepared
+from lostmotion.identification.prepared_log import Prepared
 from lostmotion.identification.readers.log import Channel, Log
 from lostmotion.identification.rig.residuals import Engine, Point
 from lostmotion.identification.rig.rig_scenario import Rig
 from lostmotion.identification.task.free_parameters import FreeParameter
-from lostmotion.identification.task.identification_file import Identification
+from lostmotion.identification.task.identification_file import Identification, free_on
 from lostmotion.identification.virtual_logs import virtual_log
 
 

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
-from lostmotion.identification.preparation.prepare import channel_factor
 from lostmotion.identification.preparation.screening import screened
+from lostmotion.identification.readers.channel_units import channel_factor
 from lostmotion.identification.readers.log import Channel, Log
 from lostmotion.identification.readers.log_files import find_logs, read_log
 

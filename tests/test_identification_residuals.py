@@ -10,15 +10,14 @@ import pytest
 
 from conftest import some
 from lostmotion import Simulation, load
-from lostmotion.identification.candidate_models import problem_of, start_point
 from lostmotion.identification.fit.input_courses import course_of
 from lostmotion.identification.fit.intervals import bootstrap
-from lostmotion.identification.fit.least_squares import Fit, Problem
+from lostmotion.identification.fit.least_squares import Fit, Problem, problem_of
 from lostmotion.identification.identify import identify_logs
 from lostmotion.identification.preparation.prepare import prepared
 from lostmotion.identification.readers.log import Channel, Log
 from lostmotion.identification.result import IdentificationResult
-from lostmotion.identification.rig.residuals import Engine, Point
+from lostmotion.identification.rig.residuals import Engine, Point, start_point
 from lostmotion.identification.rig.rig_scenario import Rig
 from lostmotion.identification.task.free_parameters import FreeParameter
 from lostmotion.identification.task.identification_file import FitOptions, Identification

@@ -11,15 +11,15 @@ import pytest
 
 import lostmotion as lm
 from identification_logs import SERVO, TRUTH, read_all, servo_plans, servo_task, write_servo_logs
-from lostmotion.identification.candidate_models import free_on, start_point
 from lostmotion.identification.fit.start_values import regressed
 from lostmotion.identification.identify import identify_logs
-from lostmotion.identification.preparation.prepare import Prepared, prepared
+from lostmotion.identification.preparation.prepare import prepared
+from lostmotion.identification.prepared_log import Prepared
 from lostmotion.identification.readers.log import Channel, Log
 from lostmotion.identification.rig.measured_motion import windows
-from lostmotion.identification.rig.residuals import Engine, Point
+from lostmotion.identification.rig.residuals import Engine, Point, start_point
 from lostmotion.identification.rig.rig_scenario import Rig
-from lostmotion.identification.task.identification_file import Identification
+from lostmotion.identification.task.identification_file import Identification, free_on
 from lostmotion.identification.virtual_logs import virtual_log
 
 AXIS = """

@@ -9,9 +9,9 @@ import pytest
 
 import lostmotion as lm
 from conftest import some
+from lostmotion.servo.hunting.at_rest import at_rest, limit_cycle
 from lostmotion.servo.hunting.standstill import NOISE, Watch
 from lostmotion.servo.margins import instability
-from lostmotion.servo.motion import at_rest, limit_cycle
 from lostmotion.servo.regimes import axis_of, regimes
 from lostmotion.simulation.runs.run import run
 

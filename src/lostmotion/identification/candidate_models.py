@@ -12,16 +12,14 @@ import numpy as np
 
 from ..errors import InputError
 from .fit.intervals import CHI_SQUARE
-from .fit.least_squares import NORMAL, Fit, Problem, search
+from .fit.least_squares import NORMAL, Fit, Problem, problem_of, search
 from .fit.log_errors import LogError, log_errors
 from .fit.saved_progress import Models
-from .preparation.prepare import Prepared
+from .prepared_log import Prepared
 from .rig.measured_motion import windows
 from .rig.residuals import Engine, Point
 from .rig.rig_scenario import Rig
-from .task.file_formulas import number
-from .task.free_parameters import FreeParameter
-from .task.identification_file import Identification
+from .task.identification_file import Identification, free_on
 from .verdicts.identifiability import Undetermined, undetermined
 from .verdicts.residual_tests import explained
 
@@ -66,31 +64,6 @@ class RungResult:
     def loose(self) -> int:
         """Number of directions that the logs do not determine."""
         return sum(u.directions for u in self.undetermined)
-
-
-def free_on(task: Identification, rung: int) -> dict[str, FreeParameter]:
-    """Parameters that are sought on a rung."""
-    names = [name for entry in task.rungs()[: rung + 1] for name in entry.free]
-    return {name: p for name, p in task.parameters.items() if name in names and not p.fixed}
-
-
-def start_point(task: Identification, logs: Sequence[Prepared]) -> Point:
-    """Start values; parameters of higher rungs are off."""
-    first = free_on(task, 0)
-    values = {
-        name: p.start if name in first or p.fixed or p.off is None else p.off for name, p in task.parameters.items()
-    }
-    own = {name: p.start for name, p in task.nuisance.items()}
-    return Point(values, {log.name: dict(own) for log in logs})
-
-
-def problem_of(rig: Rig, engine: Engine, logs: Sequence[Prepared], rung: int) -> Problem:
-    """The fit of a rung to logs."""
-    task = rig.task
-    given = [m.deviation for m in task.measured.values()]
-    deviations = None if None in given else np.array(given, dtype=float)
-    resolution = np.array([number(m.resolution, {}, "measured.resolution") for m in task.measured.values()])
-    return Problem(engine, logs, rung, free_on(task, rung), task.nuisance, task.fit, deviations, resolution)
 
 
 def several(logs: Sequence[Prepared], count: int) -> list[Prepared]:

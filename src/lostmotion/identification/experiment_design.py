@@ -10,12 +10,12 @@ import numpy as np
 
 from ..errors import InputError
 from ..inputs.arguments import checked
-from .candidate_models import free_on
 from .fit.least_squares import slope_of
 from .preparation.prepare import prepared
 from .readers.log import Log
 from .result import IdentificationResult
 from .rig.residuals import Engine, Point
+from .task.identification_file import free_on
 from .virtual_logs import virtual_log
 
 PRIOR = 1e-3  # information on a scaled parameter that nothing else is known of: it may change by about 30 of its scales

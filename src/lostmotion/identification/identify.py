@@ -12,31 +12,22 @@ import numpy as np
 from ..errors import prefixed
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count
-from .candidate_models import (
-    RungResult,
-    begun_with,
-    chosen,
-    climb,
-    first_fit,
-    free_on,
-    is_rough,
-    problem_of,
-    start_point,
-)
+from .candidate_models import RungResult, begun_with, chosen, climb, first_fit, is_rough
 from .fit.input_courses import Way, as_recorded, nearer_ways
 from .fit.intervals import Interval, bootstrap, profile, widest
-from .fit.least_squares import Fit, Problem, linearised, search
+from .fit.least_squares import Fit, Problem, linearised, problem_of, search
 from .fit.saved_progress import Progress
 from .fit.start_values import Regression, regressed
 from .left_out_conditions import left_out_errors
-from .preparation.prepare import Prepared, alike
+from .preparation.prepare import alike
 from .preparation.recorder_pauses import split_at_pauses
 from .preparation.usable_logs import gathered
+from .prepared_log import Prepared
 from .result import IdentificationResult
-from .rig.residuals import Engine, Point
+from .rig.residuals import Engine, Point, start_point
 from .rig.rig_runs import run_logs
 from .rig.rig_scenario import Rig
-from .task.identification_file import Identification, load_identification
+from .task.identification_file import Identification, free_on, load_identification
 from .verdicts.disagreeing_logs import OddLog, odd_logs
 from .verdicts.identifiability import Undetermined, at_bounds, resting_on
 from .verdicts.residual_tests import Misfit, explained, hidden, misfits, with_shapes

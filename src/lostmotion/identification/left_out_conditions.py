@@ -8,14 +8,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..errors import InputError
-from ..inputs.validation import did_you_mean, shortened
-from .candidate_models import mean_errors, problem_of, with_own
-from .fit.least_squares import Fit, search
+from ..inputs.validation import shortened
+from .candidate_models import mean_errors, with_own
+from .fit.least_squares import Fit, problem_of, search
 from .fit.log_errors import log_errors
-from .preparation.prepare import Prepared
+from .prepared_log import Prepared
 from .rig.residuals import Engine
 from .rig.rig_scenario import Rig
-from .task.identification_file import Identification
 
 Notify = Callable[[str, int, float], None]
 
@@ -53,21 +52,6 @@ class ConditionError:
         without = self.failed or f"{self.left_out:.4g}{unit} when fitted without them"
         logs = f"{self.logs} log{'' if self.logs == 1 else 's'}"
         return f"{self.name} ({logs}): mean absolute error {self.fitted:.4g}{unit}, {without}"
-
-
-def refuse_leave_out(task: Identification, logs: Sequence[Prepared]) -> None:
-    """Refuse a key of ``fit.leave_out`` that does not divide the fitted logs."""
-    train = [log for log in logs if not log.held_out]
-    for key in task.fit.leave_out:
-        lacking = [log.name for log in train if key not in log.facts]
-        if lacking:
-            known = sorted(set().union(*(log.facts for log in train)))
-            meant = did_you_mean(key, known, "give it with logs.header")
-            raise InputError(f"{lacking[0]} has no {key!r} in its header; {meant}", "fit.leave_out")
-        values = {log.facts[key] for log in train}
-        if len(values) < 2:
-            only = ", ".join(map(str, values))
-            raise InputError(f"{key!r} is {only} in all fitted logs; leave it out of the list", "fit.leave_out")
 
 
 def left_out_errors(

@@ -15,7 +15,7 @@ from .fit.least_squares import Fit
 from .fit.log_errors import LogError, total
 from .fit.start_values import Regression
 from .left_out_conditions import ConditionError
-from .preparation.prepare import Prepared
+from .prepared_log import Prepared
 from .result_as_scenario import gear_sheet, sheet_text
 from .rig.rig_scenario import Rig
 from .task.identification_file import Identification

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from .preparation.prepare import channel_factor, prepared
+from .preparation.prepare import prepared
+from .readers.channel_units import channel_factor
 from .readers.log import Channel, Log
 from .rig.rig_runs import run_log
 from .rig.rig_scenario import Rig

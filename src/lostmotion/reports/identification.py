@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from ..identification.candidate_models import RungResult, free_on
+from ..identification.candidate_models import RungResult
 from ..identification.identify import residual_table
-from ..identification.preparation.prepare import Prepared
+from ..identification.prepared_log import Prepared
 from ..identification.result import IdentificationResult
+from ..identification.task.identification_file import free_on
 from ..identification.verdicts.residual_tests import shape_variables
 from ..model.gear import Gear
 from ..model.losses import LossMap, MeshEfficiency, WormMesh, efficiency_map

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..servo.commission import TRUE, LoopSheet, ServoReport, decibels
-from ..servo.motion import LimitCycle, StepResponse
+from ..servo.hunting.at_rest import LimitCycle
+from ..servo.motion import StepResponse
 from ..units.practical import charted
 from .certificate import certificate_parts
 from .looks import FAINT, look

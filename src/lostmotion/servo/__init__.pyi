@@ -2,6 +2,8 @@ from ..verdict import Verdict as Verdict
 from .commission import LoopSheet as LoopSheet
 from .commission import ServoReport as ServoReport
 from .commission import Stiffness as Stiffness
+from .hunting.at_rest import AtRest as AtRest
+from .hunting.at_rest import LimitCycle as LimitCycle
 from .hunting.certificate import FixedPoint as FixedPoint
 from .hunting.certificate import HuntingCertificate as HuntingCertificate
 from .hunting.hunting import Hunting as Hunting
@@ -10,9 +12,7 @@ from .hunting.hunting import limit_cycle as limit_cycle
 from .margins import Bandwidth as Bandwidth
 from .margins import Instability as Instability
 from .margins import Margins as Margins
-from .motion import AtRest as AtRest
 from .motion import Following as Following
-from .motion import LimitCycle as LimitCycle
 from .motion import StepResponse as StepResponse
 from .regimes import Axis as Axis
 from .settling import Moves as Moves

@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..preparation.prepare import Prepared
+from ..prepared_log import Prepared
 from ..rig.measured_motion_input import GIVEN_SPEED
 from ..rig.residuals import Point
 from ..rig.rig_scenario import Rig

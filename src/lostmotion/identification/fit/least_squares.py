@@ -9,10 +9,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...errors import InputError
-from ..preparation.prepare import Prepared
+from ..prepared_log import Prepared
 from ..rig.residuals import Engine, Point
+from ..rig.rig_scenario import Rig
+from ..task.file_formulas import number
 from ..task.free_parameters import FreeParameter
-from ..task.identification_file import FitOptions
+from ..task.identification_file import FitOptions, free_on
 
 NORMAL = 1.2533  # of the mean of the magnitude of normally distributed errors, to their standard deviation
 SMALL = 1e-4  # relative change of the cost at which the search ends, if it comes twice in a row
@@ -277,3 +279,12 @@ def _stepped(problem: Problem, point: Point, linear: _Linear, damping: float) ->
                 own[name] = moved(p, own[name], float(e[k]))
         nuisance[log.name] = own
     return Point(values, {**point.nuisance, **nuisance})
+
+
+def problem_of(rig: Rig, engine: Engine, logs: Sequence[Prepared], rung: int) -> Problem:
+    """The fit of a rung to logs."""
+    task = rig.task
+    given = [m.deviation for m in task.measured.values()]
+    deviations = None if None in given else np.array(given, dtype=float)
+    resolution = np.array([number(m.resolution, {}, "measured.resolution") for m in task.measured.values()])
+    return Problem(engine, logs, rung, free_on(task, rung), task.nuisance, task.fit, deviations, resolution)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..preparation.prepare import Prepared
+from ..prepared_log import Prepared
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from typing import Any
 
 from ...atomic_writer import write_bytes
 from ...version import __version__
-from ..preparation.prepare import Prepared
+from ..prepared_log import Prepared
 from ..rig.residuals import Point
 from ..task.identification_file import Identification
 

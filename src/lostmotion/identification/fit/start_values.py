@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...errors import InputError
-from ..preparation.prepare import Prepared
+from ..prepared_log import Prepared
 from ..rig.inverse_dynamics import Stretch, missing_torque, stretches
 from ..rig.measured_motion import Shown, names_of_channel, shown_motion, windows
 from ..rig.residuals import Engine, Point

@@ -21,18 +21,18 @@ from ...errors import InputError, prefixed
 from ...inputs.arguments import checked
 from ...verdict import Point as Answer
 from ...verdict import State, Verdict
-from ..candidate_models import free_on, grown, is_rough, problem_of, start_point
+from ..candidate_models import grown, is_rough
 from ..fit.input_courses import as_recorded, nearer_ways
 from ..fit.intervals import bootstrap
-from ..fit.least_squares import Fit, Problem, search
-from ..preparation.prepare import Prepared
+from ..fit.least_squares import Fit, Problem, problem_of, search
 from ..preparation.recorder_pauses import split_at_pauses
 from ..preparation.usable_logs import gathered
-from ..rig.residuals import Engine, Point
+from ..prepared_log import Prepared
+from ..rig.residuals import Engine, Point, start_point
 from ..rig.rig_scenario import Rig
 from ..task.file_formulas import number
 from ..task.free_parameters import FreeParameter
-from ..task.identification_file import Identification, load_identification
+from ..task.identification_file import Identification, free_on, load_identification
 from ..verdicts.disagreeing_logs import ODD
 from ..verdicts.residual_tests import LARGE, explained, hidden, misfits
 from .trends import RESIDUAL, LogEstimate, Watched, watched

@@ -18,10 +18,11 @@ from ...inputs.arguments import checked
 from ...inputs.validation import listed
 from ...simulation.scenario.scenario import Scenario
 from ...simulation.scenario.scenario_files import find_scenario, load
+from ..readers.channel_units import channel_unit
 from ..readers.log import Log
 from ..readers.log_files import ENDINGS, read_log
 from ..rig.rig_scenario import units_of
-from .prepare import alike, channel_unit
+from .prepare import alike
 from .screening import screened
 
 MOST_LOGS = 2000

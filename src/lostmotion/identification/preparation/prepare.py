@@ -6,15 +6,15 @@ import itertools
 import re
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from ...errors import InputError
-from ...units.conversion import si_factor, si_value
 from ...units.practical import counted
+from ..prepared_log import Prepared, Segment, fact_names, facts_of
+from ..readers.channel_units import channel_unit
 from ..readers.log import Channel, Log
 from ..task.file_formulas import Formula, names_within
 from ..task.identification_file import FormulaText, Identification, InputChannel, MeasuredChannel
@@ -22,139 +22,13 @@ from .screening import screened
 
 DEFAULT = "taken from logs.header: "  # how a note on such a value begins
 NUMBER = re.compile(r"-?\d[\d.e+-]*%?")
-KINDS = ("rad", "rad/s", "N*m", "A", "V", "N", "m", "m/s", "s", "K", "rad/s^2", "m/s^2", "W", "Pa")
 
 TRANSLATED = {"m": "rad", "m/s": "rad/s", "N": "N*m"}  # of a slide, and of a shaft
-
-
-@dataclass(frozen=True)
-class Segment:
-    """Samples ``begin`` to ``end`` of a log, in one phase of the rig (-1: as it is)."""
-
-    begin: int
-    end: int
-    phase: int
-    initial: Mapping[str, FormulaText] | None = None
-    """formulas of the measured state at which a run begins anew, by dotted key of the scenario; None: it goes on from the segment
-    before"""
-
-
-@dataclass
-class Prepared:
-    """A log that is compared with runs of the rig."""
-
-    log: Log  # screened; all channels whose unit is known in SI
-    time: np.ndarray  # [s], from 0
-    inputs: dict[str, np.ndarray]
-    measured: dict[str, np.ndarray]
-    """NaN where a channel has no number: such samples are not compared, and what acts goes on"""
-    facts: dict[str, Any]  # names for formulas: its header, and `first_CHANNEL` and `mean_CHANNEL` in SI
-    segments: tuple[Segment, ...]
-    held_out: bool
-    weight: np.ndarray  # weight of each sample, by which its errors are multiplied
-    first: bool  # whether the search is to begin with it
-    begin: float = 0.0  # [s] of the run: of a log behind a pause, when all that acts is known
-    cache: dict[Any, Any] = field(default_factory=dict, repr=False)
-
-    @cached_property
-    def valid(self) -> np.ndarray:
-        """Channels x samples: whether there is a number."""
-        return np.asarray(np.isfinite(np.array(list(self.measured.values()))))
-
-    @property
-    def name(self) -> str:
-        """Name of its file."""
-        return self.log.name
-
-    def changed(
-        self, task: Identification, channels: Mapping[str, np.ndarray], *, time: np.ndarray | None = None
-    ) -> Prepared:
-        """The log with other values of some channels of its file [SI], or at other times [s]."""
-        values = {name: replace(self.log.channels[name], values=x) for name, x in channels.items()}
-        own = replace(self.log, time=self.log.time if time is None else time, channels={**self.log.channels, **values})
-        return replace(
-            self,
-            log=own,
-            time=own.time - own.time[0],
-            inputs={name: own.values(i.channel) for name, i in task.inputs.items()},
-            measured={name: own.values(m.channel) for name, m in task.measured.items()},
-            facts=self.facts | _facts(own),
-            cache={},
-        )
-
-    def part(self, begin: int, end: int) -> Prepared:
-        """Some of its samples as a log of their own, whose time begins at 0; all of them as they are."""
-        if (begin, end) == (0, len(self.time)):
-            return self
-        of = slice(begin, end)
-        own = replace(
-            self.log,
-            name=self.name if begin == 0 else f"{self.name} from {self.time[begin]:.4g} s",
-            time=self.log.time[of],
-            channels={name: replace(c, values=c.values[of]) for name, c in self.log.channels.items()},
-            notes=self.log.notes if begin == 0 else (),
-        )
-        segments = [
-            Segment(max(s.begin, begin) - begin, min(s.end, end) - begin, s.phase, s.initial)
-            for s in self.segments
-            if s.begin < end and s.end > begin
-        ]
-        return replace(
-            self,
-            log=own,
-            time=self.time[of] - self.time[begin],
-            inputs={name: x[of] for name, x in self.inputs.items()},
-            measured={name: x[of] for name, x in self.measured.items()},
-            facts=self.facts | first_values(own) if begin > 0 else self.facts,
-            segments=tuple(segments),
-            weight=self.weight[of],
-            cache={},
-        )
-
-
-def channel_factor(written: str, of_file: str, unit: str, where: str) -> float:
-    """Factor from the unit of a channel to SI; see `channel_unit`."""
-    return channel_unit(written, of_file, unit, where)[0]
-
-
-def channel_unit(written: str, of_file: str, unit: str, where: str) -> tuple[float, str]:
-    """(what one of the unit of a channel is in SI, the SI unit).
-
-    written: as the identification file says; if empty, `of_file` holds, and if that is empty, the channel is in SI.
-    unit: SI unit of what it is compared with; units of another kind are read as what they are, for a `scale` to turn them.
-
-    Raises InputError: the unit is not known.
-    """
-    text = (written or of_file).strip()
-    if text in ("", "-", "1", "bool"):
-        return 1.0, "" if text else unit
-    problem: ValueError | None = None
-    for kind in dict.fromkeys((unit, *KINDS)):
-        if kind in ("", "1"):
-            continue
-        try:
-            return si_value(f"1 {text}", kind), kind
-        except ValueError as error:
-            problem = problem or error
-    with suppress(ValueError):
-        return si_factor(text), "SI"
-    raise InputError(
-        f"the unit {text!r} is not known ({problem}); write it with measured or inputs ... unit", where=where
-    )
 
 
 def alike(note: str) -> str:
     """Part of a note that notes of other logs share: all but its numbers, and with the value of `logs.header` that it names."""
     return note if note.startswith(DEFAULT) else NUMBER.sub("#", note)
-
-
-def is_unit(text: str) -> bool:
-    """Whether a text is a unit of a channel."""
-    try:
-        channel_factor(text, "", "", "")
-    except InputError:
-        return False
-    return True
 
 
 def prepared(
@@ -195,7 +69,7 @@ def prepared(
     origin = origin or {}
     for name in origin.keys() & header.keys():
         log = log.noted(f"{name} in its header counts, in place of that of its own file")
-    facts = {**origin, **_facts(log)}
+    facts = {**origin, **facts_of(log)}
     for name in (*task.parameters, *task.nuisance):
         if name in facts:
             log = log.noted(
@@ -236,7 +110,7 @@ def _in_si(task: Identification, log: Log, units: Mapping[str, str]) -> Log:
         if name not in known:
             with suppress(InputError):
                 known[name] = channel_unit("", c.unit, "", "")
-        if name not in known and named & {name, *_facts_of(name)}:
+        if name not in known and named & {name, *fact_names(name)}:
             raise InputError(
                 f"channel {name}: the unit {c.unit!r} is not known, and a formula names the channel; "
                 f"give the channel in SI, or with a unit that is known",
@@ -274,39 +148,15 @@ def _switches(task: Identification, log: Log) -> list[str]:
     return [name for text in formulas for name in Formula(text).names if name in log.channels]
 
 
-def _facts(log: Log) -> dict[str, Any]:
-    """Facts of a log that formulas may name."""
-    facts = {key: value for key, value in log.header.items() if isinstance(value, int | float | str)}
-    for name, channel in log.channels.items():
-        if (there := np.isfinite(channel.values)).any():
-            facts[_facts_of(name)[1]] = float(np.mean(channel.values[there]))
-    return facts | first_values(log)
-
-
-def first_values(log: Log) -> dict[str, float]:
-    """``first_CHANNEL`` of the channels of a log: the first value that is a number."""
-    return {
-        _facts_of(name)[0]: float(channel.values[np.argmax(there)])
-        for name, channel in log.channels.items()
-        if (there := np.isfinite(channel.values)).any()
-    }
-
-
 def first_values_named(task: Identification) -> set[str]:
     """Measured channels whose first value a formula names."""
     named = _named(task)
-    return {name for name, m in task.measured.items() if _facts_of(m.channel)[0] in named}
+    return {name for name, m in task.measured.items() if fact_names(m.channel)[0] in named}
 
 
 def _named(task: Identification) -> frozenset[str]:
     """Names in the formulas of a task."""
     return names_within(task.model_dump(include={"set", "phases", "ladder", "logs", "measured", "inputs", "monitor"}))
-
-
-def _facts_of(channel: str) -> tuple[str, str]:
-    """Names of the first value and the mean of a channel in formulas."""
-    key = "".join(c if c.isalnum() else "_" for c in channel)
-    return f"first_{key}", f"mean_{key}"
 
 
 def _fact(text: Any, facts: Mapping[str, Any], log: Log, key: str) -> Any:

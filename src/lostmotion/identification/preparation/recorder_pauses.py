@@ -16,15 +16,16 @@ import numpy as np
 from ...control.turning import turns
 from ...errors import InputError
 from ...model.torsion import Rigid
-from ..candidate_models import start_point
+from ..prepared_log import Prepared, Segment
 from ..rig.measured_motion import depends_on_angle
 from ..rig.measured_motion_input import refuse_given_motion
 from ..rig.measurement_model import numbers_of
+from ..rig.residuals import start_point
 from ..rig.rig_scenario import Rig
 from ..task.file_formulas import number
 from ..task.free_parameters import FreeParameter
 from ..task.identification_file import FormulaText, Identification
-from .prepare import Prepared, Segment, first_values_named
+from .prepare import first_values_named
 from .screening import PAUSE
 
 LEAST = 10  # samples of a part

@@ -8,13 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import InputError
-from ..candidate_models import start_point
-from ..left_out_conditions import refuse_leave_out
+from ...inputs.validation import did_you_mean
+from ..prepared_log import Prepared
 from ..readers.log_files import find_logs, read_log
 from ..rig.measurement_model import numbers_of
+from ..rig.residuals import start_point
 from ..rig.rig_scenario import Rig, names_of
 from ..task.file_formulas import Formula
-from .prepare import Prepared, prepared
+from ..task.identification_file import Identification
+from .prepare import prepared
 
 MANY = 12  # values of what a condition names, up to which they are listed
 
@@ -109,3 +111,18 @@ def _lacking(formulas: Mapping[str, Any], values: Mapping[str, Any], known: froz
             if name not in values and name in known:
                 return f"has no {name}, which key set.{key} names; add it to the file, or give it with logs.header"
     return ""
+
+
+def refuse_leave_out(task: Identification, logs: Sequence[Prepared]) -> None:
+    """Refuse a key of ``fit.leave_out`` that does not divide the fitted logs."""
+    train = [log for log in logs if not log.held_out]
+    for key in task.fit.leave_out:
+        lacking = [log.name for log in train if key not in log.facts]
+        if lacking:
+            known = sorted(set().union(*(log.facts for log in train)))
+            meant = did_you_mean(key, known, "give it with logs.header")
+            raise InputError(f"{lacking[0]} has no {key!r} in its header; {meant}", "fit.leave_out")
+        values = {log.facts[key] for log in train}
+        if len(values) < 2:
+            only = ", ".join(map(str, values))
+            raise InputError(f"{key!r} is {only} in all fitted logs; leave it out of the list", "fit.leave_out")

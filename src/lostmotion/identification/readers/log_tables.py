@@ -17,7 +17,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...inputs.validation import did_you_mean, shortened
-from ..preparation.prepare import is_unit
+from .channel_units import is_unit
 from .log import Channel, Log
 
 NAME = re.compile(r"^\s*(?P<name>.*?)\s*[\[(](?P<unit>[^\])]*)[\])]\s*$")

@@ -22,7 +22,7 @@ from ...model.angle_torques import STANDARD_GRAVITY, Gravity, PositionHarmonic, 
 from ...model.losses import ConstantEfficiency, MeshEfficiency
 from ...model.motor import ShaftMotor
 from ...simulation.scenario.scenario import Scenario
-from ..preparation.prepare import Prepared
+from ..prepared_log import Prepared
 from .log_inputs import DELAY, course_of_input, numbers_of_input
 from .measured_motion import Shown, measured_course
 from .rig_scenario import Rig

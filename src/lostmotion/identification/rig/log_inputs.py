@@ -12,7 +12,7 @@ from ... import _core
 from ...control.axis import OPEN_LOOP, Bound, own
 from ...errors import InputError
 from ...model.signals import columns, core_signal
-from ..preparation.prepare import Prepared
+from ..prepared_log import Prepared
 from ..task.file_formulas import number
 from ..task.identification_file import Identification
 from .measured_motion_input import GIVEN_ACCELERATION, GIVEN_SPEED, given_speed, rates_of, speed_of

@@ -12,7 +12,7 @@ import numpy as np
 from ...control.turning import turns
 from ...errors import InputError
 from ...model.train import DriveTrain
-from ..preparation.prepare import Prepared, Segment
+from ..prepared_log import Prepared, Segment
 from ..task.file_formulas import names_in
 from ..task.identification_file import FormulaText
 from .measured_motion_input import refuse_given_motion

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...simulation.scenario.scenario import Scenario
-from ..preparation.prepare import Prepared
+from ..prepared_log import Prepared
 from ..task.identification_file import Identification
 
 GIVEN_SPEED = "_given_speed"

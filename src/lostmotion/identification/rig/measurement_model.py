@@ -11,7 +11,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from ...errors import InputError
-from ..preparation.prepare import Prepared
+from ..prepared_log import Prepared
 from ..task.file_formulas import names_in, number
 from ..task.identification_file import Identification, MeasuredChannel
 

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..preparation.prepare import Prepared
+from ..prepared_log import Prepared
 from ..task.free_parameters import FreeParameter
+from ..task.identification_file import Identification, free_on
 from .rig_runs import NoDerivativeError, Seen, run_logs
 from .rig_scenario import Rig
 
@@ -165,3 +166,13 @@ def _residuals(
         for (log, _), seen in zip(requests, found, strict=True)
     ]
     return rows, failed
+
+
+def start_point(task: Identification, logs: Sequence[Prepared]) -> Point:
+    """Start values; parameters of higher rungs are off."""
+    first = free_on(task, 0)
+    values = {
+        name: p.start if name in first or p.fixed or p.off is None else p.off for name, p in task.parameters.items()
+    }
+    own = {name: p.start for name, p in task.nuisance.items()}
+    return Point(values, {log.name: dict(own) for log in logs})

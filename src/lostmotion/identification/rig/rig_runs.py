@@ -15,7 +15,7 @@ import numpy as np
 from ... import _core
 from ...errors import InputError
 from ...simulation.runs.sensitivities import CENTRAL, ONE_SIDED, run_cases
-from ..preparation.prepare import Prepared, Segment
+from ..prepared_log import Prepared, Segment
 from ..task.file_formulas import names_in, number
 from ..task.free_parameters import FreeParameter
 from ..task.identification_file import Identification

@@ -18,7 +18,7 @@ from ...simulation.runs.sensitivities import channels_of
 from ...simulation.scenario.requirements import need_no_impacts
 from ...simulation.scenario.scenario import Scenario
 from ...simulation.scenario.scenario_files import find_scenario, load
-from ..preparation.prepare import Prepared
+from ..prepared_log import Prepared
 from ..task.file_formulas import Formula, names_in
 from ..task.identification_file import CHANNEL_FORMULAS, Identification, Rung
 from .scenario_variants import Variants

@@ -298,3 +298,9 @@ def load_identification(path: str | Path) -> tuple[Identification, Path]:
     data = read_toml(path, "an identification")
     with prefixed(path):
         return Identification(**data), path.parent
+
+
+def free_on(task: Identification, rung: int) -> dict[str, FreeParameter]:
+    """Parameters that are sought on a rung."""
+    names = [name for entry in task.rungs()[: rung + 1] for name in entry.free]
+    return {name: p for name, p in task.parameters.items() if name in names and not p.fixed}

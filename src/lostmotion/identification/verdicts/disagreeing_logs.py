@@ -15,10 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...errors import InputError
-from ..candidate_models import problem_of
-from ..fit.least_squares import Fit, search
-from ..preparation.prepare import Prepared
+from ..fit.least_squares import Fit, problem_of, search
 from ..preparation.screening import MOTION, frozen_stretches, wrapped_by
+from ..prepared_log import Prepared
 from ..rig.residuals import Engine, Point
 from ..rig.rig_scenario import Rig
 from .residual_tests import explained

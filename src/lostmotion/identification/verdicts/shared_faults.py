@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ..preparation.prepare import Prepared
+from ..prepared_log import Prepared
 from ..rig.residuals import Engine, Point
 from ..rig.rig_scenario import Rig
 from .disagreeing_logs import OddLog

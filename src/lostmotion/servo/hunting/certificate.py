@@ -14,8 +14,8 @@ from ...inputs.arguments import checked
 from ...inputs.quantities import argument
 from ...inputs.validation import shown
 from ...simulation.scenario.scenario import Scenario
-from ..motion import at_rest
 from ..regimes import Axis, axis_of
+from .at_rest import at_rest
 from .break_away_map import Image, Transients, image
 from .limit_cycles import SAMPLES, Loop
 from .proof import Certainty, Proof, prove

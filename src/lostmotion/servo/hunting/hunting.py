@@ -19,8 +19,8 @@ from ...response.shooting import floquet_multipliers, is_stable, motion_of
 from ...simulation.scenario.scenario import Scenario
 from ...simulation.scenario.units_of_keys import unit_for
 from ...worker_threads import thread_pool
-from ..motion import PART, at_rest, without, without_backlash, without_friction
 from ..regimes import axis_of
+from .at_rest import PART, at_rest, without, without_backlash, without_friction
 from .limit_cycles import Found, Loop, find_limit_cycle
 from .standstill import Verdict
 
@@ -178,7 +178,7 @@ def without_saturation(train: Scenario) -> Scenario | None:
 
 def _sampled(train: Scenario, motor: str | None, *, causes: bool) -> Hunting:
     """By a long run, as the servo report has it."""
-    from ..motion import limit_cycle as watched
+    from .at_rest import limit_cycle as watched
 
     axis = axis_of(train, motor)
     if axis.controller.position is None:
