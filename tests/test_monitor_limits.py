@@ -71,6 +71,16 @@ def test_a_doubled_friction_is_never_within_its_limit(tmp_path: Path, baseline: 
         assert "within the largest" not in found.text
 
 
+def test_a_watch_of_one_direction_says_which_change_it_has_not_seen(tmp_path: Path) -> None:
+    """The friction doubles, which a watch of falls does not look for: it has changed, but not fallen."""
+    task = friction_logs(tmp_path, 4, baseline=8)
+    task.write_text(task.read_text().replace("max = 0.15", 'direction = "down"'))
+    found = lm.monitor(task)
+    assert found.verdict.state == "fits"
+    assert "no fall" in found.watched["coulomb"].text and "no change" not in found.watched["coulomb"].text
+    assert found.verdict.lines == ("no watched value has changed in a direction that is watched",)
+
+
 def test_few_logs_do_not_decide_on_a_change_and_say_how_many_would(tmp_path: Path) -> None:
     found = lm.monitor(friction_logs(tmp_path, 3)).watched["coulomb"]
     assert found.change is not None

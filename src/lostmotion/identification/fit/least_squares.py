@@ -284,7 +284,7 @@ def _stepped(problem: Problem, point: Point, linear: _Linear, damping: float) ->
 def problem_of(rig: Rig, engine: Engine, logs: Sequence[Prepared], rung: int) -> Problem:
     """The fit of a rung to logs."""
     task = rig.task
-    given = [m.deviation for m in task.measured.values()]
+    given = list(rig.deviations.values())
     deviations = None if None in given else np.array(given, dtype=float)
     resolution = np.array([number(m.resolution, {}, "measured.resolution") for m in task.measured.values()])
     return Problem(engine, logs, rung, free_on(task, rung), task.nuisance, task.fit, deviations, resolution)

@@ -94,7 +94,7 @@ def _windows_or_logs(rig: Rig, logs: Sequence[Prepared], point: Point) -> Sequen
 
 def _error(rig: Rig, engine: Engine, logs: Sequence[Prepared], point: Point) -> float:
     """Mean absolute residual in units of the deviations."""
-    units = np.array([m.deviation or 1.0 for m in rig.task.measured.values()])[:, None]
+    units = np.array([deviation or 1.0 for deviation in rig.deviations.values()])[:, None]
     rows = [np.abs(r / units).ravel() for r in engine.residuals(logs, point, 0)]
     error = float(np.mean(np.concatenate(rows)))
     return error if np.isfinite(error) else np.inf

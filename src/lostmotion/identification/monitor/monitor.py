@@ -97,6 +97,14 @@ class MonitorResult:
     def __str__(self) -> str:
         return "\n".join(self.lines())
 
+    def _fits(self) -> str:
+        """What was watched, and has not happened."""
+        watches = list(self.task.monitor.watch.values())
+        one_way = any(w.direction != "both" for w in watches)
+        limited = any(w.min is not None or w.max is not None for w in watches)
+        changed = f"no watched value has changed{' in a direction that is watched' if one_way else ''}"
+        return f"{changed}, and none is beyond its limits" if limited else changed
+
     @property
     def verdict(self) -> Verdict:
         """Changes and limits, what is not decided, and logs that are not used."""
@@ -110,7 +118,7 @@ class MonitorResult:
             points.append(Answer("fits with a reservation", text))
         verdict = Verdict.of(points)
         if verdict.state == "fits":
-            return Verdict("fits", ("no watched value has changed, and none is beyond its limits",))
+            return Verdict("fits", (self._fits(),))
         more = [p.sentence for p in points if p.state == verdict.state and p.sentence != verdict.lines[0]]
         return replace(
             verdict, lines=(*verdict.lines, *more[:1], *([f"{len(more) - 1} more below"] if more[1:] else []))

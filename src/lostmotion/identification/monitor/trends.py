@@ -95,6 +95,9 @@ def watched(task: Identification, estimates: list[LogEstimate], free: list[str])
     return found
 
 
+CHANGES = {"up": "rise", "down": "fall", "both": "change"}
+
+
 class _Series:
     """Estimates of one value over the logs that determine it."""
 
@@ -160,7 +163,7 @@ class _Series:
             words = f"{self._since(change)} from {p.shown(change.before)} to {shown}"
         elif enough:
             found = f"a step of {p.shown(change.detectable)}{unit} over the last {_logs(min(RECENT, after))} would have been found with 90 %"
-            words = f"{shown}, no change; {found}"
+            words = f"{shown}, no {CHANGES[watch.direction]}; {found}"
         else:
             few = (
                 f"{_logs(after)} after the baseline determine{'s' if after == 1 else ''} it, {change.needed} are needed"
@@ -199,8 +202,8 @@ class _Series:
         assert change.begins is not None
         assert change.alarm is not None
         at, low, high = (self.estimates[self.logs[k]].log for k in change.begins)
-        kind = "changed" if change.ramp == 1 else "drifts"
-        return f"{kind} since {at} ({low} to {high}, seen with {self.estimates[self.logs[change.alarm]].log})"
+        kind, between = "changed" if change.ramp == 1 else "drifts", "" if low == high else f"{low} to {high}, "
+        return f"{kind} since {at} ({between}seen with {self.estimates[self.logs[change.alarm]].log})"
 
 
 def _variances(values: np.ndarray, deviations: np.ndarray, count: int) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,7 +21,8 @@ from ...simulation.scenario.scenario import Scenario
 from ...simulation.scenario.scenario_files import find_scenario, load
 from ..prepared_log import Prepared
 from ..task.file_formulas import Formula, names_in
-from ..task.identification_file import CHANNEL_FORMULAS, Identification, Rung
+from ..task.free_parameters import in_unit
+from ..task.identification_file import CHANNEL_FORMULAS, Identification, MeasuredChannel, Rung
 from .scenario_variants import Variants
 from .shaft_angles import angle_terms
 
@@ -81,8 +83,8 @@ class Rig:
     """
 
     def __init__(self, task: Identification, directory: Path) -> None:
-        self.task = task
         loaded = load(find_scenario(task.scenario, directory))
+        self.task = task = _in_long_form(task, loaded)
         self.scenario = loaded.long()
         need_no_impacts(self.scenario, "identify")
         self._variants = Variants(self.scenario)
@@ -107,6 +109,7 @@ class Rig:
                 )
             if isinstance(m.resolution, float) and m.resolution < 0.0:
                 raise InputError(f"{m.resolution:g} must be at least 0", f"measured.{name}.resolution")
+        self.deviations = {name: self._deviation(name, m) for name, m in task.measured.items()}
         table, _, gear = task.record.partition(".")
         if task.record and (table != "gear" or gear not in self.scenario.gears):
             raise InputError(
@@ -123,6 +126,17 @@ class Rig:
             own = {key: _read(v, f"ladder[{k}].set.{key}") for key, v in rung.set.items()}
             self._rungs.append({**(self._rungs[-1] if self._rungs else {}), **own})
         self._refuse_idle()
+
+    def _deviation(self, name: str, channel: MeasuredChannel) -> float | None:
+        """Standard deviation of the errors of a measured channel [SI]; None: the task gives none."""
+        key = f"measured.{name}.deviation"
+        try:
+            found = in_unit(channel.deviation, self.units[channel.variable], key)
+        except ValueError as problem:
+            raise InputError(str(problem).removeprefix(f"has {key} = "), key) from None
+        if found is not None and not 0.0 < found < math.inf:
+            raise InputError(f"{found:g} must be above 0", key)
+        return found
 
     def _refuse_idle(self) -> None:
         """A parameter that is sought and enters nothing."""
@@ -237,6 +251,27 @@ class Rig:
         """The scenario of the first phase of a log, without its signals, checked as any other."""
         found = self.built(self.changes({**log.facts, **values}, rung, log.segments[0].phase)).scenario
         return found.replace()
+
+
+def _in_long_form(task: Identification, scenario: Scenario) -> Identification:
+    """The task with the names that keys, inputs and variables of its scenario have in the long form."""
+    long = {short: long for long, short in scenario.train().aliases.items()}
+
+    def keys(values: Mapping[str, Any]) -> dict[str, Any]:
+        return {scenario.form.in_long(key): value for key, value in values.items()}
+
+    return task.model_copy(
+        update={
+            "inputs": {long.get(name, name): channel for name, channel in task.inputs.items()},
+            "measured": {
+                name: m.model_copy(update={"variable": long.get(m.variable, m.variable)})
+                for name, m in task.measured.items()
+            },
+            "set": keys(task.set),
+            "phases": tuple(p.model_copy(update={"set": keys(p.set)}) for p in task.phases),
+            "ladder": tuple(r.model_copy(update={"set": keys(r.set)}) for r in task.ladder),
+        }
+    )
 
 
 def units_of(scenario: Scenario) -> dict[str, str]:

@@ -79,8 +79,8 @@ class MeasuredChannel(Part):
     delay: FormulaText = 0.0  #: from the quantity until its sample [s]
     filter_time: FormulaText = 0.0  #: time constant of the first-order filter of the channel [s]
     resolution: FormulaText = 0.0  #: step of its quantisation, SI
-    deviation: Annotated[Number, Positive] | None = None
-    """standard deviation of its errors, SI: the weight against other channels; needed where there are several"""
+    deviation: float | str | None = None
+    """standard deviation of its errors, SI or text with a unit: the weight against other channels; needed where there are several"""
 
 
 class Phase(Part):

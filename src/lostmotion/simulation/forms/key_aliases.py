@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -51,6 +51,10 @@ class Form:
         """A key of the long form as files have it; others as they are."""
         return renamed(key, dict(self.keys))
 
+    def in_long(self, key: str) -> str:
+        """A key of files in the long form; others as they are."""
+        return renamed(key, dict(sorted(_first_of(self.keys).items(), key=lambda pair: -len(pair[0]))))
+
     def in_tables(self, key: str) -> str:
         """A key of files, or of the long form, as it is in the tables that are read again."""
         return key if key == "command" else renamed(key, dict(self.back))
@@ -58,10 +62,15 @@ class Form:
 
 def _axis_back() -> Iterator[tuple[str, str]]:
     yield from ((key, key) for key in (f"command.{MOTOR}", f"command.{BRAKE}"))
+    yield from _first_of(_AXIS.items()).items()
+
+
+def _first_of(keys: Iterable[tuple[str, str]]) -> dict[str, str]:
+    """For each key of files, the first key of the long form that it stands for."""
     first: dict[str, str] = {}
-    for long, short in _AXIS.items():
+    for long, short in keys:
         first.setdefault(short, long)
-    yield from first.items()
+    return first
 
 
 TRAIN = Form((), ())
