@@ -9,9 +9,48 @@ The names that most programs use are in `lostmotion` itself, the others in names
 
 from __future__ import annotations
 
+from types import ModuleType
 from typing import Any
 
-from .namespace import moved, namespace
+from .namespace import moved, namespace, when_taken
+
+# Modules whose functions return datasets: importing one of their names registers the accessor `result.lm`.
+_WITH_DATASETS = (
+    "response.crossovers",
+    "response.harmonic",
+    "response.shooting",
+    "servo.hunting.certificate",
+    "servo.hunting.hunting",
+    "simulation.runs.result_files",
+    "simulation.runs.results",
+    "simulation.runs.run",
+    "simulation.runs.switchings",
+    "test_rig.measurement",
+    "test_rig.rig",
+)
+# Modules whose results notebooks show as the page that the command writes.
+_WITH_PAGES = (
+    "identification.identify",
+    "identification.monitor.monitor",
+    "pointing.budget",
+    "servo.commission",
+    "sizing.drive_check",
+    "test_rig.measurement",
+)
+
+
+def _show_results(module: ModuleType) -> None:
+    """Gives the results of a module their charts and pages, when the first of its names is taken."""
+    inner = module.__name__.removeprefix(f"{__name__}.")
+    if inner in _WITH_DATASETS:
+        from .reports import accessor  # noqa: F401
+    if inner in _WITH_PAGES:
+        from .reports import notebook
+
+        notebook.attach(module)
+
+
+when_taken.append(_show_results)
 
 _get, __dir__ = namespace(__name__)
 

@@ -12,37 +12,17 @@ import sys
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 _TOP = "lostmotion"
 _LINE = re.compile(r"from (\.[\w.]*) import (\w+) as \2\n")
 
-# Modules whose functions return datasets: importing one of their names registers the accessor `result.lm`.
-_WITH_DATASETS = (
-    "response.crossovers",
-    "response.harmonic",
-    "response.shooting",
-    "servo.hunting.certificate",
-    "servo.hunting.hunting",
-    "simulation.runs.result_files",
-    "simulation.runs.results",
-    "simulation.runs.run",
-    "simulation.runs.switchings",
-    "test_rig.measurement",
-    "test_rig.rig",
-)
-# Modules whose results notebooks show as the page that the command writes.
-_WITH_PAGES = (
-    "identification.identify",
-    "identification.monitor.monitor",
-    "pointing.budget",
-    "servo.commission",
-    "sizing.drive_check",
-    "test_rig.measurement",
-)
-
 # Names that were taken together in another one.
 _RENAMED = {"DriveScenario": "Scenario", "TrainScenario": "Scenario"}
+
+when_taken: list[Callable[[ModuleType], None]] = []
+"""called with each module of which a public name is taken"""
 
 
 def homes_of(package: str) -> dict[str, str]:
@@ -81,11 +61,8 @@ def _public(home: str, name: str) -> Any:
     if home == _TOP:  # a namespace
         return importlib.import_module(f"{_TOP}.{name}")
     module = importlib.import_module(home)
-    inner = home.removeprefix(f"{_TOP}.")
-    if inner in _WITH_DATASETS:
-        importlib.import_module(f"{_TOP}.reports.accessor")
-    if inner in _WITH_PAGES:
-        importlib.import_module(f"{_TOP}.reports.notebook").attach(module)
+    for taken in when_taken:
+        taken(module)
     return getattr(module, name)
 
 

@@ -17,6 +17,7 @@ from ..portable.derivation import Derivation
 from ..portable.descriptions import written
 from ..simulation.forms.train_tables import TrainInitial
 from ..simulation.stepping.robot_joints import joint_drive
+from ..simulation.stepping.solver_access import solver_train
 from .attaching import drive_of_joint
 from .overlaps import without_weight
 
@@ -94,7 +95,7 @@ def write_drive(drive: Any, path: str | Path, *, controller: Controller | None =
     given = drive_of_joint(name, drive, controller)
     given = without_weight(name, given, replace=replace, weighs=True)
     joint = joint_drive(name, given, 1.0, 1e-3)
-    core = joint.simulation._core_train
+    core = solver_train(joint.simulation)
     still = [CommandSignal().core()] * len(core.input_names())
     start = joint.drive.start(TrainInitial(speeds=joint.ratios()))
     case = _core.Case(core, inputs=still, start=start, hysteresis_capacities={})

@@ -23,6 +23,7 @@ from ..control.controller import AnyReference, Controller
 from ..control.references import PositionReference
 from ..simulation.scenario.scenario import Scenario
 from ..simulation.stepping.simulation import Simulation
+from ..simulation.stepping.solver_access import solver_of
 from ..units.practical import counted
 from .plant import Plant
 from .windows import Window
@@ -67,10 +68,10 @@ class ClosedLoop:
         assert plant.closed is not None
         self.plant, self.window = plant, window
         self.simulation = _UnderSine(plant, source, amplitude, window.frequency, law)
-        self.core = self.simulation._core
+        self.core, control = solver_of(self.simulation)
         self.constants = {name: plant.signals[name].mean for name in self.simulation.inputs}
         self.begin = 0  # tick at which the window begins
-        self._running = list(running_slots(self.simulation._control))
+        self._running = list(running_slots(control))
         self.windows = self.jumps = 0
         self._to(0)
 

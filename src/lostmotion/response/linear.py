@@ -23,6 +23,7 @@ from ..simulation.runs.core_runs import core_case
 from ..simulation.scenario.requirements import need_free_motion, need_open_loop
 from ..simulation.scenario.scenario import Scenario
 from ..simulation.stepping.simulation import Simulation
+from ..simulation.stepping.solver_access import linear_regime
 from ..simulation.train_variables import only_input
 from ..simulation.variables import variables_of_core
 
@@ -245,10 +246,8 @@ def _ramp(value: float, rate: float) -> _core.Signal:
 
 
 def _model_now(simulation: Simulation) -> LinearModel:
-    need_free_motion(simulation._scenario, "linearize")
-    with simulation._turn:
-        regime = simulation._idle().linearize()
-    return _model(simulation._train, simulation._core_train, regime)
+    train, core, regime = linear_regime(simulation)
+    return _model(train, core, regime)
 
 
 def _model_of_run(what: Any, time: float) -> LinearModel:

@@ -24,6 +24,7 @@ from ...simulation.runs.stuck_contacts import explain
 from ...simulation.scenario.scenario import Scenario
 from ...simulation.stepping.simulation import Simulation
 from ...simulation.stepping.simulation_state import SimulationState
+from ...simulation.stepping.solver_access import solver_of
 from ...units.practical import practical
 
 Verdict = Literal["hunts", "at rest", "not decided"]
@@ -91,12 +92,12 @@ class Watch:
 
     def __init__(self, scenario: Scenario, names: Sequence[str]) -> None:
         self.simulation = Simulation(scenario)
-        self.core = self.simulation._core
+        self.core, control = solver_of(self.simulation)
         self.names = tuple(names)
         sampled = bool(scenario.axes())
         self.tick, ticks = frame_of(scenario) if sampled else (0.0, 0)
         self.frame = self.tick * ticks
-        self._running = list(running_slots(self.simulation._control))
+        self._running = list(running_slots(control))
         self.noise = np.array([_noise(scenario, name) for name in self.names])
         self._speeds = tuple(map(scenario.train().speed_of, scenario.train().shafts))
         self.skipped = 0.0  # time that was extrapolated, not run [s]
