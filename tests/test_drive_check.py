@@ -596,11 +596,11 @@ def test_what_moves_a_slide_is_asked_for_no_rating_of_a_gearbox():
     assert not [f for f in screw if "gearbox" in str(f.remark) or "rated_output_torque" in str(f.remark)]
     rack = lm.load("rack-axis-with-play")
     force = float(abs(lm.simulate(rack)["rack_output_force"]).max())
-    (found,) = [f for f in check_drive(rack) if f.what.endswith("output force, largest")]
+    (found,) = [f for f in check_drive(rack) if f.rule == "rack_force"]
     assert found.verdict == "unknown"
     assert found.value.endswith(" N")
     assert float(found.value.removesuffix(" N")) == pytest.approx(force, rel=0.01)  # of denser samples
-    assert found.remark == "a rack has no rated force here; compare with its data sheet"
+    assert found.remark.endswith("rack.rated_force is missing")
 
 
 def test_the_verdict_of_a_screw_turns_with_its_speed_and_its_mounting():

@@ -119,7 +119,8 @@ def test_what_is_given_takes_the_place_of_what_says_the_same() -> None:
     assert not {"efficiency", "nut_stiffness", "core_diameter"} & screw.keys()
     assert screw["mean_diameter"] == 0.02575
     belt = linear_table("belt", "elatech-at5-25", {"travel_per_turn": "0.1 m", "stiffness": "1e6 N/m"}, "x")
-    assert belt == {"travel_per_turn": "0.1 m", "stiffness": "1e6 N/m"}
+    assert not {"pitch", "specific_stiffness"} & belt.keys()
+    assert belt["rated_force"] == 1750.0  # a rating remains
     motor = linear_table("linear_motor", "inoprec-lmc88-130", {"rated_current": "3 A", "cogging_force": "3 N"}, "x")
     assert "rated_force" not in motor and motor["pole_pitch"] == 0.014
 

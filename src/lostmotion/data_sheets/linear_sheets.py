@@ -23,7 +23,7 @@ from ..inputs.quantities import (
 )
 from ..model.linear import RatedScrew
 from ..model.linear_motor import LinearMotorData
-from ..model.rack_and_belt import BeltData, RackData
+from ..model.rack_and_belt import RatedBelt, RatedRack
 from .sheet import Record
 
 Alternatives = tuple[tuple[tuple[str, ...], ...], ...]
@@ -108,7 +108,7 @@ class ScrewSheet(LinearSheet, RatedScrew):
     _compliance_is_clear = _is_a_screw = model_validator(mode="after")(_as_it_is)
 
 
-class RackSheet(LinearSheet, RackData):
+class RackSheet(LinearSheet, RatedRack):
     """Data sheet of a rack, or of a rack with its pinion.
 
     Examples
@@ -129,11 +129,8 @@ class RackSheet(LinearSheet, RackData):
     bar_length: Annotated[Length, Positive] | None = None
     bar_teeth: Annotated[Whole, Positive] | None = None
     bar_mass: Annotated[Mass, Positive] | None = None
-    rated_force: Annotated[Force, Positive] | None = None
-    """along the rack, continuous"""
-    peak_force: Annotated[Force, Positive] | None = None
 
-    PART: ClassVar[type[Part]] = RackData
+    PART: ClassVar[type[Part]] = RatedRack
     ALTERNATIVES: ClassVar[Alternatives] = ((("module", "teeth", "helix_angle"), ("travel_per_turn",)), STIFFNESSES)
     CHOICES: ClassVar[dict[str, str]] = {"teeth": "of the pinion"}
     NEEDS: ClassVar[dict[str, tuple[str, ...]]] = {"module": ("module", "travel_per_turn")}
@@ -141,7 +138,7 @@ class RackSheet(LinearSheet, RackData):
     _compliance_is_clear = _is_a_rack = model_validator(mode="after")(_as_it_is)
 
 
-class BeltSheet(LinearSheet, BeltData):
+class BeltSheet(LinearSheet, RatedBelt):
     """Data sheet of a toothed belt.
 
     Examples
@@ -153,17 +150,10 @@ class BeltSheet(LinearSheet, BeltData):
     """
 
     kind: Literal["open", "endless"] = "open"
-    profile: str = ""
-    """such as AT5"""
-    width: Annotated[Length, Positive] | None = None
-    rated_force: Annotated[Force, Positive] | None = None
-    """largest one of the tension members in operation"""
     breaking_force: Annotated[Force, Positive] | None = None
-    tooth_force: Annotated[Force, Positive] | None = None
-    """tooth force of one tooth in mesh, at standstill"""
     mass_per_length: Annotated[MassPerLength, Positive] | None = None
 
-    PART: ClassVar[type[Part]] = BeltData
+    PART: ClassVar[type[Part]] = RatedBelt
     ALTERNATIVES: ClassVar[Alternatives] = (
         (("pulley_diameter",), ("teeth", "pitch"), ("travel_per_turn",)),
         (*STIFFNESSES, ("specific_stiffness", "free_lengths")),

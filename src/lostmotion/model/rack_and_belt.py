@@ -37,6 +37,19 @@ class RackData(LinearDrive):
         return math.pi * self.module * self.teeth / cos(self.helix_angle or 0.0)
 
 
+class RatedRack(RackData):
+    """A rack and its pinion alone, with the ratings by which its force is judged.
+
+    Examples
+    --------
+    >>> RatedRack(module="2 mm", teeth=20, rated_force="8 kN").rated_force
+    8000.0
+    """
+
+    rated_force: Annotated[Force, Positive] | None = None  #: along the rack, continuous
+    peak_force: Annotated[Force, Positive] | None = None
+
+
 class BeltData(LinearDrive):
     """A toothed belt and its pulley alone, as a data sheet has them.
 
@@ -98,7 +111,36 @@ class BeltData(LinearDrive):
         return stiffness
 
 
-class Rack(RackData, Placed):
+class RatedBelt(BeltData):
+    """A toothed belt and its pulley alone, with the ratings by which its force is judged.
+
+    Examples
+    --------
+    >>> belt = RatedBelt(teeth=20, pitch="5 mm", stiffness="1 N/um", profile="AT5", width="16 mm")
+    >>> belt.meshing()
+    10
+    """
+
+    profile: str = ""
+    """such as AT5, GT2 or HTD; with width the ratings are those of manufacturers, where they are not given"""
+    width: Annotated[Length, Positive] | None = None
+    rated_force: Annotated[Force, Positive] | None = None
+    """largest force of the tension members in operation"""
+    tooth_force: Annotated[Force, Positive] | None = None
+    """tooth force of one tooth in mesh, at standstill"""
+    pretension: Annotated[Force, Positive] | None = None
+    """force of a strand at rest; left out, the largest circumferential force, so that no strand is slack"""
+    teeth_in_mesh: Annotated[Whole, Field(ge=1, le=1000)] | None = None
+    """left out, those of half of the pulley"""
+
+    def meshing(self) -> int | None:
+        """Teeth in mesh; None where neither they nor those of the pulley are known."""
+        if self.teeth_in_mesh is not None:
+            return self.teeth_in_mesh
+        return None if self.teeth is None else self.teeth // 2
+
+
+class Rack(RatedRack, Placed):
     """A pinion on a shaft and its rack on a slide, or the other way round.
 
     Examples
@@ -109,7 +151,7 @@ class Rack(RackData, Placed):
     """
 
 
-class Belt(BeltData, Placed):
+class Belt(RatedBelt, Placed):
     """A toothed belt from a pulley on a shaft to a slide.
 
     Examples

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,7 +15,9 @@ from ..model.duty import HoldingBrake
 from ..model.gearbox import Gearbox
 from ..model.linear import RatedScrew
 from ..model.motor import Motor
+from ..model.rack_and_belt import RatedBelt, RatedRack
 from ..units.practical import ROUNDING, RPM, excess, share_of_limit, told_apart
+from .belt_ratings import FULL_MESH, INCH, SOURCE, of_profile, widths, working_tension
 from .catalogue_formulas import (
     belt_force,
     buckling_force,
@@ -30,7 +32,7 @@ from .catalogue_formulas import (
 from .duty_cycle import integral
 from .finding import Finding, Judgement, within
 from .required_motion import InputDemand, RequiredMotion
-from .stages import BeltStage, RackStage, Stage
+from .stages import Stage
 
 HOUR = 3600.0
 BRAKE = "torque that the holding brake carries"
@@ -118,9 +120,9 @@ def stage_stop(motion: RequiredMotion, stage: Stage, deceleration: float) -> lis
     def judged(word: str, limit: float | None, name: str, key: str) -> Finding:
         return against(rule, f"{word} in an emergency stop", force, limit, "N", name, key)
 
-    if isinstance(stage, RackStage):
+    if isinstance(stage, RatedRack):
         return [judged("force along the rack", stage.peak_force or stage.rated_force, *_of_rack(stage))]
-    if isinstance(stage, BeltStage):
+    if isinstance(stage, RatedBelt):
         what, name = "force of the belt with pretension, in an emergency stop", "force of the belt in operation"
         strained = belt_force(force, stage.pretension)
         return [against(rule, what, strained, stage.rated_force, "N", name, "belt.rated_force")]
@@ -138,7 +140,7 @@ def motor_stop(motion: RequiredMotion, motor: Motor, deceleration: float) -> Fin
     return against("emergency_stop", "force of the motor in an emergency stop", force, limit, "N", name, key)
 
 
-def _of_rack(rack: RackStage) -> tuple[str, str]:
+def _of_rack(rack: RatedRack) -> tuple[str, str]:
     return f"{'peak' if rack.peak_force else 'rated'} force of the rack", "rack.rated_force"
 
 
@@ -188,9 +190,10 @@ def stage_rules(motion: RequiredMotion, stage: Stage, wanted_life: float | None)
     """The rules of the stage of a linear axis for the motion of its slide."""
     if isinstance(stage, RatedScrew):
         return screw_rules(axial_load(motion), stage, wanted_life)
-    if isinstance(stage, BeltStage):
-        return belt_rules(motion, stage)
-    return rack_rules(motion, stage)
+    peak = float(np.abs(motion.torque).max())
+    if isinstance(stage, RatedBelt):
+        return belt_rules(peak, stage)
+    return rack_rules(peak, stage)
 
 
 @dataclass(frozen=True)
@@ -270,21 +273,61 @@ def screw_rules(load: AxialLoad, screw: RatedScrew, wanted_life: float | None, *
     return [*found, against("screw_speed", what, RPM * fastest, most, "rpm", name, lacks)]
 
 
-def belt_rules(motion: RequiredMotion, belt: BeltStage) -> list[Finding]:
-    """Tension of a belt and the load of its teeth. Sources: `formulas.belt_force` and `formulas.tooth_forces`."""
-    peak, force_key = float(np.abs(motion.torque).max()), "belt.rated_force"
+def belt_rules(peak: float, belt: RatedBelt, *, key: str = "belt") -> list[Finding]:
+    """Tension of a belt and the load of its teeth under the largest force of its slide [N].
+
+    Ratings that its table does not give are those of its profile and width. Sources: `catalogue_formulas.belt_force`,
+    `catalogue_formulas.tooth_forces` and `belt_ratings`.
+
+    key: table of the belt, for what is missing.
+    """
+    rated, in_mesh = of_profile(belt), belt.meshing()
     what, name = "force of the belt, with pretension", "force of the belt in operation"
-    force = against("belt_force", what, belt_force(peak, belt.pretension), belt.rated_force, "N", name, force_key)
-    limit = tooth_forces(belt.tooth_force, belt.teeth) if belt.tooth_force and belt.teeth else None
+    strained = belt_force(peak, belt.pretension)
+    force = _rating("belt_force", what, strained, rated.rated_force, name, _needed(belt, "rated_force", key))
     what, name = "circumferential force on the teeth of the belt", "force of the teeth in mesh"
-    key = "belt.teeth" if belt.tooth_force else "belt.tooth_force"
-    return [force, against("belt_teeth", what, peak, limit, "N", name, key)]
+    if rated.tooth_force is None and (tension := working_tension(belt)) is not None:
+        return [force, _worked(what, peak, tension, belt)]
+    limit = tooth_forces(rated.tooth_force, in_mesh) if rated.tooth_force and in_mesh else None
+    lacks = f"{key}.teeth_in_mesh" if rated.tooth_force else _needed(belt, "tooth_force", key)
+    return [force, _rating("belt_teeth", what, peak, limit, name, lacks)]
 
 
-def rack_rules(motion: RequiredMotion, rack: RackStage) -> list[Finding]:
-    """Largest force along a rack against its peak force, or else its rated one. Source: the data sheet."""
-    peak, limit = float(np.abs(motion.torque).max()), rack.peak_force or rack.rated_force
-    return [against("rack_force", "force along the rack, largest", peak, limit, "N", *_of_rack(rack))]
+def _rating(rule: str, what: str, force: float, limit: float | None, name: str, key: str) -> Finding:
+    """A force [N] with its rating; where that is missing the force itself."""
+    found = against(rule, what, force, limit, "N", name, key)
+    return found if limit is not None else replace(found, value=f"{force:.4g} N")
+
+
+def _needed(belt: RatedBelt, rating: str, key: str) -> str:
+    """Keys that would give a rating of a belt."""
+    if not belt.profile or belt.width is None:
+        return f"{key}.{rating}, or {key}.{'width' if belt.profile else 'profile'},"
+    printed = ", ".join(f"{1e3 * width:g}" for width in widths(belt.profile))
+    there = f"sheets of {belt.profile} are {printed} mm wide" if printed else f"no sheet of {belt.profile} is at hand"
+    return f"{key}.{rating} ({there})"
+
+
+def _worked(what: str, peak: float, tension: float, belt: RatedBelt) -> Finding:
+    """Circumferential force with the allowable working tension of a profile, which holds for an inch and full mesh."""
+    found = within("belt_teeth", what, peak, tension, "N", f"working tension of {belt.profile} ({SOURCE})")
+    assert belt.width is not None
+    doubts = []
+    if belt.width < INCH:
+        doubts.append("belts narrower than 1 inch carry less by an amount that the source does not print")
+    if (in_mesh := belt.meshing()) is None or in_mesh < FULL_MESH:
+        doubts.append(f"it holds for {FULL_MESH} teeth in mesh and more")
+    if found.verdict != "ok" or not doubts:
+        return found
+    return found.noted("; ".join(doubts), verdict="unknown")
+
+
+def rack_rules(peak: float, rack: RatedRack, *, key: str = "rack") -> list[Finding]:
+    """Largest force along a rack [N] against its peak force, or else its rated one. Source: the data sheet."""
+    name, lacks = _of_rack(rack)
+    lacks = lacks.replace("rack.", f"{key}.", 1)
+    limit = rack.peak_force or rack.rated_force
+    return [_rating("rack_force", "force along the rack, largest", peak, limit, name, lacks)]
 
 
 def derated(findings: list[Finding], share: float) -> list[Finding]:

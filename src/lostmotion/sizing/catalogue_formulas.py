@@ -179,17 +179,17 @@ def belt_force(circumferential: float, pretension: float | None = None) -> float
     return circumferential + (circumferential if pretension is None else pretension)
 
 
-def tooth_forces(tooth_force: float, teeth: int) -> float:
-    """Circumferential force [N] that the teeth of a belt carry on a pulley it wraps by half: z/2 teeth, 12 at most.
+def tooth_forces(tooth_force: float, in_mesh: int) -> float:
+    """Circumferential force [N] that the teeth of a belt in mesh carry, 12 at most.
 
     Source: Elatech and Mulco catalogues of timing belts.
 
     Examples
     --------
-    >>> tooth_forces(50.0, 20), tooth_forces(50.0, 40)
+    >>> tooth_forces(50.0, 10), tooth_forces(50.0, 20)
     (500.0, 600.0)
     """
-    return tooth_force * min(teeth // 2, TEETH_IN_MESH)
+    return tooth_force * min(in_mesh, TEETH_IN_MESH)
 
 
 def capacitor_energy(capacitance: float, voltage: float, start: float) -> float:

@@ -15,7 +15,7 @@ from ..simulation.runs.results import RunArrays
 from ..simulation.runs.run import run
 from ..simulation.scenario.requirements import need_no_impacts
 from ..simulation.scenario.scenario import Scenario
-from .axis_rules import HOUR, AxialLoad, missing, screw_life, screw_rules
+from .axis_rules import HOUR, AxialLoad, belt_rules, missing, rack_rules, screw_life, screw_rules
 from .duty_cycle import MIN_REST, STANDSTILL, DutyCycle, duty_cycle
 from .finding import Finding, Findings
 from .gearbox_check import input_speeds, loads, locks, loss_map
@@ -124,7 +124,7 @@ def _gear(scenario: Scenario, name: str, result: RunArrays) -> list[Finding]:
         output_torque=torque,
     )
     peak = float(abs(result[torque]).max())
-    findings = _force(scenario.kind_of(name), peak) if train.is_slide(gear.output) else loads(gear, peak, cycle, where)
+    findings = _of_slide(scenario, name, peak) if train.is_slide(gear.output) else loads(gear, peak, cycle, where)
     if gear.rated_input_speed is not None or gear.limits is not None:
         findings += input_speeds(gear, cycle, where)
     if train.fixed_gears() == train.gears:  # else what its load drives has no verdict
@@ -132,11 +132,13 @@ def _gear(scenario: Scenario, name: str, result: RunArrays) -> list[Finding]:
     return [_with_sinking(scenario, f, result, cycle) if f.rule in MEANS else f for f in findings]
 
 
-def _force(kind: str, peak: float) -> list[Finding]:
-    """Largest force of a rack or a belt, whose ratings no table holds. A screw has rules of its own."""
-    remark = f"a {kind} has no rated force here; compare with its data sheet"
-    what = "output force, largest"
-    return [] if kind == "screw" else [Finding("peak_output_torque", what, f"{peak:.4g} N", "unknown", remark)]
+def _of_slide(scenario: Scenario, name: str, peak: float) -> list[Finding]:
+    """The rules of a rack or a belt under the largest force of its slide [N]. A screw has rules of its own."""
+    kind = scenario.kind_of(name)
+    if kind == "screw":
+        return []
+    drive, key = getattr(scenario, f"{kind}s")[name], scenario.key_in_file(f"{kind}s.{name}")
+    return belt_rules(peak, drive, key=key) if kind == "belt" else rack_rules(peak, drive, key=key)
 
 
 def _screw(scenario: Scenario, name: str, screw: RatedScrew, result: RunArrays) -> list[Finding]:

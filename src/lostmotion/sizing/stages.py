@@ -4,56 +4,27 @@ the gearbox that it forms together with the gearbox before it."""
 import itertools
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 
 from ..data_sheets.linear_components import linear_table
-from ..inputs.quantities import Force, Positive
 from ..model.gear import Gear
 from ..model.gearbox import Gearbox
 from ..model.linear import LinearDrive, RatedScrew
 from ..model.losses import ConstantEfficiency, LossMap, efficiency_map
-from ..model.rack_and_belt import BeltData, RackData
+from ..model.rack_and_belt import RatedBelt, RatedRack
 from ..model.torsion import Hysteresis, LinearStiffness, Rigid, TorsionCurve
 from .required_motion import RequiredMotion
 
 SAME = 1e-9  # relative, within which two breaks of a curve are one
 
 
-class RackStage(RackData):
-    """A rack and its pinion of an axis, with the data that their rules need.
-
-    Examples
-    --------
-    >>> RackStage(module="2 mm", teeth=20, rated_force="8 kN").rated_force
-    8000.0
-    """
-
-    rated_force: Annotated[Force, Positive] | None = None  #: along the rack, continuous
-    peak_force: Annotated[Force, Positive] | None = None
-
-
-class BeltStage(BeltData):
-    """A toothed belt of an axis, with the data that its rules need.
-
-    Examples
-    --------
-    >>> BeltStage(teeth=20, pitch="5 mm", rated_force="1.7 kN", stiffness="1 N/um").rated_force
-    1700.0
-    """
-
-    rated_force: Annotated[Force, Positive] | None = None  #: largest one of the tension members in operation
-    tooth_force: Annotated[Force, Positive] | None = None  #: force that one tooth in mesh carries
-    pretension: Annotated[Force, Positive] | None = None
-    """force of a strand at rest; left out, the largest circumferential force, so that no strand is slack"""
-
-
-Stage = RatedScrew | RackStage | BeltStage
-STAGES: dict[str, type[RatedScrew] | type[RackStage] | type[BeltStage]] = {
+Stage = RatedScrew | RatedRack | RatedBelt
+STAGES: dict[str, type[RatedScrew] | type[RatedRack] | type[RatedBelt]] = {
     "screw": RatedScrew,
-    "rack": RackStage,
-    "belt": BeltStage,
+    "rack": RatedRack,
+    "belt": RatedBelt,
 }
 
 
@@ -66,19 +37,8 @@ def stage_of(kind: str, table: Mapping[str, Any]) -> Stage:
     name = table.get("from")
     if name is None:
         return part(**table)
-    from ..data_sheets.linear_sheets import LinearSheet
-    from ..data_sheets.records import find
-
-    record = find(name, kind)
-    assert isinstance(record, LinearSheet)
-    base = type(record).PART.model_fields
     beside = {key: value for key, value in table.items() if key != "from"}
-    only_here = {key: value for key, value in beside.items() if key in part.model_fields and key not in base}
-    values = linear_table(kind, name, {k: v for k, v in beside.items() if k not in only_here}, kind)
-    printed = {
-        key: value for key in part.model_fields if key not in base and (value := getattr(record, key, None)) is not None
-    }
-    return part(**values, **(printed | only_here))
+    return part(**linear_table(kind, name, beside, kind))
 
 
 def without_record(kind: str, table: Mapping[str, Any]) -> bool:
