@@ -7,7 +7,10 @@ import lostmotion as lm
 
 NAMESPACES = [name for name in lm.__all__ if isinstance(getattr(lm, name), ModuleType)]
 FLAT = [name for name in lm.__all__ if name not in NAMESPACES]
-PATHS = {name: name for name in FLAT} | {name: f"{space}.{name}" for space in NAMESPACES for name in getattr(lm, space).__all__}
+PATHS = {name: name for name in FLAT}
+for _space in NAMESPACES:
+    for _name in getattr(lm, _space).__all__:  # a name of several namespaces has its namespace from the second on
+        PATHS[f"{_space}.{_name}" if _name in PATHS else _name] = f"{_space}.{_name}"
 
 
 def public(name: str) -> Any:

@@ -66,7 +66,7 @@ def test_a_loss_map_and_hysteresis_move_as_in_the_core(name: str) -> None:
     for row in given:
         drives.step(row)
     error = np.abs(drives["load_angle"].numpy() - exact(drive, inertias, given, 1e-3))
-    certain = drives._doubtful.numpy() == 0
+    certain = drives._arrays.doubtful.numpy() == 0
     assert certain.sum() > 0.5 * COUNT
     assert error[certain].max() < 1e-10
 
@@ -113,6 +113,6 @@ def test_what_the_kernel_does_not_take_is_refused(use: object, message: str) -> 
 
 
 def test_the_kernel_is_compiled_for_a_graphics_processor(tmp_path: object) -> None:
-    from lostmotion.warp.kernel import kernel_of
+    from lostmotion.warp.kernel import advance_kernel
 
-    wp.compile_aot_module(kernel_of("float32").module, device=None, arch=90, module_dir=tmp_path, use_ptx=True)
+    wp.compile_aot_module(advance_kernel("float32").module, device=None, arch=90, module_dir=tmp_path, use_ptx=True)

@@ -199,13 +199,18 @@ SLOW = {
     "select",
     "load_task",
 }  # with an argument that is right
+if find_spec("mujoco_warp") is not None:
+    import mujoco_warp
+
+    FREE = mujoco.MjModel.from_xml_string("<mujoco><worldbody><body><joint name='j'/><geom size='0.1'/></body></worldbody></mujoco>")
+    CALLS["warp.attach"] = (lm.warp.attach, {"model": FREE, "m": mujoco_warp.put_model(FREE), "d": mujoco_warp.make_data(FREE), "drives": {"j": "schaeffler-rt1-h-20-100"}, "stiffness": 1.0, "damping": 0.0, "samples": 1, "dtype": "float64"})  # fmt: skip
 
 
 def names() -> list[str]:
-    # `attach` alone makes an `Actuated`. MuJoCo is optional.
+    # `attach` alone makes an `Actuated` or `Joints`. MuJoCo is optional.
     missing = tuple(f"{library}." for library in ("mujoco", "warp") if find_spec(library) is None)
     wanted = {n: path for n, path in PATHS.items() if not path.startswith(missing)}
-    return [name for name in wanted if name != "Actuated" and callable(public(name))]
+    return [name for name in wanted if name not in ("Actuated", "Joints") and callable(public(name))]
 
 
 def refused_plainly(call: Callable[[], Any], where: str) -> None:

@@ -233,6 +233,12 @@ struct DriveWalk {
         const real asked = p.turned < 0 ? -to_motor : to_motor;
         command = asked > p.command_limit ? p.command_limit : asked < -p.command_limit ? -p.command_limit : asked;
     }
+    // Of a torque source: a torque [N m] at the load's side of the gear, with its tangent.
+    void ask_torque(real torque, real by) {
+        const real per_torque = p.per_ratio / p.stall_torque;
+        set_command(p.turned * torque * per_torque);
+        by_command = command < p.command_limit && command > -p.command_limit ? by * per_torque : 0;
+    }
     // Begins a tangent: the derivative by a shift of the command and of the load torque.
     void differ(real to_motor, real to_load) {
         has_tangent = true;

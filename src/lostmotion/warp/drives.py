@@ -95,7 +95,10 @@ class Drives:
             raise InputError(f"device: {problem}; give such as 'cuda:0' or 'cpu'") from None
         self._count, self._dtype = count, np.dtype(dtype)
         self._wp, self._number = wp, wp.float32 if dtype == "float32" else wp.float64
-        self._tables, self._offsets, self._shape = (self._on_device(part) for part in kernel.packed(laws, dtype))
+        self._arrays = kernel.drive_arrays(dtype)()
+        self._arrays.count = count
+        for name, part in zip(("tables", "offsets", "shape"), kernel.packed(laws, dtype), strict=True):
+            setattr(self._arrays, name, self._on_device(part))
         sheets = np.repeat(np.clip(laws["sheet"], -kernel.LIMIT, kernel.LIMIT)[:, None], count, axis=1)
         self._keys = {key: k for k, key in enumerate(kernel.SHEET.values()) if key and _has(laws, key)}
         self._numbers = drive_keys(scenario)
@@ -103,19 +106,24 @@ class Drives:
         for key, value in (vary or {}).items():
             column = value(generator, count) if callable(value) else value
             sheets[self._place(key)] = np.broadcast_to(np.asarray(column, dtype=float), (count,))
-        self._sheets = self._on_device(sheets.reshape(-1).astype(dtype))
-        self.doubts = wp.zeros(count, dtype=wp.int32, device=self._device)
-        """of each drive, what was not certain in its last step, as bits; 0: all was"""
-        self._zeros = {name: self._new(rows) for name, rows in (("states", len(kernel.STATES)), ("shown", 4))}
+        self._arrays.sheets = self._on_device(sheets.reshape(-1).astype(dtype))
+        for name, rows in (("states", len(kernel.STATES)), ("shown", 4)):
+            setattr(self._arrays, name, self._new(rows))
+        self._arrays.angles = wp.zeros(count, dtype=wp.float64, device=self._device)
+        self._arrays.modes = wp.zeros(len(kernel.MODES) * count, dtype=wp.int32, device=self._device)
+        for name in ("doubts", "switchings", "doubtful"):
+            setattr(self._arrays, name, wp.zeros(count, dtype=wp.int32, device=self._device))
         self._commands, self._loads = self._new(1), self._new(1)
-        self._modes = wp.zeros(len(kernel.MODES) * count, dtype=wp.int32, device=self._device)
-        self._angles = wp.zeros(count, dtype=wp.float64, device=self._device)
-        self._switchings, self._doubtful = (wp.zeros(count, dtype=wp.int32, device=self._device) for _ in range(2))
         self._steps = 0
-        self._kernel = kernel.kernel_of(dtype)
+        self._kernel = kernel.advance_kernel(dtype)
 
     def __len__(self) -> int:
         return self._count
+
+    @property
+    def doubts(self) -> Any:
+        """Of each drive, what was not certain in its last step, as bits; 0: all was."""
+        return self._arrays.doubts
 
     @property
     def parameters(self) -> Mapping[str, Any]:
@@ -125,18 +133,18 @@ class Drives:
     @property
     def counts(self) -> dict[str, int]:
         """Numbers of steps since the beginning: ``steps``, ``switchings``, and ``doubtful``, those with something that was not certain."""
-        sums: dict[str, Any] = {"switchings": self._switchings, "doubtful": self._doubtful}
-        return {"steps": self._steps} | {name: int(each.numpy().sum()) for name, each in sums.items()}
+        sums = {name: int(getattr(self._arrays, name).numpy().sum()) for name in ("switchings", "doubtful")}
+        return {"steps": self._steps} | sums
 
     def __getitem__(self, name: str) -> Any:
         """Values of a variable, on the device: ``motor_speed``, ``load_speed``, ``twist``, ``output_torque`` or ``load_angle``."""
         if name == "load_angle":
-            return self._angles
+            return self._arrays.angles
         names = ("motor_speed", "load_speed", "twist", "output_torque")
         if name not in names:
             raise InputError(f"{shown(name)} is no variable; the variables are {listed((*names, 'load_angle'))}")
         k = names.index(name)
-        return self._zeros["shown"][k * self._count : (k + 1) * self._count]
+        return self._arrays.shown[k * self._count : (k + 1) * self._count]
 
     @checked
     def step(self, command: Any, load_torque: Any = 0.0, step: Time = 1e-3) -> None:
@@ -152,13 +160,7 @@ class Drives:
             [s]
         """
         given = [self._input(*pair) for pair in ((command, self._commands), (load_torque, self._loads))]
-        states, seen = self._zeros["states"], self._zeros["shown"]
-        self._wp.launch(
-            self._kernel,
-            dim=self._count,
-            inputs=[self._count, self._tables, self._offsets, self._shape, self._sheets, states, self._angles, self._modes, *given, step, seen, self.doubts, self._switchings, self._doubtful],
-            device=self._device,
-        )  # fmt: skip
+        self._wp.launch(self._kernel, dim=self._count, inputs=[self._arrays, *given, step], device=self._device)
         self._steps += self._count
 
     @checked
@@ -173,7 +175,8 @@ class Drives:
         keep = np.zeros(self._count, dtype=bool) if which is None else ~np.asarray(which, dtype=bool)
         if keep.shape != (self._count,):
             raise InputError(f"which: must be an array of {self._count} Booleans, one for each drive")
-        for each in (*self._zeros.values(), self._modes, self._angles, self.doubts):
+        a = self._arrays
+        for each in (a.states, a.shown, a.modes, a.angles, a.doubts):
             rows = each.numpy().reshape(-1, self._count)
             each.assign(np.where(keep, rows, 0).reshape(-1).astype(rows.dtype))
 
@@ -209,7 +212,7 @@ class _Rows(Mapping[str, Any]):
 
     def __getitem__(self, key: str) -> Any:
         n, k = len(self._drives), self._drives._place(key)
-        return self._drives._sheets[k * n : (k + 1) * n]
+        return self._drives._arrays.sheets[k * n : (k + 1) * n]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._drives._keys)

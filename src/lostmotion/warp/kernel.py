@@ -1,4 +1,4 @@
-"""The walk of the core as a kernel of Warp. Its text is that of the core; this file says which arrays it reads and writes."""
+"""The walk of the core as kernels of Warp. Its text is that of the core; this file says which arrays they read and write."""
 
 # mypy: disable-error-code="valid-type, untyped-decorator, no-untyped-def"
 
@@ -47,10 +47,15 @@ CORE = "loss_grid.hpp", "drive_walk.hpp"
 DEGREE = {"float32": 14, "float64": 23}
 LIMIT = 1e30  # in place of infinity, which single precision has, too, but compilers may assume away
 
-BODY = """
+TOLD = ("load_torque", "speed", "per_torque", "command", "angle")
+"""what an engine was told before a step: load torque and the speed that it leads to, with its derivative; the inputs of the law"""
+MOST_ARMATURE = 1e4
+"""what an engine is told of a joint that friction holds, over the inertia of the joint"""
+START = """
     typedef {real} real;
     constexpr real ROUNDING = real({epsilon});
     {text}
+    const int n = drives.count;
     DriveLaws laws;
     {laws}
     DriveSheet sheet;
@@ -58,100 +63,200 @@ BODY = """
     DriveState x;
     {state}
     x.angle = 0;
+"""
+ADVANCE = """
     const DriveNumbers numbers = sheet.numbers(laws);
     DriveWalk walk(laws, numbers, x, commands.data[i], loads.data[i]);
     walk.bold = true;
     if (!walk.advance(step)) walk.doubts |= DriveWalk::no_regime;
     x = walk.x;
     {out}
-    angles.data[i] += x.angle;
-    doubts.data[i] = walk.doubts;
-    switchings.data[i] += walk.switchings;
-    doubtful.data[i] += walk.doubts != 0;
+    drives.angles.data[i] += x.angle;
+    drives.doubts.data[i] = walk.doubts;
+    drives.switchings.data[i] += walk.switchings;
+    drives.doubtful.data[i] += walk.doubts != 0;
+    const real torque = walk.r.output.at(x);
+"""
+JOINT = """
+    const int world = i % engine.worlds, joint = i / engine.worlds, dof = world * engine.n_dofs + engine.dofs.data[joint];
+    float& position = engine.positions.data[world * engine.n_positions + engine.places.data[joint]];
+    float& speed = engine.speeds.data[dof];
+    // While all other joints keep their speed, the joint has the inertia of the diagonal of the mass matrix.
+    const real per_torque = engine.told.data[2 * n + i];
+    if (per_torque < 0)
+        sheet.load_inertia = real(engine.masses.data[world * engine.n_masses + engine.diagonal.data[joint]] - engine.armatures.data[dof]);
+    const DriveNumbers numbers = sheet.numbers(laws);
+    const real inertia = sheet.load_inertia, least = step / (inertia * real({most_armature}));
+    JointStep it = {{laws, numbers, step, engine.samples, engine.has_law != 0}};
+    it.stiffness = engine.gains.data[i];
+    it.damping = engine.gains.data[n + i];
+    real load_torque = 0;
+    int doubts = 0;
+    if (per_torque < 0) {{
+        // The engine has found a speed, by the line that it was told. The load torque that belongs to it there gives the motion.
+        it.command = engine.told.data[3 * n + i];
+        it.angle = engine.told.data[4 * n + i];
+        load_torque = engine.told.data[i] + (real(speed) - engine.told.data[n + i]) / per_torque;
+        it.run(x, load_torque);
+        x = it.end;
+        doubts = it.doubts;
+        drives.switchings.data[i] += it.switchings;
+        drives.doubtful.data[i] += it.doubts != 0;
+        position += (float)(x.angle - step * real(speed));  // the engine has moved on with the speed at the end
+        speed = (float)it.speed;
+    }} else {{
+        x.a = real(speed);
+    }}
+    x.angle = 0;
+    {out}
+    it.command = engine.told.data[3 * n + i] = commands.data[i];
+    it.angle = engine.told.data[4 * n + i] = real(position);
+    it.run(x, load_torque);
+    drives.doubts.data[i] = doubts | it.doubts;
+    const real acceleration = (it.speed - (x.a - x.v)) / step;
+    real slope = it.per_torque < -least ? it.per_torque : -least, armature = -step / slope - inertia;
+    if (armature < 0) {{
+        armature = 0;
+        slope = -step / inertia;
+    }}
+    engine.told.data[i] = load_torque;
+    engine.told.data[n + i] = it.speed;
+    engine.told.data[2 * n + i] = slope;
+    engine.armatures.data[dof] = (float)armature;
+    engine.forces.data[dof] = (float)((inertia + armature) * acceleration + load_torque);
+    DriveWalk now(laws, numbers, x, 0, load_torque);
+    const real torque = x.known && now.make() ? now.r.output.at(x) : real(0);
+"""
+SHOW = """
     const real ratio = sheet.ratio;
-    shown.data[i] = ratio * x.a;
-    shown.data[n + i] = x.a - x.v;
-    shown.data[2 * n + i] = x.d;
-    shown.data[3 * n + i] = walk.r.output.at(x);
+    drives.shown.data[i] = ratio * x.a;
+    drives.shown.data[n + i] = x.a - x.v;
+    drives.shown.data[2 * n + i] = x.d;
+    drives.shown.data[3 * n + i] = torque;
 """
 
 
 def _source(name: str) -> str:
-    """Text of a header of the core: beside this file where the package is installed, else in the checkout."""
-    beside = Path(__file__).with_name(name)
+    """Text of a header: beside this file where the package is installed, else of the core in the checkout."""
     core = Path(__file__).parents[3] / "core" / "lostmotion"
-    places = [beside, core / "batch" / name, core / "parts" / name]
+    places = [Path(__file__).with_name(name), core / "batch" / name, core / "parts" / name]
     return next(place for place in places if place.exists()).read_text(encoding="utf-8")
 
 
-@cache
-def kernel_of(dtype: str) -> Any:
-    """The kernel for numbers of a type. Drives of all kinds share it."""
+def _body(dtype: str, last: str, *headers: str) -> str:
+    """Text of a kernel: a drive `i` of `drives` is read, and what `last` does with it."""
     single = dtype == "float32"
-    starts = [f"laws.{name} = tables.data + offsets.data[{k}];" for k, name in enumerate(LISTS[:7])]
-    starts += [f"laws.map.{name} = tables.data + offsets.data[{7 + k}];" for k, name in enumerate(LISTS[7:])]
-    starts += [f"laws.{name} = tables.data[{k}];" for k, name in enumerate(NUMBERS)]
-    whole = [f"laws.{'map.' if name.startswith('n_') else ''}{name} = shape.data[{k}];" for k, name in enumerate(WHOLE)]
-    flags = [f"laws.{name} = shape.data[{len(WHOLE) + k}] != 0;" for k, name in enumerate(FLAGS)]
+    starts = [f"laws.{name} = drives.tables.data + drives.offsets.data[{k}];" for k, name in enumerate(LISTS[:7])]
+    starts += [
+        f"laws.map.{name} = drives.tables.data + drives.offsets.data[{7 + k}];" for k, name in enumerate(LISTS[7:])
+    ]
+    starts += [f"laws.{name} = drives.tables.data[{k}];" for k, name in enumerate(NUMBERS)]
+    whole = [
+        f"laws.{'map.' if name.startswith('n_') else ''}{name} = drives.shape.data[{k}];"
+        for k, name in enumerate(WHOLE)
+    ]
+    flags = [f"laws.{name} = drives.shape.data[{len(WHOLE) + k}] != 0;" for k, name in enumerate(FLAGS)]
     modes = {"motor": "signed char", "twist": "signed char", "load": "signed char", "flanks": "signed char"}
-    read = [f"x.{name} = states.data[{k} * n + i];" for k, name in enumerate(STATES)]
-    read += [f"x.{name} = ({modes.get(name, 'short')})modes.data[{k} * n + i];" for k, name in enumerate(MODES[:-1])]
-    write = [f"states.data[{k} * n + i] = x.{name};" for k, name in enumerate(STATES)]
-    body = BODY.format(
+    read = [f"x.{name} = drives.states.data[{k} * n + i];" for k, name in enumerate(STATES)]
+    read += [
+        f"x.{name} = ({modes.get(name, 'short')})drives.modes.data[{k} * n + i];" for k, name in enumerate(MODES[:-1])
+    ]
+    write = [f"drives.states.data[{k} * n + i] = x.{name};" for k, name in enumerate(STATES)]
+    write += [f"drives.modes.data[{k} * n + i] = x.{name};" for k, name in enumerate(MODES)]
+    return (START + last + SHOW).format(
         real="float" if single else "double",
         epsilon="1.1920929e-7f" if single else "2.220446049250313e-16",
-        text="\n".join(_source(name) for name in CORE),
+        text="\n".join(_source(name) for name in (*CORE, *headers)),
         laws="\n    ".join(starts + whole + flags),
-        sheet="\n    ".join(f"sheet.{name} = sheets.data[{k} * n + i];" for k, name in enumerate(SHEET)),
-        state="\n    ".join([*read, f"x.known = modes.data[{len(MODES) - 1} * n + i] != 0;"]),
-        out="\n    ".join(write + [f"modes.data[{k} * n + i] = x.{name};" for k, name in enumerate(MODES)]),
+        sheet="\n    ".join(f"sheet.{name} = drives.sheets.data[{k} * n + i];" for k, name in enumerate(SHEET)),
+        state="\n    ".join([*read, f"x.known = drives.modes.data[{len(MODES) - 1} * n + i] != 0;"]),
+        out="\n    ".join(write),
+        most_armature=MOST_ARMATURE,
     )
-    number = wp.float32 if single else wp.float64
 
-    @wp.func_native(body)
+
+@cache
+def drive_arrays(dtype: str) -> Any:
+    """The arrays of drives, as a structure of Warp."""
+    number = wp.float32 if dtype == "float32" else wp.float64
+
+    @wp.struct
+    class DriveArrays:
+        count: wp.int32
+        tables: wp.array(dtype=number)
+        offsets: wp.array(dtype=wp.int32)
+        shape: wp.array(dtype=wp.int32)
+        sheets: wp.array(dtype=number)
+        states: wp.array(dtype=number)
+        angles: wp.array(dtype=wp.float64)
+        modes: wp.array(dtype=wp.int32)
+        shown: wp.array(dtype=number)
+        doubts: wp.array(dtype=wp.int32)
+        switchings: wp.array(dtype=wp.int32)
+        doubtful: wp.array(dtype=wp.int32)
+
+    return DriveArrays
+
+
+@cache
+def engine_arrays(dtype: str) -> Any:
+    """What drives read and write of the joints that they turn, as a structure of Warp."""
+    number = wp.float32 if dtype == "float32" else wp.float64
+
+    @wp.struct
+    class EngineArrays:
+        worlds: wp.int32
+        n_dofs: wp.int32
+        n_positions: wp.int32
+        n_masses: wp.int32
+        samples: wp.int32
+        has_law: wp.int32
+        dofs: wp.array(dtype=wp.int32)
+        places: wp.array(dtype=wp.int32)
+        diagonal: wp.array(dtype=wp.int32)
+        gains: wp.array(dtype=number)
+        told: wp.array(dtype=number)
+        positions: wp.array2d(dtype=wp.float32)
+        speeds: wp.array2d(dtype=wp.float32)
+        armatures: wp.array2d(dtype=wp.float32)
+        forces: wp.array2d(dtype=wp.float32)
+        masses: wp.array2d(dtype=wp.float32)
+
+    return EngineArrays
+
+
+@cache
+def advance_kernel(dtype: str) -> Any:
+    """The kernel that advances drives with numbers of a type. Drives of all kinds share it."""
+    number = wp.float32 if dtype == "float32" else wp.float64
+    arrays = drive_arrays(dtype)
+
+    @wp.func_native(_body(dtype, ADVANCE))
     def walk(
-        i: wp.int32,
-        n: wp.int32,
-        tables: wp.array(dtype=number),
-        offsets: wp.array(dtype=wp.int32),
-        shape: wp.array(dtype=wp.int32),
-        sheets: wp.array(dtype=number),
-        states: wp.array(dtype=number),
-        angles: wp.array(dtype=wp.float64),
-        modes: wp.array(dtype=wp.int32),
-        commands: wp.array(dtype=number),
-        loads: wp.array(dtype=number),
-        step: number,
-        shown: wp.array(dtype=number),
-        doubts: wp.array(dtype=wp.int32),
-        switchings: wp.array(dtype=wp.int32),
-        doubtful: wp.array(dtype=wp.int32),
+        i: wp.int32, drives: arrays, commands: wp.array(dtype=number), loads: wp.array(dtype=number), step: number
     ): ...
 
     @wp.kernel(enable_backward=False, module="unique")
-    def advance(
-        n: wp.int32,
-        tables: wp.array(dtype=number),
-        offsets: wp.array(dtype=wp.int32),
-        shape: wp.array(dtype=wp.int32),
-        sheets: wp.array(dtype=number),
-        states: wp.array(dtype=number),
-        angles: wp.array(dtype=wp.float64),
-        modes: wp.array(dtype=wp.int32),
-        commands: wp.array(dtype=number),
-        loads: wp.array(dtype=number),
-        step: number,
-        shown: wp.array(dtype=number),
-        doubts: wp.array(dtype=wp.int32),
-        switchings: wp.array(dtype=wp.int32),
-        doubtful: wp.array(dtype=wp.int32),
-    ):
-        walk(
-            wp.tid(), n, tables, offsets, shape, sheets, states, angles, modes, commands, loads, step, shown,
-            doubts, switchings, doubtful,
-        )  # fmt: skip
+    def advance(drives: arrays, commands: wp.array(dtype=number), loads: wp.array(dtype=number), step: number):
+        walk(wp.tid(), drives, commands, loads, step)
 
     return advance
+
+
+@cache
+def joint_kernel(dtype: str) -> Any:
+    """The kernel by which drives follow what an engine has found, and tell it what acts in the next step."""
+    number = wp.float32 if dtype == "float32" else wp.float64
+    arrays, joints = drive_arrays(dtype), engine_arrays(dtype)
+
+    @wp.func_native(_body(dtype, JOINT, "joint_step.hpp"))
+    def turn(i: wp.int32, drives: arrays, engine: joints, commands: wp.array(dtype=number), step: number): ...
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def before(drives: arrays, engine: joints, commands: wp.array(dtype=number), step: number):
+        turn(wp.tid(), drives, engine, commands, step)
+
+    return before
 
 
 def packed(laws: dict[str, Any], dtype: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
