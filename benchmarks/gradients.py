@@ -10,7 +10,7 @@ from report import Report, best
 
 import lostmotion as lm
 from lostmotion import _core
-from lostmotion.control.axis import Bound
+from lostmotion.control.axis import BoundController
 from lostmotion.simulation.runs.core_runs import core_case
 from lostmotion.simulation.runs.sensitivities import core_variation, neighbours, run_cases, sensitive_case
 
@@ -75,7 +75,7 @@ def arm() -> lm.Scenario:
     )
 
 
-def cases() -> tuple[list[Any], list[list[tuple[Any, ...]]], Bound]:
+def cases() -> tuple[list[Any], list[list[tuple[Any, ...]]], BoundController]:
     """The run with its derivatives, the runs of central differences, and the controllers."""
     s = arm()
     beside = {key: neighbours(s, key) for key in KEYS}

@@ -9,7 +9,7 @@ import numpy as np
 import lostmotion as lm
 from conftest import some
 from lostmotion.servo.hunting.at_rest import without_backlash, without_friction
-from lostmotion.servo.hunting.limit_cycles import Loop
+from lostmotion.servo.hunting.limit_cycles import UndrivenLoop
 
 AXES = some(24, 12)
 SLIPS = 30  # that a run of an axis which hunts has at least
@@ -90,7 +90,7 @@ def stable_axis(rng: random.Random) -> lm.Scenario:
 def errors_of(scenario: lm.Scenario, duration: float) -> list[float]:
     """Errors of the controller at the ends of stuck intervals of an exact run that begin after its step and last for a sample, from the
     first one on in which all but the integrator settles."""
-    loop = Loop.of(scenario.long())
+    loop = UndrivenLoop.of(scenario.long())
     run, count = loop.run(duration, 40_000), 40_000
     error = run["values"][loop.channels.index("m_error")]
     names = loop.core.switching_columns()
@@ -133,7 +133,7 @@ def check_hunts(scenario: lm.Scenario, found: Any, told: str) -> None:
 
 def check_rests(scenario: lm.Scenario, found: Any, told: str) -> None:
     """The errors of stuck intervals fall by the factor of the certificate, or nothing moves any more."""
-    loop = Loop.of(scenario.long())
+    loop = UndrivenLoop.of(scenario.long())
     if math.isnan(found.factor):
         end = loop.run(200.0 * scenario.simulation.duration, 4000)["values"][loop.channels.index("m_error")]
         assert np.ptp(end[-400:]) <= 1e-9 * np.abs(end).max(), told

@@ -26,9 +26,9 @@ from .loops import CurrentLoop, FieldOriented, FirstOrderCurrent, SpeedLoop, Vol
 from .sample_times import whole_multiple
 from .turning import turns
 
-Bound = tuple[float, list[_core.Axis]]
+BoundController = tuple[float, list[_core.Axis]]
 """shortest sample time [s], and the controllers with the numbers of their motors and shafts"""
-OPEN_LOOP: Bound = (1.0, [])
+OPEN_LOOP: BoundController = (1.0, [])
 NO_LAWS: Mapping[str, Law] = MappingProxyType({})
 
 
@@ -210,7 +210,9 @@ class _Place:
         return c.camera.core_fields() | of_motor | {"tracker": tracker}
 
 
-def core_control(train: DriveTrain, controllers: Mapping[str, Controller], laws: Mapping[str, Law] = NO_LAWS) -> Bound:
+def core_control(
+    train: DriveTrain, controllers: Mapping[str, Controller], laws: Mapping[str, Law] = NO_LAWS
+) -> BoundController:
     """The controllers of the motors of a train.
 
     laws: of controllers with ``law = true``.
@@ -232,7 +234,7 @@ def core_control(train: DriveTrain, controllers: Mapping[str, Controller], laws:
     return base, axes
 
 
-def own(control: Bound) -> Bound:
+def own(control: BoundController) -> BoundController:
     """Copies of the controllers, which may be changed."""
     base, axes = control
     return base, [_core.Axis(axis) for axis in axes]

@@ -205,7 +205,7 @@ def pointing_budget(
     )
 
 
-def _end_of_transient(scenario: Scenario, as_it_is: Found) -> tuple[float, str]:
+def _end_of_transient(scenario: Scenario, as_it_is: OneRun) -> tuple[float, str]:
     """From when on errors do not depend on how the axes start [s], and the line that says so."""
     time, first, _ = as_it_is
     second = _run(without(scenario, [_other_start(scenario)]) or scenario)[1]
@@ -308,7 +308,7 @@ def _units(scenario: Scenario) -> dict[str, str]:
     return {motor: scenario.train().angle_unit(scenario.controlled(motor)) for motor in scenario.axes()}
 
 
-Found = tuple[np.ndarray, dict[str, np.ndarray], dict[str, np.ndarray]]
+OneRun = tuple[np.ndarray, dict[str, np.ndarray], dict[str, np.ndarray]]
 """instants, errors of the true and of the measured direction by axis"""
 
 
@@ -324,7 +324,7 @@ def _different(
             yield one
 
 
-def _run(scenario: Scenario) -> Found:
+def _run(scenario: Scenario) -> OneRun:
     result = run(scenario, energy=False)
     found, measured = {}, {}
     true = pointing_errors(scenario, result)
@@ -340,7 +340,7 @@ def _run(scenario: Scenario) -> Found:
     return result.time, found, measured
 
 
-def _numbers(found: Found, after: float) -> Errors:
+def _numbers(found: OneRun, after: float) -> Errors:
     time, errors, measured = found
     counted = time >= after
     mean, numbers = partial(np.average, weights=weights(time[counted])), {}

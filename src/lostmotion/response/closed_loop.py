@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..control.axis import Bound
+from ..control.axis import BoundController
 from ..control.controller import AnyReference, Controller
 from ..control.references import PositionReference
 from ..simulation.scenario.scenario import Scenario
@@ -133,7 +133,7 @@ class _UnderSine(Simulation):
         super().__init__(under_sine(plant, source, amplitude, frequency), law=law)
 
 
-def running_slots(control: Bound) -> Iterator[int]:
+def running_slots(control: BoundController) -> Iterator[int]:
     """Slots in the memory of all controllers with instants and energies of windings, which no periodic motion restores."""
     first = 0
     for axis in control[1]:

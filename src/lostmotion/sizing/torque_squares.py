@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..control.axis import Bound
+from ..control.axis import BoundController
 from ..simulation.runs.core_runs import core_case
 from ..simulation.runs.run import MAX_SWITCHINGS, check_memory
 from ..simulation.runs.separate_trains import control_of_part, parts_of
@@ -53,7 +53,7 @@ class Squares:
 
     @property
     def lead(self) -> float:
-        """Bound on the integral from the start of an interval of the square less its mean [(N·m)² s], and of the error.
+        """BoundController on the integral from the start of an interval of the square less its mean [(N·m)² s], and of the error.
 
         With M = m + d, the mean of d is 0 and that of d² is v. Cauchy and Schwarz bound the integral of d over a part of the
         interval h by h sqrt(v)/2. So the integral of M² - m² - v = 2 m d + d² - v is at most h (|m| sqrt(v) + v).
@@ -79,7 +79,7 @@ def squares(
     channel: str,
     time: np.ndarray,
     *,
-    control: Bound = (1.0, []),
+    control: BoundController = (1.0, []),
     breaks: Iterable[float] = (),
     fastest: float = 0.0,
 ) -> Squares:

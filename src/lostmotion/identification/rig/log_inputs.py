@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ... import _core
-from ...control.axis import OPEN_LOOP, Bound, own
+from ...control.axis import OPEN_LOOP, BoundController, own
 from ...errors import InputError
 from ...model.signals import columns, core_signal
 from ..prepared_log import Prepared
@@ -51,7 +51,7 @@ def course_of_input(
     return fine, course, False, count
 
 
-class Acting:
+class LogInputs:
     """The inputs of a log from one instant to another.
 
     known: what formulas may name, by which is settled how many samples act.
@@ -77,7 +77,7 @@ class Acting:
         given = [name for name in self._task.inputs if name.endswith(GIVEN_SPEED)]
         return {name.removesuffix(GIVEN_SPEED): float(self._points(name, known)[0, 1]) for name in given}
 
-    def control(self, built: Built, known: Mapping[str, Any]) -> Bound:
+    def control(self, built: Built, known: Mapping[str, Any]) -> BoundController:
         """The sampled controllers with their references."""
         axes = built.scenario.axes()
         if not axes:

@@ -19,7 +19,7 @@ from ..prepared_log import Prepared, Segment
 from ..task.file_formulas import names_in, number
 from ..task.free_parameters import FreeParameter
 from ..task.identification_file import Identification
-from .log_inputs import NUMBERS, Acting
+from .log_inputs import NUMBERS, LogInputs
 from .measured_motion_input import GIVEN_SPEED
 from .measurement_model import Measuring, Probe, delays_that_name, numbers_of, rate_of
 from .rig_scenario import Built, Rig
@@ -164,7 +164,7 @@ class _Course:
             self._state, self._state_by, self._smooth = None, {}, True
         changes = _begun(rig.changes(self._known, self._rung, segment.phase), segment, self._known)
         built = rig.built(changes)
-        acting = Acting(rig.task, self._log, self._known, begin, end)
+        acting = LogInputs(rig.task, self._log, self._known, begin, end)
         start, capacities = rig.start(self._log, built, changes) if self._state is None else (self._state, {})
         if self._state is None:
             start = rig.driven(start, built, acting.given_speeds(self._known))
@@ -193,7 +193,7 @@ class _Course:
         )
 
     def _beside(
-        self, name: str, p: FreeParameter, changes: Mapping[str, Any], built: Built, acting: Acting, segment: Segment
+        self, name: str, p: FreeParameter, changes: Mapping[str, Any], built: Built, acting: LogInputs, segment: Segment
     ) -> list[Any]:
         """Values of the core that differ beside the value of a parameter."""
         rig, task, phase = self._rig, self._rig.task, segment.phase

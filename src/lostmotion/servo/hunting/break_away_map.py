@@ -35,8 +35,8 @@ class Transients:
     radius: np.ndarray
 
     @classmethod
-    def none(cls, of: StickSlip) -> Transients:
-        return cls(np.zeros(len(of.stuck_rates), complex), np.zeros(len(of.stuck_rates)))
+    def none(cls, contact: StickSlip) -> Transients:
+        return cls(np.zeros(len(contact.stuck_rates), complex), np.zeros(len(contact.stuck_rates)))
 
     @property
     def largest(self) -> np.ndarray:
@@ -64,20 +64,20 @@ class Transients:
 
 
 @dataclass(frozen=True)
-class Flow:
+class SlipsFromInterval:
     """Slips from an interval of errors."""
 
-    of: StickSlip
+    contact: StickSlip
     middle: np.ndarray
     half: np.ndarray
     radius: np.ndarray
 
     @classmethod
-    def begin(cls, of: StickSlip, low: float, high: float, left: Transients) -> Flow:
+    def begin(cls, contact: StickSlip, low: float, high: float, left: Transients) -> SlipsFromInterval:
         """From errors between two, with what the stuck interval before has left."""
-        middle = 0.5 * (low + high) * of.q + of.excess * of.p + of.freed @ left.middle
-        radius = np.abs(of.freed) @ left.radius
-        return cls(of, middle, 0.5 * (high - low) * of.q, np.asarray(radius))
+        middle = 0.5 * (low + high) * contact.q + contact.excess * contact.p + contact.freed @ left.middle
+        radius = np.abs(contact.freed) @ left.radius
+        return cls(contact, middle, 0.5 * (high - low) * contact.q, np.asarray(radius))
 
     @property
     def size(self) -> np.ndarray:
@@ -86,9 +86,9 @@ class Flow:
 
     def values(self, rows: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Least and largest values of an output, or of several, at instants."""
-        decay = np.exp(np.outer(times, self.of.slip_rates))
+        decay = np.exp(np.outer(times, self.contact.slip_rates))
         middle, half = ((decay @ (rows * part).T).real.T for part in (self.middle, self.half))
-        loose = np.abs(decay) @ (np.abs(rows) * (self.radius + self.of.rounding * self.size)).T
+        loose = np.abs(decay) @ (np.abs(rows) * (self.radius + self.contact.rounding * self.size)).T
         spread = np.abs(half) + loose.T
         return middle - spread, middle + spread
 
@@ -96,8 +96,8 @@ class Flow:
         """Least and largest values of an output, or of several, between each instant and the next."""
         low, high = self.values(rows, times)
         bend = (
-            np.exp(np.outer(times[:-1], self.of.slip_rates.real))
-            @ (np.abs(rows) * np.abs(self.of.slip_rates) ** 2 * self.size).T
+            np.exp(np.outer(times[:-1], self.contact.slip_rates.real))
+            @ (np.abs(rows) * np.abs(self.contact.slip_rates) ** 2 * self.size).T
         )
         off = 0.125 * np.diff(times) ** 2 * bend.T
         return np.minimum(low[..., :-1], low[..., 1:]) - off, np.maximum(high[..., :-1], high[..., 1:]) + off
@@ -108,7 +108,7 @@ class Flow:
 
     def transients(self, times: np.ndarray) -> Transients:
         """Transients at the begin of the stuck interval, if the slip ends between the first instant and the last."""
-        rows = self.of.transients
+        rows = self.contact.transients
         return Transients(*self.boxes(rows, times))
 
     def boxes(self, rows: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -122,7 +122,7 @@ class Flow:
     @property
     def latest(self) -> float:
         """After which a slip counts as endless [s]."""
-        return float(LATEST / np.abs(self.of.slip_rates.real).min())
+        return float(LATEST / np.abs(self.contact.slip_rates.real).min())
 
     @cached_property
     def short_grid(self) -> np.ndarray:
@@ -135,7 +135,7 @@ class Flow:
         return self._grid(whole=True)
 
     def _grid(self, *, whole: bool) -> np.ndarray:
-        rates, speed = self.of.slip_rates, self.of.speed
+        rates, speed = self.contact.slip_rates, self.contact.speed
         rough = np.concatenate([[0.0], np.geomspace(1e-3 / np.abs(rates).max(), self.latest, 400)])
         values = (np.exp(np.outer(rough, rates)) @ (speed * self.middle)).real
         reverses = np.flatnonzero(values < 0.0)
@@ -146,7 +146,7 @@ class Flow:
         bend = decay @ (np.abs(speed) * np.abs(rates) ** 2 * self.size)
         density = np.sqrt(bend / (8.0 * CURVED * np.minimum(top, envelope)))
         # At first the speed is small, and shown by its derivative.
-        order = 1 if self.of.excess > 0.0 else 2
+        order = 1 if self.contact.excess > 0.0 else 2
         at_first = abs(float(((speed * rates**order) @ self.middle).real))
         early = np.cumsum(np.abs(values) > FIRST * CURVED * top) == 0
         bend = decay @ (np.abs(speed) * np.abs(rates) ** (order + 2) * self.size)
@@ -157,7 +157,7 @@ class Flow:
 
     def creep(self) -> float:
         """Largest error that a slip without an end leaves."""
-        return float(np.abs(self.of.error) @ (self.size * np.exp(self.of.slip_rates.real * self.latest)))
+        return float(np.abs(self.contact.error) @ (self.size * np.exp(self.contact.slip_rates.real * self.latest)))
 
     def grid_from(self, first: float) -> np.ndarray:
         """The instants after one."""
@@ -171,7 +171,7 @@ class Flow:
 
     def end_within(self, times: np.ndarray) -> tuple[float, float] | str:
         """The same with these instants."""
-        rates, speed = self.of.slip_rates, self.of.speed
+        rates, speed = self.contact.slip_rates, self.contact.speed
         moving, *rising = self.between(np.array([speed, speed * rates, speed * rates**2]), times)[0] > 0.0
         # From 0 the speed rises as long as its first or its second derivative, times one of the same sign before, is positive.
         for positive in rising:
@@ -219,30 +219,30 @@ class Image:
         return 0.5 * (self.low + self.high)
 
 
-def image(of: StickSlip, low: float, high: float, left: Transients) -> Image:
+def image(contact: StickSlip, low: float, high: float, left: Transients) -> Image:
     """Bounds of the map over an interval of errors, with what the stuck interval before has left."""
-    flow, none = Flow.begin(of, low, high, left), Transients.none(of)
-    found = flow.end()
+    slips, none = SlipsFromInterval.begin(contact, low, high, left), Transients.none(contact)
+    found = slips.end()
     if isinstance(found, str):
         return Image(-math.inf, math.inf, (0.0, math.inf), (0.0, math.inf), none, found)
-    if found[0] == flow.latest:
-        return Image(-flow.creep(), flow.creep(), found, (math.inf, math.inf), none)
-    end = min(found[1], flow.latest)
-    times = np.linspace(found[0], end, PARTS + 1) if math.isfinite(found[1]) else flow.grid_from(found[0])
-    error, torque = flow.range_of(of.error, times), flow.range_of(of.torque, times)
+    if found[0] == slips.latest:
+        return Image(-slips.creep(), slips.creep(), found, (math.inf, math.inf), none)
+    end = min(found[1], slips.latest)
+    times = np.linspace(found[0], end, PARTS + 1) if math.isfinite(found[1]) else slips.grid_from(found[0])
+    error, torque = slips.range_of(contact.error, times), slips.range_of(contact.torque, times)
     if math.isinf(found[1]):  # it may also creep to zero error
-        error = min(error[0], -flow.creep()), max(error[1], flow.creep())
-    torque = torque[0] + of.sliding, torque[1] + of.sliding
-    after = flow.transients(times)
+        error = min(error[0], -slips.creep()), max(error[1], slips.creep())
+    torque = torque[0] + contact.sliding, torque[1] + contact.sliding
+    after = slips.transients(times)
     reason, stuck = "", (0.0, math.inf)
-    if _may_be_limited(flow, end, max(map(abs, error)), after.largest):
+    if _may_be_limited(slips, end, max(map(abs, error)), after.largest):
         reason = "the limit of the controller may act"
-    elif flow.range_of(of.held, times)[0] + of.sliding <= -of.breakaway:
+    elif slips.range_of(contact.held, times)[0] + contact.sliding <= -contact.breakaway:
         reason = "a slip may end by a reversal, without sticking"
-    elif (free := _until_free(of, error, torque, after)) is None:
+    elif (free := _until_free(contact, error, torque, after)) is None:
         reason = "the transient after a slip may free the contact against its error"
     else:
-        stuck, after = free, after.after(of.stuck_rates, *free)
+        stuck, after = free, after.after(contact.stuck_rates, *free)
     if error[1] < 0.0:
         after = after.times(-1.0)
     elif error[0] < 0.0:
@@ -250,19 +250,19 @@ def image(of: StickSlip, low: float, high: float, left: Transients) -> Image:
     return Image(*error, found, stuck, after, reason)
 
 
-def _may_be_limited(flow: Flow, end: float, error: float, transients: np.ndarray) -> bool:
+def _may_be_limited(slips: SlipsFromInterval, end: float, error: float, transients: np.ndarray) -> bool:
     """Whether the command may reach its limit in a slip, or in the stuck interval after it."""
-    of, times = flow.of, flow.short_grid
-    times = times if times[-1] >= end else flow.whole_grid
-    low, high = flow.range_of(of.command, np.append(times[times < end], end))
-    offset = of.command_per_torque * of.sliding
-    stuck = abs(of.command_per_torque) * of.breakaway + abs(of.command_per_error) * error
-    stuck += float(np.abs(of.command_of_transients) @ transients)
-    return max(abs(low + offset), abs(high + offset), stuck) >= of.limit
+    contact, times = slips.contact, slips.short_grid
+    times = times if times[-1] >= end else slips.whole_grid
+    low, high = slips.range_of(contact.command, np.append(times[times < end], end))
+    offset = contact.command_per_torque * contact.sliding
+    stuck = abs(contact.command_per_torque) * contact.breakaway + abs(contact.command_per_error) * error
+    stuck += float(np.abs(contact.command_of_transients) @ transients)
+    return max(abs(low + offset), abs(high + offset), stuck) >= contact.limit
 
 
 def _until_free(
-    of: StickSlip, error: tuple[float, float], torque: tuple[float, float], left: Transients
+    contact: StickSlip, error: tuple[float, float], torque: tuple[float, float], left: Transients
 ) -> tuple[float, float] | None:
     """Shortest and longest time that the contact stays stuck [s]; None where it may break away against its error.
 
@@ -270,15 +270,15 @@ def _until_free(
     """
     if error[0] < 0.0 < error[1]:
         both = [
-            _ramped(of, (0.0, top), around, left)
+            _ramped(contact, (0.0, top), around, left)
             for top, around in ((error[1], torque), (-error[0], _negative(torque)))
         ]
         if any(one is None for one in both):
             return None
         return min(one[0] for one in both if one is not None), math.inf
     if error[1] <= 0.0:
-        return _ramped(of, _negative(error), _negative(torque), left.times(-1.0))
-    return _ramped(of, error, torque, left)
+        return _ramped(contact, _negative(error), _negative(torque), left.times(-1.0))
+    return _ramped(contact, error, torque, left)
 
 
 def _negative(pair: tuple[float, float]) -> tuple[float, float]:
@@ -286,40 +286,42 @@ def _negative(pair: tuple[float, float]) -> tuple[float, float]:
 
 
 def _ramped(
-    of: StickSlip, error: tuple[float, float], torque: tuple[float, float], left: Transients
+    contact: StickSlip, error: tuple[float, float], torque: tuple[float, float], left: Transients
 ) -> tuple[float, float] | None:
     """The same of errors that are not negative."""
-    middle, radius = of.held_of_transients * left.middle, np.abs(of.held_of_transients) * left.radius
-    slopes = of.ramp * error[0], of.ramp * error[1]
+    middle, radius = contact.held_of_transients * left.middle, np.abs(contact.held_of_transients) * left.radius
+    slopes = contact.ramp * error[0], contact.ramp * error[1]
 
     def held(times: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
         """Least and largest torque at instants, the curvature between them, and what has not settled at the last."""
-        size = np.exp(np.outer(times, of.stuck_rates.real))
-        swing, loose = (np.exp(np.outer(times, of.stuck_rates)) @ middle).real, size @ radius
-        bend = 0.125 * np.diff(times) ** 2 * (size[:-1] @ (np.abs(of.stuck_rates) ** 2 * (np.abs(middle) + radius)))
+        size = np.exp(np.outer(times, contact.stuck_rates.real))
+        swing, loose = (np.exp(np.outer(times, contact.stuck_rates)) @ middle).real, size @ radius
+        bend = (
+            0.125 * np.diff(times) ** 2 * (size[:-1] @ (np.abs(contact.stuck_rates) ** 2 * (np.abs(middle) + radius)))
+        )
         low, high = torque[0] + slopes[0] * times + swing - loose, torque[1] + slopes[1] * times + swing + loose
         return low, high, bend, float(size[-1] @ (np.abs(middle) + radius))
 
-    times = _settling(of.stuck_rates)
+    times = _settling(contact.stuck_rates)
     low, high, bend, rest = held(times)
-    over = np.flatnonzero(np.maximum(high[:-1], high[1:]) + bend >= of.breakaway)
-    certain = np.flatnonzero(low >= of.breakaway)
-    back = np.flatnonzero(np.minimum(low[:-1], low[1:]) - bend <= -of.breakaway)
+    over = np.flatnonzero(np.maximum(high[:-1], high[1:]) + bend >= contact.breakaway)
+    certain = np.flatnonzero(low >= contact.breakaway)
+    back = np.flatnonzero(np.minimum(low[:-1], low[1:]) - bend <= -contact.breakaway)
     if len(back) and (not len(certain) or back[0] <= certain[0]):
         return None
-    if torque[0] + slopes[0] * times[-1] - rest <= -of.breakaway or (error[0] == 0.0 and len(over)):
+    if torque[0] + slopes[0] * times[-1] - rest <= -contact.breakaway or (error[0] == 0.0 and len(over)):
         return None
-    settled = (of.breakaway - torque[1] - rest) / slopes[1] if slopes[1] > 0.0 else math.inf
+    settled = (contact.breakaway - torque[1] - rest) / slopes[1] if slopes[1] > 0.0 else math.inf
     first = float(times[over[0]]) if len(over) else max(settled, float(times[-1]))
-    settled = (of.breakaway - torque[0] + rest) / slopes[0] if slopes[0] > 0.0 else math.inf
+    settled = (contact.breakaway - torque[0] + rest) / slopes[0] if slopes[0] > 0.0 else math.inf
     last = float(times[certain[0]]) if len(certain) else settled
     for _ in range(CLOSER if len(over) and len(certain) else 0):
         if not first < last:
             break
         times = np.linspace(first, last, PARTS + 1)
         low, high, bend, _ = held(times)
-        over = np.flatnonzero(np.maximum(high[:-1], high[1:]) + bend >= of.breakaway)
-        certain = np.flatnonzero(low >= of.breakaway)
+        over = np.flatnonzero(np.maximum(high[:-1], high[1:]) + bend >= contact.breakaway)
+        certain = np.flatnonzero(low >= contact.breakaway)
         first = float(times[over[0]]) if len(over) else first
         last = float(times[certain[0]]) if len(certain) else last
     return first, last

@@ -17,7 +17,7 @@ from ...simulation.scenario.scenario import Scenario
 from ..regimes import Axis, axis_of
 from .at_rest import at_rest
 from .break_away_map import Image, Transients, image
-from .limit_cycles import SAMPLES, Loop
+from .limit_cycles import SAMPLES, UndrivenLoop
 from .proof import Certainty, Proof, prove
 from .sampled_proof import map_without_steps, prove_sampled, reached_by_run
 from .sampled_stuck_contact import SampledSlip, sampled_slip
@@ -156,20 +156,20 @@ def hunting_certificate(
             raise InputError("hunting_certificate: the scenario has no controller; add one with a position loop")
         axis = axis_of(train, motor)
         return certified(axis, lambda: at_rest(axis).verdict == "at rest", largest_error)
-    loop = Loop.of(train)
+    loop = UndrivenLoop.of(train)
     try:
-        of = stick_slip(train)
+        contact = stick_slip(train)
     except UndecidableError as why:
         return _without_map("not decided", str(why))
     except AtRestError as why:
         return _at_rest(why, rests=_comes_to_rest(loop))
     largest = largest_error or _travel(train)
-    proof = prove(of, largest)
-    reached, fades = _reached(loop, of, proof)
-    points = _map(of, proof, largest)
-    found = _with_proof(proof, of.contact, reached, is_reached=fades or abs(reached) <= proof.largest)
-    fixed = tuple(_fixed_points(of, points)) if of.excess > 0.0 else ()
-    return replace(found, map=_dataset(of, points, found.verdict, train), fixed_points=fixed)
+    proof = prove(contact, largest)
+    reached, fades = _reached(loop, contact, proof)
+    points = _map(contact, proof, largest)
+    found = _with_proof(proof, contact.name, reached, is_reached=fades or abs(reached) <= proof.largest)
+    fixed = tuple(_fixed_points(contact, points)) if contact.excess > 0.0 else ()
+    return replace(found, map=_dataset(contact, points, found.verdict, train), fixed_points=fixed)
 
 
 def _with_proof(proof: Proof, contact: str, reached: float, *, is_reached: bool) -> HuntingCertificate:
@@ -210,15 +210,15 @@ def certified(axis: Axis, rests: Callable[[], bool], largest_error: float | None
             f"{name}: never comes to rest; leave out sines and last slopes, since hunting is what a loop does by itself"
         )
     try:
-        of = sampled_slip(axis)
-        proof = prove_sampled(of, largest_error or _sampled_travel(axis))
+        contact = sampled_slip(axis)
+        proof = prove_sampled(contact, largest_error or _sampled_travel(axis))
     except UndecidableError as why:
         return _without_map("not decided", str(why))
     except AtRestError as why:
         return _at_rest(why, rests=rests())
-    reached = math.nan if proof.verdict == "not decided" else reached_by_run(axis, of, proof.largest)
-    found = _with_proof(proof, of.contact, reached, is_reached=abs(reached) <= proof.largest)
-    return replace(found, map=_sampled_map(of, proof, train))
+    reached = math.nan if proof.verdict == "not decided" else reached_by_run(axis, contact, proof.largest)
+    found = _with_proof(proof, contact.name, reached, is_reached=abs(reached) <= proof.largest)
+    return replace(found, map=_sampled_map(contact, proof, train))
 
 
 def _sampled_travel(axis: Axis) -> float:
@@ -227,20 +227,20 @@ def _sampled_travel(axis: Axis) -> float:
     return float(np.abs(np.append(axis.controller.reference.at(times)[0], 0.0)).max()) or 1.0
 
 
-def _sampled_map(of: SampledSlip, proof: Proof, train: Scenario) -> xarray.Dataset | None:
+def _sampled_map(contact: SampledSlip, proof: Proof, train: Scenario) -> xarray.Dataset | None:
     """Error left by a slip without the steps of the encoder, about a band; None without one."""
     import xarray as xr
 
     if proof.band is None:
         return None
     unit, errors = _unit(train), np.linspace(0.25 * proof.band[0], 1.5 * proof.band[1], SAMPLED_POINTS)
-    image = map_without_steps(of, errors)
+    image = map_without_steps(contact, errors)
     shown = np.isfinite(image)
     about = {"units": unit, "long_name": "error left after the slip"}
     return xr.Dataset(
         {"image": ("error", image[shown], about)},
         coords={"error": ("error", errors[shown], {"units": unit, "long_name": "error at the break-away"})},
-        attrs={"contact": of.contact, "verdict": proof.verdict},
+        attrs={"contact": contact.name, "verdict": proof.verdict},
     )
 
 
@@ -258,23 +258,23 @@ def _travel(train: Scenario) -> float:
     return float(np.ptp(values)) or 1.0
 
 
-def _comes_to_rest(loop: Loop) -> bool:
+def _comes_to_rest(loop: UndrivenLoop) -> bool:
     duration = loop.scenario.simulation.duration
     return any(loop.outlook(duration * LONGER**k).rests for k in range(RUNS))
 
 
-def _reached(loop: Loop, of: StickSlip, proof: Proof) -> tuple[float, bool]:
+def _reached(loop: UndrivenLoop, contact: StickSlip, proof: Proof) -> tuple[float, bool]:
     """Error of the first settled stuck interval of the scenario's run, and whether the errors of the run fade.
 
     An interval for which the proof holds goes before the first one.
     """
-    settling = SETTLED / np.abs(of.stuck_rates.real).min() if len(of.stuck_rates) else 0.0
+    settling = SETTLED / np.abs(contact.stuck_rates.real).min() if len(contact.stuck_rates) else 0.0
     first = math.nan
     for k in range(RUNS):
         whole = loop.settled + loop.scenario.simulation.duration * LONGER**k
         run = loop.run(whole, SAMPLES)
         errors, times = run["values"][loop.channels.index(loop.watched)], np.arange(SAMPLES) * whole / SAMPLES
-        for begin, end in _stuck(_modes(loop, of, run["switchings"]), loop.settled, whole):
+        for begin, end in _stuck(_modes(loop, contact, run["switchings"]), loop.settled, whole):
             inside = np.flatnonzero((times > begin) & (times < end))
             if end - begin > settling and len(inside):
                 error = float(errors[inside[-1]])
@@ -287,10 +287,10 @@ def _reached(loop: Loop, of: StickSlip, proof: Proof) -> tuple[float, bool]:
     return first, False
 
 
-def _modes(loop: Loop, of: StickSlip, switchings: np.ndarray) -> np.ndarray:
+def _modes(loop: UndrivenLoop, contact: StickSlip, switchings: np.ndarray) -> np.ndarray:
     """Instant, and mode of the contact before and after it, of each switching of the contact."""
     names = loop.core.switching_columns()
-    columns = [0, *(names.index(f"{of.contact}_{when}") for when in ("before", "after"))]
+    columns = [0, *(names.index(f"{contact.name}_{when}") for when in ("before", "after"))]
     found = switchings[:, columns]
     return np.asarray(found[found[:, 1] != found[:, 2]])
 
@@ -311,27 +311,29 @@ def _stuck(switchings: np.ndarray, settled: float, end: float) -> list[tuple[flo
 # --- the map ---
 
 
-def _map(of: StickSlip, proof: Proof, largest: float) -> list[tuple[float, Image]]:
+def _map(contact: StickSlip, proof: Proof, largest: float) -> list[tuple[float, Image]]:
     """Points of the map from 0 on, up to some times its largest limit cycle."""
     top = (proof.largest or largest) if proof.band is None else SHOWN * proof.band[1]
-    none = Transients.none(of)
-    return [(float(e), image(of, e, e, none)) for e in np.linspace(0.0, top, POINTS) if e > 0.0 or of.excess > 0.0]
+    none = Transients.none(contact)
+    return [
+        (float(e), image(contact, e, e, none)) for e in np.linspace(0.0, top, POINTS) if e > 0.0 or contact.excess > 0.0
+    ]
 
 
-def _fixed_points(of: StickSlip, points: list[tuple[float, Image]]) -> list[FixedPoint]:
+def _fixed_points(contact: StickSlip, points: list[tuple[float, Image]]) -> list[FixedPoint]:
     """Errors of which a slip leaves the same of the other sign."""
     sums = [math.nan if i.reason else i.middle + e for e, i in points]
     brackets = [k for k in np.flatnonzero(np.diff(np.sign(sums))) if sums[k] * sums[k + 1] <= 0.0]
-    return [_fixed_point(of, points[k][0], points[k + 1][0], sums[k], sums[k + 1]) for k in brackets]
+    return [_fixed_point(contact, points[k][0], points[k + 1][0], sums[k], sums[k + 1]) for k in brackets]
 
 
-def _fixed_point(of: StickSlip, a: float, b: float, at_a: float, at_b: float) -> FixedPoint:
+def _fixed_point(contact: StickSlip, a: float, b: float, at_a: float, at_b: float) -> FixedPoint:
     """A fixed point between two errors, by secants, with the transients that one stuck interval hands to the next slip."""
-    low, high, slope, left = a, b, (at_b - at_a) / (b - a), Transients.none(of)
+    low, high, slope, left = a, b, (at_b - at_a) / (b - a), Transients.none(contact)
     for _ in range(SECANTS):
         error = min(max(b - at_b / slope, low), high)
-        found = image(of, error, error, left)
-        beside = image(of, error * (1.0 + STEP), error * (1.0 + STEP), left)
+        found = image(contact, error, error, left)
+        beside = image(contact, error * (1.0 + STEP), error * (1.0 + STEP), left)
         if found.reason or beside.reason:
             break
         slope = 1.0 + (beside.middle - found.middle) / (STEP * error)
@@ -339,7 +341,7 @@ def _fixed_point(of: StickSlip, a: float, b: float, at_a: float, at_b: float) ->
     return FixedPoint(error, sum(found.slip) + sum(found.stuck), (slope - 1.0) ** 2)
 
 
-def _dataset(of: StickSlip, points: list[tuple[float, Image]], verdict: str, train: Scenario) -> xarray.Dataset:
+def _dataset(contact: StickSlip, points: list[tuple[float, Image]], verdict: str, train: Scenario) -> xarray.Dataset:
     import xarray as xr
 
     unit = _unit(train)
@@ -352,5 +354,5 @@ def _dataset(of: StickSlip, points: list[tuple[float, Image]], verdict: str, tra
     return xr.Dataset(
         {name: ("error", values, {"units": u, "long_name": text}) for name, (values, u, text) in columns.items()},
         coords={"error": ("error", [e for e, _ in good], {"units": unit, "long_name": "error at the break-away"})},
-        attrs={"contact": of.contact, "verdict": verdict},
+        attrs={"contact": contact.name, "verdict": verdict},
     )

@@ -31,9 +31,9 @@ STRIPS = 24  # of a sample, within which a torque with a lag frees the contact
 class Slips:
     """Follows the slips of a loop with an encoder with steps from one reading."""
 
-    def __init__(self, of: SampledSlip) -> None:
-        self.of = of
-        self.n = len(of.held)
+    def __init__(self, contact: SampledSlip) -> None:
+        self.contact = contact
+        self.n = len(contact.held)
         self.speed = np.eye(self.n)[1]
         self.work = 0
         self._left: dict[tuple[int, bool], set[int]] = {}
@@ -61,29 +61,29 @@ class Slips:
 
     @cached_property
     def _loudest(self) -> float:
-        return loudest(self.of)
+        return loudest(self.contact)
 
     # --- starts ---
 
     def starts(self, count: int) -> list[tuple[int, Pieces]]:
         """Starts of the slips forward, by the tick of a frame after whose sample they are given."""
-        of, ramp, reading, found = self.of, self.of.ramp, -count * self.of.quantum, []
+        contact, ramp, reading, found = self.contact, self.contact.ramp, -count * self.contact.quantum, []
         for tick, (z, b) in enumerate(zip(ramp.z, ramp.b, strict=True)):
-            if of.lag == 0.0:
+            if contact.lag == 0.0:
                 rise = ramp.rises[tick] * reading
                 if rise > 0.0:
-                    start = z * reading + b * of.breakaway
+                    start = z * reading + b * contact.breakaway
                     found.append((tick, self._pieces(start[None], (b * rise)[None], np.array([[0.0, 1.0]]), 1)))
                 continue
-            rise = ramp.rises[(tick + 1) % of.frame] * reading
+            rise = ramp.rises[(tick + 1) % contact.frame] * reading
             if rise > 0.0:
-                found.append(((tick + 1) % of.frame, self._freed(z * reading + b * of.breakaway, b, rise)))
+                found.append(((tick + 1) % contact.frame, self._freed(z * reading + b * contact.breakaway, b, rise)))
         if not found:
             raise UndecidableError("the torque does not rise to the break-away within a sample")
         return found
 
     def _pieces(self, centre: np.ndarray, slope: np.ndarray, strip: np.ndarray, mode: int) -> Pieces:
-        k, half = len(centre), 0.5 * self.of.step
+        k, half = len(centre), 0.5 * self.contact.step
         centre, slope = centre.copy(), slope.copy()
         centre[:, :2] = slope[:, :2] = 0.0
         none = np.zeros(k, int)
@@ -97,21 +97,21 @@ class Slips:
         ``rise``. It breaks away when this is above T_S by ``(1 - w) rise``. Speed and angle after the tick are integrals
         from there, whose slopes over w are products of monotonic factors.
         """
-        of = self.of
-        gap = float(of.command @ start) - of.breakaway  # to which the torque goes, for w = 1
+        contact = self.contact
+        gap = float(contact.command @ start) - contact.breakaway  # to which the torque goes, for w = 1
         if gap <= 0.0:
             raise UndecidableError("the torque does not rise to the break-away within a sample")
         # Strips of equal time.
-        fall = np.exp(-np.linspace(0.0, of.tick, STRIPS + 1)[::-1] / of.lag)
+        fall = np.exp(-np.linspace(0.0, contact.tick, STRIPS + 1)[::-1] / contact.lag)
         edges = 1.0 - (1.0 - fall) / (1.0 - fall[0])
-        left = np.linspace(0.0, of.tick, STRIPS + 1)
-        rate = gap * fall / of.lag  # of the torque at the break-away
+        left = np.linspace(0.0, contact.tick, STRIPS + 1)
+        rate = gap * fall / contact.lag  # of the torque at the break-away
         speeds, angles = self._reached(gap, rise, edges, left)
         b = b * rise
         pieces = self._pieces(
             np.tile(start - b, (STRIPS, 1)), np.tile(b, (STRIPS, 1)), np.stack([edges[:-1], edges[1:]], axis=1), 1
         )
-        pieces = pieces.moved(of.stuck)
+        pieces = pieces.moved(contact.stuck)
         width = np.diff(edges)
         for state, ends in ((1, speeds), (0, angles)):
             slope = np.diff(ends) / width
@@ -122,27 +122,27 @@ class Slips:
 
     def _spread(self, left: np.ndarray, rate: np.ndarray, rise: float, state: int) -> np.ndarray:
         """Largest less least slope over w of the speed (1) or angle (0) after the tick, in each strip; all factors are monotonic."""
-        of = self.of
-        first, second = _integrals(of.viscous, left)
-        grown = np.exp(of.viscous * left)
+        contact = self.contact
+        first, second = _integrals(contact.viscous, left)
+        grown = np.exp(contact.viscous * left)
         one, two = (grown, first) if state else (first, second)
 
         def ends(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             return np.minimum(values[:-1], values[1:]), np.maximum(values[:-1], values[1:])
 
         (a, b), (c, d), (e, f) = ends(one), ends(two), ends(rate)
-        return np.asarray(rise * ((b / e - a / f) * of.excess + d - c) / of.inertia)
+        return np.asarray(rise * ((b / e - a / f) * contact.excess + d - c) / contact.inertia)
 
     def _reached(self, gap: float, rise: float, w: np.ndarray, left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Speed and angle after the tick: over the time that is left, the torque is T_S + (gap - (1 - w) rise) (1 - exp(-t / lag))."""
         from scipy.linalg import expm
 
-        of, found = self.of, []
+        contact, found = self.contact, []
         for one, time in zip(w, left, strict=True):
             A = np.zeros((4, 4))  # angle, speed, rest of the torque to come, 1
-            A[0, 1], A[1, 1], A[2, 2] = 1.0, of.viscous, -1.0 / of.lag
+            A[0, 1], A[1, 1], A[2, 2] = 1.0, contact.viscous, -1.0 / contact.lag
             to_come = gap - (1.0 - one) * rise
-            A[1, 2], A[1, 3] = -1.0 / of.inertia, (of.excess + to_come) / of.inertia
+            A[1, 2], A[1, 3] = -1.0 / contact.inertia, (contact.excess + to_come) / contact.inertia
             found.append((expm(A * time) @ np.array([0.0, 0.0, to_come, 1.0]))[:2])
         angles, speeds = np.array(found).T
         return speeds, angles
@@ -150,18 +150,18 @@ class Slips:
     # --- until all has settled ---
 
     def _followed(self, pieces: Pieces, tick: int, fast: float) -> set[int]:
-        of, found = self.of, set()
+        contact, found = self.contact, set()
         for k in range(TICKS):
-            if k or of.lag == 0.0:
-                pieces = propagated(of, pieces, self._slipped)
-                tick = (tick + 1) % of.frame
+            if k or contact.lag == 0.0:
+                pieces = propagated(contact, pieces, self._slipped)
+                tick = (tick + 1) % contact.frame
             pieces = self._sampled(pieces, tick)
             done = self._settles(pieces, tick)
             found |= set(pieces.read[done].tolist())
             passed = (pieces.mode > 0) & (pieces.range_of(self.speed)[0] > fast)
             if passed.any():
-                for least, most in zip(*finish(of, pieces.take(passed).boxes(), tick), strict=True):
-                    first, last = least / of.step + 0.5 - ROUNDING, most / of.step + 0.5 + ROUNDING
+                for least, most in zip(*finish(contact, pieces.take(passed).boxes(), tick), strict=True):
+                    first, last = least / contact.step + 0.5 - ROUNDING, most / contact.step + 0.5 + ROUNDING
                     found |= set(range(math.floor(first), math.floor(last) + 1))
             pieces = pieces.take(~done & ~passed)
             if not len(pieces):
@@ -173,42 +173,42 @@ class Slips:
 
     def _settles(self, pieces: Pieces, tick: int) -> np.ndarray:
         """Mask of the pieces that stay stuck until all but the integrator has settled."""
-        of = self.of
-        done = np.asarray((pieces.mode == 0) & (pieces.waited >= of.ramp.ticks))
+        contact = self.contact
+        done = np.asarray((pieces.mode == 0) & (pieces.waited >= contact.ramp.ticks))
         some = np.flatnonzero((pieces.mode == 0) & (pieces.waited == 1))
         if len(some):
             rows, constants = self._torques[tick]
             here = pieces.take(some)
-            ends = here.centre @ rows.T + np.outer(here.read * of.quantum, constants)
+            ends = here.centre @ rows.T + np.outer(here.read * contact.quantum, constants)
             slopes = here.slope @ rows.T
             most = np.maximum(*(np.abs(ends + slopes * w[:, None]).max(axis=1) for w in here.strip.T))
             most += (here.radius @ np.abs(rows).T).max(axis=1)
-            done[some[most < of.breakaway * (1.0 - ROUNDING)]] = True
+            done[some[most < contact.breakaway * (1.0 - ROUNDING)]] = True
         return done
 
     @cached_property
     def _torques(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """For each tick of a frame, torques at the samples of a stuck interval over the state at its begin, and over its reading."""
-        of, found = self.of, []
-        for tick in range(of.frame):
+        contact, found = self.contact, []
+        for tick in range(contact.frame):
             matrix, constant = np.eye(self.n), np.zeros(self.n)
             rows, constants = [], []
-            for k in range(1, of.ramp.ticks + 1):
-                S, column = of.samples[(tick + k) % of.frame]
-                for after in (of.stuck, S):  # the torque is monotonic in between
+            for k in range(1, contact.ramp.ticks + 1):
+                S, column = contact.samples[(tick + k) % contact.frame]
+                for after in (contact.stuck, S):  # the torque is monotonic in between
                     matrix, constant = after @ matrix, after @ constant
                     if after is S:
                         constant = constant + column
-                    rows.append(of.held @ matrix)
-                    constants.append(float(of.held @ constant))
+                    rows.append(contact.held @ matrix)
+                    constants.append(float(contact.held @ constant))
             found.append((np.array(rows), np.array(constants)))
         return found
 
     def _slipped(self, before: Pieces) -> list[Pieces]:
         """Pieces that go on slipping over a tick, and those that stop in it."""
-        of, way = self.of, before.mode
-        bend = bend_of(of, before)
-        after = before.moved(of.slip, way[:, None] * of.push)
+        contact, way = self.contact, before.mode
+        bend = bend_of(contact, before)
+        after = before.moved(contact.slip, way[:, None] * contact.push)
         low = along(way, *after.range_of(self.speed))[0]
         sure = low > bend
         unsure = np.flatnonzero(~sure)
@@ -219,13 +219,13 @@ class Slips:
         # The starts of those that stop are the same.
         stops = before.take(unsure)
         radius = some.radius[:, 1]
-        row = self.of.slip[1]
-        stops = stops.where(row, stops.mode * (bend[unsure] - of.push[1] + radius), -stops.mode)
+        row = self.contact.slip[1]
+        stops = stops.where(row, stops.mode * (bend[unsure] - contact.push[1] + radius), -stops.mode)
         return [after.take(sure), going, *self._stopped_within(stops)]
 
     def _stopped_within(self, pieces: Pieces) -> list[Pieces]:
         """Stuck from an instant of a tick on."""
-        of, way = self.of, pieces.mode.copy()
+        contact, way = self.contact, pieces.mode.copy()
         if not len(pieces):
             return []
         slow, quick = along(way, *pieces.range_of(self.speed))
@@ -233,39 +233,39 @@ class Slips:
         after = pieces.take(np.arange(len(pieces)))
         torque = np.stack(
             [
-                *along(way, *pieces.range_of(of.held)),
-                *along(way, *(pieces.range_of(of.held if of.lag == 0.0 else of.command))),
+                *along(way, *pieces.range_of(contact.held)),
+                *along(way, *(pieces.range_of(contact.held if contact.lag == 0.0 else contact.command))),
             ]
         )
-        push = (torque.max(axis=0) - of.sliding) / of.inertia
-        pull = (of.sliding - torque.min(axis=0)) / of.inertia + abs(of.viscous) * quick
-        top = quick + of.tick * np.maximum(push, 0.0)
-        most = top * of.tick
+        push = (torque.max(axis=0) - contact.sliding) / contact.inertia
+        pull = (contact.sliding - torque.min(axis=0)) / contact.inertia + abs(contact.viscous) * quick
+        top = quick + contact.tick * np.maximum(push, 0.0)
+        most = top * contact.tick
         brakes = push < 0.0
         least = np.where(brakes, 0.5 * slow**2 / np.where(brakes, pull, 1.0), 0.0)
         most = np.where(brakes, np.minimum(0.5 * quick**2 / np.where(brakes, -push, 1.0), most), most)
         least = np.minimum(least, most)
         for values in (after.centre, after.slope, after.radius):
             values[:, 1] = 0.0
-        after = after.moved(of.stuck)
+        after = after.moved(contact.stuck)
         after.widen(0, *along(way, least, most))
         after.came, after.mode = way, 0 * way
         after.waited[:] = 0
-        return freed_within(of, pieces, after)
+        return freed_within(contact, pieces, after)
 
     # --- at a sample ---
 
     def _sampled(self, pieces: Pieces, tick: int) -> Pieces:
-        of = self.of
-        matrix, column = of.samples[tick]
+        contact = self.contact
+        matrix, column = contact.samples[tick]
         pieces = self._divided(pieces)
-        pieces = pieces.moved(matrix, np.outer(pieces.read * of.quantum, column))
-        need_within_limits(of, pieces)
-        return pieces if of.lag > 0.0 else self._freed_at(pieces)
+        pieces = pieces.moved(matrix, np.outer(pieces.read * contact.quantum, column))
+        need_within_limits(contact, pieces)
+        return pieces if contact.lag > 0.0 else self._freed_at(pieces)
 
     def _divided(self, pieces: Pieces) -> Pieces:
         """Pieces with one reading each."""
-        step, out, known = self.of.step, [], np.full(len(pieces), -math.inf)
+        step, out, known = self.contact.step, [], np.full(len(pieces), -math.inf)
         while True:
             least, most = pieces.angles()
             low, high = one_way(pieces, np.floor(least / step + 0.5 - ROUNDING), np.floor(most / step + 0.5 + ROUNDING))
@@ -289,17 +289,17 @@ class Slips:
 
     def _freed_at(self, pieces: Pieces) -> Pieces:
         """With a torque that follows at once, a contact breaks away at the sample."""
-        of = self.of
+        contact = self.contact
         for way in (1, -1):
-            high = along(way, *pieces.range_of(of.held))[1]
-            may = (pieces.mode == 0) & (high >= of.breakaway)
+            high = along(way, *pieces.range_of(contact.held))[1]
+            may = (pieces.mode == 0) & (high >= contact.breakaway)
             if not may.any():
                 continue
             some = pieces.take(may)
             sides = np.full(len(some), way)
-            freed = some.where(of.held, sides * of.breakaway, sides)
+            freed = some.where(contact.held, sides * contact.breakaway, sides)
             freed.mode[:], freed.waited[:] = way, 0
-            stays = some.where(of.held, sides * of.breakaway, -sides)
+            stays = some.where(contact.held, sides * contact.breakaway, -sides)
             pieces = Pieces.joined([pieces.take(~may), freed, stays])
         return pieces
 

@@ -21,7 +21,7 @@ from ...simulation.scenario.units_of_keys import unit_for
 from ...worker_threads import thread_pool
 from ..regimes import axis_of
 from .at_rest import PART, at_rest, without, without_backlash, without_friction
-from .limit_cycles import Found, Loop, find_limit_cycle
+from .limit_cycles import CycleSearch, UndrivenLoop, find_limit_cycle
 from .standstill import Verdict
 
 if TYPE_CHECKING:
@@ -126,22 +126,22 @@ def limit_cycle(scenario: Scenario, *, motor: str | None = None, causes: bool = 
     return Hunting("hunts", "", True, 1.0 / found.period, amplitudes, motion, _multipliers(found), found_causes)
 
 
-def _found(train: Scenario) -> Found:
-    return find_limit_cycle(Loop.of(train), train.simulation.duration)
+def _found(train: Scenario) -> CycleSearch:
+    return find_limit_cycle(UndrivenLoop.of(train), train.simulation.duration)
 
 
-def _multipliers(found: Found) -> np.ndarray:
+def _multipliers(found: CycleSearch) -> np.ndarray:
     """Without the one of the phase, nearest to 1."""
     all_of_them = floquet_multipliers(found.result, 0)
     return np.delete(all_of_them, int(np.argmin(np.abs(all_of_them - 1.0))))
 
 
-def _swing(found: Found, name: str) -> float:
+def _swing(found: CycleSearch, name: str) -> float:
     return 0.0 if found.reason else float(np.ptp(found.values(name)))
 
 
-def _causes(train: Scenario, found: Found) -> tuple[str, ...]:
-    watched = Loop.of(train).watched
+def _causes(train: Scenario, found: CycleSearch) -> tuple[str, ...]:
+    watched = UndrivenLoop.of(train).watched
     low = PART * _swing(found, watched)
     left_out = {
         "backlash": without_backlash(train),
@@ -249,7 +249,11 @@ def hunting_map(
     if math.prod(shape) > MAX_POINTS:
         raise InputError(f"grid: {math.prod(shape)} points are more than {MAX_POINTS}; give fewer values")
     plain = train.train()
-    of = plain.angle_of(list(plain.shafts)[-1]) if variable is None else known_output(variable, Loop.of(train).channels)
+    of = (
+        plain.angle_of(list(plain.shafts)[-1])
+        if variable is None
+        else known_output(variable, UndrivenLoop.of(train).channels)
+    )
     done = 0
 
     def point(index: tuple[int, ...]) -> tuple[float, float, bool, str, str]:

@@ -31,7 +31,7 @@ MAX_SWITCHINGS = 20_000
 
 
 @dataclass(frozen=True)
-class Found:
+class CycleSearch:
     """Result of the search."""
 
     verdict: Verdict
@@ -50,7 +50,7 @@ class Found:
 
 
 @dataclass(frozen=True)
-class Loop:
+class UndrivenLoop:
     """A train with constant inputs, ready to run."""
 
     core: _core.Train
@@ -62,7 +62,7 @@ class Loop:
     scenario: Scenario
 
     @classmethod
-    def of(cls, scenario: Scenario) -> Loop:
+    def of(cls, scenario: Scenario) -> UndrivenLoop:
         """Loop of a scenario whose inputs come to rest.
 
         Raises
@@ -113,7 +113,7 @@ class Loop:
         )
 
 
-def find_limit_cycle(loop: Loop, duration: float) -> Found:
+def find_limit_cycle(loop: UndrivenLoop, duration: float) -> CycleSearch:
     """The limit cycle that a run from the start leads to.
 
     duration: of the shortest run [s]; where it does not suffice, longer ones follow.
@@ -129,12 +129,12 @@ def find_limit_cycle(loop: Loop, duration: float) -> Found:
         before, last = (float(np.ptp(part)) for part in np.array_split(x, 2))
         outlook = loop.outlook(duration)
         if outlook.rests:
-            return Found(
+            return CycleSearch(
                 "at rest", f"it comes to rest: after {whole:.4g} s {loop.watched} stays at {x[-1]:.6g}; {NOTHING_MOVES}"
             )
         first = first or last
         if last > GROWTH * first or not np.isfinite(last):
-            return Found(
+            return CycleSearch(
                 "not decided",
                 f"it grows without bound: the linear loop is unstable, and after {whole:.4g} s nothing limits it",
             )
@@ -150,16 +150,16 @@ def find_limit_cycle(loop: Loop, duration: float) -> Found:
             break
         duration = max(4.0 * duration, 2.0 * outlook.breaks_away if outlook.breaks_away < FOREVER else 0.0)
         if duration > FOREVER and np.ptp(x) <= SMALL * np.abs(watched).max():
-            return Found(
+            return CycleSearch(
                 "at rest",
                 f"it comes to rest: each slip is smaller than the one before, and from {t[0]:.3g} to {whole:.3g} s {loop.watched} stays at {x[-1]:.6g}",
             )
         if duration > FOREVER:
             break
-    return Found("not decided", f"{reason} ({outlook.describe()})" if outlook.describe() else reason)
+    return CycleSearch("not decided", f"{reason} ({outlook.describe()})" if outlook.describe() else reason)
 
 
-def _near(loop: Loop, run: dict[str, Any], apparent: float, end: float) -> tuple[str, Found | None]:
+def _near(loop: UndrivenLoop, run: dict[str, Any], apparent: float, end: float) -> tuple[str, CycleSearch | None]:
     """The limit cycle near the end of a run, or why none was found."""
     reason = ""
     for multiple in MULTIPLES:
@@ -169,7 +169,7 @@ def _near(loop: Loop, run: dict[str, Any], apparent: float, end: float) -> tuple
         result = loop.search(start, period)
         if reason := reason_of(result, 0):
             continue
-        found = Found("hunts", "", result, loop.channels)
+        found = CycleSearch("hunts", "", result, loop.channels)
         swing = float(np.ptp(found.values(loop.watched)))
         watched = run["values"][loop.channels.index(loop.watched)]
         if abs(found.period / period - 1.0) < NEAR and swing > 1e-3 * float(np.ptp(watched[-SAMPLES // 8 :])):
@@ -178,7 +178,7 @@ def _near(loop: Loop, run: dict[str, Any], apparent: float, end: float) -> tuple
     return f"it swings with a period of about {apparent:.4g} s, but does not repeat: {reason}", None
 
 
-def _shortest(loop: Loop, found: Found) -> Found:
+def _shortest(loop: UndrivenLoop, found: CycleSearch) -> CycleSearch:
     """The same motion over the shortest of its periods."""
     for parts in (2, 3, 5):
         while (shorter := _part(loop, found, parts)) is not None:
@@ -186,12 +186,12 @@ def _shortest(loop: Loop, found: Found) -> Found:
     return found
 
 
-def _part(loop: Loop, found: Found, parts: int) -> Found | None:
+def _part(loop: UndrivenLoop, found: CycleSearch, parts: int) -> CycleSearch | None:
     start = dict(zip(found.result["components"], found.result["start"][0].tolist(), strict=True))
     result = loop.search(start, found.period / parts)
     if reason_of(result, 0) or abs(result["period"][0] * parts / found.period - 1.0) >= PART_OF:
         return None
-    return Found("hunts", "", result, loop.channels)
+    return CycleSearch("hunts", "", result, loop.channels)
 
 
 def _quiet_instant(instants: np.ndarray, begin: float, end: float) -> float:

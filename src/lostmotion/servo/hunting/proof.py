@@ -45,20 +45,20 @@ class Proof:
     ranges: tuple[tuple[float, float], ...] = field(default_factory=tuple)  # magnitudes from which it is reached
 
 
-def prove(of: StickSlip, largest: float) -> Proof:
+def prove(contact: StickSlip, largest: float) -> Proof:
     """Decide for all errors up to one, or for as large a part of them as the bounds allow."""
-    if of.excess == 0.0:
-        return _shares(of, largest)
-    return _band(of, largest)
+    if contact.excess == 0.0:
+        return _shares(contact, largest)
+    return _band(contact, largest)
 
 
 # --- without an excess of static friction ---
 
 
-def _shares(of: StickSlip, largest: float) -> Proof:
+def _shares(contact: StickSlip, largest: float) -> Proof:
     error, reason = largest, ""
     for _ in range(HALVINGS):
-        factor, why = _share(of, error)
+        factor, why = _share(contact, error)
         if not why and factor < 1.0:
             return Proof("does not hunt", f"each slip leaves at most {factor:.4g} of its error", error, factor)
         reason = reason or why or f"a slip may leave {factor:.4g} of its error"
@@ -68,22 +68,22 @@ def _shares(of: StickSlip, largest: float) -> Proof:
     return Proof("not decided", reason, 0.0)
 
 
-def _share(of: StickSlip, error: float) -> tuple[float, str]:
-    """Bound of the share of its error that a slip leaves, for all errors up to one, and why there is none.
+def _share(contact: StickSlip, error: float) -> tuple[float, str]:
+    """BoundController of the share of its error that a slip leaves, for all errors up to one, and why there is none.
 
     With transients in proportion, a smaller error has the same map, and no shorter stuck interval: what holds for the largest
     error holds for all.
     """
-    left, most = Transients.none(of), 0.0
+    left, most = Transients.none(contact), 0.0
     chain: list[Transients] = []
     for _ in range(SLIPS):
-        found = image(of, error, error, left)
+        found = image(contact, error, error, left)
         if found.reason:
             return math.inf, found.reason
         most = max(most, found.largest / error)
         if math.isinf(found.stuck[0]):
             return most, ""
-        after = _in_proportion(of, found, error)
+        after = _in_proportion(contact, found, error)
         if after is None:
             return math.inf, "the transients after a slip are not small against the error that it leaves"
         if any(after.within(before) for before in [left, *chain]):
@@ -99,16 +99,16 @@ def _about(after: Transients, before: Transients) -> Transients:
     return Transients(after.middle, SLACK * after.radius + change)
 
 
-def _in_proportion(of: StickSlip, found: Image, error: float) -> Transients | None:
+def _in_proportion(contact: StickSlip, found: Image, error: float) -> Transients | None:
     """Transients after a slip, where the error that it leaves has grown to another one."""
     if found.low > 0.0:  # it goes on in its direction; all is in proportion
         factor, off = error / found.middle, 0.5 * (found.high - found.low) / found.low
         grown = found.left.times(factor)
         return Transients(grown.middle, grown.radius * (1.0 + off) + off * np.abs(grown.middle))
-    if not len(of.stuck_rates):
+    if not len(contact.stuck_rates):
         return found.left
     # A smaller error is stuck for longer, in which the transients fall by more than in proportion.
-    if np.abs(of.stuck_rates.real).min() * found.stuck[0] < 1.0:
+    if np.abs(contact.stuck_rates.real).min() * found.stuck[0] < 1.0:
         return None
     return found.left.anywhere().times(error / found.largest)
 
@@ -116,17 +116,17 @@ def _in_proportion(of: StickSlip, found: Image, error: float) -> Transients | No
 # --- with an excess ---
 
 
-def _band(of: StickSlip, largest: float) -> Proof:
-    orbit, reason = _orbit(of)
+def _band(contact: StickSlip, largest: float) -> Proof:
+    orbit, reason = _orbit(contact)
     if reason:
         return Proof("not decided", reason, 0.0)
     least, most = min(orbit[-LAST:]), max(orbit[-LAST:])
     for wider in WIDER:
         low, high = least * (1.0 - wider), most * (1.0 + wider)
         for _ in range(GROWTHS):
-            kept, reason = _kept(of, low, high)
+            kept, reason = _kept(contact, low, high)
             if isinstance(kept, Transients):
-                ranges = _leading_to(of, low, high, max(largest, high), kept)
+                ranges = _leading_to(contact, low, high, max(largest, high), kept)
                 return Proof("hunts", "", max(b for _, b in ranges), band=(low, high), ranges=ranges)
             if kept is None:
                 break
@@ -134,12 +134,12 @@ def _band(of: StickSlip, largest: float) -> Proof:
     return Proof("not decided", reason, 0.0)
 
 
-def _orbit(of: StickSlip) -> tuple[list[float], str]:
+def _orbit(contact: StickSlip) -> tuple[list[float], str]:
     """Magnitudes of the errors of slips that follow each other, from the one that begins without error."""
-    error, none = 0.0, Transients.none(of)
+    error, none = 0.0, Transients.none(contact)
     errors: list[float] = []
     for _ in range(ORBIT):
-        found = image(of, error, error, none)
+        found = image(contact, error, error, none)
         if found.reason:
             return errors, found.reason
         error = abs(found.middle)
@@ -147,11 +147,11 @@ def _orbit(of: StickSlip) -> tuple[list[float], str]:
     return errors, ""
 
 
-def _kept(of: StickSlip, low: float, high: float) -> tuple[Transients | tuple[float, float] | None, str]:
-    """Bound of the transients with which the map takes a band into itself; else the band that it takes it to, if there is one, and why."""
-    left = Transients.none(of)
+def _kept(contact: StickSlip, low: float, high: float) -> tuple[Transients | tuple[float, float] | None, str]:
+    """BoundController of the transients with which the map takes a band into itself; else the band that it takes it to, if there is one, and why."""
+    left = Transients.none(contact)
     for _ in range(ROUNDS):
-        images = _images(of, low, high, left)
+        images = _images(contact, low, high, left)
         if reason := next((found.reason for found in images if found.reason), ""):
             return None, reason
         least, most = min(found.least for found in images), max(found.largest for found in images)
@@ -167,7 +167,7 @@ def _kept(of: StickSlip, low: float, high: float) -> tuple[Transients | tuple[fl
 
 
 def _leading_to(
-    of: StickSlip, low: float, high: float, largest: float, left: Transients
+    contact: StickSlip, low: float, high: float, largest: float, left: Transients
 ) -> tuple[tuple[float, float], ...]:
     """Ranges of errors from which the band is reached: cells that the map takes into such ones, with their transients."""
     edges = np.unique([0.0, *np.geomspace(1e-2 * low, largest, RANGE_CELLS), low, high])
@@ -178,7 +178,7 @@ def _leading_to(
     for _ in range(ROUNDS):
         for k, (a, b) in enumerate(cells):
             if images[k] is None:
-                images[k] = image(of, a, b, Transients(left.middle, radius[k]))
+                images[k] = image(contact, a, b, Transients(left.middle, radius[k]))
         found = [one for one in images if one is not None]
         led, before = _led(edges, found, inside), radius.copy()
         for one, here in zip(found, led, strict=True):
@@ -192,7 +192,7 @@ def _leading_to(
         if changed[inside].any():
             radius[inside] = radius[inside].max(axis=0)
             changed = np.any(radius > before, axis=1)
-            if not _kept_with(of, low, high, Transients(left.middle, radius[inside][0])):
+            if not _kept_with(contact, low, high, Transients(left.middle, radius[inside][0])):
                 break
         images = [None if new else one for new, one in zip(changed, images, strict=True)]
     return ((low, high),)
@@ -203,13 +203,13 @@ def _met(edges: np.ndarray, found: Image) -> tuple[int, int]:
     return int(np.searchsorted(edges, found.least, "right")) - 1, int(np.searchsorted(edges, found.largest, "left"))
 
 
-def _kept_with(of: StickSlip, low: float, high: float, left: Transients) -> bool:
-    return all(not i.reason and low <= i.least <= i.largest <= high for i in _images(of, low, high, left))
+def _kept_with(contact: StickSlip, low: float, high: float, left: Transients) -> bool:
+    return all(not i.reason and low <= i.least <= i.largest <= high for i in _images(contact, low, high, left))
 
 
-def _images(of: StickSlip, low: float, high: float, left: Transients) -> list[Image]:
+def _images(contact: StickSlip, low: float, high: float, left: Transients) -> list[Image]:
     """Images of the cells of a band."""
-    return [image(of, a, b, left) for a, b in itertools.pairwise(np.linspace(low, high, CELLS + 1))]
+    return [image(contact, a, b, left) for a, b in itertools.pairwise(np.linspace(low, high, CELLS + 1))]
 
 
 def _led(edges: np.ndarray, images: list[Image], inside: np.ndarray) -> np.ndarray:

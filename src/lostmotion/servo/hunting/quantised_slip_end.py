@@ -24,11 +24,11 @@ READING = 0.5 * (1.0 + 1e-9)  # of a step, by which the reading may differ from 
 class Noise:
     """Responses to readings since an instant: a column for each, times the largest difference."""
 
-    of: SampledSlip
+    contact: SampledSlip
     columns: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
-        self.columns = np.zeros((len(self.of.held), 0))
+        self.columns = np.zeros((len(self.contact.held), 0))
 
     def on(self, row: np.ndarray) -> np.ndarray:
         """Largest effect on outputs."""
@@ -36,39 +36,41 @@ class Noise:
 
     def sample(self, matrix: np.ndarray, column: np.ndarray) -> None:
         """Goes on over a tick and takes a reading."""
-        new = column * READING * abs(self.of.quantum)
+        new = column * READING * abs(self.contact.quantum)
         self.columns = np.column_stack([matrix @ self.columns, new])
 
 
-def loudest(of: SampledSlip) -> float:
+def loudest(contact: SampledSlip) -> float:
     """Largest speed that the readings of a long slip can take or add."""
-    noise = Noise(of)
+    noise = Noise(contact)
     for tick in range(1, LONGEST):
-        noise.sample(of.linear[tick % of.frame] @ of.slip, of.samples[tick % of.frame][1])
-        if tick > of.frame and np.abs(noise.columns[:, 0]).max() <= 1e-3 * np.abs(noise.columns).max():
+        noise.sample(contact.linear[tick % contact.frame] @ contact.slip, contact.samples[tick % contact.frame][1])
+        if tick > contact.frame and np.abs(noise.columns[:, 0]).max() <= 1e-3 * np.abs(noise.columns).max():
             break
-    return float(noise.on(of.slip[1]))
+    return float(noise.on(contact.slip[1]))
 
 
-def finish(of: SampledSlip, boxes: Boxes, tick: int) -> tuple[np.ndarray, np.ndarray]:
+def finish(contact: SampledSlip, boxes: Boxes, tick: int) -> tuple[np.ndarray, np.ndarray]:
     """Least and largest angles at which fast forward slips end, from states after the sample at a tick of the frame.
 
     Raises UndecidableError: a limit of the controller may act, or the contact may break away again before all has settled.
     """
-    n, count = len(of.held), len(boxes)
-    noise, low, high = Noise(of), np.full(count, np.inf), np.full(count, -np.inf)
+    n, count = len(contact.held), len(boxes)
+    noise, low, high = Noise(contact), np.full(count, np.inf), np.full(count, -np.inf)
     alive, angle, speed = np.arange(count), np.eye(n)[0], np.eye(n)[1]
     passed = np.full(count, np.inf)  # angle of the tick before
     for _ in range(LONGEST):
-        after = boxes.moved(of.slip, of.push)
+        after = boxes.moved(contact.slip, contact.push)
         first, last = boxes.range_of(speed), after.range_of(speed)
-        loud = float(noise.on(of.slip[1]))
-        bend = bend_of(of, boxes, noise.on)
+        loud = float(noise.on(contact.slip[1]))
+        bend = bend_of(contact, boxes, noise.on)
         may = last[0] - loud <= bend
-        most = of.tick * (np.maximum(np.maximum(first[1], last[1]), 0.0) + max(loud, float(noise.on(speed))) + bend)
+        most = contact.tick * (
+            np.maximum(np.maximum(first[1], last[1]), 0.0) + max(loud, float(noise.on(speed))) + bend
+        )
         if may.any():
             some, turned = boxes.take(may), most[may]
-            _stays_stuck(of, some, noise, turned, passed[may], tick)
+            _stays_stuck(contact, some, noise, turned, passed[may], tick)
             least, top = some.range_of(angle)
             off = float(noise.on(angle))
             low[alive[may]] = np.minimum(low[alive[may]], least - off)
@@ -77,31 +79,31 @@ def finish(of: SampledSlip, boxes: Boxes, tick: int) -> tuple[np.ndarray, np.nda
         boxes, alive, passed = after.take(going), alive[going], most[going]
         if not len(boxes):
             return low, high
-        tick = (tick + 1) % of.frame
-        matrix = of.linear[tick]
+        tick = (tick + 1) % contact.frame
+        matrix = contact.linear[tick]
         boxes = boxes.moved(matrix)
-        noise.sample(matrix @ of.slip, of.samples[tick][1])
-        need_within_limits(of, boxes, noise.on)
+        noise.sample(matrix @ contact.slip, contact.samples[tick][1])
+        need_within_limits(contact, boxes, noise.on)
     raise UndecidableError("a slip is not shown to end")
 
 
 def _stays_stuck(
-    of: SampledSlip, boxes: Boxes, noise: Noise, turned: np.ndarray, passed: np.ndarray, tick: int
+    contact: SampledSlip, boxes: Boxes, noise: Noise, turned: np.ndarray, passed: np.ndarray, tick: int
 ) -> None:
     """Refuses stops after which the torque may free the contact before all but the integrator has settled.
 
     turned, passed: largest angles from the last sample to the stop, and in the tick before.
     """
-    if of.ramp.ticks > SETTLING:
+    if contact.ramp.ticks > SETTLING:
         raise UndecidableError("the controller settles too slowly while the contact is stuck")
-    rows, readings = _held_rows(of, tick)
+    rows, readings = _held_rows(contact, tick)
     spread = np.abs(np.einsum("in,bnk->bik", rows, boxes.spread)).sum(axis=2) + np.abs(rows[:, 0]) * turned[:, None]
     effects = np.column_stack([rows @ noise.columns, readings])
-    most = READING * abs(of.quantum)
+    most = READING * abs(contact.quantum)
     falls = np.minimum(np.stack([passed, turned]), 2.0 * most) / (most or 1.0)
     for way in (1.0, -1.0):
         torques = way * (boxes.centre @ rows.T) + spread + _one_way(way * effects, falls)
-        if torques.max() >= of.breakaway:
+        if torques.max() >= contact.breakaway:
             raise UndecidableError("the contact may break away again before the stuck interval has settled")
 
 
@@ -124,15 +126,15 @@ def _one_way(effects: np.ndarray, falls: np.ndarray) -> np.ndarray:
     return np.asarray(total + np.abs(kept).sum(axis=1))
 
 
-def _held_rows(of: SampledSlip, tick: int) -> tuple[np.ndarray, np.ndarray]:
+def _held_rows(contact: SampledSlip, tick: int) -> tuple[np.ndarray, np.ndarray]:
     """Rows of the torque at the samples of a stuck interval over the state before it, and the effect of the constant reading."""
-    n = len(of.held)
+    n = len(contact.held)
     matrix, constant = np.eye(n), np.zeros(n)
     matrix[1] = 0.0
-    rows, readings = [of.held @ matrix], [0.0]
-    for k in range(1, of.ramp.ticks + 1):
-        one = of.linear[(tick + k) % of.frame] @ of.stuck
-        matrix, constant = one @ matrix, one @ constant + of.samples[(tick + k) % of.frame][1]
-        rows.append(of.held @ matrix)
-        readings.append(float(of.held @ constant) * READING * abs(of.quantum))
+    rows, readings = [contact.held @ matrix], [0.0]
+    for k in range(1, contact.ramp.ticks + 1):
+        one = contact.linear[(tick + k) % contact.frame] @ contact.stuck
+        matrix, constant = one @ matrix, one @ constant + contact.samples[(tick + k) % contact.frame][1]
+        rows.append(contact.held @ matrix)
+        readings.append(float(contact.held @ constant) * READING * abs(contact.quantum))
     return np.array(rows), np.array(readings)

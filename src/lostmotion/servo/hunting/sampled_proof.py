@@ -23,7 +23,7 @@ from .proof import MARGIN, WIDER, Proof
 from .quantised_slip_end import finish, loudest
 from .sampled_stuck_contact import SampledSlip, never_rests
 from .standstill import Watch
-from .state_boxes import Flow, starts
+from .state_boxes import BoxFollower, starts
 from .stuck_contact import UndecidableError
 
 CELLS, PARTS = 4, 2  # of the angle within a step, and of the torque within the ramp of a sample
@@ -39,42 +39,42 @@ CHECKS, SAMPLES = 100, 20  # of each run, whether the contact is stuck, and samp
 WITHOUT_REST = "no reading of the encoder is the reference, so that the integrator never stops"
 
 
-def prove_sampled(of: SampledSlip, largest: float) -> Proof:
+def prove_sampled(contact: SampledSlip, largest: float) -> Proof:
     """Decide for all errors up to one, or for as large a part of them as the bounds allow."""
-    if of.step == 0.0:
-        return _band(of) if of.excess > 0.0 else _share(of, largest)
-    if never_rests(of):
-        found = _band(of, WIDER[:1]) if of.excess > 0.0 else None
+    if contact.step == 0.0:
+        return _band(contact) if contact.excess > 0.0 else _share(contact, largest)
+    if never_rests(contact):
+        found = _band(contact, WIDER[:1]) if contact.excess > 0.0 else None
         return found if found and found.verdict == "hunts" else Proof("hunts", WITHOUT_REST, largest)
-    if of.excess == 0.0:
-        return _last_readings(Slips(of))
-    found = _about_orbit(Slips(of))
-    return found if found.verdict != "not decided" or found.reason == AT_REST else _band(of)
+    if contact.excess == 0.0:
+        return _last_readings(Slips(contact))
+    found = _about_orbit(Slips(contact))
+    return found if found.verdict != "not decided" or found.reason == AT_REST else _band(contact)
 
 
 def end_of_slip(
-    of: SampledSlip, low: float, high: float, *, cells: int = 1, parts: int = 1, fast: float = 0.0
+    contact: SampledSlip, low: float, high: float, *, cells: int = 1, parts: int = 1, fast: float = 0.0
 ) -> tuple[float, float]:
     """Least and largest error after a forward slip from errors that are read as between two; with steps, as they are read then.
 
     Raises UndecidableError: the bounds do not hold.
     """
-    reading = (-high * of.ratio, -low * of.ratio)
+    reading = (-high * contact.ratio, -low * contact.ratio)
     least, most = math.inf, -math.inf
-    for tick, start in starts(of, reading, cells, parts):
-        flow = Flow(of, fast)
+    for tick, start in starts(contact, reading, cells, parts):
+        flow = BoxFollower(contact, fast)
         settled = flow.follow(start, tick)
-        angles = [settled.angle] + [np.stack(finish(of, *passed), axis=1) for passed in flow.passed]
+        angles = [settled.angle] + [np.stack(finish(contact, *passed), axis=1) for passed in flow.passed]
         for angle in angles:
             if len(angle):
                 # The first reading of the encoder is within half a step of the angle.
                 least, most = min(least, low - angle[:, 1].max()), max(most, high - angle[:, 0].min())
-    return least - 0.5 * of.step, most + 0.5 * of.step
+    return least - 0.5 * contact.step, most + 0.5 * contact.step
 
 
-def map_without_steps(of: SampledSlip, errors: np.ndarray) -> np.ndarray:
+def map_without_steps(contact: SampledSlip, errors: np.ndarray) -> np.ndarray:
     """Errors that slips leave with an encoder without steps; NaN where that is not shown."""
-    ideal, found = replace(of, step=0.0), np.full(len(errors), math.nan)
+    ideal, found = replace(contact, step=0.0), np.full(len(errors), math.nan)
     for k, error in enumerate(errors):
         try:
             found[k] = np.mean(end_of_slip(ideal, error, error))
@@ -83,10 +83,10 @@ def map_without_steps(of: SampledSlip, errors: np.ndarray) -> np.ndarray:
     return found
 
 
-def _share(of: SampledSlip, largest: float) -> Proof:
+def _share(contact: SampledSlip, largest: float) -> Proof:
     """Without steps and excess, all is in proportion to the error."""
     try:
-        least, most = end_of_slip(of, 1.0, 1.0, parts=PARTS)
+        least, most = end_of_slip(contact, 1.0, 1.0, parts=PARTS)
     except UndecidableError as why:
         return Proof("not decided", str(why), 0.0)
     factor = max(abs(least), abs(most))
@@ -118,23 +118,23 @@ def _by_readings(slips: Slips, low: int, high: int, *, bounded: bool = False) ->
         reached = set().union(*left.values()) - {0}
         low, high = min(reached | {low}), max(reached | {high})
         if len(left) == high - low + 1:
-            return _decided(slips.of, left)
+            return _decided(slips.contact, left)
     return Proof("not decided", "slips from some readings of the encoder lead beyond them", 0.0)
 
 
-def _decided(of: SampledSlip, left: dict[int, set[int]]) -> Proof:
+def _decided(contact: SampledSlip, left: dict[int, set[int]]) -> Proof:
     """Verdict for readings that lead to each other or to the reference."""
     ending, lasting = {0}, set(left)
     while more := {one for one, to in left.items() if to <= ending} - ending:
         ending |= more
     while less := {one for one in lasting if not left[one] <= lasting}:
         lasting -= less
-    top = (max(left) + 0.5) * of.step
+    top = (max(left) + 0.5) * contact.step
     if ending >= set(left) and min(left) == 1:
         text = f"from each reading of the encoder up to {counted(max(left), 'step')} from the reference the slips end at the reference"
         return Proof("does not hunt", text, top)
     if lasting and len(lasting) == max(lasting) - min(lasting) + 1:
-        band = ((min(lasting) - 0.5) * of.step, (max(lasting) + 0.5) * of.step)
+        band = ((min(lasting) - 0.5) * contact.step, (max(lasting) + 0.5) * contact.step)
         return Proof("hunts", "", band[1], band=band, ranges=(band,))
     return Proof(
         "not decided", "slips from some readings of the encoder may return to them, or end at the reference", 0.0
@@ -165,21 +165,21 @@ def _about_orbit(slips: Slips) -> Proof:
 # --- with an excess ---
 
 
-def _band(of: SampledSlip, widths: Sequence[float] = WIDER) -> Proof:
+def _band(contact: SampledSlip, widths: Sequence[float] = WIDER) -> Proof:
     try:
-        errors = _orbit(replace(of, step=0.0))
-        fast = loudest(of)
+        errors = _orbit(replace(contact, step=0.0))
+        fast = loudest(contact)
     except UndecidableError as why:
         return Proof("not decided", str(why), 0.0)
     least, most, reason = float(min(errors)), float(max(errors)), ""
     for wider in widths:
-        low, high = least * (1.0 - wider) - of.step, most * (1.0 + wider) + of.step
+        low, high = least * (1.0 - wider) - contact.step, most * (1.0 + wider) + contact.step
         for _ in range(GROWTHS):
-            if low <= of.step:
+            if low <= contact.step:
                 reason = "its limit cycle is near the resolution of the encoder"
                 break
             try:
-                after = _images(of, low, high, fast)
+                after = _images(contact, low, high, fast)
             except UndecidableError as why:
                 reason = str(why)
                 break
@@ -190,41 +190,41 @@ def _band(of: SampledSlip, widths: Sequence[float] = WIDER) -> Proof:
     return Proof("not decided", reason, 0.0)
 
 
-def _images(of: SampledSlip, low: float, high: float, fast: float) -> tuple[float, float]:
+def _images(contact: SampledSlip, low: float, high: float, fast: float) -> tuple[float, float]:
     """Least and largest magnitude of the errors after slips from a band; 0 where one may change its sign."""
     ends = []
     for a, b in itertools.pairwise(np.linspace(low, high, BAND + 1)):
-        least, most = end_of_slip(of, float(a), float(b), cells=CELLS if of.step > 0.0 else 1, fast=fast)
+        least, most = end_of_slip(contact, float(a), float(b), cells=CELLS if contact.step > 0.0 else 1, fast=fast)
         ends += [0.0] if least <= 0.0 <= most else [abs(least), abs(most)]
     return min(ends), max(ends)
 
 
-def _orbit(of: SampledSlip) -> list[float]:
+def _orbit(contact: SampledSlip) -> list[float]:
     """Magnitudes of errors that follow each other without the steps of the encoder, from a slip that begins almost without error."""
-    errors = [1e-3 * of.excess / (of.inertia * _rate(of) ** 2)]
+    errors = [1e-3 * contact.excess / (contact.inertia * _rate(contact) ** 2)]
     for _ in range(ORBIT):
-        least, most = end_of_slip(of, errors[-1], errors[-1])
+        least, most = end_of_slip(contact, errors[-1], errors[-1])
         errors.append(max(abs(0.5 * (least + most)), 1e-3 * errors[0]))
     return errors[-KEPT:]
 
 
-def _rate(of: SampledSlip) -> float:
+def _rate(contact: SampledSlip) -> float:
     """Roughly the rate of the closed loop, by the torque that a step of the error makes at once [1/s]."""
-    matrix, column = of.samples[0]
-    pulse = abs(float(of.held @ matrix @ column) or float(of.held @ column))
-    return math.sqrt(pulse * abs(of.ratio) / of.inertia) or 1.0
+    matrix, column = contact.samples[0]
+    pulse = abs(float(contact.held @ matrix @ column) or float(contact.held @ column))
+    return math.sqrt(pulse * abs(contact.ratio) / contact.inertia) or 1.0
 
 
 # --- the run of the scenario ---
 
 
-def reached_by_run(axis: Axis, of: SampledSlip, largest: float) -> float:
+def reached_by_run(axis: Axis, contact: SampledSlip, largest: float) -> float:
     """Error of the first stuck interval of the run that is not above one, in which all has settled; NaN where none is seen."""
-    name = of.contact.removesuffix("_contact")
+    name = contact.name.removesuffix("_contact")
     angle = axis.train.angle_of(name)
     to = axis.controller.reference.pieces()[-1][1] * (turns(axis.train, name, axis.shaft) or 1.0)
     watch, duration = Watch(axis.scenario, (angle,)), axis.scenario.simulation.duration
-    window = watch.window(of.tick * of.ramp.ticks)
+    window = watch.window(contact.tick * contact.ramp.ticks)
     for _ in range(RUNS):
         for _ in range(CHECKS):
             watch.follow(duration / CHECKS, SAMPLES)

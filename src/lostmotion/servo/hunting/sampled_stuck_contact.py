@@ -37,7 +37,7 @@ MOST_SETTLING = 20_000  # ticks of it
 class SampledSlip:
     """Matrices of slip, stuck interval and controller over a sample time, the slip being forward."""
 
-    contact: str
+    name: str
     tick: float  # [s]
     inertia: float  # inertia of all that turns, at the contact
     viscous: float  # rate by which the speed decays without torque, not positive [1/s]
@@ -84,13 +84,13 @@ class SampledSlip:
         return self.step * self.ratio
 
     @cached_property
-    def ramp(self) -> Ramp:
+    def ramp(self) -> SettledStuckState:
         """The settled stuck state."""
-        return Ramp.of(self)
+        return SettledStuckState.of(self)
 
 
 @dataclass(frozen=True)
-class Ramp:
+class SettledStuckState:
     """The settled stuck state after each tick of a frame: ``reading * z + torque * b``, with the torque at the contact."""
 
     ticks: int  # until all but the integrator has settled
@@ -99,7 +99,7 @@ class Ramp:
     rises: tuple[float, ...]  # by which the torque has risen at each tick, per reading
 
     @classmethod
-    def of(cls, slip: SampledSlip) -> Ramp:
+    def of(cls, slip: SampledSlip) -> SettledStuckState:
         """By following the stuck interval, for ever twice as long.
 
         Raises AtRestError: nothing winds up.
@@ -252,7 +252,7 @@ def _assembled(axis: Axis, plant: _Plant) -> SampledSlip:
     slip, push, stuck = _propagated(plant, tick, command, own)
     resolution, offset = _steps(axis, encoder)
     return SampledSlip(
-        contact=f"{plant.shaft}_contact",
+        name=f"{plant.shaft}_contact",
         tick=tick,
         inertia=plant.inertia,
         viscous=plant.viscous,
@@ -345,9 +345,15 @@ def _limits(axis: Axis, plant: _Plant, torque: np.ndarray, speed: np.ndarray) ->
     return tuple((row, left) for row, left in found if math.isfinite(left))
 
 
-def never_rests(of: SampledSlip) -> bool:
+def never_rests(contact: SampledSlip) -> bool:
     """Whether no reading of the encoder is the reference, so that the integrator winds up until the contact breaks away."""
-    if of.step == 0.0:
+    if contact.step == 0.0:
         return False
-    per_time = -sum(of.ramp.rises) / (of.frame * of.tick) * abs(of.offset) * of.step * abs(of.ratio)
-    return per_time * FOREVER > 2.0 * of.breakaway
+    per_time = (
+        -sum(contact.ramp.rises)
+        / (contact.frame * contact.tick)
+        * abs(contact.offset)
+        * contact.step
+        * abs(contact.ratio)
+    )
+    return per_time * FOREVER > 2.0 * contact.breakaway

@@ -99,37 +99,37 @@ class Settled:
     """least and largest angle of the contact's shaft, from the middle of the step of the break-away (box, 2)"""
 
 
-def starts(of: SampledSlip, reading: tuple[float, float], cells: int, parts: int) -> list[tuple[int, Boxes]]:
+def starts(contact: SampledSlip, reading: tuple[float, float], cells: int, parts: int) -> list[tuple[int, Boxes]]:
     """Settled states at the break-away forward for readings between two, less the reference, by the tick of a frame."""
-    n, ramp, half = len(of.held), of.ramp, 0.5 * of.step
+    n, ramp, half = len(contact.held), contact.ramp, 0.5 * contact.step
     middle, off = 0.5 * (reading[0] + reading[1]), 0.5 * (reading[1] - reading[0])
     found = []
     for tick, (z, b, rises) in enumerate(zip(ramp.z, ramp.b, ramp.rises, strict=True)):
         here = []
-        rise = rises if of.lag == 0.0 else ramp.rises[(tick + 1) % of.frame]
+        rise = rises if contact.lag == 0.0 else ramp.rises[(tick + 1) % contact.frame]
         inc = max(rise * reading[0], rise * reading[1])
-        if inc <= 0.0 and of.lag == 0.0:
+        if inc <= 0.0 and contact.lag == 0.0:
             continue
         for k, w in np.ndindex(cells, parts):
             spread = np.zeros((n, UNKNOWNS + n))
             # With a lag it breaks away at any instant of the tick that begins here.
-            torque = of.breakaway + abs(inc) * ((w + 0.5) / parts - (1.0 if of.lag else 0.0))
+            torque = contact.breakaway + abs(inc) * ((w + 0.5) / parts - (1.0 if contact.lag else 0.0))
             centre = z * middle + b * torque
             spread[:, 0], spread[:, 2] = z * off, b * abs(inc) * 0.5 / parts
             centre[0], spread[0] = half * ((2 * k + 1) / cells - 1.0), 0.0
             centre[1], spread[1], spread[0, 1] = 0.0, 0.0, half / cells
-            slips = np.array([0 if of.lag else 1])
+            slips = np.array([0 if contact.lag else 1])
             none, read = np.zeros(1, int), np.zeros(1)
             here.append(Boxes(centre[None], slips, none, read, none, spread[None], none, read))
         found.append((tick, Boxes.joined(here)))
     return found
 
 
-class Flow:
+class BoxFollower:
     """Follows boxes until all has settled."""
 
-    def __init__(self, of: SampledSlip, fast: float = math.inf) -> None:
-        self.of = of
+    def __init__(self, contact: SampledSlip, fast: float = math.inf) -> None:
+        self.contact = contact
         self.fast = fast
         self.passed: list[tuple[Boxes, int]] = []  # forward slips faster than that, with their tick
         self.settled: list[Settled] = []
@@ -170,18 +170,18 @@ class Flow:
                 return
             if len(boxes) > BOXES:
                 break
-            boxes = propagated(self.of, boxes, self._slipped)
-            tick = (tick + 1) % self.of.frame
+            boxes = propagated(self.contact, boxes, self._slipped)
+            tick = (tick + 1) % self.contact.frame
             boxes = self._sampled(boxes, tick)
-            need_within_limits(self.of, boxes)
-            done = (boxes.mode == 0) & (boxes.waited >= self.of.ramp.ticks)
+            need_within_limits(self.contact, boxes)
+            done = (boxes.mode == 0) & (boxes.waited >= self.contact.ramp.ticks)
             if done.any():
                 one = boxes.take(done)
-                angle = np.stack(one.range_of(np.eye(len(self.of.held))[0]), axis=1)
+                angle = np.stack(one.range_of(np.eye(len(self.contact.held))[0]), axis=1)
                 self.settled.append(Settled(one.origin, one.read, angle))
             stopped = (boxes.came != 0) & ~done
             self._collect(boxes.take(stopped), tick)
-            fast = (boxes.mode > 0) & (boxes.range_of(np.eye(len(self.of.held))[1])[0] > self.fast) & ~stopped
+            fast = (boxes.mode > 0) & (boxes.range_of(np.eye(len(self.contact.held))[1])[0] > self.fast) & ~stopped
             if fast.any():
                 self.passed.append((boxes.take(fast), tick))
             boxes = boxes.take(~done & ~stopped & ~fast)
@@ -190,7 +190,7 @@ class Flow:
     def _collect(self, boxes: Boxes, tick: int) -> None:
         low, high = boxes.ends()
         for k in range(len(boxes)):
-            cell = math.floor(CELLS * boxes.centre[k, 0] / (self.of.step or math.inf))
+            cell = math.floor(CELLS * boxes.centre[k, 0] / (self.contact.step or math.inf))
             key = (tick, int(boxes.origin[k]), float(boxes.read[k]), int(boxes.mode[k]), float(boxes.before[k]), cell)
             least, most = self._stopped.get(key, (low[k], high[k]))
             self._stopped[key] = np.minimum(least, low[k]), np.maximum(most, high[k])
@@ -199,49 +199,49 @@ class Flow:
 
     def _slipped(self, boxes: Boxes) -> list[Boxes]:
         """Boxes that go on slipping over a tick, and those that stop in it."""
-        of, way = self.of, boxes.mode
-        after = boxes.moved(of.slip, way[:, None] * of.push)
-        speed = np.eye(len(of.held))[1]
+        contact, way = self.contact, boxes.mode
+        after = boxes.moved(contact.slip, way[:, None] * contact.push)
+        speed = np.eye(len(contact.held))[1]
         last = along(way, *after.range_of(speed))
-        bend = bend_of(of, boxes)
+        bend = bend_of(contact, boxes)
         sure, going = last[0] > bend, last[1] > 0.0  # the speed is not below 0 at first, or it had stopped before
         unsure = np.flatnonzero(going & ~sure)
         after.clip(unsure, speed, np.zeros(len(unsure)), way[unsure])
         stops = boxes.take(np.arange(len(boxes)))
-        stops.clip(unsure, of.slip[1], way[unsure] * (bend[unsure] - of.push[1]), -way[unsure])
+        stops.clip(unsure, contact.slip[1], way[unsure] * (bend[unsure] - contact.push[1]), -way[unsure])
         stopped = np.flatnonzero(~sure)
         if not len(stopped):
             return [after]
         first_speed = along(way, *stops.range_of(speed))[1]
         top = np.where(last[1] <= first_speed, np.maximum(first_speed, 0.0), np.maximum(last[1], 0.0)) + bend
-        return [after.take(going), *self._stopped_within(stops.take(stopped), (top * of.tick)[stopped])]
+        return [after.take(going), *self._stopped_within(stops.take(stopped), (top * contact.tick)[stopped])]
 
     def _stopped_within(self, boxes: Boxes, most: np.ndarray) -> list[Boxes]:
         """Stuck from an instant of a tick on, up to which the shaft turns by no more than this."""
         way = boxes.mode
         boxes.centre[:, 1], boxes.spread[:, 1] = 0.0, 0.0
         boxes.widen(0, np.minimum(way * most, 0.0), np.maximum(way * most, 0.0))
-        after = boxes.moved(self.of.stuck)
+        after = boxes.moved(self.contact.stuck)
         after.came, after.mode = way.copy(), 0 * way
         after.waited[:] = 0
-        return freed_within(self.of, boxes, after)
+        return freed_within(self.contact, boxes, after)
 
     # --- at a sample ---
 
     def _sampled(self, boxes: Boxes, tick: int) -> Boxes:
-        of = self.of
-        if of.step == 0.0:
-            after = boxes.moved(of.linear[tick])
+        contact = self.contact
+        if contact.step == 0.0:
+            after = boxes.moved(contact.linear[tick])
         else:
-            matrix, column = of.samples[tick]
+            matrix, column = contact.samples[tick]
             boxes, read = self._divided(boxes)
-            after = boxes.moved(matrix, np.outer(read * of.quantum, column))
+            after = boxes.moved(matrix, np.outer(read * contact.quantum, column))
             after.before, after.read = after.read, read
-        return after if of.lag > 0.0 else self._freed(after)
+        return after if contact.lag > 0.0 else self._freed(after)
 
     def _divided(self, boxes: Boxes) -> tuple[Boxes, np.ndarray]:
         """Boxes with one reading each, in steps."""
-        row = np.eye(len(self.of.held))[0] / self.of.step
+        row = np.eye(len(self.contact.held))[0] / self.contact.step
         low, high = one_way(boxes, *(np.floor(x + 0.5) for x in boxes.range_of(row)))
         while len(several := np.flatnonzero(high > low)):
             if len(boxes) + len(several) > BOXES:
@@ -263,17 +263,17 @@ class Flow:
 
     def _freed(self, boxes: Boxes) -> Boxes:
         """With a torque that follows at once, a contact breaks away at the sample."""
-        of = self.of
+        contact = self.contact
         for way in (1, -1):
-            low, high = along(way, *boxes.range_of(of.held))
-            may = (boxes.mode == 0) & (high >= of.breakaway)
-            must = may & (low > of.breakaway)
+            low, high = along(way, *boxes.range_of(contact.held))
+            may = (boxes.mode == 0) & (high >= contact.breakaway)
+            must = may & (low > contact.breakaway)
             boxes.mode[must], boxes.waited[must] = way, 0
             both = np.flatnonzero(may & ~must)
             if len(both):
                 freed, sides = boxes.take(both), np.full(len(both), way)
                 freed.mode[:], freed.waited[:] = way, 0
-                freed.clip(np.arange(len(both)), of.held, sides * of.breakaway, sides)
-                boxes.clip(both, of.held, sides * of.breakaway, -sides)
+                freed.clip(np.arange(len(both)), contact.held, sides * contact.breakaway, sides)
+                boxes.clip(both, contact.held, sides * contact.breakaway, -sides)
                 boxes = Boxes.joined([boxes, freed])
         return boxes

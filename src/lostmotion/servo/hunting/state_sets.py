@@ -42,30 +42,30 @@ class Sets:
         return cls(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)))
 
 
-def propagated(of: SampledSlip, sets: Any, slipped: Callable[[Any], list[Any]]) -> Any:
+def propagated(contact: SampledSlip, sets: Any, slipped: Callable[[Any], list[Any]]) -> Any:
     """Sets after a tick, those that slip by a function of their kind."""
     sets.came[:] = 0
     still = sets.mode == 0
     if not still.any():
         return sets.joined(slipped(sets))
     stuck, moving = sets.take(still), sets.take(~still)
-    after = stuck.moved(of.stuck)
+    after = stuck.moved(contact.stuck)
     after.waited = after.waited + 1
-    parts = [after] if of.lag == 0.0 else freed_within(of, stuck, after)
+    parts = [after] if contact.lag == 0.0 else freed_within(contact, stuck, after)
     return sets.joined([*parts, *(slipped(moving) if len(moving) else ())])
 
 
-def freed_within(of: SampledSlip, before: Any, after: Any) -> list[Any]:
+def freed_within(contact: SampledSlip, before: Any, after: Any) -> list[Any]:
     """Sets that stay stuck over a tick, or the rest of one, and those that break away; the torque is monotonic within a tick."""
-    one, two = before.range_of(of.held), after.range_of(of.held)
-    stays = (two[0] < of.breakaway) & (two[1] > -of.breakaway)
+    one, two = before.range_of(contact.held), after.range_of(contact.held)
+    stays = (two[0] < contact.breakaway) & (two[1] > -contact.breakaway)
     parts = [after.take(stays)]
     for way in (1, -1):
         top = np.maximum(along(way, *one)[1], along(way, *two)[1])
-        frees = top >= of.breakaway
-        some, speed = after.take(frees), of.tick * np.maximum(top[frees] - of.sliding, 0.0) / of.inertia
+        frees = top >= contact.breakaway
+        some, speed = after.take(frees), contact.tick * np.maximum(top[frees] - contact.sliding, 0.0) / contact.inertia
         some.mode[:], some.waited[:] = way, 0
-        for state, most in ((1, speed), (0, speed * of.tick)):
+        for state, most in ((1, speed), (0, speed * contact.tick)):
             some.widen(state, *along(way, np.zeros(len(some)), most))
         parts.append(some)
     return parts
@@ -78,26 +78,26 @@ def one_way(sets: Sets, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, 
     return low, np.maximum(np.where((way <= 0) & ~free, np.minimum(high, sets.read), high), low)
 
 
-def bend_of(of: SampledSlip, sets: Any, noise: Callable[[np.ndarray], Any] = lambda _: 0.0) -> np.ndarray:
+def bend_of(contact: SampledSlip, sets: Any, noise: Callable[[np.ndarray], Any] = lambda _: 0.0) -> np.ndarray:
     """By how much the speed may be below that at both ends of a tick: with a torque that is held it has its least value at one.
 
     noise: largest effect of readings on an output, beside what is in the sets.
     """
-    if of.lag == 0.0:
+    if contact.lag == 0.0:
         return np.zeros(len(sets))
 
     def most(row: np.ndarray) -> np.ndarray:
         return np.asarray(np.abs(sets.range_of(row)).max(axis=0) + noise(row))
 
-    push = (np.maximum(most(of.held), most(of.command)) + of.sliding) / of.inertia
-    rate = push + abs(of.viscous) * (most(np.eye(len(of.held))[1]) + of.tick * push)
-    change = most(of.command - of.held) / (of.lag * of.inertia)
-    return np.asarray(0.125 * of.tick**2 * (change + abs(of.viscous) * rate))
+    push = (np.maximum(most(contact.held), most(contact.command)) + contact.sliding) / contact.inertia
+    rate = push + abs(contact.viscous) * (most(np.eye(len(contact.held))[1]) + contact.tick * push)
+    change = most(contact.command - contact.held) / (contact.lag * contact.inertia)
+    return np.asarray(0.125 * contact.tick**2 * (change + abs(contact.viscous) * rate))
 
 
-def need_within_limits(of: SampledSlip, sets: Any, noise: Callable[[np.ndarray], Any] = lambda _: 0.0) -> None:
+def need_within_limits(contact: SampledSlip, sets: Any, noise: Callable[[np.ndarray], Any] = lambda _: 0.0) -> None:
     """Refuses sets in which a limit of the controller may act. Raises UndecidableError."""
-    for row, limit in of.limited:
+    for row, limit in contact.limited:
         if len(sets) and (np.abs(sets.range_of(row)).max(axis=0) + noise(row)).max() >= limit:
             raise UndecidableError("the limit of the controller may act")
 

@@ -23,7 +23,7 @@ from ...model.torsion import Rigid
 from ...response.linear import LinearModel, train_model
 from ...simulation.forms.train_tables import TrainInitial
 from ...simulation.scenario.scenario import Scenario
-from .limit_cycles import Loop
+from .limit_cycles import UndrivenLoop
 
 if TYPE_CHECKING:
     from ...model.train import DriveTrain
@@ -45,7 +45,7 @@ class AtRestError(Exception):
 class StickSlip:
     """Slip and stuck interval of one contact, in modal coordinates of the slip; rows give outputs over them."""
 
-    contact: str
+    name: str
     slip_rates: np.ndarray  # eigenvalues of the slip
     rounding: float  # relative error of what is computed by modes
     q: np.ndarray
@@ -81,7 +81,7 @@ def stick_slip(scenario: Scenario) -> StickSlip:
         proportion to the error.
     Raises AtRestError: nothing winds up while the contact is stuck, or its limit keeps the controller from freeing it.
     """
-    motor, loop = _motor(scenario), Loop.of(scenario)
+    motor, loop = _motor(scenario), UndrivenLoop.of(scenario)
     if scenario.continuous()[motor].firmware is not None:
         raise UndecidableError(f"the firmware of {motor} is no linear law")
     if reasons := list(others(scenario.train())):
@@ -163,7 +163,7 @@ def others(train: DriveTrain) -> Iterator[str]:
             yield key
 
 
-def _model(loop: Loop, shaft: str, speed: float) -> LinearModel:
+def _model(loop: UndrivenLoop, shaft: str, speed: float) -> LinearModel:
     """The regime in which the shaft turns with a small speed, and all that gears join to it."""
     train = loop.scenario.train()
     ratios = {name: turns(train, name, shaft) for name in train.shafts}
@@ -179,7 +179,7 @@ class _Builder:
     """Takes the coordinates of the module's description from the models of the three regimes."""
 
     def __init__(
-        self, loop: Loop, motor: str, shaft: str, still: LinearModel, forward: LinearModel, reverse: LinearModel
+        self, loop: UndrivenLoop, motor: str, shaft: str, still: LinearModel, forward: LinearModel, reverse: LinearModel
     ) -> None:
         self.loop, self.motor, self.shaft = loop, motor, shaft
         self.train = loop.scenario.train()
@@ -222,7 +222,7 @@ class _Builder:
         if abs(command @ p) * breakaway > limit + 2.0 * abs(rest):
             raise AtRestError("the limit of the controller is below what frees the contact, so that it stays stuck")
         return StickSlip(
-            contact=self.train.contact_of(self.shaft),
+            name=self.train.contact_of(self.shaft),
             slip_rates=rates,
             rounding=1e-14 * condition,
             q=inverse @ q,

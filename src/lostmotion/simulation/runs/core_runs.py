@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ... import _core
-from ...control.axis import Bound
+from ...control.axis import BoundController
 from ...inputs.kept import kept
 from ...worker_threads import thread_pool
 from ..scenario.scenario import Scenario
@@ -23,7 +23,7 @@ def core_case(scenario: Scenario) -> _core.Case:
     return _core.Case(core, inputs=inputs, start=scenario.start(), hysteresis_capacities=scenario.capacities())
 
 
-def core_result(scenario: Scenario, control: Bound, options: Options) -> dict[str, Any]:
+def core_result(scenario: Scenario, control: BoundController, options: Options) -> dict[str, Any]:
     """One run of the core. Parts of a train that nothing joins are solved apart; under controllers side by side, unless one of
     these is a function in Python.
     """

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal, overload
 
-from ...control.axis import Bound
+from ...control.axis import BoundController
 from ...control.command import CommandSignal
 from ...control.law import as_laws
 from ...errors import InputError
@@ -218,7 +218,7 @@ def _warned(scenario: Scenario, result: RunArrays) -> RunArrays:
     return replace(result, attrs=warned(result.attrs, text)) if text else result
 
 
-def whole_run(scenario: Scenario, how: str, control: Bound, options: Options) -> RunArrays:
+def whole_run(scenario: Scenario, how: str, control: BoundController, options: Options) -> RunArrays:
     """One run of the core as arrays."""
     result = core_result(scenario, control, options)
     return raw_result(scenario, scenario.core(), result, how, ledger=options["energy"])

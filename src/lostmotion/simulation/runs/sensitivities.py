@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ... import _core
-from ...control.axis import Bound
+from ...control.axis import BoundController
 from ...errors import InputError
 from ...inputs.doubts import trusted
 from ...inputs.validation import shortened, shown
@@ -128,7 +128,7 @@ def core_variation(scenario: Scenario, key: str, beside: Sequence[Neighbour]) ->
     return key, out
 
 
-def sensitive_case(scenario: Scenario, variations: Sequence[Any], control: Bound) -> _core.SensitiveRun:
+def sensitive_case(scenario: Scenario, variations: Sequence[Any], control: BoundController) -> _core.SensitiveRun:
     """A run as the core takes it."""
     grid = scenario.simulation.grid()
     return _core.SensitiveRun(core_case(scenario), variations=variations, control=control, **grid)

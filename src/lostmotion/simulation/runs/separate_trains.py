@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...control.axis import Bound, own
+from ...control.axis import BoundController, own
 from ...control.controller import Controller
 from ...inputs.kept import kept
 from ...inputs.named import Named
@@ -114,7 +114,7 @@ def _stands_on(element: Any) -> str:
     return str(next(name for key in ("shaft", "input", "slide") if (name := getattr(element, key, None)) is not None))
 
 
-def control_of_part(control: Bound, whole: Scenario, part: Scenario) -> Bound:
+def control_of_part(control: BoundController, whole: Scenario, part: Scenario) -> BoundController:
     """Controllers that belong to a part."""
     tick, axes = control
     motors, shafts = list(whole.train().motors), list(whole.train().shafts)

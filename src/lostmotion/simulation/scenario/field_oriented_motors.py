@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...control.axis import Bound, own
+from ...control.axis import BoundController, own
 from ...model.synchronous_motor import PhaseValues
 from .scenario import Scenario
 
@@ -38,7 +38,7 @@ def set_torques(scenario: Scenario, data: dict[str, np.ndarray]) -> None:
         )
 
 
-def coarser(control: Bound) -> Bound:
+def coarser(control: BoundController) -> BoundController:
     """Copies of the controllers, with one exchange of torque and speed in each tick in place of two."""
     tick, axes = own(control)
     for axis in axes:

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic_core import core_schema
 
 from ... import _core
-from ...control.axis import NO_LAWS, Bound, core_control, motor_laws
+from ...control.axis import NO_LAWS, BoundController, core_control, motor_laws
 from ...control.continuous import ContinuousController
 from ...control.controller import Controller
 from ...control.law import Law
@@ -448,15 +448,15 @@ class Scenario:
             tuple(continuous.items()),
         )
 
-    def control(self, laws: Mapping[str, Law] = NO_LAWS) -> Bound:
+    def control(self, laws: Mapping[str, Law] = NO_LAWS) -> BoundController:
         """The solver's controllers, kept if there are no laws: change copies of them alone (`control.axis.own`)."""
         return self._bound(laws) if laws else self._control()
 
     @kept
-    def _control(self) -> Bound:
+    def _control(self) -> BoundController:
         return self._bound(NO_LAWS)
 
-    def _bound(self, laws: Mapping[str, Law]) -> Bound:
+    def _bound(self, laws: Mapping[str, Law]) -> BoundController:
         with _in_keys(self.own_key):
             return core_control(self.train(), self.axes(), laws)
 

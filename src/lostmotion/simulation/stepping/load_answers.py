@@ -8,7 +8,7 @@ from typing import Any
 
 from ...errors import InputError
 from ...inputs.validation import did_you_mean, listed, shown
-from .step_inputs import GIVE, Ramp
+from .step_inputs import GIVE, StepInput
 from .step_readings import SimulationReadings
 from .winding_error_bound import StepBound
 
@@ -47,7 +47,7 @@ class SimulationAnswers(SimulationReadings):
     _bound: StepBound | None
 
     def _begin_and_end(
-        self, command: Ramp, load_torque: Ramp, inputs: dict[str, Ramp]
+        self, command: StepInput, load_torque: StepInput, inputs: dict[str, StepInput]
     ) -> tuple[list[float], list[float]]:
         raise NotImplementedError
 
@@ -60,11 +60,11 @@ class SimulationAnswers(SimulationReadings):
     def answer(
         self,
         interval: float | str,
-        command: Ramp = GIVE,
-        load_torque: Ramp = 0.0,
+        command: StepInput = GIVE,
+        load_torque: StepInput = 0.0,
         *,
         shaft: str = "load",
-        **inputs: Ramp,
+        **inputs: StepInput,
     ) -> LoadAnswer:
         """Advance as `advance` does, and return the mean torque on the load with its derivative.
 

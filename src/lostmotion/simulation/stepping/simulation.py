@@ -10,7 +10,7 @@ from copy import deepcopy
 from typing import Any, Self
 
 from ... import _core
-from ...control.axis import Bound
+from ...control.axis import BoundController
 from ...control.continuous import ContinuousController
 from ...control.controller import Controller
 from ...control.law import as_laws
@@ -31,7 +31,17 @@ from ..train_variables import only_input
 from ..variables import Variable, variables_of_core
 from .load_answers import SimulationAnswers
 from .simulation_state import SimulationState
-from .step_inputs import GIVE, MAX_INTERVAL, MIN_INTERVAL, Ramp, ends_of, masses_given, no_input, no_interval, parts
+from .step_inputs import (
+    GIVE,
+    MAX_INTERVAL,
+    MIN_INTERVAL,
+    StepInput,
+    ends_of,
+    masses_given,
+    no_input,
+    no_interval,
+    parts,
+)
 from .step_readings import Derived
 from .winding_error_bound import StepBound
 
@@ -260,12 +270,12 @@ class Simulation(SimulationAnswers):
     def advance(
         self,
         interval: float | str,
-        command: Ramp = GIVE,
-        load_torque: Ramp = 0.0,
+        command: StepInput = GIVE,
+        load_torque: StepInput = 0.0,
         *,
         motion: Any = None,
         mass_matrix: Any = None,
-        **inputs: Ramp,
+        **inputs: StepInput,
     ) -> None:
         """Advance by an interval [s].
 
@@ -304,7 +314,7 @@ class Simulation(SimulationAnswers):
             self._step_with_motions(interval, begin, end, motion or {})
 
     def _begin_and_end(
-        self, command: Ramp, load_torque: Ramp, inputs: dict[str, Ramp]
+        self, command: StepInput, load_torque: StepInput, inputs: dict[str, StepInput]
     ) -> tuple[list[float], list[float]]:
         """The inputs of the core at the begin and the end of an interval."""
         if command is not GIVE:
@@ -390,7 +400,7 @@ class Simulation(SimulationAnswers):
         return self._only[word]
 
     @staticmethod
-    def _exchanging(control: Bound) -> Bound:
+    def _exchanging(control: BoundController) -> BoundController:
         """The controllers, as often as they exchange torque and speed with the mechanics."""
         return control
 
@@ -470,5 +480,5 @@ class _Coarser(Simulation):
     """With one exchange of torque and speed in each tick."""
 
     @staticmethod
-    def _exchanging(control: Bound) -> Bound:
+    def _exchanging(control: BoundController) -> BoundController:
         return coarser(control)

@@ -17,7 +17,7 @@ from ..train_variables import check_names
 
 GIVE: Any = object()  # in place of what has no default
 
-Ramp = float | str | tuple[float | str, float | str]
+StepInput = float | str | tuple[float | str, float | str]
 
 MIN_INTERVAL, MAX_INTERVAL = 1e-12, 1e12
 """limits of a step [s]: a shorter one is lost in the rounding of the time, a longer one in the rounding of a motion's phase"""
