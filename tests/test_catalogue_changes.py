@@ -15,7 +15,7 @@ from lostmotion.data_sheets.records import parse_sheets
 from lostmotion.errors import InputError
 from lostmotion.reports.rig import summary_rows
 from lostmotion.simulation.scenario.scenario_files import gearbox_from_record
-from lostmotion.test_rig.rig import TestRig
+from lostmotion.test_rig.virtual_rig import TestRig
 from sheets import ARCMIN, scenario_with, sheet
 
 

@@ -24,7 +24,7 @@ PACKAGE = ROOT / "src" / "lostmotion"
 LAYERS = [
     {"errors", "namespace", "verdict", "version", "_instruction_set"},
     {"_core", "atomic_writer"},
-    {"recorded", "worker_threads"},
+    {"recorded_numbers", "worker_threads"},
     {"reproducible"},
     {"units"},
     {"inputs"},
@@ -46,7 +46,7 @@ LAYERS = [
 ]
 # The same within packages that have rooms of their own; modules beside the rooms count as rooms.
 INNER = {
-    "simulation": [{"variables"}, {"train_variables"}, {"forms"}, {"scenario"}, {"stepping"}, {"runs"}, {"batches"}],
+    "simulation": [{"variables"}, {"variables_of_trains"}, {"forms"}, {"scenario"}, {"stepping"}, {"runs"}, {"batches"}],
     "studies": [{"expressions"}, {"study"}, {"runs"}, {"selection"}],
     "identification": [
         {"task"},
@@ -64,11 +64,11 @@ INNER = {
     "servo": [
         {"winding"},
         {"regimes"},
-        {"data", "sampled"},
+        {"tuning_data", "sampled"},
         {"margins"},
-        {"motion"},
+        {"axis_runs"},
         {"hunting"},
-        {"settling", "tuned"},
+        {"settling", "tuning_result"},
         {"tuning"},
         {"commission"},
     ],
@@ -198,7 +198,7 @@ OUTSIDE = {
     "control/satellites": "SGP4 and its spline are libraries; docs/theory.md leaves satellites out of the promise",
     "model/self_locking": "its eigenvalues decide a verdict and enter no run",
     "units/conversion": "its powers are of decimal numbers",
-    "units/table": "its powers are of decimal numbers",
+    "units/unit_table": "its powers are of decimal numbers",
 }
 PERMITTED = {("control/continuous", "np.linalg"): "its eigenvalues decide whether a limit is refused, and enter no run"}
 ROUNDED_DIFFERENTLY = {

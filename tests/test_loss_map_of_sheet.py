@@ -8,7 +8,7 @@ import lostmotion as lm
 from lostmotion.data_sheets.loss_data import Lubricant
 from lostmotion.data_sheets.loss_map_builder import build_loss_map
 from lostmotion.data_sheets.records import find
-from lostmotion.test_rig.rig import TestRig
+from lostmotion.test_rig.virtual_rig import TestRig
 from sheets import RPM, gearbox_of, sheet
 
 

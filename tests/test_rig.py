@@ -11,7 +11,7 @@ from lostmotion.data_sheets.loss_map_builder import build_loss_map
 from lostmotion.data_sheets.records import find
 from lostmotion.model.losses import efficiency_map
 from lostmotion.test_rig.comparison import compare
-from lostmotion.test_rig.rig import TestRig
+from lostmotion.test_rig.virtual_rig import TestRig
 from sheets import ARCMIN, COMPLETE, RPM, gearbox_of, sheet
 
 

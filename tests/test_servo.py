@@ -14,10 +14,10 @@ from conftest import ROOT, lostmotion
 from html_pages import charts
 from lostmotion.control.tuning import TwoInertias, identical_damping, identical_radius, identical_real_part, symmetrical_optimum
 from lostmotion.reports.servo import servo_report
-from lostmotion.servo.data import lag_sum, two_inertias
 from lostmotion.servo.margins import bandwidth_of, frequencies, margins
 from lostmotion.servo.regimes import Axis, axis_of, regimes
 from lostmotion.servo.sampled import SampledLoop
+from lostmotion.servo.tuning_data import lag_sum, two_inertias
 from two_mass import C_L, J_L, J_M, A, B, T, k, two_mass
 
 

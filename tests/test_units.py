@@ -19,7 +19,7 @@ from lostmotion.simulation.scenario.scenario_files import gearbox_from_record
 from lostmotion.simulation.scenario.units_of_keys import unit_of_key
 from lostmotion.units.conversion import si_factor, to_si
 from lostmotion.units.grammar import PREFIXED, angle_of, plain, read_unit, symbols, written
-from lostmotion.units.table import PREFIXES, UNITS, dimension_of, factor_of
+from lostmotion.units.unit_table import PREFIXES, UNITS, dimension_of, factor_of
 
 RPM = 2.0 * math.pi / 60.0
 DEG = math.pi / 180.0

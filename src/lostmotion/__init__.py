@@ -26,7 +26,7 @@ _WITH_DATASETS = (
     "simulation.runs.run",
     "simulation.runs.switchings",
     "test_rig.measurement",
-    "test_rig.rig",
+    "test_rig.virtual_rig",
 )
 # Modules whose results notebooks show as the page that the command writes.
 _WITH_PAGES = (

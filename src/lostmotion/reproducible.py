@@ -21,7 +21,7 @@ from typing import Any, overload
 import numpy as np
 
 from . import _core
-from .recorded import Recorded, of_function
+from .recorded_numbers import Recorded, of_function
 
 Numbers = float | np.ndarray
 

@@ -57,7 +57,7 @@ def load_scenario(source: str, overrides: list[str] | None, missing: list[str] |
 
         loaded = load(source, overrides or ())
     else:
-        from ..servo.tuned import load_untuned
+        from ..servo.tuning_result import load_untuned
 
         loaded = load_untuned(source, overrides or (), missing)
     for text in overrides or ():

@@ -25,7 +25,7 @@ from .terminal import about, busy, conclude, console, progress
 
 if TYPE_CHECKING:
     from ..servo.commission import ServoReport
-    from ..servo.tuned import Tuning
+    from ..servo.tuning_result import Tuning
     from ..simulation.scenario.scenario import Scenario
 
 OF_RULES = ("--phase-margin", "--gain-margin", "--bandwidth", "--sensitivity-peak", "--feedforward")

@@ -13,7 +13,7 @@ from functools import cache
 
 import numpy as np
 
-from ..recorded import value_of
+from ..recorded_numbers import value_of
 from ..reproducible import cos, sin
 from .profiles import Segment
 

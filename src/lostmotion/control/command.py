@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 from ..inputs.part import Part
 from ..inputs.quantities import Frequency, Limit, Number, Positive, Time, Whole
 from ..model.signals import Breakpoint, Samples, Signal, taylor
-from ..recorded import real
+from ..recorded_numbers import real
 from ..reproducible import sin
 from .references import PositionReference, Reference, SlideReference
 

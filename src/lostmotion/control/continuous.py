@@ -30,7 +30,7 @@ from ..inputs.validation import did_you_mean, shown
 from ..model.motor import Motor
 from ..model.signals import Signal, Step
 from ..model.train import DriveTrain
-from ..recorded import numbers
+from ..recorded_numbers import numbers
 from ..reproducible import sin
 from ..units.conversion import Unit
 from .command import CommandSignal

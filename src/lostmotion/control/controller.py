@@ -7,7 +7,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from ..inputs.described import ReferenceBlocks
 from ..inputs.quantities import NotNegative, Positive, Switch, Time, Whole
-from ..recorded import real
+from ..recorded_numbers import real
 from .camera import Camera, Tracker
 from .continuous import ContinuousController
 from .encoder import Encoder

@@ -27,7 +27,7 @@ from ..inputs.quantities import (
 )
 from ..inputs.validation import shown
 from ..model.signals import Breakpoint, Samples, TimeFunction, taylor
-from ..recorded import real
+from ..recorded_numbers import real
 from ..reproducible import cbrt, cos, cubic_spline, sin, sqrt
 from ..units.practical import printed
 from .cam_laws import peaks, timed

@@ -10,7 +10,7 @@ from typing import Any
 from ..control.controller import Controller
 from ..control.references import PositionReference, Reference
 from ..simulation.forms.slide_units import of_slides
-from ..simulation.train_variables import REFERENCE_UNITS
+from ..simulation.variables_of_trains import REFERENCE_UNITS
 from . import sliders
 from .sliders import Place, Range, Slider
 

@@ -8,7 +8,7 @@ from pydantic import Field
 from ..errors import InputError
 from ..inputs.named import Elements, Named, nothing
 from ..inputs.validation import did_you_mean, shown
-from ..recorded import may_differ
+from ..recorded_numbers import may_differ
 from .gear import Gear
 from .linear import LinearDrive, Screw
 from .linear_motor import LinearMotor

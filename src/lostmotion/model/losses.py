@@ -10,7 +10,7 @@ from .. import _core
 from ..inputs.breakpoints import check_apart
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, Length, Limit, NotNegative, Number, Positive, Switch, UpToOne, Whole
-from ..recorded import of_function
+from ..recorded_numbers import of_function
 from ..reproducible import arctan
 
 

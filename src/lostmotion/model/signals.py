@@ -30,7 +30,7 @@ from ..inputs.quantities import (
     Torque,
     Whole,
 )
-from ..recorded import real
+from ..recorded_numbers import real
 from ..reproducible import sin, total
 from ..units.scalars import is_number, scalar
 from .wind import Davenport, Kaimal, VonKarman, WindOfTable

@@ -12,8 +12,8 @@ import numpy as np
 from ..response.harmonic import frequency_response
 from ..simulation.runs.run import simulate
 from ..simulation.runs.switchings import switchings_of
-from ..test_rig.loop import Loop
-from ..test_rig.rig import TestRig
+from ..test_rig.torsion_loop import Loop
+from ..test_rig.virtual_rig import TestRig
 from .drive import AMPLITUDES, MODELS, paper_scenario
 
 if TYPE_CHECKING:

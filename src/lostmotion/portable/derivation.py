@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..inputs.named import Named
 from ..inputs.part import Part
 from ..inputs.quantities import Limit
-from ..recorded import Tape
+from ..recorded_numbers import Tape
 from ..simulation.forms.dotted_keys import CHANGES_OTHERS
 from ..simulation.scenario.scenario import Scenario
 from ..simulation.scenario.units_of_keys import limit_in, meaning_in, unit_for

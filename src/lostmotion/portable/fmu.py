@@ -25,7 +25,7 @@ from ..simulation.runs.results import variables_of
 from ..simulation.runs.run import run
 from ..simulation.scenario.requirements import need_no_impacts
 from ..simulation.scenario.scenario import Scenario
-from ..simulation.train_variables import axis_variables
+from ..simulation.variables_of_trains import axis_variables
 from . import fmi2, fmi3
 from .checkout import made_here
 from .dependencies import dependencies_of

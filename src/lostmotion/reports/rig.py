@@ -11,7 +11,7 @@ from ..data_sheets.sheet import Record
 from ..model.torsion import Rigid
 from ..test_rig.comparison import Comparison
 from ..test_rig.measurement import RigReport
-from ..test_rig.rig import LOST_MOTION_LOAD
+from ..test_rig.virtual_rig import LOST_MOTION_LOAD
 from ..units.practical import RPM, counted, practical
 from ..verdict import Point, Verdict
 from .looks import DOTS, step

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..data_sheets.linear_sheets import ScrewSheet
-from ..test_rig.rig import LOST_MOTION_LOAD
 from ..test_rig.screw_measurement import RATED, ScrewReport
+from ..test_rig.virtual_rig import LOST_MOTION_LOAD
 from ..units.practical import RPM
 from ..verdict import Verdict
 from .looks import DOTS, step

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from ..servo.axis_runs import StepResponse
 from ..servo.commission import TRUE, LoopSheet, ServoReport, decibels
 from ..servo.hunting.at_rest import LimitCycle
-from ..servo.motion import StepResponse
 from ..units.practical import charted
 from .certificate import certificate_parts
 from .looks import FAINT, look

@@ -13,7 +13,7 @@ from .. import _core
 from ..control.law import Law
 from ..model.train import DriveTrain
 from ..simulation.scenario.scenario import Scenario
-from ..simulation.train_variables import signals_of
+from ..simulation.variables_of_trains import signals_of
 from ..worker_threads import thread_pool
 from .closed_loop import AxisSignal, ClosedLoop, Motion, Search, mean_of
 from .plant import Plant

@@ -24,8 +24,8 @@ from ..simulation.scenario.requirements import need_free_motion, need_open_loop
 from ..simulation.scenario.scenario import Scenario
 from ..simulation.stepping.simulation import Simulation
 from ..simulation.stepping.solver_access import linear_regime
-from ..simulation.train_variables import only_input
 from ..simulation.variables import variables_of_core
+from ..simulation.variables_of_trains import only_input
 
 if TYPE_CHECKING:
     import control

@@ -17,8 +17,8 @@ from ..model.signals import Signal
 from ..model.train import DriveTrain
 from ..simulation.scenario.requirements import need_free_motion, need_open_loop
 from ..simulation.scenario.scenario import Scenario
-from ..simulation.train_variables import REFERENCE_UNITS, axis_variables, only_input
 from ..simulation.variables import Variable
+from ..simulation.variables_of_trains import REFERENCE_UNITS, axis_variables, only_input
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from ..model.signals import Signal, TorqueSignal, constant_or
 from ..simulation.forms.drive_tables import Initial
 from ..simulation.forms.train_tables import TrainInitial
 from ..simulation.scenario.scenario import Scenario
-from ..simulation.train_variables import only_input
+from ..simulation.variables_of_trains import only_input
 from ..units.practical import counted
 from .plant import Plant, plant_of
 

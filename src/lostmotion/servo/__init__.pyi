@@ -1,4 +1,6 @@
 from ..verdict import Verdict as Verdict
+from .axis_runs import Following as Following
+from .axis_runs import StepResponse as StepResponse
 from .commission import LoopSheet as LoopSheet
 from .commission import ServoReport as ServoReport
 from .commission import Stiffness as Stiffness
@@ -12,9 +14,7 @@ from .hunting.hunting import limit_cycle as limit_cycle
 from .margins import Bandwidth as Bandwidth
 from .margins import Instability as Instability
 from .margins import Margins as Margins
-from .motion import Following as Following
-from .motion import StepResponse as StepResponse
 from .regimes import Axis as Axis
 from .settling import Moves as Moves
 from .settling import Settling as Settling
-from .tuned import Tuning as Tuning
+from .tuning_result import Tuning as Tuning

@@ -17,11 +17,11 @@ from ..simulation.scenario.scenario import Scenario
 from ..units.conversion import si_value
 from ..units.practical import practical
 from ..verdict import Point, State, Verdict
+from .axis_runs import STEPPED, Following, StepResponse, following, step_response
 from .hunting.at_rest import LimitCycle, limit_cycle
 from .hunting.certificate import HuntingCertificate, certified, certified_in_words
 from .hunting.standstill import moving_input
 from .margins import Bandwidth, Instability, Margins, bandwidth_of, frequencies, instability, margins
-from .motion import STEPPED, Following, StepResponse, following, step_response
 from .regimes import Axis, Regime, axis_of, regimes
 from .sampled import SampledLoop
 from .settling import Moves, Settling, default_window, repeated, settling

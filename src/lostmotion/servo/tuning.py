@@ -27,12 +27,12 @@ from ..inputs.quantities import Angle, Frequency, Number
 from ..inputs.validation import did_you_mean, shown
 from ..simulation.scenario.scenario import Scenario
 from ..units.practical import counted
-from .data import frictions, inertias, lag_sum, two_inertias
+from .axis_runs import with_controller
 from .margins import STABLE, bandwidth_of, frequencies, margins
-from .motion import with_controller
 from .regimes import Axis, Regime, axis_of, regimes
 from .sampled import SampledLoop
-from .tuned import Amperes, Tuning, aligned, conventions, differences, load_untuned
+from .tuning_data import frictions, inertias, lag_sum, two_inertias
+from .tuning_result import Amperes, Tuning, aligned, conventions, differences, load_untuned
 
 RULES = (
     "suited",

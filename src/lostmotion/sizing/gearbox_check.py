@@ -9,7 +9,7 @@ from ..model.gearbox import Gearbox, Transmission
 from ..model.self_locking import self_locking
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
-from ..test_rig.rig import LOST_MOTION_LOAD, TestRig
+from ..test_rig.virtual_rig import LOST_MOTION_LOAD, TestRig
 from ..units.practical import ARCMIN, RPM
 from .duty_cycle import DutyCycle
 from .finding import Finding, within

@@ -10,7 +10,7 @@ from .. import _core
 from ..control.turning import turns
 from ..simulation.runs.results import RunArrays
 from ..simulation.scenario.scenario import Scenario
-from ..test_rig.rig import TestRig
+from ..test_rig.virtual_rig import TestRig
 from .axis_rules import BRAKE, SLIDE_BRAKE, against, brake_of_a_run, held_by
 from .finding import Finding
 from .holding import holding

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..data_sheets.gearbox_sheet import GearboxSheet
 from ..units.practical import ARCMIN, RPM
-from .rig import TestRig
+from .virtual_rig import TestRig
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from ..model.gear import Gear
 from ..model.gearbox import Gearbox
 from ..model.self_locking import Overrunning, overrunning
 from .comparison import Comparison, compare
-from .loop import Loop
-from .rig import TestRig
+from .torsion_loop import Loop
+from .virtual_rig import TestRig
 
 if TYPE_CHECKING:
     import xarray

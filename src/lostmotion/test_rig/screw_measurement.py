@@ -14,8 +14,8 @@ from ..inputs.quantities import Force
 from ..model.linear import ScrewData
 from ..units.practical import RPM
 from .comparison import Comparison
-from .loop import Loop
 from .screw_rig import ScrewRig
+from .torsion_loop import Loop
 
 T = TypeVar("T")
 

@@ -19,8 +19,8 @@ from ..model.torsion import Rigid
 from ..simulation.runs.results import RunArrays
 from ..simulation.runs.run import run
 from ..simulation.scenario.scenario import Scenario
-from .loop import Loop, break_away, gap, segment
-from .rig import LOST_MOTION_LOAD, RAMP, RigError
+from .torsion_loop import Loop, break_away, gap, segment
+from .virtual_rig import LOST_MOTION_LOAD, RAMP, RigError
 
 LOCKED = 1e12  # [N m] of friction on the input while it is locked
 FLYWHEEL = 1e9  # [kg m2] on the input: keeps its speed whatever the screw does

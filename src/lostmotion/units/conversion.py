@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from .grammar import FORCE_OF, Product, UnknownUnitError, angle_of, near, plain, read_unit, written
 from .scalars import is_number, objection, scalar
-from .table import dimension_of, factor_of
+from .unit_table import dimension_of, factor_of
 
 if TYPE_CHECKING:
     from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler

@@ -16,7 +16,7 @@ from ...model.linear_train import LinearElements
 from ...model.torsion import TorsionCurve
 from ...response.closed_loop import slowest
 from ...simulation.scenario.scenario import Scenario
-from ..motion import changed, first_size, pole_named, step_duration, with_controller
+from ..axis_runs import changed, first_size, pole_named, step_duration, with_controller
 from ..regimes import Axis
 from .standstill import Verdict, Watch, decide, moving_input
 

@@ -22,7 +22,7 @@ from ..runs.sensitivities import value_at
 from ..scenario.scenario import Scenario
 from ..stepping.load_answers import LoadAnswer
 from ..stepping.step_inputs import MAX_INTERVAL, MIN_INTERVAL, no_input
-from ..train_variables import only_input
+from ..variables_of_trains import only_input
 from .batch_parameters import BatchParameters, check_range
 from .exact_batches import ExactBatch
 from .walked_batches import WalkedBatch

@@ -20,7 +20,7 @@ from ...model.load import Load
 from ...model.motor import Motor
 from ...model.signals import TorqueSignal
 from ...model.task import Task
-from ...recorded import may_differ
+from ...recorded_numbers import may_differ
 from .common_tables import BASE, RECORD_NAME, ScenarioTables, SimulationTable, with_accessories
 from .key_aliases import GEARBOX, LOAD, MOTOR
 from .train_tables import ShaftTable, TrainInitial, TrainTables

@@ -11,8 +11,8 @@ from ...inputs.validation import did_you_mean
 from ...model.signals import Signal
 from ...model.torsion import Rigid
 from ...model.train import DriveTrain
-from ...recorded import may_be_left_out, real, value_of
-from ..train_variables import angle_through
+from ...recorded_numbers import may_be_left_out, real, value_of
+from ..variables_of_trains import angle_through
 
 if TYPE_CHECKING:
     from .train_tables import TrainInitial

@@ -27,7 +27,7 @@ from ...model.signals import ForceSignal, Signal, SlideSpeedSignal, SpeedSignal,
 from ...model.slide import Slide
 from ...model.task import Task
 from ...model.train import DriveTrain
-from ..train_variables import only_input
+from ..variables_of_trains import only_input
 from .common_tables import BASE, RECORD_NAME, ScenarioTables, SimulationTable, with_accessories
 from .given_motion import MotionDerivative
 from .slide_units import in_si

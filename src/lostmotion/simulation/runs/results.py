@@ -17,8 +17,8 @@ from ...inputs.kept import kept
 from ...version import __version__
 from ..scenario.field_oriented_motors import set_torques
 from ..scenario.scenario import Scenario
-from ..train_variables import axis_variables, named_signals
 from ..variables import VARIABLES, Variable
+from ..variables_of_trains import axis_variables, named_signals
 from .energy_ledger import largest_stored, ledger_of, with_energy
 from .switchings import ATTRIBUTE as SWITCHINGS
 from .switchings import COLUMNS, columns_of, packed

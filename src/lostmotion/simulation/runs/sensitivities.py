@@ -22,7 +22,7 @@ from ..forms.dotted_keys import list_index
 from ..scenario.key_suggestions import near_key
 from ..scenario.requirements import need_free_motion
 from ..scenario.scenario import Scenario
-from ..train_variables import named_signals
+from ..variables_of_trains import named_signals
 from .core_runs import core_case
 
 if TYPE_CHECKING:

@@ -30,7 +30,7 @@ from ...model.linear_train import LinearElements
 from ...model.motor import Motor
 from ...model.signals import Signal
 from ...model.train import DriveTrain
-from ...recorded import may_differ
+from ...recorded_numbers import may_differ
 from ..forms import axis_form, drive_form, stepper_fields
 from ..forms.common_tables import SimulationTable
 from ..forms.dotted_keys import set_values

@@ -27,8 +27,8 @@ from ..forms.given_motion import SLIDE_UNITS, UNITS, motion_given
 from ..forms.train_tables import TrainInitial
 from ..scenario.field_oriented_motors import bounded, coarser
 from ..scenario.scenario import Scenario
-from ..train_variables import only_input
 from ..variables import Variable, variables_of_core
+from ..variables_of_trains import only_input
 from .load_answers import SimulationAnswers
 from .simulation_state import SimulationState
 from .step_inputs import (

@@ -13,7 +13,7 @@ from ...model.drive import Drive
 from ...model.mass_matrix import MassMatrix
 from ...model.train import DriveTrain
 from ..scenario.scenario import Scenario
-from ..train_variables import check_names
+from ..variables_of_trains import check_names
 
 GIVE: Any = object()  # in place of what has no default
 

@@ -16,8 +16,8 @@ from ...model.synchronous_motor import PhaseValues
 from ...model.train import DriveTrain
 from ..scenario.field_oriented_motors import oriented
 from ..scenario.scenario import Scenario
-from ..train_variables import ALL_SIGNALS, WINDING_SIGNALS, axis_variables, signals_of
 from ..variables import Variable
+from ..variables_of_trains import ALL_SIGNALS, WINDING_SIGNALS, axis_variables, signals_of
 
 Derived = Callable[[list[float]], float]
 

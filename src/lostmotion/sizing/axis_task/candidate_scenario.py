@@ -17,7 +17,7 @@ from ...model.duty import Duty
 from ...model.gearbox import Gearbox
 from ...model.motor import Motor
 from ...model.signals import Samples, TimeFunction, TorqueSignal
-from ...servo.data import lag_sum, secant
+from ...servo.tuning_data import lag_sum, secant
 from ...simulation.forms.common_tables import SimulationTable
 from ...simulation.forms.drive_tables import Initial, LoadTable
 from ...simulation.scenario.scenario import Scenario

@@ -6,7 +6,7 @@ import re
 from typing import NamedTuple
 
 from ...units.grammar import PREFIXED
-from ...units.table import dimension_of
+from ...units.unit_table import dimension_of
 
 Powers = dict[str, float]  # unit of the table: its power
 NAMES = {symbol: name for symbol, (name, _) in PREFIXED.items()} | {"J": "joule"}

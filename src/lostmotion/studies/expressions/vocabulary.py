@@ -10,8 +10,8 @@ from ...simulation.runs.pointing_error import pointing_names
 from ...simulation.runs.results import ENERGY
 from ...simulation.scenario.field_oriented_motors import bound_names
 from ...simulation.scenario.scenario import Scenario
-from ...simulation.train_variables import axis_variables
 from ...simulation.variables import CHANNEL_NAMES, VARIABLES
+from ...simulation.variables_of_trains import axis_variables
 
 OF_TRAINS = ("energy", "time")
 OF_THE_RUN = (*OF_TRAINS, "ideal_speed", "bandwidth")

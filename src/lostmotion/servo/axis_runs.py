@@ -16,9 +16,9 @@ from ..control.turning import turns
 from ..simulation.runs.run import run
 from ..simulation.runs.sample_means import weights
 from ..simulation.scenario.scenario import Scenario
-from .data import inertias
 from .margins import unstable_pole
 from .regimes import Axis, speed_of
+from .tuning_data import inertias
 
 if TYPE_CHECKING:
     from ..simulation.runs.results import RunArrays

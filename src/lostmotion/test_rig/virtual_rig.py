@@ -29,7 +29,7 @@ from ..simulation.forms.drive_tables import Initial
 from ..simulation.runs.results import RunArrays
 from ..simulation.runs.run import run
 from ..simulation.scenario.scenario import Scenario
-from .loop import Loop, break_away, gap, segment
+from .torsion_loop import Loop, break_away, gap, segment
 
 PAIR = 100.0  # bytes for a point of a map
 
