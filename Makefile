@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 CORE_SOURCES := $(wildcard core/lostmotion/*/*.[ch]pp core/kernels/*.[ch]pp)
-FORMATTED := $(CORE_SOURCES) $(wildcard core/tests/*.[ch]pp bindings/*.[ch]pp bindings/c/*.[ch] bindings/c/*.[ch]pp bindings/fmu/*.[ch]pp bindings/mujoco/*.cpp examples/*.c benchmarks/*.[ch]pp)
+FORMATTED := src/lostmotion/warp/joint_step.hpp $(CORE_SOURCES) $(wildcard core/tests/*.[ch]pp bindings/*.[ch]pp bindings/c/*.[ch] bindings/c/*.[ch]pp bindings/fmu/*.[ch]pp bindings/mujoco/*.cpp examples/*.c benchmarks/*.[ch]pp)
 SOURCES := $(CORE_SOURCES) $(wildcard bindings/*.[ch]pp) CMakeLists.txt
 # One build tree for the extension, the C library, the library of FMUs and the tests of the core.
 TREE := build/native

@@ -3,6 +3,9 @@
 `Axes` is a vectorised environment of gymnasium where gymnasium is installed (`pip install gymnasium`), and has the same methods
 without it. Two policies are learned: one with drives that have nearly no gap, one with gaps, friction and efficiency drawn
 at random. Both are then tried on drives with gaps that neither has met.
+
+python examples/batch_axis.py GENERATIONS [DEVICE]: with a device of Warp, such as cuda:0 or cpu, policies learn with the drives of
+`lm.warp`. They are always tried with those of `lm.SimulationBatch`.
 """
 
 import sys
@@ -30,7 +33,9 @@ NEARLY_NO_GAP, GAPS, FRICTION, EFFICIENCY = (1e-6, 2e-6), (1e-3, 6e-3), (0.01, 0
 class Axes(VectorEnv):
     """Observations: error, speed of the motor, speed of the load, twist, in `SCALES`. Actions: torque / `TORQUE`."""
 
-    def __init__(self, num_envs: int, gaps: tuple[float, float], seed: int = 0, threads: int | None = None) -> None:
+    def __init__(
+        self, num_envs: int, gaps: tuple[float, float], seed: int = 0, threads: int | None = None, device: str = ""
+    ) -> None:
         drive = lm.Drive(
             motor=lm.Motor(kind="torque_source", rotor_inertia=1e-4, friction_torque=0.02),
             gearbox=lm.Gearbox(
@@ -48,7 +53,12 @@ class Axes(VectorEnv):
             "gearbox.losses.efficiency": EFFICIENCY,
         }
         vary = {key: (lambda generator, n, of=of: generator.uniform(*of, n)) for key, of in ranges.items()}
-        self.batch = lm.SimulationBatch(drive, STEP, count=num_envs, vary=vary, seed=seed, threads=threads)
+        self.on_device = bool(device)
+        self.batch: Any = (
+            lm.warp.Drives(drive, num_envs, vary=vary, seed=seed, device=device)
+            if device
+            else lm.SimulationBatch(drive, STEP, count=num_envs, vary=vary, seed=seed, threads=threads)
+        )
         self.num_envs, self.steps = num_envs, 0
         self.random = np.random.default_rng(seed)
         self.target = np.zeros(num_envs)
@@ -73,7 +83,7 @@ class Axes(VectorEnv):
         """`HELD` steps under constant torques. The reward is what is lost by error and torque; all episodes end together."""
         torque = TORQUE * np.clip(np.asarray(actions, dtype=float).reshape(self.num_envs), -1.0, 1.0)
         for _ in range(HELD):
-            self.batch.step(torque)
+            self.batch.step(torque, 0.0, **({"step": STEP} if self.on_device else {}))
         self.steps += 1
         seen = self.observe()
         reward = -np.abs(seen[:, 0]) - 0.02 * np.abs(torque / TORQUE) - 0.02 * np.abs(seen[:, 1])
@@ -81,9 +91,9 @@ class Axes(VectorEnv):
         return seen, reward, np.zeros(self.num_envs, dtype=bool), ended, {}
 
     def observe(self) -> np.ndarray:
-        names = ("motor_speed", "load_speed", "twist")
-        motor, load, twist = (self.batch[name] for name in names)
-        return np.stack([self.target - self.batch["load_angle"], motor / RATIO, load, twist], axis=1) / SCALES
+        names = ("load_angle", "motor_speed", "load_speed", "twist")
+        angle, motor, load, twist = (self.batch[name].numpy() if self.on_device else self.batch[name] for name in names)
+        return np.stack([self.target - angle, motor / RATIO, load, twist], axis=1) / SCALES
 
 
 HIDDEN = 8
@@ -113,10 +123,10 @@ def returns(axes: Axes, weights: np.ndarray, targets: np.ndarray) -> tuple[np.nd
 
 
 def learn(
-    gaps: tuple[float, float], generations: int, policies: int = 32, drives: int = 32, seed: int = 0
+    gaps: tuple[float, float], generations: int, policies: int = 32, drives: int = 32, seed: int = 0, device: str = ""
 ) -> np.ndarray:
     """Weights by evolution strategies: mirrored samples, ranks in place of returns, Adam."""
-    axes = Axes(policies * drives, gaps, seed)
+    axes = Axes(policies * drives, gaps, seed, device=device)
     random = np.random.default_rng(seed)
     weights = 0.1 * random.normal(size=WEIGHTS)
     weights[[0, HIDDEN, 2 * HIDDEN]] = 1.0, -0.5, -0.5  # about a proportional law with damping
@@ -143,6 +153,7 @@ def trial(weights: np.ndarray, gaps: tuple[float, float], drives: int = 512) -> 
 
 if __name__ == "__main__":
     generations = int(sys.argv[1]) if len(sys.argv) > 1 else 2
+    device = sys.argv[2] if len(sys.argv) > 2 else ""
     for name, gaps in (("nearly no gap", NEARLY_NO_GAP), ("gaps at random", GAPS)):
-        total, late = trial(learn(gaps, generations), GAPS)
+        total, late = trial(learn(gaps, generations, device=device), GAPS)
         print(f"learned with {name:>14}: return {total:7.4f}, late error {1e3 * late:.3f} mrad")

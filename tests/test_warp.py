@@ -71,6 +71,22 @@ def test_a_loss_map_and_hysteresis_move_as_in_the_core(name: str) -> None:
     assert error[certain].max() < 1e-10
 
 
+@pytest.mark.parametrize(("dtype", "error"), [("float64", 1e-9), ("float32", 1e-3)])
+def test_an_answer_is_that_of_the_core(dtype: str, error: float) -> None:
+    given = commands(60, COUNT, 1e-3, 0.05)
+    drives, batch = (
+        lm.warp.Drives(geared(2e-3), count=COUNT, dtype=dtype, device="cpu"),
+        lm.SimulationBatch(geared(2e-3), 1e-3, count=COUNT),
+    )
+    for row in given:
+        torque, derivative = (array.numpy() for array in drives.answer(row, 0.5))
+        want = batch.answer(row, 0.5)
+        # By how much a torque accelerates the load of 1 kg m2; rounding may put a switching into another step.
+        alike = np.abs(1.0 / (1.0 - derivative) - 1.0 / (1.0 - want.derivative)) < error
+        assert alike.mean() > (0.999 if dtype == "float64" else 0.95)
+        assert np.median(np.abs(torque - want.torque)) < 0.1 * error
+
+
 def test_written_parameters_act_in_the_next_step_and_a_reset_takes_back_those_that_are_meant() -> None:
     drives = lm.warp.Drives(geared(2e-3), count=4, dtype="float64", device="cpu")
     changed = drives.parameters["load.inertia"].numpy()

@@ -107,7 +107,7 @@ class Drives:
             column = value(generator, count) if callable(value) else value
             sheets[self._place(key)] = np.broadcast_to(np.asarray(column, dtype=float), (count,))
         self._arrays.sheets = self._on_device(sheets.reshape(-1).astype(dtype))
-        for name, rows in (("states", len(kernel.STATES)), ("shown", 4)):
+        for name, rows in (("states", len(kernel.STATES)), ("shown", 6)):
             setattr(self._arrays, name, self._new(rows))
         self._arrays.angles = wp.zeros(count, dtype=wp.float64, device=self._device)
         self._arrays.modes = wp.zeros(len(kernel.MODES) * count, dtype=wp.int32, device=self._device)
@@ -159,8 +159,32 @@ class Drives:
         step
             [s]
         """
+        self._advance(command, load_torque, step, answers=False)
+
+    @checked
+    def answer(self, command: Any, load_torque: Any = 0.0, step: Time = 1e-3) -> tuple[Any, Any]:
+        """Advance as `step` does, and return how the drives answer their load torques.
+
+        Parameters
+        ----------
+        command, load_torque, step
+            As of `step`.
+
+        Returns
+        -------
+        tuple
+            Mean torque of each drive on its load [N·m], and its derivative by the mean acceleration [kg·m²], -1e30
+            where dry friction holds the load. Arrays of Warp, which the next answer writes anew.
+        """
+        self._advance(command, load_torque, step, answers=True)
+        first, second = (self._arrays.shown[k * self._count : (k + 1) * self._count] for k in (4, 5))
+        return first, second
+
+    def _advance(self, command: Any, load_torque: Any, step: float, *, answers: bool) -> None:
         given = [self._input(*pair) for pair in ((command, self._commands), (load_torque, self._loads))]
-        self._wp.launch(self._kernel, dim=self._count, inputs=[self._arrays, *given, step], device=self._device)
+        self._wp.launch(
+            self._kernel, dim=self._count, inputs=[self._arrays, *given, step, int(answers)], device=self._device
+        )
         self._steps += self._count
 
     @checked

@@ -68,8 +68,15 @@ ADVANCE = """
     const DriveNumbers numbers = sheet.numbers(laws);
     DriveWalk walk(laws, numbers, x, commands.data[i], loads.data[i]);
     walk.bold = true;
+    if (answers) walk.differ(0, 1);
+    const real before = x.a - x.v;
     if (!walk.advance(step)) walk.doubts |= DriveWalk::no_regime;
     x = walk.x;
+    if (answers) {{
+        const real per_torque = walk.tangent[1] - walk.tangent[2];
+        drives.shown.data[4 * n + i] = sheet.load_inertia * ((x.a - x.v) - before) / step + loads.data[i];
+        drives.shown.data[5 * n + i] = per_torque < 0 ? sheet.load_inertia + step / per_torque : -real({most});
+    }}
     {out}
     drives.angles.data[i] += x.angle;
     drives.doubts.data[i] = walk.doubts;
@@ -172,6 +179,7 @@ def _body(dtype: str, last: str, *headers: str) -> str:
         state="\n    ".join([*read, f"x.known = drives.modes.data[{len(MODES) - 1} * n + i] != 0;"]),
         out="\n    ".join(write),
         most_armature=MOST_ARMATURE,
+        most=LIMIT,
     )
 
 
@@ -233,12 +241,19 @@ def advance_kernel(dtype: str) -> Any:
 
     @wp.func_native(_body(dtype, ADVANCE))
     def walk(
-        i: wp.int32, drives: arrays, commands: wp.array(dtype=number), loads: wp.array(dtype=number), step: number
+        i: wp.int32,
+        drives: arrays,
+        commands: wp.array(dtype=number),
+        loads: wp.array(dtype=number),
+        step: number,
+        answers: wp.int32,
     ): ...
 
     @wp.kernel(enable_backward=False, module="unique")
-    def advance(drives: arrays, commands: wp.array(dtype=number), loads: wp.array(dtype=number), step: number):
-        walk(wp.tid(), drives, commands, loads, step)
+    def advance(
+        drives: arrays, commands: wp.array(dtype=number), loads: wp.array(dtype=number), step: number, answers: wp.int32
+    ):
+        walk(wp.tid(), drives, commands, loads, step, answers)
 
     return advance
 
