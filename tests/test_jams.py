@@ -127,6 +127,67 @@ def test_a_given_motion_that_drives_a_self_locking_gear_by_its_output_is_refused
     assert "\n" not in str(error.value)
 
 
+def at_rest_beside(**held: Any) -> lm.Scenario:
+    """A rigid lossy gear `wedge` that rests between friction and a spring whose mass reverses, among others at rest; `held` keeps s7 still."""
+    curve = {"kind": "curve"}
+    return lm.Scenario(
+        shafts={
+            "s0": {"inertia": 5e-3},
+            "s3": {"inertia": 0.033},
+            "s5": {"inertia": 0.032, "friction_torque": 0.124},
+            "s6": {"inertia": 0.095, "torque": {"mean": -0.895, "amplitude": 1.6, "frequency": 48.4, "phase": -1.56}},
+            "s7": {"inertia": 1.76e-3, **held},
+            "s10": {"inertia": 0.231, "friction_torque": 1.8e-3},
+            "s13": {
+                "inertia": 2.33e-3,
+                "friction_torque": 1.84e-3,
+                "viscous_friction": 0.63,
+                "torque": {"mean": -0.396, "amplitude": 0.158, "frequency": 2.08, "phase": 2.07},
+            },
+            "s14": {"inertia": 0.075, "friction_torque": 6e-3, "torque": {"amplitude": 0.31, "frequency": 32.3, "phase": -1.3}},
+            "s19": {"inertia": 0.012, "friction_torque": 0.095},
+            "s20": {"inertia": 2.3e-3, "friction_torque": 0.4},
+            "s24": {"inertia": 0.032, "friction_torque": 0.068},
+        },
+        command={"clutch": 1.0},
+        gears={
+            "x5": {"input": "s3", "output": "s5", "ratio": 1.767, "stiffness": curve | {"backlash": 9.6e-3, "slopes": [3910.0]}},
+            "x7": {
+                "input": "s5",
+                "output": "s7",
+                "ratio": 5.19,
+                "stiffness": curve | {"backlash": 4.65e-4, "slopes": [13567.0]},
+                "hysteresis": {"efficiency": 0.913},
+            },
+            "x13": {"input": "s3", "output": "s13", "ratio": 6.3, "stiffness": curve | {"backlash": 1.68e-3, "slopes": [26859.0]}},
+            "wedge": {
+                "input": "s3",
+                "output": "s20",
+                "ratio": 0.588,
+                "losses": {"kind": "mesh_efficiency", "drive_efficiency": 0.536, "backdrive_efficiency": 0.536},
+            },
+        },
+        dampers={
+            "x3": {"input": "s0", "output": "s3", "viscous_friction": 10.0},
+            "x10": {"input": "s6", "output": "s10", "viscous_friction": 1.05},
+        },
+        freewheels={
+            "x6": {"input": "s0", "output": "s6"},
+            "x14": {"input": "s7", "output": "s14"},
+            "x19": {"input": "s10", "output": "s19"},
+        },
+        clutches={"clutch": {"input": "s5", "output": "s24", "torque": 0.104, "kind": "friction"}},
+        simulation={"duration": 0.02, "sample_interval": 1e-3},
+    )
+
+
+def test_a_given_motion_elsewhere_leaves_the_torque_of_a_wedged_gear_as_it_is() -> None:
+    """A shaft whose given speed is 0 is one that friction holds: the gear, which has to keep its torque as the spring reverses, is not near it."""
+    given, held = (lm.simulate(at_rest_beside(**own)) for own in ({"speed": {"mean": 0.0}}, {"friction_torque": 1e3}))
+    for name in ("s13_speed", "s6_speed", "s10_speed", "s14_speed", "x13_output_torque", "wedge_output_torque"):
+        np.testing.assert_allclose(given[name].values, held[name].values, rtol=1e-9, atol=1e-12)
+
+
 def test_with_a_stiffness_that_motion_winds_the_gear_up() -> None:
     """The worm holds, so that the torque is the stiffness times the given angle."""
     result = lm.simulate(against(1e4))

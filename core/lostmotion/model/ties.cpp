@@ -77,9 +77,19 @@ Ties tie(const std::vector<ContactPlace>& contacts, int shafts, std::span<const 
     Ties t;
     t.of.resize(static_cast<std::size_t>(shafts));
     for (int s = 0; s < shafts; ++s) t.of[static_cast<std::size_t>(s)].set(s, 1.0);
+    Flags led;  // shafts that rigid gears tie to a given motion
+    for (const int s : given.shafts) led[s] = true;
+    for (bool more = !given.shafts.empty(); std::exchange(more, false);)
+        for (const ContactPlace& c : contacts) {
+            bool some = false, all = true;
+            c.each_shaft([&](int s, double) { some = some || led[s], all = all && led[s]; });
+            if (!c.bilateral || some == all) continue;
+            c.each_shaft([&](int s, double) { led[s] = true; });
+            more = true;
+        }
     enum { rigid, frame, other };
     const auto turn = [&](const ContactPlace& c) {
-        return c.bilateral && !given.shafts.empty() ? rigid : c.b == nowhere ? frame : other;
+        return c.bilateral && led[c.a] ? rigid : c.b == nowhere ? frame : other;
     };
     for (const auto now : {rigid, frame, other})
         for (std::size_t k = 0; k < contacts.size(); ++k)

@@ -34,7 +34,8 @@ Shares tied_speed(const ContactPlace& c, const Ties& t);
 bool stop_contact(const ContactPlace& c, Ties& t, const double* inertia = nullptr, const GivenShafts& given = {});
 
 // A contact is at rest where its mode is 0 or there is none. Frame contacts come first, so that it is a gear or
-// coupling whose torque is redundant where a shaft is held twice. With given motions, rigid gears come before them.
+// coupling whose torque is redundant where a shaft is held twice. Before them come rigid gears that lead to a given
+// motion.
 Ties tie(const std::vector<ContactPlace>& contacts, int shafts, std::span<const std::int8_t> modes,
          const double* inertia = nullptr, GivenShafts given = {});
 

@@ -197,11 +197,12 @@ inline auto ExactSolver<System>::judge(Entry& e, const Memory& memory, const Cur
         if (rises && c.c0 >= -tolerance && !(grazes && c.c0 <= near)) return true;
         if (falls && c.c3 >= -tolerance) return true;
         const bool starts_on_zero = c.c0 <= rounding * magnitude;
+        // First of all: all through a short event check a slope may fall that is zero to rounding.
+        if (c.c0 <= tolerance && !grazes && departs(e, memory, cursor, g, h)) return true;
         if (falls) {
             crossing_[n_crossing_++] = {g, false, starts_on_zero};
             return true;
         }
-        if (c.c0 <= tolerance && !grazes && departs(e, memory, cursor, g, h)) return true;
         const double resolved = grazes ? near : tolerance;
         if (error > resolved && !shortest) {
             // Half the length has a sixteenth of the error, which ought to be small beside what the guard does.
