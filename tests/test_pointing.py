@@ -231,6 +231,14 @@ def test_the_command_writes_its_sheet(tmp_path: Path) -> None:
     assert "http" not in (tmp_path / "sheet" / "track.html").read_text().replace("http://www.w3.org", "")
 
 
+def test_a_bare_angle_of_view_is_printed_back_with_its_unit() -> None:
+    """0.02 rad are 1.146 degrees, wider than the errors of the axis."""
+    changes = ["--set", "simulation.duration=3", "--view", "motor=0.02"]
+    done = CliRunner().invoke(app, ["track", "tracking-loss-map", *changes])
+    assert done.exit_code == 0, done.output
+    assert "--view motor: 0.02 rad (1.15 deg)" in done.output
+
+
 @pytest.mark.parametrize(
     ("scenario", "options", "said"),
     [

@@ -29,15 +29,20 @@ def number(unit: str = "", option: str = "") -> Callable[[str], float]:
     return read
 
 
+def as_number(text: str) -> float | None:
+    """The value of a bare number; None of any other text."""
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
 def print_bare(what: str, text: str, unit: str | None) -> None:
     """Print a bare number of an option with the unit in which it is read; nothing of text with a unit, or of a plain number."""
     from ..inputs.doubts import read_as
 
-    try:
-        value = float(text)
-    except ValueError:
-        return
-    if unit:
+    value = as_number(text)
+    if unit and value is not None:
         print(f"{what}: {read_as(value, unit)}; a bare number is read in SI units")
 
 

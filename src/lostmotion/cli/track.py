@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .arguments import FiguresOption, Overrides, ReportOption, SourceArgument, again, load_scenario, number
+from .arguments import (
+    FiguresOption,
+    Overrides,
+    ReportOption,
+    SourceArgument,
+    again,
+    as_number,
+    load_scenario,
+    number,
+    print_bare,
+)
 from .targets import pictures_of, writing
 from .terminal import about, busy, conclude, console, progress
 
@@ -53,14 +63,17 @@ def track(
 
     pictures = pictures_of(figures, output)
     loaded = load_scenario(scenario, overrides)
-    from ..pointing.budget import pointing_budget, runs_of
+    from ..pointing.budget import pointing_budget, runs_of, units_of_axes
 
-    angles = {}
+    angles: dict[str, float | str] = {}
+    units = units_of_axes(loaded)
     for text in view or ():
         motor, equals, angle = text.partition("=")
         if not equals:
             raise InputError(f'--view: "{text}" must be MOTOR=ANGLE, such as "motor=6.65 deg"')
-        angles[motor.strip()] = angle.strip()
+        name, angle = motor.strip(), angle.strip()
+        angles[name] = angle if (bare := as_number(angle)) is None else bare
+        print_bare(f"--view {name}", angle, units.get(name))
     with about(scenario), progress(runs_of(loaded), "Runs") as step:
         budget = pointing_budget(loaded, after=after, view=angles, progress=step)
     _print_summary(loaded.title or Path(scenario).stem, budget)

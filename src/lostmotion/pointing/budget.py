@@ -200,7 +200,7 @@ def pointing_budget(
         group("robustness"),
         dict(sorted((speeds | {1.0: whole}).items())) if speeds else {},
         {m: c.camera.pixel for m, c in loaded.axes().items() if c.camera is not None and c.camera.pixel is not None},
-        _units(loaded),
+        units_of_axes(loaded),
         _in_view(time >= start, errors, angles) if angles else None,
     )
 
@@ -295,7 +295,7 @@ def _view(scenario: Scenario, view: Mapping[str, float | str]) -> dict[str, floa
             raise InputError(f"view: {shown(motor)} is the motor of no axis; {meant}")
     cameras = {motor: c.camera.field for motor, c in scenario.axes().items() if c.camera is not None}
     view = view or {motor: angle for motor, angle in cameras.items() if angle is not None}
-    units = _units(scenario)
+    units = units_of_axes(scenario)
     angles = {motor: argument(f"view[{motor}]", angle, units[motor]) for motor, angle in view.items()}
     for motor, angle in angles.items():
         if not angle > 0.0:
@@ -303,7 +303,7 @@ def _view(scenario: Scenario, view: Mapping[str, float | str]) -> dict[str, floa
     return angles
 
 
-def _units(scenario: Scenario) -> dict[str, str]:
+def units_of_axes(scenario: Scenario) -> dict[str, str]:
     """Unit of the position that each axis controls, by its motor."""
     return {motor: scenario.train().angle_unit(scenario.controlled(motor)) for motor in scenario.axes()}
 
